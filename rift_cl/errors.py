@@ -1,0 +1,79 @@
+"""The errors a person may meet, each with the exit status that the command line gives it.
+
+One sentence says what was wrong, where, and what to do about it. Anything else that escapes from
+the package is a defect of the package.
+"""
+
+from __future__ import annotations
+
+
+class RiftError(Exception):
+    """Every error that RiFT-CL raises on purpose."""
+
+    exit_status = 1
+
+
+class InputError(RiftError, ValueError):
+    """An argument or a file holds something that cannot be used."""
+
+    exit_status = 3
+
+
+class ShapeError(InputError):
+    """An array has the wrong shape."""
+
+
+class DTypeError(InputError, TypeError):
+    """An array has a type that has no meaning here."""
+
+
+class NonFiniteError(InputError):
+    """An array holds NaN or infinity."""
+
+
+class FileFormatError(InputError):
+    """A file is damaged, or is not what it was taken for."""
+
+
+class PathEscapeError(InputError):
+    """A path found inside a file leads outside that file's folder."""
+
+
+class ResourceLimitError(InputError):
+    """A file or request claims more than the budget allows; nothing was allocated."""
+
+
+class CheckpointError(InputError):
+    """A checkpoint is damaged or belongs to another run."""
+
+
+class DeviceError(RiftError, RuntimeError):
+    """Something is wrong with the OpenCL device or its driver."""
+
+    exit_status = 4
+
+
+class NoDeviceError(DeviceError):
+    """No OpenCL device answers the request."""
+
+
+class DeviceLostError(DeviceError):
+    """The device stopped answering."""
+
+
+class DeviceMemoryError(DeviceError, MemoryError):
+    """The device has too little memory, whatever the chunk size."""
+
+
+class KernelBuildError(DeviceError):
+    """A kernel did not compile."""
+
+
+class ForkedContextError(DeviceError):
+    """OpenCL was used in a process that was forked from one that had already used it."""
+
+
+class OutputError(RiftError, OSError):
+    """A result could not be written; nothing half-written was left behind."""
+
+    exit_status = 5

@@ -1,0 +1,84 @@
+"""How a target was looked at: directions and detector of a parallel-beam scan.
+
+A ray of a parallel scan is the line ``x cos(angle) + y sin(angle) = t``. The detector measures t:
+bin k has its centre at ``t = (k - center) * pitch``, so that bins grow with t and the rotation
+axis is seen at the (possibly fractional) bin ``center``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rift_cl.errors import InputError, ShapeError
+
+
+@dataclass(frozen=True, init=False, eq=False)
+class Parallel:
+    """A parallel-beam scan; on a volume every slice is looked at in the same way.
+
+    Args:
+        angles: directions in radians, any order, any range; kept as a read-only float64 array.
+        bins: number of detector bins in a row.
+        pitch: distance between bins, in the grid's unit of length.
+        center: bin at which the rotation axis is seen; ``(bins - 1) / 2`` when not given.
+
+    Raises:
+        ShapeError: ``angles`` is empty or not one-dimensional, or ``bins`` is not positive.
+        InputError: an angle, the pitch or the centre is not a usable number.
+    """
+
+    angles: NDArray[np.float64]
+    bins: int
+    pitch: float
+    center: float
+
+    def __init__(
+        self, angles: ArrayLike, bins: int, pitch: float = 1.0, center: float | None = None
+    ) -> None:
+        """Check the arguments and bring them into their normal form."""
+        object.__setattr__(self, "angles", _angles(angles))
+        if int(bins) != bins or bins < 1:
+            raise ShapeError(f"Parallel: bins is {bins!r}, wanted a positive whole number")
+        object.__setattr__(self, "bins", int(bins))
+        if not (math.isfinite(pitch) and pitch > 0):
+            raise InputError(f"Parallel: pitch is {pitch!r}, wanted a positive length")
+        object.__setattr__(self, "pitch", float(pitch))
+        middle = (self.bins - 1) / 2 if center is None else float(center)
+        if not math.isfinite(middle):
+            raise InputError(f"Parallel: center is {center!r}, wanted a bin number")
+        object.__setattr__(self, "center", middle)
+
+    def __eq__(self, other: object) -> bool:
+        """Scans are equal when every ray is."""
+        return isinstance(other, Parallel) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        """Equal scans hash equally."""
+        return hash(self._key())
+
+    def _key(self) -> tuple[bytes, int, float, float]:
+        return self.angles.tobytes(), self.bins, self.pitch, self.center
+
+    def coordinates(self) -> NDArray[np.float64]:
+        """The coordinate t of every bin's centre, in the unit of ``pitch``."""
+        return (np.arange(self.bins) - self.center) * self.pitch
+
+
+def _angles(angles: ArrayLike) -> NDArray[np.float64]:
+    try:
+        values = np.array(angles, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise InputError("Parallel: angles must be numbers, in radians") from None
+    if values.ndim != 1:
+        raise ShapeError(f"Parallel: angles has shape {values.shape}, wanted one dimension")
+    if values.size == 0:
+        raise ShapeError("Parallel: angles is empty; a scan needs at least one direction")
+    if not np.isfinite(values).all():
+        index = int(np.flatnonzero(~np.isfinite(values))[0])
+        raise InputError(f"Parallel: angles[{index}] is {values[index]}, wanted a finite number")
+    values.flags.writeable = False
+    return values
