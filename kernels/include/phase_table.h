@@ -1,0 +1,49 @@
+/* The phase table: a view of a parallel scan resampled so that backprojection needs no gathers.
+ *
+ * A pixel meets the detector at t = x cos(a) + y sin(a). Walk along an image row (fixed y): t
+ * grows by dx cos(a) from column to column, so a whole row reads the view at equal steps, and
+ * rows differ in where they start. So resample the view once at that step, at PHASES sub-steps,
+ *
+ *     F[r][k] = view((k + r / PHASES) * step),      r = 0 .. PHASES-1,
+ *
+ * and each row becomes two contiguous runs of F, blended with one weight for the whole row:
+ *
+ *     out[j] += (1 - w) F[r][m + j] + w F[r + 1][m + j],      m + (r + w) / PHASES = row's start,
+ *
+ * where F[PHASES][k] = F[0][k + 1]. Views with |dy sin| > |dx cos| do the same on columns. The
+ * projector is the transpose of these steps in reverse order with the same numbers. The blend is
+ * exact where the view's interpolant is straight; at its kinks it errs by O(1 / PHASES^2).
+ *
+ * Positions are 32.32 fixed-point: every kernel sees the same m, r and w, bit for bit, and the
+ * error is 2^-33 of a column per row at any size.
+ *
+ * geometry[view] = (base, slope, origin, step): row i starts at column base + slope * i, and
+ * column k of phase 0 lies on detector bin origin + step * k. */
+
+#ifndef LOG2_PHASES
+#define LOG2_PHASES 3
+#endif
+#define PHASES (1 << LOG2_PHASES)
+
+#ifndef BLOCKS
+#define BLOCKS (LANES == 8 ? 8 : 1)
+#endif
+/* Columns that one work-item handles. */
+#define SEGMENT (LANES * BLOCKS)
+
+#define FIXED_TO_FLOAT(p) ((float)(p) * (1.0f / 4294967296.0f))
+#define WHOLE(p) ((int)((p) >> 32))
+
+static int phase_of(long position) { return (int)((uint)position >> (32 - LOG2_PHASES)); }
+
+/* Weight of the next phase: the fraction below the phase, to the 24 bits that a float holds. */
+static float next_weight(long position) {
+  uint fraction = ((uint)position << LOG2_PHASES) >> 8;
+  return (float)(int)fraction * (1.0f / 16777216.0f);
+}
+
+/* A hat of half-width h bins about a bin's centre: linear interpolation where h is 1. */
+static lanes hat(lanes distance, float inverse_width) {
+  lanes value = 1.0f - absolute(distance) * inverse_width;
+  return value > 0 ? value : 0;
+}

@@ -1,0 +1,63 @@
+/* One source for every device.
+ *
+ * A CPU wants one work-item per run of samples, with explicit vectors of eight; a GPU wants a
+ * work-item per sample, many to a group. A kernel is therefore written in `lanes`, which are
+ * eight floats on a CPU (LANES 8, GROUP 1) and one float on a GPU (LANES 1, GROUP 64): its
+ * arithmetic reads the same for both, since OpenCL's operators and ?: work on either.
+ *
+ * Built-in functions: on PoCL 3.0 vload8, convert_int8, floor, mad, clamp are real calls round
+ * which every live vector register is spilled, 2.5 to 60 times slower in an inner loop. Kernels
+ * use the macros below, which avoid them there and are the built-ins elsewhere. */
+
+#ifndef LANES
+#define LANES 8
+#endif
+#ifndef GROUP
+#define GROUP 1
+#endif
+#ifndef RIFT_POCL
+#define RIFT_POCL 0
+#endif
+
+#define KERNEL __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1)))
+#define UNROLL _Pragma("unroll")
+
+#if LANES == 8
+typedef float8 lanes;
+typedef int8 lanes_int;
+#define LANE_NUMBERS ((float8)(0, 1, 2, 3, 4, 5, 6, 7))
+#define GATHER(p, i) \
+  ((float8)((p)[(i).s0], (p)[(i).s1], (p)[(i).s2], (p)[(i).s3], \
+            (p)[(i).s4], (p)[(i).s5], (p)[(i).s6], (p)[(i).s7]))
+#else
+typedef float lanes;
+typedef int lanes_int;
+#define LANE_NUMBERS 0.0f
+#define GATHER(p, i) ((p)[i])
+#endif
+
+#if LANES == 8 && RIFT_POCL
+typedef float8 lanes_at __attribute__((aligned(4)));
+#define LOAD(p) (*(const __global lanes_at *)(p))
+#define STORE(p, v) (*(__global lanes_at *)(p) = (v))
+#define TO_INT(v) __builtin_convertvector(v, int8)
+#define TO_FLOAT(v) __builtin_convertvector(v, float8)
+#elif LANES == 8
+#define LOAD(p) vload8(0, p)
+#define STORE(p, v) vstore8(v, 0, p)
+#define TO_INT(v) convert_int8(v)
+#define TO_FLOAT(v) convert_float8(v)
+#else
+#define LOAD(p) (*(p))
+#define STORE(p, v) (*(p) = (v))
+#define TO_INT(v) ((int)(v))
+#define TO_FLOAT(v) ((float)(v))
+#endif
+
+/* Largest whole number not above v, for |v| < 2^31. */
+static lanes_int floor_int(lanes v) {
+  lanes_int i = TO_INT(v);
+  return TO_FLOAT(i) > v ? i - 1 : i;
+}
+
+static lanes absolute(lanes v) { return v < 0 ? -v : v; }

@@ -1,0 +1,52 @@
+/* Phase tables to image rows (see include/phase_table.h): the inner loop of backprojection.
+ *
+ *     plane[slice][i][j] += sum over views of (1-w) F[r][m+j] + w F[r+1][m+j].
+ *
+ * Index space: (segments of columns, runs of ROWS rows, slices). Each item owns ROWS x SEGMENT
+ * pixels and keeps a row's SEGMENT sums in registers; views are taken VIEWS at a time, so that
+ * the pieces of their tables that a run of rows touches stay in the first-level cache. Per LANES
+ * pixels and view: two loads, two multiply-adds.
+ *
+ * Columns of the plane are padded to whole segments, rows are not. */
+
+#include "include/portable.h"
+#include "include/phase_table.h"
+
+#ifndef ROWS
+#define ROWS (LANES == 8 ? 16 : 1)
+#endif
+#ifndef VIEWS
+#define VIEWS 16
+#endif
+
+KERNEL void radon_backproject(
+    __global const float *restrict table, __global float *restrict plane,
+    __global const long4 *restrict geometry, int first, int count, int columns, int rows, int width)
+{
+  const int j = (int)get_global_id(0) * SEGMENT;
+  const int row0 = (int)get_global_id(1) * ROWS;
+  const int row1 = row0 + ROWS < rows ? row0 + ROWS : rows;
+  const int slice = (int)get_global_id(2);
+  if (j >= width) return;
+  for (int view0 = 0; view0 < count; view0 += VIEWS) {
+    const int view1 = view0 + VIEWS < count ? view0 + VIEWS : count;
+    for (int i = row0; i < row1; i++) {
+      __global float *pixels = plane + ((long)slice * rows + i) * width + j;
+      lanes sum[BLOCKS];
+      UNROLL for (int n = 0; n < BLOCKS; n++) sum[n] = LOAD(pixels + n * LANES);
+      for (int view = view0; view < view1; view++) {
+        const long position = geometry[first + view].x + i * geometry[first + view].y;
+        const int r = phase_of(position);
+        const float w = next_weight(position), u = 1.0f - w;
+        __global const float *at =
+            table + (((long)slice * count + view) * PHASES + r) * columns + WHOLE(position) + j;
+        __global const float *next = r == PHASES - 1 ? at - (PHASES - 1) * columns + 1 : at + columns;
+        UNROLL for (int n = 0; n < BLOCKS; n++) {
+          sum[n] = sum[n] + u * LOAD(at + n * LANES);
+          sum[n] = sum[n] + w * LOAD(next + n * LANES);
+        }
+      }
+      UNROLL for (int n = 0; n < BLOCKS; n++) STORE(pixels + n * LANES, sum[n]);
+    }
+  }
+}

@@ -1,0 +1,67 @@
+/* Image rows to phase tables: the transpose of radon_backproject.
+ *
+ *     F[r][k] = sum over rows i of phase r of (1-w) plane[i][k-m]
+ *             + sum over rows i of phase r-1 of w plane[i][k-m],
+ *     where the rows of phase PHASES-1 reach F[0] one column further on.
+ *
+ * Index space: (segments of columns, views of this run, slices). Each item owns SEGMENT columns
+ * of one view's table. Rows come sorted by phase (`order`, with `starts` telling where each phase
+ * begins), so that the sums of a phase and of the next stay in registers: one load and two
+ * multiply-adds per LANES pixels, no atomics, one order of summation. The table is written column
+ * by column (phases together), which is how radon_resample_adjoint reads it.
+ *
+ * The plane has SEGMENT zeros before and after every row, so that a segment that overhangs the
+ * row needs no bounds test. */
+
+#include "include/portable.h"
+#include "include/phase_table.h"
+#include "include/transpose.h"
+
+/* Add the rows of one phase; SHIFT is 1 where the next phase is column + 1 of phase 0. */
+#define ADD_ROWS(SHIFT) \
+  for (int n = starts[r]; n < starts[r + 1]; n++) { \
+    const int i = order[n]; \
+    const long position = g.x + i * g.y; \
+    const int j = k0 - WHOLE(position); \
+    if (j <= -SEGMENT || j > width) continue; \
+    const float w = next_weight(position), u = 1.0f - w; \
+    __global const float *pixels = image + (long)i * pitch + SEGMENT + j; \
+    UNROLL for (int b = 0; b < BLOCKS; b++) { \
+      lanes value = LOAD(pixels + b * LANES); \
+      here[b] = here[b] + u * value; \
+      if (SHIFT) value = LOAD(pixels + b * LANES - 1); \
+      next[b] = next[b] + w * value; \
+    } \
+  }
+
+KERNEL void radon_project(
+    __global float *restrict table, __global const float *restrict plane,
+    __global const long4 *restrict geometry, __global const int *restrict orders,
+    __global const int *restrict all_starts, __global const int2 *restrict views, int first, int columns, int rows, int width)
+{
+  const int k0 = (int)get_global_id(0) * SEGMENT;
+  const int number = (int)get_global_id(1), count = (int)get_global_size(1), view = first + number;
+  const int slice = (int)get_global_id(2);
+  if (k0 >= views[view].y) return;
+  const long4 g = geometry[view];
+  const int pitch = width + 2 * SEGMENT;
+  __global const float *image = plane + (long)slice * rows * pitch;
+  __global const int *order = orders + (long)view * rows;
+  __global const int *starts = all_starts + view * (PHASES + 1);
+  lanes sums[PHASES][BLOCKS], next[BLOCKS];
+  UNROLL for (int b = 0; b < BLOCKS; b++) next[b] = 0;
+  for (int r = 0; r < PHASES; r++) {
+    lanes here[BLOCKS];
+    UNROLL for (int b = 0; b < BLOCKS; b++) { here[b] = next[b]; next[b] = 0; }
+    if (r == PHASES - 1) { ADD_ROWS(1) } else { ADD_ROWS(0) }
+    UNROLL for (int b = 0; b < BLOCKS; b++) sums[r][b] = here[b];
+  }
+  __global float *out = table + (((long)slice * count + number) * columns + k0) * PHASES;
+  for (int b = 0; b < BLOCKS; b++) {
+    lanes block[PHASES];
+    UNROLL for (int r = 0; r < PHASES; r++) block[r] = sums[r][b];
+    block[0] = block[0] + next[b];
+    TRANSPOSE(block)
+    UNROLL for (int n = 0; n < PHASES; n++) STORE(out + (b * PHASES + n) * LANES, block[n]);
+  }
+}

@@ -1,0 +1,49 @@
+/* Sinogram to phase tables (see include/phase_table.h).
+ *
+ *     table[slice][view][r][k] = scale * sum over bins b of hat(tau - b) y[view][slice][b],
+ *     tau = origin + step * (k + r / PHASES).
+ *
+ * Index space: (runs of LANES columns, views of this run, slices). The PHASES entries of a column
+ * lie within one step of each other, so they share their bins: a CPU takes phases as lanes, a
+ * column at a time, `taps` broadcast loads each, and transposes at the end; a GPU takes its one
+ * column phase by phase. Bins outside the detector count as zero. `views` holds, for each view of
+ * the table, which view of the scan it is and how many columns it needs; the sinogram has `slices`
+ * slices, of which the table takes those from slice0. */
+
+#include "include/portable.h"
+#include "include/phase_table.h"
+#include "include/transpose.h"
+
+KERNEL void radon_resample(
+    __global const float *restrict sinogram, __global float *restrict table,
+    __global const long4 *restrict geometry, __global const float2 *restrict hats,
+    __global const int2 *restrict views, int first, int slice0, int slices,
+    int bins, int columns, int taps)
+{
+  const int k0 = (int)get_global_id(0) * LANES;
+  const int number = (int)get_global_id(1), count = (int)get_global_size(1), view = first + number;
+  const int slice = (int)get_global_id(2);
+  if (k0 >= views[view].y) return;
+  const long4 g = geometry[view];
+  const float inverse_width = hats[view].x, scale = hats[view].y;
+  const float step = FIXED_TO_FLOAT(g.w) * (1.0f / PHASES);
+  const long width = (long)(4294967296.0f / inverse_width);
+  __global const float *y = sinogram + ((long)views[view].x * slices + slice0 + slice) * bins;
+  lanes entries[PHASES];
+  UNROLL for (int n = 0; n < PHASES; n++) {
+    const long tau = LANES == 1 ? g.z + k0 * g.w + ((n * g.w) >> LOG2_PHASES) : g.z + (k0 + n) * g.w;
+    const long lowest = g.w < 0 ? tau + g.w : tau;
+    const int bin = WHOLE(lowest - width) + 1;
+    const lanes offset = FIXED_TO_FLOAT(tau - ((long)bin << 32)) + LANE_NUMBERS * step;
+    lanes sum = 0;
+    for (int tap = 0; tap < taps; tap++) {
+      const int b = bin + tap;
+      const float value = b >= 0 && b < bins ? y[b] : 0.0f;
+      sum = sum + value * hat(offset - (float)tap, inverse_width);
+    }
+    entries[n] = scale * sum;
+  }
+  TRANSPOSE(entries)
+  __global float *out = table + ((long)slice * count + number) * PHASES * columns + k0;
+  UNROLL for (int r = 0; r < PHASES; r++) STORE(out + (long)r * columns, entries[r]);
+}

@@ -1,0 +1,49 @@
+/* Phase tables to sinogram: the transpose of radon_resample.
+ *
+ *     y[view][slice][b] = scale * sum over k, r of hat(tau - b) table[slice][view][k][r],
+ *     tau = origin + step * (k + r / PHASES).
+ *
+ * Index space: (bins, views of this run, slices). Each item gathers, for its bin, the `reach`
+ * columns whose hats can touch it; the phases of a column lie together in memory and are taken
+ * LANES at a time. No two items write the same bin: no atomics, and one order of summation. */
+
+#include "include/portable.h"
+#include "include/phase_table.h"
+#include "include/transpose.h"
+
+/* Bins that one item takes, one after the other. */
+#ifndef BINS
+#define BINS (LANES == 8 ? 64 : 1)
+#endif
+
+KERNEL void radon_resample_adjoint(
+    __global float *restrict sinogram, __global const float *restrict table,
+    __global const long4 *restrict geometry, __global const float2 *restrict hats,
+    __global const int2 *restrict views, int first, int slice0, int slices,
+    int bins, int columns, int reach)
+{
+  const int b0 = (int)get_global_id(0) * BINS;
+  const int b1 = b0 + BINS < bins ? b0 + BINS : bins;
+  const int number = (int)get_global_id(1), count = (int)get_global_size(1), view = first + number;
+  const int slice = (int)get_global_id(2), used = views[view].y;
+  const long4 g = geometry[view];
+  const float inverse_width = hats[view].x, scale = hats[view].y;
+  const float step = FIXED_TO_FLOAT(g.w), per_bin = 1.0f / step;
+  const float behind = (per_bin < 0 ? -per_bin : per_bin) / inverse_width;
+  __global const float *entries = table + ((long)slice * count + number) * PHASES * columns;
+  __global float *y = sinogram + ((long)views[view].x * slices + slice0 + slice) * bins;
+  for (int b = b0; b < b1; b++) {
+    /* A column whose first phase lies at or before the hat's near side, whatever the rounding. */
+    const float center = ((float)(b - WHOLE(g.z)) - FIXED_TO_FLOAT(g.z & 0xffffffffL)) * per_bin;
+    const int start = (int)(center - behind + (float)columns) - columns - 1;
+    lanes sum = 0;
+    for (int k = start < 0 ? 0 : start; k < start + reach && k < used; k++) {
+      const float offset = FIXED_TO_FLOAT(g.z + k * g.w - ((long)b << 32));
+      UNROLL for (int r = 0; r < PHASES; r += LANES) {
+        const lanes distance = offset + ((float)r + LANE_NUMBERS) * (step * (1.0f / PHASES));
+        sum = sum + hat(distance, inverse_width) * LOAD(entries + k * PHASES + r);
+      }
+    }
+    y[b] = scale * SUM_OF_LANES(sum);
+  }
+}

@@ -1,0 +1,100 @@
+"""How much memory a device may use, and how work is cut to fit it.
+
+PoCL accepts any allocation and dies when memory really ends, so nothing may be allocated that was
+not counted first.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+from rift_cl.cl.traits import Traits
+from rift_cl.errors import InputError, ResourceLimitError
+
+_HOST_SHARE = 0.6
+_UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
+
+
+def parse_bytes(text: str) -> int:
+    """Read an amount of memory such as ``512M``, ``1.5 GB`` or ``1073741824`` (powers of 1024).
+
+    Raises:
+        InputError: the text is no positive amount.
+    """
+    match = re.fullmatch(r"\s*([0-9.]+)\s*([KMGT]?)(?:i?B)?\s*", text, re.IGNORECASE)
+    try:
+        amount = float(match[1]) * _UNITS[match[2].upper()] if match else 0.0
+    except ValueError:
+        amount = 0.0
+    if amount < 1:
+        raise InputError(f"memory is {text!r}, wanted a positive amount such as 512M or 2G")
+    return int(amount)
+
+
+def free_host_memory() -> int | None:
+    """Bytes of host memory that are free to take, or None where the system does not say."""
+    try:
+        text = Path("/proc/meminfo").read_text(encoding="ascii")
+        return int(text.split("MemAvailable:")[1].split()[0]) * 1024
+    except (OSError, IndexError, ValueError):
+        pass
+    try:
+        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return None
+
+
+def memory_budget(traits: Traits, limit: int | None = None) -> int:
+    """Bytes that a device may use.
+
+    The smallest of what the device reports, 60 % of free host memory where the device lives in
+    it, and ``limit`` or else the environment's ``RIFT_MEMORY``.
+    """
+    amounts = [traits.memory]
+    free = free_host_memory() if traits.is_cpu or traits.unified else None
+    if free is not None:
+        amounts.append(int(_HOST_SHARE * free))
+    if limit is None and os.environ.get("RIFT_MEMORY"):
+        limit = parse_bytes(os.environ["RIFT_MEMORY"])
+    if limit is not None:
+        amounts.append(limit)
+    return min(amounts)
+
+
+def plan_chunks(count: int, each: int, fixed: int, budget: int, *, what: str) -> list[slice]:
+    """Cut ``count`` equal pieces of work into runs that fit the budget.
+
+    Args:
+        count: number of pieces.
+        each: bytes that one piece needs.
+        fixed: bytes needed whatever the number of pieces.
+        budget: bytes there are.
+        what: the name of one piece, for the error.
+
+    Returns:
+        Slices over the pieces, as even as can be.
+
+    Raises:
+        ResourceLimitError: not even one piece fits.
+    """
+    most = (budget - fixed) // max(each, 1)
+    if most < 1:
+        raise ResourceLimitError(
+            f"one {what} needs {format_bytes(fixed + each)}, the memory budget is "
+            f"{format_bytes(budget)}: raise the budget (RIFT_MEMORY or --memory), use a device "
+            "with more memory, or make the problem smaller"
+        )
+    runs = -(-count // most)
+    edges = [count * run // runs for run in range(runs + 1)]
+    return [slice(start, stop) for start, stop in zip(edges, edges[1:], strict=False)]
+
+
+def format_bytes(amount: float) -> str:
+    """An amount of memory as a person reads it."""
+    for unit in ("B", "KiB", "MiB", "GiB"):
+        if amount < 1024:
+            return f"{amount:.3g} {unit}"
+        amount /= 1024
+    return f"{amount:.3g} TiB"

@@ -1,0 +1,104 @@
+"""Which OpenCL devices there are, and which one to use.
+
+``RIFT_DEVICE`` or ``--device`` selects one by its number in the list (``1``), by platform and
+device (``0:1``), by kind (``cpu``, ``gpu``) or by a part of its name or its platform's
+(``radeon``, ``pocl``). Without a choice the first GPU is taken, and the first CPU where there is
+no GPU.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+from rift_cl.cl.device import Device
+from rift_cl.cl.kernel_cache import cache_folder
+from rift_cl.cl.process import claim_process
+from rift_cl.errors import NoDeviceError
+
+_INSTALL = (
+    "install a driver: your GPU vendor's OpenCL package, or on Linux x86-64 a CPU driver from "
+    "PyPI with: pip install 'pyopencl[pocl]'"
+)
+# A driver that calls itself by a long name is asked for by the short one.
+_NICKNAMES = {"pocl": "portable computing language"}
+
+
+@cache
+def devices() -> tuple[Device, ...]:
+    """Every device of every OpenCL platform; empty where there is none.
+
+    Raises:
+        ForkedContextError: OpenCL was used before this process was forked.
+    """
+    return tuple(
+        Device(handle, f"{platform}:{index}") for platform, index, handle in _enumerate()
+    )
+
+
+def _enumerate() -> Iterator[tuple[int, int, Any]]:
+    claim_process()
+    cache_folder()
+    import pyopencl as cl
+
+    try:
+        platforms = cl.get_platforms()
+    except cl.Error:
+        return
+    for number, platform in enumerate(platforms):
+        try:
+            handles = platform.get_devices()
+        except cl.Error:
+            continue
+        for index, handle in enumerate(handles):
+            yield number, index, handle
+
+
+def open_device(selector: str | None = None, memory: int | None = None) -> Device:
+    """Choose a device.
+
+    Args:
+        selector: which one (see the head of this file); ``RIFT_DEVICE`` when not given, and a
+            sensible order when that is not set either.
+        memory: most bytes to use on it.
+
+    Raises:
+        NoDeviceError: there is no device, or none that fits the selector.
+    """
+    claim_process()
+    found = devices()
+    if not found:
+        raise NoDeviceError(f"no OpenCL device was found: {_INSTALL}")
+    selector = selector or os.environ.get("RIFT_DEVICE")
+    fitting = [d for d in found if _fits(d, found.index(d), selector)] if selector else by_rank()
+    if not fitting:
+        known = ", ".join(f"{d.selector} {d.name} ({d.platform})" for d in found)
+        raise NoDeviceError(f"no OpenCL device fits {selector!r}; there is: {known}")
+    chosen = fitting[0]
+    if memory is None:
+        return chosen
+    return Device(chosen._handle, chosen.selector, memory=memory)
+
+
+def by_rank() -> list[Device]:
+    """The devices in the order in which they are preferred: GPUs, then CPUs."""
+    return sorted(devices(), key=lambda device: device.traits.is_cpu)
+
+
+def default_device() -> Device:
+    """The device that is used where none is named (``RIFT_DEVICE`` selects another)."""
+    return open_device()
+
+
+def _fits(device: Device, number: int, selector: str) -> bool:
+    wanted = selector.strip().lower()
+    if wanted in (str(number), device.selector):
+        return True
+    if wanted in ("cpu", "gpu"):
+        return device.traits.is_cpu == (wanted == "cpu")
+    if not any(letter.isalpha() for letter in wanted):
+        return False
+    wanted = _NICKNAMES.get(wanted, wanted)
+    return wanted in f"{device.name} {device.platform}".lower()

@@ -1,0 +1,44 @@
+"""What a driver's error codes mean to a person: the one place that names them."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+
+from rift_cl.errors import DeviceError, DeviceLostError, DeviceMemoryError
+
+_MEMORY = ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES", "INVALID_BUFFER_SIZE")
+_MEMORY_TOO = ("OUT_OF_HOST_MEMORY",)
+_LOST = ("DEVICE_NOT_AVAILABLE", "INVALID_COMMAND_QUEUE", "INVALID_CONTEXT")
+
+
+@contextlib.contextmanager
+def named_errors(doing: str, device: str) -> Iterator[None]:
+    """Turn a driver's exception into one of ours.
+
+    Args:
+        doing: what was being done, to stand in the sentence.
+        device: the device's name.
+
+    Raises:
+        DeviceMemoryError: the driver ran out of memory or refused a size.
+        DeviceLostError: the device went away.
+        DeviceError: any other failure of the driver.
+    """
+    import pyopencl as cl
+
+    try:
+        yield
+    except (cl.Error, MemoryError) as error:
+        text = str(error)
+        if isinstance(error, MemoryError) or any(code in text for code in _MEMORY + _MEMORY_TOO):
+            raise DeviceMemoryError(
+                f"{device} ran out of memory while {doing} ({text}): give it less at a time, for "
+                "example a smaller memory budget (RIFT_MEMORY or --memory)"
+            ) from error
+        if any(code in text for code in _LOST):
+            raise DeviceLostError(
+                f"{device} went away while {doing} ({text}): what was on the device is lost, "
+                "what was saved is not; start again from the last saved result"
+            ) from error
+        raise DeviceError(f"{device} failed while {doing}: {text}") from error

@@ -1,0 +1,152 @@
+"""The gate between host arrays and a device.
+
+Drivers copy bytes: a Fortran-ordered array arrives transposed, a big-endian one as noise, a
+shorter one without a word. So every host array passes through ``as_host_array`` first, which
+gives back C-ordered native float32 of the wanted shape, or one clear error.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.failures import named_errors
+from rift_cl.errors import DeviceError, DTypeError, NonFiniteError, ShapeError
+
+if TYPE_CHECKING:
+    from rift_cl.cl.device import Device
+
+_BLOCK = 1 << 20
+
+
+def as_host_array(
+    values: Any, shape: tuple[int, ...], *, name: str, wants: str
+) -> NDArray[np.float32]:
+    """Bring an array into the one form that may cross to a device.
+
+    Args:
+        values: anything NumPy reads as an array of real numbers, of any order and byte order.
+        shape: the shape it must have.
+        name: what the caller calls it, for the error.
+        wants: who wants this shape, for the error.
+
+    Returns:
+        The same values as C-ordered native float32; ``values`` itself where it already is that.
+
+    Raises:
+        ShapeError: the shape differs.
+        DTypeError: the values are not real numbers.
+        NonFiniteError: a value is NaN or infinite, or too large for float32.
+    """
+    if isinstance(values, np.ma.MaskedArray):
+        raise DTypeError(f"{name} is a masked array: fill the masked values first")
+    array = np.asarray(values)
+    if array.dtype.kind not in "fiub":
+        raise DTypeError(f"{name} has type {array.dtype}, wanted real numbers (float32)")
+    if array.shape != shape:
+        raise ShapeError(f"{name} has shape {array.shape}, {wants} wants {shape}")
+    with np.errstate(over="ignore"):
+        array = np.ascontiguousarray(array, dtype=np.float32)
+    check_finite(array, name=name)
+    return array
+
+
+def check_finite(array: NDArray[Any], *, name: str) -> None:
+    """Raise if any value is NaN or infinite: one of them spoils a whole filtered slice.
+
+    Raises:
+        NonFiniteError: with the first such position and the number of them.
+    """
+    flat = array.reshape(-1)
+    for start in range(0, flat.size, _BLOCK):
+        if not np.isfinite(flat[start : start + _BLOCK]).all():
+            bad = np.flatnonzero(~np.isfinite(flat))
+            place = tuple(int(i) for i in np.unravel_index(bad[0], array.shape))
+            raise NonFiniteError(
+                f"{name} holds {bad.size} values that are not finite, the first ({flat[bad[0]]}) "
+                f"at {place}: replace them before, for example with numpy.nan_to_num"
+            )
+
+
+def upload(device: Device, host: NDArray[Any]) -> Any:
+    """Copy a C-ordered host array into a new device array."""
+    import pyopencl as cl
+
+    array = device.empty(host.shape, host.dtype)
+    if host.size:
+        with named_errors(f"copying {host.nbytes} bytes to it", device.name):
+            cl.enqueue_copy(device.queue, array.base_data, host, is_blocking=True)
+    return array
+
+
+def share(device: Device, host: NDArray[Any]) -> Any:
+    """Give a device a C-ordered host array to read: without a copy where memory is shared.
+
+    The host array must outlive every kernel that reads the result.
+    """
+    import pyopencl as cl
+    from pyopencl.array import Array
+
+    if not device.traits.unified or host.size == 0:
+        return upload(device, host)
+    flags = cl.mem_flags.READ_ONLY | cl.mem_flags.USE_HOST_PTR
+    with named_errors(f"sharing {host.nbytes} bytes with it", device.name):
+        buffer = cl.Buffer(device.context, flags, hostbuf=host)
+        return Array(device.queue, host.shape, host.dtype, data=buffer)
+
+
+def download(device: Device, array: Any, out: NDArray[Any] | None = None) -> NDArray[Any]:
+    """Copy a device array to the host, after everything enqueued before.
+
+    Args:
+        device: where the array lives.
+        array: the device array.
+        out: C-ordered host array of the same shape and type to fill; a new one if not given.
+    """
+    import pyopencl as cl
+
+    host = np.empty(array.shape, array.dtype) if out is None else out
+    if host.size:
+        with named_errors(f"copying {host.nbytes} bytes from it", device.name):
+            cl.enqueue_copy(device.queue, host, array.base_data, is_blocking=True)
+    return host
+
+
+def as_device_array(device: Device, array: Any, shape: tuple[int, ...], *, name: str) -> Any:
+    """Check a device array that a caller handed in.
+
+    Raises:
+        ShapeError: the shape or memory order is not the wanted one.
+        DTypeError: the values are not float32.
+        DeviceError: the array belongs to another device.
+    """
+    if array.shape != shape:
+        raise ShapeError(f"{name} has shape {array.shape}, wanted {shape}")
+    if array.dtype != np.float32:
+        raise DTypeError(f"{name} has type {array.dtype} on the device, wanted float32")
+    if not array.flags.c_contiguous or array.offset:
+        raise ShapeError(f"{name} is a strided view on the device: pass {name}.copy()")
+    if array.context != device.context:
+        raise DeviceError(f"{name} lives on another device than {device.name}: copy it over first")
+    return array
+
+
+def is_device_array(value: Any) -> bool:
+    """Whether a value is a ``pyopencl.array.Array`` (asked without importing pyopencl)."""
+    return hasattr(value, "base_data") and hasattr(value, "queue")
+
+
+def check_output(out: Any, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Check a host array that a result is to be written into.
+
+    Raises:
+        ShapeError: its shape or memory order is not the wanted one.
+        DTypeError: it is no writable float32 array.
+    """
+    if not isinstance(out, np.ndarray) or out.dtype != np.dtype("=f4") or not out.flags.writeable:
+        raise DTypeError("out must be a writable NumPy array of native float32")
+    if out.shape != shape or not out.flags.c_contiguous:
+        raise ShapeError(f"out has shape {out.shape}, wanted a C-ordered array of shape {shape}")
+    return out

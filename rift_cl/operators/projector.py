@@ -1,0 +1,203 @@
+"""The X-ray transform of a parallel scan and its exact adjoint, by phase tables.
+
+Forward: image -> padded planes (by rows, by columns) -> phase tables -> bins. Adjoint: the same
+steps transposed, in reverse, with the same numbers. ``kernels/include/phase_table.h`` derives the
+method; ``rift_cl/reference/radon.py`` has the matrix that it approximates.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from rift_cl.cl.budget import plan_chunks
+from rift_cl.cl.device import Device
+from rift_cl.cl.discovery import default_device
+from rift_cl.errors import InputError
+from rift_cl.geometry import Grid, Parallel
+from rift_cl.operators.linear import LinearOperator, Piece
+from rift_cl.operators.phase_table import LOG2_PHASES, PhaseTable, phase_table
+
+# Tables of a run of views together: on a CPU they should stay in its caches.
+_TABLE_BYTES = {"cpu": 4 << 20, "gpu": 64 << 20}
+_FEWEST_VIEWS = 16
+# Slices that are worked on together, which bounds the scratch memory of any volume.
+_SLAB = 16
+
+
+class Projector(LinearOperator):
+    """Line integrals of an image, or of every slice of a volume.
+
+    Args:
+        grid: where the image lives, (ny, nx) or (nz, ny, nx).
+        scan: how it is looked at.
+        footprint: how a pixel is spread over the bins. ``linear``: by linear interpolation
+            between the two bins about the pixel's centre; where bins are finer than the pixel's
+            shadow the hat widens to that shadow, so that no ray falls between pixels.
+        device: where to work; the default device if not given.
+
+    The domain is ``grid.shape``; the range is (angles, bins), or (angles, nz, bins) for a volume.
+    Values of the range are in the image's unit times the grid's unit of length.
+
+    Raises:
+        InputError: the footprint is unknown.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        scan: Parallel,
+        footprint: str = "linear",
+        *,
+        device: Device | None = None,
+    ) -> None:
+        if footprint != "linear":
+            raise InputError(f"footprint is {footprint!r}, wanted 'linear'")
+        rows = grid.shape[:-2]
+        shape = (len(scan.angles), *rows, scan.bins)
+        super().__init__(grid.shape, shape, device or default_device())
+        self.grid, self.scan = grid, scan
+        lanes = self.device.traits.macros["LANES"]
+        blocks = 8 if lanes > 1 else 1
+        self._segment = lanes * blocks
+        self._macros = {"BLOCKS": blocks, "LOG2_PHASES": LOG2_PHASES}
+
+    @cached_property
+    def _walks(self) -> tuple[_Walk, _Walk]:
+        plane = self.grid.slice()
+        return (
+            _Walk(self.device, phase_table(plane, self.scan, along_x=True, segment=self._segment)),
+            _Walk(self.device, phase_table(plane, self.scan, along_x=False, segment=self._segment)),
+        )
+
+    def _apply(self, x: Any, out: Any) -> None:
+        for slab in _slabs(x):
+            for transpose, walk in enumerate(self._walks):
+                if walk.count:
+                    plane = self._split(walk, x, slab, transpose)
+                    for run in self._runs(walk, slab):
+                        self._project(walk, plane, out, slab, run)
+
+    def _split(self, walk: _Walk, image: Any, slab: _Slab, transpose: int) -> Any:
+        table, margin = walk.table, self._segment
+        plane = self.device.zeros((slab.count, table.rows, table.width + 2 * margin))
+        tiles = (*self._tiles(table.width, table.rows), slab.count)
+        shape = (table.rows, table.width, margin)
+        arguments = (image, plane, slab.first, *shape)
+        self.device.launch("plane_split", tiles, *arguments, TRANSPOSE=transpose)
+        return plane
+
+    def _project(self, walk: _Walk, plane: Any, out: Any, slab: _Slab, run: _Run) -> None:
+        table, (first, count) = walk.table, run
+        entries = self.device.empty((slab.count, count, table.entries))
+        self.device.launch(
+            "radon_project",
+            (table.columns // self._segment, count, slab.count),
+            *(entries, plane, walk.geometry, walk.orders, walk.starts, walk.views),
+            *(first, table.columns, table.rows, table.width),
+            **self._macros,
+        )
+        bins = 64 if self.device.traits.is_cpu else 1
+        self.device.launch(
+            "radon_resample_adjoint",
+            (-(-self.scan.bins // bins), count, slab.count),
+            *(out, entries, walk.geometry, walk.hats, walk.views),
+            *(first, slab.first, slab.total, self.scan.bins, table.columns, table.reach),
+            BINS=bins,
+            **self._macros,
+        )
+
+    def _apply_adjoint(self, y: Any, out: Any) -> None:
+        for slab in _slabs(out):
+            planes = [self._backproject(walk, y, slab) for walk in self._walks]
+            ny, nx = self.grid.shape[-2:]
+            tiles = (*self._tiles(nx, ny), slab.count)
+            pitches = [walk.table.padded for walk in self._walks]
+            self.device.launch("plane_merge", tiles, *planes, out, slab.first, ny, nx, *pitches)
+
+    def _backproject(self, walk: _Walk, y: Any, slab: _Slab) -> Any:
+        table = walk.table
+        plane = self.device.zeros((slab.count, table.rows, table.padded))
+        rows = 16 if self.device.traits.is_cpu else 1
+        for first, count in self._runs(walk, slab):
+            entries = self.device.empty((slab.count, count, table.entries))
+            self.device.launch(
+                "radon_resample",
+                (table.columns // self.device.traits.macros["LANES"], count, slab.count),
+                *(y, entries, walk.geometry, walk.hats, walk.views),
+                *(first, slab.first, slab.total, self.scan.bins, table.columns, table.taps),
+                **self._macros,
+            )
+            self.device.launch(
+                "radon_backproject",
+                (table.padded // self._segment, -(-table.rows // rows), slab.count),
+                *(entries, plane, walk.geometry),
+                *(first, count, table.columns, table.rows, table.padded),
+                ROWS=rows,
+                **self._macros,
+            )
+        return plane
+
+    def _tiles(self, width: int, rows: int) -> tuple[int, int]:
+        tile = 16 if self.device.traits.is_cpu else 1
+        return -(-width // tile), -(-rows // tile)
+
+    def _runs(self, walk: _Walk, slab: _Slab) -> Iterator[_Run]:
+        """Runs of views whose tables fit the table memory, but no fewer than a cache's worth."""
+        room = _TABLE_BYTES["cpu" if self.device.traits.is_cpu else "gpu"]
+        most = max(_FEWEST_VIEWS, room // (4 * walk.table.entries * slab.count))
+        for first in range(0, walk.count, most):
+            yield _Run(first, min(most, walk.count - first))
+
+    def _pieces(self, budget: int) -> Iterable[Piece]:
+        each = 4 * (math.prod(self.grid.shape[-2:]) + len(self.scan.angles) * self.scan.bins)
+        runs = plan_chunks(self.grid.slices, each, self._scratch(), budget, what="slice")
+        if len(self.grid.shape) == 2:
+            return [((), ())]
+        return [((run,), (slice(None), run)) for run in runs]
+
+    def _scratch(self) -> int:
+        """Bytes needed besides the arrays that go in and come out."""
+        slices = min(_SLAB, self.grid.slices)
+        planes = [walk.table.rows * (walk.table.width + 2 * self._segment) for walk in self._walks]
+        tables = max(4 * walk.table.entries for walk in self._walks) * _FEWEST_VIEWS
+        records = sum(walk.nbytes for walk in self._walks)
+        return slices * (4 * sum(planes) + tables) + max(_TABLE_BYTES.values()) + records
+
+
+class _Walk:
+    """A phase table and the device's copy of its records."""
+
+    def __init__(self, device: Device, table: PhaseTable) -> None:
+        self.table = table
+        self.count = len(table.views)
+        self.views = device.array(table.views)
+        self.geometry = device.array(table.geometry)
+        self.hats = device.array(table.hats)
+        self.orders = device.array(table.orders)
+        self.starts = device.array(table.starts)
+        arrays = (table.views, table.geometry, table.hats, table.orders, table.starts)
+        self.nbytes = sum(array.nbytes for array in arrays)
+
+
+class _Slab(NamedTuple):
+    """Slices that are worked on together: ``count`` of ``total``, from ``first``."""
+
+    first: int
+    count: int
+    total: int
+
+
+class _Run(NamedTuple):
+    """Views whose tables exist at the same time."""
+
+    first: int
+    count: int
+
+
+def _slabs(image: Any) -> Iterator[_Slab]:
+    total = image.shape[0] if len(image.shape) == 3 else 1
+    for first in range(0, total, _SLAB):
+        yield _Slab(first, min(_SLAB, total - first), total)
