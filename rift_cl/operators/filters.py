@@ -1,0 +1,186 @@
+"""Filters along the detector: the ramp and its windows, a tunable high-pass, any response.
+
+A filter is designed on the host as a convolution kernel in real space and applied on the device
+without wrap-around. The ramp is built from its exact samples in real space (Ramachandran and
+Lakshminarayanan 1971; Kak and Slaney, Principles of Computerized Tomographic Imaging, eq. 3.61),
+so that its value at frequency zero, and with it the level of a reconstruction, is right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rift_cl.cl.budget import plan_chunks
+from rift_cl.cl.device import Device
+from rift_cl.cl.discovery import default_device
+from rift_cl.errors import InputError, ShapeError
+from rift_cl.geometry import Parallel
+from rift_cl.operators.linear import LinearOperator, Piece
+
+Floats = NDArray[np.float64]
+
+# Windows over u = frequency / (cutoff * Nyquist), 0 <= u <= 1.
+WINDOWS: dict[str, Callable[[Floats], Floats]] = {
+    "ram-lak": np.ones_like,
+    "shepp-logan": lambda u: np.sinc(u / 2),
+    "cosine": lambda u: np.cos(np.pi * u / 2),
+    "hamming": lambda u: 0.54 + 0.46 * np.cos(np.pi * u),
+    "hann": lambda u: 0.5 + 0.5 * np.cos(np.pi * u),
+}
+# A response that is no ramp is sampled this many times finer than the detector can tell apart.
+_OVERSAMPLING = 16
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """The ramp |f| under a window: what makes filtered backprojection quantitative.
+
+    Args:
+        window: ``ram-lak`` (none), ``shepp-logan``, ``cosine``, ``hamming`` or ``hann``.
+        cutoff: where the window ends, as a fraction of the detector's Nyquist frequency.
+    """
+
+    window: str = "ram-lak"
+    cutoff: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check the window's name and cutoff."""
+        if self.window not in WINDOWS:
+            raise InputError(f"filter is {self.window!r}, wanted one of {', '.join(WINDOWS)}")
+        if not 0 < self.cutoff <= 1:
+            raise InputError(f"cutoff is {self.cutoff}, wanted a fraction of Nyquist, 0 < c <= 1")
+
+    def taps(self, bins: int, pitch: float) -> Floats:
+        """Convolution kernel h[-(bins-1)] .. h[bins-1], in 1 / length^2."""
+        length = 1 << (2 * bins).bit_length()
+        n = np.abs(np.fft.fftfreq(length, 1 / length))
+        exact = np.where(n % 2 == 1, -1 / (np.pi * np.maximum(n, 1)) ** 2, 0.0)
+        exact[0] = 0.25
+        u = 2 * np.fft.rfftfreq(length) / self.cutoff
+        window = np.where(u <= 1, WINDOWS[self.window](np.minimum(u, 1)), 0.0)
+        kernel = np.fft.irfft(np.fft.rfft(exact) * window, length)[:bins] / pitch**2
+        return np.concatenate([kernel[:0:-1], kernel])
+
+
+@dataclass(frozen=True)
+class HighPass:
+    """The tunable high-pass |f|^exponent: 1 is the ramp, 0 leaves the views as they are.
+
+    Between the two it takes away a part of the low-frequency bias that an orbit's views have.
+    The response is scaled to meet the ramp at the Nyquist frequency, where both pass the most.
+
+    Args:
+        exponent: 0 or more.
+    """
+
+    exponent: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check the exponent."""
+        if not 0 <= self.exponent < np.inf:
+            raise InputError(f"exponent is {self.exponent}, wanted a number >= 0")
+
+    def taps(self, bins: int, pitch: float) -> Floats:
+        """Convolution kernel h[-(bins-1)] .. h[bins-1], in 1 / length^2."""
+        nyquist = 0.5 / pitch
+        return Response(lambda f: nyquist * (f / nyquist) ** self.exponent).taps(bins, pitch)
+
+
+@dataclass(frozen=True)
+class Response:
+    """Any response that depends on the magnitude of frequency alone.
+
+    Args:
+        function: the response (1 / length, as the ramp's is) at frequencies given in cycles per
+            unit of length, an array of them at a time, from 0 to the detector's Nyquist.
+    """
+
+    function: Callable[[Floats], ArrayLike]
+
+    def taps(self, bins: int, pitch: float) -> Floats:
+        """Convolution kernel h[-(bins-1)] .. h[bins-1]: the cosine transform of the response."""
+        from scipy.fft import dct
+
+        count = _OVERSAMPLING * bins
+        width = 0.5 / pitch / count
+        frequencies = (np.arange(count) + 0.5) * width
+        values = np.asarray(self.function(frequencies), dtype=np.float64)
+        if values.shape != frequencies.shape or not np.isfinite(values).all():
+            raise InputError("filter response must give one finite number for each frequency")
+        kernel = width * dct(values, type=2)[:bins]
+        return np.concatenate([kernel[:0:-1], kernel])
+
+
+Filter = Ramp | HighPass | Response
+
+
+def as_filter(filter: str | Filter | Callable[[Floats], ArrayLike]) -> Filter:
+    """A filter from its name, itself, or a response function.
+
+    Raises:
+        InputError: it is none of these, or the name is unknown.
+    """
+    if isinstance(filter, (Ramp, HighPass, Response)):
+        return filter
+    if isinstance(filter, str):
+        return HighPass() if filter == "high-pass" else Ramp(filter)
+    if callable(filter):
+        return Response(filter)
+    raise InputError(f"filter is {filter!r}, wanted a name, a filter or a function of frequency")
+
+
+class ViewFilter(LinearOperator):
+    """A filter along the detector, applied to every row of every view.
+
+    Args:
+        scan: the scan whose views are filtered.
+        filter: the filter.
+        rows: detector rows in a view, None for a sinogram of (angles, bins).
+        gains: a factor for each view, (angles,); 1 if not given.
+        device: where to work; the default device if not given.
+
+    Domain and range are (angles, bins) or (angles, rows, bins). The operator is its own adjoint.
+    """
+
+    def __init__(
+        self,
+        scan: Parallel,
+        filter: Filter,
+        *,
+        rows: int | None = None,
+        gains: ArrayLike | None = None,
+        device: Device | None = None,
+    ) -> None:
+        shape = (len(scan.angles), *(() if rows is None else (rows,)), scan.bins)
+        super().__init__(shape, shape, device or default_device())
+        factors = np.ones(shape[0]) if gains is None else np.asarray(gains, dtype=np.float64)
+        if factors.shape != shape[:1]:
+            raise ShapeError(f"gains has shape {factors.shape}, wanted one for each of {shape[0]}")
+        cpu = self.device.traits.is_cpu
+        self._blocks, self._run = (2, 4) if cpu else (1, 1)
+        self._segment = self.device.traits.macros["LANES"] * self._blocks
+        taps = filter.taps(scan.bins, scan.pitch) * scan.pitch
+        self._taps = self.device.array(np.pad(taps, (0, self._segment)))
+        self._gains = self.device.array(factors)
+
+    def _apply(self, x: Any, out: Any) -> None:
+        views, bins = x.shape[0], x.shape[-1]
+        per_view = x.shape[1] if len(x.shape) == 3 else 1
+        size = (-(-bins // self._segment), -(-views * per_view // self._run))
+        arguments = (x, out, self._taps, self._gains, views * per_view, per_view, bins)
+        macros = {"BLOCKS": self._blocks, "ROWS": self._run}
+        self.device.launch("filter_views", size, *arguments, **macros)
+
+    _apply_adjoint = _apply
+
+    def _pieces(self, budget: int) -> Iterable[Piece]:
+        if len(self.domain) == 2:
+            return [((), ())]
+        each = 8 * self.domain[0] * self.domain[2]
+        runs = plan_chunks(self.domain[1], each, 0, budget, what="row of every view")
+        return [((slice(None), run), (slice(None), run)) for run in runs]
