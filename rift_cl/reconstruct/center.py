@@ -1,0 +1,143 @@
+"""The centre of rotation: first from opposite views, then from the sharpness of the slice.
+
+Two views from opposite sides are mirror images about the axis, so the reflection under which they
+correlate best gives the centre to about a bin; it works for truncated and noisy data too. Near it
+the slice itself decides. A wrong centre smears every point into a small arc with negative values
+beside it, which adds as much negative as positive, so the mean absolute value of the slice is
+least at the right one (Donath, Beckmann and Schreyer, J. Opt. Soc. Am. A 23, 1048, 2006, metric
+Q_IA). Far from the right centre that metric misleads, since then the object leaves the field of
+view; hence the order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.device import Device
+from rift_cl.cl.discovery import default_device
+from rift_cl.cl.memory import as_host_array
+from rift_cl.errors import InputError
+from rift_cl.geometry import Grid, Parallel
+from rift_cl.operators import Projector
+from rift_cl.reconstruct.fbp import fbp
+
+Floats = NDArray[np.float64]
+# Pairs of views that are compared: those nearest to opposite.
+_PAIRS = 8
+# Steps of the two rounds of the sharpness search, and how far each looks, in bins.
+_ROUNDS = ((1.0, 6.0), (0.25, 1.5))
+# Half-width of the parabola in bins: wide enough to average over the ripple that interpolation
+# between bins puts on the scores.
+_PARABOLA = 1.5
+
+
+@dataclass(frozen=True)
+class CenterSearch:
+    """What a search for the centre of rotation found.
+
+    Args:
+        center: the best centre, in bins.
+        mirror: centres (first row) and the correlation of mirrored opposite views (second row),
+            1 at best.
+        sharpness: centres and the mean absolute value of their slices, least at best.
+    """
+
+    center: float
+    mirror: Floats
+    sharpness: Floats
+
+
+def find_center(
+    sinogram: NDArray[np.float32],
+    angles: Floats,
+    *,
+    span: tuple[float, float] | None = None,
+    device: Device | None = None,
+) -> CenterSearch:
+    """Find the detector bin at which the rotation axis is seen.
+
+    Args:
+        sinogram: line integrals of one slice, (angle, bin); angles should cover pi.
+        angles: directions in radians.
+        span: where to search, in bins; the middle half of the detector if not given.
+        device: where to work.
+
+    Raises:
+        InputError: the sinogram is empty of contrast, too narrow, or the span lies outside it.
+    """
+    device = device or default_device()
+    bins = Parallel(angles, np.shape(sinogram)[-1]).bins
+    y = as_host_array(sinogram, (len(angles), bins), name="sinogram", wants="find_center")
+    low, high = span or ((bins - 1) / 4, 3 * (bins - 1) / 4)
+    if not 0 <= low < high <= bins - 1:
+        raise InputError(f"span is {(low, high)}, wanted bins between 0 and {bins - 1}")
+    if bins < 8 or not np.ptp(y) > 0:
+        raise InputError("the sinogram has too few bins or no contrast: give the center yourself")
+    mirror = _mirror_scores(y, angles, low, high)
+    best = float(mirror[0, mirror[1].argmax()])
+    scores = np.empty((2, 0))
+    for step, reach in _ROUNDS:
+        steps = np.arange(-reach, reach + step / 2, step)
+        tried = np.setdiff1d(np.clip(best + steps, 0, bins - 1), scores[0])
+        scores = np.concatenate([scores, _sharpness(y, angles, tried, device)], axis=1)
+        best = float(scores[0, scores[1].argmin()])
+    scores = scores[:, scores[0].argsort()]
+    return CenterSearch(_lowest(scores), mirror, scores)
+
+
+def _mirror_scores(y: NDArray[np.float32], angles: Floats, low: float, high: float) -> Floats:
+    """Correlation of opposite views mirrored about every half bin from ``low`` to ``high``."""
+    first, second = _opposite_views(angles)
+    centers = np.arange(np.ceil(2 * low), 2 * high + 1) / 2
+    last = y.shape[1] - 1
+    scores = []
+    for center in centers:
+        turn = round(2 * center)
+        bins = np.arange(max(0, turn - last), min(last, turn) + 1)
+        views, mirrored = y[first][:, bins], y[second][:, turn - bins]
+        views = views - views.mean(axis=1, keepdims=True)
+        mirrored = mirrored - mirrored.mean(axis=1, keepdims=True)
+        scale = np.linalg.norm(views) * np.linalg.norm(mirrored)
+        scores.append(float((views * mirrored).sum() / scale) if scale > 0 else 0.0)
+    return np.stack([centers, np.array(scores)])
+
+
+def _opposite_views(angles: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The pairs of views whose directions differ by nearest to pi."""
+    order = np.argsort(np.mod(angles, 2 * np.pi))
+    circle = np.mod(angles, 2 * np.pi)[order]
+    # The view that follows each one's opposite direction, and the one before that.
+    after = np.searchsorted(circle, np.mod(circle + np.pi, 2 * np.pi))
+    second = np.concatenate([after, after - 1]) % len(angles)
+    first = np.tile(np.arange(len(angles)), 2)
+    error = np.abs(np.mod(circle[first] - circle[second], 2 * np.pi) - np.pi)
+    nearest = np.argsort(error, kind="stable")[:_PAIRS]
+    return order[first[nearest]], order[second[nearest]]
+
+
+def _sharpness(y: NDArray[np.float32], angles: Floats, centers: Floats, device: Device) -> Floats:
+    """The mean absolute value of the slice that each centre gives."""
+    bins = y.shape[1]
+    grid, views = Grid((bins, bins)), device.array(y)
+    disc = np.hypot(grid.coordinates(0)[:, None], grid.coordinates(1)) <= bins / 2
+    scores = []
+    for center in centers:
+        scan = Parallel(angles, bins, center=center)
+        image = device.get(fbp(Projector(grid, scan, device=device), views))
+        scores.append(float(np.abs(image[disc]).mean(dtype=np.float64)))
+    return np.stack([centers, np.array(scores)])
+
+
+def _lowest(scores: Floats) -> float:
+    """The minimum of a parabola fitted about the least score, kept within the fit's range."""
+    best = scores[0, scores[1].argmin()]
+    near = np.abs(scores[0] - best) <= _PARABOLA
+    if np.count_nonzero(near) < 3:
+        return float(best)
+    curvature, slope, _ = np.polyfit(scores[0, near] - best, scores[1, near], 2)
+    if curvature <= 0:
+        return float(best)
+    return float(best + np.clip(-slope / (2 * curvature), -_PARABOLA, _PARABOLA))
