@@ -1,0 +1,184 @@
+"""How close an image is to the truth: PSNR, SSIM and the fit that removes gain and offset.
+
+Every score takes a mask, because a reconstruction is only defined inside the field of view and an
+empty background would flatter it. Arrays of any real type are scored in double precision.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rift_cl.errors import DTypeError, InputError, NonFiniteError, ShapeError
+from rift_cl.geometry import Grid
+
+_WINDOW = 11
+_Reals = NDArray[np.float64]
+_Mask = NDArray[np.bool_]
+
+
+def psnr(
+    image: ArrayLike, truth: ArrayLike, *, peak: float = 1.0, mask: ArrayLike | None = None
+) -> float:
+    """Peak signal-to-noise ratio, ``10 log10(peak^2 / mean squared error)``.
+
+    Args:
+        image: what is scored, any shape.
+        truth: what it should be, of the same shape.
+        peak: the value that counts as full scale.
+        mask: samples that count, boolean and of the same shape; all when not given.
+
+    Returns:
+        Decibels; infinity for a perfect image.
+
+    Raises:
+        ShapeError: the shapes differ or nothing is left to score.
+        DTypeError: an array is not real, or the mask not boolean.
+        NonFiniteError: ``image`` or ``truth`` holds NaN or infinity, masked or not.
+        InputError: ``peak`` is not a positive number.
+    """
+    found, wanted, counts = _checked(image, truth, mask)
+    _check_peak("psnr", peak)
+    error = float(np.mean((found - wanted)[counts] ** 2))
+    return 10 * math.log10(peak**2 / error) if error > 0 else math.inf
+
+
+def ssim(
+    image: ArrayLike, truth: ArrayLike, *, peak: float = 1.0, mask: ArrayLike | None = None
+) -> float:
+    """Structural similarity of Wang et al. (IEEE Trans. Image Process. 13, 2004).
+
+    The window is Gaussian, 11 samples wide with sigma 1.5, the covariance is the population's.
+    The map is averaged over every sample of the mask, the reflected border included; means that
+    leave a border of 5 samples out differ a little.
+
+    Args:
+        image: what is scored: (y, x), or (z, y, x) with a three-dimensional window.
+        truth: what it should be, of the same shape.
+        peak: the range of values that the data could have.
+        mask: samples that count, boolean and of the same shape; all when not given.
+
+    Returns:
+        Similarity, 1 for a perfect image.
+
+    Raises:
+        ShapeError: the shapes differ, nothing is left to score, or a side is shorter than 11.
+        DTypeError: an array is not real, or the mask not boolean.
+        NonFiniteError: ``image`` or ``truth`` holds NaN or infinity, masked or not.
+        InputError: ``peak`` is not a positive number.
+    """
+    from skimage.metrics import structural_similarity  # noqa: PLC0415  heavy, wanted here alone
+
+    found, wanted, counts = _checked(image, truth, mask)
+    _check_peak("ssim", peak)
+    if found.ndim not in (2, 3) or min(found.shape) < _WINDOW:
+        raise ShapeError(
+            f"ssim: image has shape {found.shape}, wanted (y, x) or (z, y, x) with every side "
+            f"{_WINDOW} or longer"
+        )
+    _, similarity = structural_similarity(
+        found,
+        wanted,
+        data_range=peak,
+        gaussian_weights=True,
+        sigma=1.5,
+        use_sample_covariance=False,
+        full=True,
+    )
+    return float(np.mean(similarity[counts]))
+
+
+def affine_fit(
+    image: ArrayLike, truth: ArrayLike, *, mask: ArrayLike | None = None
+) -> tuple[_Reals, float, float]:
+    """The image with the gain and offset that bring it closest to the truth.
+
+    For methods whose scale is arbitrary, such as unfiltered backprojection: minimises the sum of
+    ``(gain * image + offset - truth)^2`` over the mask.
+
+    Args:
+        image: what is fitted, any shape.
+        truth: what it should be, of the same shape.
+        mask: samples that count, boolean and of the same shape; all when not given.
+
+    Returns:
+        ``gain * image + offset`` on the whole image, the gain, and the offset. A constant image
+        has gain 0 and the mean of the truth for offset.
+
+    Raises:
+        ShapeError: the shapes differ or nothing is left to fit.
+        DTypeError: an array is not real, or the mask not boolean.
+        NonFiniteError: ``image`` or ``truth`` holds NaN or infinity, masked or not.
+    """
+    found, wanted, counts = _checked(image, truth, mask)
+    x, y = found[counts], wanted[counts]
+    if x.min() == x.max():
+        gain = 0.0
+    else:
+        deviation = x - x.mean()
+        gain = float(np.sum(deviation * (y - y.mean())) / np.sum(deviation**2))
+    offset = float(y.mean() - gain * x.mean())
+    return gain * found + offset, gain, offset
+
+
+def disc(grid: Grid, *, radius: float | None = None) -> _Mask:
+    """Mask of the samples in a disc about the grid's centre; a cylinder along z for a volume.
+
+    Args:
+        grid: the image or volume.
+        radius: in the grid's unit of length; the inscribed disc, ``min(ny * dy, nx * dx) / 2``,
+            when not given.
+
+    Returns:
+        Booleans of shape ``grid.shape``: true where the centre of the sample is in the disc.
+
+    Raises:
+        InputError: ``radius`` is not a positive number.
+    """
+    plane = grid.slice()
+    if radius is None:
+        radius = min(n * d for n, d in zip(plane.shape, plane.spacing, strict=True)) / 2
+    if not (math.isfinite(radius) and radius > 0):
+        raise InputError(f"disc: radius is {radius!r}, wanted a positive length")
+    y, x = (plane.coordinates(axis) - plane.center[axis] for axis in (0, 1))
+    inside = y[:, None] ** 2 + x**2 <= radius**2
+    return np.broadcast_to(inside, grid.shape).copy()
+
+
+def _checked(
+    image: ArrayLike, truth: ArrayLike, mask: ArrayLike | None
+) -> tuple[_Reals, _Reals, _Mask]:
+    found, wanted = _finite("image", image), _finite("truth", truth)
+    if found.shape != wanted.shape:
+        raise ShapeError(f"image has shape {found.shape} and truth {wanted.shape}; make them equal")
+    counts = np.ones(found.shape, dtype=np.bool_) if mask is None else np.asarray(mask)
+    if counts.dtype != np.bool_:
+        raise DTypeError(f"mask has type {counts.dtype}, wanted bool: compare it with a number")
+    if counts.shape != found.shape:
+        raise ShapeError(f"mask has shape {counts.shape}, wanted that of the image, {found.shape}")
+    if not counts.any():
+        raise ShapeError("nothing to compare: the image is empty or the mask is false everywhere")
+    return found, wanted, counts
+
+
+def _finite(name: str, array: ArrayLike) -> _Reals:
+    given: NDArray[Any] = np.asarray(array)
+    if given.dtype.kind not in "biuf":
+        raise DTypeError(f"{name} has type {given.dtype}, wanted real numbers")
+    values = given.astype(np.float64)
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        index = tuple(int(i) for i in np.unravel_index(bad[0], values.shape))
+        raise NonFiniteError(
+            f"{name} holds {values[index]} at {index}, and {bad.size} such values in all; "
+            "replace them before scoring"
+        )
+    return values
+
+
+def _check_peak(function: str, peak: float) -> None:
+    if not (math.isfinite(peak) and peak > 0):
+        raise InputError(f"{function}: peak is {peak!r}, wanted a positive number")
