@@ -14,7 +14,7 @@ from functools import cache
 from typing import Any
 
 from rift_cl.cl.device import Device
-from rift_cl.cl.kernel_cache import cache_folder
+from rift_cl.cl.kernel_cache import prepare_cache
 from rift_cl.cl.process import claim_process
 from rift_cl.errors import NoDeviceError
 
@@ -40,7 +40,7 @@ def devices() -> tuple[Device, ...]:
 
 def _enumerate() -> Iterator[tuple[int, int, Any]]:
     claim_process()
-    cache_folder()
+    prepare_cache()
     import pyopencl as cl
 
     try:

@@ -19,6 +19,8 @@ from functools import cache
 from pathlib import Path
 
 from rift_cl import __version__
+from rift_cl.cl.cache_check import LOCK, record, remove_damaged
+from rift_cl.errors import DeviceError
 
 try:
     import fcntl
@@ -26,42 +28,51 @@ except ImportError:  # Windows: no PoCL wheel there, so no cache to guard
     fcntl = None  # type: ignore[assignment]
 
 
+def prepare_cache() -> None:
+    """Make the cache safe to load from; call before a driver loads."""
+    with build_lock(), contextlib.suppress(OSError):
+        remove_damaged(cache_folder())
+
+
 @cache
 def cache_folder() -> Path:
     """Choose the cache folder and point the drivers at it; call before a driver loads.
 
-    ``RIFT_CACHE_DIR`` names another folder. A ``POCL_CACHE_DIR`` that the user set is kept as
-    long as it can be used.
+    It is ``rift_cl/<version>`` inside ``RIFT_CACHE_DIR``, or else inside the user's cache folder.
+    A ``POCL_CACHE_DIR`` is overruled, because locks and checks hold in our own folder alone.
+
+    Raises:
+        DeviceError: neither that folder nor a temporary one can be used.
     """
-    folder = _private(_wanted())
+    folder = _private(_root())
     if folder is None:
-        folder = Path(tempfile.mkdtemp(prefix="rift-cl-"))
+        folder = _temporary()
         warnings.warn(
-            f"kernel cache {_wanted()} cannot be used; compiled kernels go to {folder} and are "
-            "lost afterwards: set RIFT_CACHE_DIR to a folder that you own",
+            f"kernel cache in {_root()} cannot be used; compiled kernels go to {folder}, where the "
+            "next run will not find them: set RIFT_CACHE_DIR to a folder that you own",
             stacklevel=2,
         )
-    foreign = os.environ.get("POCL_CACHE_DIR")
-    if foreign is None or _private(Path(foreign)) is None:
-        os.environ["POCL_CACHE_DIR"] = str(folder)
+        # Child processes go to the same place, so that its lock holds for them too.
+        os.environ["RIFT_CACHE_DIR"] = str(folder.parents[1])
+    os.environ["POCL_CACHE_DIR"] = str(folder)
     # pyopencl's own cache is a pickle; the drivers that need one keep a better one themselves.
     os.environ.setdefault("PYOPENCL_NO_CACHE", "1")
     return folder
 
 
-def _wanted() -> Path:
-    named = os.environ.get("RIFT_CACHE_DIR")
-    if named:
-        return Path(named)
-    root = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()
-    return Path(root) / "rift_cl" / __version__
+def _root() -> Path:
+    named = os.environ.get("RIFT_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
+    return Path(named or os.path.expanduser("~/.cache")).absolute()  # noqa: PTH111 - never raises
 
 
-def _private(folder: Path) -> Path | None:
-    """The folder, made and closed to others, or None when it is not ours or not writable."""
+def _private(root: Path) -> Path | None:
+    """Our folder under a root, made and closed to others, or None when that cannot be."""
+    folder = root / "rift_cl" / __version__
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if hasattr(os, "getuid") and folder.stat().st_uid != os.getuid():
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        # Whoever owns a folder above ours can put another in its place.
+        owners = {path.stat().st_uid for path in (folder, folder.parent, root)}
+        if hasattr(os, "getuid") and owners != {os.getuid()}:
             return None
         folder.chmod(0o700)
         with tempfile.TemporaryFile(dir=folder):
@@ -70,15 +81,42 @@ def _private(folder: Path) -> Path | None:
         return None
 
 
+def _temporary() -> Path:
+    with contextlib.suppress(OSError):
+        folder = _private(Path(tempfile.mkdtemp(prefix="rift-cl-")))
+        if folder is not None:
+            return folder
+    raise DeviceError(
+        f"compiled kernels can be kept neither in {_root()} nor in a temporary folder: set "
+        "RIFT_CACHE_DIR to a folder that you own and can write to"
+    )
+
+
 @contextlib.contextmanager
 def build_lock() -> Iterator[None]:
-    """Hold the cache against every other process of this user."""
-    if fcntl is None:
+    """Hold the cache against every other process of this user.
+
+    Raises:
+        DeviceError: the cache folder cannot be used any more.
+    """
+    folder = cache_folder()
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        handle = (folder / LOCK).open("w")
+    except OSError as error:
+        raise DeviceError(
+            f"kernel cache {folder} cannot be used any more ({error.strerror}): make it writable, "
+            "or set RIFT_CACHE_DIR to a folder that you own"
+        ) from error
+    with handle:
+        if fcntl is not None:
+            # Some network file systems have no locks; a lost race is then repeated (program.py).
+            with contextlib.suppress(OSError):
+                fcntl.flock(handle, fcntl.LOCK_EX)
         yield
-        return
-    with (cache_folder() / "build.lock").open("w") as handle:
-        fcntl.flock(handle, fcntl.LOCK_EX)
-        yield
+        # Without a record the next process builds again, which is slow but right.
+        with contextlib.suppress(OSError):
+            record(folder)
 
 
 def cache_size() -> int:
@@ -89,11 +127,11 @@ def cache_size() -> int:
 
 def clear_cache() -> int:
     """Remove every compiled kernel and return how many bytes that freed."""
-    freed = cache_size()
     with build_lock():
+        before = cache_size()
         for entry in cache_folder().iterdir():
             if entry.is_dir():
                 shutil.rmtree(entry, ignore_errors=True)
-            elif entry.name != "build.lock":
+            elif entry.name != LOCK:
                 entry.unlink(missing_ok=True)
-    return freed
+        return before - cache_size()

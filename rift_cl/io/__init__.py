@@ -1,1 +1,54 @@
-"""."""
+"""Files in and out: scans and pictures read, volumes and reports written.
+
+The names are resolved when they are first used, so that importing the package loads none of the
+file libraries.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rift_cl.io.image import read_image, write_png
+    from rift_cl.io.output import atomic_path, make_folder, write_json, write_text
+    from rift_cl.io.scan import open_scan
+    from rift_cl.io.scan_file import ScanFile, ScanRows
+    from rift_cl.io.volume import VolumeWriter, open_volume, read_volume
+
+_HOMES = {
+    "ScanFile": "scan_file",
+    "ScanRows": "scan_file",
+    "VolumeWriter": "volume",
+    "atomic_path": "output",
+    "make_folder": "output",
+    "open_scan": "scan",
+    "open_volume": "volume",
+    "read_image": "image",
+    "read_volume": "volume",
+    "write_json": "output",
+    "write_png": "image",
+    "write_text": "output",
+}
+
+__all__ = [
+    "ScanFile",
+    "ScanRows",
+    "VolumeWriter",
+    "atomic_path",
+    "make_folder",
+    "open_scan",
+    "open_volume",
+    "read_image",
+    "read_volume",
+    "write_json",
+    "write_png",
+    "write_text",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load the module that holds a public name."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)

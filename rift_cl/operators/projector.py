@@ -153,12 +153,13 @@ class Projector(LinearOperator):
 
     def _pieces(self, budget: int) -> Iterable[Piece]:
         each = 4 * (math.prod(self.grid.shape[-2:]) + len(self.scan.angles) * self.scan.bins)
-        runs = plan_chunks(self.grid.slices, each, self._scratch(), budget, what="slice")
+        runs = plan_chunks(self.grid.slices, each, self.scratch, budget, what="slice")
         if len(self.grid.shape) == 2:
             return [((), ())]
         return [((run,), (slice(None), run)) for run in runs]
 
-    def _scratch(self) -> int:
+    @property
+    def scratch(self) -> int:
         """Bytes needed besides the arrays that go in and come out."""
         slices = min(_SLAB, self.grid.slices)
         planes = [walk.table.rows * (walk.table.width + 2 * self._segment) for walk in self._walks]

@@ -1,0 +1,163 @@
+"""The command ``rift``: settings from the command line, progress to stderr, results to stdout.
+
+Every command is a settings dataclass and a job; this file only turns arguments into the one, runs
+the other, and turns errors into a sentence and an exit status: 0 ok, 2 usage, 3 input, 4 device,
+5 output, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import sys
+import traceback
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from rift_cl import __version__
+from rift_cl.errors import RiftError
+from rift_cl.progress import Report
+from rift_cl.progress_bar import show_progress
+
+_INTERRUPTED = 130
+
+
+@dataclass(frozen=True)
+class Output:
+    """How a command talks."""
+
+    quiet: bool = False
+    """Show no progress."""
+    debug: bool = False
+    """Show the traceback of an error."""
+
+
+Talk = Annotated[Output, tyro.conf.arg(name="")]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status."""
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    if arguments == ["--version"]:
+        print(f"rift {__version__}")
+        return 0
+    command: Callable[[], int] = tyro.extras.subcommand_cli_from_dict(
+        _commands(),
+        prog="rift",
+        description="Tomography and splatting on any OpenCL device.",
+        args=arguments,
+        config=(tyro.conf.OmitArgPrefixes,),
+    )
+    return command()
+
+
+def _commands() -> dict[str, Callable[..., Callable[[], int]]]:
+    from rift_cl.jobs.cache import CacheSettings
+    from rift_cl.jobs.center import CenterSettings
+    from rift_cl.jobs.demo import DemoSettings
+    from rift_cl.jobs.devices import DevicesSettings
+    from rift_cl.jobs.reconstruct import ReconstructSettings
+
+    return {
+        "devices": _command(_devices, DevicesSettings),
+        "demo": _command(_demo, DemoSettings),
+        "reconstruct": _command(_reconstruct, ReconstructSettings),
+        "center": _command(_center, CenterSettings),
+        "cache": _command(_cache, CacheSettings),
+    }
+
+
+def _command(run: Callable[[Any, Output], None], settings: type) -> Callable[..., Callable[[], int]]:
+    """A command for tyro: it takes settings and gives back what is to be run."""
+
+    def command(settings: Any, output: Any = Output()) -> Callable[[], int]:  # noqa: B008 - frozen
+        return lambda: _guarded(run, settings, output)
+
+    command.__annotations__ = {
+        "settings": Annotated[settings, tyro.conf.arg(name="")],
+        "output": Talk,
+    }
+    command.__doc__ = settings.__doc__
+    return command
+
+
+def _guarded(run: Callable[[Any, Output], None], settings: Any, output: Output) -> int:
+    """Run a command; an error becomes one sentence and an exit status."""
+    try:
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            run(settings, output)
+    except RiftError as error:
+        if output.debug:
+            traceback.print_exc()
+        print(f"rift: {error}", file=sys.stderr)
+        return error.exit_status
+    except KeyboardInterrupt:
+        print("rift: interrupted; nothing half-written was left behind", file=sys.stderr)
+        return _INTERRUPTED
+    return 0
+
+
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    print(f"rift: warning: {message}", file=sys.stderr)
+
+
+def _watch(reports: Iterable[Report], output: Output) -> None:
+    show_progress(reports, quiet=output.quiet)
+
+
+def _print_table(columns: Sequence[str], rows: Iterable[Sequence[Any]], *, caption: str = "") -> None:
+    table = Table(*columns, caption=caption or None, caption_justify="left")
+    for row in rows:
+        table.add_row(*(f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row))
+    Console().print(table)
+
+
+def _devices(settings: Any, output: Output) -> None:
+    from rift_cl.jobs.devices import COLUMNS, device_rows
+
+    _print_table(COLUMNS, device_rows())
+
+
+def _demo(settings: Any, output: Output) -> None:
+    from rift_cl.jobs.demo import COLUMNS, SCORING, DemoJob
+
+    job = DemoJob(settings)
+    _watch(job.run(), output)
+    _print_table(COLUMNS, job.rows, caption=SCORING)
+    print(f"pictures and report.html are in {settings.out}")
+
+
+def _reconstruct(settings: Any, output: Output) -> None:
+    from rift_cl.jobs.reconstruct import Reconstruction
+
+    job = Reconstruction(settings)
+    if settings.dry_run:
+        _print_table(("what", "plan"), job.plan().items())
+        return
+    _watch(job.run(), output)
+    _print_table(("figure", "value"), job.metrics.items())
+    print(f"slices and report.html are in {settings.out}")
+
+
+def _center(settings: Any, output: Output) -> None:
+    from rift_cl.jobs.center import CenterJob
+
+    job = CenterJob(settings)
+    _watch(job.run(), output)
+    print(f"{job.metrics['center']:.2f}")
+    print(f"contact sheet and report.html are in {settings.out}", file=sys.stderr)
+
+
+def _cache(settings: Any, output: Output) -> None:
+    from rift_cl.jobs.cache import run_cache
+
+    print(run_cache(settings))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,87 @@
+"""Small things in HDF5 datasets: angles, image keys, pixel sizes and their units."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import FileFormatError, ShapeError
+from rift_cl.io.boundary import check_claim, check_numeric
+from rift_cl.io.hdf5_tree import Hdf5Tree
+
+# Eight million frames: no scan has more, and a forged header may not ask for gigabytes.
+_LONGEST_VECTOR = 64 << 20
+
+
+def numeric_shape(tree: Hdf5Tree, name: str) -> tuple[int, ...]:
+    """Shape of a dataset that holds real numbers.
+
+    Raises:
+        FileFormatError: there is no such dataset.
+        DTypeError: it does not hold real numbers.
+        ShapeError: it is empty.
+    """
+    node = tree.dataset(name)
+    check_numeric(tree.path, name, node.dtype)
+    if node.shape is None or 0 in node.shape:
+        raise ShapeError(f"{tree.path}: {name!r} has shape {node.shape}, it holds nothing")
+    return tuple(int(n) for n in node.shape)
+
+
+def read_vector(tree: Hdf5Tree, name: str) -> NDArray[np.float64]:
+    """Read one number per frame; axes of length 1 are dropped.
+
+    Raises:
+        FileFormatError: there is no such dataset.
+        DTypeError: it does not hold real numbers.
+        ShapeError: it is no vector.
+        ResourceLimitError: it claims to be far longer than any scan.
+    """
+    shape = numeric_shape(tree, name)
+    size = math.prod(shape)
+    if size != max(shape, default=1):
+        raise ShapeError(f"{tree.path}: {name!r} has shape {shape}, wanted one number per frame")
+    node = tree.dataset(name)
+    chunk = math.prod(node.chunks) if node.chunks else 0
+    check_claim(tree.path, f"{name!r}", 8 * max(size, chunk), _LONGEST_VECTOR)
+    values = np.empty(shape, np.float64)
+    node.read_direct(values)
+    return values.reshape(size)
+
+
+def read_length(tree: Hdf5Tree, name: str) -> tuple[float, str] | None:
+    """The first number of a dataset and its unit, or None where there is no such dataset."""
+    if tree.find(name) is None:
+        return None
+    return float(read_vector(tree, name)[0]), unit_of(tree, name)
+
+
+def read_angles(tree: Hdf5Tree, name: str) -> NDArray[np.float64]:
+    """Read angles in radians; the dataset holds degrees unless its ``units`` say radians.
+
+    Raises:
+        FileFormatError: there is no such dataset, or its unit is unknown.
+        InputError: it is no vector of numbers; see ``read_vector``.
+    """
+    unit = unit_of(tree, name).strip().lower()
+    values = read_vector(tree, name)
+    if unit.startswith("rad"):
+        return values
+    if unit in ("", "°") or unit.startswith("deg"):
+        return np.deg2rad(values)
+    raise FileFormatError(
+        f"{tree.path}: the units of {name!r} are {unit!r}, wanted degrees or radians; mend the "
+        "attribute, or name other angles with theta= (--theta)"
+    )
+
+
+def unit_of(tree: Hdf5Tree, name: str) -> str:
+    """The ``units`` attribute of a dataset, empty where it has none."""
+    value = tree.dataset(name).attrs.get("units", "")
+    if isinstance(value, np.ndarray) and value.size == 1:
+        value = value.item()
+    if isinstance(value, bytes):
+        value = value.decode(errors="replace")
+    return value if isinstance(value, str) else ""

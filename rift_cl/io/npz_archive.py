@@ -1,0 +1,130 @@
+"""An NPZ file as a table of array headers: nothing is loaded that was not counted first.
+
+NPZ is a zip archive of NumPy's NPY files. The headers are read without the arrays, and what they
+claim is compared with what the archive stores and with the budget, because an archive of a
+kilobyte may ask for terabytes. Nothing is ever unpickled.
+"""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from rift_cl.errors import FileFormatError, ShapeError
+from rift_cl.io.boundary import HOW_TO_NAME, check_claim, check_numeric
+
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+# Deflate packs at most this many bytes into one; a few more cover the blocks' own headers.
+_DEFLATE_LIMIT = 1032
+_DEFLATE_SLACK = 4096
+_LISTED = 8
+
+
+@dataclass(frozen=True)
+class ArrayHeader:
+    """What an array in the archive claims to be.
+
+    Args:
+        shape: its shape.
+        dtype: its type; a real number.
+        offset: bytes of the NPY header before the values.
+    """
+
+    shape: tuple[int, ...]
+    dtype: np.dtype[np.generic]
+    offset: int
+
+    @property
+    def size(self) -> int:
+        """Bytes of the values."""
+        return math.prod(self.shape) * self.dtype.itemsize
+
+
+class NpzArchive:
+    """The arrays of an open NPZ archive.
+
+    Args:
+        path: its file, for errors.
+        archive: the archive, open for reading.
+    """
+
+    def __init__(self, path: Path, archive: zipfile.ZipFile) -> None:
+        self.path = path
+        self._archive = archive
+        self._members = {member.filename: member for member in archive.infolist()}
+
+    def __contains__(self, name: str) -> bool:
+        return f"{name}.npy" in self._members
+
+    def header(self, name: str) -> ArrayHeader:
+        """What an array claims to be.
+
+        Raises:
+            FileFormatError: there is no such array, or its header is damaged.
+            DTypeError: it does not hold real numbers.
+            ShapeError: it is empty.
+        """
+        if name not in self:
+            raise FileFormatError(f"{self.path}: has no array {name!r}; {self.contents()}")
+        with self._archive.open(self._members[f"{name}.npy"]) as file:
+            shape, dtype = _parse(file)
+            header = ArrayHeader(shape, dtype, file.tell())
+        check_numeric(self.path, name, dtype)
+        if min(shape, default=1) < 1:
+            raise ShapeError(f"{self.path}: {name!r} has shape {shape}, it holds nothing")
+        return header
+
+    def load(self, name: str, *, budget: int | None) -> NDArray[np.generic]:
+        """Load an array whole.
+
+        Raises:
+            ResourceLimitError: it claims more than the budget; nothing was allocated.
+            FileFormatError: it claims more, or less, than the archive stores.
+        """
+        header = self.header(name)
+        check_claim(self.path, f"{name!r}", header.size, budget)
+        member = self._members[f"{name}.npy"]
+        stored = member.compress_size
+        most = stored * _DEFLATE_LIMIT + _DEFLATE_SLACK if member.compress_type else stored
+        if (
+            member.compress_type not in _METHODS
+            or member.file_size != header.offset + header.size
+            or member.file_size > most
+            or stored > self.path.stat().st_size
+        ):
+            raise FileFormatError(
+                f"{self.path}: {name!r} claims {header.size} bytes, which is not what the "
+                "archive stores; the file is damaged"
+            )
+        with self._archive.open(member) as file:
+            values: NDArray[np.generic] = npy.read_array(file, allow_pickle=False)
+        return values
+
+    def contents(self) -> str:
+        """A phrase that lists the first arrays, and how to name one."""
+        names = [name[: -len(".npy")] for name in self._members if name.endswith(".npy")]
+        if not names:
+            return "it holds no array at all"
+        listed = ", ".join(f"{name!r} {self._shape(name)}" for name in names[:_LISTED])
+        more = ", ..." if len(names) > _LISTED else ""
+        return f"it holds {listed}{more}: {HOW_TO_NAME}"
+
+    def _shape(self, name: str) -> tuple[int, ...] | str:
+        with self._archive.open(self._members[f"{name}.npy"]) as file:
+            return _parse(file)[0]
+
+
+def _parse(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[np.generic]]:
+    version = npy.read_magic(file)
+    readers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+    if version not in readers:
+        raise ValueError(f"NPY version {version} is not known")
+    shape, _, dtype = readers[version](file)
+    return tuple(int(n) for n in shape), dtype

@@ -1,0 +1,126 @@
+"""Pixels through OpenImageIO: one function in, one out, no error left unread.
+
+OpenImageIO reports failure by return values, and for some formats by ``geterror`` alone: a PNG on
+a full disk counts as written otherwise. On the way in it would try every decoder it has on a file
+that the first one refuses, so the few formats wanted here are recognised before it is asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO
+from numpy.typing import NDArray
+
+from rift_cl.errors import FileFormatError, ResourceLimitError
+from rift_cl.io.boundary import check_claim, reading
+
+_SUFFIXES = {
+    ".png": "png",
+    ".exr": "openexr",
+    ".tif": "tiff",
+    ".tiff": "tiff",
+    ".jpg": "jpeg",
+    ".jpeg": "jpeg",
+    ".hdr": "hdr",
+}
+_SIGNATURES = {
+    b"\x89PNG\r\n\x1a\n": "png",
+    b"\x76\x2f\x31\x01": "openexr",
+    b"II*\0": "tiff",
+    b"MM\0*": "tiff",
+    b"II+\0": "tiff",
+    b"MM\0+": "tiff",
+    b"\xff\xd8\xff": "jpeg",
+    b"#?RADIANCE": "hdr",
+    b"#?RGBE": "hdr",
+}
+
+
+def write_pixels(
+    path: Path, pixels: NDArray[Any], *, format: str, attributes: Mapping[str, Any]
+) -> None:
+    """Write (y, x, channel), uint8 or float32, in a format that the file's name need not show.
+
+    Raises:
+        OSError: any step failed; what was written is no picture.
+    """
+    high, wide, channels = pixels.shape
+    spec = OpenImageIO.ImageSpec(
+        wide, high, channels, "uint8" if pixels.dtype == np.uint8 else "float"
+    )
+    for name, value in attributes.items():
+        spec.attribute(name, value)
+    output = OpenImageIO.ImageOutput.create(format)
+    if output is None:
+        raise OSError(f"OpenImageIO cannot write {format}")
+    done = output.open(str(path), spec)
+    if done:
+        done = output.write_image(np.ascontiguousarray(pixels))
+        done = output.close() and done
+    message = _first_line(output.geterror())
+    if not done or message:
+        raise OSError(message or "OpenImageIO gives no reason")
+
+
+def read_pixels(path: Path, *, budget: int | None = None) -> NDArray[np.float32]:
+    """Read (y, x, channel) as float32; integers are scaled to [0, 1], alpha is not multiplied in.
+
+    Raises:
+        InputError: there is no such file.
+        FileFormatError: the file is damaged, or is none of PNG, OpenEXR, TIFF, JPEG and HDR.
+        ResourceLimitError: the image is larger than the budget; nothing was allocated.
+    """
+    with reading(path, "the image"), _opened(path, _format(path)) as source:
+        spec = source.spec()
+        if spec.deep or spec.depth > 1:
+            raise FileFormatError(f"{path}: holds deep pixels, a flat image is wanted")
+        check_claim(path, "the image", spec.width * spec.height * spec.nchannels * 4, budget)
+        pixels = source.read_image("float")
+        message = _first_line(source.geterror())
+        if pixels is None or message:
+            raise FileFormatError(f"{path}: the image is damaged ({message})")
+        return np.asarray(pixels, np.float32).reshape(spec.height, spec.width, spec.nchannels)
+
+
+@contextmanager
+def _opened(path: Path, format: str) -> Iterator[Any]:
+    config = OpenImageIO.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)
+    every = OpenImageIO.get_int_attribute("try_all_readers", 1)
+    OpenImageIO.attribute("try_all_readers", 0)
+    try:
+        source = OpenImageIO.ImageInput.open(str(path), config)
+    finally:
+        OpenImageIO.attribute("try_all_readers", every)
+    if source is None:
+        message = _first_line(OpenImageIO.geterror())
+        kind = ResourceLimitError if "limits:imagesize" in message else FileFormatError
+        raise kind(f"{path}: the image cannot be read ({message})")
+    try:
+        if source.format_name() != format:
+            raise FileFormatError(f"{path}: was taken for {source.format_name()}, it is {format}")
+        yield source
+    finally:
+        source.close()
+
+
+def _format(path: Path) -> str:
+    with path.open("rb") as file:
+        start = file.read(16)
+    content = next((name for mark, name in _SIGNATURES.items() if start.startswith(mark)), None)
+    if content is None or _SUFFIXES.get(path.suffix.lower()) != content:
+        raise FileFormatError(
+            f"{path}: the content is {content or 'of no known format'}, the name says "
+            f"{path.suffix or 'nothing'}; an image is .png, .exr, .tif, .jpg or .hdr and what its "
+            "name says"
+        )
+    return content
+
+
+def _first_line(message: str) -> str:
+    return message.splitlines()[0].strip() if message else ""

@@ -1,0 +1,127 @@
+"""What was found in a file that holds a scan, and the rows that are read from it.
+
+A scan is often larger than memory, and slices of a parallel-beam scan are independent, so that a
+file is described once and then read a few detector rows at a time. A description holds no open
+file: it can be sent to another process.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import InputError, NonFiniteError, ShapeError
+
+Frames = NDArray[np.float32]
+Kind = Literal["transmission", "attenuation"]
+
+
+@dataclass(frozen=True, eq=False)
+class ScanRows:
+    """Some detector rows of a scan.
+
+    Args:
+        projections: float32 (angle, row, bin).
+        flats: frames with the beam but no sample, float32 (n, row, bin), or None.
+        darks: frames without the beam, float32 (n, row, bin), or None.
+    """
+
+    projections: Frames
+    flats: Frames | None
+    darks: Frames | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArrayNames:
+    """Names of arrays inside a file; None means the name that the layout gives.
+
+    Args:
+        dataset: the projections.
+        theta: the angles.
+        flats: the frames without the sample.
+        darks: the frames without the beam.
+    """
+
+    dataset: str | None = None
+    theta: str | None = None
+    flats: str | None = None
+    darks: str | None = None
+
+
+class RowSource(Protocol):
+    """Whatever reads rows from one kind of file; a value that can be pickled."""
+
+    def read(self, start: int, stop: int) -> ScanRows:
+        """Read rows ``start`` to ``stop``, which are known to exist."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScanFile:
+    """A scan in a file, known by its headers and angles alone.
+
+    Args:
+        path: the file.
+        shape: (angle, row, bin) of the projections of the sample.
+        angles: direction of each projection in radians, float64, read-only.
+        pitch: distance between detector bins in ``unit``; None where the file gives no positive
+            number.
+        unit: unit of ``pitch`` as the file names it, empty where it does not.
+        kind: "transmission" for counts that want flat and dark correction and a logarithm,
+            "attenuation" for line integrals.
+        source: the layout that was recognised, for people.
+        rows: reads the rows.
+    """
+
+    path: Path
+    shape: tuple[int, int, int]
+    angles: NDArray[np.float64]
+    pitch: float | None
+    unit: str
+    kind: Kind
+    source: str
+    rows: RowSource = field(repr=False)
+
+    def read(self, start: int, stop: int) -> ScanRows:
+        """Read detector rows ``start`` to ``stop``; the file is opened for that and closed again.
+
+        Raises:
+            InputError: there are no such rows, or the file is gone.
+            FileFormatError: the file is damaged, or changed since it was opened.
+            ResourceLimitError: the rows are larger than the budget; nothing was allocated.
+        """
+        if not 0 <= start < stop <= self.shape[1]:
+            raise InputError(
+                f"{self.path}: rows {start} to {stop} were asked for, the scan has rows 0 to "
+                f"{self.shape[1]}"
+            )
+        return self.rows.read(start, stop)
+
+
+def check_angles(
+    path: Path, name: str, angles: NDArray[np.float64], *, projections: int
+) -> NDArray[np.float64]:
+    """Make sure that there is one finite angle for each projection; returned read-only.
+
+    Raises:
+        ShapeError: the numbers of angles and projections differ.
+        NonFiniteError: an angle is NaN or infinite.
+    """
+    if angles.size != projections:
+        raise ShapeError(
+            f"{path}: {name!r} holds {angles.size} angles for {projections} projections; name "
+            "the array that belongs to them with theta= (--theta)"
+        )
+    bad = np.flatnonzero(~np.isfinite(angles))
+    if bad.size:
+        raise NonFiniteError(f"{path}: angle {bad[0]} of {name!r} is {angles[bad[0]]}")
+    angles.flags.writeable = False
+    return angles
+
+
+def usable_pitch(value: float) -> float | None:
+    """A pixel size, or None where the number in the file cannot be one."""
+    return value if np.isfinite(value) and value > 0 else None

@@ -1,0 +1,97 @@
+"""The folder that a long command leaves behind: what was asked, what came out, what to look at.
+
+``config.json`` holds the settings, the device and the version, so that the run can be repeated;
+``metrics.json`` holds its figures; ``report.html`` shows both, and the pictures, in one file.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import platform
+from collections.abc import Mapping
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from rift_cl import __version__
+from rift_cl.cl.device import Device
+from rift_cl.errors import OutputError
+from rift_cl.html_page import Page
+from rift_cl.io.output import make_folder, write_json, write_text, writing
+
+_CONFIG = "config.json"
+
+
+class RunFolder:
+    """A run's folder.
+
+    Args:
+        path: the folder; made when it is not there.
+        job: the command's name.
+        overwrite: whether an earlier run of the same command may be replaced.
+
+    Raises:
+        OutputError: the folder cannot be made, or holds something that would be lost.
+    """
+
+    def __init__(self, path: Path, job: str, *, overwrite: bool) -> None:
+        self.path = path
+        self._job = job
+        with writing(path):
+            used = path.exists() and (not path.is_dir() or any(path.iterdir()))
+        if used and _job_of(path) != job:
+            raise OutputError(f"{path}: holds other things already; name another folder (--out)")
+        if used and not overwrite:
+            raise OutputError(
+                f"{path}: holds an earlier run; name another folder (--out) or add --overwrite"
+            )
+
+    def make(self) -> None:
+        """Make the folder: the first moment at which anything is written."""
+        make_folder(self.path)
+
+    def discard(self) -> None:
+        """Remove the folder if a failed run left nothing in it."""
+        if self.path.is_dir() and not any(self.path.iterdir()):
+            self.path.rmdir()
+
+    def finish(
+        self, settings: Any, metrics: Mapping[str, Any], page: Page, device: Device
+    ) -> None:
+        """Write the report, the metrics and, last, the configuration."""
+        config = {
+            "job": self._job,
+            "rift_cl": __version__,
+            "settings": dataclasses.asdict(settings),
+            "environment": environment(device),
+        }
+        page.section("Settings")
+        page.code(json.dumps(config["settings"], indent=2, default=str))
+        page.section("Environment")
+        page.facts(environment(device))
+        write_text(self.path / "report.html", page.html())
+        write_json(self.path / "metrics.json", metrics)
+        write_json(self.path / _CONFIG, config)
+
+
+def environment(device: Device) -> dict[str, str]:
+    """The facts on which the figures of a run may depend."""
+    return {
+        "device": device.name,
+        "platform": device.platform,
+        "driver": device.driver,
+        "python": platform.python_version(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "rift_cl": __version__,
+        "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+    }
+
+
+def _job_of(path: Path) -> str | None:
+    """The command whose run a folder holds, or None."""
+    try:
+        job = json.loads((path / _CONFIG).read_text(encoding="utf-8"))["job"]
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
+    return job if isinstance(job, str) else None

@@ -1,0 +1,78 @@
+"""A scan as the commands take it: a file, what to call its arrays, and how to read its rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from tyro.conf import Positional
+
+from rift_cl.cl.budget import parse_bytes
+from rift_cl.cl.device import Device
+from rift_cl.cl.discovery import open_device
+from rift_cl.errors import NonFiniteError
+from rift_cl.io.scan import open_scan
+from rift_cl.io.scan_file import ScanFile
+from rift_cl.reconstruct.flatfield import Attenuation, attenuation
+
+
+@dataclass(frozen=True)
+class ScanInput:
+    """Where a scan is and how to read it."""
+
+    scan: Annotated[Path, Positional]
+    """HDF5 (Data Exchange, NXtomo, or any named dataset) or NPZ file."""
+    dataset: str | None = None
+    """Name of the projections in the file, where it is not the layout's own."""
+    theta: str | None = None
+    """Name of the angles in the file."""
+    flats: str | None = None
+    """Name of the frames without the sample."""
+    darks: str | None = None
+    """Name of the frames without the beam."""
+    device: str | None = None
+    """Device to use: its number, cpu, gpu, or a part of its name; see 'rift devices'."""
+    memory: str | None = None
+    """Most memory to use, such as 512M or 4G."""
+
+    def open_device(self) -> Device:
+        """The chosen device."""
+        limit = None if self.memory is None else parse_bytes(self.memory)
+        return open_device(self.device, limit)
+
+    def open_scan(self) -> ScanFile:
+        """The file's description."""
+        names = {"theta": self.theta, "flats": self.flats, "darks": self.darks}
+        limit = None if self.memory is None else parse_bytes(self.memory)
+        return open_scan(self.scan, dataset=self.dataset, budget=limit, **names)
+
+
+def read_attenuation(scan: ScanFile, start: int, stop: int) -> Attenuation:
+    """Line integrals of some detector rows.
+
+    Raises:
+        NonFiniteError: a sample is not finite; the sentence names the file, view, row and bin.
+        InputError: the rows cannot be read or corrected.
+    """
+    rows = scan.read(start, stop)
+    for name in ("projections", "flats", "darks"):
+        frames = getattr(rows, name)
+        if frames is not None:
+            _check(frames, f"{scan.path}: {name}", start)
+    if scan.kind == "attenuation" or rows.flats is None:
+        return Attenuation(rows.projections, 0, 0)
+    return attenuation(rows.projections, rows.flats, rows.darks)
+
+
+def _check(frames: NDArray[np.float32], name: str, start: int) -> None:
+    finite = np.isfinite(frames)
+    if not finite.all():
+        view, row, bin = (int(i) for i in np.argwhere(~finite)[0])
+        raise NonFiniteError(
+            f"{name} hold {np.count_nonzero(~finite)} values that are not finite in these rows, "
+            f"the first at view {view}, row {start + row}, bin {bin}: repair the file, or leave "
+            "the row out with --rows"
+        )

@@ -1,0 +1,51 @@
+"""What every test shares: the devices to test on and the folder of real data.
+
+Every OpenCL device that is found takes part. A CPU takes part twice: as it is, and dressed as a
+GPU (one lane, groups of 64), so that both drivers of every kernel are tested without a GPU.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import rift_cl as rift
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep compiled kernels in the tests' own folder, which stays warm from run to run."""
+    if "RIFT_CACHE_DIR" not in os.environ and hasattr(config, "cache"):
+        os.environ["RIFT_CACHE_DIR"] = str(config.cache.mkdir("rift_cl_kernels"))
+
+
+@cache
+def _variants() -> list[rift.Device]:
+    found = list(rift.devices())
+    for device in rift.devices():
+        if device.traits.is_cpu:
+            traits = dataclasses.replace(device.traits, is_cpu=False)
+            found.append(rift.Device(device._handle, device.selector, traits=traits))
+    return found
+
+
+def _label(device: rift.Device) -> str:
+    return f"{device.selector}-{'cpu' if device.traits.is_cpu else 'gpu'}"
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run a test that asks for ``device`` on each of them; they are opened but once."""
+    if "device" in metafunc.fixturenames:
+        metafunc.parametrize("device", _variants(), ids=_label, scope="session")
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of real scans and captures, which the repository does not carry."""
+    folder = Path(__file__).parents[2] / "shared" / "data"
+    if not folder.is_dir():
+        pytest.skip(f"no real data: {folder} is absent")
+    return folder

@@ -1,0 +1,279 @@
+"""Scans are found and read row by row, whatever layout they are in."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import scan_files as made
+
+from rift_cl.errors import (
+    DTypeError,
+    FileFormatError,
+    InputError,
+    NonFiniteError,
+    ShapeError,
+)
+from rift_cl.io import ScanFile, open_scan
+
+
+def whole(scan: ScanFile) -> np.ndarray:
+    return scan.read(0, scan.shape[1]).projections
+
+
+@pytest.mark.parametrize("dtype", ["<u2", ">u2", ">f4", "<f8", "<f2", "<i8"])
+def test_data_exchange(tmp_path: Path, dtype: str) -> None:
+    data = made.data_exchange(tmp_path / "a.h5", dtype)
+    scan = open_scan(tmp_path / "a.h5")
+    assert (scan.shape, scan.kind, scan.source) == ((6, 4, 5), "transmission", "Data Exchange")
+    assert (scan.pitch, scan.unit) == (None, "")
+    np.testing.assert_allclose(scan.angles, np.deg2rad(made.DEGREES), rtol=1e-15)
+    rows = scan.read(1, 3)
+    assert rows.projections.dtype == np.float32
+    np.testing.assert_array_equal(rows.projections, data[:, 1:3].astype(np.float32))
+    assert rows.flats is not None and rows.darks is not None
+    np.testing.assert_array_equal(rows.flats, made.counts(2, 4, 5)[:, 1:3] + 1000)
+    np.testing.assert_array_equal(rows.darks, made.counts(3, 4, 5)[:, 1:3] + 2000)
+
+
+def test_radians_and_other_units(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    made.data_exchange(path)
+    with h5py.File(path, "a") as file:
+        file["exchange/theta"].attrs["units"] = "Radians"
+    np.testing.assert_array_equal(open_scan(path).angles, made.DEGREES)
+    with h5py.File(path, "a") as file:
+        file["exchange/theta"].attrs["units"] = "gon"
+    with pytest.raises(FileFormatError, match="'gon', wanted degrees or radians"):
+        open_scan(path)
+    with h5py.File(path, "a") as file:
+        del file["exchange/theta"].attrs["units"]
+    np.testing.assert_allclose(open_scan(path).angles, np.deg2rad(made.DEGREES))
+
+
+def test_data_exchange_without_angles_takes_named_ones(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    made.data_exchange(path)
+    with h5py.File(path, "a") as file:
+        file.move("exchange/theta", "elsewhere/angle")
+        del file["exchange/data_white"]
+    with pytest.raises(FileFormatError, match=r"--theta.*/elsewhere/angle|/elsewhere.*--theta"):
+        open_scan(path)
+    scan = open_scan(path, theta="elsewhere/angle")
+    np.testing.assert_allclose(scan.angles, np.deg2rad(made.DEGREES))
+    assert scan.read(0, 1).flats is None
+
+
+def test_a_single_flat_without_its_axis(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    made.data_exchange(path)
+    with h5py.File(path, "a") as file:
+        file["one"] = made.counts(4, 5)
+    rows = open_scan(path, flats="one").read(2, 4)
+    np.testing.assert_array_equal(rows.flats, made.counts(4, 5)[None, 2:4])
+
+
+@pytest.mark.parametrize("group", ["entry1/tomo_entry", "entry0000", "/"])
+def test_nxtomo(tmp_path: Path, group: str) -> None:
+    data = made.nxtomo(tmp_path / "a.nxs", group=group)
+    scan = open_scan(tmp_path / "a.nxs")
+    assert (scan.shape, scan.kind, scan.pitch, scan.unit) == ((4, 4, 5), "transmission", 3.5, "um")
+    assert scan.source == "NXtomo /" + group.strip("/")
+    np.testing.assert_allclose(scan.angles, np.deg2rad([20, 30, 50, 70]))
+    rows = scan.read(1, 4)
+    np.testing.assert_array_equal(rows.projections, data[made.KEYS == 0, 1:4])
+    np.testing.assert_array_equal(rows.flats, data[made.KEYS == 1, 1:4])
+    np.testing.assert_array_equal(rows.darks, data[made.KEYS == 2, 1:4])
+
+
+def test_several_nxtomo_scans_must_be_told_apart(tmp_path: Path) -> None:
+    path = tmp_path / "a.nxs"
+    made.nxtomo(path, group="first")
+    made.nxtomo(path, group="second", mode="a")
+    with h5py.File(path, "a") as file:
+        file["alias"] = h5py.SoftLink("/first")
+    with pytest.raises(FileFormatError, match="several NXtomo"):
+        open_scan(path)
+    assert open_scan(path, dataset="second").source == "NXtomo second"
+    with h5py.File(path, "a") as file:
+        del file["second"]
+    assert open_scan(path).shape == (4, 4, 5)
+
+
+def test_nxtomo_key_count(tmp_path: Path) -> None:
+    path = tmp_path / "a.nxs"
+    made.nxtomo(path)
+    key = "entry1/tomo_entry/instrument/detector/image_key"
+    with h5py.File(path, "a") as file:
+        file[key][:] = 1
+    with pytest.raises(FileFormatError, match="image key 0"):
+        open_scan(path)
+    with h5py.File(path, "a") as file:
+        del file[key]
+        file[key] = np.zeros(5)
+    with pytest.raises(ShapeError, match="5 image keys for 8 frames"):
+        open_scan(path)
+
+
+def test_named_arrays(tmp_path: Path) -> None:
+    path = tmp_path / "a.hdf5"
+    stack = made.counts(6, 4, 5, dtype="<f4")
+    with h5py.File(path, "w") as file:
+        file["a/stack"], file["a/sino"] = stack, stack[:, 2]
+        file["a/angle"], file["a/flat"] = made.DEGREES, stack[0, 2]
+        file["soft"] = h5py.SoftLink("/a")
+    scan = open_scan(path, dataset="soft/stack", theta="/soft/angle")
+    assert (scan.kind, scan.shape) == ("attenuation", (6, 4, 5))
+    np.testing.assert_array_equal(whole(scan), stack)
+    scan = open_scan(path, dataset="/a/sino", theta="a/angle", flats="a/flat")
+    assert (scan.kind, scan.shape) == ("transmission", (6, 1, 5))
+    rows = scan.read(0, 1)
+    np.testing.assert_array_equal(rows.projections[:, 0], stack[:, 2])
+    np.testing.assert_array_equal(rows.flats, stack[:1, 2:3])
+
+
+def test_npz(tmp_path: Path) -> None:
+    data = made.npz(tmp_path / "a.npz")
+    scan = open_scan(tmp_path / "a.npz")
+    assert (scan.shape, scan.kind, scan.pitch) == ((6, 4, 5), "transmission", 0.25)
+    rows = scan.read(2, 4)
+    np.testing.assert_array_equal(rows.projections, data[:, 2:4])
+    assert rows.flats is not None and rows.flats.dtype == np.float32
+    np.testing.assert_array_equal(rows.flats, made.counts(2, 4, 5)[:, 2:4])
+    assert rows.darks is None
+
+
+def test_npz_sinogram(tmp_path: Path) -> None:
+    sinogram = np.asfortranarray(made.counts(6, 5, dtype=">f8"))
+    np.savez(tmp_path / "a.npz", sinogram=sinogram, angles=np.arange(6))
+    scan = open_scan(tmp_path / "a.npz")
+    assert (scan.shape, scan.kind, scan.pitch) == ((6, 1, 5), "attenuation", None)
+    np.testing.assert_array_equal(whole(scan)[:, 0], sinogram)
+
+
+def test_a_scan_can_be_sent_to_another_process(tmp_path: Path) -> None:
+    made.data_exchange(tmp_path / "a.h5")
+    made.npz(tmp_path / "b.npz")
+    for name in ("a.h5", "b.npz"):
+        scan = open_scan(tmp_path / name)
+        np.testing.assert_array_equal(whole(pickle.loads(pickle.dumps(scan))), whole(scan))
+
+
+@pytest.mark.parametrize("rows", [(0, 0), (-1, 2), (2, 5), (3, 2)])
+def test_rows_that_are_not_there(tmp_path: Path, rows: tuple[int, int]) -> None:
+    made.data_exchange(tmp_path / "a.h5")
+    with pytest.raises(InputError, match="the scan has rows 0 to 4"):
+        open_scan(tmp_path / "a.h5").read(*rows)
+
+
+def test_a_file_that_changed_since(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    made.data_exchange(path)
+    scan = open_scan(path)
+    with h5py.File(path, "a") as file:
+        del file["exchange/data"]
+        file["exchange/data"] = made.counts(6, 4, 7)
+    with pytest.raises(FileFormatError, match=r"had shape \(6, 4, 5\)"):
+        scan.read(0, 1)
+    path.unlink()
+    with pytest.raises(InputError, match="no such file"):
+        scan.read(0, 1)
+
+
+def replaced(path: Path, name: str, value: object) -> Path:
+    made.data_exchange(path)
+    with h5py.File(path, "a") as file:
+        del file["exchange/" + name]
+        file["exchange/" + name] = value
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "kind", "message"),
+    [
+        ("theta", np.arange(7.0), ShapeError, "7 angles for 6 projections"),
+        ("theta", np.zeros((3, 2)), ShapeError, "one number per frame"),
+        ("theta", [0, 1, np.nan, 3, 4, 5], NonFiniteError, "angle 2"),
+        ("theta", [b"x"] * 6, DTypeError, "exchange/theta"),
+        ("data", np.zeros((6, 4, 5), np.bool_), DTypeError, "exchange/data.*bool"),
+        ("data", np.zeros((6, 4, 5), np.complex64), DTypeError, "complex64"),
+        ("data", "text", DTypeError, "exchange/data"),
+        ("data", np.zeros((6, 0, 5)), ShapeError, "holds nothing"),
+        ("data", h5py.Empty("f4"), ShapeError, "holds nothing"),
+        ("data", np.zeros((6, 4, 5, 2)), ShapeError, r"wanted \(angle, row, bin\)"),
+        ("data_white", np.zeros((2, 4, 6)), ShapeError, "rows and bins must agree"),
+        ("data_dark", np.zeros(5), ShapeError, "rows and bins must agree"),
+    ],
+)
+def test_arrays_that_do_not_fit(
+    tmp_path: Path, name: str, value: object, kind: type[Exception], message: str
+) -> None:
+    with pytest.raises(kind, match=message):
+        open_scan(replaced(tmp_path / "a.h5", name, value))
+
+
+@pytest.mark.parametrize(
+    ("arrays", "kind", "message"),
+    [
+        ({"angles": np.zeros(5)}, ShapeError, "5 angles for 6"),
+        ({"angles": np.array([0, 1, 2, 3, 4, np.inf])}, NonFiniteError, "angle 5"),
+        ({"projections": np.zeros((6, 4, 5), "?")}, DTypeError, "bool"),
+        ({"projections": np.array([[[None]]])}, DTypeError, "object"),
+        ({"projections": np.zeros((6, 0, 5))}, ShapeError, "holds nothing"),
+        ({"flats": np.zeros((2, 4, 6))}, ShapeError, "must agree"),
+    ],
+)
+def test_npz_arrays_that_do_not_fit(
+    tmp_path: Path, arrays: dict[str, np.ndarray], kind: type[Exception], message: str
+) -> None:
+    usual = {"projections": np.zeros((6, 4, 5)), "angles": np.zeros(6)}
+    np.savez(tmp_path / "a.npz", **{**usual, **arrays})
+    with pytest.raises(kind, match=message):
+        open_scan(tmp_path / "a.npz")
+
+
+def test_files_that_hold_no_scan_list_what_they_hold(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for index in range(12):
+            file[f"g/d{index:02}"] = np.zeros((2, index + 1))
+    with pytest.raises(FileFormatError, match=r"'/g/d00' \(2, 1\).*'/g/d07' \(2, 8\), \.\.\.:"):
+        open_scan(tmp_path / "a.h5")
+    with pytest.raises(FileFormatError, match=r"no dataset 'g/x'; it holds '/g/d00'"):
+        open_scan(tmp_path / "a.h5", dataset="g/x")
+    with pytest.raises(FileFormatError, match="--theta"):
+        open_scan(tmp_path / "a.h5", dataset="g/d01")
+    np.savez(tmp_path / "a.npz", other=np.zeros((2, 3)))
+    with pytest.raises(FileFormatError, match=r"'other' \(2, 3\).*dataset="):
+        open_scan(tmp_path / "a.npz")
+
+
+def test_names_that_lie(tmp_path: Path) -> None:
+    (tmp_path / "text.h5").write_text("not a scan")
+    with pytest.raises(FileFormatError, match="neither HDF5 nor NPZ"):
+        open_scan(tmp_path / "text.h5")
+    made.data_exchange(tmp_path / "really_hdf5.npz")
+    with pytest.raises(FileFormatError, match="the name says NPZ, the content is HDF5"):
+        open_scan(tmp_path / "really_hdf5.npz")
+    made.data_exchange(tmp_path / "a.dat")
+    with pytest.raises(InputError, match=r"not from '\.dat'"):
+        open_scan(tmp_path / "a.dat")
+    with pytest.raises(InputError, match=r"gone\.h5: there is no such file"):
+        open_scan(tmp_path / "gone.h5")
+    (tmp_path / "folder.h5").mkdir()
+    with pytest.raises(InputError, match="is not a file"):
+        open_scan(tmp_path / "folder.h5")
+
+
+def test_the_tooth(shared_data: Path) -> None:
+    scan = open_scan(shared_data / "tooth" / "tooth.h5")
+    assert (scan.shape, scan.kind) == ((181, 2, 640), "transmission")
+    assert scan.angles[-1] == pytest.approx(np.deg2rad(179.0055), abs=1e-6)
+    rows = scan.read(1, 2)
+    assert rows.flats is not None and rows.darks is not None
+    assert rows.flats.shape == rows.darks.shape == (10, 1, 640)
+    dark = rows.darks.mean(0)
+    line = -np.log((rows.projections - dark) / (rows.flats.mean(0) - dark))
+    assert abs(np.median(line[:, 0, :40])) < 0.05 < 0.5 < line[:, 0, 250:350].mean()
