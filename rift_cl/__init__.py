@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from rift_cl import metrics as metrics
-    from rift_cl import phantom as phantom
+    from rift_cl import metrics, phantom
     from rift_cl.cl import Device, default_device, devices, open_device
     from rift_cl.errors import RiftError
     from rift_cl.geometry import Grid, Parallel
@@ -46,7 +45,25 @@ _HOMES = {
 }
 _MODULES = ("metrics", "phantom")
 
-__all__ = [*sorted(_HOMES), *_MODULES]
+__all__ = [
+    "Device",
+    "Grid",
+    "HighPass",
+    "LinearOperator",
+    "Parallel",
+    "Projector",
+    "Ramp",
+    "Response",
+    "RiftError",
+    "backproject",
+    "default_device",
+    "devices",
+    "dot_test",
+    "fbp",
+    "metrics",
+    "open_device",
+    "phantom",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -14,6 +14,7 @@ from rift_cl.cl.traits import Traits
 from rift_cl.errors import InputError, ResourceLimitError
 
 _HOST_SHARE = 0.6
+_MOST = 1 << 63
 _UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
 
 
@@ -28,7 +29,7 @@ def parse_bytes(text: str) -> int:
         amount = float(match[1]) * _UNITS[match[2].upper()] if match else 0.0
     except ValueError:
         amount = 0.0
-    if amount < 1:
+    if not 1 <= amount < _MOST:
         raise InputError(f"memory is {text!r}, wanted a positive amount such as 512M or 2G")
     return int(amount)
 
@@ -87,8 +88,7 @@ def plan_chunks(count: int, each: int, fixed: int, budget: int, *, what: str) ->
             "with more memory, or make the problem smaller"
         )
     runs = -(-count // most)
-    edges = [count * run // runs for run in range(runs + 1)]
-    return [slice(start, stop) for start, stop in zip(edges, edges[1:], strict=False)]
+    return [slice(count * run // runs, count * (run + 1) // runs) for run in range(runs)]
 
 
 def format_bytes(amount: float) -> str:

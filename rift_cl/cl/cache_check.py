@@ -2,57 +2,58 @@
 
 PoCL dies by a signal when a kernel in its cache was cut short or altered, by a full disk or a
 power cut, and no exception can tell of it. So checksums are written down while the build lock is
-held, and compared when the next process starts: a program whose files are not as they were
-written down, or that a killed process left behind, is removed and built again. What is damaged
-while a process runs is found by the next one only.
+held, and compared when the next process starts: a program that is not as it was written down is
+removed and built again. What is damaged while a process runs is found by the next one only.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
-LOCK = "build.lock"
 _RECORD = "checksums.json"
 # A driver touches this file to say when it used a program; it holds nothing.
 _TOUCHED = "last_accessed"
+_UNKNOWN, _UNREADABLE = -1, -2
 
 
 def remove_damaged(folder: Path) -> int:
     """Remove every program that is not as it was recorded; hold the build lock meanwhile.
 
+    A program without a record stays: another process may be building it without our lock, and
+    a driver puts its files in place whole. Without any record nothing can be trusted.
+
     Returns:
-        The number of programs and stray files that were removed.
+        The number of programs that were removed.
     """
     known = _read(folder)
-    damaged = set()
-    for name, path in _files(folder):
-        if known.get(name) != _checksum(path):
-            damaged.add(_program(name))
+    damaged = {
+        _program(name)
+        for name, path in _files(folder)
+        if known is None or known.get(name, _UNKNOWN) not in (_UNKNOWN, _checksum(path))
+    }
     for program in damaged:
-        _remove(folder / program)
-    _write(folder, {name: value for name, value in known.items() if _program(name) not in damaged})
+        shutil.rmtree(folder / program, ignore_errors=True)
+    kept = {name: value for name, value in (known or {}).items() if _program(name) not in damaged}
+    _write(folder, kept)
     return len(damaged)
 
 
 def record(folder: Path) -> None:
     """Write down the checksums of files that are new; hold the build lock meanwhile."""
-    known, new = _read(folder), {}
-    for name, path in _files(folder):
-        # A file at the top is the driver's scratch; it belongs to no program.
-        if name not in known and "/" in name:
-            new[name] = _checksum(path)
+    known = _read(folder) or {}
+    new = {name: _checksum(path) for name, path in _files(folder) if name not in known}
     if new:
         _write(folder, {**known, **new})
 
 
 def _files(folder: Path) -> Iterator[tuple[str, Path]]:
-    for path in folder.rglob("*"):
-        if path.is_file() and path.name not in (LOCK, _RECORD, _TOUCHED):
+    """Every file of every program, by its name inside the cache."""
+    for path in folder.glob("*/*/**/*"):
+        if path.is_file() and path.name != _TOUCHED:
             yield path.relative_to(folder).as_posix(), path
 
 
@@ -65,25 +66,18 @@ def _checksum(path: Path) -> int:
     try:
         return zlib.crc32(path.read_bytes())
     except OSError:
-        return -1
+        return _UNREADABLE
 
 
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)
-
-
-def _read(folder: Path) -> dict[str, int]:
+def _read(folder: Path) -> dict[str, int] | None:
     try:
         known = json.loads((folder / _RECORD).read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        return {}
-    return known if isinstance(known, dict) else {}
+        return None
+    return known if isinstance(known, dict) else None
 
 
 def _write(folder: Path, known: dict[str, int]) -> None:
     part = folder / f"{_RECORD}.part"
     part.write_text(json.dumps(known), encoding="utf-8")
-    os.replace(part, folder / _RECORD)
+    part.replace(folder / _RECORD)

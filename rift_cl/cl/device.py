@@ -6,19 +6,18 @@ pickled as the selector that opens it: contexts do not travel, names do.
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import Any
+import threading
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from rift_cl.cl.budget import memory_budget
 from rift_cl.cl.failures import named_errors
-from rift_cl.cl.memory import download, upload
+from rift_cl.cl.memory import as_plain, as_real_array, download, upload
 from rift_cl.cl.process import claim_process
 from rift_cl.cl.program import Programs
 from rift_cl.cl.traits import Traits
-from rift_cl.errors import DTypeError
 
 
 class Device:
@@ -41,6 +40,8 @@ class Device:
         self.traits = traits or Traits.of(handle)
         self._limit = memory
         self._handle = handle
+        self._opened: _Opened | None = None
+        self._opening = threading.Lock()
         self._programs = Programs(self)
 
     def __repr__(self) -> str:
@@ -53,28 +54,28 @@ class Device:
 
         return open_device, (self.selector, self._limit)
 
-    @cached_property
+    @property
     def context(self) -> Any:
         """The ``pyopencl.Context``."""
-        import pyopencl as cl
+        return self._open().context
 
-        claim_process()
-        with named_errors("opening it", self.name):
-            return cl.Context([self._handle])
-
-    @cached_property
+    @property
     def queue(self) -> Any:
         """The one in-order ``pyopencl.CommandQueue``."""
-        import pyopencl as cl
+        return self._open().queue
 
-        with named_errors("opening it", self.name):
-            return cl.CommandQueue(self.context)
+    def _open(self) -> _Opened:
+        """What this device works with, opened by its first user: threads must share one context.
 
-    @cached_property
-    def _pool(self) -> Any:
-        from pyopencl.tools import ImmediateAllocator, MemoryPool
-
-        return MemoryPool(ImmediateAllocator(self.queue))
+        Raises:
+            ForkedContextError: OpenCL was used before this process was forked.
+        """
+        claim_process()
+        with self._opening:
+            if self._opened is None:
+                with named_errors("opening it", self.name):
+                    self._opened = _Opened.of(self._handle)
+            return self._opened
 
     @property
     def budget(self) -> int:
@@ -85,9 +86,13 @@ class Device:
         """A new ``pyopencl.array.Array`` whose contents are not set."""
         from pyopencl.array import Array
 
-        claim_process()
+        opened = self._open()
+        # Blocks that are kept for the next array count as well, until the room is needed.
+        wanted = int(np.prod(shape, dtype=np.int64)) * np.dtype(dtype).itemsize
+        if opened.pool.managed_bytes + wanted > self.budget:
+            opened.pool.free_held()
         with named_errors(f"allocating an array of shape {shape}", self.name):
-            return Array(self.queue, shape, dtype, allocator=self._pool)
+            return Array(opened.queue, shape, dtype, allocator=opened.pool)
 
     def zeros(self, shape: int | tuple[int, ...], dtype: DTypeLike = np.float32) -> Any:
         """A new device array of zeros."""
@@ -105,13 +110,9 @@ class Device:
         Raises:
             DTypeError: the values are not real numbers.
         """
-        values = np.asarray(host)
-        if values.dtype.kind not in "fiub":
-            raise DTypeError(f"array has type {values.dtype}, wanted real numbers")
-        if values.dtype.kind in "fb":
-            values = values.astype(np.float32, copy=False)
-        native = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("="))
-        return upload(self, native.reshape(values.shape))
+        values = as_real_array(host, name="array")
+        native = np.float32 if values.dtype.kind in "fb" else values.dtype.newbyteorder("=")
+        return upload(self, as_plain(values, native))
 
     def get(self, array: Any) -> NDArray[Any]:
         """Copy a device array to the host."""
@@ -123,9 +124,27 @@ class Device:
 
     def finish(self) -> None:
         """Wait until everything enqueued is done."""
+        queue = self.queue
         with named_errors("finishing its work", self.name):
-            self.queue.finish()
+            queue.finish()
 
     def release(self) -> None:
         """Give memory that no array uses any more back to the driver."""
-        self._pool.free_held()
+        self._open().pool.free_held()
+
+
+class _Opened(NamedTuple):
+    """What is made once a device is needed."""
+
+    context: Any
+    queue: Any
+    pool: Any
+
+    @classmethod
+    def of(cls, handle: Any) -> _Opened:
+        import pyopencl as cl
+        from pyopencl.tools import ImmediateAllocator, MemoryPool
+
+        context = cl.Context([handle])
+        queue = cl.CommandQueue(context)
+        return cls(context, queue, MemoryPool(ImmediateAllocator(queue)))

@@ -9,7 +9,7 @@ no GPU.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import threading
 from functools import cache
 from typing import Any
 
@@ -22,38 +22,44 @@ _INSTALL = (
     "install a driver: your GPU vendor's OpenCL package, or on Linux x86-64 a CPU driver from "
     "PyPI with: pip install 'pyopencl[pocl]'"
 )
+_enumerating = threading.Lock()
 # A driver that calls itself by a long name is asked for by the short one.
 _NICKNAMES = {"pocl": "portable computing language"}
 
 
-@cache
 def devices() -> tuple[Device, ...]:
     """Every device of every OpenCL platform; empty where there is none.
 
     Raises:
         ForkedContextError: OpenCL was used before this process was forked.
     """
-    return tuple(
-        Device(handle, f"{platform}:{index}") for platform, index, handle in _enumerate()
-    )
-
-
-def _enumerate() -> Iterator[tuple[int, int, Any]]:
     claim_process()
+    # Threads that ask at the same time must be given the same devices, or they cannot share arrays.
+    with _enumerating:
+        return _found()
+
+
+@cache
+def _found() -> tuple[Device, ...]:
     prepare_cache()
     import pyopencl as cl
 
     try:
         platforms = cl.get_platforms()
     except cl.Error:
-        return
-    for number, platform in enumerate(platforms):
-        try:
-            handles = platform.get_devices()
-        except cl.Error:
-            continue
-        for index, handle in enumerate(handles):
-            yield number, index, handle
+        return ()
+    return tuple(d for number, platform in enumerate(platforms) for d in _of(number, platform))
+
+
+def _of(number: int, platform: Any) -> list[Device]:
+    import pyopencl as cl
+
+    try:
+        handles = platform.get_devices()
+        return [Device(handle, f"{number}:{index}") for index, handle in enumerate(handles)]
+    except cl.Error:
+        # A driver that cannot answer must not hide the others.
+        return []
 
 
 def open_device(selector: str | None = None, memory: int | None = None) -> Device:
@@ -67,7 +73,6 @@ def open_device(selector: str | None = None, memory: int | None = None) -> Devic
     Raises:
         NoDeviceError: there is no device, or none that fits the selector.
     """
-    claim_process()
     found = devices()
     if not found:
         raise NoDeviceError(f"no OpenCL device was found: {_INSTALL}")

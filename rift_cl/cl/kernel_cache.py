@@ -19,13 +19,15 @@ from functools import cache
 from pathlib import Path
 
 from rift_cl import __version__
-from rift_cl.cl.cache_check import LOCK, record, remove_damaged
+from rift_cl.cl.cache_check import record, remove_damaged
 from rift_cl.errors import DeviceError
 
 try:
     import fcntl
 except ImportError:  # Windows: no PoCL wheel there, so no cache to guard
     fcntl = None  # type: ignore[assignment]
+
+_LOCK = "build.lock"
 
 
 def prepare_cache() -> None:
@@ -102,7 +104,7 @@ def build_lock() -> Iterator[None]:
     folder = cache_folder()
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        handle = (folder / LOCK).open("w")
+        handle = (folder / _LOCK).open("w")
     except OSError as error:
         raise DeviceError(
             f"kernel cache {folder} cannot be used any more ({error.strerror}): make it writable, "
@@ -132,6 +134,6 @@ def clear_cache() -> int:
         for entry in cache_folder().iterdir():
             if entry.is_dir():
                 shutil.rmtree(entry, ignore_errors=True)
-            elif entry.name != LOCK:
+            elif entry.name != _LOCK:
                 entry.unlink(missing_ok=True)
         return before - cache_size()

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from rift_cl.cl.failures import named_errors
 from rift_cl.errors import DeviceError, DTypeError, NonFiniteError, ShapeError
@@ -40,17 +40,36 @@ def as_host_array(
         DTypeError: the values are not real numbers.
         NonFiniteError: a value is NaN or infinite, or too large for float32.
     """
-    if isinstance(values, np.ma.MaskedArray):
-        raise DTypeError(f"{name} is a masked array: fill the masked values first")
-    array = np.asarray(values)
-    if array.dtype.kind not in "fiub":
-        raise DTypeError(f"{name} has type {array.dtype}, wanted real numbers (float32)")
+    array = as_real_array(values, name=name)
     if array.shape != shape:
         raise ShapeError(f"{name} has shape {array.shape}, {wants} wants {shape}")
-    with np.errstate(over="ignore"):
-        array = np.ascontiguousarray(array, dtype=np.float32)
-    check_finite(array, name=name)
+    plain = as_plain(array, np.float32)
+    check_finite(plain, name=name)
+    return plain
+
+
+def as_real_array(values: Any, *, name: str) -> NDArray[Any]:
+    """Read anything as a NumPy array of real numbers.
+
+    Raises:
+        DTypeError: the values are not real numbers.
+    """
+    if isinstance(values, np.ma.MaskedArray):
+        raise DTypeError(f"{name} is a masked array: fill the masked values first")
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise DTypeError(f"{name} cannot be read as an array of numbers: {error}") from error
+    if array.dtype.kind not in "fiub":
+        raise DTypeError(f"{name} has type {array.dtype}, wanted real numbers (float32)")
     return array
+
+
+def as_plain(array: NDArray[Any], dtype: DTypeLike) -> NDArray[Any]:
+    """The same values in the one form that a driver takes: aligned, C-ordered, of this type."""
+    # A value too large for float32 becomes infinite, whatever numpy.seterr says.
+    with np.errstate(all="ignore"):
+        return np.require(array, dtype, ["C_CONTIGUOUS", "ALIGNED"])
 
 
 def check_finite(array: NDArray[Any], *, name: str) -> None:
@@ -65,8 +84,8 @@ def check_finite(array: NDArray[Any], *, name: str) -> None:
             bad = np.flatnonzero(~np.isfinite(flat))
             place = tuple(int(i) for i in np.unravel_index(bad[0], array.shape))
             raise NonFiniteError(
-                f"{name} holds {bad.size} values that are not finite, the first ({flat[bad[0]]}) "
-                f"at {place}: replace them before, for example with numpy.nan_to_num"
+                f"{name} holds NaN or infinity in {bad.size} places, first ({flat[bad[0]]}) at "
+                f"{place}: replace them before, for example with numpy.nan_to_num"
             )
 
 
@@ -104,9 +123,14 @@ def download(device: Device, array: Any, out: NDArray[Any] | None = None) -> NDA
         device: where the array lives.
         array: the device array.
         out: C-ordered host array of the same shape and type to fill; a new one if not given.
+
+    Raises:
+        ShapeError: the array is a strided view.
+        DeviceError: the array belongs to another device.
     """
     import pyopencl as cl
 
+    _check_whole(device, array, name="array")
     host = np.empty(array.shape, array.dtype) if out is None else out
     if host.size:
         with named_errors(f"copying {host.nbytes} bytes from it", device.name):
@@ -126,11 +150,16 @@ def as_device_array(device: Device, array: Any, shape: tuple[int, ...], *, name:
         raise ShapeError(f"{name} has shape {array.shape}, wanted {shape}")
     if array.dtype != np.float32:
         raise DTypeError(f"{name} has type {array.dtype} on the device, wanted float32")
+    _check_whole(device, array, name=name)
+    return array
+
+
+def _check_whole(device: Device, array: Any, *, name: str) -> None:
+    """Kernels and copies see buffers, and know nothing of views into them."""
     if not array.flags.c_contiguous or array.offset:
         raise ShapeError(f"{name} is a strided view on the device: pass {name}.copy()")
     if array.context != device.context:
         raise DeviceError(f"{name} lives on another device than {device.name}: copy it over first")
-    return array
 
 
 def is_device_array(value: Any) -> bool:

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from rift_cl.cl.device import Device
 
 OPTIONS = ("-cl-std=CL1.2", "-cl-mad-enable", "-w")
+# PoCL compiles for grids up to this size and for larger ones apart.
+_SMALL_GRID = 65534
 _PAUSES = (0.0, 0.1, 0.3)
 _Key = tuple[str, tuple[tuple[str, int | float], ...]]
 
@@ -45,12 +47,16 @@ class Programs:
     def __init__(self, device: Device) -> None:
         self._device = device
         self._programs: dict[_Key, Any] = {}
-        self._started: set[_Key] = set()
+        self._started: set[tuple[_Key, bool]] = set()
         self._building = threading.RLock()
         self._own = _ThreadKernels()
 
     def launch(
-        self, name: str, size: tuple[int, ...], arguments: tuple[Any, ...], macros: Mapping[str, Any]
+        self,
+        name: str,
+        size: tuple[int, ...],
+        arguments: tuple[Any, ...],
+        macros: Mapping[str, Any],
     ) -> None:
         """Enqueue one kernel over ``size`` work-items; the first axis is rounded up to groups.
 
@@ -78,20 +84,23 @@ class Programs:
 
         queue = self._device.queue
         kernel.set_args(*(_argument(value) for value in values))
-        if key in self._started:
+        started = (key, max(size) > _SMALL_GRID)
+        if started in self._started:
             cl.enqueue_nd_range_kernel(queue, kernel, size, local)
             return
         # PoCL compiles again for the first launch, into the same cache.
         with self._building, build_lock():
             cl.enqueue_nd_range_kernel(queue, kernel, size, local)
             queue.finish()
-            self._started.add(key)
+            self._started.add(started)
 
     def _kernel(self, key: _Key) -> Any:
         if key not in self._own.kernels:
             import pyopencl as cl
 
-            self._own.kernels[key] = cl.Kernel(self._program(key), key[0])
+            program = self._program(key)
+            with named_errors(f"loading kernel {key[0]}", self._device.name):
+                self._own.kernels[key] = cl.Kernel(program, key[0])
         return self._own.kernels[key]
 
     def _program(self, key: _Key) -> Any:
@@ -129,7 +138,7 @@ def _argument(value: Any) -> Any:
 
 
 def _literal(value: float) -> str:
-    return f"{value!r}f" if isinstance(value, float) else str(int(value))
+    return f"{float(value)!r}f" if isinstance(value, (float, np.floating)) else str(int(value))
 
 
 def _log(text: str) -> str:

@@ -57,7 +57,8 @@ class Grid:
     def coordinates(self, axis: int) -> NDArray[np.float64]:
         """Coordinates of the samples along one axis (an index into ``shape``)."""
         n = self.shape[axis]
-        return self.center[axis] + (np.arange(n) - (n - 1) / 2) * self.spacing[axis]
+        steps = np.arange(n, dtype=np.float64) - (n - 1) / 2
+        return self.center[axis] + steps * self.spacing[axis]
 
     def slice(self) -> Grid:
         """The grid of one slice: a volume without its z axis, an image as it is."""

@@ -65,7 +65,8 @@ class Parallel:
 
     def coordinates(self) -> NDArray[np.float64]:
         """The coordinate t of every bin's centre, in the unit of ``pitch``."""
-        return (np.arange(self.bins) - self.center) * self.pitch
+        t: NDArray[np.float64] = (np.arange(self.bins, dtype=np.float64) - self.center) * self.pitch
+        return t
 
 
 def _angles(angles: ArrayLike) -> NDArray[np.float64]:

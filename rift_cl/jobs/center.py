@@ -64,10 +64,8 @@ class CenterJob:
         total = 1 + len(_SHEET)
         yield Report(0, total, "steps")
         sinogram = read_attenuation(self.scan, self.row, self.row + 1).projections[:, 0]
-        found = find_center(
-            sinogram, self.scan.angles, span=self.settings.span, device=self.device
-        )
-        self.metrics = {"center": found.center, "row": self.row}
+        found = find_center(sinogram, self.scan.angles, span=self.settings.span, device=self.device)
+        self.metrics = {"center": found.center, "row": self.row, "decided_by": found.by}
         slices = {}
         for step, offset in enumerate(_SHEET, start=1):
             yield Report(step, total, "steps", {"center": found.center})
@@ -114,8 +112,12 @@ class CenterJob:
         }
         for name, title in titles.items():
             scores = getattr(found, name)
+            if not scores.size:
+                continue
             series = {"score": (scores[0], scores[1])}
-            figure = curves(series, xlabel="centre, bins", ylabel=title, mark=round(found.center, 2))
+            figure = curves(
+                series, xlabel="centre, bins", ylabel=title, mark=round(found.center, 2)
+            )
             page.figure(figure_png(figure), caption=captions[name], alt=f"Curve of {title}")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,12 @@ from rift_cl.plot import curves, figure_png, image_grid
 from rift_cl.progress import Report
 
 COLUMNS = ("views", "PSNR unfiltered", "SSIM unfiltered", "PSNR filtered", "SSIM filtered")
-_KEYS = ("psnr_unfiltered", "ssim_unfiltered", "psnr_filtered", "ssim_filtered")
+SCORES = ("psnr_unfiltered", "ssim_unfiltered", "psnr_filtered", "ssim_filtered")
+
+SCORING = (
+    "PSNR in dB (peak 1) and SSIM, inside the inscribed disc. Unfiltered slices are scored after "
+    "an affine fit to the phantom (gain and offset), filtered ones as they are."
+)
 
 
 @dataclass(frozen=True)
@@ -55,7 +60,7 @@ class DemoJob:
         scores = []
         for score in view_study(self.settings.size, counts, self.device):
             scores.append(score)
-            self.rows.append((score.views, *(score.scores[key] for key in _KEYS)))
+            self.rows.append(study_row(score))
             yield Report(len(scores), len(counts), "view counts")
         self.folder.make()
         for score in scores:
@@ -77,16 +82,16 @@ class DemoJob:
             alt="Reconstructions for growing numbers of views, unfiltered above, filtered below",
         )
         page.table(COLUMNS, self.rows, caption=SCORING)
+        views = [s.views for s in scores]
         for metric, label in (("psnr", "PSNR, dB"), ("ssim", "SSIM")):
-            figure = study_curves(scores, metric, label)
+            figure = study_curves(views, [s.scores for s in scores], metric, label)
             page.figure(figure_png(figure), caption=SCORING, alt=f"{label} against views")
         return page
 
 
-SCORING = (
-    "PSNR in dB (peak 1) and SSIM, inside the inscribed disc. Unfiltered slices are scored after "
-    "an affine fit to the phantom (gain and offset), filtered ones as they are."
-)
+def study_row(score: ViewScore) -> tuple[float, ...]:
+    """A row of the table of scores."""
+    return (score.views, *(score.scores[key] for key in SCORES))
 
 
 def study_panels(scores: list[ViewScore]) -> Any:
@@ -100,11 +105,12 @@ def study_panels(scores: list[ViewScore]) -> Any:
     )
 
 
-def study_curves(scores: list[ViewScore], metric: str, label: str) -> Any:
+def study_curves(
+    views: Sequence[int], scores: Sequence[Mapping[str, float]], metric: str, label: str
+) -> Any:
     """One metric of a study against the number of views."""
-    views = [s.views for s in scores]
     series = {
-        name: (views, [s.scores[f"{metric}_{name}"] for s in scores])
+        name: (views, [score[f"{metric}_{name}"] for score in scores])
         for name in ("unfiltered", "filtered")
     }
     return curves(series, xlabel="number of views", ylabel=label, log_x=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.discovery import devices, open_device
+from rift_cl.cl.self_test import self_test
 
 COLUMNS = ("device", "name", "platform, driver", "kind", "units", "memory", "traits", "self-test")
 
@@ -27,10 +28,8 @@ def device_rows() -> list[tuple[str, ...]]:
     Raises:
         NoDeviceError: there is none, or ``RIFT_DEVICE`` fits none.
     """
-    from rift_cl.cl.self_test import self_test
-
     chosen = open_device().selector
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for number, device in enumerate(devices()):
         traits, test = device.traits, self_test(device)
         features = {"unified memory": traits.unified, "fp64": traits.fp64, "PoCL": traits.pocl}

@@ -6,6 +6,7 @@ memory budget allows, so that the size of a scan is bounded by the disk alone.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -113,7 +114,7 @@ class Reconstruction:
         return {
             "scan": f"{self.scan.path} ({self.scan.source}, {self.scan.kind})",
             "projections": f"{self.scan.shape} (angle, row, bin)",
-            "volume": f"{self.shape} (z, y, x), {format_bytes(4 * np.prod(self.shape))}",
+            "volume": f"{self.shape} (z, y, x), {format_bytes(4 * math.prod(self.shape))}",
             "slabs": f"{len(self.slabs)} of at most {max(s.stop - s.start for s in self.slabs)}",
             "device": f"{self.device.name}, budget {format_bytes(self.device.budget)}",
             "output": str(self.settings.out / _NAMES[self.settings.format]),

@@ -56,9 +56,7 @@ class RunFolder:
         if self.path.is_dir() and not any(self.path.iterdir()):
             self.path.rmdir()
 
-    def finish(
-        self, settings: Any, metrics: Mapping[str, Any], page: Page, device: Device
-    ) -> None:
+    def finish(self, settings: Any, metrics: Mapping[str, Any], page: Page, device: Device) -> None:
         """Write the report, the metrics and, last, the configuration."""
         config = {
             "job": self._job,

@@ -108,7 +108,7 @@ class Response:
 
         count = _OVERSAMPLING * bins
         width = 0.5 / pitch / count
-        frequencies = (np.arange(count) + 0.5) * width
+        frequencies: Floats = (np.arange(count, dtype=np.float64) + 0.5) * width
         values = np.asarray(self.function(frequencies), dtype=np.float64)
         if values.shape != frequencies.shape or not np.isfinite(values).all():
             raise InputError("filter response must give one finite number for each frequency")
@@ -176,7 +176,8 @@ class ViewFilter(LinearOperator):
         macros = {"BLOCKS": self._blocks, "ROWS": self._run}
         self.device.launch("filter_views", size, *arguments, **macros)
 
-    _apply_adjoint = _apply
+    def _apply_adjoint(self, y: Any, out: Any) -> None:
+        self._apply(y, out)
 
     def _pieces(self, budget: int) -> Iterable[Piece]:
         if len(self.domain) == 2:

@@ -19,7 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.cl.memory import as_device_array, as_host_array, check_output, download, is_device_array, share
+from rift_cl.cl.memory import (
+    as_device_array,
+    as_host_array,
+    check_output,
+    download,
+    is_device_array,
+    share,
+)
 from rift_cl.errors import DeviceMemoryError, ResourceLimitError, ShapeError
 
 Shape = tuple[int, ...]
@@ -149,7 +156,7 @@ class Adjoint(LinearOperator):
         self._forward = forward
 
     @property
-    def T(self) -> LinearOperator:  # type: ignore[override]
+    def T(self) -> LinearOperator:
         """The operator that this is the adjoint of."""
         return self._forward
 

@@ -82,8 +82,8 @@ class Projector(LinearOperator):
 
     def _split(self, walk: _Walk, image: Any, slab: _Slab, transpose: int) -> Any:
         table, margin = walk.table, self._segment
-        plane = self.device.zeros((slab.count, table.rows, table.width + 2 * margin))
-        tiles = (*self._tiles(table.width, table.rows), slab.count)
+        plane = self.device.zeros((slab.slices, table.rows, table.width + 2 * margin))
+        tiles = (*self._tiles(table.width, table.rows), slab.slices)
         shape = (table.rows, table.width, margin)
         arguments = (image, plane, slab.first, *shape)
         self.device.launch("plane_split", tiles, *arguments, TRANSPOSE=transpose)
@@ -91,10 +91,10 @@ class Projector(LinearOperator):
 
     def _project(self, walk: _Walk, plane: Any, out: Any, slab: _Slab, run: _Run) -> None:
         table, (first, count) = walk.table, run
-        entries = self.device.empty((slab.count, count, table.entries))
+        entries = self.device.empty((slab.slices, count, table.entries))
         self.device.launch(
             "radon_project",
-            (table.columns // self._segment, count, slab.count),
+            (table.columns // self._segment, count, slab.slices),
             *(entries, plane, walk.geometry, walk.orders, walk.starts, walk.views),
             *(first, table.columns, table.rows, table.width),
             **self._macros,
@@ -102,7 +102,7 @@ class Projector(LinearOperator):
         bins = 64 if self.device.traits.is_cpu else 1
         self.device.launch(
             "radon_resample_adjoint",
-            (-(-self.scan.bins // bins), count, slab.count),
+            (-(-self.scan.bins // bins), count, slab.slices),
             *(out, entries, walk.geometry, walk.hats, walk.views),
             *(first, slab.first, slab.total, self.scan.bins, table.columns, table.reach),
             BINS=bins,
@@ -113,26 +113,26 @@ class Projector(LinearOperator):
         for slab in _slabs(out):
             planes = [self._backproject(walk, y, slab) for walk in self._walks]
             ny, nx = self.grid.shape[-2:]
-            tiles = (*self._tiles(nx, ny), slab.count)
+            tiles = (*self._tiles(nx, ny), slab.slices)
             pitches = [walk.table.padded for walk in self._walks]
             self.device.launch("plane_merge", tiles, *planes, out, slab.first, ny, nx, *pitches)
 
     def _backproject(self, walk: _Walk, y: Any, slab: _Slab) -> Any:
         table = walk.table
-        plane = self.device.zeros((slab.count, table.rows, table.padded))
+        plane = self.device.zeros((slab.slices, table.rows, table.padded))
         rows = 16 if self.device.traits.is_cpu else 1
         for first, count in self._runs(walk, slab):
-            entries = self.device.empty((slab.count, count, table.entries))
+            entries = self.device.empty((slab.slices, count, table.entries))
             self.device.launch(
                 "radon_resample",
-                (table.columns // self.device.traits.macros["LANES"], count, slab.count),
+                (table.columns // self.device.traits.macros["LANES"], count, slab.slices),
                 *(y, entries, walk.geometry, walk.hats, walk.views),
                 *(first, slab.first, slab.total, self.scan.bins, table.columns, table.taps),
                 **self._macros,
             )
             self.device.launch(
                 "radon_backproject",
-                (table.padded // self._segment, -(-table.rows // rows), slab.count),
+                (table.padded // self._segment, -(-table.rows // rows), slab.slices),
                 *(entries, plane, walk.geometry),
                 *(first, count, table.columns, table.rows, table.padded),
                 ROWS=rows,
@@ -147,7 +147,7 @@ class Projector(LinearOperator):
     def _runs(self, walk: _Walk, slab: _Slab) -> Iterator[_Run]:
         """Runs of views whose tables fit the table memory, but no fewer than a cache's worth."""
         room = _TABLE_BYTES["cpu" if self.device.traits.is_cpu else "gpu"]
-        most = max(_FEWEST_VIEWS, room // (4 * walk.table.entries * slab.count))
+        most = max(_FEWEST_VIEWS, room // (4 * walk.table.entries * slab.slices))
         for first in range(0, walk.count, most):
             yield _Run(first, min(most, walk.count - first))
 
@@ -184,10 +184,10 @@ class _Walk:
 
 
 class _Slab(NamedTuple):
-    """Slices that are worked on together: ``count`` of ``total``, from ``first``."""
+    """Slices that are worked on together: ``slices`` of ``total``, from ``first``."""
 
     first: int
-    count: int
+    slices: int
     total: int
 
 
@@ -195,7 +195,7 @@ class _Run(NamedTuple):
     """Views whose tables exist at the same time."""
 
     first: int
-    count: int
+    views: int
 
 
 def _slabs(image: Any) -> Iterator[_Slab]:

@@ -1,17 +1,19 @@
 """The centre of rotation: first from opposite views, then from the sharpness of the slice.
 
 Two views from opposite sides are mirror images about the axis, so the reflection under which they
-correlate best gives the centre to about a bin; it works for truncated and noisy data too. Near it
-the slice itself decides. A wrong centre smears every point into a small arc with negative values
-beside it, which adds as much negative as positive, so the mean absolute value of the slice is
-least at the right one (Donath, Beckmann and Schreyer, J. Opt. Soc. Am. A 23, 1048, 2006, metric
-Q_IA). Far from the right centre that metric misleads, since then the object leaves the field of
-view; hence the order.
+correlate best gives the centre. Over a full turn there are such pairs, and they decide. Over half
+a turn the nearest pairs are off by the step between views, and the slice itself decides near
+their answer: a wrong centre smears every point into a small arc with negative values beside it,
+which adds as much negative as positive, so the mean absolute value of the slice is least at the
+right one (Donath, Beckmann and Schreyer, J. Opt. Soc. Am. A 23, 1048, 2006, metric Q_IA). Far
+from the right centre that metric misleads, since then the object leaves the field of view; hence
+the order, and where it has no minimum nearby, as for a truncated object, the pairs decide again.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +29,8 @@ from rift_cl.reconstruct.fbp import fbp
 Floats = NDArray[np.float64]
 # Pairs of views that are compared: those nearest to opposite.
 _PAIRS = 8
+# Pairs count as opposite when no bin moves further than this between them, in bins.
+_EXACT = 0.5
 # Steps of the two rounds of the sharpness search, and how far each looks, in bins.
 _ROUNDS = ((1.0, 6.0), (0.25, 1.5))
 # Half-width of the parabola in bins: wide enough to average over the ripple that interpolation
@@ -42,12 +46,15 @@ class CenterSearch:
         center: the best centre, in bins.
         mirror: centres (first row) and the correlation of mirrored opposite views (second row),
             1 at best.
-        sharpness: centres and the mean absolute value of their slices, least at best.
+        sharpness: centres and the mean absolute value of their slices, least at best; empty
+            where opposite views decide alone.
+        by: what decided, "sharpness" or "mirror".
     """
 
     center: float
     mirror: Floats
     sharpness: Floats
+    by: str
 
 
 def find_center(
@@ -76,28 +83,28 @@ def find_center(
         raise InputError(f"span is {(low, high)}, wanted bins between 0 and {bins - 1}")
     if bins < 8 or not np.ptp(y) > 0:
         raise InputError("the sinogram has too few bins or no contrast: give the center yourself")
-    mirror = _mirror_scores(y, angles, low, high)
-    best = float(mirror[0, mirror[1].argmax()])
-    scores = np.empty((2, 0))
-    for step, reach in _ROUNDS:
-        steps = np.arange(-reach, reach + step / 2, step)
-        tried = np.setdiff1d(np.clip(best + steps, 0, bins - 1), scores[0])
-        scores = np.concatenate([scores, _sharpness(y, angles, tried, device)], axis=1)
-        best = float(scores[0, scores[1].argmin()])
-    scores = scores[:, scores[0].argsort()]
-    return CenterSearch(_lowest(scores), mirror, scores)
+    pairs = _opposite_views(angles)
+    mirror = _mirror_scores(y, pairs, low, high)
+    guess = float(mirror[0, mirror[1].argmax()])
+    by_mirror = _lowest(mirror * [[1], [-1]])
+    if pairs.error * bins / 2 < _EXACT:
+        return CenterSearch(by_mirror, mirror, np.empty((2, 0)), "mirror")
+    scores = _search_sharpness(y, angles, guess, device)
+    best = float(scores[0, scores[1].argmin()])
+    if abs(best - guess) < _ROUNDS[0][1]:
+        return CenterSearch(_lowest(scores), mirror, scores, "sharpness")
+    return CenterSearch(by_mirror, mirror, scores, "mirror")
 
 
-def _mirror_scores(y: NDArray[np.float32], angles: Floats, low: float, high: float) -> Floats:
+def _mirror_scores(y: NDArray[np.float32], pairs: _Pairs, low: float, high: float) -> Floats:
     """Correlation of opposite views mirrored about every half bin from ``low`` to ``high``."""
-    first, second = _opposite_views(angles)
     centers = np.arange(np.ceil(2 * low), 2 * high + 1) / 2
     last = y.shape[1] - 1
     scores = []
     for center in centers:
         turn = round(2 * center)
         bins = np.arange(max(0, turn - last), min(last, turn) + 1)
-        views, mirrored = y[first][:, bins], y[second][:, turn - bins]
+        views, mirrored = y[pairs.first][:, bins], y[pairs.second][:, turn - bins]
         views = views - views.mean(axis=1, keepdims=True)
         mirrored = mirrored - mirrored.mean(axis=1, keepdims=True)
         scale = np.linalg.norm(views) * np.linalg.norm(mirrored)
@@ -105,7 +112,15 @@ def _mirror_scores(y: NDArray[np.float32], angles: Floats, low: float, high: flo
     return np.stack([centers, np.array(scores)])
 
 
-def _opposite_views(angles: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+class _Pairs(NamedTuple):
+    """Pairs of views from nearly opposite sides, and how far from it the worst is, in radians."""
+
+    first: NDArray[np.intp]
+    second: NDArray[np.intp]
+    error: float
+
+
+def _opposite_views(angles: Floats) -> _Pairs:
     """The pairs of views whose directions differ by nearest to pi."""
     order = np.argsort(np.mod(angles, 2 * np.pi))
     circle = np.mod(angles, 2 * np.pi)[order]
@@ -115,7 +130,20 @@ def _opposite_views(angles: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]
     first = np.tile(np.arange(len(angles)), 2)
     error = np.abs(np.mod(circle[first] - circle[second], 2 * np.pi) - np.pi)
     nearest = np.argsort(error, kind="stable")[:_PAIRS]
-    return order[first[nearest]], order[second[nearest]]
+    return _Pairs(order[first[nearest]], order[second[nearest]], float(error[nearest].max()))
+
+
+def _search_sharpness(
+    y: NDArray[np.float32], angles: Floats, guess: float, device: Device
+) -> Floats:
+    """Scores of centres about a guess, in ascending order: coarsely, then finely at the best."""
+    scores = np.empty((2, 0))
+    for step, reach in _ROUNDS:
+        steps = np.arange(-reach, reach + step / 2, step)
+        tried = np.setdiff1d(np.clip(guess + steps, 0, y.shape[1] - 1), scores[0])
+        scores = np.concatenate([scores, _sharpness(y, angles, tried, device)], axis=1)
+        guess = float(scores[0, scores[1].argmin()])
+    return scores[:, scores[0].argsort()]
 
 
 def _sharpness(y: NDArray[np.float32], angles: Floats, centers: Floats, device: Device) -> Floats:

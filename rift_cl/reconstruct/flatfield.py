@@ -67,7 +67,8 @@ def attenuation(projections: Floats, flats: Floats, darks: Floats | None = None)
             f"flats are no brighter than darks anywhere in row {row}: are the two swapped, or "
             "is this row outside the beam (choose rows with --rows)?"
         )
-    transmission = (projections - dark) / np.where(dead, 1, beam)
+    beam[dead] = 1
+    transmission: Floats = (projections - dark) / beam
     _fill(transmission, dead)
     starved = transmission < _FAINTEST
     np.maximum(transmission, _FAINTEST, out=transmission)
