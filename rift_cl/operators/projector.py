@@ -62,6 +62,7 @@ class Projector(LinearOperator):
         lanes = self.device.traits.macros["LANES"]
         blocks = 8 if lanes > 1 else 1
         self._segment = lanes * blocks
+        self._table_bytes = _TABLE_BYTES["cpu" if self.device.traits.is_cpu else "gpu"]
         self._macros = {"BLOCKS": blocks, "LOG2_PHASES": LOG2_PHASES}
 
     @cached_property
@@ -146,13 +147,22 @@ class Projector(LinearOperator):
 
     def _runs(self, walk: _Walk, slab: _Slab) -> Iterator[_Run]:
         """Runs of views whose tables fit the table memory, but no fewer than a cache's worth."""
-        room = _TABLE_BYTES["cpu" if self.device.traits.is_cpu else "gpu"]
-        most = max(_FEWEST_VIEWS, room // (4 * walk.table.entries * slab.slices))
+        most = max(_FEWEST_VIEWS, self._table_bytes // (4 * walk.table.entries * slab.slices))
         for first in range(0, walk.count, most):
             yield _Run(first, min(most, walk.count - first))
 
     def _pieces(self, budget: int) -> Iterable[Piece]:
-        each = 4 * (math.prod(self.grid.shape[-2:]) + len(self.scan.angles) * self.scan.bins)
+        return self.pieces(budget)
+
+    def pieces(self, budget: int, *, sinograms: int = 1) -> list[Piece]:
+        """How to cut the slices to fit a budget in bytes.
+
+        Args:
+            budget: bytes there are.
+            sinograms: how many a slice needs at a time; more than one where others are made of it.
+        """
+        views, bins = len(self.scan.angles), self.scan.bins
+        each = 4 * (math.prod(self.grid.shape[-2:]) + sinograms * views * bins)
         runs = plan_chunks(self.grid.slices, each, self.scratch, budget, what="slice")
         if len(self.grid.shape) == 2:
             return [((), ())]
@@ -165,7 +175,7 @@ class Projector(LinearOperator):
         planes = [walk.table.rows * (walk.table.width + 2 * self._segment) for walk in self._walks]
         tables = max(4 * walk.table.entries for walk in self._walks) * _FEWEST_VIEWS
         records = sum(walk.nbytes for walk in self._walks)
-        return slices * (4 * sum(planes) + tables) + max(_TABLE_BYTES.values()) + records
+        return slices * (4 * sum(planes) + tables) + self._table_bytes + records
 
 
 class _Walk:

@@ -57,7 +57,9 @@ class FilteredBackprojection(LinearOperator):
         self._filter._apply_adjoint(projected, out)
 
     def _pieces(self, budget: int) -> Iterable[Piece]:
-        return self._A.T._pieces(budget // 2)
+        # The sinogram and the filtered one.
+        pieces = self._A.pieces(budget, sinograms=2)
+        return [(inside, outside) for outside, inside in pieces]
 
 
 def fbp(

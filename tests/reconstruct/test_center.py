@@ -69,7 +69,9 @@ def test_non_finite_values_are_told():
 
 def test_real_tooth(shared_data):
     with h5py.File(shared_data / "tooth" / "tooth.h5") as file:
-        frames = [file[f"exchange/{n}"][:].astype("f4") for n in ("data", "data_white", "data_dark")]
+        frames = [
+            file[f"exchange/{n}"][:].astype("f4") for n in ("data", "data_white", "data_dark")
+        ]
         angles = np.deg2rad(file["exchange/theta"][:])
     y = attenuation(*frames).projections
     for row in range(y.shape[1]):

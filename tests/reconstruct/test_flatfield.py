@@ -59,7 +59,7 @@ def test_starved_samples_are_bounded_and_counted(scan):
 
 def test_swapped_frames_are_told(scan):
     _, counts, flats, darks = scan
-    with pytest.raises(InputError, match="row 0.*swapped"):
+    with pytest.raises(InputError, match=r"row 0.*swapped"):
         attenuation(counts, darks, flats)
 
 

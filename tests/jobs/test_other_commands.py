@@ -1,0 +1,76 @@
+"""``rift demo``, ``rift center``, ``rift devices``, ``rift cache``."""
+
+import json
+
+import pytest
+
+import rift_cl as rift
+from rift_cl.cli import main
+
+
+def test_demo(tmp_path, capsys):
+    out = tmp_path / "demo"
+    assert main(["demo", "--out", str(out), "--size", "96", "--views", "8", "60", "150"]) == 0
+    rows = json.loads((out / "metrics.json").read_text())["views"]
+    filtered = [row["psnr_filtered"] for row in rows]
+    assert [row["count"] for row in rows] == [8, 60, 150]
+    assert filtered == sorted(filtered)
+    # The paper's point: without the filter more views do not help.
+    assert filtered[-1] > rows[-1]["psnr_unfiltered"] + 8
+    assert abs(rows[-1]["psnr_unfiltered"] - rows[1]["psnr_unfiltered"]) < 0.2
+    assert {"filtered_8.png", "unfiltered_150.png", "report.html"} <= {
+        p.name for p in out.iterdir()
+    }
+    assert "PSNR filtered" in capsys.readouterr().out
+
+
+def test_demo_can_be_repeated_but_takes_no_other_folder(tmp_path, capsys):
+    arguments = ["demo", "--out", str(tmp_path / "demo"), "--size", "32", "--views", "4"]
+    assert main(arguments) == 0
+    assert main(arguments) == 0
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("keep")
+    assert main(["demo", "--out", str(tmp_path / "mine")]) == 5
+
+
+def test_center(scan, tmp_path, capsys):
+    out = tmp_path / "center"
+    assert main(["center", str(scan.counts), "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert float(printed.split()[0]) == pytest.approx(45, abs=0.3)
+    page = (out / "report.html").read_text()
+    assert page.count("data:image/png;base64,") == 3
+    assert json.loads((out / "metrics.json").read_text())["decided_by"] == "sharpness"
+
+
+def test_center_of_a_row_that_is_not_there(scan, tmp_path, capsys):
+    assert main(["center", str(scan.counts), "--row", "7", "--out", str(tmp_path / "c")]) == 3
+    assert "--row is 7" in capsys.readouterr().err
+
+
+def test_devices(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    assert main(["devices"]) == 0
+    printed = capsys.readouterr().out
+    assert "*" in printed
+    assert "passed" in printed
+    for device in rift.devices():
+        assert device.name.split()[0] in printed
+
+
+def test_cache(capsys):
+    assert main(["cache"]) == 0
+    assert " in " in capsys.readouterr().out
+
+
+def test_version(capsys):
+    assert main(["--version"]) == 0
+    assert rift.__version__ in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", ["demo", "devices", "reconstruct", "center", "cache"])
+def test_help_has_an_example(command, capsys):
+    with pytest.raises(SystemExit) as exit:
+        main([command, "--help"])
+    assert exit.value.code == 0
+    assert "Example:" in capsys.readouterr().out
