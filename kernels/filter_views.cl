@@ -46,8 +46,8 @@ KERNEL void filter_views(
   for (int i = 0; i < ROWS && row0 + i < rows; i++) {
     const int row = row0 + i;
     __global float *out = filtered + (long)row * bins + b;
-    float values[SEGMENT];
-    UNROLL for (int n = 0; n < BLOCKS; n++) *(lanes *)(values + n * LANES) = gains[row / rows_per_view] * sum[i][n];
-    for (int n = 0; n < SEGMENT && b + n < bins; n++) out[n] = values[n];
+    lanes values[BLOCKS];
+    UNROLL for (int n = 0; n < BLOCKS; n++) values[n] = gains[row / rows_per_view] * sum[i][n];
+    for (int n = 0; n < SEGMENT && b + n < bins; n++) out[n] = ((const float *)values)[n];
   }
 }

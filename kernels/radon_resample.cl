@@ -36,11 +36,9 @@ KERNEL void radon_resample(
     const int bin = WHOLE(lowest - width) + 1;
     const lanes offset = FIXED_TO_FLOAT(tau - ((long)bin << 32)) + LANE_NUMBERS * step;
     lanes sum = 0;
-    for (int tap = 0; tap < taps; tap++) {
-      const int b = bin + tap;
-      const float value = b >= 0 && b < bins ? y[b] : 0.0f;
-      sum = sum + value * hat(offset - (float)tap, inverse_width);
-    }
+    const int near = bin > 0 ? bin : 0, far = bins - bin < taps ? bins : bin + taps;
+    for (int b = near; b < far; b++)
+      sum = sum + y[b] * hat(offset - (float)(b - bin), inverse_width);
     entries[n] = scale * sum;
   }
   TRANSPOSE(entries)

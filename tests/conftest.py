@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import subprocess
+import sys
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -49,3 +52,29 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no real data: {folder} is absent")
     return folder
+
+
+@pytest.fixture(scope="session")
+def python() -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run code in a process of its own, with a changed environment (None takes a variable out).
+
+    The time limit is there to turn a hang into a failure.
+    """
+
+    def run(code: str, **changes: str | None) -> subprocess.CompletedProcess[str]:
+        environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+        # What this process told its own driver is nothing that a fresh one would find.
+        environment.pop("POCL_CACHE_DIR", None)
+        environment.update({name: value for name, value in changes.items() if value is not None})
+        for name in (name for name, value in changes.items() if value is None):
+            environment.pop(name, None)
+        return subprocess.run(
+            [sys.executable, "-c", code],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+
+    return run

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from rift_cl.cl.failures import named_errors
-from rift_cl.errors import DeviceError, DTypeError, NonFiniteError, ShapeError
+from rift_cl.errors import DeviceError, DTypeError, InputError, NonFiniteError, ShapeError
 
 if TYPE_CHECKING:
     from rift_cl.cl.device import Device
@@ -146,6 +146,10 @@ def as_device_array(device: Device, array: Any, shape: tuple[int, ...], *, name:
         DTypeError: the values are not float32.
         DeviceError: the array belongs to another device.
     """
+    if not is_device_array(array):
+        raise DTypeError(
+            f"{name} is a {type(array).__name__} on the host, wanted a device array like the other"
+        )
     if array.shape != shape:
         raise ShapeError(f"{name} has shape {array.shape}, wanted {shape}")
     if array.dtype != np.float32:
@@ -179,3 +183,17 @@ def check_output(out: Any, shape: tuple[int, ...]) -> NDArray[np.float32]:
     if out.shape != shape or not out.flags.c_contiguous:
         raise ShapeError(f"out has shape {out.shape}, wanted a C-ordered array of shape {shape}")
     return out
+
+
+def demand_apart(x: Any, out: Any, *, name: str) -> None:
+    """Refuse an output that shares memory with the input: parts would be read too late.
+
+    Raises:
+        InputError: the two share memory.
+    """
+    if is_device_array(x):
+        shared = x.base_data is not None and x.base_data == out.base_data
+    else:
+        shared = np.may_share_memory(x, out)
+    if shared:
+        raise InputError(f"out is {name} itself: give it memory of its own")

@@ -27,7 +27,8 @@ OPTIONS = ("-cl-std=CL1.2", "-cl-mad-enable", "-w")
 # PoCL compiles for grids up to this size and for larger ones apart.
 _SMALL_GRID = 65534
 _PAUSES = (0.0, 0.1, 0.3)
-_Key = tuple[str, tuple[tuple[str, int | float], ...]]
+# A kernel and its macros as the compiler sees them: 1 and 1.0 are equal, but not the same.
+_Key = tuple[str, tuple[tuple[str, str], ...]]
 
 
 class _ThreadKernels(threading.local):
@@ -63,13 +64,14 @@ class Programs:
         Args:
             name: the kernel, which is also its file and its entry point.
             size: work-items along each axis; nothing is enqueued when one is zero.
-            arguments: device arrays, and Python ints and floats for ``int`` and ``float``.
+            arguments: device arrays, and Python ints and floats for ``int`` and ``float``;
+                NumPy scalars for what is neither.
             macros: the compile-time constants that this variant is built with.
         """
         claim_process()
         if 0 in size:
             return
-        key = (name, tuple(sorted(macros.items())))
+        key = (name, tuple(sorted((macro, _literal(value)) for macro, value in macros.items())))
         kernel = self._kernel(key)
         group = self._device.traits.macros["GROUP"]
         rounded = (-(-size[0] // group) * group, *size[1:])
@@ -114,7 +116,7 @@ class Programs:
 
         name, macros = key
         defines = {**self._device.traits.macros, **dict(macros)}
-        options = [*OPTIONS, *(f"-D{macro}={_literal(value)}" for macro, value in defines.items())]
+        options = [*OPTIONS, *(f"-D{macro}={value}" for macro, value in defines.items())]
         failure = ""
         for pause in _PAUSES:
             time.sleep(pause)
@@ -130,9 +132,9 @@ class Programs:
 
 
 def _argument(value: Any) -> Any:
-    if isinstance(value, (int, np.integer)):
+    if isinstance(value, int):
         return np.int32(value)
-    if isinstance(value, (float, np.floating)):
+    if isinstance(value, float):
         return np.float32(value)
     return value.base_data if hasattr(value, "base_data") else value
 

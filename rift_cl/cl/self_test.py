@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.errors import RiftError
@@ -53,7 +54,7 @@ def self_test(device: Device) -> SelfTest:
     return SelfTest(passed=True, detail="copies and kernels gave the right numbers")
 
 
-def _merged(device: Device, image: np.ndarray[tuple[int, ...], np.dtype[np.float32]]) -> object:
+def _merged(device: Device, image: NDArray[np.float32]) -> NDArray[np.float32]:
     """The image's rows and columns as two planes, added: twice the image."""
     rows, columns = image.shape
     source, merged = device.array(image), device.empty(image.shape)
@@ -68,4 +69,5 @@ def _merged(device: Device, image: np.ndarray[tuple[int, ...], np.dtype[np.float
         (columns, rows, 1),
         *(by_rows, by_columns, merged, 0, rows, columns, columns, rows),
     )
-    return device.get(merged)
+    result: NDArray[np.float32] = device.get(merged)
+    return result

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
+from rift_cl.cl.memory import check_finite
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
 from rift_cl.operators.linear import LinearOperator, Piece
@@ -32,6 +33,7 @@ WINDOWS: dict[str, Callable[[Floats], Floats]] = {
     "hamming": lambda u: 0.54 + 0.46 * np.cos(np.pi * u),
     "hann": lambda u: 0.5 + 0.5 * np.cos(np.pi * u),
 }
+HIGH_PASS = "high-pass"
 # A response that is no ramp is sampled this many times finer than the detector can tell apart.
 _OVERSAMPLING = 16
 
@@ -51,7 +53,8 @@ class Ramp:
     def __post_init__(self) -> None:
         """Check the window's name and cutoff."""
         if self.window not in WINDOWS:
-            raise InputError(f"filter is {self.window!r}, wanted one of {', '.join(WINDOWS)}")
+            names = ", ".join([*WINDOWS, HIGH_PASS])
+            raise InputError(f"filter is {self.window!r}, wanted one of {names}")
         if not 0 < self.cutoff <= 1:
             raise InputError(f"cutoff is {self.cutoff}, wanted a fraction of Nyquist, 0 < c <= 1")
 
@@ -69,7 +72,7 @@ class Ramp:
 
 @dataclass(frozen=True)
 class HighPass:
-    """The tunable high-pass |f|^exponent: 1 is the ramp, 0 leaves the views as they are.
+    """The tunable high-pass |f|^exponent: 1 is the ramp, 0 passes everything alike.
 
     Between the two it takes away a part of the low-frequency bias that an orbit's views have.
     The response is scaled to meet the ramp at the Nyquist frequency, where both pass the most.
@@ -109,10 +112,11 @@ class Response:
         count = _OVERSAMPLING * bins
         width = 0.5 / pitch / count
         frequencies: Floats = (np.arange(count, dtype=np.float64) + 0.5) * width
-        values = np.asarray(self.function(frequencies), dtype=np.float64)
-        if values.shape != frequencies.shape or not np.isfinite(values).all():
+        values = np.asarray(self.function(frequencies))
+        real = values.dtype.kind in "fiub" and values.shape == frequencies.shape
+        if not real or not np.isfinite(values).all():
             raise InputError("filter response must give one finite number for each frequency")
-        kernel = width * dct(values, type=2)[:bins]
+        kernel = width * dct(values.astype(np.float64), type=2)[:bins]
         return np.concatenate([kernel[:0:-1], kernel])
 
 
@@ -128,7 +132,7 @@ def as_filter(filter: str | Filter | Callable[[Floats], ArrayLike]) -> Filter:
     if isinstance(filter, (Ramp, HighPass, Response)):
         return filter
     if isinstance(filter, str):
-        return HighPass() if filter == "high-pass" else Ramp(filter)
+        return HighPass() if filter == HIGH_PASS else Ramp(filter)
     if callable(filter):
         return Response(filter)
     raise InputError(f"filter is {filter!r}, wanted a name, a filter or a function of frequency")
@@ -159,8 +163,11 @@ class ViewFilter(LinearOperator):
         shape = (len(scan.angles), *(() if rows is None else (rows,)), scan.bins)
         super().__init__(shape, shape, device or default_device())
         factors = np.ones(shape[0]) if gains is None else np.asarray(gains, dtype=np.float64)
+        if rows is not None and rows < 1:
+            raise ShapeError(f"rows is {rows}, wanted at least 1 detector row")
         if factors.shape != shape[:1]:
             raise ShapeError(f"gains has shape {factors.shape}, wanted one for each of {shape[0]}")
+        check_finite(factors, name="gains")
         cpu = self.device.traits.is_cpu
         self._blocks, self._run = (2, 4) if cpu else (1, 1)
         self._segment = self.device.traits.macros["LANES"] * self._blocks
@@ -181,7 +188,7 @@ class ViewFilter(LinearOperator):
 
     def _pieces(self, budget: int) -> Iterable[Piece]:
         if len(self.domain) == 2:
-            return [((), ())]
+            return super()._pieces(budget)
         each = 8 * self.domain[0] * self.domain[2]
         runs = plan_chunks(self.domain[1], each, 0, budget, what="row of every view")
         return [((slice(None), run), (slice(None), run)) for run in runs]

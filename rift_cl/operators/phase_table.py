@@ -13,11 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
 
 LOG2_PHASES = 3
 PHASES = 1 << LOG2_PHASES
 _ONE = float(1 << 32)
+# Bins per column beyond which 32.32 fixed point runs out of one side or the other.
+_WITHIN = (1e-6, 1e6)
+# A table that lies further than this from the detector, in bins, misses it as well from here.
+_FAR = float(1 << 30)
 
 
 @dataclass(frozen=True)
@@ -76,7 +81,12 @@ def phase_table(grid: Grid, scan: Parallel, *, along_x: bool, segment: int) -> P
     base = np.maximum(0, -slope * (rows - 1))
     corner = grid.coordinates(walk)[0] * cosine + grid.coordinates(other)[0] * sine
     step = dx * cosine / scan.pitch
-    origin = scan.center + corner / scan.pitch - step * (base / _ONE)
+    origin = np.clip(scan.center + corner / scan.pitch - step * (base / _ONE), -_FAR, _FAR)
+    if len(views) and not _WITHIN[0] < np.abs(step).min() <= np.abs(step).max() < _WITHIN[1]:
+        raise InputError(
+            f"pitch is {scan.pitch:g}, samples are {grid.spacing} apart: a bin may be at most "
+            f"{1 / _WITHIN[0]:g} times as wide as a sample, or as narrow"
+        )
     half_width = np.maximum(1.0, np.abs(step))
     padded = -(-width // segment) * segment
     used = ((base + np.maximum(slope, 0) * (rows - 1)) >> 32) + padded + 2

@@ -24,7 +24,7 @@ from rift_cl.cl.memory import as_host_array
 from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.operators import Projector
-from rift_cl.reconstruct.fbp import fbp
+from rift_cl.reconstruct.filtered_backprojection import fbp
 
 Floats = NDArray[np.float64]
 # Pairs of views that are compared: those nearest to opposite.

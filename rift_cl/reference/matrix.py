@@ -34,11 +34,13 @@ class MatrixProjector:
         slices = np.asarray(image, dtype=np.float64).reshape(self._grid.slices, -1)
         rays = (self.matrix @ slices.T).reshape(len(self._scan.angles), self._scan.bins, -1)
         rows = self._grid.shape[:-2]
-        return rays.transpose(0, 2, 1).reshape(len(rays), *rows, self._scan.bins)
+        views: Floats = rays.transpose(0, 2, 1).reshape(len(rays), *rows, self._scan.bins)
+        return views
 
     def backproject(self, sinogram: ArrayLike) -> Floats:
         """Image of a sinogram, or volume of a stack: the transposed matrix applied to it."""
         views = np.asarray(sinogram, dtype=np.float64)
         rays = views.reshape(len(views), self._grid.slices, -1).transpose(0, 2, 1)
-        pixels: Floats = self.matrix.T @ rays.reshape(-1, self._grid.slices)
-        return pixels.T.reshape(self._grid.shape)
+        slices = self.matrix.T @ rays.reshape(-1, self._grid.slices)
+        pixels: Floats = slices.T.reshape(self._grid.shape)
+        return pixels

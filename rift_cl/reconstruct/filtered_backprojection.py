@@ -87,7 +87,7 @@ def fbp(
     Raises:
         InputError: ``y`` does not fit, is not finite, or a name is unknown.
     """
-    return FilteredBackprojection(A, filter, compensate=compensate)(y, out)
+    return FilteredBackprojection(A, filter, compensate=compensate)(y, out, name="y")
 
 
 def backproject(A: Projector, y: Any, *, out: Any = None) -> Any:
@@ -97,7 +97,7 @@ def backproject(A: Projector, y: Any, *, out: Any = None) -> Any:
     1 / r, in the image's unit times a length; compare it after an affine fit.
     """
     factor = np.pi / len(A.scan.angles) * _unspread(A)
-    return (A.T * factor)(y, out)
+    return (A.T * factor)(y, out, name="y")
 
 
 def _unspread(A: Projector) -> float:

@@ -1,0 +1,16 @@
+/* y = a x + b y, sample by sample: what sums and multiples of operators are made of.
+ *
+ * Index space: (runs of RUN samples). */
+
+#include "include/portable.h"
+
+#ifndef RUN
+#define RUN (LANES == 8 ? 4096 : 1)
+#endif
+
+KERNEL void axpby(__global const float *x, __global float *y, float a, float b, ulong size)
+{
+  const ulong begin = (ulong)get_global_id(0) * RUN;
+  const ulong end = begin + RUN < size ? begin + RUN : size;
+  for (ulong i = begin; i < end; i++) y[i] = a * x[i] + b * y[i];
+}

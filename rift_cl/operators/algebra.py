@@ -1,0 +1,154 @@
+"""Operators made of operators: adjoints, multiples, sums, products."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from rift_cl.cl.device import Device
+from rift_cl.errors import DeviceError, InputError, ShapeError
+from rift_cl.operators.linear import LinearOperator, Piece
+
+# Samples that one work-item of axpby takes on a CPU.
+_RUN = 4096
+
+
+class Adjoint(LinearOperator):
+    """The adjoint of an operator."""
+
+    def __init__(self, forward: LinearOperator) -> None:
+        super().__init__(forward.range, forward.domain, forward.device)
+        self._forward = forward
+
+    @property
+    def T(self) -> LinearOperator:
+        """The operator that this is the adjoint of."""
+        return self._forward
+
+    def _apply(self, x: Any, out: Any) -> None:
+        self._forward._apply_adjoint(x, out)
+
+    def _apply_adjoint(self, y: Any, out: Any) -> None:
+        self._forward._apply(y, out)
+
+    @property
+    def scratch(self) -> int:
+        """What the operator itself needs."""
+        return self._forward.scratch
+
+    def _pieces(self, budget: int) -> Iterable[Piece]:
+        return [(inside, outside) for outside, inside in self._forward._pieces(budget)]
+
+
+class Scaled(LinearOperator):
+    """A multiple of an operator."""
+
+    def __init__(self, inner: LinearOperator, factor: float) -> None:
+        super().__init__(inner.domain, inner.range, inner.device)
+        self._inner = inner
+        self._factor = _finite(factor)
+
+    def _apply(self, x: Any, out: Any) -> None:
+        self._inner._apply(x, out)
+        axpby(self.device, 0.0, out, self._factor, out)
+
+    def _apply_adjoint(self, y: Any, out: Any) -> None:
+        self._inner._apply_adjoint(y, out)
+        axpby(self.device, 0.0, out, self._factor, out)
+
+    @property
+    def scratch(self) -> int:
+        """What the operator itself needs."""
+        return self._inner.scratch
+
+    def _pieces(self, budget: int) -> Iterable[Piece]:
+        return self._inner._pieces(budget)
+
+
+class Sum(LinearOperator):
+    """The sum of two operators between the same spaces."""
+
+    def __init__(self, left: LinearOperator, right: LinearOperator) -> None:
+        if (left.domain, left.range) != (right.domain, right.range):
+            raise ShapeError(
+                f"sum of operators {left.domain} -> {left.range} and {right.domain} -> "
+                f"{right.range}: both must map between the same shapes"
+            )
+        _demand_one_device(left, right)
+        super().__init__(left.domain, left.range, left.device)
+        self._terms = (left, right)
+
+    @property
+    def scratch(self) -> int:
+        """The second term's result, besides what the terms need themselves."""
+        other = 4 * max(math.prod(self.domain), math.prod(self.range))
+        return other + max(term.scratch for term in self._terms)
+
+    def _apply(self, x: Any, out: Any) -> None:
+        left, right = self._terms
+        left._apply(x, out)
+        other = self.device.empty(out.shape)
+        right._apply(x, other)
+        axpby(self.device, 1.0, other, 1.0, out)
+
+    def _apply_adjoint(self, y: Any, out: Any) -> None:
+        left, right = self._terms
+        left._apply_adjoint(y, out)
+        other = self.device.empty(out.shape)
+        right._apply_adjoint(y, other)
+        axpby(self.device, 1.0, other, 1.0, out)
+
+
+class Product(LinearOperator):
+    """One operator after another."""
+
+    def __init__(self, outer: LinearOperator, inner: LinearOperator) -> None:
+        if outer.domain != inner.range:
+            raise ShapeError(
+                f"product of operators: the inner one gives {inner.range}, the outer one takes "
+                f"{outer.domain}"
+            )
+        _demand_one_device(outer, inner)
+        super().__init__(inner.domain, outer.range, outer.device)
+        self._outer, self._inner = outer, inner
+
+    @property
+    def scratch(self) -> int:
+        """What passes between the two, besides what they need themselves."""
+        return 4 * math.prod(self._inner.range) + max(self._outer.scratch, self._inner.scratch)
+
+    def _apply(self, x: Any, out: Any) -> None:
+        between = self.device.empty(self._inner.range)
+        self._inner._apply(x, between)
+        self._outer._apply(between, out)
+
+    def _apply_adjoint(self, y: Any, out: Any) -> None:
+        between = self.device.empty(self._inner.range)
+        self._outer._apply_adjoint(y, between)
+        self._inner._apply_adjoint(between, out)
+
+
+def axpby(device: Device, a: float, x: Any, b: float, y: Any) -> None:
+    """Y = a x + b y on device arrays of the same shape."""
+    run = _RUN if device.traits.is_cpu else 1
+    size = -(-y.size // run)
+    device.launch("axpby", (size,), x, y, float(a), float(b), np.uint64(y.size), RUN=run)
+
+
+def _finite(factor: float) -> float:
+    with np.errstate(over="ignore"):
+        rounded = float(np.float32(factor))
+    if not math.isfinite(rounded):
+        raise InputError(f"an operator cannot be multiplied by {factor}: it must fit a float32")
+    return rounded
+
+
+def _demand_one_device(first: LinearOperator, second: LinearOperator) -> None:
+    if first.device is not second.device:
+        raise DeviceError(
+            f"operators on two devices, {first.device.name} and {second.device.name}, cannot be "
+            "combined: make both on one Device"
+        )

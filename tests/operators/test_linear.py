@@ -1,0 +1,240 @@
+"""What every operator takes and gives, and the algebra of operators."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.errors import DTypeError, InputError, NonFiniteError, ShapeError
+from rift_cl.operators import LinearOperator, Ramp, ViewFilter
+
+GRID = rift.Grid((12, 15))
+SCAN = rift.Parallel(np.linspace(0, np.pi, 8, endpoint=False), bins=21)
+RANDOM = np.random.default_rng(3)
+X = RANDOM.standard_normal(GRID.shape).astype(np.float32)
+Y = RANDOM.standard_normal((8, 21)).astype(np.float32)
+
+
+@pytest.fixture
+def A(device):
+    return rift.Projector(GRID, SCAN, device=device)
+
+
+@pytest.fixture
+def F(device):
+    return ViewFilter(SCAN, Ramp("hann"), gains=np.arange(8), device=device)
+
+
+def close(value, truth):
+    return np.linalg.norm(value - truth) <= 1e-6 * np.linalg.norm(truth)
+
+
+def test_shapes_and_adjoints(A):
+    assert (A.domain, A.range) == ((12, 15), (8, 21))
+    assert (A.T.domain, A.T.range) == ((8, 21), (12, 15))
+    assert A.T.T is A
+    assert A.T is A.T
+
+
+def test_numpy_in_gives_numpy_out(A):
+    y, x = A(X), A.T(Y)
+    assert isinstance(y, np.ndarray) and (y.shape, y.dtype) == ((8, 21), np.float32)
+    assert isinstance(x, np.ndarray) and (x.shape, x.dtype) == ((12, 15), np.float32)
+    assert np.array_equal(A @ X, y)
+
+
+def test_device_array_in_gives_device_array_out(A, device):
+    y = A(device.array(X))
+    assert type(y) is type(device.array(X))
+    assert np.array_equal(device.get(y), A(X))
+    assert np.array_equal(device.get(A.T(device.array(Y))), A.T(Y))
+
+
+def test_the_input_is_left_alone(A, F, device):
+    for B, given in ((A, X), (A.T, Y), (F, Y), (A.T @ F @ A + 2 * (A.T @ A), X)):
+        host, there = given.copy(), device.array(given)
+        B(host)
+        B(there)
+        assert np.array_equal(host, given)
+        assert np.array_equal(device.get(there), given)
+
+
+def test_out_is_filled_and_returned(A, F, device):
+    for B, given in ((A, X), (A.T, Y), (A.T @ F, Y), (-F, Y), (F + F, Y)):
+        host = np.full(B.range, np.nan, np.float32)
+        assert B(given, out=host) is host
+        assert np.array_equal(host, B(given))
+        there = device.array(np.full(B.range, 7.0))
+        assert B(device.array(given), out=there) is there
+        assert np.array_equal(device.get(there), B(given))
+
+
+@pytest.mark.parametrize(
+    "out",
+    [
+        np.empty((8, 20), np.float32),
+        np.empty((8, 21), np.float64),
+        np.empty((8, 21), ">f4"),
+        np.empty((8, 21), np.float32, order="F"),
+        np.empty((16, 21), np.float32)[::2],
+        [[0.0] * 21] * 8,
+        np.frombuffer(bytes(4 * 8 * 21), np.float32).reshape(8, 21),
+    ],
+)
+def test_an_out_that_cannot_hold_the_result_is_refused(A, out):
+    with pytest.raises(InputError, match=r"^out "):
+        A(X, out=out)
+
+
+def test_out_must_be_on_the_side_of_the_input(A, device):
+    with pytest.raises(InputError, match=r"^out "):
+        A(X, out=device.empty(A.range))
+    with pytest.raises(InputError, match=r"^out "):
+        A(device.array(X), out=np.empty(A.range, np.float32))
+
+
+def test_out_on_the_input_is_right_or_refused(F, device):
+    """An operator whose output is its input must not read what it has already overwritten."""
+    for B in (F, F + F, F @ F, F - 2 * F):
+        there = device.array(Y)
+        try:
+            B(there, out=there)
+        except InputError:
+            continue
+        assert np.array_equal(device.get(there), B(Y))
+
+
+@pytest.mark.parametrize("dtype", [">f4", "f8", ">f8", "f2", "i1", "u2", "i8", ">i4", "?"])
+def test_any_real_type_is_taken(A, dtype):
+    values = (10 * X).astype(dtype)
+    assert np.array_equal(A(values), A(values.astype(np.float32)))
+
+
+def test_any_memory_order_is_taken(A):
+    wide = RANDOM.standard_normal((24, 45)).astype(np.float32)
+    views = (np.asfortranarray(X), wide[::2, ::3], wide[::-2, 44:0:-3], X.T.copy().T, X.tolist())
+    for view in views:
+        assert np.array_equal(A(view), A(np.array(view, dtype=np.float32, order="C")))
+    assert np.array_equal(
+        A(np.broadcast_to(np.float32(2), GRID.shape)), A(np.full(GRID.shape, 2.0))
+    )
+
+
+@pytest.mark.parametrize("shape", [(12, 14), (15, 12), (180,), (1, 12, 15), (), (0, 15)])
+def test_wrong_shapes_are_refused(A, device, shape):
+    with pytest.raises(ShapeError, match=r"x has shape .*\(12, 15\)"):
+        A(np.zeros(shape))
+    if 0 not in shape and shape:
+        with pytest.raises(ShapeError, match=r"x has shape .*\(12, 15\)"):
+            A(device.array(np.zeros(shape)))
+
+
+@pytest.mark.parametrize("dtype", ["c8", "O", "U3", "M8[s]"])
+def test_types_without_a_meaning_are_refused(A, dtype):
+    with pytest.raises(DTypeError, match="x has type"):
+        A(np.zeros(GRID.shape).astype(dtype))
+
+
+def test_masked_and_double_device_arrays_are_refused(A, device):
+    with pytest.raises(DTypeError, match="masked"):
+        A(np.ma.masked_less(X, 0))
+    with pytest.raises(DTypeError, match="x has type float64 on the device"):
+        A(device.empty(GRID.shape, np.float64))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300])
+def test_non_finite_values_are_refused_with_their_place(A, bad):
+    values = X.astype(np.float64)
+    values[3, 4] = bad
+    with pytest.raises(NonFiniteError, match=r"x holds .*\(3, 4\)"):
+        A(values)
+
+
+def test_empty_scans_are_refused_by_name():
+    with pytest.raises(ShapeError, match="angles is empty"):
+        rift.Parallel([], bins=5)
+    with pytest.raises(ShapeError, match="bins is 0"):
+        rift.Parallel([0.0], bins=0)
+
+
+def test_an_unknown_footprint_is_refused(device):
+    with pytest.raises(InputError, match="footprint is 'round', wanted 'linear'"):
+        rift.Projector(GRID, SCAN, "round", device=device)
+
+
+def test_algebra(A, F):
+    y, z = A(X), F(A(X))
+    assert close((A + A)(X), 2 * y)
+    assert close((F @ A - A)(X), z - y)
+    assert close((3 * A)(X), 3 * y)
+    assert close((A * np.float64(-0.5))(X), -0.5 * y)
+    assert close((np.float32(4) * A)(X), 4 * y)
+    assert close((-A)(X), -y)
+    assert close((F @ A)(X), z)
+    assert close((A.T @ F @ A)(X), A.T(z))
+    assert not (0 * A)(X).any()
+
+
+def test_adjoints_of_the_algebra(A, F):
+    for B in (A + A, F @ A - A, 3 * A, -A, F @ A, A.T @ F @ A, (A.T @ F @ A + 2 * (A.T @ A)).T):
+        assert rift.dot_test(B, seed=4) <= 1e-6
+        assert B.T.T is B
+        assert (B.T.domain, B.T.range) == (B.range, B.domain)
+    assert close((F @ A).T(Y), A.T(F(Y)))
+    assert close((A - 3 * A).T(Y), -2 * A.T(Y))
+    assert np.array_equal((2 * A.T)(Y), (2 * A).T(Y))
+
+
+def test_operators_that_do_not_fit_are_refused(A, F):
+    with pytest.raises(ShapeError, match="sum of operators"):
+        A + A.T
+    with pytest.raises(ShapeError, match="sum of operators"):
+        A - F
+    with pytest.raises(ShapeError, match="product of operators"):
+        A @ F
+
+
+def test_operators_on_two_devices_are_refused(A, device):
+    other = rift.Device(device._handle, device.selector, traits=device.traits)
+    B = rift.Projector(GRID, SCAN, device=other)
+    for combine in (lambda: A + B, lambda: A - B, lambda: A.T @ B):
+        with pytest.raises(rift.RiftError, match="device"):
+            combine()
+
+
+@pytest.mark.parametrize("other", [1, "A", None, [1.0]])
+def test_what_is_no_operator_cannot_be_added(A, other):
+    with pytest.raises(TypeError):
+        A + other
+    with pytest.raises(TypeError):
+        A - other
+
+
+@pytest.mark.parametrize("factor", [np.nan, np.inf, 1e300])
+def test_factors_must_be_finite(A, factor):
+    with pytest.raises(InputError):
+        factor * A
+
+
+class Unmatched(LinearOperator):
+    """An operator whose adjoint is wrong by one part in a thousand."""
+
+    def __init__(self, A):
+        super().__init__(A.domain, A.range, A.device)
+        self._apply = A._apply
+        self._almost = 1.001 * A.T
+
+    def _apply(self, x, out):
+        raise NotImplementedError
+
+    def _apply_adjoint(self, y, out):
+        self._almost._apply(y, out)
+
+
+def test_the_dot_test_finds_a_pair_that_is_not_matched(A):
+    assert 5e-4 < rift.dot_test(Unmatched(A)) < 2e-3
+
+
+def test_the_dot_test_of_nothing_is_nothing(A):
+    assert rift.dot_test(0 * A) == 0

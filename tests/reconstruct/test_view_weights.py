@@ -1,0 +1,86 @@
+"""The quadrature over directions: what every set of weights must obey, and known sets."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rift_cl.errors import InputError
+from rift_cl.reconstruct.view_weights import view_weights
+
+WAYS = (None, "voronoi")
+EVEN = np.linspace(0, np.pi, 12, endpoint=False)
+ANGLES = st.lists(st.floats(-20, 20), min_size=1, max_size=30).map(np.array)
+
+
+@given(ANGLES, st.sampled_from(WAYS))
+def test_weights_add_up_to_the_half_circle(angles, compensate):
+    weights = view_weights(angles, compensate)
+    assert weights.shape == angles.shape
+    assert (weights >= 0).all()
+    assert weights.sum() == pytest.approx(np.pi)
+
+
+@given(ANGLES, st.randoms(use_true_random=False), st.sampled_from(WAYS))
+def test_order_does_not_matter(angles, random, compensate):
+    angles = np.unique(np.round(angles, 3))
+    order = random.sample(range(len(angles)), len(angles))
+    shuffled = view_weights(angles[order], compensate)
+    np.testing.assert_allclose(shuffled, view_weights(angles, compensate)[order], atol=1e-12)
+
+
+@pytest.mark.parametrize("compensate", WAYS)
+@pytest.mark.parametrize("start", [0.0, 0.3, -2.0, 1e3])
+def test_even_directions_weigh_the_same(compensate, start):
+    np.testing.assert_allclose(view_weights(EVEN + start, compensate), np.pi / 12)
+    full = np.linspace(0, 2 * np.pi, 24, endpoint=False) + start
+    np.testing.assert_allclose(view_weights(full, compensate), np.pi / 24)
+    odd = np.linspace(0, 2 * np.pi, 23, endpoint=False) + start
+    np.testing.assert_allclose(view_weights(odd, compensate), np.pi / 23)
+
+
+@pytest.mark.parametrize("compensate", WAYS)
+def test_one_direction_stands_for_all(compensate):
+    assert view_weights(np.array([0.7]), compensate) == pytest.approx([np.pi])
+    opposite = np.array([0.7, 0.7 + np.pi, 0.7, 0.7 - 3 * np.pi])
+    np.testing.assert_allclose(view_weights(opposite, compensate), np.pi / 4)
+
+
+@pytest.mark.parametrize("compensate", WAYS)
+def test_a_closed_end_counts_once(compensate):
+    weights = view_weights(np.append(EVEN, np.pi), compensate)
+    np.testing.assert_allclose(weights[1:-1], np.pi / 12)
+    np.testing.assert_allclose(weights[[0, -1]], np.pi / 24)
+
+
+@pytest.mark.parametrize("compensate", WAYS)
+@pytest.mark.parametrize("turns", [2, 3, 4, 7])
+def test_repeated_directions_share_alike(compensate, turns):
+    """No measurement may be thrown away because others were made beside it."""
+    repeated = np.concatenate([EVEN + k * np.pi for k in range(turns)])
+    np.testing.assert_allclose(view_weights(repeated, compensate), np.pi / 12 / turns)
+    uneven = np.array([0.0, 1.0, 1.0, 1.0, 2.0])
+    weights = view_weights(uneven, "voronoi")
+    np.testing.assert_allclose(weights, [(np.pi - 1) / 2, *[1 / 3] * 3, (np.pi - 1) / 2])
+
+
+def test_voronoi_is_half_the_distance_between_neighbours():
+    angles = np.array([0.9, 0.1, 2.0, 0.4])
+    expected = [0.5 * (2.0 - 0.4), 0.5 * (0.4 - 2.0 + np.pi), 0.5 * (0.1 - 0.9 + np.pi), 0.4]
+    np.testing.assert_allclose(view_weights(angles, "voronoi"), expected)
+
+
+@pytest.mark.parametrize("end", [0.5, np.pi / 2, 2.5])
+def test_a_missing_wedge_is_nobody_s(end):
+    """The views beside it know no more about it than the others."""
+    wedge = np.linspace(0, end, 90)
+    np.testing.assert_allclose(view_weights(wedge), np.pi / 90)
+    assert view_weights(wedge, "voronoi")[0] > 0.3
+
+
+@pytest.mark.parametrize("compensate", ["", "Voronoi", "nope", 1])
+def test_an_unknown_compensation_is_refused(compensate):
+    with pytest.raises(InputError, match=f"compensate is {compensate!r}, wanted .*'voronoi'"):
+        view_weights(EVEN, compensate)
