@@ -60,6 +60,7 @@ class Hdf5Tree:
             PathEscapeError: a link on the way leads outside the file's folder.
             FileFormatError: links go round in circles, or to a file that is missing.
         """
+        self._links = 0
         return self._follow(self.root, name)
 
     def dataset(self, name: str) -> Any:
@@ -138,6 +139,7 @@ class Hdf5Tree:
         here = dataset.file["/"]
         if source.file_name != ".":
             here = self._open(self._inside(dataset, source.file_name))
+        self._links = 0
         node = self._follow(here, "/" + source.dset_name)
         if not isinstance(node, h5py.Dataset):
             raise FileFormatError(

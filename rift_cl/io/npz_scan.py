@@ -110,10 +110,12 @@ def _complete(archive: NpzArchive, names: ArrayNames) -> ArrayNames:
         raise FileFormatError(
             f"{archive.path}: has neither 'projections' nor 'sinogram'; {archive.contents()}"
         )
+    names = replace(names, theta=names.theta or "angles")
+    if names.dataset is not None:
+        return names
     return replace(
         names,
-        dataset=names.dataset or usual[0],
-        theta=names.theta or "angles",
+        dataset=usual[0],
         flats=names.flats or ("flats" if "flats" in archive else None),
         darks=names.darks or ("darks" if "darks" in archive else None),
     )

@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import FileFormatError, ShapeError
+from rift_cl.errors import FileFormatError, InputError, ShapeError
 from rift_cl.io.hdf5_frames import FrameStack, calibration_stack, projection_stack, runs_of
 from rift_cl.io.hdf5_tree import Hdf5Tree
 from rift_cl.io.hdf5_values import read_angles, read_length, read_vector
@@ -25,7 +25,7 @@ _DATA = "instrument/detector/data"
 _ANGLE = "sample/rotation_angle"
 _PIXEL = "instrument/detector/x_pixel_size"
 _DEEPEST = 2
-_MOST_GROUPS = 1000
+_MOST_GROUPS = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,13 +56,23 @@ def find_entry(tree: Hdf5Tree, within: str) -> str | None:
 
     Raises:
         FileFormatError: there are several.
+        PathEscapeError: there is none, but a link leads outside the file's folder.
     """
-    found = {_address(tree, name): name for name in _groups(tree, within) if _is_entry(tree, name)}
+    found: dict[Any, str] = {}
+    blocked: InputError | None = None
+    for name in _groups(tree, within):
+        try:
+            if _is_entry(tree, name):
+                found.setdefault(_address(tree, name), name)
+        except InputError as error:
+            blocked = error
     if len(found) > 1:
-        names = ", ".join(repr(name) for name in found.values())
+        names = ", ".join(repr(name or "/") for name in found.values())
         raise FileFormatError(
             f"{tree.path}: holds several NXtomo scans ({names}); name one with dataset= (--dataset)"
         )
+    if blocked and not found:
+        raise blocked
     return next(iter(found.values()), None)
 
 
@@ -78,11 +88,13 @@ def read_entry(tree: Hdf5Tree, group: str, names: ArrayNames) -> TomoEntry:
     keys = read_vector(tree, f"{group}/{_KEY}")
     if keys.size != frames.frames:
         raise ShapeError(
-            f"{tree.path}: {group!r} has {keys.size} image keys for {frames.frames} frames"
+            f"{tree.path}: {group or '/'!r} has {keys.size} image keys for {frames.frames} frames"
         )
     projections = _select(frames, keys, 0)
     if projections is None:
-        raise FileFormatError(f"{tree.path}: no frame of {group!r} has image key 0, a projection")
+        raise FileFormatError(
+            f"{tree.path}: no frame of {group or '/'!r} has image key 0, a projection"
+        )
     pixel, unit = read_length(tree, f"{group}/{_PIXEL}") or (0.0, "")
     return TomoEntry(
         group,
@@ -115,16 +127,22 @@ def _angles(tree: Hdf5Tree, name: str, keys: NDArray[np.float64]) -> NDArray[np.
 
 def _groups(tree: Hdf5Tree, top: str) -> Iterator[str]:
     level = [top.rstrip("/")]
-    seen = 0
+    left = _MOST_GROUPS
     for _ in range(_DEEPEST + 1):
-        below: list[str] = []
-        for name in level:
-            node = tree.find(name or "/")
-            if isinstance(node, h5py.Group) and seen < _MOST_GROUPS:
-                seen += 1
-                yield name
-                below += [f"{name}/{child}" for child in node]
-        level = below
+        level, above = [], level[:left]
+        left -= len(above)
+        for name in above:
+            yield name
+            level += _children(tree, name)
+
+
+def _children(tree: Hdf5Tree, name: str) -> list[str]:
+    # A link that leads astray hides a group; it need not be the one that is wanted.
+    try:
+        node = tree.find(name or "/")
+    except InputError:
+        return []
+    return [f"{name}/{child}" for child in node] if isinstance(node, h5py.Group) else []
 
 
 def _is_entry(tree: Hdf5Tree, group: str) -> bool:

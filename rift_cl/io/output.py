@@ -114,13 +114,13 @@ def staged_file(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def staged_folder(path: Path, ours: Callable[[str], bool]) -> Iterator[Path]:
+def staged_folder(path: Path, strange: Callable[[list[str]], str | None]) -> Iterator[Path]:
     """Make a temporary folder; a clean exit turns it into ``path``.
 
     Args:
         path: the final name.
-        ours: whether an entry of an existing folder may come from an earlier result. A folder
-            that holds anything else is refused, never replaced.
+        strange: of the names in an existing folder, one that no earlier result can have left
+            there, or None. A folder with such an entry is refused, never replaced.
 
     Raises:
         OutputError: the folder cannot be made, or ``path`` is something else already.
@@ -129,7 +129,7 @@ def staged_folder(path: Path, ours: Callable[[str], bool]) -> Iterator[Path]:
     old = path.with_name(path.name + _OLD)
     with writing(path):
         for folder in (path, part, old):
-            _demand_ours(folder, ours)
+            _demand_ours(folder, strange)
         _remove(part)
         part.mkdir()
     try:
@@ -160,9 +160,10 @@ def check_space(path: Path, need: int) -> None:
 
 def sync(path: Path) -> None:
     """Force a file, or the entries of a folder, to the disk."""
-    if path.is_dir() and os.name == "nt":
+    folder = path.is_dir()
+    if folder and os.name == "nt":
         return  # Windows keeps folders in order by itself and refuses to open them.
-    handle = os.open(path, os.O_RDONLY)
+    handle = os.open(path, os.O_RDONLY if folder else os.O_RDWR)
     try:
         os.fsync(handle)
     finally:
@@ -190,15 +191,15 @@ def _swap(part: Path, path: Path, old: Path) -> None:
     shutil.rmtree(old, ignore_errors=True)
 
 
-def _demand_ours(folder: Path, ours: Callable[[str], bool]) -> None:
+def _demand_ours(folder: Path, strange: Callable[[list[str]], str | None]) -> None:
     if not folder.exists():
         return
     if not folder.is_dir():
         raise OutputError(f"{folder}: is a file, a folder is to be written; name another place")
-    strange = next((entry.name for entry in folder.iterdir() if not ours(entry.name)), None)
-    if strange is not None:
+    name = strange(sorted(entry.name for entry in folder.iterdir()))
+    if name is not None:
         raise OutputError(
-            f"{folder}: holds {strange!r}, which no earlier result has; it is not replaced: name "
+            f"{folder}: holds {name!r}, which no earlier result has; it is not replaced: name "
             "another place"
         )
 

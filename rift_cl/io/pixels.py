@@ -123,4 +123,4 @@ def _format(path: Path) -> str:
 
 
 def _first_line(message: str) -> str:
-    return message.splitlines()[0].strip() if message else ""
+    return (message.strip().splitlines() or [""])[0]

@@ -55,7 +55,7 @@ def open_scan(
         PathEscapeError: the file leads to another one outside its folder.
         ResourceLimitError: an array that must be read now is larger than the budget.
     """
-    path = Path(path)
+    path = Path(path).absolute()
     names = ArrayNames(dataset=dataset, theta=theta, flats=flats, darks=darks)
     suffix = path.suffix.lower()
     if suffix != ".npz" and suffix not in _HDF5_SUFFIXES:

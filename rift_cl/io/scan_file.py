@@ -71,7 +71,7 @@ class ScanFile:
             number.
         unit: unit of ``pitch`` as the file names it, empty where it does not.
         kind: "transmission" for counts that want flat and dark correction and a logarithm,
-            "attenuation" for line integrals.
+            "attenuation" for line integrals. Even counts may come without flats or darks.
         source: the layout that was recognised, for people.
         rows: reads the rows.
     """

@@ -8,9 +8,12 @@ known place, so they are written there as to any file.
 from __future__ import annotations
 
 import errno
+import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
+from io import FileIO
 from pathlib import Path
 
 import h5py
@@ -37,15 +40,7 @@ def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
             _reserve(part, offset, layout.size)
             file = part.open("r+b", buffering=0)
         with file:
-
-            def write(start: int, slab: Slab) -> None:
-                with writing(path):
-                    file.seek(offset + start * slab[0].nbytes)
-                    rest = slab.astype("<f4", copy=False).reshape(-1).view(np.uint8).data
-                    while rest:
-                        rest = rest[file.write(rest) :]
-
-            yield write
+            yield partial(_write_slab, path, file, offset)
         if part.stat().st_size < offset + layout.size:
             raise OutputError(f"{path}: is shorter than its samples; the disk lost some of them")
 
@@ -57,12 +52,19 @@ def load_volume(path: Path, *, budget: int | None) -> Slab:
         check_numeric(path, _DATASET, dataset.dtype)
         if dataset.shape is None or len(dataset.shape) != 3 or 0 in dataset.shape:
             raise ShapeError(f"{path}: /{_DATASET} has shape {dataset.shape}, wanted (z, y, x)")
-        chunk = int(np.prod(dataset.chunks, dtype=object)) if dataset.chunks else 0
-        need = 4 * int(np.prod(dataset.shape, dtype=object)) + chunk * dataset.dtype.itemsize
-        check_claim(path, "the volume", need, budget)
+        chunk = math.prod(dataset.chunks) * dataset.dtype.itemsize if dataset.chunks else 0
+        check_claim(path, "the volume", 4 * math.prod(dataset.shape) + chunk, budget)
         volume = np.empty(dataset.shape, np.float32)
         dataset.read_direct(volume)
     return volume
+
+
+def _write_slab(path: Path, file: FileIO, offset: int, start: int, slab: Slab) -> None:
+    rest = slab.astype("<f4", copy=False).reshape(-1).view(np.uint8).data
+    with writing(path):
+        file.seek(offset + start * slab[0].nbytes)
+        while rest:
+            rest = rest[file.write(rest) :]
 
 
 def _write_header(part: Path, layout: VolumeLayout) -> int:

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,14 +25,8 @@ _CENTIMETRES = {"m": 100.0, "cm": 1.0, "mm": 0.1, "um": 1e-4, "µm": 1e-4, "μm"
 @contextmanager
 def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
     """Write slices into a folder that gets its name at the end."""
-    attributes = _attributes(layout)
-    with staged_folder(path, _ours) as folder:
-
-        def write(start: int, slab: Slab) -> None:
-            for index, image in enumerate(slab, start):
-                _write_slice(folder / f"slice_{index:05d}.tif", image, attributes)
-
-        yield write
+    with staged_folder(path, _strange) as folder:
+        yield partial(_write_slices, folder, _attributes(layout))
 
 
 def load_volume(path: Path, *, budget: int | None) -> Slab:
@@ -59,11 +54,13 @@ def _slice(folder: Path, index: int) -> Path:
     return folder / f"slice_{index:05d}.tif"
 
 
-def _write_slice(path: Path, image: Slab, attributes: dict[str, Any]) -> None:
-    with atomic_path(path) as part:
-        write_pixels(part, image[..., np.newaxis], format="tiff", attributes=attributes)
-        if part.stat().st_size < image.nbytes:
-            raise OutputError(f"{path}: is shorter than its samples; the disk lost some of them")
+def _write_slices(folder: Path, attributes: dict[str, Any], start: int, slab: Slab) -> None:
+    for index, image in enumerate(slab, start):
+        path = _slice(folder, index)
+        with atomic_path(path) as part:
+            write_pixels(part, image[..., np.newaxis], format="tiff", attributes=attributes)
+            if part.stat().st_size < image.nbytes:
+                raise OutputError(f"{path}: is shorter than its samples; the disk lost some")
 
 
 def _attributes(layout: VolumeLayout) -> dict[str, Any]:
@@ -79,8 +76,9 @@ def _attributes(layout: VolumeLayout) -> dict[str, Any]:
         attributes["ResolutionUnit"] = "cm"
         attributes["XResolution"] = 1 / (wide * length)
         attributes["YResolution"] = 1 / (high * length)
+        attributes["PixelAspectRatio"] = wide / high
     return attributes
 
 
-def _ours(name: str) -> bool:
-    return _SLICE.fullmatch(name.removesuffix(".part")) is not None
+def _strange(names: list[str]) -> str | None:
+    return next((n for n in names if not _SLICE.fullmatch(n.removesuffix(".part"))), None)

@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,8 @@ from rift_cl.io.boundary import check_claim, check_numeric
 from rift_cl.io.output import staged_folder, writing
 from rift_cl.io.volume import Slab, VolumeLayout, WriteSlab
 
-_OURS = re.compile(r"c|zarr\.json.*|\.z(array|attrs|group|metadata).*|\d+(\.\d+)*(\..*)?")
+_HEADER = re.compile(r"(zarr\.|\.zarray).*")
+_CHUNK = re.compile(r"c|\.zattrs.*|\d+\.\d+\.\d+(\..*\.partial)?")
 _LARGEST_HEADER = 1 << 20
 # Decoders that only unpack bytes. Others, such as "pickle", would run what the file says.
 _CODECS = {"blosc", "bytes", "crc32c", "gzip", "lz4", "zlib", "zstd"}
@@ -31,7 +33,7 @@ _CODECS = {"blosc", "bytes", "crc32c", "gzip", "lz4", "zlib", "zstd"}
 @contextmanager
 def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
     """Write chunks into a store that gets its name at the end."""
-    with staged_folder(path, _ours) as folder:
+    with staged_folder(path, _strange) as folder:
         with writing(path):
             array = zarr.open_array(
                 str(folder),
@@ -43,11 +45,7 @@ def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
             )
             array.attrs.update({**layout.attributes, "complete": False})
 
-        def write(start: int, slab: Slab) -> None:
-            with writing(path):
-                array[start : start + len(slab)] = slab
-
-        yield write
+        yield partial(_write_slab, path, array)
         with writing(path):
             array.attrs["complete"] = True
 
@@ -66,6 +64,11 @@ def load_volume(path: Path, *, budget: int | None) -> Slab:
     need = math.prod(array.shape) * each + math.prod(array.chunks) * array.dtype.itemsize
     check_claim(path, "the volume", need, budget)
     return np.asarray(array[...], np.float32)
+
+
+def _write_slab(path: Path, array: Any, start: int, slab: Slab) -> None:
+    with writing(path):
+        array[start : start + len(slab)] = slab
 
 
 def _check_links(path: Path) -> None:
@@ -94,5 +97,8 @@ def _codecs(header: Path) -> set[str]:
     return {str(name) for name in names if name is not None}
 
 
-def _ours(name: str) -> bool:
-    return _OURS.fullmatch(name) is not None
+def _strange(names: list[str]) -> str | None:
+    strange = [name for name in names if not _HEADER.fullmatch(name)]
+    if len(strange) == len(names):
+        return next(iter(names), None)
+    return next((name for name in strange if not _CHUNK.fullmatch(name)), None)

@@ -46,7 +46,5 @@ def nxtomo(path: Path, *, group: str = "entry1/tomo_entry", mode: str = "w") -> 
 def npz(path: Path) -> np.ndarray:
     data = counts(FRAMES, ROWS, BINS, dtype="<f4")
     flats = counts(2, ROWS, BINS, dtype="<f8")
-    np.savez_compressed(
-        path, projections=data, angles=np.deg2rad(DEGREES), flats=flats, pitch=0.25
-    )
+    np.savez_compressed(path, projections=data, angles=np.deg2rad(DEGREES), flats=flats, pitch=0.25)
     return data

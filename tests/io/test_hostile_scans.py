@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 import scan_files as made
 
-from rift_cl.errors import FileFormatError, PathEscapeError, ResourceLimitError, RiftError
+from rift_cl.errors import FileFormatError, ResourceLimitError, RiftError
 from rift_cl.io import ScanFile, open_scan
 
 
@@ -30,7 +30,7 @@ def grown() -> int:
 def hdf5_claim(path: Path, data: tuple[int, ...], theta: int, **layout: object) -> Path:
     with h5py.File(path, "w") as file:
         file.create_dataset("exchange/data", data, "f4", **layout)
-        file.create_dataset("exchange/theta", (theta,), "f4", chunks=(1000,))
+        file.create_dataset("exchange/theta", (theta,), "f4", chunks=(min(theta, 1000),))
     assert path.stat().st_size < 10_000
     return path
 
@@ -42,16 +42,16 @@ def test_terabytes_in_a_kilobyte_of_hdf5(tmp_path: Path, layout: dict[str, objec
     scan = open_scan(path, budget=1 << 30)
     with pytest.raises(ResourceLimitError, match="the memory budget is 1 GiB"):
         scan.read(0, 30_000)
-    with pytest.raises(ResourceLimitError, match="rows 0 to 1 of the scan claims 1.12 GiB"):
+    with pytest.raises(ResourceLimitError, match=r"rows 0 to 1 of the scan claims 1\.12 GiB"):
         scan.read(0, 1)
-    with pytest.raises(ResourceLimitError, match="32.7 TiB"):
+    with pytest.raises(ResourceLimitError, match=r"32\.7 TiB"):
         open_scan(path).read(0, 30_000)
     assert grown() - before < 50 << 20
 
 
 def test_a_chunk_counts_whole(tmp_path: Path) -> None:
     path = hdf5_claim(tmp_path / "a.h5", (8, 20_000, 5_000), 8, chunks=(8, 20_000, 5_000))
-    with pytest.raises(ResourceLimitError, match="claims 2.98 GiB"):
+    with pytest.raises(ResourceLimitError, match=r"claims 2\.98 GiB"):
         open_scan(path, budget=1 << 20).read(0, 1)
 
 
@@ -121,119 +121,6 @@ def test_a_pickle_is_never_opened(tmp_path: Path) -> None:
     with pytest.raises(RiftError, match="object"):
         open_scan(tmp_path / "a.npz")
     assert not (tmp_path / "sprung").exists()
-
-
-@pytest.fixture
-def folders(tmp_path: Path) -> tuple[Path, Path]:
-    """A folder to read from, and a scan outside it."""
-    inner = tmp_path / "inner"
-    inner.mkdir()
-    made.data_exchange(tmp_path / "secret.h5")
-    (tmp_path / "secret.raw").write_bytes(bytes(480))
-    return inner, tmp_path / "secret.h5"
-
-
-def virtual(file: h5py.File, name: str, source: str, dataset: str) -> None:
-    layout = h5py.VirtualLayout((6, 4, 5), "<u2")
-    layout[:] = h5py.VirtualSource(source, dataset, (6, 4, 5))
-    file.create_virtual_dataset(name, layout)
-
-
-ESCAPES = ["../secret.h5", "{absolute}", "sub/../../secret.h5", "symlink.h5"]
-
-
-@pytest.mark.parametrize("target", ESCAPES)
-@pytest.mark.parametrize("means", ["link", "soft link to link", "virtual", "group link"])
-def test_ways_out_of_the_folder(folders: tuple[Path, Path], target: str, means: str) -> None:
-    inner, secret = folders
-    target = target.format(absolute=secret)
-    (inner / "symlink.h5").symlink_to(secret)
-    (inner / "sub").mkdir()
-    with h5py.File(inner / "a.h5", "w") as file:
-        file["exchange/theta"] = made.DEGREES
-        if means == "link":
-            file["exchange/data"] = h5py.ExternalLink(target, "/exchange/data")
-        elif means == "soft link to link":
-            file["elsewhere"] = h5py.ExternalLink(target, "/exchange")
-            file["exchange/data"] = h5py.SoftLink("/elsewhere/data")
-        elif means == "virtual":
-            virtual(file, "exchange/data", target, "exchange/data")
-        else:
-            del file["exchange"]
-            file["exchange"] = h5py.ExternalLink(target, "/exchange")
-    with pytest.raises(PathEscapeError, match="outside the folder"):
-        open_scan(inner / "a.h5")
-
-
-def test_a_way_out_by_a_second_file(folders: tuple[Path, Path]) -> None:
-    inner, secret = folders
-    with h5py.File(inner / "b.h5", "w") as file:
-        virtual(file, "data", str(secret), "exchange/data")
-    with h5py.File(inner / "a.h5", "w") as file:
-        file["exchange/theta"] = made.DEGREES
-        virtual(file, "exchange/data", "b.h5", "data")
-    with pytest.raises(PathEscapeError, match="outside the folder"):
-        open_scan(inner / "a.h5")
-
-
-def test_raw_files_outside(folders: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> None:
-    inner, secret = folders
-    with h5py.File(inner / "a.h5", "w") as file:
-        raw = [(str(secret.with_suffix(".raw")), 0, 480)]
-        file.create_dataset("exchange/data", (6, 4, 5), "f4", external=raw)
-        file["exchange/theta"] = made.DEGREES
-    with pytest.raises(PathEscapeError, match=r"secret\.raw"):
-        open_scan(inner / "a.h5")
-    with h5py.File(inner / "a.h5", "a") as file:
-        del file["exchange/data"]
-        file.create_dataset("exchange/data", (6, 4, 5), "f4", external=[("secret.raw", 0, 480)])
-    monkeypatch.chdir(secret.parent)
-    with pytest.raises(PathEscapeError, match=r"secret\.raw"):
-        open_scan(inner / "a.h5")
-
-
-def test_links_inside_the_folder_are_followed(tmp_path: Path) -> None:
-    (tmp_path / "raw").mkdir()
-    data = made.data_exchange(tmp_path / "raw" / "b.h5")
-    with h5py.File(tmp_path / "a.h5", "w") as file:
-        file["exchange"] = h5py.ExternalLink("raw/b.h5", "/exchange")
-        virtual(file, "copy", "raw/b.h5", "exchange/data")
-    for name in (None, "copy"):
-        scan = open_scan(tmp_path / "a.h5", dataset=name, theta="exchange/theta")
-        np.testing.assert_array_equal(scan.read(0, 4).projections, data)
-
-
-def test_missing_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    elsewhere = tmp_path / "elsewhere"
-    elsewhere.mkdir()
-    made.data_exchange(elsewhere / "b.h5")
-    monkeypatch.chdir(elsewhere)
-    for number, source in enumerate(["b.h5", "b%b.h5"]):
-        path = tmp_path / f"{number}.h5"
-        with h5py.File(path, "w") as file:
-            file["exchange/theta"] = made.DEGREES
-            virtual(file, "exchange/data", source, "exchange/data")
-        with pytest.raises(FileFormatError, match=r"not there|pattern"):
-            open_scan(path)
-
-
-@pytest.mark.parametrize("means", ["virtual", "soft", "grown soft"])
-def test_circles(tmp_path: Path, means: str) -> None:
-    path = tmp_path / "a.h5"
-    with h5py.File(path, "w") as file:
-        file["exchange/theta"] = made.DEGREES
-        if means == "virtual":
-            virtual(file, "exchange/data", ".", "other")
-            virtual(file, "other", "a.h5", "exchange/data")
-        elif means == "soft":
-            file["exchange/data"] = h5py.SoftLink("/exchange/data")
-        else:
-            file["exchange/data"] = h5py.SoftLink("/l9/x")
-            file["l0"] = h5py.SoftLink("/")
-            for level in range(1, 10):
-                file[f"l{level}"] = h5py.SoftLink("/" + f"l{level - 1}/" * 50)
-    with pytest.raises(FileFormatError, match=r"circles|of itself"):
-        open_scan(path)
 
 
 def outcome(path: Path) -> ScanFile | RiftError:
