@@ -71,10 +71,12 @@ def _commands() -> dict[str, Callable[..., Callable[[], int]]]:
     }
 
 
-def _command(run: Callable[[Any, Output], None], settings: type) -> Callable[..., Callable[[], int]]:
+def _command(
+    run: Callable[[Any, Output], None], settings: type
+) -> Callable[..., Callable[[], int]]:
     """A command for tyro: it takes settings and gives back what is to be run."""
 
-    def command(settings: Any, output: Any = Output()) -> Callable[[], int]:  # noqa: B008 - frozen
+    def command(settings: Any, output: Any = Output()) -> Callable[[], int]:
         return lambda: _guarded(run, settings, output)
 
     command.__annotations__ = {
@@ -110,7 +112,9 @@ def _watch(reports: Iterable[Report], output: Output) -> None:
     show_progress(reports, quiet=output.quiet)
 
 
-def _print_table(columns: Sequence[str], rows: Iterable[Sequence[Any]], *, caption: str = "") -> None:
+def _print_table(
+    columns: Sequence[str], rows: Iterable[Sequence[Any]], *, caption: str = ""
+) -> None:
     table = Table(*columns, caption=caption or None, caption_justify="left")
     for row in rows:
         table.add_row(*(f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row))

@@ -70,7 +70,7 @@ def ssim(
         NonFiniteError: ``image`` or ``truth`` holds NaN or infinity, masked or not.
         InputError: ``peak`` is not a positive number.
     """
-    from skimage.metrics import structural_similarity  # noqa: PLC0415  heavy, wanted here alone
+    from skimage.metrics import structural_similarity
 
     found, wanted, counts = _checked(image, truth, mask)
     _check_peak("ssim", peak)

@@ -238,7 +238,7 @@ def _real(name: str, values: ArrayLike, *, axes: int = 1) -> _Reals:
 
 
 def _figure(width: int, height: int) -> Figure:
-    from matplotlib.figure import Figure  # noqa: PLC0415  heavy, wanted only to draw
+    from matplotlib.figure import Figure
 
     return Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, facecolor="white")
 

@@ -116,7 +116,7 @@ def build_lock() -> Iterator[None]:
             with contextlib.suppress(OSError):
                 fcntl.flock(handle, fcntl.LOCK_EX)
         yield
-        # Without a record the next process builds again, which is slow but right.
+        # What cannot be recorded is trusted, as any driver trusts its cache.
         with contextlib.suppress(OSError):
             record(folder)
 

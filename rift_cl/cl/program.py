@@ -27,6 +27,8 @@ OPTIONS = ("-cl-std=CL1.2", "-cl-mad-enable", "-w")
 # PoCL compiles for grids up to this size and for larger ones apart.
 _SMALL_GRID = 65534
 _PAUSES = (0.0, 0.1, 0.3)
+# One for all devices: pyopencl writes Python code for each new kernel, and that is not thread-safe.
+_building = threading.RLock()
 # A kernel and its macros as the compiler sees them: 1 and 1.0 are equal, but not the same.
 _Key = tuple[str, tuple[tuple[str, str], ...]]
 
@@ -49,7 +51,6 @@ class Programs:
         self._device = device
         self._programs: dict[_Key, Any] = {}
         self._started: set[tuple[_Key, bool]] = set()
-        self._building = threading.RLock()
         self._own = _ThreadKernels()
 
     def launch(
@@ -91,7 +92,7 @@ class Programs:
             cl.enqueue_nd_range_kernel(queue, kernel, size, local)
             return
         # PoCL compiles again for the first launch, into the same cache.
-        with self._building, build_lock():
+        with _building, build_lock():
             cl.enqueue_nd_range_kernel(queue, kernel, size, local)
             queue.finish()
             self._started.add(started)
@@ -101,12 +102,12 @@ class Programs:
             import pyopencl as cl
 
             program = self._program(key)
-            with named_errors(f"loading kernel {key[0]}", self._device.name):
+            with _building, named_errors(f"loading kernel {key[0]}", self._device.name):
                 self._own.kernels[key] = cl.Kernel(program, key[0])
         return self._own.kernels[key]
 
     def _program(self, key: _Key) -> Any:
-        with self._building:
+        with _building:
             if key not in self._programs:
                 self._programs[key] = self._build(key)
             return self._programs[key]

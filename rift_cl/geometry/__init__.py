@@ -1,6 +1,7 @@
-"""Where things are: grids of samples and the scans that look at them. Values, no OpenCL."""
+"""Where things are: grids of samples, scans and cameras that look at them. Values, no OpenCL."""
 
+from rift_cl.geometry.camera import Camera
 from rift_cl.geometry.grid import Grid
 from rift_cl.geometry.scan import Parallel
 
-__all__ = ["Grid", "Parallel"]
+__all__ = ["Camera", "Grid", "Parallel"]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError, ShapeError
+from rift_cl.geometry.numbers import real_numbers
 
 
 @dataclass(frozen=True, init=False)
@@ -66,21 +67,20 @@ class Grid:
 
 
 def _counts(shape: Sequence[int]) -> tuple[int, ...]:
-    try:
-        counts = tuple(int(n) for n in shape)
-        whole = counts == tuple(shape)
-    except (TypeError, ValueError):
-        counts, whole = (), False
-    if not whole or len(counts) not in (2, 3) or min(counts) < 1:
+    numbers = real_numbers(shape)
+    if numbers is None or numbers.shape not in ((2,), (3,)) or not _whole(numbers):
         raise ShapeError(f"Grid: shape is {shape!r}, wanted (ny, nx) or (nz, ny, nx), each >= 1")
-    return counts
+    return tuple(int(n) for n in numbers)
+
+
+def _whole(numbers: NDArray[np.float64]) -> bool:
+    return all(number.is_integer() and number >= 1 for number in numbers.tolist())
 
 
 def _per_axis(name: str, value: float | Sequence[float], axes: int) -> tuple[float, ...]:
-    try:
-        numbers = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"Grid: {name} is {value!r}, wanted numbers") from None
+    numbers = real_numbers(value)
+    if numbers is None:
+        raise InputError(f"Grid: {name} is {value!r}, wanted numbers")
     if numbers.ndim > 1 or numbers.size not in (1, axes):
         raise ShapeError(f"Grid: {name} is {value!r}, wanted one number or one for each axis")
     if not np.isfinite(numbers).all():

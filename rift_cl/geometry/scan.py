@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError, ShapeError
+from rift_cl.geometry.numbers import one_number, real_numbers
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -41,14 +43,15 @@ class Parallel:
     ) -> None:
         """Check the arguments and bring them into their normal form."""
         object.__setattr__(self, "angles", _angles(angles))
-        if int(bins) != bins or bins < 1:
+        count, length = one_number(bins), one_number(pitch)
+        if not (count >= 1 and count.is_integer()):
             raise ShapeError(f"Parallel: bins is {bins!r}, wanted a positive whole number")
-        object.__setattr__(self, "bins", int(bins))
-        if not (math.isfinite(pitch) and pitch > 0):
+        object.__setattr__(self, "bins", int(count))
+        if not length > 0:
             raise InputError(f"Parallel: pitch is {pitch!r}, wanted a positive length")
-        object.__setattr__(self, "pitch", float(pitch))
-        middle = (self.bins - 1) / 2 if center is None else float(center)
-        if not math.isfinite(middle):
+        object.__setattr__(self, "pitch", length)
+        middle = (self.bins - 1) / 2 if center is None else one_number(center)
+        if math.isnan(middle):
             raise InputError(f"Parallel: center is {center!r}, wanted a bin number")
         object.__setattr__(self, "center", middle)
 
@@ -60,6 +63,10 @@ class Parallel:
         """Equal scans hash equally."""
         return hash(self._key())
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies are made by the constructor, so that their angles are read-only as well."""
+        return Parallel, (self.angles, self.bins, self.pitch, self.center)
+
     def _key(self) -> tuple[bytes, int, float, float]:
         return self.angles.tobytes(), self.bins, self.pitch, self.center
 
@@ -70,10 +77,9 @@ class Parallel:
 
 
 def _angles(angles: ArrayLike) -> NDArray[np.float64]:
-    try:
-        values = np.array(angles, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise InputError("Parallel: angles must be numbers, in radians") from None
+    values = real_numbers(angles)
+    if values is None:
+        raise InputError(f"Parallel: angles is {angles!r}, wanted real numbers, in radians")
     if values.ndim != 1:
         raise ShapeError(f"Parallel: angles has shape {values.shape}, wanted one dimension")
     if values.size == 0:

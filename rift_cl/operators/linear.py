@@ -123,23 +123,24 @@ class LinearOperator(ABC):
 
     def _apply_host(self, x: NDArray[np.float32], y: NDArray[np.float32]) -> None:
         budget = self.device.budget
-        pieces = self._pieces(budget)
-        for halving in range(1, _HALVINGS + 2):
+        lack: DeviceMemoryError | None = None
+        for halving in range(_HALVINGS + 1):
             try:
-                for inside, outside in pieces:
+                for inside, outside in self._pieces(budget >> halving):
                     self._apply_piece(x, y, inside, outside)
                 return
             except DeviceMemoryError as failure:
                 # The driver had less than it said: take smaller pieces while there are smaller.
+                if halving == _HALVINGS:
+                    raise
+                lack = failure
                 # What still runs may read the host's memory, so it comes to its end first.
                 self.device.finish()
                 self.device.release()
-                try:
-                    pieces = self._pieces(budget >> halving)
-                except ResourceLimitError:
-                    raise failure from None
-                if halving > _HALVINGS:
-                    raise
+            except ResourceLimitError:
+                if lack is not None:
+                    raise lack from None
+                raise
 
     def _apply_piece(
         self,

@@ -1,0 +1,27 @@
+/* Count the digits of every chunk of keys: the first half of a stable radix pass.
+ *
+ *     table[digit][chunk] = keys of the chunk that have this digit
+ *
+ * The prefix sum of the table tells radix_scatter where each chunk's keys of each digit begin.
+ *
+ * Index space: chunks. See include/radix.h for FIRST and the counters. */
+
+#include "include/portable.h"
+#include "include/chunk.h"
+#include "include/radix.h"
+
+KERNEL void radix_count(
+    __global const uint *restrict keys, __global const int *restrict slots,
+    __global const long *restrict visible, __global int *restrict table,
+    int splats, int chunks, int shift)
+{
+  __local int counters[DIGITS * GROUP];
+  __local int *own = counters + get_local_id(0);
+  const int chunk = (int)get_global_id(0);
+  if (chunk >= chunks) return;
+  for (int digit = 0; digit < DIGITS; digit++) own[digit * GROUP] = 0;
+  const int end = CHUNK_BEGIN(chunk + 1, chunks, ELEMENTS);
+  for (int i = CHUNK_BEGIN(chunk, chunks, ELEMENTS); i < end; i++)
+    if (!LEFT_OUT(i)) COUNTER(keys[i])++;
+  for (int digit = 0; digit < DIGITS; digit++) table[digit * chunks + chunk] = own[digit * GROUP];
+}

@@ -1,0 +1,37 @@
+/* Replace whole numbers by the sum of all before them: the way down of a prefix sum.
+ *
+ *     values[i] = sum of values[0] .. values[i - 1]
+ *
+ * Each item goes through one run, from the sum of all runs before it: sums[run's number]. Where
+ * one run is all there is (WHOLE 1), it starts from zero and leaves the total in sums[0].
+ *
+ * Index space: runs. WIDE 1: the values have 64 bits. */
+
+#include "include/portable.h"
+
+#ifndef WIDE
+#define WIDE 0
+#endif
+#ifndef WHOLE
+#define WHOLE 0
+#endif
+#if WIDE
+typedef long number;
+#else
+typedef int number;
+#endif
+
+KERNEL void scan_place(
+    __global number *restrict values, __global long *restrict sums, int count, int run)
+{
+  const long first = (long)get_global_id(0) * run;
+  const long stop = first + run < count ? first + run : count;
+  if (first >= count) return;
+  long sum = WHOLE ? 0 : sums[get_global_id(0)];
+  for (long i = first; i < stop; i++) {
+    const number value = values[i];
+    values[i] = (number)sum;
+    sum += value;
+  }
+  if (WHOLE) sums[0] = sum;
+}

@@ -1,0 +1,33 @@
+/* Count the tiles of every splat, and make its depth a key that sorts as an unsigned number.
+ *
+ *     counts[i] = tiles in the box of splat i, 0 where its depth is NaN;  counts[splats] = 0
+ *     keys[i]   = the bits of its depth, flipped so that their order is that of the numbers
+ *
+ * The sign bit is flipped, and for negative numbers (an orthographic camera has them) all others
+ * too. Both zeros have one key. Only bits are looked at: compilers fold tests for NaN away, and a
+ * device may take the smallest numbers for zero.
+ *
+ * Index space: runs of `run` splats. screen is (splats, 8) with the depth in column 6. */
+
+#include "include/portable.h"
+#include "include/tile_box.h"
+
+#define DEPTH 6
+
+KERNEL void tile_count(
+    __global const int4 *restrict boxes, __global const uint *restrict screen,
+    __global int *restrict counts, __global uint *restrict keys,
+    int splats, int run, int tiles_x, int tiles_y)
+{
+  const long first = (long)get_global_id(0) * run;
+  const long stop = first + run < splats ? first + run : splats;
+  for (long i = first; i < stop; i++) {
+    const int4 box = clipped_box(boxes[i], tiles_x, tiles_y);
+    uint bits = screen[i * 8 + DEPTH];
+    const int nan = (bits & 0x7fffffffu) > 0x7f800000u;
+    if (bits == 0x80000000u) bits = 0;
+    counts[i] = !nan && box.z > box.x && box.w > box.y ? (box.z - box.x) * (box.w - box.y) : 0;
+    keys[i] = bits & 0x80000000u ? ~bits : bits | 0x80000000u;
+  }
+  if (first == 0) counts[splats] = 0;
+}

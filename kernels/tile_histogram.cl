@@ -1,0 +1,19 @@
+/* Count the entries of every tile, chunk by chunk: the first step of a counting sort by tile.
+ *
+ *     table[chunk][tile] = (splat, tile) pairs of the chunk
+ *
+ * Index space: chunks of the walk of include/tile_walk.h. */
+
+#include "include/portable.h"
+#include "include/tile_walk.h"
+
+KERNEL void tile_histogram(
+    __global const int4 *restrict ranks, __global const int *restrict offsets,
+    __global int *restrict table, int splats, int pairs, int chunks, int tiles, int tiles_x)
+{
+  const int chunk = (int)get_global_id(0);
+  if (chunk >= chunks) return;
+  __global int *own = table + (long)chunk * tiles;
+  for (int tile = 0; tile < tiles; tile++) own[tile] = 0;
+  FOR_EACH_PAIR(own[tile]++;)
+}

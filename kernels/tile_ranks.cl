@@ -1,0 +1,38 @@
+/* Gather what the lists need of every splat, from front to back, in one go.
+ *
+ *     ranks[r]  = (corner: its box's first tile, tiles in a row of the box, its first slot, splat)
+ *     counts[r] = its tiles;  0 for the ranks that no visible splat has, and for rank `splats`
+ *
+ * The gather is the one random access to the splats; what follows reads `ranks` in order.
+ *
+ * Index space: runs of `run` ranks, the last of which closes the list. SORTED 0: the splats are
+ * taken in index order, and neither `order` nor `visible` is read. */
+
+#include "include/portable.h"
+#include "include/tile_box.h"
+
+#ifndef SORTED
+#define SORTED 1
+#endif
+
+KERNEL void tile_ranks(
+    __global const int4 *restrict boxes, __global const int *restrict slots,
+    __global const int *restrict order, __global const long *restrict visible,
+    __global int4 *restrict ranks, __global int *restrict counts,
+    int splats, int run, int tiles_x, int tiles_y)
+{
+  const long first = (long)get_global_id(0) * run;
+  const long stop = first + run < splats ? first + run : splats;
+  const int filled = SORTED ? (int)visible[0] : splats;
+  for (long rank = first; rank < stop; rank++) {
+    int count = 0;
+    if (rank < filled) {
+      const int splat = SORTED ? order[rank] : (int)rank;
+      const int4 box = clipped_box(boxes[splat], tiles_x, tiles_y);
+      count = slots[splat + 1] - slots[splat];
+      ranks[rank] = (int4)(box.y * tiles_x + box.x, box.z - box.x, slots[splat], splat);
+    }
+    counts[rank] = count;
+  }
+  if (first == 0) counts[splats] = 0;
+}

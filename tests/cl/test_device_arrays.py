@@ -1,0 +1,103 @@
+"""Arrays on a device: what they hold, and which of them an operator refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.cl import Device
+from rift_cl.cl.memory import as_device_array, is_device_array
+from rift_cl.errors import DeviceError, DTypeError, ShapeError
+
+SHAPE = (4, 6)
+
+
+def _checked(device, array):
+    return as_device_array(device, array, SHAPE, name="x")
+
+
+def test_good_array_passes_as_it_is(device):
+    array = device.zeros(SHAPE)
+    assert _checked(device, array) is array
+
+
+def test_wrong_shape(device):
+    for shape in ((6, 4), (24,), (4, 6, 1), (4, 0)):
+        with pytest.raises(ShapeError, match="x has shape"):
+            _checked(device, device.zeros(shape))
+
+
+@pytest.mark.parametrize("dtype", [np.int32, np.uint8, np.float64, np.complex64])
+def test_wrong_type(device, dtype):
+    with pytest.raises(DTypeError, match=np.dtype(dtype).name):
+        _checked(device, device.empty(SHAPE, dtype))
+
+
+def test_views_are_refused_and_the_copy_is_taken(device):
+    wide = device.array(np.arange(96.0).reshape(8, 12))
+    tall = device.array(np.arange(48.0).reshape(8, 6))
+    views = {"strided": wide[::2, ::2], "later rows": tall[4:], "transposed": tall[:6, :4].T}
+    for view in views.values():
+        assert view.shape == SHAPE
+        with pytest.raises(ShapeError, match="strided view"):
+            _checked(device, view)
+        with pytest.raises(ShapeError, match="strided view"):
+            device.get(view)
+    np.testing.assert_array_equal(device.get(tall[4:].copy()), np.arange(24.0, 48.0).reshape(SHAPE))
+    assert _checked(device, tall[4:].copy()).shape == SHAPE
+
+
+def test_array_of_another_context(device):
+    other = Device(device._handle, device.selector, traits=device.traits)
+    array = other.zeros(SHAPE)
+    with pytest.raises(DeviceError, match="another device"):
+        _checked(device, array)
+    with pytest.raises(DeviceError, match="another device"):
+        device.get(array)
+
+
+def test_operator_refuses_what_the_check_refuses(device):
+    A = rift.Projector(rift.Grid(SHAPE), rift.Parallel([0.0], 8), device=device)
+    with pytest.raises(DTypeError):
+        A(device.zeros(SHAPE, np.int32))
+    with pytest.raises(ShapeError):
+        A(device.zeros((6, 4)))
+    with pytest.raises(ShapeError, match="out"):
+        A(device.zeros(SHAPE), device.zeros((8, 1)))
+
+
+def test_zeros_are_zero_in_memory_that_was_used_before(device):
+    for _ in range(5):
+        used = device.array(np.full(1000, np.nan))
+        del used
+        assert not device.get(device.zeros(1000)).any()
+
+
+@pytest.mark.parametrize("shape", [(), (0,), (3, 0, 2), 5, (1,)])
+def test_small_and_empty_shapes(device, shape):
+    array = device.zeros(shape)
+    assert device.get(array).shape == (shape if isinstance(shape, tuple) else (shape,))
+
+
+def test_types_on_the_device(device):
+    for dtype in ("f2", "f8", ">f4", "?"):
+        assert device.array(np.ones(3, dtype)).dtype == np.float32
+    for dtype in ("i4", "u2", ">i8"):
+        assert device.array(np.ones(3, dtype)).dtype == np.dtype(dtype).newbyteorder("=")
+
+
+def test_is_device_array_needs_no_driver(device):
+    assert is_device_array(device.zeros(3))
+    assert not any(is_device_array(value) for value in (np.zeros(3), [1.0], None, 3.0))
+
+
+def test_launch_over_nothing_does_nothing(device):
+    device.launch("no_such_kernel", (0, 5))
+    device.launch("no_such_kernel", (5, 0, 1))
+
+
+def test_finish_and_release(device):
+    device.finish()
+    device.release()
+    assert device.get(device.zeros(3)).tolist() == [0, 0, 0]
