@@ -29,13 +29,14 @@ KERNEL void radon_resample_adjoint(
   const long4 g = geometry[view];
   const float inverse_width = hats[view].x, scale = hats[view].y;
   const float step = FIXED_TO_FLOAT(g.w), per_bin = 1.0f / step;
-  const float behind = (per_bin < 0 ? -per_bin : per_bin) / inverse_width;
+  const float reach_back = (per_bin < 0 ? -per_bin : per_bin) / inverse_width +
+                           (1.0f - 1.0f / PHASES) + 1e-3f + 1e-6f * columns;
   __global const float *entries = table + ((long)slice * count + number) * PHASES * columns;
   __global float *y = sinogram + ((long)views[view].x * slices + slice0 + slice) * bins;
   for (int b = b0; b < b1; b++) {
-    /* A column whose first phase lies at or before the hat's near side, whatever the rounding. */
+    /* The first column with a phase inside the hat, or the one before where rounding hides it. */
     const float center = ((float)(b - WHOLE(g.z)) - FIXED_TO_FLOAT(g.z & 0xffffffffL)) * per_bin;
-    const int start = (int)(center - behind + (float)columns) - columns - 1;
+    const int start = (int)(center - reach_back + (float)columns) - columns + 1;
     lanes sum = 0;
     for (int k = start < 0 ? 0 : start; k < start + reach && k < used; k++) {
       const float offset = FIXED_TO_FLOAT(g.z + k * g.w - ((long)b << 32));

@@ -20,6 +20,10 @@ from rift_cl.cl.program import Programs
 from rift_cl.cl.traits import Traits
 
 
+# Asking for the budget costs more than a small array is worth.
+_LARGE = 1 << 20
+
+
 class Device:
     """One OpenCL device, opened.
 
@@ -89,7 +93,7 @@ class Device:
         opened = self._open()
         # Blocks that are kept for the next array count as well, until the room is needed.
         wanted = int(np.prod(shape, dtype=np.int64)) * np.dtype(dtype).itemsize
-        if opened.pool.managed_bytes + wanted > self.budget:
+        if wanted >= _LARGE and opened.pool.managed_bytes + wanted > self.budget:
             opened.pool.free_held()
         with named_errors(f"allocating an array of shape {shape}", self.name):
             return Array(opened.queue, shape, dtype, allocator=opened.pool)

@@ -39,7 +39,7 @@ class PhaseTable:
         rows, width: the image as seen along this axis.
         padded: ``width`` in whole segments.
         taps: most bins that the phases of one column read.
-        reach: most columns that one bin reads, with room for rounding at both ends.
+        reach: most columns that one bin reads.
     """
 
     views: NDArray[np.int32]
@@ -102,7 +102,8 @@ def phase_table(grid: Grid, scan: Parallel, *, along_x: bool, segment: int) -> P
         width=width,
         padded=padded,
         taps=int(np.ceil(np.max(2 * half_width + np.abs(step), initial=1.0))),
-        reach=int(np.ceil(np.max(2 * half_width / np.abs(step), initial=1.0))) + 3,
+        # The hat's width in columns, a column's own phases, and what rounding may add.
+        reach=int(np.max(2 * half_width / np.abs(step), initial=0.0) + 1 - 1 / PHASES + 0.1) + 1,
     )
 
 
