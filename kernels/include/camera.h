@@ -1,0 +1,202 @@
+/* How a camera maps a point to the screen, how its map bends there, and the gradient of both.
+ *
+ * q = (x, y, z) is a point in the camera's frame (x right, y down, z forward), (u, v) its pixel
+ * position and J the 2x3 matrix of their derivatives, whose rows are `du` and `dv`:
+ *
+ *     pinhole   u = fx x / z + cx,
+ *     ortho     u = fx x + cx,
+ *     fisheye   u = fx x s + cx,   s = theta / r, r = |(x, y)|, theta = atan2(r, z),
+ *
+ * and the same for v with y. A pinhole's J is taken at most 15 % of the image outside of it, as
+ * gsplat and inria do: far outside, the local affine map stretches a splat without bound. In
+ * pixels that is px = clamp(u, -0.15 W, 1.15 W) - cx, with du = (fx, 0, -px) / z.
+ *
+ * `volume` is det [du; dv; ray] with the unit ray along which J sees (its null direction): pixel
+ * area times length along the ray, per unit of volume. Line integrals need it. */
+
+#define PINHOLE 0
+#define ORTHO 1
+#define FISHEYE 2
+#ifndef MODEL
+#define MODEL PINHOLE
+#endif
+#define MARGIN 0.15f
+
+/* Rows of the world-to-camera matrix, then (fx, fy, cx, cy), then the image. */
+#define CAMERA_PARAMETERS \
+  float4 view_x, float4 view_y, float4 view_z, float4 intrinsics, int width, int height
+#define CAMERA \
+  camera_of(view_x, view_y, view_z, intrinsics, (float)width, (float)height)
+
+typedef struct {
+  rows3 rotation;
+  float3 shift;
+  float fx, fy, cx, cy, width, height;
+} Camera;
+
+typedef struct {
+  float u, v, volume;
+  float3 du, dv;
+} Screen;
+
+/* dL/d of a Screen's members; of the volume, by its logarithm. */
+typedef struct {
+  float u, v, log_volume;
+  float3 du, dv;
+} ScreenGradient;
+
+typedef struct {
+  float3 point;
+  float fx, fy, cx, cy;
+} CameraGradient;
+
+static Camera camera_of(
+    float4 row_x, float4 row_y, float4 row_z, float4 intrinsics, float width, float height) {
+  Camera c;
+  c.rotation.x = row_x.xyz;
+  c.rotation.y = row_y.xyz;
+  c.rotation.z = row_z.xyz;
+  c.shift = (float3)(row_x.w, row_y.w, row_z.w);
+  c.fx = intrinsics.x;
+  c.fy = intrinsics.y;
+  c.cx = intrinsics.z;
+  c.cy = intrinsics.w;
+  c.width = width;
+  c.height = height;
+  return c;
+}
+
+#if MODEL == PINHOLE
+
+/* Offset from the principal point, kept near the image. */
+static float near_image(float offset, float center, float size) {
+  const float low = -MARGIN * size - center, high = (1 + MARGIN) * size - center;
+  return offset < low ? low : offset > high ? high : offset;
+}
+
+static Screen to_screen(Camera c, float3 q) {
+  const float inverse = 1 / q.z, x = c.fx * q.x * inverse, y = c.fy * q.y * inverse;
+  const float px = near_image(x, c.cx, c.width), py = near_image(y, c.cy, c.height);
+  const float tx = px / c.fx, ty = py / c.fy;
+  Screen s;
+  s.u = x + c.cx;
+  s.v = y + c.cy;
+  s.du = (float3)(c.fx * inverse, 0, -px * inverse);
+  s.dv = (float3)(0, c.fy * inverse, -py * inverse);
+  s.volume = c.fx * inverse * c.fy * inverse * sqrt(1 + tx * tx + ty * ty);
+  return s;
+}
+
+static CameraGradient to_screen_grad(Camera c, float3 q, ScreenGradient g) {
+  const float inverse = 1 / q.z, x = q.x * inverse, y = q.y * inverse;
+  const float free_x = c.fx * x, free_y = c.fy * y;
+  const float px = near_image(free_x, c.cx, c.width), py = near_image(free_y, c.cy, c.height);
+  const float tx = px / c.fx, ty = py / c.fy;
+  const float stretch = g.log_volume / (1 + tx * tx + ty * ty);
+  float gx = -g.du.z * inverse + stretch * tx / c.fx;
+  float gy = -g.dv.z * inverse + stretch * ty / c.fy;
+  CameraGradient out;
+  out.cx = g.u;
+  out.cy = g.v;
+  /* A bound moves with the principal point alone. */
+  if (px != free_x) { out.cx -= gx; gx = 0; }
+  if (py != free_y) { out.cy -= gy; gy = 0; }
+  gx += g.u;
+  gy += g.v;
+  out.fx = g.du.x * inverse + gx * x + (g.log_volume - stretch * tx * tx) / c.fx;
+  out.fy = g.dv.y * inverse + gy * y + (g.log_volume - stretch * ty * ty) / c.fy;
+  out.point.x = gx * c.fx * inverse;
+  out.point.y = gy * c.fy * inverse;
+  out.point.z = -(out.point.x * x + out.point.y * y) - 2 * g.log_volume * inverse
+      + (g.du.z * px + g.dv.z * py - g.du.x * c.fx - g.dv.y * c.fy) * inverse * inverse;
+  return out;
+}
+
+#elif MODEL == ORTHO
+
+static Screen to_screen(Camera c, float3 q) {
+  Screen s;
+  s.u = c.fx * q.x + c.cx;
+  s.v = c.fy * q.y + c.cy;
+  s.du = (float3)(c.fx, 0, 0);
+  s.dv = (float3)(0, c.fy, 0);
+  s.volume = c.fx * c.fy;
+  return s;
+}
+
+static CameraGradient to_screen_grad(Camera c, float3 q, ScreenGradient g) {
+  CameraGradient out;
+  out.point = (float3)(g.u * c.fx, g.v * c.fy, 0);
+  out.fx = g.u * q.x + g.du.x + g.log_volume / c.fx;
+  out.fy = g.v * q.y + g.dv.y + g.log_volume / c.fy;
+  out.cx = g.u;
+  out.cy = g.v;
+  return out;
+}
+
+#else
+
+/* s = theta / r and its derivatives by w = r^2: ds/dw = s1 / 2, ds1/dw = s2; m = 1 / |q|^2.
+ * Near the axis the closed forms cancel, and series in t = w / z^2 take their place:
+ * z s = sum (-t)^n / (2 n + 1). */
+typedef struct {
+  float s, s1, s2, m;
+} Bend;
+
+#define SERIES 10
+#define SERIES_BELOW 0.1f
+
+static Bend bend_of(float3 q) {
+  const float w = q.x * q.x + q.y * q.y, i = 1 / q.z, t = w * i * i;
+  Bend b;
+  b.m = 1 / (w + q.z * q.z);
+  if (q.z > 0 && t < SERIES_BELOW) {
+    b.s = b.s1 = b.s2 = 0;
+    for (int n = SERIES; n >= 0; n--) b.s = 1.0f / (2 * n + 1) - t * b.s;
+    for (int n = SERIES; n >= 1; n--) b.s1 = 2.0f * n / (2 * n + 1) - t * b.s1;
+    for (int n = SERIES; n >= 2; n--) b.s2 = 2.0f * n * (n - 1) / (2 * n + 1) - t * b.s2;
+    b.s *= i;
+    b.s1 *= -i * i * i;
+    b.s2 *= i * i * i * i * i;
+    return b;
+  }
+  b.s = atan2(sqrt(w), q.z) / sqrt(w);
+  b.s1 = (q.z * b.m - b.s) / w;
+  b.s2 = -(q.z * b.m * b.m + 1.5f * b.s1) / w;
+  return b;
+}
+
+static Screen to_screen(Camera c, float3 q) {
+  const Bend b = bend_of(q);
+  Screen s;
+  s.u = c.fx * q.x * b.s + c.cx;
+  s.v = c.fy * q.y * b.s + c.cy;
+  s.du = c.fx * (float3)(b.s + q.x * q.x * b.s1, q.x * q.y * b.s1, -q.x * b.m);
+  s.dv = c.fy * (float3)(q.x * q.y * b.s1, b.s + q.y * q.y * b.s1, -q.y * b.m);
+  s.volume = 0; /* no line integrals */
+  return s;
+}
+
+static CameraGradient to_screen_grad(Camera c, float3 q, ScreenGradient g) {
+  const Bend b = bend_of(q);
+  const float3 gu = c.fx * g.du, gv = c.fy * g.dv;
+  CameraGradient out;
+  out.cx = g.u;
+  out.cy = g.v;
+  out.fx = g.u * q.x * b.s + g.du.x * (b.s + q.x * q.x * b.s1) + g.du.y * q.x * q.y * b.s1
+      - g.du.z * q.x * b.m;
+  out.fy = g.v * q.y * b.s + g.dv.x * q.x * q.y * b.s1 + g.dv.y * (b.s + q.y * q.y * b.s1)
+      - g.dv.z * q.y * b.m;
+  const float cross = gu.y + gv.x;
+  const float gs = g.u * c.fx * q.x + g.v * c.fy * q.y + gu.x + gv.y;
+  const float gs1 = gu.x * q.x * q.x + cross * q.x * q.y + gv.y * q.y * q.y;
+  const float gm = -gu.z * q.x - gv.z * q.y;
+  /* By w, of which x and y get twice themselves. */
+  const float gw = gs * b.s1 + 2 * gs1 * b.s2 - 2 * gm * b.m * b.m;
+  out.point.x = g.u * c.fx * b.s + (2 * gu.x * q.x + cross * q.y) * b.s1 - gu.z * b.m + gw * q.x;
+  out.point.y = g.v * c.fy * b.s + (2 * gv.y * q.y + cross * q.x) * b.s1 - gv.z * b.m + gw * q.y;
+  out.point.z = -gs * b.m + 2 * gs1 * b.m * b.m - 2 * gm * q.z * b.m * b.m;
+  return out;
+}
+
+#endif

@@ -1,0 +1,115 @@
+/* Project splats: from Gaussians in space to conics, extents and tile rectangles on the screen.
+ *
+ *     screen[i] = (u, v, a, b, c, weight, depth, factor),
+ *     sigma(pixel) = 0.5 (a dx^2 + c dy^2) + b dx dy,     (dx, dy) = (u, v) - pixel centre,
+ *
+ * where (a, b; b, c) is the inverse of the screen covariance plus eps2d, weight = opacity * factor
+ * and depth is the camera's z. boxes[i] = (x0, y0, x1, y1) are the tiles that the splat's ellipse
+ * may reach, x1 and y1 exclusive, radii[i] half the sides of its bounding rectangle, rounded up.
+ *
+ * An ellipse ends where weight * exp(-sigma) falls below 1/255, and at EXTENT standard deviations
+ * at the latest; line integrals, which no display rounds, and SMOOTH cut-offs end at EXTENT always.
+ *
+ * Splats that are not drawn get zeros and the reason in `culled`, the first of: not finite or
+ * degenerate in what was given (2), out of depth (1), too large to tell (2), too faint (3),
+ * clipped for its radius (5), off the screen (4). Index space: splats. */
+
+#include "include/portable.h"
+#include "include/small_matrix.h"
+#include "include/camera.h"
+#include "include/gaussian.h"
+
+#ifndef TILE
+#define TILE 16
+#endif
+#ifndef SMOOTH
+#define SMOOTH 0
+#endif
+/* Standard deviations; splat.h stops adding line integrals there as well. */
+#define EXTENT 3.33f
+/* Radii are held at this, so that they fit an int with room to add. */
+#define MOST_PIXELS (1 << 30)
+#define FAINTEST (1.0f / 255.0f)
+/* Below it some devices take a number for zero. */
+#define LEAST_NORMAL 1.2e-38f
+
+/* Largest whole number not above v, and smallest not below, held between 0 and most. */
+static int whole_below(float v, int most) { return v < 0 ? 0 : v > most ? most : (int)v; }
+
+static int whole_above(float v, int most) {
+  const int below = whole_below(v, most);
+  return below < most && below < v ? below + 1 : below;
+}
+
+/* ln x of a positive normal number, to 2e-7 of it or of 1: with x = m 2^e, m about 1,
+ * ln m = 2 artanh((m - 1) / (m + 1)). The built-in takes longer than all else here on PoCL. */
+static float natural_log(float x) {
+  const int e = (as_int(x) - 0x3f3504f3) >> 23;
+  const float m = as_float(as_int(x) - (e << 23)), s = (m - 1) / (m + 1), t = s * s;
+  const float series = 1 + t * (1 / 3.0f + t * (1 / 5.0f + t * (1 / 7.0f + t * (1 / 9.0f))));
+  return e * 0.69314718f + 2 * s * series;
+}
+
+/* Extent of a splat on the screen and in tiles; gives VISIBLE, or why it is not drawn. */
+static int bound(
+    const Gaussian *g, float weight, float radius_clip, int width, int height, int *radii, int *box)
+{
+  float extent = EXTENT;
+  if (!(weight >= (XRAY ? LEAST_NORMAL : FAINTEST))) return TOO_FAINT;
+  if (!XRAY && !SMOOTH) {
+    const float at_threshold = sqrt(2 * natural_log(larger(weight / FAINTEST, 1)));
+    extent = at_threshold < EXTENT ? at_threshold : EXTENT;
+  }
+  radii[0] = whole_above(extent * sqrt(dot3(g->v0, g->v0) + g->eps), MOST_PIXELS);
+  radii[1] = whole_above(extent * sqrt(dot3(g->v1, g->v1) + g->eps), MOST_PIXELS);
+  const float rx = radii[0], ry = radii[1];
+  if (rx <= radius_clip && ry <= radius_clip) return CLIPPED;
+  const float left = g->screen.u - rx, right = g->screen.u + rx;
+  const float top = g->screen.v - ry, bottom = g->screen.v + ry;
+  if (!(right > 0 && left < width && bottom > 0 && top < height)) return OFF_SCREEN;
+  const int across = (width + TILE - 1) / TILE, down = (height + TILE - 1) / TILE;
+  box[0] = whole_below(left / TILE, across);
+  box[1] = whole_below(top / TILE, down);
+  box[2] = whole_above(right / TILE, across);
+  box[3] = whole_above(bottom / TILE, down);
+  return box[0] < box[2] && box[1] < box[3] ? VISIBLE : OFF_SCREEN;
+}
+
+/* The screen's row of a splat, its rectangles, and why it is not drawn. */
+static int project(
+    const Gaussian *g, float opacity, float radius_clip, int width, int height,
+    float *row, int *radii, int *box)
+{
+  row[0] = g->screen.u;
+  row[1] = g->screen.v;
+  row[2] = (dot3(g->v1, g->v1) + g->eps) * g->inverse;
+  row[3] = -dot3(g->v0, g->v1) * g->inverse;
+  row[4] = (dot3(g->v0, g->v0) + g->eps) * g->inverse;
+  row[5] = opacity * g->factor;
+  row[6] = g->point.z;
+  row[7] = g->factor;
+  if (not_finite(row[2]) | not_finite(row[3]) | not_finite(row[4]) | not_finite(row[5])) return DEGENERATE;
+  return bound(g, row[5], radius_clip, width, height, radii, box);
+}
+
+KERNEL void splat_project(
+    __global const float *restrict means, SHAPES, __global const float *restrict opacities,
+    __global float *restrict screen, __global int *restrict boxes, __global int *restrict radii,
+    __global uchar *restrict culled, CAMERA_PARAMETERS,
+    float near_plane, float far_plane, float radius_clip, float eps2d, int count)
+{
+  const long i = get_global_id(0);
+  if (i >= count) return;
+  Gaussian g;
+  float row[8];
+  int box[4], radius[2];
+  const float opacity = opacities[i];
+  int code = not_finite(opacity) ? DEGENERATE
+      : see_gaussian(&g, CAMERA, means, SHAPE, i, near_plane, far_plane, eps2d);
+  if (code == VISIBLE) code = project(&g, opacity, radius_clip, width, height, row, radius, box);
+  const int drawn = code == VISIBLE;
+  for (int k = 0; k < 8; k++) screen[8 * i + k] = drawn ? row[k] : 0;
+  for (int k = 0; k < 4; k++) boxes[4 * i + k] = drawn ? box[k] : 0;
+  for (int k = 0; k < 2; k++) radii[2 * i + k] = drawn ? radius[k] : 0;
+  culled[i] = (uchar)code;
+}

@@ -1,0 +1,236 @@
+/* Gradient of splat_project, and the sum over tiles that comes before it.
+ *
+ * The raster gradient left records[slot] = (S0, Sx, Sy, Sxx, Sxy, Syy, colours, [|u|, |v|]) for
+ * every tile of a splat: sums over pixels of dL/dsigma times (1, dx, dy, dx^2, dx dy, dy^2), of
+ * dL/dcolour, and with ABSGRAD the magnitudes of the screen-position gradient. A splat's slots
+ * are contiguous; they are added here in their order. Then, with Q the inverse of the dilated
+ * screen covariance, S2 the matrix of second moments, U = Q V and S0 = -dL/dln(weight),
+ *
+ *     dL/d(u, v) = Q (Sx, Sy),      dL/dV = -Q S2 U + what the factor adds,
+ *
+ * and back through V = J W F to everything that J, W and F are made of. With COVARIANCES dL/dH is
+ * needed for H = V V^T: -Q S2 Q / 2 + what the factor adds, and then M^T dL/dH M.
+ *
+ * With DEPTH the last colour is the splat's depth. With CAMERA_GRADIENT each splat leaves its
+ * part of dL/d(view, rows of 4), dL/d(fx, fy, cx, cy) in camera_parts. Nothing flows through
+ * extents and culls; splats that are not drawn get zeros. Index space: splats. */
+
+#include "include/portable.h"
+#include "include/small_matrix.h"
+#include "include/camera.h"
+#include "include/gaussian.h"
+
+#ifndef CHANNELS
+#define CHANNELS 3
+#endif
+#ifndef ABSGRAD
+#define ABSGRAD 0
+#endif
+#ifndef DEPTH
+#define DEPTH 0
+#endif
+#ifndef CAMERA_GRADIENT
+#define CAMERA_GRADIENT 1
+#endif
+#define RECORD (6 + CHANNELS + 2 * ABSGRAD)
+
+#if COVARIANCES
+#define SHAPE_GRADIENTS __global float *restrict grad_covars
+#define SHAPE_GRADIENT grad_covars
+#else
+#define SHAPE_GRADIENTS __global float *restrict grad_quats, __global float *restrict grad_scales
+#define SHAPE_GRADIENT grad_quats, grad_scales
+#endif
+
+/* dL/d of V's rows, of M's rows, and of ln factor. */
+typedef struct {
+  float3 v0, v1, m0, m1;
+  float log_factor;
+} ViewGradient;
+
+/* Sum of a splat's records, in their order. */
+static void add_slots(__global const float *restrict records, int slot, int end, float *sum) {
+  for (int k = 0; k < RECORD; k++) sum[k] = 0;
+  for (; slot < end; slot++)
+    for (int k = 0; k < RECORD; k++) sum[k] += records[(long)slot * RECORD + k];
+}
+
+static void clear(__global float *p, int length) {
+  for (int k = 0; k < length; k++) p[k] = 0;
+}
+
+/* From the moments to the screen derivative M and root F, through dilation and factor. */
+static ViewGradient dilate_grad(const Gaussian *g, const float *s) {
+  ViewGradient out;
+  out.log_factor = ANTIALIASED && g->factor <= LEAST_COMPENSATION ? 0 : -s[0];
+  /* adj(V V^T) V, and U. */
+  const float3 a0 = cross3(g->v1, g->normal), a1 = cross3(g->normal, g->v0);
+  const float3 u0 = (a0 + g->eps * g->v0) * g->inverse, u1 = (a1 + g->eps * g->v1) * g->inverse;
+  const float3 w0 = s[3] * u0 + s[4] * u1, w1 = s[4] * u0 + s[5] * u1;
+  const float2 x = apply_conic(g, (float2)(w0.x, w1.x));
+  const float2 y = apply_conic(g, (float2)(w0.y, w1.y));
+  const float2 z = apply_conic(g, (float2)(w0.z, w1.z));
+  out.v0 = -(float3)(x.x, y.x, z.x);
+  out.v1 = -(float3)(x.y, y.y, z.y);
+#if XRAY || ANTIALIASED
+  out.v0 -= out.log_factor * u0;
+  out.v1 -= out.log_factor * u1;
+#endif
+#if ANTIALIASED
+  const float share = out.log_factor == 0 ? 0 : out.log_factor / g->undilated;
+  out.v0 += share * a0;
+  out.v1 += share * a1;
+#endif
+  out.m0 = apply3(g->root, out.v0);
+  out.m1 = apply3(g->root, out.v1);
+  return out;
+}
+
+#if COVARIANCES
+
+static void clear_shape(__global float *covar, long i) { clear(covar + 6 * i, 6); }
+
+static void shape_grad(
+    const Gaussian *g, const float *s, const ViewGradient *view, __global float *covar, long i)
+{
+  const float2 q0 = apply_conic(g, (float2)(1, 0)), q1 = apply_conic(g, (float2)(0, 1));
+  const float2 r0 = apply_conic(g, (float2)(s[3] * q0.x + s[4] * q0.y, s[4] * q0.x + s[5] * q0.y));
+  const float2 r1 = apply_conic(g, (float2)(s[3] * q1.x + s[4] * q1.y, s[4] * q1.x + s[5] * q1.y));
+  float xx = -0.5f * r0.x, xy = -0.5f * r1.x, yy = -0.5f * r1.y;
+#if XRAY || ANTIALIASED
+  const float half_factor = 0.5f * view->log_factor;
+  xx -= half_factor * q0.x;
+  xy -= half_factor * q0.y;
+  yy -= half_factor * q1.y;
+#endif
+#if ANTIALIASED
+  const float share = view->log_factor == 0 ? 0 : half_factor / g->undilated;
+  xx += share * dot3(g->v1, g->v1);
+  xy -= share * dot3(g->v0, g->v1);
+  yy += share * dot3(g->v0, g->v0);
+#endif
+  const float3 left = xx * g->m0 + xy * g->m1, right = xy * g->m0 + yy * g->m1;
+  float3 rows[3];
+  rows[0] = g->m0.x * left + g->m1.x * right;
+  rows[1] = g->m0.y * left + g->m1.y * right;
+  rows[2] = g->m0.z * left + g->m1.z * right;
+#if XRAY
+  /* Half the inverse covariance, from the columns of F's inverse. */
+  const float3 c0 = cross3(g->root.y, g->root.z) / g->root_det;
+  const float3 c1 = cross3(g->root.z, g->root.x) / g->root_det;
+  const float3 c2 = cross3(g->root.x, g->root.y) / g->root_det;
+  rows[0] += half_factor * (float3)(dot3(c0, c0), dot3(c0, c1), dot3(c0, c2));
+  rows[1] += half_factor * (float3)(dot3(c1, c0), dot3(c1, c1), dot3(c1, c2));
+  rows[2] += half_factor * (float3)(dot3(c2, c0), dot3(c2, c1), dot3(c2, c2));
+#endif
+  /* The six numbers stand for nine: off the diagonal each is two entries. */
+  store3(covar, 2 * i, (float3)(rows[0].x, 2 * rows[0].y, 2 * rows[0].z));
+  store3(covar, 2 * i + 1, (float3)(rows[1].y, 2 * rows[1].z, rows[2].z));
+}
+
+#else
+
+static void clear_shape(__global float *quat, __global float *scale, long i) {
+  clear(quat + 4 * i, 4);
+  clear(scale + 3 * i, 3);
+}
+
+static void shape_grad(
+    const Gaussian *g, const float *s, const ViewGradient *view,
+    __global float *quat, __global float *scale, long i)
+{
+  /* dL/dF = M^T dL/dV; F = R S. */
+  rows3 f;
+  f.x = g->m0.x * view->v0 + g->m1.x * view->v1;
+  f.y = g->m0.y * view->v0 + g->m1.y * view->v1;
+  f.z = g->m0.z * view->v0 + g->m1.z * view->v1;
+  float3 by_scale = f.x * g->axes.x + f.y * g->axes.y + f.z * g->axes.z;
+#if XRAY
+  by_scale += view->log_factor / g->scale;
+#endif
+  store3(scale, i, by_scale);
+  const float3 x = f.x * g->scale, y = f.y * g->scale, z = f.z * g->scale;
+  const float4 q = g->quat;
+  float4 d;
+  d.w = q.x * (z.y - y.z) + q.y * (x.z - z.x) + q.z * (y.x - x.y);
+  d.x = q.w * (z.y - y.z) + q.y * (x.y + y.x) + q.z * (x.z + z.x) - 2 * q.x * (y.y + z.z);
+  d.y = q.w * (x.z - z.x) + q.x * (x.y + y.x) + q.z * (y.z + z.y) - 2 * q.y * (x.x + z.z);
+  d.z = q.w * (y.x - x.y) + q.x * (x.z + z.x) + q.y * (y.z + z.y) - 2 * q.z * (x.x + y.y);
+  /* Length has no effect: what is along q goes. */
+  const float along = d.x * q.x + d.y * q.y + d.z * q.z + d.w * q.w;
+  d = (d - along * q) * (2 / g->quat_length);
+  quat[4 * i] = d.w;
+  store3(quat + 4 * i + 1, 0, d.xyz);
+}
+
+#endif
+
+/* The part of a splat in the gradient of the camera. */
+static void camera_grad(
+    const Gaussian *g, const ViewGradient *view, const CameraGradient *c, __global float *part)
+{
+  const float3 q = c->point, du = g->screen.du, dv = g->screen.dv;
+  store3(part, 0, q.x * g->world + du.x * view->m0 + dv.x * view->m1);
+  store3(part + 4, 0, q.y * g->world + du.y * view->m0 + dv.y * view->m1);
+  store3(part + 8, 0, q.z * g->world + du.z * view->m0 + dv.z * view->m1);
+  part[3] = q.x;
+  part[7] = q.y;
+  part[11] = q.z;
+  part[12] = c->fx;
+  part[13] = c->fy;
+  part[14] = c->cx;
+  part[15] = c->cy;
+}
+
+/* Back from the screen to the mean and the camera. */
+static CameraGradient screen_grad(
+    const Gaussian *g, Camera camera, const ViewGradient *view, float2 uv, float depth)
+{
+  ScreenGradient screen;
+  screen.u = uv.x;
+  screen.v = uv.y;
+  screen.log_volume = XRAY ? view->log_factor : 0;
+  screen.du = apply3(camera.rotation, view->m0);
+  screen.dv = apply3(camera.rotation, view->m1);
+  CameraGradient out = to_screen_grad(camera, g->point, screen);
+  out.point.z += depth;
+  return out;
+}
+
+KERNEL void splat_project_grad(
+    __global const float *restrict means, SHAPES, __global const float *restrict opacities,
+    __global const uchar *restrict culled, __global const int *restrict slots,
+    __global const float *restrict records, CAMERA_PARAMETERS,
+    float near_plane, float far_plane, float eps2d, int count,
+    __global float *restrict grad_means, SHAPE_GRADIENTS, __global float *restrict grad_opacities,
+    __global float *restrict grad_colors, __global float *restrict grad_means2d,
+    __global float *restrict grad_means2d_abs, __global float *restrict camera_parts)
+{
+  const long i = get_global_id(0);
+  if (i >= count) return;
+  const int drawn = culled[i] == VISIBLE;
+  float s[RECORD];
+  add_slots(records, drawn ? slots[i] : 0, drawn ? slots[i + 1] : 0, s);
+  for (int k = 0; k < CHANNELS; k++) grad_colors[i * CHANNELS + k] = s[6 + k];
+  for (int k = 0; k < 2 * ABSGRAD; k++) grad_means2d_abs[2 * i + k] = s[6 + CHANNELS + k];
+  if (!drawn) {
+    clear(grad_means + 3 * i, 3);
+    clear(grad_opacities + i, 1);
+    clear(grad_means2d + 2 * i, 2);
+    clear_shape(SHAPE_GRADIENT, i);
+    if (CAMERA_GRADIENT) clear(camera_parts + 16 * i, 16);
+    return;
+  }
+  const Camera camera = CAMERA;
+  Gaussian g;
+  see_gaussian(&g, camera, means, SHAPE, i, near_plane, far_plane, eps2d);
+  const ViewGradient view = dilate_grad(&g, s);
+  const float2 uv = apply_conic(&g, (float2)(s[1], s[2]));
+  const CameraGradient point = screen_grad(&g, camera, &view, uv, DEPTH ? s[6 + CHANNELS - 1] : 0);
+  grad_opacities[i] = -s[0] / opacities[i];
+  grad_means2d[2 * i] = uv.x;
+  grad_means2d[2 * i + 1] = uv.y;
+  shape_grad(&g, s, &view, SHAPE_GRADIENT, i);
+  store3(grad_means, i, apply_transposed3(camera.rotation, point.point));
+  if (CAMERA_GRADIENT) camera_grad(&g, &view, &point, camera_parts + 16 * i);
+}

@@ -1,0 +1,60 @@
+"""What projection gives: splats on the screen, and gradients by all that was projected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+# The meaning of the codes in ``Projected.culled``.
+CULL_REASONS = (
+    "visible",
+    "out of depth",
+    "not finite or degenerate",
+    "too faint",
+    "off screen",
+    "clipped for its radius",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Projected:
+    """N splats as the camera sees them; device arrays.
+
+    Args:
+        screen: (N, 8): mean x, mean y, conic a, b, c, weight, depth, factor; pixels and scene
+            units. Weight is opacity times factor: 1, or Mip-Splatting's compensation, or in xray
+            mode the line integral through a unit peak.
+        boxes: (N, 4) int32 tile rectangles (x0, y0, x1, y1), x1 and y1 exclusive.
+        radii: (N, 2) int32, half the sides of the bounding rectangle in pixels.
+        culled: (N,) uint8, an index into ``CULL_REASONS``; splats with another code than 0 have
+            zeros everywhere.
+    """
+
+    screen: Any
+    boxes: Any
+    radii: Any
+    culled: Any
+
+
+@dataclass(frozen=True, eq=False)
+class SplatGradients:
+    """Gradients of a loss by everything that was projected; device arrays.
+
+    Args:
+        means, quats, scales, covars, opacities: as in ``Splats``; None where it has None.
+        colors: (N, D) gradient by what was drawn in each channel.
+        means2d: (N, 2) gradient by the position on the screen, in 1 / pixels.
+        means2d_abs: (N, 2) the sum over pixels of its magnitudes; None without ``absgrad``.
+        camera: (N, 16) each splat's part in the gradient by the camera, for ``sum_columns``:
+            the upper 3 rows of the view matrix, then fx, fy, cx, cy; None if not asked for.
+    """
+
+    means: Any
+    quats: Any
+    scales: Any
+    covars: Any
+    opacities: Any
+    colors: Any
+    means2d: Any
+    means2d_abs: Any
+    camera: Any

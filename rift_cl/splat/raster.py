@@ -1,0 +1,198 @@
+"""Splats on the screen to pixels, and the gradient back: the drivers of the raster kernels.
+
+``kernels/splat_raster_cpu.cl`` says what is computed, ``kernels/splat_raster_grad_cpu.cl`` how it
+is differentiated. Features of more than 32 channels are drawn 32 at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rift_cl.cl.device import Device
+from rift_cl.cl.memory import as_device_array
+from rift_cl.errors import InputError, ShapeError
+from rift_cl.splat.settings import SplatSettings
+from rift_cl.splat.tile_lists import TileLists
+
+_CHANNELS = 32
+_TILES = (8, 16, 32)
+# Moments of dL/dsigma that a slot holds besides its colour sums.
+MOMENTS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class ScreenSplats:
+    """Projected splats with what they show; device arrays.
+
+    Args:
+        screen: (N, 8): mean x, mean y, conic a, b, c, weight, depth, extra.
+        radii: (N, 2) int32, how far each reaches along x and y, in pixels.
+        features: (N, D), the channels that are drawn.
+    """
+
+    screen: Any
+    radii: Any
+    features: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Raster:
+    """A drawn image, and what its gradient needs; device arrays.
+
+    Args:
+        image: (height, width, D), with the background.
+        transmittance: (height, width), what of the background is seen.
+        last: (height, width) int32, one more than the last entry that counted.
+    """
+
+    image: Any
+    transmittance: Any
+    last: Any
+
+
+def rasterize(
+    device: Device,
+    splats: ScreenSplats,
+    lists: TileLists,
+    size: tuple[int, int],
+    *,
+    settings: SplatSettings,
+    background: Any = None,
+) -> Raster:
+    """Draw splats.
+
+    Args:
+        device: where the arrays are.
+        splats: the projected splats.
+        lists: which splats each tile draws.
+        size: (height, width) in pixels.
+        settings: how to draw.
+        background: (D,) device array; black if not given. In xray mode there is none.
+
+    Raises:
+        InputError: the tile size is none that the kernels are made for.
+        ShapeError: features or background do not fit.
+    """
+    _check(splats, lists, size, settings)
+    height, width = size
+    channels = splats.features.shape[1]
+    background = _background(device, background, channels)
+    raster = Raster(
+        device.empty((height, width, channels)),
+        device.empty((height, width)),
+        device.empty((height, width), np.int32),
+    )
+    for first, count in _channel_runs(channels):
+        device.launch(
+            _kernel(device, "splat_raster"),
+            _work(device, lists, settings, per_pixel=True),
+            *(raster.image, raster.transmittance, raster.last),
+            *(splats.screen, splats.radii, splats.features, background),
+            *(lists.entries, lists.starts, height, width, lists.tiles_x),
+            *(settings.alpha_cap, channels, first),
+            **_macros(settings, count),
+        )
+    return raster
+
+
+def raster_grad(
+    device: Device,
+    splats: ScreenSplats,
+    lists: TileLists,
+    raster: Raster,
+    grad_image: Any,
+    grad_transmittance: Any = None,
+    *,
+    settings: SplatSettings,
+    background: Any = None,
+) -> Any:
+    """The gradient of a loss, as a record for every (splat, tile) pair.
+
+    Args:
+        device: where the arrays are.
+        splats: as given to ``rasterize``.
+        lists: as given to ``rasterize``.
+        raster: what it returned.
+        grad_image: dL/d image, (height, width, D) device array.
+        grad_transmittance: dL/d transmittance, (height, width); zero if not given.
+        settings: as given to ``rasterize``.
+        background: as given to ``rasterize``.
+
+    Returns:
+        (M, 6 + D [+ 2]) device array, slot by slot: see ``kernels/include/splat_slots.h``.
+    """
+    height, width, channels = raster.image.shape
+    as_device_array(device, grad_image, raster.image.shape, name="grad_image")
+    if grad_transmittance is None:
+        grad_transmittance = device.zeros((height, width))
+    as_device_array(device, grad_transmittance, (height, width), name="grad_transmittance")
+    background = _background(device, background, channels)
+    record = MOMENTS + channels + 2 * settings.absgrad
+    slots = device.empty((lists.n_entries, record))
+    nothing = device.zeros((height, width)) if channels > _CHANNELS else grad_transmittance
+    for first, count in _channel_runs(channels):
+        device.launch(
+            _kernel(device, "splat_raster_grad"),
+            _work(device, lists, settings, per_pixel=False),
+            *(slots, grad_image, nothing if first else grad_transmittance),
+            *(raster.transmittance, raster.last),
+            *(splats.screen, splats.radii, splats.features, background),
+            *(lists.entries, lists.starts, height, width, lists.tiles_x),
+            *(settings.alpha_cap, channels, first),
+            **_macros(settings, count),
+            ABSGRAD=int(settings.absgrad),
+        )
+    return slots
+
+
+def _check(
+    splats: ScreenSplats, lists: TileLists, size: tuple[int, int], settings: SplatSettings
+) -> None:
+    if settings.tile not in _TILES:
+        raise InputError(f"tile is {settings.tile}, wanted one of {_TILES}")
+    tiles = (lists.tiles_y, lists.tiles_x)
+    wanted = tuple(-(-pixels // settings.tile) for pixels in size)
+    if tiles != wanted:
+        raise ShapeError(f"lists have {tiles} tiles, an image of {size} pixels has {wanted}")
+    if len(splats.features.shape) != 2 or len(splats.features) != len(splats.screen):
+        raise ShapeError(
+            f"features have shape {splats.features.shape}, wanted ({len(splats.screen)}, channels)"
+        )
+
+
+def _background(device: Device, background: Any, channels: int) -> Any:
+    if background is None:
+        return device.zeros(channels)
+    return as_device_array(device, background, (channels,), name="background")
+
+
+def _channel_runs(channels: int) -> Iterator[tuple[int, int]]:
+    for first in range(0, channels, _CHANNELS):
+        yield first, min(_CHANNELS, channels - first)
+
+
+def _kernel(device: Device, name: str) -> str:
+    return f"{name}_{'cpu' if device.traits.is_cpu else 'gpu'}"
+
+
+def _work(
+    device: Device, lists: TileLists, settings: SplatSettings, *, per_pixel: bool
+) -> tuple[int]:
+    """Work-items: a CPU takes one for a tile; a GPU one for a pixel, or a group for a tile."""
+    tiles = lists.tiles_x * lists.tiles_y
+    if device.traits.is_cpu:
+        return (tiles,)
+    return (tiles * (settings.tile**2 if per_pixel else device.traits.macros["GROUP"]),)
+
+
+def _macros(settings: SplatSettings, channels: int) -> dict[str, int]:
+    return {
+        "TILE": settings.tile,
+        "CHANNELS": channels,
+        "ADDITIVE": int(settings.mode == "xray"),
+        "SMOOTH": int(settings.smooth_cutoff),
+    }

@@ -1,0 +1,71 @@
+"""How splats are drawn: every switch of the rasterizer, in one value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from rift_cl.errors import InputError
+from rift_cl.geometry.numbers import one_number
+
+SplatMode = Literal["light", "xray"]
+
+
+@dataclass(frozen=True)
+class SplatSettings:
+    """Settings of the rasterizer; those of gsplat have its names' meaning and its defaults.
+
+    Args:
+        near: splats with a smaller depth are left out, in scene units; positive for a pinhole.
+        far: splats with a larger depth are left out.
+        radius_clip: splats whose radii are not larger than this are left out, in pixels.
+        eps2d: variance that every splat gains on the screen, in square pixels.
+        tile: edge of a tile in pixels.
+        alpha_cap: most that one splat may hide, 0 < cap < 1 (0.999 in gsplat 1.5).
+        antialiased: dim splats as dilation widens them (Mip-Splatting), in light mode alone:
+            in xray mode dilation never changes a splat's mass.
+        mode: ``light`` composites front to back; ``xray`` adds line integrals, with opacities
+            as densities.
+        absgrad: sum magnitudes of screen-position gradients as well, for densification.
+        smooth_cutoff: replace thresholds by smooth ones, so that finite differences hold; for
+            tests alone.
+
+    Raises:
+        InputError: a number is out of its range, or the mode is unknown.
+    """
+
+    near: float = 0.01
+    far: float = 1e10
+    radius_clip: float = 0.0
+    eps2d: float = 0.3
+    tile: int = 16
+    alpha_cap: float = 0.99
+    antialiased: bool = False
+    mode: SplatMode = "light"
+    absgrad: bool = False
+    smooth_cutoff: bool = False
+
+    def __post_init__(self) -> None:
+        """Check every number's range."""
+        if not one_number(self.near) < one_number(self.far):
+            raise InputError(
+                f"SplatSettings: near is {self.near!r} and far is {self.far!r}, wanted near < far, "
+                "both finite"
+            )
+        for name in ("radius_clip", "eps2d"):
+            value = getattr(self, name)
+            if not one_number(value) >= 0:
+                raise InputError(f"SplatSettings: {name} is {value!r}, wanted a number >= 0")
+        edge = one_number(self.tile)
+        if not (edge >= 1 and edge.is_integer()):
+            raise InputError(f"SplatSettings: tile is {self.tile!r}, wanted a whole number >= 1")
+        if not 0 < one_number(self.alpha_cap) < 1:
+            raise InputError(f"SplatSettings: alpha_cap is {self.alpha_cap!r}, wanted 0 < cap < 1")
+        if self.mode not in get_args(SplatMode):
+            wanted = " or ".join(get_args(SplatMode))
+            raise InputError(f"SplatSettings: mode is {self.mode!r}, wanted {wanted}")
+        if self.antialiased and self.mode == "xray":
+            raise InputError(
+                "SplatSettings: antialiased has no meaning in xray mode, where dilation keeps a "
+                "splat's mass: leave it off"
+            )

@@ -1,0 +1,226 @@
+"""The benchmark runs, writes what it says, and notices a kernel that nobody measures.
+
+No test looks at how long anything took.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.cl.source import kernel_names
+from rift_cl.errors import InputError
+from rift_cl.operators.phase_table import PHASES, phase_table
+
+ROOT = Path(__file__).parents[2]
+SCRIPT = ROOT / "tools" / "bench_kernels.py"
+
+
+@pytest.fixture
+def tool(monkeypatch):
+    """Import a module as the script does."""
+    monkeypatch.syspath_prepend(SCRIPT.parent)
+    return importlib.import_module
+
+
+def run(*arguments):
+    path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    return subprocess.run(
+        [sys.executable, str(SCRIPT), *map(str, arguments)],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bench")
+    where = ("--json", folder / "bench.json", "--markdown", folder / "bench.md")
+    done = run("--sizes", "32x24", "--slices", "2", "--rounds", "1", "--splats", "9000", "40", *where)
+    assert done.returncode == 0, done.stderr
+    assert sorted(path.name for path in folder.iterdir()) == ["bench.json", "bench.md"]
+    record = json.loads((folder / "bench.json").read_text(encoding="utf-8"))
+    return record, (folder / "bench.md").read_text(encoding="utf-8"), done.stdout
+
+
+def kernels_of(case):
+    return [kernel for split in case["splits"] for kernel in split["kernels"]]
+
+
+def positive(value):
+    return isinstance(value, (int, float)) and math.isfinite(value) and value > 0
+
+
+def test_head_names_version_device_and_date(bench):
+    record, page, shown = bench
+    device = rift.default_device()
+    assert record["version"] == rift.__version__
+    assert (record["device"]["name"], record["device"]["driver"]) == (device.name, device.driver)
+    assert record["host"]["cpu"] and record["date"].endswith("+00:00") and record["seed"] == 0
+    assert device.name in page and "radon_project" in shown
+
+
+def test_limits_are_positive_and_the_best_of_the_raw_ones(bench):
+    limits = bench[0]["limits"]
+    assert all(positive(limits[name]) for name in ("multiply_add", "bandwidth", "launch"))
+    assert limits["multiply_add"] == max(raw["multiply_add"] for raw in limits["raw"])
+    assert limits["launch"] == min(raw["launch"] for raw in limits["raw"])
+
+
+def test_every_kernel_has_positive_rates_in_every_case(bench):
+    cases = bench[0]["cases"]
+    assert [(case["n"], case["views"], case["slices"]) for case in cases] == [
+        (32, 24, 1),
+        (32, 24, 2),
+    ]
+    for case in cases:
+        for kernel in kernels_of(case):
+            assert positive(kernel["multiply_add_share"]) or kernel["kernel"] == "plane_split"
+    (scene,) = bench[0]["splats"]
+    assert 0 < scene["lane_use"] <= 1
+    both = [kernel for case in (cases[0], scene) for kernel in kernels_of(case)]
+    other = "_gpu" if rift.default_device().traits.is_cpu else "_cpu"
+    driven = {name for name in kernel_names() if not name.endswith(other)}
+    assert {kernel["kernel"] for kernel in both} == driven
+    for kernel in both:
+        assert all(positive(kernel[key]) for key in ("min_s", "rate_per_s", "bytes_per_s"))
+        assert kernel["min_s"] == pytest.approx(min(kernel["raw_s"]), abs=1e-6)
+
+
+def test_shares_of_an_operation_add_up(bench):
+    for split in bench[0]["cases"][0]["splits"]:
+        shares = [kernel["share"] for kernel in split["kernels"]]
+        assert sum(shares) + split["rest"]["share"] == pytest.approx(1)
+
+
+def test_operations_are_timed_and_scored(bench):
+    for case in bench[0]["cases"]:
+        assert [entry["arrays"] for entry in case["contenders"]] == ["device", "NumPy"]
+        for entry in case["contenders"]:
+            assert set(entry["operations"]) == {"forward", "backward", "fbp"}
+            assert all(positive(done["updates_per_s"]) for done in entry["operations"].values())
+            assert entry["accuracy"]["fbp_psnr_db"] > 18
+            assert entry["accuracy"]["forward_error"] < 0.15
+    assert bench[0]["cases"][0]["contenders"][0]["accuracy"]["adjoint_mismatch"] < 1e-6
+    assert bench[0]["cases"][0]["dot_test"] < 1e-6
+
+
+def test_without_peers_there_are_no_ratios(bench):
+    assert all(case["speed_ups"] == [] for case in bench[0]["cases"])
+    assert bench[0]["skipped"] == {}
+
+
+def test_bad_size_is_one_sentence_and_the_input_status(tmp_path):
+    done = run("--sizes", "512*768", "--json", tmp_path / "x.json")
+    assert done.returncode == InputError.exit_status
+    assert "512*768" in done.stderr and "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_unknown_kernel_stops_the_run(tool, monkeypatch, tmp_path, capsys):
+    script = tool("bench_kernels")
+    monkeypatch.setattr(script, "kernel_names", lambda: [*kernel_names(), "cone_project"])
+    monkeypatch.setattr(sys, "argv", ["bench_kernels", "--json", str(tmp_path / "x.json")])
+    assert script.main() == 1
+    assert "cone_project" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_kernel_that_nothing_launches_is_noticed(tool):
+    costs = tool("bench.costs")
+    costs.check_measured(["radon_project"], ["radon_project", "plane_split"])
+    with pytest.raises(costs.CoverageError, match="plane_split"):
+        costs.check_measured(["radon_project", "plane_split"], ["radon_project"])
+
+
+def test_counted_entries_are_those_of_the_tables(tool):
+    case = tool("bench.case").Case(96, 50)
+    used = 0
+    for along_x in (True, False):
+        table = phase_table(case.plane, case.scan, along_x=along_x, segment=1)
+        # The table rounds up to whole columns and adds two for the overhang.
+        used += PHASES * int(np.sum(table.views[:, 1] - 2))
+    assert tool("bench.costs").entries(case) == pytest.approx(used, rel=0.01)
+
+
+@pytest.mark.parametrize("slices", [1, 3])
+def test_inputs_may_be_written_to(tool, slices):
+    # scikit-image refuses read-only images, and would be reported as a peer that failed.
+    case = tool("bench.case").Case(16, 4, slices)
+    assert case.image.flags.writeable and case.projections.flags.writeable
+    assert case.image.shape == case.grid.shape
+
+
+def test_scikit_image_takes_part(tool):
+    peers, race, case = tool("bench.peers"), tool("bench.race"), tool("bench.case").Case(32, 24)
+    skipped: dict[str, str] = {}
+    lined = race.line_up([peers.ScikitImage], rift.default_device(), case, skipped)
+    (entry,) = race.race(lined, rounds=1, warm_up=False, skipped=skipped)
+    accuracy = race.race_record(entry, seed=0)["accuracy"]
+    assert skipped == {}
+    assert accuracy["fbp_psnr_db"] > 18
+    assert accuracy["forward_error"] < 0.15
+    assert accuracy["adjoint_mismatch"] < 0.1
+
+
+def test_launches_are_recorded_and_the_device_is_left_as_it_was(tool):
+    device = rift.default_device()
+    grid, scan = rift.Grid((16, 16)), rift.Parallel([0.1, 1.7], bins=26)
+    A = rift.Projector(grid, scan, device=device)
+    with tool("bench.operations").each_launch(device) as log:
+        recorded = A(np.ones((16, 16)))
+    names = [name for name, _ in log]
+    assert sorted(set(names)) == ["plane_split", "radon_project", "radon_resample_adjoint"]
+    assert len(names) == 6
+    assert "launch" not in vars(device)
+    assert np.array_equal(recorded, A(np.ones((16, 16))))
+
+
+def test_speed_up_is_against_the_fastest_peer_that_can(tool):
+    def entry(name, *, ours=False, **seconds):
+        done = {key: {"min_s": s, "median_s": 2 * s} for key, s in seconds.items()}
+        return {"name": name, "ours": ours, "operations": done}
+
+    records = [
+        entry("ours", ours=True, forward=1.0, fbp=1.0),
+        entry("slow", forward=9.0, fbp=8.0),
+        entry("fast", forward=3.0),
+    ]
+    found = tool("bench.race").speed_ups(records)
+    ratios = {up["operation"]: (up["peer"], up["by_min"]) for up in found}
+    assert ratios == {"forward": ("fast", 3.0), "fbp": ("slow", 8.0)}
+
+
+def test_peer_that_cannot_be_made_is_skipped_with_the_reason(tool):
+    contender, race, case = tool("bench.contender"), tool("bench.race"), tool("bench.case")
+
+    class Missing(contender.RiftOnHost):
+        name, ours = "missing", False
+
+        def __init__(self, device, case):
+            raise ImportError("No module named 'missing'")
+
+    class Broken(contender.RiftOnHost):
+        name, ours, repeats = "broken", False, 1
+
+        def backward(self, sinogram):
+            raise RuntimeError("it broke")
+
+    skipped: dict[str, str] = {}
+    size = case.Case(16, 4)
+    lined = race.line_up([Missing, Broken], rift.default_device(), size, skipped)
+    entries = race.race(lined, rounds=2, warm_up=False, skipped=skipped)
+    assert entries == []
+    assert "No module named 'missing'" in skipped["missing"]
+    assert skipped["broken"] == "RuntimeError: it broke"

@@ -1,0 +1,209 @@
+"""The peers: ASTRA, silx, gratopy and scikit-image behind the contender's interface.
+
+Conventions, found by comparison with exact sinograms: ASTRA and silx let y grow upwards, which
+turns the sign of the angles; gratopy's detector runs the other way as well; scikit-image has its
+rotation axis at pixel and bin n // 2, so it gets a sinogram of the head half a pixel off.
+Peers are imported when they are asked for, by name: none of them is needed otherwise.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from importlib import import_module
+from typing import Any, ClassVar
+
+import numpy as np
+
+import rift_cl as rift
+from bench.case import Case, Floats
+from bench.contender import Contender
+from rift_cl import phantom
+
+
+class Astra(Contender):
+    """ASTRA's CPU algorithms, which use one thread."""
+
+    projector: ClassVar[str]
+
+    def __init__(self, device: rift.Device, case: Case) -> None:
+        super().__init__(device, case)
+        self._astra = import_module("astra")
+        image = self._astra.create_vol_geom(case.n, case.n)
+        views = self._astra.create_proj_geom("parallel", 1.0, case.bins, -case.angles)
+        self._image = self._astra.data2d.create("-vol", image, 0)
+        self._views = self._astra.data2d.create("-sino", views, 0)
+        projector = self._astra.create_projector(self.projector, views, image)
+        self._algorithms = {kind: self._algorithm(kind, projector) for kind in ("FP", "BP", "FBP")}
+
+    def _algorithm(self, kind: str, projector: int) -> int:
+        settings = self._astra.astra_dict(kind)
+        image = "VolumeDataId" if kind == "FP" else "ReconstructionDataId"
+        settings |= {"ProjectorId": projector, "ProjectionDataId": self._views, image: self._image}
+        if kind == "FBP":
+            settings["option"] = {"FilterType": "ram-lak"}
+        return int(self._astra.algorithm.create(settings))
+
+    def _run(self, kind: str, given: int, array: Floats, wanted: int) -> Any:
+        self._astra.data2d.store(given, array)
+        self._astra.algorithm.run(self._algorithms[kind])
+        return self._astra.data2d.get(wanted)
+
+    def forward(self, image: Any) -> Any:
+        """Project."""
+        return self._run("FP", self._image, image, self._views)
+
+    def backward(self, sinogram: Any) -> Any:
+        """Backproject."""
+        return self._run("BP", self._views, sinogram, self._image)
+
+    def fbp(self, sinogram: Any) -> Any:
+        """Reconstruct."""
+        return self._run("FBP", self._views, sinogram, self._image)
+
+
+class AstraLine(Astra):
+    """Rays weighted by their length in a pixel."""
+
+    name, projector = "ASTRA line", "line"
+
+
+class AstraLinear(Astra):
+    """Joseph's interpolation."""
+
+    name, projector = "ASTRA linear", "linear"
+
+
+class AstraStrip(Astra):
+    """Rays as wide as a bin, weighted by area."""
+
+    name, projector = "ASTRA strip", "strip"
+
+
+class Silx(Contender):
+    """silx.opencl on the same device; its filter uses NumPy's FFT where gpyfft is missing."""
+
+    name = "silx"
+
+    def __init__(self, device: rift.Device, case: Case) -> None:
+        super().__init__(device, case)
+        projection = import_module("silx.opencl.projection")
+        backprojection = import_module("silx.opencl.backprojection")
+        middle, offset = (case.bins - 1) / 2, (case.bins - case.n) / 2
+        self._project = projection.Projection(
+            (case.n, case.n),
+            angles=-case.angles,
+            detector_width=case.bins,
+            axis_position=middle,
+            ctx=device.context,
+        ).projection
+        self._back = backprojection.Backprojection(
+            (case.views, case.bins),
+            slice_shape=(case.n, case.n),
+            angles=-case.angles,
+            ctx=device.context,
+            extra_options={"gpu_offset_x": offset, "gpu_offset_y": offset},
+        )
+
+    def forward(self, image: Any) -> Any:
+        """Project."""
+        return self._project(image)
+
+    def backward(self, sinogram: Any) -> Any:
+        """Backproject."""
+        return self._back.backprojection(sinogram)
+
+    def fbp(self, sinogram: Any) -> Any:
+        """Reconstruct."""
+        return self._back.filtered_backprojection(sinogram)
+
+
+class Gratopy(Contender):
+    """Gratopy on the same device, arrays on the device; it has no filters."""
+
+    name = "gratopy"
+    arrays = "device"
+    operations = ("forward", "backward")
+
+    def __init__(self, device: rift.Device, case: Case) -> None:
+        super().__init__(device, case)
+        self._gratopy = import_module("gratopy")
+        self._settings = self._gratopy.ProjectionSettings(
+            device.queue,
+            self._gratopy.RADON,
+            (case.n, case.n),
+            np.pi - case.angles,
+            case.bins,
+            image_width=float(case.n),
+            detector_width=float(case.bins),
+            angle_weights=1.0,
+        )
+
+    def enter(self, array: Floats) -> Any:
+        """Copy to the device; its sinograms are (bin, angle)."""
+        turned = array.T if array.shape == self.case.sinogram.shape else array
+        return self.device.array(turned)
+
+    def leave(self, array: Any) -> Floats:
+        """Copy to the host."""
+        values: Floats = array.get()
+        return values.T if values.shape == self.case.sinogram.T.shape else values
+
+    def forward(self, image: Any) -> Any:
+        """Project and wait for the result."""
+        result = self._gratopy.forwardprojection(image, self._settings)
+        self.device.finish()
+        return result
+
+    def backward(self, sinogram: Any) -> Any:
+        """Backproject and wait for the result."""
+        result = self._gratopy.backprojection(sinogram, self._settings)
+        self.device.finish()
+        return result
+
+
+class ScikitImage(Contender):
+    """scikit-image, on the CPU; ``radon`` sees the disc alone, with n bins."""
+
+    name = "scikit-image"
+
+    def __init__(self, device: rift.Device, case: Case) -> None:
+        super().__init__(device, case)
+        self._transform = import_module("skimage.transform")
+        self._degrees = -np.rad2deg(case.angles)
+
+    @cached_property
+    def sinogram(self) -> Floats:
+        """The exact sinogram with the axis at pixel n // 2 and bin bins // 2."""
+        n = self.case.n
+        grid = rift.Grid((n, n), center=(n - 1) / 2 - n // 2)
+        scan = rift.Parallel(self.case.angles, self.case.bins, center=self.case.bins // 2)
+        return phantom.shepp_logan_sinogram(grid, scan)
+
+    def forward(self, image: Any) -> Any:
+        """Project, and add the bins that see nothing."""
+        views = self._transform.radon(image, self._degrees, circle=True).T
+        before = self.case.bins // 2 - self.case.n // 2
+        return np.pad(views, ((0, 0), (before, self.case.bins - self.case.n - before)))
+
+    def backward(self, sinogram: Any) -> Any:
+        """Backproject."""
+        return self._inverse(sinogram, None)
+
+    def fbp(self, sinogram: Any) -> Any:
+        """Reconstruct."""
+        return self._inverse(sinogram, "ramp")
+
+    def _inverse(self, sinogram: Floats, name: str | None) -> Any:
+        size = self.case.n
+        settings = {"output_size": size, "filter_name": name, "circle": False}
+        return self._transform.iradon(sinogram.T, self._degrees, **settings)
+
+
+PEERS: tuple[type[Contender], ...] = (
+    AstraLine,
+    AstraLinear,
+    AstraStrip,
+    Silx,
+    Gratopy,
+    ScikitImage,
+)

@@ -1,0 +1,187 @@
+"""Splats: the scenes that are drawn, the operations on them, and what each kernel has to do.
+
+The scene is a cube of small Gaussians with spherical harmonics of degree 3 (seed 0), as in the
+comparison of rasterizers that the design quotes. Compositing is counted in lanes: pixels that a
+splat's strips and rows touch in a tile before the tile is finished. Lane use is the share of them
+in which the splat counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+import rift_cl as rift
+from bench.costs import Cost
+from rift_cl.geometry import Camera
+from rift_cl.splat.raster import MOMENTS
+from rift_cl.splat.renderer import Frame, Renderer
+from rift_cl.splat.splats import Splats
+
+# Operations per lane, forward and backward: the count that the design's prototype used.
+_FORWARD, _BACKWARD = 32, 62
+_STRIP = 8
+_COEFFICIENTS = 16
+
+
+@dataclass(frozen=True)
+class SplatCase:
+    """A scene and an image size; its frame is drawn once to count the work.
+
+    Args:
+        count: number of splats.
+        size: pixels along each side.
+        device: where to draw.
+    """
+
+    count: int
+    size: int
+    device: rift.Device
+
+    @property
+    def name(self) -> str:
+        """How tables call it."""
+        return f"{self.count} splats, {self.size}²"
+
+    @cached_property
+    def splats(self) -> Splats:
+        """The cube of Gaussians."""
+        random = np.random.default_rng(0)
+        return Splats.upload(
+            self.device,
+            means=random.uniform(-1, 1, (self.count, 3)),
+            quats=random.normal(size=(self.count, 4)),
+            scales=np.exp(random.normal(np.log(0.02), 0.4, (self.count, 3))),
+            opacities=random.uniform(0.1, 0.9, self.count),
+            sh=0.2 * random.normal(size=(self.count, _COEFFICIENTS, 3)),
+        )
+
+    @cached_property
+    def camera(self) -> Camera:
+        """Looks at the cube from four half-edges away."""
+        view = np.eye(4)
+        view[2, 3] = 4
+        focal, center = 1.2 * self.size, self.size / 2
+        K = [[focal, 0, center], [0, focal, center], [0, 0, 1]]
+        return Camera((self.size, self.size), K, view)
+
+    @cached_property
+    def frame(self) -> Frame:
+        """The drawn scene."""
+        return self._forward()
+
+    def _forward(self) -> Frame:
+        background = self.device.array(np.float32([0.1, 0.2, 0.3]))
+        return Renderer(device=self.device).forward(self.splats, self.camera, background=background)
+
+    @cached_property
+    def operations(self) -> dict[str, Callable[[], Any]]:
+        """The operations by name, on device arrays."""
+        random = np.random.default_rng(1)
+        grad = self.device.array(random.normal(size=(self.size, self.size, 3)))
+        renderer = Renderer(device=self.device)
+        return {
+            "draw": self._forward,
+            "gradient": lambda: renderer.backward(self.frame, grad, with_camera=True),
+        }
+
+    @property
+    def entries(self) -> int:
+        """Pairs of a splat and a tile."""
+        return self.frame.lists.n_entries
+
+    @property
+    def pixels(self) -> int:
+        """Pixels of the image."""
+        return self.size**2
+
+    @cached_property
+    def lanes(self) -> tuple[int, int]:
+        """Lanes that are evaluated, and those of them in which the splat counted."""
+        return _count_lanes(self.device, self.frame)
+
+    def record(self) -> dict[str, Any]:
+        """How the JSON file tells it from others."""
+        evaluated, used = self.lanes
+        counts = {"entries": self.entries, "lanes": evaluated, "lane_use": used / evaluated}
+        return {"name": self.name, "count": self.count, "size": self.size, **counts}
+
+
+def _count_lanes(device: rift.Device, frame: Frame) -> tuple[int, int]:
+    lists, tile = frame.lists, 16
+    starts, splat = device.get(lists.starts), device.get(lists.entries)[:, 0]
+    last, height, width = device.get(frame.raster.last), *frame.camera.size
+    screen, radii = device.get(frame.projected.screen), device.get(frame.projected.radii)
+    evaluated = used = 0
+    for number in range(len(starts) - 1):
+        y0, x0 = number // lists.tiles_x * tile, number % lists.tiles_x * tile
+        ends = last[y0 : min(y0 + tile, height), x0 : min(x0 + tile, width)]
+        drawn = np.arange(starts[number], max(starts[number], ends.max()))
+        mean, radius = screen[splat[drawn], :2], radii[splat[drawn]]
+        top = np.maximum((mean[:, 1] - radius[:, 1]).astype(int) - 1 - y0, 0)
+        bottom = np.minimum((mean[:, 1] + radius[:, 1]).astype(int) + 1 - y0, tile)
+        left = x0 + _STRIP * np.arange(tile // _STRIP)[:, None]
+        seen = (left <= mean[:, 0] + radius[:, 0]) & (left + _STRIP >= mean[:, 0] - radius[:, 0])
+        evaluated += int((_STRIP * seen.sum(axis=0) * np.maximum(bottom - top, 0)).sum())
+        used += _count_used(screen[splat[drawn]], drawn, ends, (y0, x0))
+    return evaluated, used
+
+
+def _count_used(screen: Any, drawn: Any, ends: Any, corner: tuple[int, int]) -> int:
+    y, x = (np.arange(n) + first + 0.5 for n, first in zip(ends.shape, corner, strict=True))
+    mean_x, mean_y, a, b, c, weight = (column[:, None, None] for column in screen[:, :6].T)
+    dx, dy = mean_x - x, mean_y - y[:, None]
+    sigma = 0.5 * (a * dx * dx + c * dy * dy) + b * dx * dy
+    counts = (weight * np.exp(-sigma) >= 1 / 255) & (drawn[:, None, None] < ends)
+    return int(counts.sum())
+
+
+def _bytes_only(unit: str, count: Callable[[SplatCase], float], each: int, what: str) -> Cost:
+    formula = f"bytes: {each} per {unit} ({what})"
+    return Cost(unit, 0, count, lambda case: each * count(case), formula)
+
+
+def _n(case: SplatCase) -> float:
+    return case.count
+
+
+def _m(case: SplatCase) -> float:
+    return case.entries
+
+
+def _raster(flops: int, what: str) -> Cost:
+    record = 4 * (MOMENTS + 3)
+
+    def moved(case: SplatCase) -> float:
+        written = record if flops == _BACKWARD else 0
+        return case.entries * (8 + 52 + written) + 20 * case.pixels
+
+    formula = f"{flops} flop per lane; bytes: {what}"
+    return Cost("lane", flops, lambda case: case.lanes[0], moved, formula)
+
+
+SPLAT_COSTS: dict[str, Cost] = {
+    "splat_project": _bytes_only("splat", _n, 44 + 57, "parameters in, screen and box out"),
+    "splat_shade": _bytes_only("splat", _n, 12 + 192 + 12, "harmonics in, colour out"),
+    "tile_count": _bytes_only("splat", _n, 24, "box and depth in, count and key out"),
+    "radix_count": _bytes_only("splat", _n, 4 * 4, "keys in, four passes"),
+    "radix_scatter": _bytes_only("splat", _n, 4 * 16, "keys and order in and out, four passes"),
+    "scan_sum": _bytes_only("splat", _n, 4, "counts in"),
+    "scan_place": _bytes_only("splat", _n, 8, "counts in, offsets out"),
+    "tile_ranks": _bytes_only("splat", _n, 28, "order and box in, ranked counts out"),
+    "tile_histogram": _bytes_only("entry", _m, 4, "tiles counted"),
+    "tile_offsets": _bytes_only("entry", _m, 4, "counts to offsets"),
+    "tile_scatter": _bytes_only("entry", _m, 12, "offsets in, entries out"),
+    "splat_raster_cpu": _raster(_FORWARD, "each entry's splat, the image"),
+    "splat_raster_gpu": _raster(_FORWARD, "each entry's splat, the image"),
+    "splat_raster_grad_cpu": _raster(_BACKWARD, "each entry's splat and record, the image"),
+    "splat_raster_grad_gpu": _raster(_BACKWARD, "each entry's splat and record, the image"),
+    "splat_project_grad": _bytes_only("entry", _m, 36, "records in; the splats' own are fewer"),
+    "splat_shade_grad": _bytes_only("splat", _n, 12 + 192 + 24 + 192, "harmonics in and out"),
+    "sum_columns": _bytes_only("splat", _n, 64, "the camera's parts in"),
+    "background_grad": _bytes_only("pixel", lambda case: case.pixels, 28, "image in, parts out"),
+}

@@ -1,0 +1,53 @@
+"""Where and when a benchmark ran: what a figure means nothing without."""
+
+from __future__ import annotations
+
+import os
+import platform
+from datetime import datetime, timezone
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import rift_cl as rift
+
+_PACKAGES = ("numpy", "scipy", "pyopencl", "astra-toolbox", "silx", "gratopy", "scikit-image")
+
+
+def surroundings(device: rift.Device) -> dict[str, Any]:
+    """Version, date, device, host and packages, for the head of the JSON file."""
+    return {
+        "version": rift.__version__,
+        "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        "device": {
+            "name": device.name,
+            "platform": device.platform,
+            "driver": device.driver,
+            "selector": device.selector,
+            "is_cpu": device.traits.is_cpu,
+            "compute_units": device.traits.compute_units,
+        },
+        "host": {
+            "cpu": _cpu_model(),
+            "cores": os.cpu_count(),
+            "system": platform.system(),
+            "python": platform.python_version(),
+        },
+        "packages": {name: found for name in _PACKAGES if (found := _installed(name))},
+    }
+
+
+def _cpu_model() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return models[0] if models else platform.processor() or platform.machine()
+
+
+def _installed(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None

@@ -1,0 +1,216 @@
+"""How fast the kernels are, how near to the device's limits, and how they compare with peers.
+
+    python tools/bench_kernels.py --json bench.json
+    python tools/bench_kernels.py --peers --json bench.json --markdown docs/performance.md
+
+Limits, kernels and whole operations are measured in one process on one device. A kernel that is
+shipped and not measured makes the run fail, so that none is forgotten.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import tyro
+
+import rift_cl as rift
+from bench.case import Case
+from bench.contender import Contender, RiftOnDevice, RiftOnHost
+from bench.costs import COSTS, Cost, CoverageError, check_known, check_measured
+from bench.limits import LimitMeter, Limits
+from bench.operations import Split, operations, split_record, splits
+from bench.peers import PEERS, ScikitImage
+from bench.race import line_up, race, race_record, speed_ups
+from bench.splats import SPLAT_COSTS, SplatCase
+from bench.surroundings import surroundings
+from bench.tables import markdown, show, tables
+from rift_cl.cl.source import kernel_names
+
+_SIZES = ("256x384", "512x768", "2048x1500")
+_QUICK_SIZES = ("256x384",)
+# Splats, and pixels along a side.
+_SPLATS = ((10_000, 256), (10_000, 512), (100_000, 256), (100_000, 512))
+_QUICK_SPLATS = ((10_000, 256),)
+# Updates from which peers run once (they need minutes), and up to which a stack is measured.
+_ONCE_UPDATES = 2e9
+_STACK_UPDATES = 1e10
+_OURS: tuple[type[Contender], ...] = (RiftOnDevice, RiftOnHost)
+
+
+@dataclass(frozen=True)
+class Options:
+    """Measure the kernels, and with --peers other packages on the same work.
+
+    Args:
+        json: file for every figure and every raw time.
+        markdown: file for the tables, ready for the documentation.
+        peers: also run ASTRA, silx, gratopy and scikit-image, as far as they are installed.
+        quick: one size and few repeats.
+        device: which OpenCL device, as RIFT_DEVICE selects it.
+        sizes: PIXELSxVIEWS, any number of them.
+        splats: (splats, pixels along a side) of the scenes that are drawn.
+        slices: slices of the stack that is measured beside each image; 1 for no stack.
+        rounds: how often each measurement is repeated; by size when not given.
+        seed: of the white noise in the adjoint tests.
+    """
+
+    json: Path
+    markdown: Path | None = None
+    peers: bool = False
+    quick: bool = False
+    device: str | None = None
+    sizes: tuple[str, ...] = ()
+    splats: tuple[tuple[int, int], ...] = ()
+    slices: int = 16
+    rounds: int | None = None
+    seed: int = 0
+
+
+@dataclass
+class Measured:
+    """What was measured at one size; shares wait for the limits of the whole run."""
+
+    splits: list[Split]
+    record: dict[str, Any]
+
+    def finished(self, limits: Limits, costs: Mapping[str, Cost] = COSTS) -> dict[str, Any]:
+        """The JSON record, shares of the limits included."""
+        records = [split_record(split, limits, costs) for split in self.splits]
+        return {**self.record, "splits": records}
+
+
+def measure_all(options: Options) -> Iterator[dict[str, Any]]:
+    """Run the benchmark, size by size.
+
+    Yields:
+        The record of all that was measured so far, after each size, so that a long run which is
+        stopped leaves what it has.
+
+    Raises:
+        CoverageError: a shipped kernel has no cost or was not launched.
+        RiftError: no device fits, or a size cannot be read.
+    """
+    sizes = options.sizes or (_QUICK_SIZES if options.quick else _SIZES)
+    cases = [Case.parse(size) for size in sizes]
+    known = {**COSTS, **SPLAT_COSTS}
+    check_known(kernel_names(), known)
+    device = rift.open_device(options.device)
+    meter, skipped = LimitMeter(device), dict[str, str]()
+    driven = [name for name in kernel_names() if _drives(name, device)]
+    drawn = _draw(meter, options)
+    measured: list[Measured] = []
+    for case in cases:
+        measured += _measure(meter, case, options, skipped)
+        done = [split for found in (*measured, *drawn) for split in found.splits]
+        check_measured(driven, {name for split in done for name in split.kernels})
+        yield {
+            **surroundings(device),
+            "seed": options.seed,
+            "limits": {**asdict(meter.best()), "raw": [asdict(each) for each in meter.measured]},
+            "formulas": {name: known[name].formula for name in driven},
+            "skipped": skipped,
+            "cases": [found.finished(meter.best()) for found in measured],
+            "splats": [found.finished(meter.best(), SPLAT_COSTS) for found in drawn],
+        }
+
+
+def _drives(kernel: str, device: rift.Device) -> bool:
+    """Whether a kernel is for this kind of device: some have a driver for each kind."""
+    return not kernel.endswith("_gpu" if device.traits.is_cpu else "_cpu")
+
+
+def _draw(meter: LimitMeter, options: Options) -> list[Measured]:
+    found = []
+    for count, size in options.splats or (_QUICK_SPLATS if options.quick else _SPLATS):
+        case = SplatCase(count, size, meter.device)
+        _say(f"{case.name}: kernels")
+        rounds = options.rounds or (2 if options.quick else 8)
+        found.append(Measured(splits(meter, case, case.operations, repeats=rounds), case.record()))
+    return found
+
+
+def _measure(
+    meter: LimitMeter, case: Case, options: Options, skipped: dict[str, str]
+) -> Iterator[Measured]:
+    peers = PEERS if options.peers else ()
+    left_out = dict[str, str]()
+    if peers and case.updates > _ONCE_UPDATES:
+        peers = tuple(peer for peer in PEERS if peer is not ScikitImage)
+        left_out[ScikitImage.name] = "it would take minutes at this size"
+    yield _measure_one(
+        meter, case, options, kinds=(*_OURS, *peers), skipped=skipped, left_out=left_out
+    )
+    stack = replace(case, slices=options.slices)
+    if stack.slices > 1 and stack.updates <= _STACK_UPDATES:
+        yield _measure_one(meter, stack, options, kinds=_OURS, skipped={}, left_out={})
+
+
+def _measure_one(
+    meter: LimitMeter,
+    case: Case,
+    options: Options,
+    *,
+    kinds: Sequence[type[Contender]],
+    skipped: dict[str, str],
+    left_out: dict[str, str],
+) -> Measured:
+    _say(f"{case.name}: kernels")
+    rounds = options.rounds or (2 if options.quick else 5 if case.updates < 1e8 else 3)
+    runs = operations(meter.device, case)
+    kernel_splits = splits(meter, case, runs, repeats=rounds)
+    _say(f"{case.name}: {', '.join(kind.name for kind in kinds)}")
+    once = len(kinds) > len(_OURS) and case.updates > _ONCE_UPDATES
+    contenders = line_up(kinds, meter.device, case, skipped)
+    entries = race(contenders, rounds=1 if once else rounds, warm_up=not once, skipped=skipped)
+    records = [race_record(entry, seed=options.seed) for entry in entries]
+    record = {
+        **case.record(),
+        "contenders": records,
+        "speed_ups": speed_ups(records),
+        "dot_test": _dot_test(meter.device, case, options.seed) if case.slices == 1 else None,
+        "peers_once": once,
+        "left_out": left_out,
+    }
+    return Measured(kernel_splits, record)
+
+
+def _dot_test(device: rift.Device, case: Case, seed: int) -> float:
+    return rift.dot_test(rift.Projector(case.grid, case.scan, device=device), seed=seed)
+
+
+def _write(path: Path, text: str) -> None:
+    part = path.with_name(f"{path.name}.part")
+    part.write_text(text, encoding="utf-8")
+    part.replace(path)
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def main() -> int:
+    """Run with the command line's arguments; the exit status."""
+    options = tyro.cli(Options)
+    record: dict[str, Any] = {}
+    try:
+        for record in measure_all(options):
+            _write(options.json, json.dumps(record, indent=1) + "\n")
+            if options.markdown is not None:
+                _write(options.markdown, markdown(record))
+    except rift.RiftError as error:
+        _say(f"bench_kernels: {error}")
+        return error.exit_status
+    except CoverageError as error:
+        _say(f"bench_kernels: {error}")
+        return 1
+    show(tables(record))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
