@@ -22,11 +22,13 @@ if TYPE_CHECKING:
     from rift_cl import metrics, phantom
     from rift_cl.cl import Device, default_device, devices, open_device
     from rift_cl.errors import RiftError
-    from rift_cl.geometry import Grid, Parallel
+    from rift_cl.geometry import Camera, Grid, Parallel
     from rift_cl.operators import HighPass, LinearOperator, Projector, Ramp, Response, dot_test
     from rift_cl.reconstruct import backproject, fbp
+    from rift_cl.splat import Renderer, Splats, SplatSettings
 
 _HOMES = {
+    "Camera": "geometry",
     "Device": "cl",
     "Grid": "geometry",
     "HighPass": "operators",
@@ -34,8 +36,11 @@ _HOMES = {
     "Parallel": "geometry",
     "Projector": "operators",
     "Ramp": "operators",
+    "Renderer": "splat",
     "Response": "operators",
     "RiftError": "errors",
+    "SplatSettings": "splat",
+    "Splats": "splat",
     "backproject": "reconstruct",
     "default_device": "cl",
     "devices": "cl",
@@ -46,6 +51,7 @@ _HOMES = {
 _MODULES = ("metrics", "phantom")
 
 __all__ = [
+    "Camera",
     "Device",
     "Grid",
     "HighPass",
@@ -53,8 +59,11 @@ __all__ = [
     "Parallel",
     "Projector",
     "Ramp",
+    "Renderer",
     "Response",
     "RiftError",
+    "SplatSettings",
+    "Splats",
     "backproject",
     "default_device",
     "devices",

@@ -19,8 +19,7 @@ from rift_cl.cl.process import claim_process
 from rift_cl.cl.program import Programs
 from rift_cl.cl.traits import Traits
 
-
-# Asking for the budget costs more than a small array is worth.
+# Asking how much memory the host has free costs more than a smaller array is worth.
 _LARGE = 1 << 20
 
 
@@ -93,7 +92,8 @@ class Device:
         opened = self._open()
         # Blocks that are kept for the next array count as well, until the room is needed.
         wanted = int(np.prod(shape, dtype=np.int64)) * np.dtype(dtype).itemsize
-        if wanted >= _LARGE and opened.pool.managed_bytes + wanted > self.budget:
+        room = self.budget if wanted >= _LARGE else self._limit or self.traits.memory
+        if opened.pool.managed_bytes + wanted > room:
             opened.pool.free_held()
         with named_errors(f"allocating an array of shape {shape}", self.name):
             return Array(opened.queue, shape, dtype, allocator=opened.pool)

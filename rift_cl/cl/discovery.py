@@ -77,7 +77,7 @@ def open_device(selector: str | None = None, memory: int | None = None) -> Devic
     if not found:
         raise NoDeviceError(f"no OpenCL device was found: {_INSTALL}")
     selector = selector or os.environ.get("RIFT_DEVICE")
-    fitting = [d for d in found if _fits(d, found.index(d), selector)] if selector else by_rank()
+    fitting = _fitting(found, selector) if selector else by_rank()
     if not fitting:
         known = ", ".join(f"{d.selector} {d.name} ({d.platform})" for d in found)
         raise NoDeviceError(f"no OpenCL device fits {selector!r}; there is: {known}")
@@ -95,6 +95,10 @@ def by_rank() -> list[Device]:
 def default_device() -> Device:
     """The device that is used where none is named (``RIFT_DEVICE`` selects another)."""
     return open_device()
+
+
+def _fitting(found: tuple[Device, ...], selector: str) -> list[Device]:
+    return [device for number, device in enumerate(found) if _fits(device, number, selector)]
 
 
 def _fits(device: Device, number: int, selector: str) -> bool:

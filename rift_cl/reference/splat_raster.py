@@ -96,8 +96,9 @@ def _tile(
 
 
 def _falloff(sigma: Floats, rules: Rules) -> Floats:
+    plain: Floats = np.exp(-sigma)
     if rules.smooth:
-        return np.exp(-sigma) * np.maximum(1 - sigma / SMOOTH_EDGE, 0) ** 2
-    if rules.additive:
-        return np.where(sigma <= BOX_EDGE, np.exp(-sigma), 0)
-    return np.exp(-sigma)
+        plain *= np.maximum(1 - sigma / SMOOTH_EDGE, 0) ** 2
+    elif rules.additive:
+        plain *= sigma <= BOX_EDGE
+    return plain

@@ -6,9 +6,8 @@ from scenes import random_scene
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.reference.splat_raster import Rules, raster
-from rift_cl.splat.raster import rasterize, raster_grad
+from rift_cl.splat.raster import raster_grad, rasterize
 from rift_cl.splat.settings import SplatSettings
-
 
 SIZE = (50, 70)
 KINDS = {

@@ -47,7 +47,9 @@ def run(*arguments):
 def bench(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bench")
     where = ("--json", folder / "bench.json", "--markdown", folder / "bench.md")
-    done = run("--sizes", "32x24", "--slices", "2", "--rounds", "1", "--splats", "9000", "40", *where)
+    done = run(
+        "--sizes", "32x24", "--slices", "2", "--rounds", "1", "--splats", "9000", "40", *where
+    )
     assert done.returncode == 0, done.stderr
     assert sorted(path.name for path in folder.iterdir()) == ["bench.json", "bench.md"]
     record = json.loads((folder / "bench.json").read_text(encoding="utf-8"))
@@ -68,6 +70,7 @@ def test_head_names_version_device_and_date(bench):
     assert record["version"] == rift.__version__
     assert (record["device"]["name"], record["device"]["driver"]) == (device.name, device.driver)
     assert record["host"]["cpu"] and record["date"].endswith("+00:00") and record["seed"] == 0
+    assert positive(record["import_s"])
     assert device.name in page and "radon_project" in shown
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import platform
+import subprocess
+import sys
 from datetime import datetime, timezone
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -12,6 +14,7 @@ from typing import Any
 import rift_cl as rift
 
 _PACKAGES = ("numpy", "scipy", "pyopencl", "astra-toolbox", "silx", "gratopy", "scikit-image")
+_IMPORTS = 5
 
 
 def surroundings(device: rift.Device) -> dict[str, Any]:
@@ -33,8 +36,22 @@ def surroundings(device: rift.Device) -> dict[str, Any]:
             "system": platform.system(),
             "python": platform.python_version(),
         },
+        "import_s": import_seconds(),
         "packages": {name: found for name in _PACKAGES if (found := _installed(name))},
     }
+
+
+def import_seconds() -> float:
+    """Seconds that ``import rift_cl`` and a first look at a grid take in a fresh process."""
+    code = (
+        "import time; start = time.perf_counter(); import rift_cl; rift_cl.Grid((2, 2)); "
+        "print(time.perf_counter() - start)"
+    )
+    times = []
+    for _ in range(_IMPORTS):
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+        times.append(float(done.stdout))
+    return min(times)
 
 
 def _cpu_model() -> str:

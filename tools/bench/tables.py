@@ -105,12 +105,13 @@ def _limits(record: dict[str, Any]) -> Table:
         ("multiply-add", f"{limits['multiply_add'] / 1e9:.1f} GFLOP/s"),
         ("memory, triad", f"{limits['bandwidth'] / 1e9:.1f} GB/s"),
         ("one launch and one wait", f"{limits['launch'] * 1e6:.0f} µs"),
+        ("`import rift_cl` and a `Grid`", f"{record['import_s']:.2f} s"),
     ]
     note = (
         "Multiply-adds are measured on the vectors that our kernels use (eight floats on a CPU, "
         "one on a GPU); the driver may not use the widest that the hardware has."
     )
-    return Table(f"Limits of {record['device']['name']}", ("limit", "value"), rows, (note,))
+    return Table(f"Limits of {record['device']['name']}", ("what", "value"), rows, (note,))
 
 
 def _work(record: dict[str, Any]) -> Table:
