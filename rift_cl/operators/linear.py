@@ -110,7 +110,7 @@ class LinearOperator(ABC):
         from rift_cl.operators.algebra import Scaled
 
         return (
-            Scaled(self, factor)
+            Scaled(self, float(factor))
             if isinstance(factor, (int, float, np.integer, np.floating))
             else NotImplemented
         )
