@@ -122,9 +122,12 @@ def _print_table(
 
 
 def _devices(settings: Any, output: Output) -> None:
-    from rift_cl.jobs.devices import COLUMNS, device_rows
+    from rift_cl.jobs.devices import device_facts
 
-    _print_table(COLUMNS, device_rows())
+    for name, facts in device_facts():
+        print(name)
+        for what, value in facts.items():
+            print(f"     {what:<10} {value}")
 
 
 def _demo(settings: Any, output: Output) -> None:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rift_cl.cl.budget import format_bytes
+from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import devices, open_device
 from rift_cl.cl.self_test import self_test
-
-COLUMNS = ("device", "name", "platform, driver", "kind", "units", "memory", "traits", "self-test")
 
 
 @dataclass(frozen=True)
@@ -22,27 +21,28 @@ class DevicesSettings:
     """
 
 
-def device_rows() -> list[tuple[str, ...]]:
-    """A row for every device, in the order of their numbers.
+def device_facts() -> list[tuple[str, dict[str, str]]]:
+    """The name of every device, in the order of their numbers, and what there is to say of it.
 
     Raises:
         NoDeviceError: there is none, or ``RIFT_DEVICE`` fits none.
     """
     chosen = open_device().selector
-    rows: list[tuple[str, ...]] = []
-    for number, device in enumerate(devices()):
-        traits, test = device.traits, self_test(device)
-        features = {"unified memory": traits.unified, "fp64": traits.fp64, "PoCL": traits.pocl}
-        rows.append(
-            (
-                f"{number}{' *' if device.selector == chosen else ''}",
-                device.name,
-                f"{device.platform}, {device.driver}",
-                "CPU" if traits.is_cpu else "GPU",
-                str(traits.compute_units),
-                f"{format_bytes(device.budget)} of {format_bytes(traits.memory)}",
-                ", ".join(name for name, there in features.items() if there),
-                "passed" if test.passed else f"FAILED: {test.detail}",
-            )
-        )
-    return rows
+    return [
+        (f"{number}{'*' if device.selector == chosen else ' '} {device.name}", _facts(device))
+        for number, device in enumerate(devices())
+    ]
+
+
+def _facts(device: Device) -> dict[str, str]:
+    traits, test = device.traits, self_test(device)
+    features = {"unified memory": traits.unified, "fp64": traits.fp64, "PoCL": traits.pocl}
+    return {
+        "platform": f"{device.platform}, driver {device.driver}",
+        "selector": device.selector,
+        "kind": f"{'CPU' if traits.is_cpu else 'GPU'}, {traits.compute_units} compute units",
+        "memory": f"{format_bytes(device.budget)} to use of {format_bytes(traits.memory)}",
+        "local": f"{format_bytes(traits.local_memory)}, groups of at most {traits.group}",
+        "traits": ", ".join(name for name, there in features.items() if there) or "none",
+        "self-test": f"{'passed' if test.passed else 'FAILED'}: {test.detail}",
+    }
