@@ -28,7 +28,7 @@ from rift_cl.jobs.run_folder import RunFolder
 from rift_cl.jobs.scan_input import ScanInput, read_attenuation
 from rift_cl.operators import HighPass, Projector, Ramp
 from rift_cl.progress import Report
-from rift_cl.reconstruct import backproject, fbp, find_center
+from rift_cl.reconstruct import Attenuation, backproject, fbp, find_center
 
 # Slices between two reports of progress.
 _SLAB = 16
@@ -90,6 +90,7 @@ class Reconstruction:
         self._geometry(settings.center)
         self.folder = RunFolder(settings.out, "reconstruct", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
+        self._preview = Preview.of(self.shape[0])
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -142,7 +143,6 @@ class Reconstruction:
         settings, count = self.settings, self.shape[0]
         path = settings.out / _NAMES[settings.format]
         spacing = (self.pitch,) * 3
-        self._preview = Preview.of(count)
         self.metrics = {"center": center, "dead_pixels": 0, "starved_samples": 0}
         projectors: dict[int, Projector] = {}
         with open_volume(
@@ -151,21 +151,23 @@ class Reconstruction:
             for slab in self.slabs:
                 size = slab.stop - slab.start
                 A = projectors.setdefault(size, self._projector(size, center))
-                slices = self._slices(A, slab)
+                integrals = self._line_integrals(slab)
+                self.metrics["dead_pixels"] += integrals.dead
+                self.metrics["starved_samples"] += integrals.starved
+                slices = self._invert(A, integrals.projections)
                 volume.write(slab.start, slices)
                 self._preview.take(slab.start, slices)
                 yield Report(slab.stop, count, "slices", {"center": center})
         self.metrics.update(self._preview.statistics())
 
-    def _slices(self, A: Projector, slab: slice) -> NDArray[np.float32]:
+    def _line_integrals(self, slab: slice) -> Attenuation:
         first = self.rows[0]
-        integrals = read_attenuation(self.scan, first + slab.start, first + slab.stop)
-        if self.metrics:
-            self.metrics["dead_pixels"] += integrals.dead
-            self.metrics["starved_samples"] += integrals.starved
+        return read_attenuation(self.scan, first + slab.start, first + slab.stop)
+
+    def _invert(self, A: Projector, projections: NDArray[np.float32]) -> NDArray[np.float32]:
         if self.settings.method == "backproject":
-            return np.asarray(backproject(A, integrals.projections))
-        return np.asarray(fbp(A, integrals.projections, self.filter))
+            return np.asarray(backproject(A, projections))
+        return np.asarray(fbp(A, projections, self.filter))
 
     def _find_center(self) -> float:
         middle = sum(self.rows) // 2
@@ -181,9 +183,10 @@ class Reconstruction:
 
     def _seconds_per_slice(self) -> float:
         A = self._projector(1, self.settings.center)
-        self._slices(A, slice(0, 1))
-        begin = time.perf_counter()
-        self._slices(A, slice(0, 1))
+        # Twice: the first time builds the kernels.
+        for _ in range(2):
+            begin = time.perf_counter()
+            self._invert(A, self._line_integrals(slice(0, 1)).projections)
         return time.perf_counter() - begin
 
 
