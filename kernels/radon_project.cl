@@ -4,7 +4,7 @@
  *             + sum over rows i of phase r-1 of w plane[i][k-m],
  *     where the rows of phase PHASES-1 reach F[0] one column further on.
  *
- * Index space: (segments of columns, views of this run, slices). Each item owns SEGMENT columns
+ * Index space: segments of columns and views of this run, then slices. Each item owns SEGMENT columns
  * of one view's table. Rows come sorted by phase (`order`, with `starts` telling where each phase
  * begins), so that the sums of a phase and of the next stay in registers: one load and two
  * multiply-adds per LANES pixels, no atomics, one order of summation. The table is written column
@@ -16,6 +16,12 @@
 #include "include/portable.h"
 #include "include/phase_table.h"
 #include "include/transpose.h"
+
+/* Neighbouring items of a GPU take neighbouring segments, so that their loads are one. A CPU takes
+ * one segment of all views of a run in turn: their rows lie in nearly the same band of the image,
+ * which then stays in its cache. */
+#define SEGMENT_AXIS (LANES == 8 ? 1 : 0)
+#define VIEW_AXIS (1 - SEGMENT_AXIS)
 
 /* Add the rows of one phase; SHIFT is 1 where the next phase is column + 1 of phase 0. */
 #define ADD_ROWS(SHIFT) \
@@ -39,8 +45,9 @@ KERNEL void radon_project(
     __global const long4 *restrict geometry, __global const int *restrict orders,
     __global const int *restrict all_starts, __global const int2 *restrict views, int first, int columns, int rows, int width)
 {
-  const int k0 = (int)get_global_id(0) * SEGMENT;
-  const int number = (int)get_global_id(1), count = (int)get_global_size(1), view = first + number;
+  const int k0 = (int)get_global_id(SEGMENT_AXIS) * SEGMENT;
+  const int number = (int)get_global_id(VIEW_AXIS), count = (int)get_global_size(VIEW_AXIS);
+  const int view = first + number;
   const int slice = (int)get_global_id(2);
   if (k0 >= views[view].y) return;
   const long4 g = geometry[view];

@@ -93,9 +93,11 @@ class Projector(LinearOperator):
     def _project(self, walk: _Walk, plane: Any, out: Any, slab: _Slab, run: _Run) -> None:
         table, (first, count) = walk.table, run
         entries = self.device.empty((slab.slices, count, table.entries))
+        segments = table.columns // self._segment
+        work = (count, segments) if self.device.traits.is_cpu else (segments, count)
         self.device.launch(
             "radon_project",
-            (table.columns // self._segment, count, slab.slices),
+            (*work, slab.slices),
             *(entries, plane, walk.geometry, walk.orders, walk.starts, walk.views),
             *(first, table.columns, table.rows, table.width),
             **self._macros,
