@@ -1,12 +1,14 @@
 """The command ``rift``: settings from the command line, progress to stderr, results to stdout.
 
 Every command is a settings dataclass and a job; this file only turns arguments into the one, runs
-the other, and turns errors into a sentence and an exit status: 0 ok, 2 usage, 3 input, 4 device,
-5 output, 130 interrupted.
+the other, and turns errors into a sentence and an exit status: 0 ok, 2 usage (an unknown option, or
+no number where one is wanted), 3 input (a file or a value that cannot be used), 4 device, 5 output,
+130 interrupted.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 import traceback
 import warnings
@@ -21,9 +23,9 @@ from rich.table import Table
 from rift_cl import __version__
 from rift_cl.errors import RiftError
 from rift_cl.progress import Report
-from rift_cl.progress_bar import show_progress
+from rift_cl.progress_bar import print_line, show_progress
 
-_INTERRUPTED = 130
+_INPUT, _OUTPUT, _INTERRUPTED = 3, 5, 130
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,24 @@ Talk = Annotated[Output, tyro.conf.arg(name="")]
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    if arguments == ["--version"]:
+    try:
+        status = _run(arguments)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except KeyboardInterrupt:
+        return _say("rift: interrupted; no file is half-written", _INTERRUPTED)
+    except BrokenPipeError:
+        # Whoever read the output has seen enough; the interpreter must not try to flush the rest.
+        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115 - kept open until the end
+        return 0
+    except OSError as error:
+        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115 - kept open until the end
+        return _say(f"rift: the output cannot be written ({error.strerror})", _OUTPUT)
+    return status
+
+
+def _run(arguments: Sequence[str]) -> int:
+    if list(arguments) == ["--version"]:
         print(f"rift {__version__}")
         return 0
     command: Callable[[], int] = tyro.extras.subcommand_cli_from_dict(
@@ -96,16 +115,19 @@ def _guarded(run: Callable[[Any, Output], None], settings: Any, output: Output) 
     except RiftError as error:
         if output.debug:
             traceback.print_exc()
-        print(f"rift: {error}", file=sys.stderr)
-        return error.exit_status
-    except KeyboardInterrupt:
-        print("rift: interrupted; nothing half-written was left behind", file=sys.stderr)
-        return _INTERRUPTED
+        return _say(f"rift: {error}", error.exit_status)
+    except MemoryError as error:
+        return _say(f"rift: there is too little memory for this ({error}): ask for less", _INPUT)
     return 0
 
 
+def _say(sentence: str, status: int) -> int:
+    print_line(sentence)
+    return status
+
+
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    print(f"rift: warning: {message}", file=sys.stderr)
+    print_line(f"rift: warning: {message}")
 
 
 def _watch(reports: Iterable[Report], output: Output) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterable
+from contextlib import suppress
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -20,7 +21,7 @@ def show_progress(reports: Iterable[Report], *, quiet: bool) -> None:
     if quiet:
         for _ in reports:
             pass
-    elif sys.stderr.isatty():
+    elif sys.stderr is not None and sys.stderr.isatty():
         _draw_bar(reports)
     else:
         _print_lines(reports)
@@ -58,7 +59,14 @@ def _print_lines(reports: Iterable[Report]) -> None:
         parts = [f"{report.done}/{report.total} {report.what}", _rate(report, elapsed)]
         parts += [f"{left:.0f} s left"] if left else []
         line = ", ".join(part for part in parts if part) + _figures(report)
-        print(line, file=sys.stderr, flush=True)
+        print_line(line)
+
+
+def print_line(line: str) -> None:
+    """Print a line to stderr; a closed or full stderr must not end the work."""
+    if sys.stderr is not None:
+        with suppress(OSError, ValueError):
+            print(line, file=sys.stderr, flush=True)
 
 
 def _rate(report: Report, elapsed: float) -> str:

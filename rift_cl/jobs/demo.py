@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rift_cl.cl.discovery import open_device
+from rift_cl.errors import InputError
 from rift_cl.html_page import Page
 from rift_cl.io.image import write_png
 from rift_cl.jobs.run_folder import RunFolder
@@ -16,6 +17,8 @@ from rift_cl.plot import curves, figure_png, image_grid
 from rift_cl.progress import Report
 
 COLUMNS = ("views", "PSNR unfiltered", "SSIM unfiltered", "PSNR filtered", "SSIM filtered")
+# SSIM looks at windows of 11 samples.
+_SMALLEST = 11
 SCORES = ("psnr_unfiltered", "ssim_unfiltered", "psnr_filtered", "ssim_filtered")
 
 SCORING = (
@@ -50,6 +53,10 @@ class DemoJob:
 
     def __init__(self, settings: DemoSettings) -> None:
         self.settings = settings
+        if settings.size < _SMALLEST:
+            raise InputError(f"--size is {settings.size}, wanted {_SMALLEST} or more")
+        if not settings.views or min(settings.views) < 1:
+            raise InputError(f"--views is {settings.views}, wanted one number or more, each >= 1")
         self.device = open_device(settings.device)
         self.folder = RunFolder(settings.out, "demo", overwrite=True)
         self.rows: list[tuple[float, ...]] = []
@@ -63,6 +70,7 @@ class DemoJob:
             self.rows.append(study_row(score))
             yield Report(len(scores), len(counts), "view counts")
         self.folder.make()
+        self.folder.drop("filtered_*.png", "unfiltered_*.png")
         for score in scores:
             for name in ("unfiltered", "filtered"):
                 write_png(self.settings.out / f"{name}_{score.views}.png", getattr(score, name))

@@ -83,11 +83,13 @@ class Reconstruction:
         self.device: Device = settings.open_device()
         self.scan: ScanFile = settings.open_scan()
         self.rows = _rows(settings.rows, self.scan)
-        self.pitch = settings.pitch or self.scan.pitch or 1.0
-        self.unit = settings.unit or self.scan.unit or ("bin" if self.pitch == 1.0 else "")
+        self.pitch = (self.scan.pitch or 1.0) if settings.pitch is None else settings.pitch
+        unit = self.scan.unit or ("bin" if self.pitch == 1.0 else "")
+        self.unit = unit if settings.unit is None else settings.unit
         self.filter = _filter(settings)
         # Made now, so that a bad pitch or center is told before any work.
         self._geometry(settings.center)
+        _check_center(settings.center, self.scan)
         self.folder = RunFolder(settings.out, "reconstruct", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
         self._preview = Preview.of(self.shape[0])
@@ -135,6 +137,8 @@ class Reconstruction:
         except BaseException:
             self.folder.discard()
             raise
+        formats = set(_NAMES.values()) - {_NAMES[self.settings.format]}
+        self.folder.drop(*formats)
         self.metrics["seconds"] = time.perf_counter() - begin
         page = reconstruction_page(self, self._preview)
         self.folder.finish(self.settings, self.metrics, page, self.device)
@@ -203,6 +207,13 @@ def _rows(wanted: tuple[int, int] | None, scan: ScanFile) -> tuple[int, int]:
             "the first and the one after the last"
         )
     return rows
+
+
+def _check_center(center: float | None, scan: ScanFile) -> None:
+    """A rotation axis may lie off the detector, but not where no ray meets the slice."""
+    bins = scan.shape[2]
+    if center is not None and not -bins < center < 2 * bins:
+        raise InputError(f"--center is {center:g}, the detector has the bins 0 to {bins - 1}")
 
 
 def _filter(settings: ReconstructSettings) -> Ramp | HighPass:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import platform
+import shutil
 from collections.abc import Mapping
 from datetime import datetime, timezone
 from pathlib import Path
@@ -38,6 +39,9 @@ class RunFolder:
     def __init__(self, path: Path, job: str, *, overwrite: bool) -> None:
         self.path = path
         self._job = job
+        above = next(parent for parent in path.absolute().parents if parent.exists())
+        if not above.is_dir():
+            raise OutputError(f"{path}: {above} is no folder; name another place (--out)")
         with writing(path):
             used = path.exists() and (not path.is_dir() or any(path.iterdir()))
         if used and _job_of(path) != job:
@@ -48,18 +52,28 @@ class RunFolder:
             )
 
     def make(self) -> None:
-        """Make the folder: the first moment at which anything is written."""
+        """Make the folder and mark it as ours: the first moment at which anything is written."""
         make_folder(self.path)
+        write_json(self.path / _CONFIG, {"job": self._job, "complete": False})
 
     def discard(self) -> None:
-        """Remove the folder if a failed run left nothing in it."""
-        if self.path.is_dir() and not any(self.path.iterdir()):
+        """Remove the folder if a failed run left nothing in it but the mark."""
+        if self.path.is_dir() and [entry.name for entry in self.path.iterdir()] == [_CONFIG]:
+            (self.path / _CONFIG).unlink()
             self.path.rmdir()
+
+    def drop(self, *patterns: str) -> None:
+        """Remove what an earlier run left under names that this one does not write again."""
+        for pattern in patterns:
+            for entry in self.path.glob(pattern):
+                with writing(entry):
+                    shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
 
     def finish(self, settings: Any, metrics: Mapping[str, Any], page: Page, device: Device) -> None:
         """Write the report, the metrics and, last, the configuration."""
         config = {
             "job": self._job,
+            "complete": True,
             "rift_cl": __version__,
             "settings": dataclasses.asdict(settings),
             "environment": environment(device),

@@ -73,6 +73,6 @@ def _check(frames: NDArray[np.float32], name: str, start: int) -> None:
         view, row, bin = (int(i) for i in np.argwhere(~finite)[0])
         raise NonFiniteError(
             f"{name} hold {np.count_nonzero(~finite)} values that are not finite in these rows, "
-            f"the first at view {view}, row {start + row}, bin {bin}: repair the file, or leave "
-            "the row out with --rows"
+            f"the first at view {view}, row {start + row}, bin {bin}: repair the file, or choose "
+            "other rows"
         )

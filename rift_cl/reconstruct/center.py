@@ -27,6 +27,9 @@ from rift_cl.operators import Projector
 from rift_cl.reconstruct.filtered_backprojection import fbp
 
 Floats = NDArray[np.float64]
+# A search needs some detail, and views from nearly all directions.
+_FEWEST_BINS = 8
+_WIDEST_GAP = np.pi / 6
 # Pairs of views that are compared: those nearest to opposite.
 _PAIRS = 8
 # Pairs count as opposite when no bin moves further than this between them, in bins.
@@ -78,11 +81,12 @@ def find_center(
     device = device or default_device()
     bins = Parallel(angles, np.shape(sinogram)[-1]).bins
     y = as_host_array(sinogram, (len(angles), bins), name="sinogram", wants="find_center")
+    _check_searchable(y, angles)
     low, high = span or ((bins - 1) / 4, 3 * (bins - 1) / 4)
     if not 0 <= low < high <= bins - 1:
-        raise InputError(f"span is {(low, high)}, wanted bins between 0 and {bins - 1}")
-    if bins < 8 or not np.ptp(y) > 0:
-        raise InputError("the sinogram has too few bins or no contrast: give the center yourself")
+        raise InputError(
+            f"span is {(low, high)}, wanted two bins in ascending order, between 0 and {bins - 1}"
+        )
     pairs = _opposite_views(angles)
     mirror = _mirror_scores(y, pairs, low, high)
     guess = float(mirror[0, mirror[1].argmax()])
@@ -110,6 +114,21 @@ def _mirror_scores(y: NDArray[np.float32], pairs: _Pairs, low: float, high: floa
         scale = np.linalg.norm(views) * np.linalg.norm(mirrored)
         scores.append(float((views * mirrored).sum() / scale) if scale > 0 else 0.0)
     return np.stack([centers, np.array(scores)])
+
+
+def _check_searchable(y: NDArray[np.float32], angles: Floats) -> None:
+    if y.shape[1] < _FEWEST_BINS or not np.ptp(y) > 0:
+        raise InputError(
+            "the sinogram has too few bins or no contrast to find its center of rotation: look at "
+            "another row, or give the center yourself (--center)"
+        )
+    directions = np.sort(np.mod(angles, np.pi))
+    gap = np.diff(directions, append=directions[0] + np.pi).max()
+    if gap > _WIDEST_GAP:
+        raise InputError(
+            f"the views leave a gap of {np.rad2deg(gap):.0f} degrees, too wide to find the center "
+            "of rotation: give it yourself (--center); are the angles in radians?"
+        )
 
 
 class _Pairs(NamedTuple):

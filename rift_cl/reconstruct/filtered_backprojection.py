@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rift_cl.errors import InputError
 from rift_cl.operators.filters import Filter, ViewFilter, as_filter
 from rift_cl.operators.linear import LinearOperator, Piece
 from rift_cl.operators.projector import Projector
@@ -87,6 +88,7 @@ def fbp(
     Raises:
         InputError: ``y`` does not fit, is not finite, or a name is unknown.
     """
+    _check_projector(A)
     return FilteredBackprojection(A, filter, compensate=compensate)(y, out, name="y")
 
 
@@ -96,8 +98,14 @@ def backproject(A: Projector, y: Any, *, out: Any = None) -> Any:
     Arguments, result and errors are those of ``fbp``. The result is the image convolved with
     1 / r, in the image's unit times a length; compare it after an affine fit.
     """
+    _check_projector(A)
     factor = np.pi / len(A.scan.angles) * _unspread(A)
     return (A.T * factor)(y, out, name="y")
+
+
+def _check_projector(A: Any) -> None:
+    if not isinstance(A, Projector):
+        raise InputError(f"A is a {type(A).__name__}, wanted a Projector first, then the sinogram")
 
 
 def _unspread(A: Projector) -> float:

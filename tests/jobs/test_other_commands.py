@@ -1,6 +1,10 @@
 """``rift demo``, ``rift center``, ``rift devices``, ``rift cache``."""
 
 import json
+import os
+import shlex
+import subprocess
+import sys
 
 import pytest
 
@@ -31,6 +35,41 @@ def test_demo_can_be_repeated_but_takes_no_other_folder(tmp_path, capsys):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "notes.txt").write_text("keep")
     assert main(["demo", "--out", str(tmp_path / "mine")]) == 5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [(("--size", "4"), "--size"), (("--views", "0"), "--views"), (("--views",), "--views")],
+)
+def test_demo_arguments_are_told(tmp_path, capsys, arguments, word):
+    assert main(["demo", "--out", str(tmp_path / "demo"), *arguments]) == 3
+    assert word in capsys.readouterr().err
+    assert not (tmp_path / "demo").exists()
+
+
+def test_a_demo_that_is_repeated_leaves_no_old_pictures(tmp_path, capsys):
+    out = tmp_path / "demo"
+    for views in ("3", "5"):
+        assert main(["demo", "--out", str(out), "--size", "32", "--views", views]) == 0
+    assert sorted(path.name for path in out.glob("*.png")) == ["filtered_5.png", "unfiltered_5.png"]
+
+
+@pytest.mark.parametrize("how", [">&-", "2>&-", "| head -0", "> /dev/full", "2> /dev/full"])
+def test_closed_and_full_streams_are_survived(how, tmp_path):
+    command = f"{shlex.quote(sys.executable)} -m rift_cl.cli demo --size 32 --views 4 --out d {how}"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(
+        ["bash", "-c", command],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert done.returncode == (5 if how == "> /dev/full" else 0)
+    assert "Traceback" not in done.stderr
+    assert (tmp_path / "d" / "report.html").exists()
 
 
 def test_center(scan, tmp_path, capsys):

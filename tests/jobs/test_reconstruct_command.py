@@ -156,6 +156,8 @@ def test_bad_scans_are_told_and_leave_nothing(scan, tmp_path, capsys, change, wo
     [
         (("--rows", "2", "9"), INPUT, "rows"),
         (("--pitch", "-1"), INPUT, "pitch"),
+        (("--pitch", "0"), INPUT, "pitch"),
+        (("--center", "1e9"), INPUT, "--center"),
         (("--cutoff", "0"), INPUT, "cutoff"),
         (("--exponent", "-1", "--filter", "high-pass"), INPUT, "exponent"),
         (("--memory", "lots"), INPUT, "memory"),
@@ -167,7 +169,8 @@ def test_bad_scans_are_told_and_leave_nothing(scan, tmp_path, capsys, change, wo
 )
 def test_bad_arguments_are_told(scan, tmp_path, capsys, extra, status, words):
     out = () if "--out" in extra else ("--out", tmp_path / "out")
-    assert run("reconstruct", scan.counts, "--center", 45, *out, *extra) == status
+    center = () if "--center" in extra else ("--center", 45)
+    assert run("reconstruct", scan.counts, *center, *out, *extra) == status
     captured = capsys.readouterr()
     assert words in captured.err
     assert "Traceback" not in captured.err
@@ -194,6 +197,40 @@ def test_interruption_leaves_nothing(scan, tmp_path, monkeypatch, capsys):
     out = tmp_path / "out"
     assert run("reconstruct", scan.counts, "--center", 45, "--out", out) == INTERRUPTED
     assert not out.exists()
+
+
+def test_a_run_cut_off_in_its_report_can_be_repeated(scan, tmp_path, monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    arguments = ("reconstruct", scan.counts, "--center", 45, "--out", tmp_path / "out")
+    with monkeypatch.context() as patch:
+        patch.setattr("rift_cl.jobs.reconstruct.reconstruction_page", interrupt)
+        assert run(*arguments) == INTERRUPTED
+    assert run(*arguments) == OUTPUT
+    assert run(*arguments, "--overwrite") == 0
+
+
+def test_another_format_replaces_the_first(scan, tmp_path):
+    arguments = ("reconstruct", scan.counts, "--center", 45, "--out", tmp_path / "out")
+    assert run(*arguments) == 0
+    assert run(*arguments, "--overwrite", "--format", "h5") == 0
+    assert not (tmp_path / "out" / "slices").exists()
+    assert (tmp_path / "out" / "volume.h5").exists()
+
+
+def test_a_dry_run_tells_of_an_output_that_cannot_be(scan, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    out = tmp_path / "file" / "out"
+    assert run("reconstruct", scan.counts, "--center", 45, "--out", out, "--dry-run") == OUTPUT
+    assert "no folder" in capsys.readouterr().err
+
+
+def test_angles_that_leave_a_gap_have_no_center_to_be_found(tmp_path, capsys):
+    path = tmp_path / "one.npz"
+    np.savez(path, sinogram=np.random.default_rng(0).random((1, 32)), angles=[0.1])
+    assert run("reconstruct", path, "--out", tmp_path / "out") == INPUT
+    assert "gap of 180 degrees" in capsys.readouterr().err
 
 
 def test_real_tooth(shared_data, tmp_path):
