@@ -4,11 +4,11 @@
  *             + sum over rows i of phase r-1 of w plane[i][k-m],
  *     where the rows of phase PHASES-1 reach F[0] one column further on.
  *
- * Index space: segments of columns and views of this run, then slices. Each item owns SEGMENT columns
- * of one view's table. Rows come sorted by phase (`order`, with `starts` telling where each phase
- * begins), so that the sums of a phase and of the next stay in registers: one load and two
- * multiply-adds per LANES pixels, no atomics, one order of summation. The table is written column
- * by column (phases together), which is how radon_resample_adjoint reads it.
+ * Index space: segments of columns and views of this run, then slices. Each item owns SEGMENT
+ * columns of one view's table. Rows come sorted by phase (`order`, with `starts` telling where
+ * each phase begins), so that the sums of a phase and of the next stay in registers: one load and
+ * two multiply-adds per LANES pixels, no atomics, one order of summation. The table is written
+ * column by column (phases together), which is how radon_resample_adjoint reads it.
  *
  * The plane has SEGMENT zeros before and after every row, so that a segment that overhangs the
  * row needs no bounds test. */

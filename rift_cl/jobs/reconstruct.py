@@ -137,6 +137,8 @@ class Reconstruction:
         except BaseException:
             self.folder.discard()
             raise
+        # From here on the slices are this run's, and an earlier configuration no longer theirs.
+        self.folder.mark()
         formats = set(_NAMES.values()) - {_NAMES[self.settings.format]}
         self.folder.drop(*formats)
         self.metrics["seconds"] = time.perf_counter() - begin

@@ -52,8 +52,13 @@ class RunFolder:
             )
 
     def make(self) -> None:
-        """Make the folder and mark it as ours: the first moment at which anything is written."""
+        """Make the folder, and mark it as ours if no earlier run did: the first thing written."""
         make_folder(self.path)
+        if not (self.path / _CONFIG).exists():
+            self.mark()
+
+    def mark(self) -> None:
+        """Say that the folder is this command's, and that its run is not finished."""
         write_json(self.path / _CONFIG, {"job": self._job, "complete": False})
 
     def discard(self) -> None:

@@ -76,7 +76,8 @@ def find_center(
         device: where to work.
 
     Raises:
-        InputError: the sinogram is empty of contrast, too narrow, or the span lies outside it.
+        InputError: the sinogram is empty of contrast or too narrow, the views leave a wide gap,
+            or the span lies outside the detector.
     """
     device = device or default_device()
     bins = Parallel(angles, np.shape(sinogram)[-1]).bins

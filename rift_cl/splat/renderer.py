@@ -30,22 +30,18 @@ from rift_cl.splat.tile_lists import TileLists, tile_lists
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A drawn image with what its gradient needs; device arrays.
+    """A drawn image with what its gradient needs.
 
     Args:
-        image: (height, width, D), the background included.
-        transmittance: (height, width), what of the background is seen; alpha is one minus it.
         splats: what was drawn.
         camera: what drew it.
         background: (D,) or None.
         projected: the splats on the screen.
         screen: the same as the raster takes them.
         lists: the tile lists.
-        raster: what the raster left for its gradient.
+        raster: the image, and what the raster left for its gradient.
     """
 
-    image: Any
-    transmittance: Any
     splats: Splats
     camera: Camera
     background: Any
@@ -53,6 +49,16 @@ class Frame:
     screen: ScreenSplats
     lists: TileLists
     raster: Raster
+
+    @property
+    def image(self) -> Any:
+        """(height, width, D) device array, the background included."""
+        return self.raster.image
+
+    @property
+    def transmittance(self) -> Any:
+        """(height, width) device array, what of the background is seen; alpha is one minus it."""
+        return self.raster.transmittance
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,10 +122,7 @@ class Renderer:
         drawn = rasterize(
             device, screen, lists, camera.size, settings=settings, background=background
         )
-        return Frame(
-            *(drawn.image, drawn.transmittance, splats, camera, background),
-            *(projected, screen, lists, drawn),
-        )
+        return Frame(splats, camera, background, projected, screen, lists, drawn)
 
     def backward(
         self,

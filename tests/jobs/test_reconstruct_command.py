@@ -211,6 +211,15 @@ def test_a_run_cut_off_in_its_report_can_be_repeated(scan, tmp_path, monkeypatch
     assert run(*arguments, "--overwrite") == 0
 
 
+def test_a_failed_overwrite_loses_nothing(scan, tmp_path):
+    out = tmp_path / "out"
+    assert run("reconstruct", scan.counts, "--center", 45, "--out", out) == 0
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    bad = broken(scan.counts, tmp_path, _nan)
+    assert run("reconstruct", bad, "--center", 45, "--out", out, "--overwrite") == INPUT
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
 def test_another_format_replaces_the_first(scan, tmp_path):
     arguments = ("reconstruct", scan.counts, "--center", 45, "--out", tmp_path / "out")
     assert run(*arguments) == 0
