@@ -1,11 +1,12 @@
 /* Project splats: from Gaussians in space to conics, extents and tile rectangles on the screen.
  *
- *     screen[i] = (u, v, a, b, c, weight, depth, factor),
+ *     screen[i] = (u, v, a, b, c, weight, extent_x, extent_y),
  *     sigma(pixel) = 0.5 (a dx^2 + c dy^2) + b dx dy,     (dx, dy) = (u, v) - pixel centre,
  *
  * where (a, b; b, c) is the inverse of the screen covariance plus eps2d, weight = opacity * factor
- * and depth is the camera's z. boxes[i] = (x0, y0, x1, y1) are the tiles that the splat's ellipse
- * may reach, x1 and y1 exclusive, radii[i] half the sides of its bounding rectangle, rounded up.
+ * and the extents are half the sides of the rectangle round the splat's ellipse. boxes[i] =
+ * (x0, y0, x1, y1) are the tiles that this rectangle touches when its extents are rounded up to
+ * pixels (gsplat's radii), x1 and y1 exclusive. depths[i] is the camera's z.
  *
  * An ellipse ends where weight * exp(-sigma) falls below 1/255, and at EXTENT standard deviations
  * at the latest; line integrals, which no display rounds, and SMOOTH cut-offs end at EXTENT always.
@@ -26,9 +27,9 @@
 #define SMOOTH 0
 #endif
 /* Standard deviations; splat.h stops adding line integrals there as well. */
-#define EXTENT 3.33f
-/* Radii are held at this, so that they fit an int with room to add. */
-#define MOST_PIXELS (1 << 30)
+#define EXTENT (XRAY ? 4.0f : 3.33f)
+/* Extents are held at this, so that rounded up they fit an int with room to add. */
+#define MOST_PIXELS 1e9f
 #define FAINTEST (1.0f / 255.0f)
 /* Below it some devices take a number for zero. */
 #define LEAST_NORMAL 1.2e-38f
@@ -52,7 +53,7 @@ static float natural_log(float x) {
 
 /* Extent of a splat on the screen and in tiles; gives VISIBLE, or why it is not drawn. */
 static int bound(
-    const Gaussian *g, float weight, float radius_clip, int width, int height, int *radii, int *box)
+    const Gaussian *g, float weight, float radius_clip, int width, int height, float *extents, int *box)
 {
   float extent = EXTENT;
   if (!(weight >= (XRAY ? LEAST_NORMAL : FAINTEST))) return TOO_FAINT;
@@ -60,9 +61,11 @@ static int bound(
     const float at_threshold = sqrt(2 * natural_log(larger(weight / FAINTEST, 1)));
     extent = at_threshold < EXTENT ? at_threshold : EXTENT;
   }
-  radii[0] = whole_above(extent * sqrt(dot3(g->v0, g->v0) + g->eps), MOST_PIXELS);
-  radii[1] = whole_above(extent * sqrt(dot3(g->v1, g->v1) + g->eps), MOST_PIXELS);
-  const float rx = radii[0], ry = radii[1];
+  const float reach_x = extent * sqrt(dot3(g->v0, g->v0) + g->eps);
+  const float reach_y = extent * sqrt(dot3(g->v1, g->v1) + g->eps);
+  extents[0] = reach_x < MOST_PIXELS ? reach_x : MOST_PIXELS;
+  extents[1] = reach_y < MOST_PIXELS ? reach_y : MOST_PIXELS;
+  const float rx = whole_above(extents[0], 1 << 30), ry = whole_above(extents[1], 1 << 30);
   if (rx <= radius_clip && ry <= radius_clip) return CLIPPED;
   const float left = g->screen.u - rx, right = g->screen.u + rx;
   const float top = g->screen.v - ry, bottom = g->screen.v + ry;
@@ -78,7 +81,7 @@ static int bound(
 /* The screen's row of a splat, its rectangles, and why it is not drawn. */
 static int project(
     const Gaussian *g, float opacity, float radius_clip, int width, int height,
-    float *row, int *radii, int *box)
+    float *row, int *box)
 {
   row[0] = g->screen.u;
   row[1] = g->screen.v;
@@ -86,15 +89,13 @@ static int project(
   row[3] = -dot3(g->v0, g->v1) * g->inverse;
   row[4] = (dot3(g->v0, g->v0) + g->eps) * g->inverse;
   row[5] = opacity * g->factor;
-  row[6] = g->point.z;
-  row[7] = g->factor;
   if (not_finite(row[2]) | not_finite(row[3]) | not_finite(row[4]) | not_finite(row[5])) return DEGENERATE;
-  return bound(g, row[5], radius_clip, width, height, radii, box);
+  return bound(g, row[5], radius_clip, width, height, row + 6, box);
 }
 
 KERNEL void splat_project(
     __global const float *restrict means, SHAPES, __global const float *restrict opacities,
-    __global float *restrict screen, __global int *restrict boxes, __global int *restrict radii,
+    __global float *restrict screen, __global float *restrict depths, __global int *restrict boxes,
     __global uchar *restrict culled, CAMERA_PARAMETERS,
     float near_plane, float far_plane, float radius_clip, float eps2d, int count)
 {
@@ -102,14 +103,14 @@ KERNEL void splat_project(
   if (i >= count) return;
   Gaussian g;
   float row[8];
-  int box[4], radius[2];
+  int box[4];
   const float opacity = opacities[i];
   int code = not_finite(opacity) ? DEGENERATE
       : see_gaussian(&g, CAMERA, means, SHAPE, i, near_plane, far_plane, eps2d);
-  if (code == VISIBLE) code = project(&g, opacity, radius_clip, width, height, row, radius, box);
+  if (code == VISIBLE) code = project(&g, opacity, radius_clip, width, height, row, box);
   const int drawn = code == VISIBLE;
   for (int k = 0; k < 8; k++) screen[8 * i + k] = drawn ? row[k] : 0;
   for (int k = 0; k < 4; k++) boxes[4 * i + k] = drawn ? box[k] : 0;
-  for (int k = 0; k < 2; k++) radii[2 * i + k] = drawn ? radius[k] : 0;
+  depths[i] = drawn ? g.point.z : 0;
   culled[i] = (uchar)code;
 }

@@ -1,17 +1,17 @@
-/* Gradient of splat_project, and the sum over tiles that comes before it.
+/* Gradient of splat_project.
  *
- * The raster gradient left records[slot] = (S0, Sx, Sy, Sxx, Sxy, Syy, colours, [|u|, |v|]) for
- * every tile of a splat: sums over pixels of dL/dsigma times (1, dx, dy, dx^2, dx dy, dy^2), of
- * dL/dcolour, and with ABSGRAD the magnitudes of the screen-position gradient. A splat's slots
- * are contiguous; they are added here in their order. Then, with Q the inverse of the dilated
- * screen covariance, S2 the matrix of second moments, U = Q V and S0 = -dL/dln(weight),
+ * What comes in for a splat is sums[i] = (S0, Sx, Sy, Sxx, Sxy, Syy, features, [|u|, |v|]): sums
+ * over pixels of dL/dsigma times (1, dx, dy, dx^2, dx dy, dy^2), of dL/dfeature, and with ABSGRAD
+ * the magnitudes of the screen-position gradient. With Q the inverse of the dilated screen
+ * covariance, S2 the matrix of second moments, U = Q V and S0 = -dL/dln(weight),
  *
  *     dL/d(u, v) = Q (Sx, Sy),      dL/dV = -Q S2 U + what the factor adds,
  *
+ * (without FIRST_MOMENTS dL/d(u, v) itself comes in place of Sx, Sy)
  * and back through V = J W F to everything that J, W and F are made of. With COVARIANCES dL/dH is
  * needed for H = V V^T: -Q S2 Q / 2 + what the factor adds, and then M^T dL/dH M.
  *
- * With DEPTH the last colour is the splat's depth. With CAMERA_GRADIENT each splat leaves its
+ * With DEPTH the last feature is the splat's depth. With CAMERA_GRADIENT each splat leaves its
  * part of dL/d(view, rows of 4), dL/d(fx, fy, cx, cy) in camera_parts. Nothing flows through
  * extents and culls; splats that are not drawn get zeros. Index space: splats. */
 
@@ -32,6 +32,9 @@
 #ifndef CAMERA_GRADIENT
 #define CAMERA_GRADIENT 1
 #endif
+#ifndef FIRST_MOMENTS
+#define FIRST_MOMENTS 1
+#endif
 #define RECORD (6 + CHANNELS + 2 * ABSGRAD)
 
 #if COVARIANCES
@@ -47,13 +50,6 @@ typedef struct {
   float3 v0, v1, m0, m1;
   float log_factor;
 } ViewGradient;
-
-/* Sum of a splat's records, in their order. */
-static void add_slots(__global const float *restrict records, int slot, int end, float *sum) {
-  for (int k = 0; k < RECORD; k++) sum[k] = 0;
-  for (; slot < end; slot++)
-    for (int k = 0; k < RECORD; k++) sum[k] += records[(long)slot * RECORD + k];
-}
 
 static void clear(__global float *p, int length) {
   for (int k = 0; k < length; k++) p[k] = 0;
@@ -199,19 +195,18 @@ static CameraGradient screen_grad(
 
 KERNEL void splat_project_grad(
     __global const float *restrict means, SHAPES, __global const float *restrict opacities,
-    __global const uchar *restrict culled, __global const int *restrict slots,
-    __global const float *restrict records, CAMERA_PARAMETERS,
+    __global const uchar *restrict culled, __global const float *restrict sums, CAMERA_PARAMETERS,
     float near_plane, float far_plane, float eps2d, int count,
     __global float *restrict grad_means, SHAPE_GRADIENTS, __global float *restrict grad_opacities,
-    __global float *restrict grad_colors, __global float *restrict grad_means2d,
+    __global float *restrict grad_features, __global float *restrict grad_means2d,
     __global float *restrict grad_means2d_abs, __global float *restrict camera_parts)
 {
   const long i = get_global_id(0);
   if (i >= count) return;
   const int drawn = culled[i] == VISIBLE;
   float s[RECORD];
-  add_slots(records, drawn ? slots[i] : 0, drawn ? slots[i + 1] : 0, s);
-  for (int k = 0; k < CHANNELS; k++) grad_colors[i * CHANNELS + k] = s[6 + k];
+  for (int k = 0; k < RECORD; k++) s[k] = drawn ? sums[i * RECORD + k] : 0;
+  for (int k = 0; k < CHANNELS; k++) grad_features[i * CHANNELS + k] = s[6 + k];
   for (int k = 0; k < 2 * ABSGRAD; k++) grad_means2d_abs[2 * i + k] = s[6 + CHANNELS + k];
   if (!drawn) {
     clear(grad_means + 3 * i, 3);
@@ -225,7 +220,7 @@ KERNEL void splat_project_grad(
   Gaussian g;
   see_gaussian(&g, camera, means, SHAPE, i, near_plane, far_plane, eps2d);
   const ViewGradient view = dilate_grad(&g, s);
-  const float2 uv = apply_conic(&g, (float2)(s[1], s[2]));
+  const float2 first = (float2)(s[1], s[2]), uv = FIRST_MOMENTS ? apply_conic(&g, first) : first;
   const CameraGradient point = screen_grad(&g, camera, &view, uv, DEPTH ? s[6 + CHANNELS - 1] : 0);
   grad_opacities[i] = -s[0] / opacities[i];
   grad_means2d[2 * i] = uv.x;

@@ -3,14 +3,16 @@
  *     light: C = sum of w c + T background,  w = alpha T,  T the product of (1 - alpha) so far;
  *     ADDITIVE: C = sum of weight exp(-sigma) c, whatever the order (line integrals of X-rays).
  *
- * Index space: (tiles). Each item owns one tile, whose pixels lie in strips of LANES columns. For
- * each splat only the strips and rows that its box touches are visited; strips are fixed, so that
- * every load and store of a pixel's state is aligned to where it was stored. A finished pixel
- * keeps its transmittance with the sign turned. Work stops when all pixels are finished.
+ * Index space: (tiles), of the rows of tiles from first_tile_row on. Each item owns one tile, whose
+ * pixels lie in strips of LANES columns. For each splat only the strips and rows that its extents
+ * touch are visited; strips are fixed, so that every load and store of a pixel's state is aligned
+ * to where it was stored. A finished pixel keeps its transmittance with the sign turned, which
+ * makes every later weight negative or zero and is dropped with it. Where a pixel finished is
+ * noted only when a sign turned. Work stops when all pixels are finished.
  *
  * A pixel and a splat have `stride` channels, of which this launch does CHANNELS from `first`.
- * Written for each pixel: image (CHANNELS numbers), the final transmittance, and one more than
- * the last entry that counted, where the gradient begins its way back. */
+ * Written for each pixel: image (CHANNELS numbers), the final transmittance, and how
+ * many of the tile's entries were looked at, where the gradient begins its way back. */
 
 #include "include/portable.h"
 #include "include/exponential.h"
@@ -20,90 +22,97 @@
 #define PIXELS (STRIPS * TILE)
 /* Splats between two looks at whether the tile is finished. */
 #define PATIENCE 16
+/* Splats are asked for so many entries before they are needed: they lie anywhere in memory. */
+#define AHEAD 8
+#define SIGN_BIT ((int)0x80000000)
 
-#if ADDITIVE || SMOOTH
-#define FINISHED(left) 0
+static int any_negative(lanes_int v) {
+#if LANES == 8
+  const int4 four = v.lo | v.hi;
+  const int2 two = four.lo | four.hi;
+  return (two.x | two.y) < 0;
 #else
-#define FINISHED(left) finished(left)
-static int finished(const lanes *left) {
-  lanes most = left[0];
-  for (int p = 1; p < PIXELS; p++) most = left[p] > most ? left[p] : most;
-  for (int lane = 0; lane < LANES; lane++)
-    if (((const float *)&most)[lane] > 0) return 0;
-  return 1;
-}
+  return v < 0;
 #endif
+}
+
+static int all_negative(const lanes (*state)[1 + CHANNELS]) {
+  lanes_int sign = AS_INT(state[0][0]);
+  for (int p = 1; p < PIXELS; p++) sign &= AS_INT(state[p][0]);
+  return !any_negative(~sign);
+}
 
 KERNEL void splat_raster_cpu(
     __global float *restrict image, __global float *restrict transmittance,
     __global int *restrict last, __global const float *restrict screen,
-    __global const int2 *restrict radii, __global const float *restrict features,
-    __global const float *restrict background, __global const int2 *restrict entries,
-    __global const int *restrict starts, int height, int width, int tiles_x, float cap, int stride, int first)
+    __global const float *restrict features, __global const float *restrict background,
+    __global const int2 *restrict entries, __global const int *restrict starts,
+    int height, int width, int tiles_x, int first_tile_row, float cap, int stride, int first)
 {
-  const int tile = (int)get_global_id(0);
-  const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
-  lanes left[PIXELS], color[CHANNELS][PIXELS];
+  const int tile = (int)get_global_id(0), start = starts[tile], stop = starts[tile + 1];
+  const int x0 = tile % tiles_x * TILE, y0 = (tile / tiles_x + first_tile_row) * TILE;
+  lanes state[PIXELS][1 + CHANNELS];
   lanes_int end[PIXELS];
   for (int p = 0; p < PIXELS; p++) {
-    left[p] = 1;
-    end[p] = 0;
-    for (int n = 0; n < CHANNELS; n++) color[n][p] = 0;
+    state[p][0] = 1;
+    end[p] = stop;
+    for (int n = 0; n < CHANNELS; n++) state[p][1 + n] = 0;
   }
-  for (int entry = starts[tile]; entry < starts[tile + 1]; entry++) {
-    const int splat = entries[entry].x;
+  for (int entry = start; entry < stop; entry++) {
+    const int splat = entries[entry].x, next_splat = entries[entry + AHEAD < stop ? entry + AHEAD : entry].x;
+    PREFETCH(screen + 8 * next_splat);
+    PREFETCH(features + (long)next_splat * stride + first);
     __global const float *s = screen + 8 * splat;
     __global const float *feature = features + (long)splat * stride + first;
-    const float mean_x = s[0], mean_y = s[1], weight = s[5];
-    const float a = 0.5f * s[2], b = s[3], c = 0.5f * s[4];
-    const int2 radius = radii[splat];
-    const int row0 = (int)(mean_y - radius.y) - 1 - y0, row1 = (int)(mean_y + radius.y) + 1 - y0;
-    const int top = row0 > 0 ? row0 : 0, bottom = row1 < TILE ? row1 : TILE;
-    if ((entry - starts[tile]) % PATIENCE == PATIENCE - 1 && FINISHED(left)) break;
+    const float mean_x = s[0] - x0, mean_y = s[1] - y0, weight = s[5];
+    const float a = 0.5f * TO_POWER * s[2], b = TO_POWER * s[3], c = 0.5f * TO_POWER * s[4];
+    const float extent_x = s[6], extent_y = s[7];
+    const int top = first_row_in(mean_y - extent_y), bottom = past_row_in(mean_y + extent_y);
+#if !ADDITIVE && !SMOOTH
+    if ((entry - start) % PATIENCE == PATIENCE - 1 && all_negative(state)) break;
+#endif
     for (int strip = 0; strip < STRIPS; strip++) {
-      const float left_edge = (float)(x0 + strip * LANES);
-      if (left_edge > mean_x + radius.x || left_edge + LANES < mean_x - radius.x) continue;
-      const lanes dx = (mean_x - left_edge - 0.5f) - LANE_NUMBERS;
+      const float begin = strip * LANES + 0.5f;
+      if (begin > mean_x + extent_x || begin + (LANES - 1) < mean_x - extent_x) continue;
+      const lanes dx = (mean_x - begin) - LANE_NUMBERS;
       const lanes quadratic = a * dx * dx, linear = b * dx;
+      lanes dy = mean_y - (top + 0.5f);
+      lanes_int turned = 0;
       for (int row = top; row < bottom; row++) {
-        const int p = strip * TILE + row;
-        const float dy = mean_y - (float)(y0 + row) - 0.5f;
-        const lanes sigma = quadratic + linear * dy + c * dy * dy;
+        lanes *here = state[strip * TILE + row];
+        const lanes raw = weight * falloff(quadratic + dy * (linear + c * dy));
+        dy = dy - 1.0f;
 #if ADDITIVE
-        const lanes w = weight * falloff(sigma);
+        const lanes w = raw;
+#elif SMOOTH
+        const lanes w = raw * here[0];
+        here[0] = here[0] - w;
 #else
-        lanes alpha = weight * falloff(sigma);
-#if !SMOOTH
-        alpha = alpha < cap ? alpha : cap;
+        lanes alpha = raw < cap ? raw : cap;
         alpha = alpha < FAINTEST ? 0 : alpha;
-        alpha = sigma < 0 ? 0 : alpha;
+        const lanes t = here[0], share = alpha * t, rest = t - share;
+        const lanes_int goes_on = rest > OPAQUE;
+        const lanes w = goes_on ? share : 0, after = goes_on ? rest : AS_LANES(AS_INT(t) | SIGN_BIT);
+        turned |= AS_INT(t) ^ AS_INT(after);
+        here[0] = after;
 #endif
-        const lanes t = left[p], w_here = alpha * t, next = t - w_here;
-#if SMOOTH
-        const lanes w = w_here;
-        left[p] = next;
-        end[p] = entry + 1;
-#else
-        /* A finished pixel has t < 0, and so has w_here. */
-        const lanes w = next > OPAQUE && t > 0 ? w_here : 0;
-        left[p] = w > 0 ? next : (alpha > 0 && t > 0 ? -t : t);
-        end[p] = w > 0 ? entry + 1 : end[p];
-#endif
-#endif
-        UNROLL for (int n = 0; n < CHANNELS; n++) color[n][p] = color[n][p] + w * feature[n];
+        UNROLL for (int n = 0; n < CHANNELS; n++) here[1 + n] = here[1 + n] + w * feature[n];
       }
+      if (!any_negative(turned)) continue;
+      for (int p = strip * TILE + top; p < strip * TILE + bottom; p++)
+        end[p] = state[p][0] < 0 && end[p] == stop ? entry : end[p];
     }
   }
   for (int p = 0; p < PIXELS; p++) {
     const int y = y0 + p % TILE, x = x0 + p / TILE * LANES;
     for (int lane = 0; lane < LANES && x + lane < width && y < height; lane++) {
       const long pixel = (long)y * width + x + lane;
-      const float t = ((const float *)&left[p])[lane], rest = t < 0 ? -t : t;
+      const float t = ((const float *)&state[p][0])[lane], rest = t < 0 ? -t : t;
       transmittance[pixel] = rest;
-      last[pixel] = ((const int *)&end[p])[lane];
+      last[pixel] = ((const int *)&end[p])[lane] - start;
       for (int n = 0; n < CHANNELS; n++)
         image[pixel * stride + first + n] =
-            ((const float *)&color[n][p])[lane] + (ADDITIVE ? 0 : rest * background[first + n]);
+            ((const float *)&state[p][1 + n])[lane] + (ADDITIVE ? 0 : rest * background[first + n]);
     }
   }
 }

@@ -19,23 +19,24 @@ KERNEL void splat_raster_grad_gpu(
     __global float *restrict slots, __global const float *restrict grad_image,
     __global const float *restrict grad_transmittance,
     __global const float *restrict transmittance, __global const int *restrict last,
-    __global const float *restrict screen, __global const int2 *restrict radii,
-    __global const float *restrict features, __global const float *restrict background,
-    __global const int2 *restrict entries, __global const int *restrict starts,
-    int height, int width, int tiles_x, float cap, int stride, int first)
+    __global const float *restrict screen, __global const float *restrict features,
+    __global const float *restrict background, __global const int2 *restrict entries,
+    __global const int *restrict starts, int height, int width, int tiles_x, int first_tile_row,
+    float cap, int stride, int first)
 {
   __local float shares[BATCH][RECORD][GROUP];
   __local int ends[GROUP];
   const int me = (int)get_local_id(0), tile = (int)get_group_id(0);
-  const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
+  const int x0 = tile % tiles_x * TILE, y0 = (tile / tiles_x + first_tile_row) * TILE;
   float left[PIXELS], behind[PIXELS], v[PIXELS][CHANNELS];
+  const int begin = starts[tile];
   int end[PIXELS], deepest = 0;
   for (int p = 0; p < PIXELS; p++) {
     const int within = p * GROUP + me, x = x0 + within % TILE, y = y0 + within / TILE;
     const int inside = x < width && y < height;
     const long pixel = inside ? (long)y * width + x : 0;
     left[p] = inside ? transmittance[pixel] : 1;
-    end[p] = inside ? last[pixel] : 0;
+    end[p] = inside ? last[pixel] + begin : 0;
     behind[p] = inside ? grad_transmittance[pixel] : 0;
     for (int n = 0; n < CHANNELS; n++) {
       v[p][n] = inside ? grad_image[pixel * stride + first + n] : 0;
@@ -46,13 +47,12 @@ KERNEL void splat_raster_grad_gpu(
   ends[me] = deepest;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (int n = 0; n < GROUP; n++) deepest = ends[n] > deepest ? ends[n] : deepest;
-  const int begin = starts[tile];
   for (int top = starts[tile + 1]; top > begin; top -= BATCH) {
     for (int k = 0; k < BATCH; k++) {
       const int entry = top - 1 - k;
       float sums[RECORD];
       UNROLL for (int n = 0; n < RECORD; n++) sums[n] = 0;
-      if (entry >= begin && (ADDITIVE || entry < deepest)) {
+      if (entry >= begin && entry < deepest) {
         const int splat = entries[entry].x;
         __global const float *s = screen + 8 * splat;
         __global const float *feature = features + (long)splat * stride + first;
@@ -61,7 +61,7 @@ KERNEL void splat_raster_grad_gpu(
           const float dx = s[0] - (x0 + within % TILE) - 0.5f;
           const float dy = s[1] - (y0 + within / TILE) - 0.5f;
           const float sigma = 0.5f * (s[2] * dx * dx + s[4] * dy * dy) + s[3] * dx * dy;
-          const float raw = s[5] * falloff(sigma);
+          const float raw = s[5] * falloff(TO_POWER * sigma);
           float cv = 0;
           UNROLL for (int n = 0; n < CHANNELS; n++) cv += feature[n] * v[p][n];
 #if ADDITIVE
@@ -69,14 +69,16 @@ KERNEL void splat_raster_grad_gpu(
           float g = -raw * cv;
 #else
           const float alpha = SMOOTH || raw < cap ? raw : cap;
-          if (!SMOOTH && (sigma < 0 || alpha < FAINTEST || entry >= end[p])) continue;
+          if (!SMOOTH && (alpha < FAINTEST || entry >= end[p])) continue;
           const float t = left[p] / (1.0f - alpha), difference = cv - behind[p], w = alpha * t;
           left[p] = t;
           behind[p] += alpha * difference;
           float g = !SMOOTH && raw > cap ? 0 : -w * difference;
 #endif
           sums[0] += g;
-          g *= falloff_rate(sigma);
+#if SMOOTH
+          g *= falloff_rate(TO_POWER * sigma);
+#endif
           sums[1] += g * dx;
           sums[2] += g * dy;
           sums[3] += g * dx * dx;

@@ -3,15 +3,20 @@
  *     color = max(sum over k of Y_k(direction) sh[k] + 1/2, 0),   direction = mean - camera, unit.
  *
  * Splats that are not drawn are black, and so are those whose coefficients give no finite colour
- * (black ones pass no gradient on, so that they spoil nothing else). Index space: splats. */
+ * (black ones pass no gradient on, so that they spoil nothing else). The colour is written to the
+ * first three of STRIDE features. Index space: splats. */
 
 #include "include/portable.h"
 #include "include/small_matrix.h"
 #include "include/sh.h"
 
+#ifndef STRIDE
+#define STRIDE 3
+#endif
+
 KERNEL void splat_shade(
     __global const float *restrict means, __global const float *restrict sh,
-    __global const uchar *restrict culled, __global float *restrict colors, float4 center, int count)
+    __global const uchar *restrict culled, __global float *restrict features, float4 center, int count)
 {
   const long i = get_global_id(0);
   if (i >= count) return;
@@ -25,5 +30,5 @@ KERNEL void splat_shade(
     for (int k = 0; k < COEFFICIENTS; k++) color += basis[k] * load3(sh, i * COEFFICIENTS + k);
     color = not_finite3(color) ? (float3)(0, 0, 0) : color > 0 ? color : (float3)(0, 0, 0);
   }
-  store3(colors, i, color);
+  store3(features + i * STRIDE, 0, color);
 }

@@ -6,8 +6,10 @@
  *     dL/dt = W^-T dL/dmean,      dL/dW = (W^-T dL/dmean) o^T.
  *
  * inverse_x, _y, _z are the rows of W^-T, each followed by a coordinate of o. A colour that was
- * held at zero passes nothing on, and so no splat that is not drawn. grad_colors has STRIDE numbers for each splat, of which the
- * first three are the colour's. Index space: splats. */
+ * held at zero passes nothing on, and so no splat that is not drawn. features and grad_features
+ * have STRIDE numbers for each splat, of which the first three are the colour's.
+ *
+ * Index space: splats. */
 
 #include "include/portable.h"
 #include "include/small_matrix.h"
@@ -24,18 +26,18 @@ static void add3(__global float *p, long i, float3 v) { store3(p, i, load3(p, i)
 
 KERNEL void splat_shade_grad(
     __global const float *restrict means, __global const float *restrict sh,
-    __global const float *restrict colors, __global const float *restrict grad_colors,
+    __global const float *restrict features, __global const float *restrict grad_features,
     float4 inverse_x, float4 inverse_y, float4 inverse_z, int count, __global float *restrict grad_sh,
     __global float *restrict grad_means, __global float *restrict camera_parts)
 {
   const long i = get_global_id(0);
   if (i >= count) return;
-  const float3 color = load3(colors, i);
+  const float3 color = load3(features + i * STRIDE, 0);
   if (!(color.x > 0) && !(color.y > 0) && !(color.z > 0)) {
     for (int k = 0; k < 3 * COEFFICIENTS; k++) grad_sh[i * 3 * COEFFICIENTS + k] = 0;
     return;
   }
-  __global const float *into = grad_colors + i * STRIDE;
+  __global const float *into = grad_features + i * STRIDE;
   const float3 incoming =
       (float3)(color.x > 0 ? into[0] : 0, color.y > 0 ? into[1] : 0, color.z > 0 ? into[2] : 0);
   const float3 center = (float3)(inverse_x.w, inverse_y.w, inverse_z.w);

@@ -7,23 +7,21 @@
  * too. Both zeros have one key. Only bits are looked at: compilers fold tests for NaN away, and a
  * device may take the smallest numbers for zero.
  *
- * Index space: runs of `run` splats. screen is (splats, 8) with the depth in column 6. */
+ * Index space: runs of `run` splats. */
 
 #include "include/portable.h"
 #include "include/tile_box.h"
 
-#define DEPTH 6
-
 KERNEL void tile_count(
-    __global const int4 *restrict boxes, __global const uint *restrict screen,
+    __global const int4 *restrict boxes, __global const uint *restrict depths,
     __global int *restrict counts, __global uint *restrict keys,
-    int splats, int run, int tiles_x, int tiles_y)
+    int splats, int run, int tiles_x, int first_tile_row, int tiles_y)
 {
   const long first = (long)get_global_id(0) * run;
   const long stop = first + run < splats ? first + run : splats;
   for (long i = first; i < stop; i++) {
-    const int4 box = clipped_box(boxes[i], tiles_x, tiles_y);
-    uint bits = screen[i * 8 + DEPTH];
+    const int4 box = clipped_box(boxes[i], tiles_x, first_tile_row, tiles_y);
+    uint bits = depths[i];
     const int nan = (bits & 0x7fffffffu) > 0x7f800000u;
     if (bits == 0x80000000u) bits = 0;
     counts[i] = !nan && box.z > box.x && box.w > box.y ? (box.z - box.x) * (box.w - box.y) : 0;

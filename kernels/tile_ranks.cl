@@ -19,7 +19,7 @@ KERNEL void tile_ranks(
     __global const int4 *restrict boxes, __global const int *restrict slots,
     __global const int *restrict order, __global const long *restrict visible,
     __global int4 *restrict ranks, __global int *restrict counts,
-    int splats, int run, int tiles_x, int tiles_y)
+    int splats, int run, int tiles_x, int first_tile_row, int tiles_y)
 {
   const long first = (long)get_global_id(0) * run;
   const long stop = first + run < splats ? first + run : splats;
@@ -28,7 +28,7 @@ KERNEL void tile_ranks(
     int count = 0;
     if (rank < filled) {
       const int splat = SORTED ? order[rank] : (int)rank;
-      const int4 box = clipped_box(boxes[splat], tiles_x, tiles_y);
+      const int4 box = clipped_box(boxes[splat], tiles_x, first_tile_row, tiles_y);
       count = slots[splat + 1] - slots[splat];
       ranks[rank] = (int4)(box.y * tiles_x + box.x, box.z - box.x, slots[splat], splat);
     }

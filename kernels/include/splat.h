@@ -3,13 +3,14 @@
  *     d = mean - pixel centre,     sigma = (a dx^2 + c dy^2) / 2 + b dx dy,
  *     alpha = min(cap, weight exp(-sigma)).
  *
- * A splat counts where sigma >= 0 and alpha >= 1/255, and a pixel is finished by the splat that
- * would leave less than 1e-4 of its transmittance (3D Gaussian Splatting, Kerbl et al. 2023;
- * conventions of gsplat). These thresholds make the image jump as parameters move, so a test can
- * ask for SMOOTH: no thresholds, and exp(-sigma) fades to zero at SMOOTH_EDGE with a continuous
- * slope.
+ * A splat counts where alpha >= 1/255, and a pixel is finished by the splat that would leave no
+ * more than 1e-4 of its transmittance (3D Gaussian Splatting, Kerbl et al. 2023; conventions of
+ * gsplat). These thresholds make the image jump as parameters move, so a test can ask for SMOOTH:
+ * no thresholds, and exp(-sigma) fades to zero at SMOOTH_EDGE with a continuous slope. Rounding
+ * may leave sigma a little below zero next to a needle's mean; it is zero then.
  *
- * screen[splat] = (mean_x, mean_y, a, b, c, weight, depth, extra). */
+ * screen[splat] = (mean_x, mean_y, a, b, c, weight, extent_x, extent_y): a splat counts nowhere
+ * farther from its mean than its extents. */
 
 #ifndef TILE
 #define TILE 16
@@ -27,27 +28,40 @@
 #define FAINTEST (1.0f / 255.0f)
 #define OPAQUE 1e-4f
 #define SMOOTH_EDGE 4.5f
-/* Boxes end at 3.33 standard deviations; so does what is added, wherever tiles lie. */
-#define BOX_EDGE 5.54445f
+/* What sigma is multiplied with to be an exponent of two. */
+#define TO_POWER -1.44269504f
+#define TO_SIGMA -0.69314718f
+/* Line integrals end at 4 standard deviations, wherever tiles lie: 3.4e-4 of a mass lies beyond. */
+#define ADDED_EDGE 8.0f
 
-/* exp(-sigma), or its smooth stand-in. */
-static lanes falloff(lanes sigma) {
+/* exp(-sigma) or its smooth stand-in, of power = TO_POWER sigma. */
+static lanes falloff(lanes power) {
 #if SMOOTH
-  const lanes left = sigma < SMOOTH_EDGE ? 1.0f - sigma * (1.0f / SMOOTH_EDGE) : 0;
-  return exp_minus(sigma) * left * left;
+  const lanes rest = 1.0f - power * (TO_SIGMA / SMOOTH_EDGE), left = rest > 0 ? rest : 0;
+  return power_of_two(power) * left * left;
 #elif ADDITIVE
-  return sigma <= BOX_EDGE ? exp_minus(sigma) : 0;
+  return power >= TO_POWER * ADDED_EDGE ? power_of_two(power) : 0;
 #else
-  return exp_minus(sigma);
+  return power_of_two(power);
 #endif
 }
 
-/* -d falloff / d sigma, as a multiple of falloff. */
-static lanes falloff_rate(lanes sigma) {
 #if SMOOTH
-  const lanes left = SMOOTH_EDGE - sigma;
+/* -d falloff / d sigma, as a multiple of falloff; it is 1 for an exponential. */
+static lanes falloff_rate(lanes power) {
+  const lanes left = SMOOTH_EDGE - TO_SIGMA * power;
   return 1.0f + 2.0f / (left > 1e-3f ? left : 1e-3f);
-#else
-  return 1.0f + 0.0f * sigma;
+}
 #endif
+
+/* The rows of a tile whose centres lie between two edges: the first, and one past the last. */
+static int first_row_in(float low) {
+  const float v = low - 0.5f;
+  const int whole = (int)v;
+  return v <= 0 ? 0 : v >= TILE ? TILE : whole < v ? whole + 1 : whole;
+}
+
+static int past_row_in(float high) {
+  const float v = high - 0.5f;
+  return v < 0 ? 0 : v >= TILE ? TILE : (int)v + 1;
 }

@@ -8,12 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from rift_cl.cl.device import Device
+from rift_cl.cl.arithmetic import axpby
 from rift_cl.errors import DeviceError, InputError, ShapeError
 from rift_cl.operators.linear import LinearOperator, Piece
-
-# Samples that one work-item of axpby takes on a CPU.
-_RUN = 4096
 
 
 class Adjoint(LinearOperator):
@@ -129,13 +126,6 @@ class Product(LinearOperator):
         between = self.device.empty(self._inner.range)
         self._outer._apply_adjoint(y, between)
         self._inner._apply_adjoint(between, out)
-
-
-def axpby(device: Device, a: float, x: Any, b: float, y: Any) -> None:
-    """Y = a x + b y on device arrays of the same shape."""
-    run = _RUN if device.traits.is_cpu else 1
-    size = -(-y.size // run)
-    device.launch("axpby", (size,), x, y, float(a), float(b), np.uint64(y.size), RUN=run)
 
 
 def _finite(factor: float) -> float:

@@ -18,7 +18,7 @@ from rift_cl.geometry import Camera
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-_EXTENT = 3.33
+_EXTENT, _XRAY_EXTENT = 3.33, 4.0
 _FAINTEST = 1 / 255
 _LEAST_COMPENSATION = 0.005
 _MARGIN = 0.15
@@ -117,7 +117,7 @@ def _line_integrals(
 def _reach(weights: Floats, mode: str) -> Floats:
     """Standard deviations at which a splat ends."""
     if mode == "xray":
-        return np.full(len(weights), _EXTENT)
+        return np.full(len(weights), _XRAY_EXTENT)
     at_threshold = np.sqrt(2 * np.log(np.maximum(weights / _FAINTEST, 1)))
     return np.asarray(np.minimum(_EXTENT, at_threshold))
 

@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 FAINTEST, OPAQUE = 1 / 255, 1e-4
-SMOOTH_EDGE, BOX_EDGE = 4.5, 5.54445
+SMOOTH_EDGE, ADDED_EDGE = 4.5, 8.0
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def _tile(
         alpha = weight * _falloff(sigma, rules)
         if not rules.smooth:
             alpha = np.minimum(alpha, rules.cap)
-            counts = (sigma >= 0) & (alpha >= FAINTEST) & ~finished
+            counts = (alpha >= FAINTEST) & ~finished
             finished |= counts & (left * (1 - alpha) <= OPAQUE)
             alpha = np.where(counts & ~finished, alpha, 0)
         color += (alpha * left)[..., None] * features[splat]
@@ -100,5 +100,5 @@ def _falloff(sigma: Floats, rules: Rules) -> Floats:
     if rules.smooth:
         plain *= np.maximum(1 - sigma / SMOOTH_EDGE, 0) ** 2
     elif rules.additive:
-        plain *= sigma <= BOX_EDGE
+        plain *= sigma <= ADDED_EDGE
     return plain

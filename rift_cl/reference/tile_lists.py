@@ -29,7 +29,13 @@ class TileListArrays(NamedTuple):
 
 
 def tile_lists(
-    boxes: ArrayLike, depth: ArrayLike, *, tiles_x: int, tiles_y: int, sort: bool = True
+    boxes: ArrayLike,
+    depth: ArrayLike,
+    *,
+    tiles_x: int,
+    tiles_y: int,
+    first_row: int = 0,
+    sort: bool = True,
 ) -> TileListArrays:
     """The tile lists of N splats.
 
@@ -38,10 +44,13 @@ def tile_lists(
         depth: (N,) distances from the camera; a splat at NaN is culled.
         tiles_x: tiles in a row.
         tiles_y: rows of tiles.
+        first_row: the row of tiles that they begin with, and are counted from.
         sort: front to back; otherwise in index order.
     """
     depths: NDArray[np.float32] = np.asarray(depth, dtype=np.float32)
-    clipped: NDArray[Any] = np.clip(boxes, 0, [tiles_x, tiles_y, tiles_x, tiles_y])
+    down = np.array([0, first_row, 0, first_row])
+    moved = np.asarray(boxes, np.int64).reshape(-1, 4) - down
+    clipped: NDArray[Any] = np.clip(moved, 0, [tiles_x, tiles_y, tiles_x, tiles_y])
     sides = np.maximum(clipped[:, 2:].astype(np.int64) - clipped[:, :2], 0)
     areas = np.where(np.isnan(depths), 0, sides.prod(axis=1))
     slots = np.concatenate([[0], np.cumsum(areas)])

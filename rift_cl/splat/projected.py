@@ -21,18 +21,19 @@ class Projected:
     """N splats as the camera sees them; device arrays.
 
     Args:
-        screen: (N, 8): mean x, mean y, conic a, b, c, weight, depth, factor; pixels and scene
-            units. Weight is opacity times factor: 1, or Mip-Splatting's compensation, or in xray
-            mode the line integral through a unit peak.
+        screen: (N, 8): mean x, mean y, conic a, b, c, weight, extent x, extent y; pixels. Weight
+            is opacity times a factor: 1, or Mip-Splatting's compensation, or in xray mode the
+            line integral through a unit peak. Extents are half the sides of the rectangle round
+            all that is drawn of a splat.
+        depths: (N,) distances along the camera's axis, in scene units.
         boxes: (N, 4) int32 tile rectangles (x0, y0, x1, y1), x1 and y1 exclusive.
-        radii: (N, 2) int32, half the sides of the bounding rectangle in pixels.
         culled: (N,) uint8, an index into ``CULL_REASONS``; splats with another code than 0 have
             zeros everywhere.
     """
 
     screen: Any
+    depths: Any
     boxes: Any
-    radii: Any
     culled: Any
 
 
@@ -42,7 +43,7 @@ class SplatGradients:
 
     Args:
         means, quats, scales, covars, opacities: as in ``Splats``; None where it has None.
-        colors: (N, D) gradient by what was drawn in each channel.
+        features: (N, D) gradient by what was drawn in each channel.
         means2d: (N, 2) gradient by the position on the screen, in 1 / pixels.
         means2d_abs: (N, 2) the sum over pixels of its magnitudes; None without ``absgrad``.
         camera: (N, 16) each splat's part in the gradient by the camera, for ``sum_columns``:
@@ -54,7 +55,7 @@ class SplatGradients:
     scales: Any
     covars: Any
     opacities: Any
-    colors: Any
+    features: Any
     means2d: Any
     means2d_abs: Any
     camera: Any

@@ -1,7 +1,7 @@
 """Splats to the screen, and gradients from the screen to splats and camera.
 
-The drivers of ``kernels/splat_project.cl``, ``splat_shade.cl`` and their gradients, which say
-what is computed; ``rift_cl.reference.splat_projection`` is their twin.
+The drivers of ``kernels/splat_project.cl`` and its gradient, which say what is computed;
+``rift_cl.reference.splat_projection`` is their twin.
 """
 
 from __future__ import annotations
@@ -20,9 +20,8 @@ from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 
 _MODELS = {"pinhole": 0, "ortho": 1, "fisheye": 2}
-# Numbers of a record before its colours, and of the camera's gradient.
-_MOMENTS, _CAMERA = 6, 16
-_RUN = 64
+# Moments of dL/dsigma that stand before the features' gradients; numbers of the camera's.
+MOMENTS, _CAMERA = 6, 16
 
 
 def project(device: Device, splats: Splats, camera: Camera, settings: SplatSettings) -> Projected:
@@ -38,15 +37,15 @@ def project(device: Device, splats: Splats, camera: Camera, settings: SplatSetti
     count = len(splats)
     projected = Projected(
         device.empty((count, 8)),
+        device.empty((count,)),
         device.empty((count, 4), np.int32),
-        device.empty((count, 2), np.int32),
         device.empty((count,), np.uint8),
     )
     device.launch(
         "splat_project",
         (count,),
         *(splats.means, *_shapes(splats), splats.opacities),
-        *(projected.screen, projected.boxes, projected.radii, projected.culled),
+        *(projected.screen, projected.depths, projected.boxes, projected.culled),
         *_camera_arguments(camera),
         *(float(settings.near), float(settings.far), float(settings.radius_clip)),
         *(float(settings.eps2d), count),
@@ -64,12 +63,12 @@ def project_grad(
     settings: SplatSettings,
     *,
     projected: Projected,
-    slots: Any,
-    records: Any,
+    sums: Any,
     with_camera: bool = True,
     depth_channel: bool = False,
+    first_moments: bool = True,
 ) -> SplatGradients:
-    """The gradient of ``project``, from the records that the raster gradient left.
+    """The gradient of ``project``.
 
     Args:
         device: where the arrays are.
@@ -77,99 +76,40 @@ def project_grad(
         camera: as given to ``project``.
         settings: as given to ``project``.
         projected: what it returned.
-        slots: (N + 1,) int32, where each splat's records begin.
-        records: (M, 6 + D), with ``absgrad`` (M, 8 + D): see ``kernels/splat_project_grad.cl``.
+        sums: (N, 6 + D), with ``absgrad`` (N, 8 + D), what ``sum_slots`` returned: see
+            ``kernels/splat_project_grad.cl``.
         with_camera: leave the parts of the camera's gradient as well.
         depth_channel: the last of the D channels is the splats' depth.
+        first_moments: numbers 1 and 2 are the first moments of dL/dsigma; otherwise they are the
+            gradient by the position on the screen.
 
     Raises:
-        ShapeError: slots or records do not fit.
+        ShapeError: the sums do not fit.
     """
-    channels = _channels(device, splats, settings, slots, records)
+    fixed = MOMENTS + 2 * settings.absgrad
+    channels = sums.shape[-1] - fixed
+    if channels < 1:
+        raise ShapeError(
+            f"project_grad: sums has shape {sums.shape}, wanted (N, {fixed} + channels)"
+        )
+    as_device_array(device, sums, (len(splats), fixed + channels), name="sums")
     out = _empty_gradients(device, splats, channels, settings.absgrad, with_camera)
     device.launch(
         "splat_project_grad",
         (len(splats),),
-        *(splats.means, *_shapes(splats), splats.opacities, projected.culled, slots, records),
+        *(splats.means, *_shapes(splats), splats.opacities, projected.culled, sums),
         *_camera_arguments(camera),
         *(float(settings.near), float(settings.far), float(settings.eps2d), len(splats)),
         *(out.means, *((out.quats, out.scales) if splats.covars is None else (out.covars,))),
-        *(out.opacities, out.colors, out.means2d, out.means2d_abs, out.camera),
+        *(out.opacities, out.features, out.means2d, out.means2d_abs, out.camera),
         **_macros(splats, camera, settings),
         CHANNELS=channels,
         ABSGRAD=settings.absgrad,
         DEPTH=depth_channel,
+        FIRST_MOMENTS=first_moments,
         CAMERA_GRADIENT=with_camera,
     )
     return out
-
-
-def shade(device: Device, splats: Splats, camera: Camera, projected: Projected) -> Any:
-    """Colours (N, 3) of splats with spherical harmonics, as seen from the camera's centre.
-
-    Raises:
-        InputError: the splats have no spherical harmonics.
-    """
-    colors = device.empty((len(splats), 3))
-    center = np.array([*camera.center, 0], np.float32)
-    device.launch(
-        "splat_shade",
-        (len(splats),),
-        *(splats.means, _harmonics(splats), projected.culled, colors, center, len(splats)),
-        COEFFICIENTS=splats.sh.shape[1],
-    )
-    return colors
-
-
-def shade_grad(
-    device: Device, splats: Splats, camera: Camera, *, colors: Any, gradients: SplatGradients
-) -> Any:
-    """The gradient of ``shade``.
-
-    Args:
-        device: where the arrays are.
-        splats: as given to ``shade``.
-        camera: as given to ``shade``.
-        colors: what it returned.
-        gradients: what ``project_grad`` returned; the first three of its colours are what comes
-            in. What flows through the viewing direction is added to its means and camera.
-
-    Returns:
-        (N, K, 3) gradient by the coefficients.
-
-    Raises:
-        InputError: the splats have no spherical harmonics.
-        ShapeError: the gradient has less than three channels.
-    """
-    stride = gradients.colors.shape[1]
-    if stride < 3:
-        raise ShapeError(f"shade_grad: gradients.colors has {stride} channels, wanted 3 or more")
-    grad_sh = device.empty(_harmonics(splats).shape)
-    inverse = np.linalg.inv(camera.view[:3, :3]).T
-    rows = np.column_stack([inverse, camera.center]).astype(np.float32, order="C")
-    device.launch(
-        "splat_shade_grad",
-        (len(splats),),
-        *(splats.means, splats.sh, colors, gradients.colors, *rows, len(splats)),
-        *(grad_sh, gradients.means, gradients.camera),
-        COEFFICIENTS=splats.sh.shape[1],
-        STRIDE=stride,
-        CAMERA_GRADIENT=gradients.camera is not None,
-    )
-    return grad_sh
-
-
-def sum_columns(device: Device, table: Any) -> Any:
-    """Sum over the rows of a (N, C) device array, in an order that N alone decides: (C,)."""
-    rows, columns = table.shape
-    if rows == 0:
-        return device.zeros((columns,))
-    while rows > 1:
-        runs = -(-rows // _RUN)
-        sums = device.empty((runs, columns))
-        device.launch("sum_columns", (runs * columns,), table, sums, rows, columns, RUN=_RUN)
-        table, rows = sums, runs
-    return table.reshape((columns,))
 
 
 def _check(device: Device, splats: Splats, camera: Camera, settings: SplatSettings) -> None:
@@ -203,30 +143,6 @@ def _camera_arguments(camera: Camera) -> tuple[Any, ...]:
     return (*rows, np.array(camera.intrinsics, np.float32), camera.width, camera.height)
 
 
-def _harmonics(splats: Splats) -> Any:
-    if splats.sh is None:
-        raise InputError("shade: these splats have no spherical harmonics; draw their colors")
-    return splats.sh
-
-
-def _channels(
-    device: Device, splats: Splats, settings: SplatSettings, slots: Any, records: Any
-) -> int:
-    """Number of colour channels that the records have."""
-    if slots.shape != (len(splats) + 1,) or slots.dtype != np.int32:
-        raise ShapeError(
-            f"project_grad: slots is {slots.dtype} of shape {slots.shape}, wanted int32 of shape "
-            f"({len(splats) + 1},)"
-        )
-    fixed = _MOMENTS + 2 * settings.absgrad
-    if len(records.shape) != 2 or records.shape[1] <= fixed:
-        raise ShapeError(
-            f"project_grad: records has shape {records.shape}, wanted (M, {fixed} + channels)"
-        )
-    as_device_array(device, records, records.shape, name="records")
-    return int(records.shape[1]) - fixed
-
-
 def _empty_gradients(
     device: Device, splats: Splats, channels: int, absgrad: bool, with_camera: bool
 ) -> SplatGradients:
@@ -237,7 +153,7 @@ def _empty_gradients(
         scales=None if given else device.empty((count, 3)),
         covars=device.empty((count, 6)) if given else None,
         opacities=device.empty((count,)),
-        colors=device.empty((count, channels)),
+        features=device.empty((count, channels)),
         means2d=device.empty((count, 2)),
         means2d_abs=device.empty((count, 2)) if absgrad else None,
         camera=device.empty((count, _CAMERA)) if with_camera else None,

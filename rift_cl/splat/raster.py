@@ -15,13 +15,13 @@ import numpy as np
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError, ShapeError
+from rift_cl.splat.projection import MOMENTS
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.tile_lists import TileLists
+from rift_cl.splat.tiles import Tiles
 
 _CHANNELS = 32
 _TILES = (8, 16, 32)
-# Moments of dL/dsigma that a slot holds besides its colour sums.
-MOMENTS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,13 +29,11 @@ class ScreenSplats:
     """Projected splats with what they show; device arrays.
 
     Args:
-        screen: (N, 8): mean x, mean y, conic a, b, c, weight, depth, extra.
-        radii: (N, 2) int32, how far each reaches along x and y, in pixels.
+        screen: (N, 8): mean x, mean y, conic a, b, c, weight, extent x, extent y.
         features: (N, D), the channels that are drawn.
     """
 
     screen: Any
-    radii: Any
     features: Any
 
 
@@ -46,7 +44,7 @@ class Raster:
     Args:
         image: (height, width, D), with the background.
         transmittance: (height, width), what of the background is seen.
-        last: (height, width) int32, one more than the last entry that counted.
+        last: (height, width) int32, how many of its tile's entries were looked at.
     """
 
     image: Any
@@ -62,16 +60,18 @@ def rasterize(
     *,
     settings: SplatSettings,
     background: Any = None,
+    into: Raster | None = None,
 ) -> Raster:
     """Draw splats.
 
     Args:
         device: where the arrays are.
         splats: the projected splats.
-        lists: which splats each tile draws.
-        size: (height, width) in pixels.
+        lists: which splats each tile draws; they may be those of some rows of tiles.
+        size: (height, width) of the image in pixels.
         settings: how to draw.
         background: (D,) device array; black if not given. In xray mode there is none.
+        into: a raster whose rows are drawn; a new one if not given.
 
     Raises:
         InputError: the tile size is none that the kernels are made for.
@@ -81,7 +81,7 @@ def rasterize(
     height, width = size
     channels = splats.features.shape[1]
     background = _background(device, background, channels)
-    raster = Raster(
+    raster = into or Raster(
         device.empty((height, width, channels)),
         device.empty((height, width)),
         device.empty((height, width), np.int32),
@@ -91,8 +91,9 @@ def rasterize(
             _kernel(device, "splat_raster"),
             _work(device, lists, settings, per_pixel=True),
             *(raster.image, raster.transmittance, raster.last),
-            *(splats.screen, splats.radii, splats.features, background),
-            *(lists.entries, lists.starts, height, width, lists.tiles_x),
+            *(splats.screen, splats.features, background),
+            *(lists.entries, lists.starts, height, width),
+            *(lists.tiles.across, lists.tiles.first_row),
             *(settings.alpha_cap, channels, first),
             **_macros(settings, count),
         )
@@ -140,8 +141,9 @@ def raster_grad(
             _work(device, lists, settings, per_pixel=False),
             *(slots, grad_image, nothing if first else grad_transmittance),
             *(raster.transmittance, raster.last),
-            *(splats.screen, splats.radii, splats.features, background),
-            *(lists.entries, lists.starts, height, width, lists.tiles_x),
+            *(splats.screen, splats.features, background),
+            *(lists.entries, lists.starts, height, width),
+            *(lists.tiles.across, lists.tiles.first_row),
             *(settings.alpha_cap, channels, first),
             **_macros(settings, count),
             ABSGRAD=int(settings.absgrad),
@@ -149,15 +151,38 @@ def raster_grad(
     return slots
 
 
+def sum_slots(device: Device, lists: TileLists, records: Any, *, onto: Any = None) -> Any:
+    """Sum each splat's records over its tiles: (N, 6 + D [+ 2]).
+
+    Args:
+        device: where the arrays are.
+        lists: the lists whose slots the records fill.
+        records: what ``raster_grad`` returned for them.
+        onto: sums of the rows of tiles above, which these are added to; zero if not given.
+    """
+    count, record = lists.slots.size - 1, records.shape[1]
+    sums = device.empty((count, record)) if onto is None else onto
+    device.launch(
+        "splat_sum_slots",
+        (count,),
+        *(lists.slots, records, sums, count),
+        RECORD=record,
+        CONTINUED=onto is not None,
+    )
+    return sums
+
+
 def _check(
     splats: ScreenSplats, lists: TileLists, size: tuple[int, int], settings: SplatSettings
 ) -> None:
     if settings.tile not in _TILES:
         raise InputError(f"tile is {settings.tile}, wanted one of {_TILES}")
-    tiles = (lists.tiles_y, lists.tiles_x)
-    wanted = tuple(-(-pixels // settings.tile) for pixels in size)
-    if tiles != wanted:
-        raise ShapeError(f"lists have {tiles} tiles, an image of {size} pixels has {wanted}")
+    whole, listed = Tiles.of(size, settings.tile), lists.tiles
+    if listed.across != whole.across or listed.first_row + listed.rows > whole.rows:
+        raise ShapeError(
+            f"lists have tiles {listed.across} x {listed.first_row + listed.rows}, an image of "
+            f"{size} pixels has {whole.across} x {whole.rows}"
+        )
     if len(splats.features.shape) != 2 or len(splats.features) != len(splats.screen):
         raise ShapeError(
             f"features have shape {splats.features.shape}, wanted ({len(splats.screen)}, channels)"
@@ -183,7 +208,7 @@ def _work(
     device: Device, lists: TileLists, settings: SplatSettings, *, per_pixel: bool
 ) -> tuple[int]:
     """Work-items: a CPU takes one for a tile; a GPU one for a pixel, or a group for a tile."""
-    tiles = lists.tiles_x * lists.tiles_y
+    tiles = lists.tiles.count
     if device.traits.is_cpu:
         return (tiles,)
     return (tiles * (settings.tile**2 if per_pixel else device.traits.macros["GROUP"]),)

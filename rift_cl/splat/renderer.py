@@ -1,82 +1,36 @@
 """The whole way from splats to an image and back, resident on the device.
 
 ``forward`` keeps what its gradient needs in a ``Frame``; ``backward`` turns dL/d image into
-gradients of every parameter. Nothing is summed by atomics, so the same call gives the same bits.
+gradients of every parameter. Nothing is summed by atomics, so the same call gives the same bits,
+and so it does in a smaller memory budget, in which the image is drawn in bands.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, Literal
 
 import numpy as np
 
+from rift_cl.cl.arithmetic import copy_columns, sum_columns
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
+from rift_cl.cl.memory import as_device_array
+from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
-from rift_cl.splat.projected import CULL_REASONS, Projected, SplatGradients
-from rift_cl.splat.projection import (
-    project,
-    project_grad,
-    shade,
-    shade_grad,
-    sum_columns,
-)
-from rift_cl.splat.raster import Raster, ScreenSplats, raster_grad, rasterize
+from rift_cl.splat.bands import FrameMemory, check_fixed, plan_bands
+from rift_cl.splat.depth import expected_depth, expected_depth_grad
+from rift_cl.splat.features import Channels, gather_features, own_columns, shade_grad
+from rift_cl.splat.frame import Frame, FrameGradients
+from rift_cl.splat.projected import CULL_REASONS, Projected
+from rift_cl.splat.projection import project, project_grad
+from rift_cl.splat.raster import Raster, ScreenSplats, raster_grad, rasterize, sum_slots
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
-from rift_cl.splat.tile_lists import TileLists, tile_lists
+from rift_cl.splat.tile_lists import TileLists, count_tiles, list_tiles, tile_lists
+from rift_cl.splat.tiles import Tiles
 
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """A drawn image with what its gradient needs.
-
-    Args:
-        splats: what was drawn.
-        camera: what drew it.
-        background: (D,) or None.
-        projected: the splats on the screen.
-        screen: the same as the raster takes them.
-        lists: the tile lists.
-        raster: the image, and what the raster left for its gradient.
-    """
-
-    splats: Splats
-    camera: Camera
-    background: Any
-    projected: Projected
-    screen: ScreenSplats
-    lists: TileLists
-    raster: Raster
-
-    @property
-    def image(self) -> Any:
-        """(height, width, D) device array, the background included."""
-        return self.raster.image
-
-    @property
-    def transmittance(self) -> Any:
-        """(height, width) device array, what of the background is seen; alpha is one minus it."""
-        return self.raster.transmittance
-
-
-@dataclass(frozen=True, eq=False)
-class FrameGradients:
-    """Gradients of a loss by everything that a frame was made of; device arrays.
-
-    Args:
-        splats: by the splats' parameters and their positions on the screen.
-        sh: (N, K, 3) by the spherical harmonics; None where the splats have colours.
-        camera: (16,): by the upper three rows of the view matrix, then fx, fy, cx, cy; None if
-            not asked for.
-        background: (D,); None where there was none.
-    """
-
-    splats: SplatGradients
-    sh: Any
-    camera: Any
-    background: Any
+DepthKind = Literal["accumulated", "expected"]
 
 
 class Renderer:
@@ -93,36 +47,44 @@ class Renderer:
         self.settings = settings or SplatSettings()
         self.device = device or default_device()
 
-    def forward(self, splats: Splats, camera: Camera, *, background: Any = None) -> Frame:
+    def forward(
+        self,
+        splats: Splats,
+        camera: Camera,
+        *,
+        background: Any = None,
+        depth: DepthKind | None = None,
+    ) -> Frame:
         """Draw splats.
 
+        The channels of the image are three colours if the splats have ``sh``, then their
+        ``colors`` if they have any, then depth if it is asked for.
+
         Args:
-            splats: parameters on this renderer's device, with ``colors`` or ``sh``.
+            splats: parameters on this renderer's device.
             camera: the view.
-            background: (D,) device array; black if not given.
+            background: (D,) device array, for all channels but depth; black if not given. Depth
+                has none, and in xray mode there is none.
+            depth: draw depth along the camera's axis as the last channel: ``accumulated``, the
+                sum of weights times depths, or ``expected``, that divided by alpha.
 
         Raises:
-            InputError: the splats have neither colours nor spherical harmonics.
-            ResourceLimitError: the tile lists do not fit the memory budget.
+            InputError: there is nothing to draw, or no depth in this mode.
+            ShapeError: the background does not fit.
+            ResourceLimitError: not even one row of tiles fits the memory budget.
         """
         device, settings = self.device, self.settings
+        channels = self._channels(splats, depth)
+        behind = self._behind(background, channels)
+        memory = self._memory(splats, camera, channels, gradient=False)
+        check_fixed(memory, device.budget)
         projected = project(device, splats, camera, settings)
-        features = splats.colors
-        if features is None:
-            features = shade(device, splats, camera, projected)
-        height, width = camera.size
-        lists = tile_lists(
-            device,
-            *(projected.boxes, projected.screen),
-            tiles_x=-(-width // settings.tile),
-            tiles_y=-(-height // settings.tile),
-            sort=settings.mode == "light",
-        )
-        screen = ScreenSplats(projected.screen, projected.radii, features)
-        drawn = rasterize(
-            device, screen, lists, camera.size, settings=settings, background=background
-        )
-        return Frame(splats, camera, background, projected, screen, lists, drawn)
+        features = gather_features(device, splats, camera, projected, channels)
+        screen = ScreenSplats(projected.screen, features)
+        lists, raster = self._draw(screen, projected, camera, memory, behind)
+        if depth == "expected":
+            expected_depth(device, raster)
+        return Frame(splats, camera, behind, depth, channels, projected, screen, lists, raster)
 
     def backward(
         self,
@@ -139,35 +101,122 @@ class Renderer:
             grad_image: dL/d image, (height, width, D) device array.
             grad_transmittance: dL/d transmittance, (height, width); zero if not given.
             with_camera: differentiate by pose and intrinsics as well.
+
+        Raises:
+            ShapeError: a gradient does not fit the frame.
+            ResourceLimitError: not even one row of tiles fits the memory budget.
         """
-        device, settings = self.device, self.settings
-        records = raster_grad(
-            device,
-            *(frame.screen, frame.lists, frame.raster, grad_image, grad_transmittance),
-            settings=settings,
-            background=frame.background,
-        )
+        device, splats, camera = self.device, frame.splats, frame.camera
+        as_device_array(device, grad_image, frame.image.shape, name="grad_image")
+        if frame.depth == "expected":
+            grad_image, grad_transmittance = expected_depth_grad(
+                device, frame.raster, grad_image, grad_transmittance
+            )
         gradients = project_grad(
             device,
-            *(frame.splats, frame.camera, settings),
+            *(splats, camera, self.settings),
             projected=frame.projected,
-            slots=frame.lists.slots,
-            records=records,
+            sums=self._sums(frame, grad_image, grad_transmittance),
             with_camera=with_camera,
+            depth_channel=frame.depth is not None,
         )
         sh = None
-        if frame.splats.colors is None:
-            sh = shade_grad(
-                device,
-                *(frame.splats, frame.camera),
-                colors=frame.screen.features,
-                gradients=gradients,
+        if splats.sh is not None:
+            features = frame.screen.features
+            sh = shade_grad(device, splats, camera, features=features, gradients=gradients)
+        return FrameGradients(
+            splats=gradients,
+            colors=own_columns(device, gradients.features, frame.channels),
+            sh=sh,
+            camera=sum_columns(device, gradients.camera) if with_camera else None,
+            background=self._background_grad(frame, grad_image),
+        )
+
+    def culled(self, frame: Frame) -> dict[str, int]:
+        """How many splats were left out of a frame, by reason."""
+        codes = np.bincount(self.device.get(frame.projected.culled), minlength=len(CULL_REASONS))
+        return {
+            reason: int(count) for reason, count in zip(CULL_REASONS, codes, strict=True) if count
+        }
+
+    def _channels(self, splats: Splats, depth: DepthKind | None) -> Channels:
+        if depth not in (None, "accumulated", "expected"):
+            raise InputError(f"depth is {depth!r}, wanted None, accumulated or expected")
+        if depth is not None and self.settings.mode == "xray":
+            raise InputError("depth has no meaning in xray mode, in which nothing hides anything")
+        return Channels.of(splats, depth=depth is not None)
+
+    def _behind(self, background: Any, channels: Channels) -> Any:
+        """The background of all channels; None where there is none."""
+        if background is None or self.settings.mode == "xray":
+            return None
+        as_device_array(self.device, background, (channels.color,), name="background")
+        if not channels.depth:
+            return background
+        behind = self.device.zeros((1, channels.total))
+        row = background.reshape((1, channels.color))
+        copy_columns(self.device, row, 0, behind, 0, channels.color)
+        return behind.reshape((channels.total,))
+
+    def _memory(
+        self, splats: Splats, camera: Camera, channels: Channels, *, gradient: bool
+    ) -> FrameMemory:
+        return FrameMemory.of(splats, camera.size, channels.total, self.settings, gradient=gradient)
+
+    def _draw(
+        self,
+        screen: ScreenSplats,
+        projected: Projected,
+        camera: Camera,
+        memory: FrameMemory,
+        background: Any,
+    ) -> tuple[TileLists | None, Raster]:
+        """Draw at once and keep the lists, or band by band where they do not fit."""
+        device, settings = self.device, self.settings
+        tiles, sort = Tiles.of(camera.size, settings.tile), settings.mode == "light"
+        counts = count_tiles(device, projected.boxes, projected.depths, tiles)
+        drawing = {"settings": settings, "background": background}
+        budget = device.budget
+        if memory.fixed + memory.lists(counts.n_entries, tiles.count) <= budget:
+            lists = list_tiles(device, counts, sort=sort)
+            return lists, rasterize(device, screen, lists, camera.size, **drawing)
+        del counts
+        raster = None
+        for band in plan_bands(device.get(projected.boxes), tiles, memory, budget):
+            lists = tile_lists(device, projected.boxes, projected.depths, band, sort=sort)
+            raster = rasterize(device, screen, lists, camera.size, **drawing, into=raster)
+        assert raster is not None
+        return None, raster
+
+    def _sums(self, frame: Frame, grad_image: Any, grad_transmittance: Any) -> Any:
+        """Each splat's sums over its tiles, of what the raster's gradient leaves there."""
+        sums = None
+        for lists in self._lists(frame):
+            records = raster_grad(
+                self.device,
+                *(frame.screen, lists, frame.raster, grad_image, grad_transmittance),
+                settings=self.settings,
+                background=frame.background,
             )
-        camera = sum_columns(device, gradients.camera) if with_camera else None
-        return FrameGradients(gradients, sh, camera, self._background_grad(frame, grad_image))
+            sums = sum_slots(self.device, lists, records, onto=sums)
+        return sums
+
+    def _lists(self, frame: Frame) -> Iterator[TileLists]:
+        """The lists of all tiles, or of one band after the other, as the records fit."""
+        device, projected = self.device, frame.projected
+        memory = self._memory(frame.splats, frame.camera, frame.channels, gradient=True)
+        tiles = Tiles.of(frame.camera.size, self.settings.tile)
+        budget = device.budget
+        kept = frame.lists
+        if kept and memory.fixed + memory.lists(kept.n_entries, tiles.count) <= budget:
+            yield kept
+            return
+        sort = self.settings.mode == "light"
+        for band in plan_bands(device.get(projected.boxes), tiles, memory, budget):
+            yield tile_lists(device, projected.boxes, projected.depths, band, sort=sort)
 
     def _background_grad(self, frame: Frame, grad_image: Any) -> Any:
-        if frame.background is None or self.settings.mode == "xray":
+        if frame.background is None:
             return None
         height, width, channels = frame.image.shape
         seen = self.device.empty((height * width, channels))
@@ -176,11 +225,9 @@ class Renderer:
             (height * width,),
             *(grad_image, frame.transmittance, seen, height * width, channels),
         )
-        return sum_columns(self.device, seen)
-
-    def culled(self, frame: Frame) -> dict[str, int]:
-        """How many splats were left out of a frame, by reason."""
-        codes = np.bincount(self.device.get(frame.projected.culled), minlength=len(CULL_REASONS))
-        return {
-            reason: int(count) for reason, count in zip(CULL_REASONS, codes, strict=True) if count
-        }
+        total, color = sum_columns(self.device, seen), frame.channels.color
+        if color == channels:
+            return total
+        ours = self.device.empty((1, color))
+        copy_columns(self.device, total.reshape((1, channels)), 0, ours, 0, color)
+        return ours.reshape((color,))

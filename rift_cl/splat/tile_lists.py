@@ -18,22 +18,25 @@ import numpy as np
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
-from rift_cl.errors import DTypeError, InputError, ResourceLimitError, ShapeError
+from rift_cl.errors import DTypeError, ResourceLimitError, ShapeError
+from rift_cl.splat.prefix_sum import (
+    GPU_RUN,
+    Levels,
+    exclusive_scan,
+    pieces,
+    run_length,
+    scan_levels,
+)
+from rift_cl.splat.tiles import Tiles
 
 _MOST = 2**31 - 1
 _KEY_BITS = 32
-# A CPU's cores take so many chunks each, which evens their loads, of at least so many elements,
-# below which starting a kernel costs more than running it.
-_CPU_CHUNKS, _CPU_LEAST = 4, 4096
-# A GPU's work-items are many: each takes so few elements of a list, and of the pairs.
-_GPU_RUN, _GPU_PAIRS = 64, 256
+# A GPU's work-items are many: each takes so few of the pairs.
+_GPU_PAIRS = 256
 # Bits that one pass of the depth sort looks at; a GPU's items have less local memory for counters.
 _CPU_DIGIT, _GPU_DIGIT = 8, 4
 # The chunks' histograms over tiles may have so many numbers for each entry of the lists.
 _TABLE_SHARE = 2
-
-# A scan goes up and down a pyramid of sums: the run that each level sums up, and its sums.
-_Levels = list[tuple[int, Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,59 +47,103 @@ class TileLists:
         slots: (N + 1,) int32, where each splat's slots begin, in index order.
         entries: (M, 2) int32, the pairs (splat, slot), tile after tile, front to back within one.
             A slot is ``slots[splat]`` plus the row-major place of the tile in the splat's box.
-        starts: (tiles + 1,) int32, where each tile's entries begin; tile ``ty * tiles_x + tx``.
+        starts: (tiles + 1,) int32, where each tile's entries begin.
         n_entries: M.
-        tiles_x: tiles in a row.
-        tiles_y: rows of tiles.
+        tiles: the tiles that were listed.
     """
 
     slots: Any
     entries: Any
     starts: Any
     n_entries: int
-    tiles_x: int
-    tiles_y: int
+    tiles: Tiles
+
+
+@dataclass(frozen=True, eq=False)
+class TileCounts:
+    """What is known before lists are made: how long they will be.
+
+    Args:
+        boxes: the splats' boxes.
+        slots: (N + 1,) int32, as in ``TileLists``.
+        keys: (N,) uint32, depths as numbers that sort.
+        n_entries: M.
+        tiles: the tiles that are to be listed.
+    """
+
+    boxes: Any
+    slots: Any
+    keys: Any
+    n_entries: int
+    tiles: Tiles
 
 
 def tile_lists(
-    device: Device, boxes: Any, screen: Any, *, tiles_x: int, tiles_y: int, sort: bool = True
+    device: Device, boxes: Any, depths: Any, tiles: Tiles, *, sort: bool = True
 ) -> TileLists:
-    """List the splats of every tile.
+    """List the splats of every tile: ``count_tiles`` and ``list_tiles``, which say more."""
+    return list_tiles(device, count_tiles(device, boxes, depths, tiles), sort=sort)
+
+
+def count_tiles(device: Device, boxes: Any, depths: Any, tiles: Tiles) -> TileCounts:
+    """Count the tiles of every splat.
 
     Args:
         device: where the arrays are.
         boxes: (N, 4) int32 device array, each splat's tiles [x0, y0, x1, y1). A splat whose box
-            holds no tile of the image is culled; what lies outside the image is cut off.
-        screen: (N, 8) float32 device array with the depth in column 6: any number, infinite ones
-            and negative ones too. A splat whose depth is NaN is culled.
-        tiles_x: tiles in a row.
-        tiles_y: rows of tiles.
-        sort: front to back, equal depths by index; otherwise all in index order.
+            holds none of the tiles is culled; what lies outside of them is cut off.
+        depths: (N,) float32 device array: any number, infinite ones and negative ones too. A
+            splat whose depth is NaN is culled.
+        tiles: which tiles to list.
 
     Raises:
         ShapeError: an array has the wrong shape or is a strided view.
         DTypeError: an array has the wrong type.
-        InputError: there are no tiles.
-        ResourceLimitError: the lists have 2^31 entries or more, or do not fit the memory budget.
+        ResourceLimitError: there are 2^31 entries or more, or not even counts fit the budget.
     """
-    splats = _checked_splats(device, boxes, screen)
-    tiles = _checked_tiles(tiles_x, tiles_y)
+    splats = _checked_splats(device, boxes, depths)
     _check_room(device, splats, 0, tiles)
-    levels = _scan_levels(device, _longest_scan(device, splats, tiles))
-    grid = (tiles_x, tiles_y)
-    slots, keys, entries = _count_tiles(device, boxes, screen, grid, levels)
+    slots, keys = device.empty(splats + 1, np.int32), device.empty(splats, np.uint32)
+    run = run_length(device, splats, gpu=1)
+    counting = (boxes, depths, slots, keys, splats, run, tiles.across, tiles.first_row, tiles.rows)
+    device.launch("tile_count", (pieces(splats, run),), *counting)
+    total = exclusive_scan(device, slots, splats + 1, scan_levels(device, splats + 1))
+    entries = int(device.get(total)[0])
+    if entries > _MOST:
+        raise ResourceLimitError(
+            f"the {splats} splats cover {entries} tiles in all, at most {_MOST} can be listed: "
+            "use larger tiles, a smaller image, or fewer or smaller splats"
+        )
+    return TileCounts(boxes, slots, keys, entries, tiles)
+
+
+def list_tiles(device: Device, counts: TileCounts, *, sort: bool = True) -> TileLists:
+    """Make the lists that were counted.
+
+    Args:
+        device: where the arrays are.
+        counts: from ``count_tiles``.
+        sort: front to back, equal depths by index; otherwise all in index order.
+
+    Raises:
+        ResourceLimitError: the lists do not fit the memory budget.
+    """
+    slots, entries, tiles = counts.slots, counts.n_entries, counts.tiles
+    splats = counts.keys.size
     _check_room(device, splats, entries, tiles)
     if entries == 0:
         nothing = device.empty((0, 2), np.int32)
-        return TileLists(slots, nothing, device.zeros(tiles + 1, np.int32), 0, *grid)
-    order, visible = _depth_order(device, keys, slots, levels) if sort else (None, None)
+        return TileLists(slots, nothing, device.zeros(tiles.count + 1, np.int32), 0, tiles)
+    levels = scan_levels(device, _longest_scan(device, splats, tiles))
+    order, visible = _depth_order(device, counts.keys, slots, levels) if sort else (None, None)
     ranks, offsets = device.empty((splats, 4), np.int32), device.empty(splats + 1, np.int32)
-    run = _run(device, splats, gpu=1)
-    gathering = (boxes, slots, order, visible, ranks, offsets, splats, run, *grid)
-    device.launch("tile_ranks", (_pieces(splats, run),), *gathering, SORTED=sort)
-    _exclusive_scan(device, offsets, splats + 1, levels)
-    listed, starts = _sort_by_tile(device, ranks, offsets, entries, grid, levels)
-    return TileLists(slots, listed, starts, entries, *grid)
+    run = run_length(device, splats, gpu=1)
+    gathering = (counts.boxes, slots, order, visible, ranks, offsets, splats, run)
+    place = (tiles.across, tiles.first_row, tiles.rows)
+    device.launch("tile_ranks", (pieces(splats, run),), *gathering, *place, SORTED=sort)
+    exclusive_scan(device, offsets, splats + 1, levels)
+    listed, starts = _sort_by_tile(device, ranks, offsets, entries, tiles, levels)
+    return TileLists(slots, listed, starts, entries, tiles)
 
 
 def tile_lists_bytes(n: int, m: int, *, tiles: int = 0) -> int:
@@ -112,92 +159,30 @@ def tile_lists_bytes(n: int, m: int, *, tiles: int = 0) -> int:
     return 42 * n + 8 * m + 4 * max(_TABLE_SHARE * m, tiles) + 5 * tiles + (1 << 14)
 
 
-def _checked_splats(device: Device, boxes: Any, screen: Any) -> int:
+def _checked_splats(device: Device, boxes: Any, depths: Any) -> int:
     if len(boxes.shape) != 2 or boxes.shape[1] != 4:
         raise ShapeError(f"boxes has shape {boxes.shape}, wanted (splats, 4)")
     if boxes.dtype != np.int32:
         raise DTypeError(f"boxes has type {boxes.dtype} on the device, wanted int32")
     # The gate wants float32; what else it looks at is the same for any type of four bytes.
     as_device_array(device, boxes.view(np.float32), boxes.shape, name="boxes")
-    as_device_array(device, screen, (boxes.shape[0], 8), name="screen")
+    as_device_array(device, depths, (boxes.shape[0],), name="depths")
     return int(boxes.shape[0])
 
 
-def _checked_tiles(tiles_x: int, tiles_y: int) -> int:
-    if tiles_x < 1 or tiles_y < 1:
-        raise InputError(f"tiles_x, tiles_y are {tiles_x}, {tiles_y}, wanted at least one tile")
-    if tiles_x * tiles_y >= _MOST:
-        raise ResourceLimitError(
-            f"tiles_x * tiles_y is {tiles_x * tiles_y}, wanted less than {_MOST}: use larger tiles"
-        )
-    return tiles_x * tiles_y
-
-
-def _check_room(device: Device, splats: int, entries: int, tiles: int) -> None:
-    need = tile_lists_bytes(splats, entries, tiles=tiles)
-    what = f"set of tile lists ({splats} splats, {entries} entries, {tiles} tiles)"
+def _check_room(device: Device, splats: int, entries: int, tiles: Tiles) -> None:
+    need = tile_lists_bytes(splats, entries, tiles=tiles.count)
+    what = f"set of tile lists ({splats} splats, {entries} entries, {tiles.count} tiles)"
     plan_chunks(1, need, 0, device.budget, what=what)
 
 
-def _run(device: Device, count: int, *, gpu: int) -> int:
-    """Elements that one work-item goes through: a core's share on a CPU, ``gpu`` on a GPU."""
-    if not device.traits.is_cpu:
-        return gpu
-    return max(_CPU_LEAST, _pieces(count, _CPU_CHUNKS * device.traits.compute_units))
-
-
-def _pieces(count: int, size: int) -> int:
-    """Pieces of this size that hold so many elements; one piece where there are none."""
-    return max(1, -(-count // size))
-
-
-def _longest_scan(device: Device, splats: int, tiles: int) -> int:
+def _longest_scan(device: Device, splats: int, tiles: Tiles) -> int:
     """Most numbers of any scan: over splats, tiles, or the digits of a radix pass."""
     bits, chunks = _radix(device, splats)
-    return max(splats + 1, tiles + 1, chunks << bits)
+    return max(splats + 1, tiles.count + 1, chunks << bits)
 
 
-def _scan_levels(device: Device, most: int) -> _Levels:
-    """For scans of at most so many numbers: each level's run and room for the sums of its runs."""
-    run = _run(device, most, gpu=_GPU_RUN)
-    sums = device.empty(_pieces(most, run), np.int64)
-    return [(run, sums), *(_scan_levels(device, sums.size) if sums.size > 1 else [])]
-
-
-def _exclusive_scan(
-    device: Device, values: Any, count: int, levels: _Levels, *, wide: bool = False
-) -> Any:
-    """Replace int32 numbers (``wide``: int64) by the sum of all before; (1,) int64, the total."""
-    (run, sums), *above = levels
-    runs = _pieces(count, run)
-    total = sums[:1]
-    if runs > 1:
-        device.launch("scan_sum", (runs,), values, sums, count, run, WIDE=wide)
-        total = _exclusive_scan(device, sums, runs, above, wide=True)
-    scanning = (values, sums, count, run)
-    device.launch("scan_place", (runs,), *scanning, WIDE=wide, WHOLE=runs == 1)
-    return total
-
-
-def _count_tiles(
-    device: Device, boxes: Any, screen: Any, grid: tuple[int, int], levels: _Levels
-) -> tuple[Any, Any, int]:
-    """The splats' slots (N + 1), their keys by depth (N), and the number of entries."""
-    splats = boxes.shape[0]
-    slots, keys = device.empty(splats + 1, np.int32), device.empty(splats, np.uint32)
-    run = _run(device, splats, gpu=1)
-    counting = (boxes, screen, slots, keys, splats, run, *grid)
-    device.launch("tile_count", (_pieces(splats, run),), *counting)
-    entries = int(device.get(_exclusive_scan(device, slots, splats + 1, levels))[0])
-    if entries > _MOST:
-        raise ResourceLimitError(
-            f"the {splats} splats cover {entries} tiles in all, at most {_MOST} can be listed: "
-            "use larger tiles, a smaller image, or fewer or smaller splats"
-        )
-    return slots, keys, entries
-
-
-def _depth_order(device: Device, keys: Any, slots: Any, levels: _Levels) -> tuple[Any, Any]:
+def _depth_order(device: Device, keys: Any, slots: Any, levels: Levels) -> tuple[Any, Any]:
     """Sort the splats that have slots by key: their order (N, visible in front) and number."""
     splats = keys.size
     bits, chunks = _radix(device, splats)
@@ -210,7 +195,7 @@ def _depth_order(device: Device, keys: Any, slots: Any, levels: _Levels) -> tupl
         macros = {"DIGIT_BITS": bits, "FIRST": shift == 0}
         sizes = (splats, chunks, shift)
         device.launch("radix_count", (chunks,), here[0], slots, visible, table, *sizes, **macros)
-        visible = _exclusive_scan(device, table, table.size, levels)
+        visible = exclusive_scan(device, table, table.size, levels)
         moving = (*here, *there, slots, visible, table, *sizes)
         device.launch("radix_scatter", (chunks,), *moving, **macros)
         here, there = there, here
@@ -220,23 +205,23 @@ def _depth_order(device: Device, keys: Any, slots: Any, levels: _Levels) -> tupl
 def _radix(device: Device, splats: int) -> tuple[int, int]:
     """Bits of a digit, and chunks of the list."""
     bits = _CPU_DIGIT if device.traits.is_cpu else _GPU_DIGIT
-    return bits, _pieces(splats, _run(device, splats, gpu=_GPU_RUN))
+    return bits, pieces(splats, run_length(device, splats, gpu=GPU_RUN))
 
 
 def _sort_by_tile(
-    device: Device, ranks: Any, offsets: Any, pairs: int, grid: tuple[int, int], levels: _Levels
+    device: Device, ranks: Any, offsets: Any, pairs: int, place: Tiles, levels: Levels
 ) -> tuple[Any, Any]:
     """Place the pairs of all ranks by tile: entries and starts."""
-    tiles = grid[0] * grid[1]
-    chunks = _pieces(pairs, _run(device, pairs, gpu=_GPU_PAIRS))
+    tiles = place.count
+    chunks = pieces(pairs, run_length(device, pairs, gpu=_GPU_PAIRS))
     chunks = min(chunks, max(1, _TABLE_SHARE * pairs // tiles))
     table = device.empty((chunks, tiles), np.int32)
     starts = device.empty(tiles + 1, np.int32)
     entries = device.empty((pairs, 2), np.int32)
-    walk, sizes = (ranks, offsets, table), (len(ranks), pairs, chunks, tiles, grid[0])
-    run = _run(device, tiles, gpu=1)
+    walk, sizes = (ranks, offsets, table), (len(ranks), pairs, chunks, tiles, place.across)
+    run = run_length(device, tiles, gpu=1)
     device.launch("tile_histogram", (chunks,), *walk, *sizes)
-    device.launch("tile_offsets", (_pieces(tiles, run),), table, starts, chunks, tiles, run)
-    _exclusive_scan(device, starts, tiles + 1, levels)
+    device.launch("tile_offsets", (pieces(tiles, run),), table, starts, chunks, tiles, run)
+    exclusive_scan(device, starts, tiles + 1, levels)
     device.launch("tile_scatter", (chunks,), *walk, starts, entries, *sizes)
     return entries, starts

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import torch
 import twin_projection as twin
 from projection_scenes import shaped, twin_of, upload
 
-from rift_cl.splat.projection import project, project_grad, shade, shade_grad, sum_columns
+from rift_cl.cl.arithmetic import sum_columns
+from rift_cl.splat.features import shade, shade_grad
+from rift_cl.splat.projection import project, project_grad
+from rift_cl.splat.raster import sum_slots
 
 
 def tiles_of(boxes):
@@ -30,6 +35,12 @@ def random_records(counts, covars, channels, *, seed=1, absgrad=False):
     return slots, np.stack(parts, 1).astype(np.float32)
 
 
+def sums_of(device, slots, records):
+    """The records of each splat, summed on the device."""
+    lists = SimpleNamespace(slots=device.array(slots))
+    return sum_slots(device, lists, device.array(records))
+
+
 def run(device, values, kind, *, channels=3, depth_channel=False, shaded=True, one_tile=False):
     """Gradients on the device, with the sums that came in: (host gradients, sums, drawn)."""
     splats, camera, settings = upload(device, values, kind), kind.camera, kind.settings
@@ -44,14 +55,14 @@ def run(device, values, kind, *, channels=3, depth_channel=False, shaded=True, o
         camera,
         settings,
         projected=projected,
-        slots=device.array(slots),
-        records=device.array(records),
+        sums=sums_of(device, slots, records),
         depth_channel=depth_channel,
     )
     by_sh = None
     if shaded:
-        colors = shade(device, splats, camera, projected)
-        by_sh = shade_grad(device, splats, camera, colors=colors, gradients=gradients)
+        features = device.zeros((len(splats), channels))
+        shade(device, splats, camera, projected, into=features)
+        by_sh = shade_grad(device, splats, camera, features=features, gradients=gradients)
     host = {name: device.get(array) for name, array in vars(gradients).items() if array is not None}
     host["camera"] = device.get(sum_columns(device, gradients.camera))
     if shaded:

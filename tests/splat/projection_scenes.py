@@ -109,7 +109,8 @@ def twin_of(values, kind, camera=None, covars=None):
 def projected_on(device, values, kind, camera=None):
     """What the device gives, on the host."""
     projected = project(device, upload(device, values, kind), camera or kind.camera, kind.settings)
-    return {name: device.get(array) for name, array in vars(projected).items()}
+    found = {name: device.get(array) for name, array in vars(projected).items()}
+    return found | {"radii": np.ceil(found["screen"][:, 6:])}
 
 
 # One splat in the middle of the picture, for cases that change one thing.

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from projection_scenes import Kind, projected_on, random_splats, upload
 
-from rift_cl.splat.projection import project, shade
+from rift_cl.splat.features import shade
+from rift_cl.splat.projection import project
 from rift_cl.splat.settings import SplatSettings
 
 torch = pytest.importorskip("torch", reason="torch is not installed")
@@ -29,9 +30,12 @@ def test_gsplat_projects_alike(device, model):
     screen = found["screen"][drawn]
     np.testing.assert_allclose(screen[:, :2], means[0].numpy()[drawn], rtol=0, atol=1e-3)
     np.testing.assert_allclose(screen[:, 2:5], conics[0].numpy()[drawn], rtol=1e-4, atol=1e-4)
-    np.testing.assert_allclose(screen[:, 6], depths[0].numpy()[drawn], rtol=1e-5)
+    np.testing.assert_allclose(found["depths"][drawn], depths[0].numpy()[drawn], rtol=1e-5)
     np.testing.assert_allclose(
-        screen[:, 7], np.maximum(kept[0].numpy()[drawn], 0.005), rtol=1e-3, atol=1e-5
+        screen[:, 5] / values["opacities"][drawn],
+        np.maximum(kept[0].numpy()[drawn], 0.005),
+        rtol=1e-3,
+        atol=1e-5,
     )
     # Its torch code knows no opacity, which can only make an extent smaller.
     assert (found["radii"][drawn] <= radii[0].numpy()[drawn]).all()

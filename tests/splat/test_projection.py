@@ -38,8 +38,8 @@ def test_screen_is_the_twins(device, name):
     error = np.linalg.norm(screen[:, 2:5] - conics, axis=1) / np.linalg.norm(conics, axis=1)
     assert error.max() < 1e-5 * loose
     np.testing.assert_allclose(screen[:, 5], twin.weights[drawn], rtol=1e-5 * loose)
-    np.testing.assert_allclose(screen[:, 6], twin.depths[drawn], rtol=1e-6)
-    np.testing.assert_allclose(screen[:, 7], twin.factors[drawn], rtol=1e-5 * loose)
+    np.testing.assert_allclose(screen[:, 6:], twin.extents[drawn], rtol=1e-5 * loose)
+    np.testing.assert_allclose(found["depths"][drawn], twin.depths[drawn], rtol=1e-6)
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -53,7 +53,7 @@ def test_rectangles_and_culls_are_the_twins(device, name):
     np.testing.assert_array_equal(found["boxes"][clear], twin.boxes[clear])
     drawn = clear & (twin.culled == 0)
     np.testing.assert_array_equal(found["radii"][drawn], twin.radii[drawn])
-    for array in ("screen", "radii", "boxes"):
+    for array in ("screen", "depths", "boxes"):
         assert not found[array][found["culled"] > 0].any(), array
 
 
@@ -146,7 +146,7 @@ def test_needle_keeps_its_digits(device):
     twin, found = twin_of(values, kind), projected_on(device, values, kind)
     drawn = (found["culled"] == 0) & (twin.factors > 0.006)
     assert drawn.sum() > 100
-    np.testing.assert_allclose(found["screen"][drawn, 7], twin.factors[drawn], rtol=2e-4)
+    np.testing.assert_allclose(found["screen"][drawn, 5], twin.weights[drawn], rtol=2e-4)
 
 
 def test_only_the_direction_of_a_quaternion_counts(device):
@@ -170,6 +170,6 @@ def test_no_splats_at_all(device):
     found = projected_on(
         device, {name: value[:0] for name, value in random_splats(1).items()}, Kind()
     )
-    assert [found[name].shape for name in ("screen", "boxes", "radii", "culled")] == [
-        (0, 8), (0, 4), (0, 2), (0,)
+    assert [found[name].shape for name in ("screen", "boxes", "depths", "culled")] == [
+        (0, 8), (0, 4), (0,), (0,)
     ]  # fmt: skip

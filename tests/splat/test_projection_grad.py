@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from projection_scenes import KINDS, Kind, random_splats, twin_of, upload
 
+from rift_cl.cl.arithmetic import sum_columns
 from rift_cl.errors import DTypeError, ShapeError
-from rift_cl.splat.projection import project, project_grad, shade, shade_grad, sum_columns
+from rift_cl.splat.features import shade, shade_grad
+from rift_cl.splat.projection import project, project_grad
+from rift_cl.splat.raster import sum_slots
 from rift_cl.splat.settings import SplatSettings
 
 pytest.importorskip("torch", reason="the oracle of gradients is torch's autograd")
@@ -22,7 +27,7 @@ def test_gradients_are_autograds(device, name):
     right = oracle(values, kind, sums, drawn)
     shape = {"covars"} if kind.covars else {"quats", "scales"}
     assert set(right) == {"means", "opacities", "sh", "camera"} | shape
-    np.testing.assert_allclose(found["colors"], sums[:, 6:], rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(found["features"], sums[:, 6:], rtol=1e-5, atol=1e-5)
     for what, wanted in right.items():
         assert np.linalg.norm(wanted) > 0, what
         assert error(found[what], wanted) < 3e-5, what
@@ -102,8 +107,8 @@ def test_compensation_that_is_held_passes_nothing_on(device, covars):
 def test_every_channel_and_the_depth_find_their_place(device):
     values, kind = random_splats(150), Kind(settings=SplatSettings(absgrad=True))
     found, sums, drawn = run(device, values, kind, channels=5, depth_channel=True)
-    assert found["colors"].shape == (150, 5)
-    np.testing.assert_allclose(found["colors"], sums[:, 6:11], rtol=1e-5, atol=1e-5)
+    assert found["features"].shape == (150, 5)
+    np.testing.assert_allclose(found["features"], sums[:, 6:11], rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(found["means2d_abs"], sums[:, 11:], rtol=1e-5)
     right = oracle(values, kind, sums[:, :11], drawn, depth_channel=True)
     for what in ("means", "sh", "camera"):
@@ -145,19 +150,19 @@ def test_without_the_camera_the_rest_is_the_same(device):
     projected = project(device, splats, camera, SplatSettings())
     twin_covars = twin_of(values, Kind()).covars
     slots, records = made.random_records(made.tiles_of(device.get(projected.boxes)), twin_covars, 3)
-    slots, records = device.array(slots), device.array(records)
+    sums = made.sums_of(device, slots, records)
     with_it, without = (
         project_grad(
-            device, splats, camera, SplatSettings(), projected=projected, slots=slots,
-            records=records, with_camera=flag,
+            device, splats, camera, SplatSettings(), projected=projected, sums=sums,
+            with_camera=flag,
         )
         for flag in (True, False)
     )  # fmt: skip
     assert without.camera is None
-    colors = shade(device, splats, camera, projected)
+    features = shade(device, splats, camera, projected)
     for gradients in (with_it, without):
-        shade_grad(device, splats, camera, colors=colors, gradients=gradients)
-    for name in ("means", "quats", "scales", "opacities", "colors", "means2d"):
+        shade_grad(device, splats, camera, features=features, gradients=gradients)
+    for name in ("means", "quats", "scales", "opacities", "features", "means2d"):
         pair = [device.get(getattr(gradients, name)) for gradients in (with_it, without)]
         np.testing.assert_allclose(*pair, rtol=1e-5, atol=1e-6, err_msg=name)
 
@@ -191,7 +196,7 @@ def test_splats_without_slots_and_no_splats_at_all(device):
         projected = project(device, splats, camera, SplatSettings())
         gradients = project_grad(
             device, splats, camera, SplatSettings(), projected=projected,
-            slots=device.zeros((count + 1,), np.int32), records=device.empty((0, 9)),
+            sums=made.sums_of(device, np.zeros(count + 1, np.int32), np.zeros((0, 9), np.float32)),
         )  # fmt: skip
         assert not device.get(gradients.means).any()
         assert not device.get(sum_columns(device, gradients.camera)).any()
@@ -206,23 +211,49 @@ def test_columns_are_summed(device, shape):
     np.testing.assert_allclose(total, table.sum(axis=0, dtype=float), rtol=1e-6)
 
 
-def test_slots_and_records_must_fit(device):
+def test_records_are_summed_in_bands_to_the_same_bits(device):
+    random = np.random.default_rng(0)
+    counts = random.integers(0, 40, 300)
+    slots = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    records = random.standard_normal((slots[-1], 9)).astype(np.float32)
+    whole = device.get(made.sums_of(device, slots, records))
+    sums = None
+    for band in np.array_split(np.arange(40), 3):
+        place = np.arange(slots[-1]) - np.repeat(slots[:-1], counts)
+        here = np.isin(place, band)
+        owners = np.repeat(np.arange(300), counts)[here]
+        starts = np.concatenate([[0], np.cumsum(np.bincount(owners, minlength=300))])
+        lists = SimpleNamespace(slots=device.array(starts.astype(np.int32)))
+        sums = sum_slots(device, lists, device.array(records[here]), onto=sums)
+    assert device.get(sums).tobytes() == whole.tobytes()
+    expected = np.add.reduceat(np.append(records, np.zeros((1, 9)), 0), slots[:-1], dtype=float)
+    np.testing.assert_allclose(whole, expected * (counts > 0)[:, None], rtol=1e-4, atol=1e-5)
+
+
+def test_position_gradients_may_come_in_place_of_first_moments(device):
+    values, kind = random_splats(120), Kind()
+    found, sums, drawn = run(device, values, kind, shaded=False)
+    splats = upload(device, values, kind)
+    projected = project(device, splats, kind.camera, kind.settings)
+    sums[:, 1:3] = found["means2d"]
+    direct = project_grad(
+        device, splats, kind.camera, kind.settings, projected=projected,
+        sums=device.array(sums), first_moments=False,
+    )  # fmt: skip
+    assert drawn.sum() > 60
+    np.testing.assert_allclose(device.get(direct.means), found["means"], rtol=1e-4, atol=1e-3)
+
+
+def test_sums_must_fit(device):
     splats = upload(device, random_splats(4), Kind())
     projected = project(device, splats, Kind().camera, SplatSettings())
-    slots, records = device.zeros((5,), np.int32), device.zeros((3, 9))
 
-    def attempt(slots=slots, records=records):
-        project_grad(
-            device, splats, Kind().camera, SplatSettings(),
-            projected=projected, slots=slots, records=records,
-        )  # fmt: skip
+    def attempt(sums):
+        project_grad(device, splats, Kind().camera, SplatSettings(), projected=projected, sums=sums)
 
-    attempt()
-    for bad in (device.zeros((4,), np.int32), device.zeros((5,))):
-        with pytest.raises(ShapeError, match=r"slots is .*wanted int32 of shape"):
-            attempt(slots=bad)
-    for bad in (device.zeros((3, 6)), device.zeros((9,))):
-        with pytest.raises(ShapeError, match="records has shape"):
-            attempt(records=bad)
-    with pytest.raises(DTypeError, match="records"):
-        attempt(records=device.zeros((3, 9), np.int32))
+    attempt(device.zeros((4, 9)))
+    for bad in (device.zeros((4, 6)), device.zeros((3, 9)), device.zeros((4,))):
+        with pytest.raises(ShapeError, match="sums has shape"):
+            attempt(bad)
+    with pytest.raises(DTypeError, match="sums"):
+        attempt(device.zeros((4, 9), np.int32))

@@ -171,7 +171,7 @@ def test_the_deepest_splats_keep_their_digits(device):
     image, _ = raster_torch(scene, screen, features, rules_of(settings), np.zeros(3))
     (image * torch.tensor(grad_image)).sum().backward()
     found, expected = chain(sums, scene.screen), screen.grad.numpy()[:, :6]
-    deepest = np.argsort(scene.screen[:, 6])[-8:]
+    deepest = np.argsort(scene.depths)[-8:]
     for splat in deepest:
         error = np.linalg.norm(found[splat] - expected[splat])
         assert error < 1e-4 * np.linalg.norm(expected[splat])

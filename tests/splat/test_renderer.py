@@ -12,6 +12,7 @@ from rift_cl.reference.splat_raster import Rules
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
+from rift_cl.splat.tiles import Tiles
 
 SIZE = (45, 61)
 BACKGROUND = np.float32([0.2, 0.5, 0.9])
@@ -31,7 +32,7 @@ class Lists:
 
     entries: np.ndarray
     starts: np.ndarray
-    tiles: tuple[int, int]
+    tiles: Tiles
     size: tuple[int, int]
 
 
@@ -62,18 +63,18 @@ def oracle(way, values, frame, device, grad_image):
     view = torch.tensor(frame.camera.view[:3], requires_grad=True)
     lens = torch.tensor(frame.camera.intrinsics, dtype=torch.float64, requires_grad=True)
     covars = twin.covariance(leaves["quats"], leaves["scales"])
-    pixels, conics, weights, depths = twin.screen(
+    pixels, conics, weights, _ = twin.screen(
         *(leaves["means"], covars, leaves["opacities"], view, lens),
         camera=frame.camera,
         settings=settings,
     )
-    parts = (pixels, conics[:, 0, :], conics[:, 1, 1:], weights[:, None], depths[:, None])
+    parts = (pixels, conics[:, 0, :], conics[:, 1, 1:], weights[:, None])
     screen = torch.cat(parts, 1)
     colors = twin.shade(leaves["means"], leaves["sh"], view)
     lists = Lists(
         device.get(frame.lists.entries),
         device.get(frame.lists.starts),
-        (frame.lists.tiles_y, frame.lists.tiles_x),
+        frame.lists.tiles,
         SIZE,
     )
     rules = Rules(settings.tile, settings.alpha_cap, settings.mode == "xray", smooth=True)
@@ -140,8 +141,10 @@ def test_xray_of_a_splat_is_its_mass(device):
     frame = renderer.forward(splats, camera_of("ortho"))
     fx, fy, *_ = frame.camera.intrinsics
     mass = 0.7 * (2 * np.pi) ** 1.5 * 0.3 * 0.2 * 0.4
-    # Boxes end at 3.33 standard deviations, which leaves out 0.39 %.
-    assert device.get(frame.image).sum() / (fx * fy) == pytest.approx(mass, rel=5e-3)
+    # Four standard deviations leave out 0.034 %.
+    assert device.get(frame.image).sum() / (fx * fy) == pytest.approx(
+        mass * (1 - np.exp(-8)), rel=4e-4
+    )
 
 
 def test_splats_that_cannot_be_drawn_are_counted(device):

@@ -8,7 +8,8 @@ from projection_scenes import Kind, camera_of, random_splats, upload
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.reference.splat_projection import shade_splats, spherical_harmonics
-from rift_cl.splat.projection import project, project_grad, shade, shade_grad
+from rift_cl.splat.features import shade, shade_grad
+from rift_cl.splat.projection import project, project_grad
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 
@@ -74,7 +75,7 @@ def test_color_that_is_no_number_is_black_and_spoils_nothing(device, bad):
     colors = shade(device, splats, Kind().camera, projected)
     assert device.get(colors)[7].tolist() == [0, 0, 0]
     gradients = grad_of_ones(device, splats, projected)
-    by_sh = shade_grad(device, splats, Kind().camera, colors=colors, gradients=gradients)
+    by_sh = shade_grad(device, splats, Kind().camera, features=colors, gradients=gradients)
     assert not device.get(by_sh)[7].any()
     assert np.isfinite(device.get(by_sh)).all()
     assert np.isfinite(device.get(gradients.means)).all()
@@ -82,18 +83,16 @@ def test_color_that_is_no_number_is_black_and_spoils_nothing(device, bad):
 
 
 def grad_of_ones(device, splats, projected, channels=3):
-    """Gradients of projection whose colours are one record of ones for every splat."""
-    count = len(splats)
-    records = np.zeros((count, 6 + channels), np.float32)
-    records[:, 6:] = 1
+    """Gradients of projection with ones for every feature."""
+    sums = np.zeros((len(splats), 6 + channels), np.float32)
+    sums[:, 6:] = 1
     return project_grad(
         device,
         splats,
         Kind().camera,
         SplatSettings(),
         projected=projected,
-        slots=device.array(np.arange(count + 1, dtype=np.int32)),
-        records=device.array(records),
+        sums=device.array(sums),
     )
 
 
@@ -118,8 +117,8 @@ def test_shading_needs_harmonics_and_three_channels(device):
     splats = upload(device, values, Kind())
     colors = shade(device, splats, Kind().camera, projected)
     gradients = grad_of_ones(device, splats, projected, channels=2)
-    with pytest.raises(ShapeError, match="2 channels"):
-        shade_grad(device, splats, Kind().camera, colors=colors, gradients=gradients)
+    with pytest.raises(ShapeError, match=r"shape \(5, 2\), wanted that of features, \(5, 3\)"):
+        shade_grad(device, splats, Kind().camera, features=colors, gradients=gradients)
 
 
 def test_no_splats_have_no_colors(device):

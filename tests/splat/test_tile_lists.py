@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 import rift_cl as rift
 from rift_cl.errors import DTypeError, InputError, ResourceLimitError, ShapeError
 from rift_cl.reference.tile_lists import tile_lists as twin
+from rift_cl.splat import prefix_sum
 from rift_cl.splat.tile_lists import tile_lists, tile_lists_bytes
+from rift_cl.splat.tiles import Tiles
 
 MODULE = importlib.import_module("rift_cl.splat.tile_lists")
 FIELDS = ("slots", "entries", "starts")
@@ -23,17 +25,12 @@ TELLING = np.array(
 )
 
 
-def _screen(depth):
-    # What is not the depth must not be looked at.
-    screen = np.full((len(depth), 8), np.nan, np.float32)
-    screen[:, 6] = depth
-    return screen
-
-
-def _lists(device, boxes, depth, **sizes):
+def _lists(device, boxes, depth, *, tiles_x, tiles_y, first_row=0, sort=True):
     boxes = np.asarray(boxes, np.int32).reshape(-1, 4)
-    lists = tile_lists(device, device.array(boxes), device.array(_screen(depth)), **sizes)
-    assert (lists.tiles_x, lists.tiles_y) == (sizes["tiles_x"], sizes["tiles_y"])
+    depths = device.array(np.asarray(depth, np.float32))
+    tiles = Tiles(tiles_x, tiles_y, first_row)
+    lists = tile_lists(device, device.array(boxes), depths, tiles, sort=sort)
+    assert lists.tiles == tiles
     assert lists.n_entries == lists.entries.shape[0]
     return [device.get(getattr(lists, field)) for field in FIELDS]
 
@@ -84,7 +81,9 @@ def test_random_splats(device, splats, sort):
 @pytest.mark.parametrize("sort", [True, False])
 @pytest.mark.parametrize("least", [2, 3])
 def test_every_way_of_cutting_the_work(device, monkeypatch, least, sort):
-    for name in ("_CPU_LEAST", "_GPU_RUN", "_GPU_PAIRS"):
+    monkeypatch.setattr(prefix_sum, "_CPU_LEAST", least)
+    monkeypatch.setattr(prefix_sum, "GPU_RUN", least)
+    for name in ("GPU_RUN", "_GPU_PAIRS"):
         monkeypatch.setattr(MODULE, name, least)
     for splats in (1, 2, 5, 8, 9, 33, 70):
         boxes, depth = _scene(splats, tiles_x=4, tiles_y=3, seed=splats)
@@ -112,7 +111,7 @@ def test_culled_splats_between_visible_ones(device):
 
 def test_culled_splats_are_left_out_of_the_sort(device):
     keys, slots = np.array([7, 5, 9, 1], np.uint32), np.array([0, 3, 3, 4, 6], np.int32)
-    levels = MODULE._scan_levels(device, 1 << 12)
+    levels = prefix_sum.scan_levels(device, 1 << 12)
     order, visible = MODULE._depth_order(device, device.array(keys), device.array(slots), levels)
     assert device.get(visible).tolist() == [3]
     assert device.get(order)[:3].tolist() == [3, 0, 2]
@@ -219,7 +218,7 @@ def test_lists_larger_than_the_memory_budget(device):
 @pytest.mark.parametrize("splats, side", [(0, 200), (1, 1), (3, 90), (5000, 3), (40000, 30)])
 def test_the_estimate_covers_every_allocation(device, monkeypatch, splats, side):
     boxes, depth = _scene(splats, tiles_x=side, tiles_y=side)
-    arrays = device.array(boxes.astype(np.int32)), device.array(_screen(depth))
+    arrays = device.array(boxes.astype(np.int32)), device.array(depth)
     taken = []
     allocate = device.empty
 
@@ -228,23 +227,22 @@ def test_the_estimate_covers_every_allocation(device, monkeypatch, splats, side)
         return taken[-1]
 
     monkeypatch.setattr(device, "empty", counting)
-    lists = tile_lists(device, *arrays, tiles_x=side, tiles_y=side)
+    lists = tile_lists(device, *arrays, Tiles(side, side))
     total = sum(array.nbytes for array in taken)
     assert 0 < total <= tile_lists_bytes(splats, lists.n_entries, tiles=side * side)
 
 
 def test_unusable_arguments(device):
-    boxes, screen = device.zeros((5, 4), np.int32), device.zeros((5, 8))
-    grid = {"tiles_x": 2, "tiles_y": 2}
+    boxes, depths, tiles = device.zeros((5, 4), np.int32), device.zeros(5), Tiles(2, 2)
     with pytest.raises(ShapeError, match="boxes has shape"):
-        tile_lists(device, device.zeros((5, 3), np.int32), screen, **grid)
+        tile_lists(device, device.zeros((5, 3), np.int32), depths, tiles)
     with pytest.raises(DTypeError, match="boxes has type"):
-        tile_lists(device, device.zeros((5, 4)), screen, **grid)
+        tile_lists(device, device.zeros((5, 4)), depths, tiles)
     with pytest.raises(ShapeError, match="boxes is a strided view"):
-        tile_lists(device, device.zeros((7, 4), np.int32)[2:], screen, **grid)
-    with pytest.raises(ShapeError, match="screen has shape"):
-        tile_lists(device, boxes, device.zeros((4, 8)), **grid)
+        tile_lists(device, device.zeros((7, 4), np.int32)[2:], depths, tiles)
+    with pytest.raises(ShapeError, match="depths has shape"):
+        tile_lists(device, boxes, device.zeros(4), tiles)
     with pytest.raises(InputError, match="at least one tile"):
-        tile_lists(device, boxes, screen, tiles_x=0, tiles_y=2)
+        Tiles(0, 2)
     with pytest.raises(ResourceLimitError, match="larger tiles"):
-        tile_lists(device, boxes, screen, tiles_x=1 << 16, tiles_y=1 << 16)
+        Tiles(1 << 16, 1 << 16)

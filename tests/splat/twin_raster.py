@@ -2,7 +2,7 @@
 
 import torch
 
-from rift_cl.reference.splat_raster import BOX_EDGE, FAINTEST, OPAQUE, SMOOTH_EDGE
+from rift_cl.reference.splat_raster import ADDED_EDGE, FAINTEST, OPAQUE, SMOOTH_EDGE
 
 
 def raster_torch(scene, screen, features, rules, background):
@@ -11,8 +11,8 @@ def raster_torch(scene, screen, features, rules, background):
     image = torch.zeros(height, width, features.shape[1], dtype=torch.float64)
     left = torch.ones(height, width, dtype=torch.float64)
     for tile in range(len(scene.starts) - 1):
-        y = tile // scene.tiles[1] * rules.tile
-        x = tile % scene.tiles[1] * rules.tile
+        y = tile // scene.tiles.across * rules.tile
+        x = tile % scene.tiles.across * rules.tile
         rows, columns = min(rules.tile, height - y), min(rules.tile, width - x)
         order = scene.entries[scene.starts[tile] : scene.starts[tile + 1], 0]
         color, rest = _tile(screen, features, order, (y, x, rows, columns), rules)
@@ -38,13 +38,13 @@ def _tile(screen, features, order, place, rules):
         if rules.smooth:
             value = value * torch.clamp(1 - sigma / SMOOTH_EDGE, min=0) ** 2
         if rules.additive:
-            inside = sigma <= BOX_EDGE
+            inside = sigma <= ADDED_EDGE
             color = color + torch.where(inside, value, 0.0)[..., None] * features[splat]
             continue
         alpha = value
         if not rules.smooth:
             alpha = torch.clamp(value, max=rules.cap)
-            counts = alive & (sigma >= 0) & (alpha >= FAINTEST)
+            counts = alive & (alpha >= FAINTEST)
             alive = alive & ~(counts & (left * (1 - alpha) <= OPAQUE))
             alpha = torch.where(counts & alive, alpha, 0.0)
         color = color + (alpha * left)[..., None] * features[splat]

@@ -18,8 +18,9 @@ import numpy as np
 import rift_cl as rift
 from bench.costs import Cost
 from rift_cl.geometry import Camera
-from rift_cl.splat.raster import MOMENTS
-from rift_cl.splat.renderer import Frame, Renderer
+from rift_cl.splat.frame import Frame
+from rift_cl.splat.projection import MOMENTS
+from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
 
 # Operations per lane, forward and backward: the count that the design's prototype used.
@@ -74,6 +75,11 @@ class SplatCase:
         """The drawn scene."""
         return self._forward()
 
+    @cached_property
+    def depth_frame(self) -> Frame:
+        """The scene with its expected depth."""
+        return Renderer(device=self.device).forward(self.splats, self.camera, depth="expected")
+
     def _forward(self) -> Frame:
         background = self.device.array(np.float32([0.1, 0.2, 0.3]))
         return Renderer(device=self.device).forward(self.splats, self.camera, background=background)
@@ -83,10 +89,13 @@ class SplatCase:
         """The operations by name, on device arrays."""
         random = np.random.default_rng(1)
         grad = self.device.array(random.normal(size=(self.size, self.size, 3)))
+        deep = self.device.array(random.normal(size=(self.size, self.size, 4)))
         renderer = Renderer(device=self.device)
         return {
             "draw": self._forward,
             "gradient": lambda: renderer.backward(self.frame, grad, with_camera=True),
+            "depth": lambda: renderer.forward(self.splats, self.camera, depth="expected"),
+            "depth gradient": lambda: renderer.backward(self.depth_frame, deep, with_camera=True),
         }
 
     @property
@@ -115,19 +124,21 @@ def _count_lanes(device: rift.Device, frame: Frame) -> tuple[int, int]:
     lists, tile = frame.lists, 16
     starts, splat = device.get(lists.starts), device.get(lists.entries)[:, 0]
     last, height, width = device.get(frame.raster.last), *frame.camera.size
-    screen, radii = device.get(frame.projected.screen), device.get(frame.projected.radii)
+    screen = device.get(frame.projected.screen)
     evaluated = used = 0
     for number in range(len(starts) - 1):
-        y0, x0 = number // lists.tiles_x * tile, number % lists.tiles_x * tile
+        y0, x0 = number // lists.tiles.across * tile, number % lists.tiles.across * tile
         ends = last[y0 : min(y0 + tile, height), x0 : min(x0 + tile, width)]
-        drawn = np.arange(starts[number], max(starts[number], ends.max()))
-        mean, radius = screen[splat[drawn], :2], radii[splat[drawn]]
-        top = np.maximum((mean[:, 1] - radius[:, 1]).astype(int) - 1 - y0, 0)
-        bottom = np.minimum((mean[:, 1] + radius[:, 1]).astype(int) + 1 - y0, tile)
-        left = x0 + _STRIP * np.arange(tile // _STRIP)[:, None]
-        seen = (left <= mean[:, 0] + radius[:, 0]) & (left + _STRIP >= mean[:, 0] - radius[:, 0])
-        evaluated += int((_STRIP * seen.sum(axis=0) * np.maximum(bottom - top, 0)).sum())
-        used += _count_used(screen[splat[drawn]], drawn, ends, (y0, x0))
+        drawn = np.arange(ends.max())
+        listed = screen[splat[starts[number] + drawn]]
+        mean, extent = listed[:, :2] - (x0 + 0.5, y0 + 0.5), listed[:, 6:]
+        top = np.maximum(np.ceil(mean[:, 1] - extent[:, 1]), 0)
+        bottom = np.minimum(np.floor(mean[:, 1] + extent[:, 1]) + 1, tile)
+        begin = _STRIP * np.arange(tile // _STRIP)[:, None]
+        low, high = mean[:, 0] - extent[:, 0], mean[:, 0] + extent[:, 0]
+        strips = ((begin <= high) & (begin + _STRIP - 1 >= low)).sum(axis=0)
+        evaluated += int((_STRIP * strips * np.maximum(bottom - top, 0)).sum())
+        used += _count_used(listed, drawn, ends, (y0, x0))
     return evaluated, used
 
 
@@ -151,6 +162,10 @@ def _n(case: SplatCase) -> float:
 
 def _m(case: SplatCase) -> float:
     return case.entries
+
+
+def _pixels(case: SplatCase) -> float:
+    return case.pixels
 
 
 def _raster(flops: int, what: str) -> Cost:
@@ -180,8 +195,12 @@ SPLAT_COSTS: dict[str, Cost] = {
     "splat_raster_gpu": _raster(_FORWARD, "each entry's splat, the image"),
     "splat_raster_grad_cpu": _raster(_BACKWARD, "each entry's splat and record, the image"),
     "splat_raster_grad_gpu": _raster(_BACKWARD, "each entry's splat and record, the image"),
-    "splat_project_grad": _bytes_only("entry", _m, 36, "records in; the splats' own are fewer"),
+    "splat_sum_slots": _bytes_only("entry", _m, 36, "records in; the splats' sums are fewer"),
+    "splat_project_grad": _bytes_only("splat", _n, 44 + 36 + 132, "sums in, gradients out"),
+    "copy_columns": _bytes_only("splat", _n, 8, "depth in and out"),
+    "expected_depth": _bytes_only("pixel", _pixels, 12, "depth and transmittance in, depth out"),
+    "expected_depth_grad": _bytes_only("pixel", _pixels, 48, "images in and out"),
     "splat_shade_grad": _bytes_only("splat", _n, 12 + 192 + 24 + 192, "harmonics in and out"),
     "sum_columns": _bytes_only("splat", _n, 64, "the camera's parts in"),
-    "background_grad": _bytes_only("pixel", lambda case: case.pixels, 28, "image in, parts out"),
+    "background_grad": _bytes_only("pixel", _pixels, 28, "image in, parts out"),
 }

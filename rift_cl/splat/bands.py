@@ -1,0 +1,145 @@
+"""Drawing within a memory budget: how much it takes, and which rows of tiles at a time.
+
+Tile lists and the gradient's records grow with the number of (splat, tile) pairs, which can be
+any multiple of the number of splats. Where they do not fit, the image is drawn in bands of whole
+rows of tiles, one after the other. Each tile's list is the same in every band, and a splat's
+records are summed in the order of the tiles whatever the band, so that every bit stays the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.budget import format_bytes
+from rift_cl.errors import ResourceLimitError
+from rift_cl.splat.projection import MOMENTS
+from rift_cl.splat.settings import SplatSettings
+from rift_cl.splat.splats import Splats
+from rift_cl.splat.tile_lists import tile_lists_bytes
+from rift_cl.splat.tiles import Tiles
+
+# Bytes of a splat on the screen: screen, depth, box, code.
+_PROJECTED = 32 + 4 + 16 + 1
+# Bytes of a splat's part in the gradient by the camera.
+_CAMERA = 64
+
+
+@dataclass(frozen=True)
+class FrameMemory:
+    """Bytes that one frame takes on the device.
+
+    Args:
+        splats: number of splats.
+        parameters: floats that one splat is described by.
+        pixels: of the image.
+        channels: of the image.
+        gradient: whether its gradient is wanted as well.
+        absgrad: whether that has the magnitudes.
+    """
+
+    splats: int
+    parameters: int
+    pixels: int
+    channels: int
+    gradient: bool = False
+    absgrad: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        splats: Splats,
+        size: tuple[int, int],
+        channels: int,
+        settings: SplatSettings,
+        *,
+        gradient: bool,
+    ) -> FrameMemory:
+        """What a frame of these splats takes."""
+        floats = sum(array.size for array in vars(splats).values() if array is not None)
+        parameters = -(-floats // max(len(splats), 1))
+        pixels = size[0] * size[1]
+        return cls(len(splats), parameters, pixels, channels, gradient, settings.absgrad)
+
+    @property
+    def record(self) -> int:
+        """Floats of a (splat, tile) pair's record."""
+        return MOMENTS + self.channels + 2 * self.absgrad
+
+    @property
+    def fixed(self) -> int:
+        """Bytes that are taken however the image is cut: parameters, screen, image."""
+        splat = 4 * self.parameters + _PROJECTED + 4 * self.channels
+        pixel = 4 * self.channels + 8
+        if self.gradient:
+            splat += 4 * (self.parameters + self.record + self.channels + 4) + _CAMERA
+            # The gradients that come in, and the background's parts that go out.
+            pixel += 8 * self.channels + 8
+        return self.splats * splat + self.pixels * pixel
+
+    def lists(self, entries: int, tiles: int) -> int:
+        """Bytes that the lists of so many tiles take, with the records of the gradient."""
+        records = 4 * self.record * entries if self.gradient else 0
+        return tile_lists_bytes(self.splats, entries, tiles=tiles) + records
+
+
+def check_fixed(memory: FrameMemory, budget: int) -> None:
+    """Refuse a frame that cannot be drawn in any number of bands.
+
+    Raises:
+        ResourceLimitError: what is taken however the image is cut does not fit the budget.
+    """
+    if memory.fixed > budget:
+        raise ResourceLimitError(
+            f"{memory.splats} splats and an image of {memory.pixels} pixels with "
+            f"{memory.channels} channels need {format_bytes(memory.fixed)}, the memory budget is "
+            f"{format_bytes(budget)}: raise the budget (RIFT_MEMORY or --memory), use a device "
+            "with more memory, or draw fewer splats or a smaller image"
+        )
+
+
+def plan_bands(
+    boxes: NDArray[np.int32], tiles: Tiles, memory: FrameMemory, budget: int
+) -> list[Tiles]:
+    """Cut an image into as few bands as fit the budget.
+
+    Args:
+        boxes: (N, 4) the splats' tiles, on the host.
+        tiles: all tiles of the image.
+        memory: what a frame takes.
+        budget: bytes there are.
+
+    Raises:
+        ResourceLimitError: not even one row of tiles fits.
+    """
+    room = budget - memory.fixed
+    per_row = entries_per_row(boxes, tiles)
+    bands: list[Tiles] = []
+    first, entries = 0, 0
+    for row, more in enumerate(per_row.tolist()):
+        if row > first and memory.lists(entries + more, (row + 1 - first) * tiles.across) > room:
+            bands.append(Tiles(tiles.across, row - first, first))
+            first, entries = row, 0
+        entries += more
+        if row == first and memory.lists(entries, tiles.across) > room:
+            raise ResourceLimitError(
+                f"one row of tiles ({entries} splat and tile pairs) needs "
+                f"{format_bytes(memory.fixed + memory.lists(entries, tiles.across))}, the memory "
+                f"budget is {format_bytes(budget)}: raise the budget (RIFT_MEMORY or --memory), "
+                "use a device with more memory, or draw fewer or smaller splats"
+            )
+    return [*bands, Tiles(tiles.across, tiles.rows - first, first)]
+
+
+def entries_per_row(boxes: NDArray[Any], tiles: Tiles) -> NDArray[np.int64]:
+    """(splat, tile) pairs in each row of tiles."""
+    clipped = np.clip(boxes.astype(np.int64), 0, [tiles.across, tiles.rows] * 2)
+    x0, y0, x1, y1 = clipped.T
+    widths = np.where(y1 > y0, np.maximum(x1 - x0, 0), 0)
+    steps = np.zeros(tiles.rows + 1, np.int64)
+    np.add.at(steps, y0, widths)
+    np.add.at(steps, y1, -widths)
+    return np.cumsum(steps)[:-1]
