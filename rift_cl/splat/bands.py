@@ -55,14 +55,12 @@ class FrameMemory:
         size: tuple[int, int],
         channels: int,
         settings: SplatSettings,
-        *,
-        gradient: bool,
     ) -> FrameMemory:
-        """What a frame of these splats takes."""
+        """What a frame of these splats takes, without its gradient."""
         floats = sum(array.size for array in vars(splats).values() if array is not None)
         parameters = -(-floats // max(len(splats), 1))
         pixels = size[0] * size[1]
-        return cls(len(splats), parameters, pixels, channels, gradient, settings.absgrad)
+        return cls(len(splats), parameters, pixels, channels, absgrad=settings.absgrad)
 
     @property
     def record(self) -> int:

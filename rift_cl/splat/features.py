@@ -69,7 +69,7 @@ def gather_features(
         return splats.colors
     features = device.empty((len(splats), channels.total))
     if channels.shaded:
-        shade(device, splats, camera, projected, into=features)
+        shade(device, splats.means, splats.sh, camera, projected.culled, into=features)
     if channels.own:
         copy_columns(device, splats.colors, 0, features, channels.shaded, channels.own)
     if channels.depth:
@@ -87,15 +87,16 @@ def own_columns(device: Device, table: Any, channels: Channels) -> Any:
 
 
 def shade(
-    device: Device, splats: Splats, camera: Camera, projected: Projected, *, into: Any = None
+    device: Device, means: Any, sh: Any, camera: Camera, culled: Any, *, into: Any = None
 ) -> Any:
     """Colours of splats with spherical harmonics, as seen from the camera's centre.
 
     Args:
         device: where the arrays are.
-        splats: with ``sh``.
+        means: (N, 3) positions.
+        sh: (N, K, 3) coefficients.
         camera: the view.
-        projected: what ``project`` returned for it; splats that are not drawn are black.
+        culled: (N,) why a splat is not drawn; those that are not are black.
         into: a table of features whose first three columns are written; a new one if not given.
 
     Returns:
@@ -104,13 +105,14 @@ def shade(
     Raises:
         InputError: the splats have no spherical harmonics.
     """
-    sh = _harmonics(splats)
-    features = device.empty((len(splats), 3)) if into is None else into
+    _check_harmonics(sh)
+    count = means.shape[0]
+    features = device.empty((count, 3)) if into is None else into
     center = np.array([*camera.center, 0], np.float32)
     device.launch(
         "splat_shade",
-        (len(splats),),
-        *(splats.means, sh, projected.culled, features, center, len(splats)),
+        (count,),
+        *(means, sh, culled, features, center, count),
         COEFFICIENTS=sh.shape[1],
         STRIDE=features.shape[1],
     )
@@ -118,13 +120,20 @@ def shade(
 
 
 def shade_grad(
-    device: Device, splats: Splats, camera: Camera, *, features: Any, gradients: SplatGradients
+    device: Device,
+    means: Any,
+    sh: Any,
+    camera: Camera,
+    *,
+    features: Any,
+    gradients: SplatGradients,
 ) -> Any:
     """The gradient of ``shade``.
 
     Args:
         device: where the arrays are.
-        splats: as given to ``shade``.
+        means: as given to ``shade``.
+        sh: as given to ``shade``.
         camera: as given to ``shade``.
         features: the table it wrote to.
         gradients: the first three of its features are what comes in; what flows through the
@@ -137,7 +146,8 @@ def shade_grad(
         InputError: the splats have no spherical harmonics.
         ShapeError: the gradient and the features have not the same channels, three or more.
     """
-    sh = _harmonics(splats)
+    _check_harmonics(sh)
+    count = means.shape[0]
     if gradients.features.shape != features.shape or features.shape[1] < 3:
         raise ShapeError(
             f"shade_grad: gradients.features has shape {gradients.features.shape}, wanted that of "
@@ -148,8 +158,8 @@ def shade_grad(
     rows = np.column_stack([inverse, camera.center]).astype(np.float32, order="C")
     device.launch(
         "splat_shade_grad",
-        (len(splats),),
-        *(splats.means, sh, features, gradients.features, *rows, len(splats)),
+        (count,),
+        *(means, sh, features, gradients.features, *rows, count),
         *(grad_sh, gradients.means, gradients.camera),
         COEFFICIENTS=sh.shape[1],
         STRIDE=features.shape[1],
@@ -158,7 +168,6 @@ def shade_grad(
     return grad_sh
 
 
-def _harmonics(splats: Splats) -> Any:
-    if splats.sh is None:
+def _check_harmonics(sh: Any) -> None:
+    if sh is None:
         raise InputError("shade: these splats have no spherical harmonics; draw their colors")
-    return splats.sh

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from rift_cl.geometry import Camera
+from rift_cl.splat.drawing import Drawing
 from rift_cl.splat.features import Channels
 from rift_cl.splat.projected import Projected, SplatGradients
-from rift_cl.splat.raster import Raster, ScreenSplats
+from rift_cl.splat.raster import Raster
 from rift_cl.splat.splats import Splats
 from rift_cl.splat.tile_lists import TileLists
 
@@ -20,34 +21,41 @@ class Frame:
     Args:
         splats: what was drawn.
         camera: what drew it.
-        background: (D,) with 0 for depth, or None.
         depth: ``accumulated``, ``expected``, or None.
         channels: what the image's channels are.
-        projected: the splats on the screen.
-        screen: the same as the raster takes them.
-        lists: the tile lists; None where they did not fit and the image was drawn in bands.
-        raster: the image, and what the raster left for its gradient.
+        drawing: the splats on the screen, the image, and what the raster left for its gradient.
     """
 
     splats: Splats
     camera: Camera
-    background: Any
     depth: str | None
     channels: Channels
-    projected: Projected
-    screen: ScreenSplats
-    lists: TileLists | None
-    raster: Raster
+    drawing: Drawing
 
     @property
     def image(self) -> Any:
         """(height, width, D) device array, the background included."""
-        return self.raster.image
+        return self.drawing.raster.image
 
     @property
     def transmittance(self) -> Any:
         """(height, width) device array, what of the background is seen; alpha is one minus it."""
-        return self.raster.transmittance
+        return self.drawing.raster.transmittance
+
+    @property
+    def projected(self) -> Projected:
+        """The splats on the screen."""
+        return self.drawing.projected
+
+    @property
+    def lists(self) -> TileLists | None:
+        """The tile lists; None where the image was drawn in bands."""
+        return self.drawing.lists
+
+    @property
+    def raster(self) -> Raster:
+        """The image, and what the raster left for its gradient."""
+        return self.drawing.raster
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,6 @@ and so it does in a smaller memory budget, in which the image is drawn in bands.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any, Literal
 
 import numpy as np
@@ -18,17 +17,15 @@ from rift_cl.cl.discovery import default_device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
-from rift_cl.splat.bands import FrameMemory, check_fixed, plan_bands
+from rift_cl.splat.bands import FrameMemory, check_fixed
 from rift_cl.splat.depth import expected_depth, expected_depth_grad
+from rift_cl.splat.drawing import draw, draw_grad
 from rift_cl.splat.features import Channels, gather_features, own_columns, shade_grad
 from rift_cl.splat.frame import Frame, FrameGradients
-from rift_cl.splat.projected import CULL_REASONS, Projected
+from rift_cl.splat.projected import CULL_REASONS
 from rift_cl.splat.projection import project, project_grad
-from rift_cl.splat.raster import Raster, ScreenSplats, raster_grad, rasterize, sum_slots
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
-from rift_cl.splat.tile_lists import TileLists, count_tiles, list_tiles, tile_lists
-from rift_cl.splat.tiles import Tiles
 
 DepthKind = Literal["accumulated", "expected"]
 
@@ -76,15 +73,20 @@ class Renderer:
         device, settings = self.device, self.settings
         channels = self._channels(splats, depth)
         behind = self._behind(background, channels)
-        memory = self._memory(splats, camera, channels, gradient=False)
+        memory = FrameMemory.of(splats, camera.size, channels.total, settings)
         check_fixed(memory, device.budget)
         projected = project(device, splats, camera, settings)
         features = gather_features(device, splats, camera, projected, channels)
-        screen = ScreenSplats(projected.screen, features)
-        lists, raster = self._draw(screen, projected, camera, memory, behind)
+        drawing = draw(
+            device,
+            *(projected, features, camera.size),
+            settings=settings,
+            memory=memory,
+            background=behind,
+        )
         if depth == "expected":
-            expected_depth(device, raster)
-        return Frame(splats, camera, behind, depth, channels, projected, screen, lists, raster)
+            expected_depth(device, drawing.raster)
+        return Frame(splats, camera, depth, channels, drawing)
 
     def backward(
         self,
@@ -116,14 +118,15 @@ class Renderer:
             device,
             *(splats, camera, self.settings),
             projected=frame.projected,
-            sums=self._sums(frame, grad_image, grad_transmittance),
+            sums=draw_grad(device, frame.drawing, grad_image, grad_transmittance),
             with_camera=with_camera,
             depth_channel=frame.depth is not None,
         )
         sh = None
         if splats.sh is not None:
-            features = frame.screen.features
-            sh = shade_grad(device, splats, camera, features=features, gradients=gradients)
+            features = frame.drawing.features
+            given = (splats.means, splats.sh, camera)
+            sh = shade_grad(device, *given, features=features, gradients=gradients)
         return FrameGradients(
             splats=gradients,
             colors=own_columns(device, gradients.features, frame.channels),
@@ -158,65 +161,8 @@ class Renderer:
         copy_columns(self.device, row, 0, behind, 0, channels.color)
         return behind.reshape((channels.total,))
 
-    def _memory(
-        self, splats: Splats, camera: Camera, channels: Channels, *, gradient: bool
-    ) -> FrameMemory:
-        return FrameMemory.of(splats, camera.size, channels.total, self.settings, gradient=gradient)
-
-    def _draw(
-        self,
-        screen: ScreenSplats,
-        projected: Projected,
-        camera: Camera,
-        memory: FrameMemory,
-        background: Any,
-    ) -> tuple[TileLists | None, Raster]:
-        """Draw at once and keep the lists, or band by band where they do not fit."""
-        device, settings = self.device, self.settings
-        tiles, sort = Tiles.of(camera.size, settings.tile), settings.mode == "light"
-        counts = count_tiles(device, projected.boxes, projected.depths, tiles)
-        drawing = {"settings": settings, "background": background}
-        budget = device.budget
-        if memory.fixed + memory.lists(counts.n_entries, tiles.count) <= budget:
-            lists = list_tiles(device, counts, sort=sort)
-            return lists, rasterize(device, screen, lists, camera.size, **drawing)
-        del counts
-        raster = None
-        for band in plan_bands(device.get(projected.boxes), tiles, memory, budget):
-            lists = tile_lists(device, projected.boxes, projected.depths, band, sort=sort)
-            raster = rasterize(device, screen, lists, camera.size, **drawing, into=raster)
-        assert raster is not None
-        return None, raster
-
-    def _sums(self, frame: Frame, grad_image: Any, grad_transmittance: Any) -> Any:
-        """Each splat's sums over its tiles, of what the raster's gradient leaves there."""
-        sums = None
-        for lists in self._lists(frame):
-            records = raster_grad(
-                self.device,
-                *(frame.screen, lists, frame.raster, grad_image, grad_transmittance),
-                settings=self.settings,
-                background=frame.background,
-            )
-            sums = sum_slots(self.device, lists, records, onto=sums)
-        return sums
-
-    def _lists(self, frame: Frame) -> Iterator[TileLists]:
-        """The lists of all tiles, or of one band after the other, as the records fit."""
-        device, projected = self.device, frame.projected
-        memory = self._memory(frame.splats, frame.camera, frame.channels, gradient=True)
-        tiles = Tiles.of(frame.camera.size, self.settings.tile)
-        budget = device.budget
-        kept = frame.lists
-        if kept and memory.fixed + memory.lists(kept.n_entries, tiles.count) <= budget:
-            yield kept
-            return
-        sort = self.settings.mode == "light"
-        for band in plan_bands(device.get(projected.boxes), tiles, memory, budget):
-            yield tile_lists(device, projected.boxes, projected.depths, band, sort=sort)
-
     def _background_grad(self, frame: Frame, grad_image: Any) -> Any:
-        if frame.background is None:
+        if frame.drawing.background is None:
             return None
         height, width, channels = frame.image.shape
         seen = self.device.empty((height * width, channels))

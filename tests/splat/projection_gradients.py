@@ -61,8 +61,10 @@ def run(device, values, kind, *, channels=3, depth_channel=False, shaded=True, o
     by_sh = None
     if shaded:
         features = device.zeros((len(splats), channels))
-        shade(device, splats, camera, projected, into=features)
-        by_sh = shade_grad(device, splats, camera, features=features, gradients=gradients)
+        shade(device, splats.means, splats.sh, camera, projected.culled, into=features)
+        by_sh = shade_grad(
+            device, splats.means, splats.sh, camera, features=features, gradients=gradients
+        )
     host = {name: device.get(array) for name, array in vars(gradients).items() if array is not None}
     host["camera"] = device.get(sum_columns(device, gradients.camera))
     if shaded:

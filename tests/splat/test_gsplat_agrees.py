@@ -47,7 +47,7 @@ def test_gsplat_shades_alike(device):
     peer = gsplat._spherical_harmonics(4, directions, torch.tensor(values["sh"]).double())
     splats = upload(device, values, Kind())
     projected = project(device, splats, Kind().camera, SplatSettings())
-    colors = device.get(shade(device, splats, Kind().camera, projected))
+    colors = device.get(shade(device, splats.means, splats.sh, Kind().camera, projected.culled))
     drawn = device.get(projected.culled) == 0
     wanted = np.maximum(peer.numpy() + 0.5, 0)
     np.testing.assert_allclose(colors[drawn], wanted[drawn], rtol=1e-5, atol=1e-5)

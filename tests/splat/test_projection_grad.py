@@ -159,9 +159,9 @@ def test_without_the_camera_the_rest_is_the_same(device):
         for flag in (True, False)
     )  # fmt: skip
     assert without.camera is None
-    features = shade(device, splats, camera, projected)
+    features = shade(device, splats.means, splats.sh, camera, projected.culled)
     for gradients in (with_it, without):
-        shade_grad(device, splats, camera, features=features, gradients=gradients)
+        shade_grad(device, splats.means, splats.sh, camera, features=features, gradients=gradients)
     for name in ("means", "quats", "scales", "opacities", "features", "means2d"):
         pair = [device.get(getattr(gradients, name)) for gradients in (with_it, without)]
         np.testing.assert_allclose(*pair, rtol=1e-5, atol=1e-6, err_msg=name)

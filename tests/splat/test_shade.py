@@ -21,7 +21,7 @@ def colors_of(device, values, kind=None):
     kind = kind or Kind()
     splats = upload(device, values, kind)
     projected = project(device, splats, kind.camera, kind.settings)
-    colors = shade(device, splats, kind.camera, projected)
+    colors = shade(device, splats.means, splats.sh, kind.camera, projected.culled)
     return device.get(colors), device.get(projected.culled) == 0
 
 
@@ -72,10 +72,12 @@ def test_color_that_is_no_number_is_black_and_spoils_nothing(device, bad):
     splats = upload(device, values, Kind())
     projected = project(device, splats, Kind().camera, SplatSettings())
     assert device.get(projected.culled)[7] == 0
-    colors = shade(device, splats, Kind().camera, projected)
+    colors = shade(device, splats.means, splats.sh, Kind().camera, projected.culled)
     assert device.get(colors)[7].tolist() == [0, 0, 0]
     gradients = grad_of_ones(device, splats, projected)
-    by_sh = shade_grad(device, splats, Kind().camera, features=colors, gradients=gradients)
+    by_sh = shade_grad(
+        device, splats.means, splats.sh, Kind().camera, features=colors, gradients=gradients
+    )
     assert not device.get(by_sh)[7].any()
     assert np.isfinite(device.get(by_sh)).all()
     assert np.isfinite(device.get(gradients.means)).all()
@@ -104,7 +106,7 @@ def test_splat_where_the_camera_stands_has_a_color_and_no_gradient_by_direction(
     values["means"] = camera.center[None].astype(np.float32)
     splats = upload(device, values, kind)
     projected = project(device, splats, camera, kind.settings)
-    color = device.get(shade(device, splats, camera, projected))
+    color = device.get(shade(device, splats.means, splats.sh, camera, projected.culled))
     assert np.isfinite(color).all()
 
 
@@ -113,12 +115,14 @@ def test_shading_needs_harmonics_and_three_channels(device):
     splats = Splats.upload(device, **(values | {"sh": None}))
     projected = project(device, splats, Kind().camera, SplatSettings())
     with pytest.raises(InputError, match="no spherical harmonics"):
-        shade(device, splats, Kind().camera, projected)
+        shade(device, splats.means, splats.sh, Kind().camera, projected.culled)
     splats = upload(device, values, Kind())
-    colors = shade(device, splats, Kind().camera, projected)
+    colors = shade(device, splats.means, splats.sh, Kind().camera, projected.culled)
     gradients = grad_of_ones(device, splats, projected, channels=2)
     with pytest.raises(ShapeError, match=r"shape \(5, 2\), wanted that of features, \(5, 3\)"):
-        shade_grad(device, splats, Kind().camera, features=colors, gradients=gradients)
+        shade_grad(
+            device, splats.means, splats.sh, Kind().camera, features=colors, gradients=gradients
+        )
 
 
 def test_no_splats_have_no_colors(device):

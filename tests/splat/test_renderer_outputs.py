@@ -1,0 +1,177 @@
+"""Everything that a frame can show: features beside colours, depth, several cameras at once."""
+
+import numpy as np
+import pytest
+from projection_scenes import camera_of, random_splats
+
+from rift_cl.errors import InputError, ShapeError
+from rift_cl.splat.batch import draw_views, views_grad
+from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.settings import SplatSettings
+from rift_cl.splat.splats import Splats
+
+SIZE = (97, 143)
+SHARED = ("means", "quats", "scales", "opacities")
+
+
+def splats_of(device, count=80, *, sh=True, channels=0):
+    values = random_splats(count, coefficients=4, wide=1.5)
+    if not sh:
+        del values["sh"]
+    if channels:
+        colors = np.random.default_rng(5).uniform(0, 1, (count, channels))
+        values["colors"] = colors.astype(np.float32)
+    return Splats.upload(device, **values)
+
+
+def noise(shape, seed=3):
+    return np.random.default_rng(seed).normal(size=shape).astype(np.float32)
+
+
+def gradients_of(device, found):
+    """All gradients that there are, on the host, by name."""
+    arrays = {f"splats.{name}": array for name, array in vars(found.splats).items()}
+    arrays |= {name: getattr(found, name) for name in ("colors", "sh", "camera", "background")}
+    return {name: device.get(array) for name, array in arrays.items() if array is not None}
+
+
+def test_features_stand_behind_the_colours_of_harmonics(device):
+    renderer, camera = Renderer(device=device), camera_of("pinhole")
+    behind = np.linspace(0.1, 0.9, 8).astype(np.float32)
+    both = splats_of(device, channels=5)
+    together = renderer.forward(both, camera, background=device.array(behind))
+    assert together.image.shape == (*SIZE, 8)
+    image = device.get(together.image)
+    parts = [(splats_of(device), slice(3)), (splats_of(device, sh=False, channels=5), slice(3, 8))]
+    for splats, place in parts:
+        alone = renderer.forward(splats, camera, background=device.array(behind[place]))
+        assert np.array_equal(device.get(alone.image), image[..., place])
+    grad = noise(image.shape)
+    found = gradients_of(device, renderer.backward(together, device.array(grad)))
+    colors = splats_of(device, sh=False, channels=5)
+    alone = renderer.forward(colors, camera, background=device.array(behind[3:]))
+    own = gradients_of(device, renderer.backward(alone, device.array(grad[..., 3:].copy())))
+    assert found["sh"].shape == (80, 4, 3) and np.array_equal(found["colors"], own["colors"])
+    np.testing.assert_allclose(found["background"][3:], own["background"], rtol=1e-6)
+
+
+@pytest.mark.parametrize("channels", [0, 2, 40])
+def test_depth_is_the_last_channel(device, channels):
+    renderer, camera = Renderer(device=device), camera_of("pinhole")
+    splats = splats_of(device, sh=False, channels=channels)
+    behind = device.array(np.full(channels, 0.5)) if channels else None
+    deep = renderer.forward(splats, camera, depth="accumulated", background=behind)
+    expected = renderer.forward(splats, camera, depth="expected", background=behind)
+    image, quotient = device.get(deep.image), device.get(expected.image)
+    assert image.shape == (*SIZE, channels + 1)
+    assert np.array_equal(image[..., :-1], quotient[..., :-1])
+    alpha = 1 - device.get(deep.transmittance)
+    held = np.maximum(alpha, np.float32(1e-10))
+    np.testing.assert_allclose(quotient[..., -1], image[..., -1] / held, rtol=1e-6)
+    depths = device.get(deep.projected.depths)
+    seen = alpha > 0.5
+    assert seen.sum() > 100
+    nearest, farthest = depths[depths > 0].min(), depths.max()
+    inside = (quotient[..., -1] > nearest * 0.999) & (quotient[..., -1] < farthest * 1.001)
+    assert inside[seen].all()
+
+
+def test_depth_of_one_splat_is_its_own(device):
+    splats = Splats.upload(
+        device, means=[[0, 0, 0.5]], quats=[[1, 0, 0, 0]], scales=[[1, 1, 1]], opacities=[0.9]
+    )
+    frame = Renderer(device=device).forward(splats, camera_of("pinhole"), depth="expected")
+    depth, alpha = device.get(frame.image)[..., 0], 1 - device.get(frame.transmittance)
+    wanted = device.get(frame.projected.depths)[0]
+    np.testing.assert_allclose(depth[alpha > 0.01], wanted, rtol=1e-4)
+    assert not depth[alpha == 0].any()
+
+
+def test_gradient_of_expected_depth_is_the_quotients(device):
+    """dL/dD = g / alpha and dL/dT = g E / alpha: with them the accumulated depth's gradient."""
+    renderer, camera = Renderer(device=device), camera_of("pinhole")
+    splats = splats_of(device, channels=0)
+    grad, by_thin = noise((*SIZE, 4)), noise(SIZE, 4)
+    expected = renderer.forward(splats, camera, depth="expected")
+    arrays = device.array(grad), device.array(by_thin)
+    found = gradients_of(device, renderer.backward(expected, *arrays, with_camera=True))
+    deep = renderer.forward(splats, camera, depth="accumulated")
+    alpha = 1 - device.get(deep.transmittance)
+    seen = alpha > 1e-10
+    share = grad[..., 3] / np.maximum(alpha, np.float32(1e-10))
+    by_thin = by_thin + np.where(seen, share * device.get(expected.image)[..., 3], 0)
+    grad[..., 3] = share
+    arrays = device.array(grad), device.array(by_thin)
+    wanted = gradients_of(device, renderer.backward(deep, *arrays, with_camera=True))
+    for name, gradient in found.items():
+        error = np.linalg.norm(gradient - wanted[name]) / np.linalg.norm(wanted[name])
+        assert error < 1e-5, name
+
+
+def test_depth_gradient_is_that_of_differences(device):
+    """Through the smooth cut-off, along the camera's axis, in float32 and so to some digits."""
+    renderer = Renderer(SplatSettings(smooth_cutoff=True), device=device)
+    camera, values = camera_of("pinhole"), random_splats(40, wide=1.0)
+    del values["sh"]
+    # Splats many pixels wide, over which float32 differences are smooth.
+    values["scales"] = np.maximum(values["scales"], 0.1)
+    weights = noise((*SIZE, 1))
+
+    def loss(shift):
+        moved = values | {"means": values["means"] + np.float32(shift) * way}
+        frame = renderer.forward(Splats.upload(device, **moved), camera, depth="accumulated")
+        return frame, float((device.get(frame.image).astype(float) * weights).sum())
+
+    way = noise((40, 3), 7)
+    frame, _ = loss(0)
+    found = renderer.backward(frame, device.array(weights))
+    slope = float((device.get(found.splats.means) * way).sum())
+    step = 2e-4
+    difference = (loss(step)[1] - loss(-step)[1]) / (2 * step)
+    assert difference == pytest.approx(slope, rel=2e-2, abs=1.0)
+
+
+@pytest.mark.parametrize("with_camera", [False, True])
+def test_gradients_of_several_cameras_add_up(device, with_camera):
+    renderer = Renderer(SplatSettings(absgrad=True), device=device)
+    splats = splats_of(device, channels=2)
+    cameras = [camera_of("pinhole", focal=focal) for focal in (90.0, 120.0, 150.0)]
+    behind = [device.array(noise(5, seed)) for seed in range(3)]
+    frames = draw_views(renderer, splats, cameras, backgrounds=behind)
+    grads = [device.array(noise(frame.image.shape, 9)) for frame in frames]
+    total, views = views_grad(renderer, frames, grads, with_camera=with_camera)
+    alone = [
+        gradients_of(device, renderer.backward(frame, grad, with_camera=with_camera))
+        for frame, grad in zip(frames, grads, strict=True)
+    ]
+    for name in (*SHARED, "colors", "sh"):
+        key = f"splats.{name}" if name in SHARED else name
+        wanted = (alone[0][key] + alone[1][key]) + alone[2][key]
+        assert np.array_equal(device.get(getattr(total, name)), wanted), name
+    assert total.covars is None
+    for view, one in zip(views, alone, strict=True):
+        assert np.array_equal(device.get(view.means2d), one["splats.means2d"])
+        assert np.array_equal(device.get(view.means2d_abs), one["splats.means2d_abs"])
+        assert np.array_equal(device.get(view.background), one["background"])
+        assert (view.camera is None) != with_camera
+
+
+def test_what_cannot_be_drawn_is_named(device):
+    renderer, camera = Renderer(device=device), camera_of("pinhole")
+    splats = splats_of(device)
+    with pytest.raises(InputError, match="depth is 'far'"):
+        renderer.forward(splats, camera, depth="far")
+    xray = Renderer(SplatSettings(mode="xray"), device=device)
+    with pytest.raises(InputError, match="xray"):
+        xray.forward(splats, camera, depth="expected")
+    with pytest.raises(ShapeError, match="background has shape"):
+        renderer.forward(splats, camera, depth="expected", background=device.zeros(4))
+    with pytest.raises(ShapeError, match="backgrounds has 1 entries"):
+        draw_views(renderer, splats, [camera, camera], backgrounds=[None])
+    with pytest.raises(ShapeError, match="there are no frames"):
+        views_grad(renderer, [], [])
+    frames = draw_views(renderer, splats, [camera])
+    with pytest.raises(ShapeError, match="grad_images has 0 entries"):
+        views_grad(renderer, frames, [])
+    with pytest.raises(ShapeError, match="grad_image has shape"):
+        renderer.backward(frames[0], device.zeros((3, 3, 3)))
