@@ -25,7 +25,8 @@ from bench.costs import COSTS, Cost, CoverageError, check_known, check_measured
 from bench.limits import LimitMeter, Limits
 from bench.operations import Split, operations, split_record, splits
 from bench.peers import PEERS, ScikitImage
-from bench.race import line_up, race, race_record, speed_ups
+from bench.race import compared
+from bench.rasterizers import RASTERIZERS
 from bench.splats import SPLAT_COSTS, SplatCase
 from bench.surroundings import surroundings
 from bench.tables import markdown, show, tables
@@ -49,7 +50,8 @@ class Options:
     Args:
         json: file for every figure and every raw time.
         markdown: file for the tables, ready for the documentation.
-        peers: also run ASTRA, silx, gratopy and scikit-image, as far as they are installed.
+        peers: also run ASTRA, silx, gratopy, scikit-image and a rasterizer in torch, as far as
+            they are installed.
         quick: one size and few repeats.
         device: which OpenCL device, as RIFT_DEVICE selects it.
         sizes: PIXELSxVIEWS, any number of them.
@@ -125,12 +127,16 @@ def _drives(kernel: str, device: rift.Device) -> bool:
 
 
 def _draw(meter: LimitMeter, options: Options) -> list[Measured]:
-    found = []
+    found, skipped, kinds = [], dict[str, str](), RASTERIZERS if options.peers else ()
     for count, size in options.splats or (_QUICK_SPLATS if options.quick else _SPLATS):
         case = SplatCase(count, size, meter.device)
-        _say(f"{case.name}: kernels")
+        _say(f"{case.name}: {', '.join(['kernels', *(kind.name for kind in kinds)])}")
         rounds = options.rounds or (2 if options.quick else 8)
-        found.append(Measured(splits(meter, case, case.operations, repeats=rounds), case.record()))
+        kernel_splits = splits(meter, case, case.operations, repeats=rounds)
+        lead = compared(
+            kinds, meter.device, case, rounds=rounds, seed=options.seed, skipped=skipped
+        )
+        found.append(Measured(kernel_splits, {**case.record(), **lead, "left_out": dict(skipped)}))
     return found
 
 
@@ -165,13 +171,16 @@ def _measure_one(
     kernel_splits = splits(meter, case, runs, repeats=rounds)
     _say(f"{case.name}: {', '.join(kind.name for kind in kinds)}")
     once = len(kinds) > len(_OURS) and case.updates > _ONCE_UPDATES
-    contenders = line_up(kinds, meter.device, case, skipped)
-    entries = race(contenders, rounds=1 if once else rounds, warm_up=not once, skipped=skipped)
-    records = [race_record(entry, seed=options.seed) for entry in entries]
+    lead = compared(
+        *(kinds, meter.device, case),
+        rounds=1 if once else rounds,
+        warm_up=not once,
+        seed=options.seed,
+        skipped=skipped,
+    )
     record = {
         **case.record(),
-        "contenders": records,
-        "speed_ups": speed_ups(records),
+        **lead,
         "dot_test": _dot_test(meter.device, case, options.seed) if case.slices == 1 else None,
         "peers_once": once,
         "left_out": left_out,

@@ -16,11 +16,11 @@ import numpy as np
 
 import rift_cl as rift
 from bench.case import Case, Floats
-from bench.contender import Contender
+from bench.contender import TomographyContender
 from rift_cl import phantom
 
 
-class Astra(Contender):
+class Astra(TomographyContender):
     """ASTRA's CPU algorithms, which use one thread."""
 
     projector: ClassVar[str]
@@ -79,7 +79,7 @@ class AstraStrip(Astra):
     name, projector = "ASTRA strip", "strip"
 
 
-class Silx(Contender):
+class Silx(TomographyContender):
     """silx.opencl on the same device; its filter uses NumPy's FFT where gpyfft is missing."""
 
     name = "silx"
@@ -117,7 +117,7 @@ class Silx(Contender):
         return self._back.filtered_backprojection(sinogram)
 
 
-class Gratopy(Contender):
+class Gratopy(TomographyContender):
     """Gratopy on the same device, arrays on the device; it has no filters."""
 
     name = "gratopy"
@@ -161,7 +161,7 @@ class Gratopy(Contender):
         return result
 
 
-class ScikitImage(Contender):
+class ScikitImage(TomographyContender):
     """scikit-image, on the CPU; ``radon`` sees the disc alone, with n bins."""
 
     name = "scikit-image"
@@ -199,7 +199,7 @@ class ScikitImage(Contender):
         return self._transform.iradon(sinogram.T, self._degrees, **settings)
 
 
-PEERS: tuple[type[Contender], ...] = (
+PEERS: tuple[type[TomographyContender], ...] = (
     AstraLine,
     AstraLinear,
     AstraStrip,

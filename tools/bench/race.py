@@ -14,15 +14,9 @@ from typing import Any
 import numpy as np
 
 import rift_cl as rift
-from bench.case import Case, Floats
+from bench.case import Floats
 from bench.contender import Contender
 from bench.timing import summary, timed
-from rift_cl import metrics
-
-# The adjoint test runs both directions twice more; beyond this many updates it would take minutes.
-_ADJOINT_UPDATES = 1e9
-# Noise must vanish where scikit-image, whose disc is half a pixel off, wants zeros.
-_MARGIN = 2.0
 
 
 @dataclass
@@ -41,7 +35,7 @@ class Entry:
 
 
 def line_up(
-    kinds: Iterable[type[Contender]], device: rift.Device, case: Case, skipped: dict[str, str]
+    kinds: Iterable[type[Contender]], device: rift.Device, case: Any, skipped: dict[str, str]
 ) -> list[Contender]:
     """Make the contenders of a case; who cannot be made is left out and the reason noted."""
     contenders = []
@@ -79,6 +73,24 @@ def race(
     return [entry for entry in entries if entry.contender.name not in skipped]
 
 
+def compared(
+    kinds: Iterable[type[Contender]],
+    device: rift.Device,
+    case: Any,
+    *,
+    rounds: int,
+    warm_up: bool = True,
+    seed: int,
+    skipped: dict[str, str],
+) -> dict[str, Any]:
+    """The JSON record of a race between those who can be made: each of them, and our lead."""
+    entries = race(
+        line_up(kinds, device, case, skipped), rounds=rounds, warm_up=warm_up, skipped=skipped
+    )
+    records = [race_record(entry, seed=seed) for entry in entries]
+    return {"contenders": records, "speed_ups": speed_ups(records)}
+
+
 def _turn(entry: Entry, skipped: dict[str, str]) -> None:
     contender = entry.contender
     if contender.name in skipped:
@@ -94,10 +106,9 @@ def _turn(entry: Entry, skipped: dict[str, str]) -> None:
 
 def _repeat(entry: Entry, operation: str) -> None:
     contender = entry.contender
-    given = contender.case.image if operation == "forward" else contender.sinogram
-    array, run = contender.enter(given), getattr(contender, operation)
+    run = contender.prepared(operation)
     for _ in range(contender.repeats):
-        seconds, result = timed(lambda: run(array))
+        seconds, result = timed(run)
         entry.seconds[operation].append(seconds)
     # A copy: some peers hand out the same buffer every time.
     entry.outputs[operation] = np.array(contender.leave(result))
@@ -110,56 +121,17 @@ def _reason(error: Exception) -> str:
 
 def race_record(entry: Entry, *, seed: int) -> dict[str, Any]:
     """The JSON record of one contender at one size."""
-    contender, case = entry.contender, entry.contender.case
+    contender = entry.contender
     return {
         "name": contender.name,
         "arrays": contender.arrays,
         "ours": contender.ours,
         "operations": {
-            operation: {**summary(seconds), "updates_per_s": case.updates / min(seconds)}
+            operation: {**summary(seconds), **contender.rates(min(seconds))}
             for operation, seconds in entry.seconds.items()
         },
-        "accuracy": _accuracy(entry, seed=seed),
+        "accuracy": contender.accuracy(entry.outputs, seed=seed),
     }
-
-
-def _accuracy(entry: Entry, *, seed: int) -> dict[str, float | None]:
-    """Scores of the last results; of the first slice, since a stack's are all alike."""
-    contender, case, mask = entry.contender, entry.contender.case, entry.contender.case.disc()
-    found = entry.outputs.get("fbp")
-    image = None if found is None else found.reshape(-1, case.n, case.n)[0]
-    test = case.slices == 1 and case.updates <= _ADJOINT_UPDATES
-    return {
-        "forward_error": _relative(entry.outputs["forward"], contender.sinogram),
-        "fbp_psnr_db": None if image is None else metrics.psnr(image, case.truth, mask=mask),
-        "fbp_ssim": None if image is None else metrics.ssim(image, case.truth, mask=mask),
-        "adjoint_mismatch": adjoint_mismatch(contender, seed=seed) if test else None,
-    }
-
-
-def _relative(found: Floats, exact: Floats) -> float:
-    return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
-
-
-def adjoint_mismatch(contender: Contender, *, seed: int) -> float:
-    """|<Ax, y> - s <x, A'y>| / (|Ax| |y|) for white noise x in the disc and y = Ax.
-
-    Packages scale their backprojection differently, so the factor s is fitted first, on the
-    phantom and its projection.
-    """
-    case = contender.case
-    image, views, back = _there_and_back(contender, case.truth)
-    scale = np.sum(views**2) / np.sum(image * back)
-    noise = np.random.default_rng(seed).standard_normal(case.truth.shape).astype(np.float32)
-    image, views, back = _there_and_back(contender, noise * case.disc(margin=_MARGIN))
-    energy = np.sum(views**2)
-    return float(abs(energy - scale * np.sum(image * back)) / energy)
-
-
-def _there_and_back(contender: Contender, image: Floats) -> tuple[Any, Any, Any]:
-    views = np.array(contender.leave(contender.forward(contender.enter(image))), dtype=np.float32)
-    back = contender.leave(contender.backward(contender.enter(views)))
-    return image.astype(np.float64), views.astype(np.float64), back.astype(np.float64)
 
 
 def speed_ups(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 import rift_cl as rift
+from bench.case import Floats
 from bench.costs import Cost
 from rift_cl.geometry import Camera
-from rift_cl.splat.frame import Frame
+from rift_cl.splat.frame import Frame, FrameGradients
 from rift_cl.splat.projection import MOMENTS
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
@@ -49,17 +50,33 @@ class SplatCase:
         return f"{self.count} splats, {self.size}²"
 
     @cached_property
-    def splats(self) -> Splats:
-        """The cube of Gaussians."""
+    def parameters(self) -> dict[str, Floats]:
+        """The cube of Gaussians: host arrays by the names that ``Splats`` gives them."""
         random = np.random.default_rng(0)
-        return Splats.upload(
-            self.device,
-            means=random.uniform(-1, 1, (self.count, 3)),
-            quats=random.normal(size=(self.count, 4)),
-            scales=np.exp(random.normal(np.log(0.02), 0.4, (self.count, 3))),
-            opacities=random.uniform(0.1, 0.9, self.count),
-            sh=0.2 * random.normal(size=(self.count, _COEFFICIENTS, 3)),
-        )
+        values = {
+            "means": random.uniform(-1, 1, (self.count, 3)),
+            "quats": random.normal(size=(self.count, 4)),
+            "scales": np.exp(random.normal(np.log(0.02), 0.4, (self.count, 3))),
+            "opacities": random.uniform(0.1, 0.9, self.count),
+            "sh": 0.2 * random.normal(size=(self.count, _COEFFICIENTS, 3)),
+        }
+        return {name: array.astype(np.float32) for name, array in values.items()}
+
+    @cached_property
+    def splats(self) -> Splats:
+        """The same on the device."""
+        return Splats.upload(self.device, **self.parameters)
+
+    @property
+    def background(self) -> Floats:
+        """What is behind the cube, (3,)."""
+        return np.float32([0.1, 0.2, 0.3])
+
+    @cached_property
+    def grad_image(self) -> Floats:
+        """A loss's gradient by the image, white noise."""
+        random = np.random.default_rng(1)
+        return random.normal(size=(self.size, self.size, 3)).astype(np.float32)
 
     @cached_property
     def camera(self) -> Camera:
@@ -76,20 +93,26 @@ class SplatCase:
         return self._forward()
 
     @cached_property
+    def gradients(self) -> FrameGradients:
+        """The gradients of ``frame`` for ``grad_image``."""
+        grad = self.device.array(self.grad_image)
+        return Renderer(device=self.device).backward(self.frame, grad)
+
+    @cached_property
     def depth_frame(self) -> Frame:
         """The scene with its expected depth."""
         return Renderer(device=self.device).forward(self.splats, self.camera, depth="expected")
 
     def _forward(self) -> Frame:
-        background = self.device.array(np.float32([0.1, 0.2, 0.3]))
+        background = self.device.array(self.background)
         return Renderer(device=self.device).forward(self.splats, self.camera, background=background)
 
     @cached_property
     def operations(self) -> dict[str, Callable[[], Any]]:
         """The operations by name, on device arrays."""
-        random = np.random.default_rng(1)
-        grad = self.device.array(random.normal(size=(self.size, self.size, 3)))
-        deep = self.device.array(random.normal(size=(self.size, self.size, 4)))
+        grad = self.device.array(self.grad_image)
+        noise = np.random.default_rng(2).normal(size=(self.size, self.size, 4))
+        deep = self.device.array(noise)
         renderer = Renderer(device=self.device)
         return {
             "draw": self._forward,

@@ -13,7 +13,8 @@ from typing import Any
 
 import rift_cl as rift
 
-_PACKAGES = ("numpy", "scipy", "pyopencl", "astra-toolbox", "silx", "gratopy", "scikit-image")
+_OURS = ("numpy", "scipy", "pyopencl")
+_PACKAGES = (*_OURS, "astra-toolbox", "silx", "gratopy", "scikit-image", "torch")
 _IMPORTS = 5
 
 

@@ -19,6 +19,11 @@ _LEGEND = (
     "head from that sinogram; adjoint: relative mismatch of <Ax, Ax> and s <x, A'Ax> for white "
     "noise x, the factor s fitted on the head."
 )
+_RASTERIZERS = (
+    "Tiles in plain torch on the CPU, its gradients by autograd; the same splats, tiles and "
+    "thresholds. Ours leaves image and gradients on the device. Difference: relative L2 distance "
+    "of the images, and of the gradients by the means."
+)
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,8 @@ def tables(record: dict[str, Any]) -> Iterator[Table]:
             yield _speed_ups(case)
     if record["splats"]:
         yield _scenes(record["splats"])
+    if any(scene["contenders"] for scene in record["splats"]):
+        yield _rasterizers(record["splats"])
     for scene in record["splats"]:
         yield _kernels(scene)
 
@@ -136,6 +143,23 @@ def _scenes(scenes: list[dict[str, Any]]) -> Table:
         "parameter and of the camera left on the device."
     )
     return Table("Splats", columns, rows, (note,))
+
+
+def _rasterizers(scenes: list[dict[str, Any]]) -> Table:
+    rows: list[Sequence[str]] = []
+    for scene in scenes:
+        by_name = {record["name"]: record for record in scene["contenders"]}
+        for up in scene["speed_ups"]:
+            name, pair = up["operation"], (by_name[up["ours"]], by_name[up["peer"]])
+            times = (_times(each["operations"][name]) for each in pair)
+            distance = _number(pair[1]["accuracy"][name], ".0e")
+            lead = f"{up['by_min']:.1f}×"
+            rows.append((scene["name"], name, up["peer"], *times, lead, distance))
+    reasons = {name: why for scene in scenes for name, why in scene["left_out"].items()}
+    notes = [_RASTERIZERS, *(f"{name} left out: {reason}" for name, reason in reasons.items())]
+    columns = ("scene", "operation", "fastest peer", "rift_cl, ms", "peer, ms", "times faster")
+    title = "Splats against a rasterizer in torch"
+    return Table(title, (*columns, "difference"), rows, notes, texts=3)
 
 
 def _kernels(case: dict[str, Any]) -> Table:
