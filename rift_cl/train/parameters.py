@@ -1,0 +1,176 @@
+"""What is trained: splats before their activations, on the device, with Adam's moments.
+
+Scales are trained as logarithms and opacities as logits; what the rasterizer draws, ``drawn``, is
+made from them after every step. One owner, the trainer, changes these arrays in place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.arithmetic import copy_columns
+from rift_cl.cl.device import Device
+from rift_cl.splat.frame import FrameGradients
+from rift_cl.splat.splats import Splats
+
+GROUPS = ("means", "quats", "log_scales", "logits", "sh")
+_BETA1, _BETA2, _EPSILON = 0.9, 0.999, 1e-15
+# Parameters that one work-item of a CPU goes through; kernels/adam.cl has the same.
+_CPU_RUN = 4096
+
+Arrays = Mapping[str, NDArray[np.float32]]
+
+
+@dataclass
+class Parameters:
+    """N splats in training; every mapping has an array for each of ``GROUPS``.
+
+    Args:
+        device: where they are.
+        raw: what is trained: (N, 3), (N, 4), (N, 3), (N,), (N, K, 3).
+        first: Adam's means of gradients.
+        second: Adam's means of their squares.
+        drawn: what the rasterizer draws; shares positions, quaternions and harmonics with ``raw``.
+        step: steps of Adam that were taken.
+    """
+
+    device: Device
+    raw: dict[str, Any]
+    first: dict[str, Any]
+    second: dict[str, Any]
+    drawn: Splats
+    step: int = 0
+
+    @classmethod
+    def of(
+        cls,
+        device: Device,
+        raw: Arrays,
+        *,
+        first: Arrays | None = None,
+        second: Arrays | None = None,
+        step: int = 0,
+    ) -> Parameters:
+        """Send host arrays to a device; moments are zero if not given."""
+        sent = {name: device.array(raw[name]) for name in GROUPS}
+        return cls(
+            device,
+            sent,
+            _moments(device, sent, first),
+            _moments(device, sent, second),
+            _activated(device, sent),
+            step,
+        )
+
+    def __len__(self) -> int:
+        """Number of splats."""
+        return int(self.raw["means"].shape[0])
+
+    def host(self) -> tuple[dict[str, NDArray[np.float32]], ...]:
+        """The raw values and both moments, on the host."""
+        return tuple(
+            {name: self.device.get(group[name]) for name in GROUPS}
+            for group in (self.raw, self.first, self.second)
+        )
+
+    def update(
+        self,
+        gradients: FrameGradients,
+        rates: Mapping[str, float],
+        *,
+        sh_rest: float,
+        opacity_penalty: float,
+        scale_penalty: float,
+    ) -> None:
+        """One step of Adam.
+
+        Args:
+            gradients: of the loss, by what was drawn.
+            rates: of each group; of the harmonics, that of the constant one.
+            sh_rest: rate of the other harmonics, as a share of that.
+            opacity_penalty: weight of the mean opacity in the loss.
+            scale_penalty: weight of the mean scale in the loss.
+        """
+        count, found = len(self), gradients.splats
+        self.device.launch(
+            "splat_activate_grad",
+            (count,),
+            *(self.drawn.scales, self.drawn.opacities, found.scales, found.opacities),
+            *(scale_penalty / (3 * count), opacity_penalty / count, count),
+        )
+        by = (found.means, found.quats, found.scales, found.opacities, gradients.sh)
+        self.step += 1
+        for name, gradient in zip(GROUPS, by, strict=True):
+            period = np.full(3 * self.raw["sh"].shape[1] if name == "sh" else 1, rates[name])
+            if name == "sh":
+                period[3:] *= sh_rest
+            self._adam(name, gradient, period)
+        _activate(self.device, self.raw, self.drawn)
+
+    def _adam(self, name: str, gradient: Any, period: NDArray[np.float64]) -> None:
+        device, size = self.device, self.raw[name].size
+        lanes = device.traits.macros["LANES"]
+        # Two periods and a run more, so that rates can be read from any place on.
+        table = np.resize(period, 2 * len(period) + lanes).astype(np.float32)
+        run = _CPU_RUN if device.traits.is_cpu else 1
+        device.launch(
+            "adam",
+            (-(-size // run),),
+            *(self.raw[name], self.first[name], self.second[name], gradient, device.array(table)),
+            *(len(period), _BETA1, _BETA2),
+            *(1 / (1 - _BETA1**self.step), 1 / (1 - _BETA2**self.step), _EPSILON),
+            np.uint64(size),
+            RUN=run,
+        )
+
+    def shake(self, amount: float, seed: int) -> None:
+        """Move faint splats at random; ``kernels/splat_noise.cl`` says how."""
+        drawn, count = self.drawn, len(self)
+        self.device.launch(
+            "splat_noise",
+            (count,),
+            *(drawn.means, drawn.quats, drawn.scales, drawn.opacities),
+            *(float(amount), np.uint32(seed & 0xFFFFFFFF), np.uint32(self.step), count),
+        )
+
+    def add_degree(self) -> None:
+        """Let the next degree of harmonics join, with coefficients of zero."""
+        count, had = len(self), self.raw["sh"].shape[1]
+        wanted = (int(np.sqrt(had)) + 1) ** 2
+        for group in (self.raw, self.first, self.second):
+            wider = self.device.zeros((count, wanted, 3))
+            copy_columns(self.device, group["sh"], 0, wider, 0, 3 * had)
+            group["sh"] = wider
+        self.drawn = _activated(self.device, self.raw)
+
+
+def _moments(device: Device, sent: Mapping[str, Any], given: Arrays | None) -> dict[str, Any]:
+    if given is None:
+        return {name: device.zeros(sent[name].shape) for name in GROUPS}
+    return {name: device.array(given[name]) for name in GROUPS}
+
+
+def _activated(device: Device, raw: Mapping[str, Any]) -> Splats:
+    count = raw["means"].shape[0]
+    drawn = Splats(
+        raw["means"],
+        raw["quats"],
+        device.empty((count, 3)),
+        device.empty((count,)),
+        sh=raw["sh"],
+    )
+    _activate(device, raw, drawn)
+    return drawn
+
+
+def _activate(device: Device, raw: Mapping[str, Any], drawn: Splats) -> None:
+    device.launch(
+        "splat_activate",
+        (len(drawn),),
+        *(raw["log_scales"], raw["logits"], drawn.scales, drawn.opacities, len(drawn)),
+    )

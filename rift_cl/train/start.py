@@ -1,0 +1,121 @@
+"""Where splats begin: at known points of the scene, or at random in what the cameras all see."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from rift_cl.errors import InputError
+from rift_cl.geometry import Camera
+
+# Constant spherical harmonic.
+_Y0 = 0.28209479177387814
+_OPACITY = 0.1
+# A splat begins as large as the distance to so many neighbours.
+_NEIGHBOURS = 3
+# Directions from which a random point must be seen, and candidates that are tried for each.
+_SHARE_OF_VIEWS, _TRIES = 0.5, 400
+
+Floats = NDArray[np.float64]
+
+
+def scene_extent(cameras: Sequence[Camera]) -> float:
+    """The length that positions' rates are measured in: how far the cameras spread (3DGS)."""
+    centers = np.array([camera.center for camera in cameras])
+    spread = np.linalg.norm(centers - centers.mean(axis=0), axis=1).max()
+    if spread > 0:
+        return float(1.1 * spread)
+    return float(np.linalg.norm(focus_of(cameras) - centers[0])) or 1.0
+
+
+def focus_of(cameras: Sequence[Camera]) -> Floats:
+    """The point nearest to all optical axes, (3,); before the cameras if they are parallel."""
+    centers = np.array([camera.center for camera in cameras])
+    axes = np.array([camera.view[2, :3] for camera in cameras])
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    normal = across.sum(axis=0)
+    if np.linalg.cond(normal) > 1e8:
+        return np.asarray(centers.mean(axis=0) + axes.mean(axis=0))
+    return np.asarray(np.linalg.solve(normal, (across @ centers[:, :, None]).sum(axis=0))[:, 0])
+
+
+def random_points(cameras: Sequence[Camera], count: int, seed: int) -> Floats:
+    """Points at random in the volume that at least half of the cameras see, (N, 3).
+
+    Raises:
+        InputError: the cameras have no volume in common.
+    """
+    random = np.random.default_rng((seed, 0x57A7))
+    middle = focus_of(cameras)
+    centers = np.array([camera.center for camera in cameras])
+    reach = float(np.median(np.linalg.norm(centers - middle, axis=1))) or 1.0
+    found: list[Floats] = []
+    for _ in range(_TRIES):
+        points = middle + random.uniform(-reach, reach, (count, 3))
+        found.append(points[_seen_by(cameras, points) >= _SHARE_OF_VIEWS])
+        if sum(map(len, found)) >= count:
+            return np.concatenate(found)[:count]
+    raise InputError(
+        "the cameras have no volume in common that half of them see: give points to begin with"
+    )
+
+
+def _seen_by(cameras: Sequence[Camera], points: Floats) -> Floats:
+    """Share of the cameras in whose image each point lies."""
+    seen = np.zeros(len(points))
+    for camera in cameras:
+        local = points @ camera.view[:3, :3].T + camera.view[:3, 3]
+        fx, fy, cx, cy = camera.intrinsics
+        with np.errstate(all="ignore"):
+            depth = local[:, 2] if camera.model != "ortho" else 1.0
+            u, v = fx * local[:, 0] / depth + cx, fy * local[:, 1] / depth + cy
+        inside = (u > 0) & (u < camera.width) & (v > 0) & (v < camera.height)
+        seen += inside & ((local[:, 2] > 0) | (camera.model == "ortho"))
+    return seen / len(cameras)
+
+
+def start_splats(
+    points: Floats, colors: Floats | None, *, seed: int
+) -> dict[str, NDArray[np.float32]]:
+    """Round, faint splats at (N, 3) points, as large as the gaps between them.
+
+    Args:
+        points: (N, 3) positions.
+        colors: (N, 3) in display light, 0 to 1; grey of some variety if not given.
+        seed: of that variety.
+
+    Returns:
+        Raw values with harmonics of degree 0, as ``Parameters.of`` takes them.
+
+    Raises:
+        InputError: there are no points.
+    """
+    count = len(points)
+    if count == 0:
+        raise InputError("there are no points to begin with, wanted one or more")
+    random = np.random.default_rng((seed, 0xC0105))
+    if colors is None:
+        colors = random.uniform(0.3, 0.7, (count, 3))
+    gaps = _gaps(points)
+    values = {
+        "means": points,
+        "quats": np.tile([1.0, 0, 0, 0], (count, 1)),
+        "log_scales": np.repeat(np.log(gaps)[:, None], 3, axis=1),
+        "logits": np.full(count, np.log(_OPACITY / (1 - _OPACITY))),
+        "sh": ((colors - 0.5) / _Y0)[:, None, :],
+    }
+    return {name: np.ascontiguousarray(value, np.float32) for name, value in values.items()}
+
+
+def _gaps(points: Floats) -> Floats:
+    """Root mean square distance to the nearest neighbours."""
+    near = min(_NEIGHBOURS, len(points) - 1)
+    if near == 0:
+        return np.ones(1)
+    distances = cKDTree(points).query(points, k=near + 1)[0][:, 1:]
+    mean = np.sqrt((distances**2).mean(axis=1))
+    least = max(float(np.median(mean)) * 1e-3, 1e-7)
+    return np.asarray(np.maximum(mean, least))

@@ -1,0 +1,80 @@
+"""Where splats begin, and how large the scene is taken for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rift_cl.errors import InputError
+from rift_cl.geometry import Camera
+from rift_cl.train.start import focus_of, random_points, scene_extent, start_splats
+
+
+def ring(count=12, radius=5.0, middle=(0.3, -0.2, 0.1)):
+    """Cameras on a ring that look at its middle."""
+    cameras = []
+    for angle in np.arange(count) * 2 * np.pi / count:
+        center = np.array(middle) + radius * np.array([np.cos(angle), np.sin(angle), 0.3])
+        forward = (np.array(middle) - center) / np.linalg.norm(np.array(middle) - center)
+        right = np.cross(forward, [0, 0, 1.0])
+        right /= np.linalg.norm(right)
+        view = np.eye(4)
+        view[:3, :3] = [right, np.cross(forward, right), forward]
+        view[:3, 3] = -view[:3, :3] @ center
+        cameras.append(Camera((60, 80), [[90, 0, 40], [0, 90, 30], [0, 0, 1]], view))
+    return cameras
+
+
+def test_focus_is_where_the_axes_meet():
+    np.testing.assert_allclose(focus_of(ring()), [0.3, -0.2, 0.1], atol=1e-9)
+    alone = ring(1)
+    assert np.linalg.norm(focus_of(alone) - alone[0].center) == pytest.approx(1)
+
+
+def test_extent_is_how_far_the_cameras_spread():
+    assert scene_extent(ring()) == pytest.approx(1.1 * 5.0)
+    assert scene_extent(ring(1)) == pytest.approx(1.0)
+
+
+def test_random_points_lie_where_half_of_the_cameras_look():
+    cameras = ring()
+    points = random_points(cameras, 500, 3)
+    assert points.shape == (500, 3)
+    seen = np.zeros(500)
+    for camera in cameras:
+        local = points @ camera.view[:3, :3].T + camera.view[:3, 3]
+        pixels = local[:, :2] / local[:, 2:] * 90 + (40, 30)
+        seen += (local[:, 2] > 0) & ((pixels > 0) & (pixels < (80, 60))).all(axis=1)
+    assert (seen >= 6).all()
+    assert np.array_equal(points, random_points(cameras, 500, 3))
+    assert not np.array_equal(points, random_points(cameras, 500, 4))
+
+
+def test_cameras_that_look_apart_are_told():
+    away = [Camera((4, 4), [[400, 0, 2], [0, 400, 2], [0, 0, 1]], pose) for pose in poses_apart()]
+    with pytest.raises(InputError, match="no volume in common"):
+        random_points(away, 10, 0)
+
+
+def poses_apart():
+    for shift in (0, 1e3, 2e3, 3e3, 4e3):
+        view = np.eye(4)
+        view[0, 3] = -shift
+        yield view
+
+
+def test_splats_are_as_large_as_the_gaps():
+    grid = np.stack(np.meshgrid(*3 * [np.arange(4) * 0.5], indexing="ij"), -1).reshape(-1, 3)
+    raw = start_splats(grid, None, seed=0)
+    np.testing.assert_allclose(np.exp(raw["log_scales"]), 0.5, rtol=1e-6)
+    assert raw["sh"].shape == (64, 1, 3)
+    colored = start_splats(grid, np.full((64, 3), 0.8), seed=0)
+    np.testing.assert_allclose(0.28209479 * colored["sh"] + 0.5, 0.8, rtol=1e-6)
+
+
+def test_points_in_one_place_and_one_point():
+    same = start_splats(np.zeros((5, 3)), None, seed=0)
+    assert np.isfinite(same["log_scales"]).all()
+    assert start_splats(np.zeros((1, 3)), None, seed=0)["log_scales"].tolist() == [[0, 0, 0]]
+    with pytest.raises(InputError, match="no points"):
+        start_splats(np.zeros((0, 3)), None, seed=0)
