@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from rift_cl.cl import Device, default_device, devices, open_device
     from rift_cl.errors import RiftError
     from rift_cl.geometry import Camera, Grid, Parallel
+    from rift_cl.io import SplatScene
     from rift_cl.operators import HighPass, LinearOperator, Projector, Ramp, Response, dot_test
     from rift_cl.reconstruct import backproject, fbp
     from rift_cl.splat import Renderer, Splats, SplatSettings
@@ -39,6 +40,7 @@ _HOMES = {
     "Renderer": "splat",
     "Response": "operators",
     "RiftError": "errors",
+    "SplatScene": "io",
     "SplatSettings": "splat",
     "Splats": "splat",
     "backproject": "reconstruct",
@@ -62,6 +64,7 @@ __all__ = [
     "Renderer",
     "Response",
     "RiftError",
+    "SplatScene",
     "SplatSettings",
     "Splats",
     "backproject",

@@ -79,6 +79,7 @@ def _commands() -> dict[str, Callable[..., Callable[[], int]]]:
     from rift_cl.jobs.center import CenterSettings
     from rift_cl.jobs.demo import DemoSettings
     from rift_cl.jobs.devices import DevicesSettings
+    from rift_cl.jobs.fit import FitSettings
     from rift_cl.jobs.reconstruct import ReconstructSettings
 
     return {
@@ -86,6 +87,7 @@ def _commands() -> dict[str, Callable[..., Callable[[], int]]]:
         "demo": _command(_demo, DemoSettings),
         "reconstruct": _command(_reconstruct, ReconstructSettings),
         "center": _command(_center, CenterSettings),
+        "fit": _command(_fit, FitSettings),
         "cache": _command(_cache, CacheSettings),
     }
 
@@ -180,6 +182,19 @@ def _center(settings: Any, output: Output) -> None:
     _watch(job.run(), output)
     print(f"{job.metrics['center']:.2f}")
     print(f"contact sheet and report.html are in {settings.out}", file=sys.stderr)
+
+
+def _fit(settings: Any, output: Output) -> None:
+    from rift_cl.jobs.fit import Fit
+    from rift_cl.jobs.fit_report import COLUMNS, SCORING, score_rows
+
+    job = Fit(settings)
+    if settings.dry_run:
+        _print_table(("what", "plan"), job.plan().items())
+        return
+    _watch(job.run(), output)
+    _print_table(COLUMNS, score_rows(job.metrics), caption=SCORING)
+    print(f"scene.ply and report.html are in {settings.out}")
 
 
 def _cache(settings: Any, output: Output) -> None:

@@ -51,10 +51,11 @@ def image_grid(
     row_labels: Sequence[str] | None = None,
     size: float = 2.4,
 ) -> Figure:
-    """Grey panels side by side, with the display window stated below them.
+    """Panels side by side, with the display window of grey ones stated below them.
 
     Args:
-        images: the panels row by row, each (y, x); row 0 of an image is on top.
+        images: the panels row by row, each (y, x), or (y, x, 3) colours from 0 to 1, which are
+            shown as they are; row 0 of an image is on top.
         titles: a text above each panel, empty where none is wanted; it may hold line breaks.
         columns: panels in a row.
         window: (black, white) for all panels, or one such pair for each row. When not given, from
@@ -63,12 +64,12 @@ def image_grid(
         size: longer side of a panel in inches, up to the rounding that keeps samples square.
 
     Raises:
-        ShapeError: no image, one that is not (y, x), or titles, labels or windows do not match.
+        ShapeError: no image, one of other axes, or titles, labels or windows do not match.
         DTypeError: an image is not of real numbers.
         NonFiniteError: an image holds NaN or infinity.
         InputError: white is not above black, or ``columns`` or ``size`` is not positive.
     """
-    pixels = [_real(f"images[{k}]", image, axes=2) for k, image in enumerate(images)]
+    pixels = [_pixels(f"images[{k}]", image) for k, image in enumerate(images)]
     if columns < 1 or not 0 < size < math.inf:
         raise InputError(f"image_grid: columns is {columns}, size {size}; wanted positive numbers")
     rows = -(-len(pixels) // columns)
@@ -88,6 +89,12 @@ def image_grid(
     return _draw_grid(panels, columns, labels, f"Display window {footer}")
 
 
+def _pixels(name: str, image: ArrayLike) -> _Reals:
+    in_color = np.ndim(image) == 3 and np.shape(image)[2] == 3
+    pixels = _real(name, image, axes=3 if in_color else 2)
+    return np.clip(pixels, 0, 1) if in_color else pixels
+
+
 def _windows(
     images: Sequence[_Reals], window: _Window | Sequence[_Window] | None, rows: int
 ) -> list[_Window]:
@@ -103,7 +110,7 @@ def _windows(
 
 
 def _drawn_size(image: _Reals, target: int) -> tuple[int, int]:
-    factor = target / max(image.shape)
+    factor = target / max(image.shape[:2])
     factor = max(1, round(factor)) if factor > 0.75 else factor
     return max(1, round(image.shape[0] * factor)), max(1, round(image.shape[1] * factor))
 

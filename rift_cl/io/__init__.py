@@ -10,21 +10,29 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rift_cl.io.capture import Capture, View, camera_at, open_capture, read_view
     from rift_cl.io.image import read_image, write_png
     from rift_cl.io.output import atomic_path, make_folder, write_json, write_text
     from rift_cl.io.scan import open_scan
     from rift_cl.io.scan_file import ScanFile, ScanRows
+    from rift_cl.io.splat_scene import SplatScene
     from rift_cl.io.volume import VolumeWriter, open_volume, read_volume
 
 _HOMES = {
+    "Capture": "capture",
     "ScanFile": "scan_file",
     "ScanRows": "scan_file",
+    "SplatScene": "splat_scene",
+    "View": "capture",
     "VolumeWriter": "volume",
     "atomic_path": "output",
+    "camera_at": "capture",
     "make_folder": "output",
+    "open_capture": "capture",
     "open_scan": "scan",
     "open_volume": "volume",
     "read_image": "image",
+    "read_view": "capture",
     "read_volume": "volume",
     "write_json": "output",
     "write_png": "image",
@@ -32,14 +40,20 @@ _HOMES = {
 }
 
 __all__ = [
+    "Capture",
     "ScanFile",
     "ScanRows",
+    "SplatScene",
+    "View",
     "VolumeWriter",
     "atomic_path",
+    "camera_at",
     "make_folder",
+    "open_capture",
     "open_scan",
     "open_volume",
     "read_image",
+    "read_view",
     "read_volume",
     "write_json",
     "write_png",

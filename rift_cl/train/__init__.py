@@ -1,1 +1,1 @@
-"""What a trainer of splats needs on the device: losses with their gradients."""
+"""Training splats on the device: the loss, its gradient, and what steps along it."""

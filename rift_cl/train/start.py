@@ -1,4 +1,4 @@
-"""Where splats begin: at known points of the scene, or at random in what the cameras all see."""
+"""Where splats begin: at known points, in the visual hull, or at random where the cameras look."""
 
 from __future__ import annotations
 
@@ -16,8 +16,13 @@ _Y0 = 0.28209479177387814
 _OPACITY = 0.1
 # A splat begins as large as the distance to so many neighbours.
 _NEIGHBOURS = 3
-# Directions from which a random point must be seen, and candidates that are tried for each.
+# Share of the views that must see a random point, and how often points are drawn.
 _SHARE_OF_VIEWS, _TRIES = 0.5, 400
+# Share of the views that must see foreground at a point of the hull, share of points that lie near
+# its surface, and how near, as a share of the distance at which the cameras stand.
+_HULL, _SHELL, _DEPTH = 0.98, 0.85, 0.03
+# Points that are tried to find out where the hull lies, and how many of them must lie in it.
+_COARSE, _FEWEST = 200_000, 20
 
 Floats = NDArray[np.float64]
 
@@ -63,18 +68,78 @@ def random_points(cameras: Sequence[Camera], count: int, seed: int) -> Floats:
     )
 
 
+def hull_points(
+    cameras: Sequence[Camera], masks: Sequence[NDArray[np.bool_]], count: int, seed: int
+) -> Floats | None:
+    """Points in the visual hull: what all cameras see in front of the background, (N, 3).
+
+    Most of them lie near its surface, where what is opaque shows.
+
+    Args:
+        cameras: some views, from as many sides as there are.
+        masks: (height, width) the foreground of each.
+        count: how many points.
+        seed: of the drawing by chance.
+
+    Returns:
+        The points, or None where hardly any point is in front of the background everywhere.
+    """
+    random = np.random.default_rng((seed, 0x40CC))
+    middle = focus_of(cameras)
+    centers = np.array([camera.center for camera in cameras])
+    reach = float(np.median(np.linalg.norm(centers - middle, axis=1))) or 1.0
+    coarse = middle + random.uniform(-reach, reach, (_COARSE, 3))
+    coarse = coarse[_in_hull(cameras, masks, coarse)]
+    if len(coarse) < _FEWEST:
+        return None
+    margin = 0.1 * (coarse.max(axis=0) - coarse.min(axis=0))
+    low, high = coarse.min(axis=0) - margin, coarse.max(axis=0) + margin
+    shell, core = [np.empty((0, 3))], [np.empty((0, 3))]
+    for _ in range(_TRIES):
+        points = random.uniform(low, high, (count, 3))
+        points = points[_in_hull(cameras, masks, points)]
+        away = random.normal(size=points.shape)
+        away *= _DEPTH * reach / np.linalg.norm(away, axis=1, keepdims=True)
+        near = ~_in_hull(cameras, masks, points + away)
+        shell.append(points[near])
+        core.append(points[~near])
+        found, rest = sum(map(len, shell)), sum(map(len, core))
+        if found >= _SHELL * count and found + rest >= count:
+            outer = np.concatenate(shell)[: max(round(_SHELL * count), count - rest)]
+            return np.concatenate([outer, np.concatenate(core)])[:count]
+    return None
+
+
+def _in_hull(
+    cameras: Sequence[Camera], masks: Sequence[NDArray[np.bool_]], points: Floats
+) -> NDArray[np.bool_]:
+    seen, front = np.zeros(len(points)), np.zeros(len(points))
+    for camera, mask in zip(cameras, masks, strict=True):
+        rows, columns, inside = _pixels_of(camera, points)
+        seen += inside
+        front += inside & mask[rows, columns]
+    return np.asarray((seen >= _SHARE_OF_VIEWS * len(cameras)) & (front >= _HULL * seen))
+
+
+def _pixels_of(
+    camera: Camera, points: Floats
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+    """Rows and columns of the pixels that points fall on, and whether they fall on the image."""
+    local = points @ camera.view[:3, :3].T + camera.view[:3, 3]
+    fx, fy, cx, cy = camera.intrinsics
+    with np.errstate(all="ignore"):
+        depth = local[:, 2] if camera.model != "ortho" else 1.0
+        u, v = fx * local[:, 0] / depth + cx, fy * local[:, 1] / depth + cy
+        inside = (u > 0) & (u < camera.width) & (v > 0) & (v < camera.height)
+    inside &= (local[:, 2] > 0) | (camera.model == "ortho")
+    u, v = np.where(inside, u, 0), np.where(inside, v, 0)
+    return v.astype(np.int64), u.astype(np.int64), inside
+
+
 def _seen_by(cameras: Sequence[Camera], points: Floats) -> Floats:
     """Share of the cameras in whose image each point lies."""
-    seen = np.zeros(len(points))
-    for camera in cameras:
-        local = points @ camera.view[:3, :3].T + camera.view[:3, 3]
-        fx, fy, cx, cy = camera.intrinsics
-        with np.errstate(all="ignore"):
-            depth = local[:, 2] if camera.model != "ortho" else 1.0
-            u, v = fx * local[:, 0] / depth + cx, fy * local[:, 1] / depth + cy
-        inside = (u > 0) & (u < camera.width) & (v > 0) & (v < camera.height)
-        seen += inside & ((local[:, 2] > 0) | (camera.model == "ortho"))
-    return seen / len(cameras)
+    seen = sum(_pixels_of(camera, points)[2].astype(float) for camera in cameras)
+    return np.asarray(seen / len(cameras))
 
 
 def start_splats(

@@ -38,6 +38,9 @@ class Pictures(Protocol):
 
     cameras: Sequence[Camera]
 
+    def begin(self, step: int) -> None:
+        """Called before each step."""
+
     def target(self, number: int) -> Any:
         """(height, width, 3) device array in display light, over the background."""
 
@@ -128,6 +131,7 @@ class Trainer:
         """One picture; the loss as a (1,) device array."""
         settings, parameters = self.settings, self.parameters
         number = self.view_at(parameters.step)
+        self.pictures.begin(parameters.step)
         frame = self.renderer.forward(
             parameters.drawn,
             self.pictures.cameras[number],

@@ -9,13 +9,15 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.train.start import focus_of, random_points, scene_extent, start_splats
 
+MIDDLE_OF_RING = np.array([0.3, -0.2, 0.1])
 
-def ring(count=12, radius=5.0, middle=(0.3, -0.2, 0.1)):
+
+def ring(count=12, radius=5.0, middle=MIDDLE_OF_RING):
     """Cameras on a ring that look at its middle."""
     cameras = []
     for angle in np.arange(count) * 2 * np.pi / count:
-        center = np.array(middle) + radius * np.array([np.cos(angle), np.sin(angle), 0.3])
-        forward = (np.array(middle) - center) / np.linalg.norm(np.array(middle) - center)
+        center = middle + radius * np.array([np.cos(angle), np.sin(angle), 0.3])
+        forward = (middle - center) / np.linalg.norm(middle - center)
         right = np.cross(forward, [0, 0, 1.0])
         right /= np.linalg.norm(right)
         view = np.eye(4)

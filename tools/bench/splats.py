@@ -18,6 +18,7 @@ import numpy as np
 import rift_cl as rift
 from bench.case import Floats
 from bench.costs import Cost
+from bench.training import TRAINING_COSTS, training_operations
 from rift_cl.geometry import Camera
 from rift_cl.splat.frame import Frame, FrameGradients
 from rift_cl.splat.projection import MOMENTS
@@ -119,6 +120,7 @@ class SplatCase:
             "gradient": lambda: renderer.backward(self.frame, grad, with_camera=True),
             "depth": lambda: renderer.forward(self.splats, self.camera, depth="expected"),
             "depth gradient": lambda: renderer.backward(self.depth_frame, deep, with_camera=True),
+            **training_operations(self),
         }
 
     @property
@@ -226,4 +228,5 @@ SPLAT_COSTS: dict[str, Cost] = {
     "splat_shade_grad": _bytes_only("splat", _n, 12 + 192 + 24 + 192, "harmonics in and out"),
     "sum_columns": _bytes_only("splat", _n, 64, "the camera's parts in"),
     "background_grad": _bytes_only("pixel", _pixels, 28, "image in, parts out"),
+    **TRAINING_COSTS,
 }

@@ -1,0 +1,187 @@
+"""Splats in the PLY layout of 3D Gaussian splatting (Kerbl et al. 2023), which viewers read.
+
+One element ``vertex`` of floats: x y z, nx ny nz (zero, never read), f_dc_0 to 2, f_rest_0 to
+3 (K - 1) - 1, opacity, scale_0 to 2, rot_0 to 3. The rest of the harmonics is channel-major: every
+coefficient of red comes before the first of green.
+
+Bodies are read and written in blocks that stay in the cache. Nothing is mapped into memory: a
+mapped file that somebody shortens ends the process.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from io import BufferedReader, TextIOWrapper
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import FileFormatError
+from rift_cl.io.boundary import check_claim
+from rift_cl.io.ply_header import PlyHeader, read_header
+
+if TYPE_CHECKING:
+    from rift_cl.io.splat_scene import SplatScene
+
+Arrays = dict[str, NDArray[np.float32]]
+
+# Numbers of spherical harmonics of degree 0 to 4.
+COEFFICIENTS = (1, 4, 9, 16, 25)
+
+_NORMALS = ("nx", "ny", "nz")
+_BLOCK = 1 << 20
+# Characters that a number in a text may take, with the space after it.
+_WIDEST = 64
+_LISTED = 4
+
+
+def read_ply(path: Path, file: BufferedReader, *, budget: int | None) -> Arrays:
+    """Read the arrays of a scene from a file that is open at its beginning.
+
+    Raises:
+        FileFormatError: the file is damaged, or holds no splats.
+        ResourceLimitError: they are larger than the budget; nothing was allocated.
+    """
+    header = read_header(path, file)
+    coefficients = _coefficients(path, header)
+    header.check_size(path, file.seek(0, 2))
+    check_claim(path, "the scene", 4 * (11 + 3 * coefficients) * header.count, budget)
+    arrays = _empty(header.count, coefficients)
+    columns = _columns(arrays)
+    file.seek(header.offset)
+    start = 0
+    for block in (_binary_blocks if header.order else _text_blocks)(path, file, header):
+        # A number too large for float32 becomes infinite, and is refused with the others.
+        with np.errstate(over="ignore"):
+            for name, column in columns.items():
+                column[start : start + len(block)] = block[name]
+        start += len(block)
+    return arrays
+
+
+def encode_ply(scene: SplatScene) -> tuple[int, Iterator[bytes]]:
+    """A scene as the bytes of a file: how many they are, and the blocks that they come in."""
+    columns = _columns(vars(scene))
+    names = list(columns)
+    names[3:3] = _NORMALS
+    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(scene)}"]
+    lines += [f"property float {name}" for name in names]
+    header = "\n".join([*lines, "end_header", ""]).encode()
+    record = np.dtype([(name, "<f4") for name in names])
+    return len(header) + len(scene) * record.itemsize, _encoded(header, record, columns)
+
+
+def _encoded(
+    header: bytes, record: np.dtype[np.void], columns: dict[str, NDArray[np.float32]]
+) -> Iterator[bytes]:
+    yield header
+    runs = _runs(len(columns["x"]), record)
+    block = np.zeros(runs[0].stop if runs else 0, record)
+    for run in runs:
+        part = block[: run.stop - run.start]
+        for name, column in columns.items():
+            part[name] = column[run]
+        yield part.tobytes()
+
+
+def scene_shapes(count: int, coefficients: int) -> dict[str, tuple[int, ...]]:
+    """The shapes of a scene's arrays by their names."""
+    return {
+        "means": (count, 3),
+        "log_scales": (count, 3),
+        "quats": (count, 4),
+        "logit_opacities": (count,),
+        "sh": (count, coefficients, 3),
+    }
+
+
+def _columns(arrays: dict[str, Any]) -> dict[str, NDArray[np.float32]]:
+    """Views of the arrays by the names of the properties, in the order of the file."""
+    means, sh, quats = arrays["means"], arrays["sh"], arrays["quats"]
+    rest = sh.shape[1] - 1
+    columns: dict[str, NDArray[np.float32]] = dict(zip("xyz", means.T, strict=True))
+    columns |= {f"f_dc_{c}": sh[:, 0, c] for c in range(3)}
+    columns |= {f"f_rest_{c * rest + k}": sh[:, 1 + k, c] for c in range(3) for k in range(rest)}
+    columns["opacity"] = arrays["logit_opacities"]
+    columns |= {f"scale_{i}": column for i, column in enumerate(arrays["log_scales"].T)}
+    columns |= {f"rot_{i}": column for i, column in enumerate(quats.T)}
+    return columns
+
+
+def _empty(count: int, coefficients: int) -> Arrays:
+    return {
+        name: np.empty(shape, np.float32)
+        for name, shape in scene_shapes(count, coefficients).items()
+    }
+
+
+def _coefficients(path: Path, header: PlyHeader) -> int:
+    """The number of harmonics, after a look whether every property is there."""
+    rest = sum(name.startswith("f_rest_") for name in header.properties)
+    if rest % 3 or 1 + rest // 3 not in COEFFICIENTS:
+        raise FileFormatError(
+            f"{path}: has {rest} properties f_rest, wanted 0, 9, 24, 45 or 72 (degree 0 to 4)"
+        )
+    wanted = _columns(_empty(0, 1 + rest // 3))
+    missing = [name for name in wanted if name not in header.properties]
+    if missing:
+        more = ", ..." if len(missing) > _LISTED else ""
+        raise FileFormatError(
+            f"{path}: lacks {', '.join(missing[:_LISTED])}{more}; it holds points or a mesh, or "
+            "splats of another layout than that of 3D Gaussian splatting"
+        )
+    return 1 + rest // 3
+
+
+def _runs(count: int, record: np.dtype[np.void]) -> list[slice]:
+    """Cut records into blocks."""
+    rows = max(1, _BLOCK // record.itemsize)
+    return [slice(start, min(start + rows, count)) for start in range(0, count, rows)]
+
+
+def _binary_blocks(
+    path: Path, file: BufferedReader, header: PlyHeader
+) -> Iterator[NDArray[np.void]]:
+    runs = _runs(header.count, header.record)
+    block = np.empty(runs[0].stop if runs else 0, header.record)
+    for run in runs:
+        part = block[: run.stop - run.start]
+        if file.readinto(part.view(np.uint8).data) < part.nbytes:
+            raise FileFormatError(f"{path}: was cut off while it was read")
+        yield part
+
+
+def _text_blocks(path: Path, file: BufferedReader, header: PlyHeader) -> Iterator[NDArray[np.void]]:
+    width = len(header.properties)
+    record = np.dtype([(name, "f4") for name in header.properties])
+    with TextIOWrapper(file, "ascii") as text:
+        # A longer line comes in pieces, which have too few numbers and are refused as such.
+        pieces = iter(lambda: text.readline(_WIDEST * width), "")
+        lines = (line for line in pieces if line.strip())
+        for run in _runs(header.count, record):
+            rows = list(islice(lines, run.stop - run.start))
+            if len(rows) < run.stop - run.start:
+                raise FileFormatError(
+                    f"{path}: claims {header.count} records and holds {run.start + len(rows)}; it "
+                    "was cut off"
+                )
+            yield _table(path, rows, run.start, width).view(record)[:, 0]
+        if next(lines, None) is not None:
+            raise FileFormatError(f"{path}: holds more than the {header.count} records it claims")
+
+
+def _table(path: Path, rows: list[str], start: int, width: int) -> NDArray[np.float32]:
+    try:
+        values = np.loadtxt(rows, np.float32, comments=None, ndmin=2)
+        fits = values.shape[1] == width
+    except ValueError:
+        fits = False
+    if not fits:
+        raise FileFormatError(
+            f"{path}: records {start} to {start + len(rows)} are no lines of {width} numbers each; "
+            "the file is damaged"
+        )
+    return values

@@ -1,0 +1,183 @@
+"""Splats on the host, as files hold them: before the activations that a rasterizer needs.
+
+A trainer works on logarithms of scales and logits of opacities, and its files keep them, so that
+a scene that was saved and loaded is the same to the bit. ``upload`` makes what is drawn of it.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.device import Device
+from rift_cl.cl.memory import as_host_array, as_real_array, check_finite
+from rift_cl.errors import FileFormatError, InputError, OutputError, ShapeError
+from rift_cl.io.boundary import reading
+from rift_cl.io.output import atomic_path, check_space
+from rift_cl.io.splat_activations import log_scales_of, logits_of, opacities_of, scales_of
+from rift_cl.io.splat_file import encode_splat, read_splat
+from rift_cl.io.splat_ply import COEFFICIENTS, encode_ply, read_ply, scene_shapes
+from rift_cl.splat.splats import Splats
+
+_ENCODERS = {".ply": encode_ply, ".splat": encode_splat}
+_PLY_STARTS = (b"ply\n", b"ply\r")
+
+
+@dataclass(frozen=True, eq=False)
+class SplatScene:
+    """N splats in host memory; arrays of any real type become float32, float32 is not copied.
+
+    Args:
+        means: (N, 3) positions in world coordinates.
+        log_scales: (N, 3) logarithms of the standard deviations along the rotated axes.
+        quats: (N, 4) rotations as quaternions (w, x, y, z) of any length.
+        logit_opacities: (N,) logits of the opacities.
+        sh: (N, K, 3) coefficients of spherical harmonics, K = 1, 4, 9, 16 or 25.
+
+    Raises:
+        ShapeError: an array does not fit the others.
+        DTypeError: an array does not hold real numbers.
+        NonFiniteError: an array holds NaN or infinity.
+    """
+
+    means: NDArray[np.float32]
+    log_scales: NDArray[np.float32]
+    quats: NDArray[np.float32]
+    logit_opacities: NDArray[np.float32]
+    sh: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        """Bring the arrays into their normal form and check that they fit each other."""
+        means, sh = (
+            as_real_array(getattr(self, n), name=f"SplatScene: {n}") for n in ("means", "sh")
+        )
+        count = means.shape[0] if means.ndim else 0
+        if sh.ndim != 3 or sh.shape[1] not in COEFFICIENTS:
+            raise ShapeError(
+                f"SplatScene: sh has shape {sh.shape}, wanted ({count}, K, 3) with K = 1, 4, 9, "
+                "16 or 25"
+            )
+        for name, shape in scene_shapes(count, sh.shape[1]).items():
+            array = as_host_array(
+                getattr(self, name), shape, name=f"SplatScene: {name}", wants="the scene"
+            )
+            object.__setattr__(self, name, array)
+
+    def __len__(self) -> int:
+        """Number of splats."""
+        return len(self.means)
+
+    @property
+    def degree(self) -> int:
+        """Degree of the spherical harmonics, 0 to 4."""
+        return COEFFICIENTS.index(self.sh.shape[1])
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *, budget: int | None = None) -> SplatScene:
+        """Read a .ply file of 3D Gaussian splatting, whatever its name is, or a .splat file.
+
+        A PLY file may be text or binary of either byte order, with its properties in any order,
+        of any scalar type, and with others between them, which are left out. A .splat file has
+        no signature and is known by its name.
+
+        Args:
+            path: the file.
+            budget: bytes that the splats may take; 60 % of the free memory when not given.
+
+        Raises:
+            InputError: there is no such file.
+            FileFormatError: the file is damaged, or holds no splats.
+            NonFiniteError: it holds NaN or infinity.
+            ResourceLimitError: the splats are larger than the budget; nothing was allocated.
+        """
+        path = Path(path)
+        with reading(path, "the scene"):
+            arrays = _read(path, budget=budget)
+            for name, array in arrays.items():
+                check_finite(array, name=f"{path}: {name}")
+        return cls(**arrays)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a file that appears complete or not at all.
+
+        Args:
+            path: ends in .ply, which keeps every bit, or in .splat: 32 bytes for each splat, with
+                rounded opacities, rotations and colours, and without the higher harmonics.
+
+        Raises:
+            InputError: the ending is another, or an empty scene is to become a .splat file.
+            OutputError: the file cannot be written.
+        """
+        path = Path(path)
+        if path.suffix.lower() not in _ENCODERS:
+            raise InputError(f"{path}: splats are written as .ply or .splat: end the name so")
+        size, blocks = _ENCODERS[path.suffix.lower()](self)
+        check_space(path, size)
+        with atomic_path(path) as part:
+            with part.open("wb") as file:
+                for block in blocks:
+                    file.write(block)
+            if part.stat().st_size != size:
+                raise OutputError(f"{path}: is shorter than its splats; the disk lost some")
+
+    def upload(self, device: Device) -> Splats:
+        """Copy what is drawn to a device: scales, opacities, and the rest as it is."""
+        return Splats.upload(
+            device,
+            means=self.means,
+            quats=self.quats,
+            scales=scales_of(self.log_scales),
+            opacities=opacities_of(self.logit_opacities),
+            sh=self.sh,
+        )
+
+    @classmethod
+    def of(cls, splats: Splats, device: Device) -> SplatScene:
+        """Copy splats back from a device.
+
+        A scale of 0 and opacities of 0 and 1, whose logarithms and logits are not finite, become
+        the float32 numbers nearest to them.
+
+        Raises:
+            InputError: the splats have covariances, own colours or no harmonics, or a scale or
+                an opacity that no file can hold.
+            NonFiniteError: an array holds NaN, or positions, rotations or harmonics infinity.
+        """
+        if splats.quats is None or splats.sh is None or splats.colors is not None:
+            raise InputError("SplatScene: wants splats with quats, scales and sh, and no colors")
+        scales, opacities = device.get(splats.scales), device.get(splats.opacities)
+        _demand_range("scales", scales, np.inf)
+        _demand_range("opacities", opacities, 1)
+        return cls(
+            means=device.get(splats.means),
+            log_scales=log_scales_of(scales),
+            quats=device.get(splats.quats),
+            logit_opacities=logits_of(opacities),
+            sh=device.get(splats.sh),
+        )
+
+
+def _read(path: Path, *, budget: int | None) -> dict[str, NDArray[np.float32]]:
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is not a file")
+    with path.open("rb") as file:
+        start = file.read(4)
+        file.seek(0)
+        if start in _PLY_STARTS:
+            return read_ply(path, file, budget=budget)
+        if path.suffix.lower() == ".splat":
+            return read_splat(path, file, budget=budget)
+    raise FileFormatError(f"{path}: is no PLY file, and no .splat file by its name")
+
+
+def _demand_range(name: str, values: NDArray[np.float32], most: float) -> None:
+    outside = np.count_nonzero((values < 0) | (values > most))
+    if outside:
+        raise InputError(
+            f"SplatScene: {name} hold {outside} values outside 0 to {most:g}, whose "
+            f"{'logits' if name == 'opacities' else 'logarithms'} do not exist"
+        )

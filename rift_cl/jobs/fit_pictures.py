@@ -1,0 +1,118 @@
+"""The photographs of a fit: decoded once, sent to the device one at a time, over their background.
+
+Photographs are kept on the host as 8-bit codes where that loses nothing to a display, and are
+decoded again whenever they do not fit the budget. Those with alpha are laid over a background that
+is drawn by chance for each step, so that transparent places must become transparent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.budget import free_host_memory
+from rift_cl.cl.device import Device
+from rift_cl.geometry import Camera
+from rift_cl.io.capture import View, camera_at, read_view
+
+# Share of the free host memory that photographs may take.
+_SHARE = 0.4
+# What differs by more from the background, or has more alpha, is in front of it.
+_FOREGROUND = 2 / 255
+# A border is of one colour if so many of its samples are, to within so many codes.
+_UNIFORM, _CODES = 0.8, 1.5
+
+Floats = NDArray[np.float32]
+
+
+class CapturePictures:
+    """What a trainer looks at; see ``rift_cl.train.trainer.Pictures``.
+
+    Args:
+        device: where pictures are sent.
+        views: the photographs.
+        downscale: whole factor by which they are made smaller.
+        seed: of the random backgrounds.
+        background: (3,) in display light, of photographs without alpha; found if not given.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        views: Sequence[View],
+        *,
+        downscale: int = 1,
+        seed: int = 0,
+        background: Floats | None = None,
+    ) -> None:
+        self.device = device
+        self.views = views
+        self.cameras: Sequence[Camera] = [camera_at(view, downscale) for view in views]
+        self._downscale, self._seed = downscale, seed
+        self._kept: dict[int, NDArray[np.uint8]] = {}
+        self._room = int(_SHARE * (free_host_memory() or 1 << 30))
+        found = self._common_border() if background is None else background
+        self.behind = np.zeros(3, np.float32) if found is None else found
+        self._backed = found is not None
+        self._step = 0
+
+    def image(self, number: int) -> Floats:
+        """(height, width, 3 or 4) in display light, alpha straight."""
+        if number not in self._kept:
+            image = read_view(self.views[number], downscale=self._downscale)
+            codes = np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8)
+            if codes.nbytes > self._room:
+                return image
+            self._room -= codes.nbytes
+            self._kept[number] = codes
+        return np.asarray(self._kept[number], np.float32) / np.float32(255)
+
+    def over(self, number: int, background: Floats) -> Floats:
+        """(height, width, 3) over a background."""
+        image = self.image(number)
+        if image.shape[2] == 3:
+            return image
+        alpha = image[..., 3:]
+        return np.asarray(image[..., :3] * alpha + background * (1 - alpha), np.float32)
+
+    def begin(self, step: int) -> None:
+        """Say which step comes: backgrounds hang on it."""
+        self._step = step
+
+    def target(self, number: int) -> Any:
+        """The picture on the device, over the background of this step."""
+        return self.device.array(self.over(number, self._behind(number)))
+
+    def background(self, number: int) -> Any:
+        """What is behind the splats in this step."""
+        return self.device.array(self._behind(number))
+
+    def _behind(self, number: int) -> Floats:
+        if self.image(number).shape[2] == 3:
+            return self.behind
+        random = np.random.default_rng((self._seed, self._step, 0xBAC))
+        return random.uniform(0, 1, 3).astype(np.float32)
+
+    def foreground(self, number: int) -> NDArray[np.bool_] | None:
+        """(height, width) what is in front of the background; None where nobody can tell."""
+        image = self.image(number)
+        if image.shape[2] == 4:
+            return np.asarray(image[..., 3] > _FOREGROUND)
+        if not self._backed:
+            return None
+        return np.asarray(np.abs(image - self.behind).max(axis=2) > _FOREGROUND)
+
+    def _common_border(self) -> Floats | None:
+        """The colour that all borders of a few pictures have; None if they have none."""
+        few = np.unique(np.linspace(0, len(self.views) - 1, 8).round().astype(int))
+        edges = []
+        for number in few.tolist():
+            image = self.image(number)[..., :3]
+            edges += [image[0], image[-1], image[:, 0], image[:, -1]]
+        border = np.concatenate(edges)
+        middle = np.median(border, axis=0)
+        same = np.abs(border - middle).max(axis=1) <= _CODES / 255
+        return np.asarray(middle, np.float32) if same.mean() >= _UNIFORM else None

@@ -1,0 +1,103 @@
+"""How good a fit is: scores on pictures it never saw, beside what no fit at all would score.
+
+A dense ring of cameras makes blending of neighbours look good, so that two baselines stand beside
+every score: the nearest training picture as it is, and the mean of the two nearest. Nearest is by
+angle as seen from where the cameras look; that angle is in the table too. The foreground is what
+differs from the background by more than two codes, or what alpha says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.geometry import Camera
+from rift_cl.jobs.fit_pictures import CapturePictures
+from rift_cl.metrics import psnr, ssim
+from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.splats import Splats
+from rift_cl.train.start import focus_of
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class ViewScore:
+    """Scores of one picture.
+
+    Args:
+        name: of the picture.
+        angle: to the nearest training picture, in degrees.
+        values: PSNR in dB and SSIM by name, of the whole picture and of its foreground.
+        truth: (height, width, 3) what it should be.
+        image: (height, width, 3) what was drawn.
+    """
+
+    name: str
+    angle: float
+    values: dict[str, float]
+    truth: Floats
+    image: Floats
+
+
+def score_views(
+    renderer: Renderer, splats: Splats, unseen: CapturePictures, seen: CapturePictures
+) -> Iterator[ViewScore]:
+    """Draw and score every picture of ``unseen``; ``seen`` are the ones that were trained on."""
+    focus = focus_of(seen.cameras)
+    for number, camera in enumerate(unseen.cameras):
+        behind = unseen.behind
+        frame = renderer.forward(splats, camera, background=renderer.device.array(behind))
+        image = np.clip(renderer.device.get(frame.image), 0, 1)
+        truth = unseen.over(number, behind)
+        angles = _angles(seen.cameras, camera, focus)
+        front = unseen.foreground(number)
+        values = scores_of(image, truth, front, "fit")
+        for name, blend in _baselines(seen, angles, truth.shape, behind).items():
+            values |= scores_of(blend, truth, front, name)
+        yield ViewScore(unseen.views[number].name, float(angles.min()), values, truth, image)
+
+
+def scores_of(
+    image: Floats, truth: Floats, foreground: NDArray[np.bool_] | None, name: str
+) -> dict[str, float]:
+    """PSNR and SSIM of the whole picture and of the foreground, where there is one."""
+    channels = range(truth.shape[2])
+    values = {
+        f"{name}_psnr": psnr(image, truth),
+        f"{name}_ssim": float(np.mean([ssim(image[..., c], truth[..., c]) for c in channels])),
+    }
+    if foreground is not None and foreground.any() and not foreground.all():
+        mask = np.repeat(foreground[..., None], truth.shape[2], axis=2)
+        values[f"{name}_psnr_foreground"] = psnr(image, truth, mask=mask)
+    return values
+
+
+def mean_scores(scores: Sequence[ViewScore]) -> dict[str, float]:
+    """The mean of every score over the pictures that have it."""
+    names = dict.fromkeys(name for score in scores for name in score.values)
+    return {
+        name: float(np.mean([s.values[name] for s in scores if name in s.values])) for name in names
+    }
+
+
+def _angles(cameras: Sequence[Camera], camera: Camera, focus: NDArray[np.float64]) -> Floats:
+    """Degrees between a camera and others, as seen from where they look."""
+    ways = np.array([other.center for other in cameras]) - focus
+    way = camera.center - focus
+    across = np.linalg.norm(np.cross(ways, way), axis=1)
+    return np.asarray(np.degrees(np.arctan2(across, ways @ way)), np.float32)
+
+
+def _baselines(
+    seen: CapturePictures, angles: Floats, shape: tuple[int, ...], behind: Floats
+) -> dict[str, Floats]:
+    """The nearest training picture, and the mean of the two nearest, where their sizes agree."""
+    nearest = np.argsort(angles, kind="stable")[:2].tolist()
+    pictures = [seen.over(number, behind) for number in nearest]
+    if any(picture.shape != shape for picture in pictures):
+        return {}
+    return {"nearest": pictures[0], "blend": np.mean(pictures, axis=0, dtype=np.float32)}

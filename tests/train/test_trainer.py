@@ -1,0 +1,125 @@
+"""Fitting: it learns, does the same twice, and keeps to its schedule."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_start import ring
+
+from rift_cl.errors import InputError
+from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.settings import SplatSettings
+from rift_cl.train.parameters import GROUPS, Parameters
+from rift_cl.train.settings import Renewal, TrainSettings
+from rift_cl.train.start import hull_points, random_points, start_splats
+from rift_cl.train.trainer import Schedule, Trainer
+
+MIDDLE = np.array([0.3, -0.2, 0.1])
+SETTINGS = TrainSettings(
+    steps=120, splats=150, sh_degree=1, sh_every=40, seed=3, renewal=Renewal(first=40, every=20)
+)
+
+
+class Ball:
+    """Pictures of a coloured ball of splats before grey."""
+
+    def __init__(self, device):
+        self.device, self.cameras, self.begun = device, ring(8), []
+        random = np.random.default_rng(0)
+        points = random.normal(size=(300, 3))
+        points = MIDDLE + points / np.linalg.norm(points, axis=1, keepdims=True)
+        raw = start_splats(points, 0.5 + 0.4 * np.sin(3 * points), seed=0)
+        raw["logits"][:] = 3
+        scene = Parameters.of(device, raw).drawn
+        renderer = Renderer(SplatSettings(), device=device)
+        self.grey = device.array(np.full(3, 0.5, np.float32))
+        self.images = [
+            device.get(renderer.forward(scene, camera, background=self.grey).image)
+            for camera in self.cameras
+        ]
+
+    def begin(self, step):
+        self.begun.append(step)
+
+    def target(self, number):
+        return self.device.array(self.images[number])
+
+    def background(self, number):
+        return self.grey
+
+
+def trainer_of(device, settings=SETTINGS):
+    pictures = Ball(device)
+    raw = start_splats(random_points(pictures.cameras, 100, 1), None, seed=1)
+    return Trainer(pictures, Parameters.of(device, raw), settings)
+
+
+def test_the_loss_falls_and_reports_say_so(device):
+    trainer = trainer_of(device, replace(SETTINGS, steps=240))
+    reports = list(trainer.run())
+    losses = [report.values["loss"] for report in reports]
+    assert reports[-1].done == reports[-1].total == 240
+    assert losses[-1] < 0.85 * losses[0]
+    assert 100 < len(trainer.parameters) <= 150
+    assert trainer.parameters.raw["sh"].shape[1] == 4
+    assert trainer.pictures.begun == list(range(240))
+
+
+def test_two_runs_give_the_same_splats_bit_by_bit(device):
+    found = []
+    for _ in range(2):
+        trainer = trainer_of(device)
+        list(trainer.run())
+        found.append(trainer.parameters.host())
+    for first, second in zip(*found, strict=True):
+        assert all(first[name].tobytes() == second[name].tobytes() for name in GROUPS)
+
+
+def test_every_picture_is_looked_at_once_before_any_is_again(device):
+    trainer = trainer_of(device)
+    order = [trainer.view_at(step) for step in range(24)]
+    assert all(sorted(order[k : k + 8]) == list(range(8)) for k in (0, 8, 16))
+    assert order[:8] != order[8:16]
+
+
+def test_rates_fall_and_fade_in_the_finish():
+    schedule = Schedule(TrainSettings(steps=1000, finish=0.2), extent=2.0)
+    assert schedule.finish == 800
+    first, middle, last = (schedule.rates(step) for step in (0, 800, 1000))
+    assert first["means"] == pytest.approx(2 * 1.6e-4)
+    assert middle["means"] == pytest.approx(0.01 * first["means"])
+    assert middle["logits"] == first["logits"]
+    for name in GROUPS:
+        assert last[name] == pytest.approx(0.05 * middle[name]), name
+
+
+def test_the_hull_is_where_every_mask_agrees():
+    cameras = ring(16)
+    masks = []
+    for camera in cameras:
+        y, x = np.mgrid[: camera.height, : camera.width] + 0.5
+        masks.append(np.hypot(x - 40, y - 30) < 12)
+    points = hull_points(cameras, masks, 400, 2)
+    away = np.linalg.norm(points - MIDDLE, axis=1)
+    # A disc of 12 pixels at focal length 90, five away: a ball of radius 0.7 or a little more.
+    assert points.shape == (400, 3) and away.max() < 1.0
+    assert np.median(away) > 0.5
+    assert hull_points(cameras, [np.zeros((60, 80), bool)] * 16, 400, 2) is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"steps": 0}, "steps is 0"),
+        ({"splats": 1.5}, "splats is 1.5"),
+        ({"sh_degree": 5}, "sh_degree is 5"),
+        ({"ssim_weight": 1.2}, "ssim_weight is 1.2"),
+        ({"finish": float("nan")}, "finish is nan"),
+        ({"seed": -1}, "seed is -1"),
+    ],
+)
+def test_settings_out_of_range_are_named(changes, words):
+    with pytest.raises(InputError, match=words):
+        TrainSettings(**changes)
