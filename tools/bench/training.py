@@ -40,9 +40,12 @@ def training_operations(case: SplatCase) -> dict[str, Callable[[], Any]]:
     return {"loss": lambda: loss(device, case.frame.image, target), "update": update}
 
 
-def _per(unit: str, count: Callable[[SplatCase], float], each: int, what: str) -> Cost:
-    formula = f"bytes: {each} per {unit} ({what})"
-    return Cost(unit, 0, count, lambda case: each * count(case), formula)
+def _per(
+    unit: str, count: Callable[[SplatCase], float], each: int, what: str, flops: int = 0
+) -> Cost:
+    work = f"{flops} flop per {unit}; " if flops else ""
+    formula = f"{work}bytes: {each} per {unit} ({what})"
+    return Cost(unit, flops, count, lambda case: each * count(case), formula)
 
 
 def _splats(case: SplatCase) -> float:
@@ -62,6 +65,6 @@ TRAINING_COSTS: dict[str, Cost] = {
     "splat_activate": _per("splat", _splats, 32, "scales and opacity in and out"),
     "splat_activate_grad": _per("splat", _splats, 48, "scales, opacity, gradients in and out"),
     "splat_noise": _per("splat", _splats, 56, "the splat in, its place out"),
-    "ssim_map": _per("sample", _samples, 20, "two images in, three maps out"),
-    "loss_grad": _per("sample", _samples, 24, "two images and three maps in, gradient out"),
+    "ssim_map": _per("sample", _samples, 20, "two images in, three maps out", 215),
+    "loss_grad": _per("sample", _samples, 24, "two images and three maps in, gradient out", 145),
 }
