@@ -75,7 +75,7 @@ def read_pixels(path: Path, *, budget: int | None = None) -> NDArray[np.float32]
         FileFormatError: the file is damaged, or is none of PNG, OpenEXR, TIFF, JPEG and HDR.
         ResourceLimitError: the image is larger than the budget; nothing was allocated.
     """
-    with reading(path, "the image"), _opened(path, _format(path)) as source:
+    with reading(path, "the image"), opened_image(path, image_format(path)) as source:
         spec = source.spec()
         if spec.deep or spec.depth > 1:
             raise FileFormatError(f"{path}: holds deep pixels, a flat image is wanted")
@@ -88,7 +88,13 @@ def read_pixels(path: Path, *, budget: int | None = None) -> NDArray[np.float32]
 
 
 @contextmanager
-def _opened(path: Path, format: str) -> Iterator[Any]:
+def opened_image(path: Path, format: str) -> Iterator[Any]:
+    """The file as OpenImageIO's input, its alpha not multiplied in.
+
+    Raises:
+        FileFormatError: it is damaged, or of another format than this.
+        ResourceLimitError: it is larger than OpenImageIO's own limit.
+    """
     config = OpenImageIO.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
     every = OpenImageIO.get_int_attribute("try_all_readers", 1)
@@ -109,7 +115,12 @@ def _opened(path: Path, format: str) -> Iterator[Any]:
         source.close()
 
 
-def _format(path: Path) -> str:
+def image_format(path: Path) -> str:
+    """OpenImageIO's name for the format of a file, by its content.
+
+    Raises:
+        FileFormatError: content and name do not agree, or the format is not known.
+    """
     with path.open("rb") as file:
         start = file.read(16)
     content = next((name for mark, name in _SIGNATURES.items() if start.startswith(mark)), None)

@@ -105,17 +105,25 @@ def _parse(path: Path, lines: Iterable[str]) -> tuple[str, int, dict[str, str]]:
     order: str | None = None
     count: int | None = None
     properties: dict[str, str] = {}
+    empty = False
     for number, line in enumerate(lines, 2):
         match line.split():
             case [] | ["comment" | "obj_info", *_]:
                 pass
             case ["format", name, "1.0"] if order is None and name in _ORDERS:
                 order = _ORDERS[name]
+            case ["element", _, "0"] if count is not None:
+                # An element without records, such as the faces of a cloud: nothing to read.
+                empty = True
+            case ["property", *_] if empty:
+                pass
             case ["element", name, amount] if order is not None:
                 _demand_vertex(path, name, first=count is None)
                 count = _counted(path, amount)
             case ["property", "list", *_]:
-                raise FileFormatError(f"{path}: has a list property, which splats have not")
+                raise FileFormatError(
+                    f"{path}: has a list property, as meshes have; wanted plain numbers alone"
+                )
             case ["property", kind, name] if count is not None and kind in _TYPES:
                 if name in properties:
                     raise FileFormatError(f"{path}: has two properties {name[:_SHOWN]!r}")
@@ -135,7 +143,7 @@ def _demand_vertex(path: Path, name: str, *, first: bool) -> None:
         return
     hint = "; unpack a compressed PLY first" if name == "chunk" else ""
     raise FileFormatError(
-        f"{path}: has an element {name[:_SHOWN]!r}, splats are one element 'vertex' alone{hint}"
+        f"{path}: has an element {name[:_SHOWN]!r}, wanted one element 'vertex' alone{hint}"
     )
 
 

@@ -3,16 +3,12 @@
 One element ``vertex`` of floats: x y z, nx ny nz (zero, never read), f_dc_0 to 2, f_rest_0 to
 3 (K - 1) - 1, opacity, scale_0 to 2, rot_0 to 3. The rest of the harmonics is channel-major: every
 coefficient of red comes before the first of green.
-
-Bodies are read and written in blocks that stay in the cache. Nothing is mapped into memory: a
-mapped file that somebody shortens ends the process.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from io import BufferedReader, TextIOWrapper
-from itertools import islice
+from io import BufferedReader
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +17,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim
+from rift_cl.io.ply_body import read_blocks, record_runs
 from rift_cl.io.ply_header import PlyHeader, read_header
 
 if TYPE_CHECKING:
@@ -32,9 +29,6 @@ Arrays = dict[str, NDArray[np.float32]]
 COEFFICIENTS = (1, 4, 9, 16, 25)
 
 _NORMALS = ("nx", "ny", "nz")
-_BLOCK = 1 << 20
-# Characters that a number in a text may take, with the space after it.
-_WIDEST = 64
 _LISTED = 4
 
 
@@ -51,9 +45,8 @@ def read_ply(path: Path, file: BufferedReader, *, budget: int | None) -> Arrays:
     check_claim(path, "the scene", 4 * (11 + 3 * coefficients) * header.count, budget)
     arrays = _empty(header.count, coefficients)
     columns = _columns(arrays)
-    file.seek(header.offset)
     start = 0
-    for block in (_binary_blocks if header.order else _text_blocks)(path, file, header):
+    for block in read_blocks(path, file, header):
         # A number too large for float32 becomes infinite, and is refused with the others.
         with np.errstate(over="ignore"):
             for name, column in columns.items():
@@ -78,7 +71,7 @@ def _encoded(
     header: bytes, record: np.dtype[np.void], columns: dict[str, NDArray[np.float32]]
 ) -> Iterator[bytes]:
     yield header
-    runs = _runs(len(columns["x"]), record)
+    runs = record_runs(len(columns["x"]), record)
     block = np.zeros(runs[0].stop if runs else 0, record)
     for run in runs:
         part = block[: run.stop - run.start]
@@ -134,54 +127,3 @@ def _coefficients(path: Path, header: PlyHeader) -> int:
             "splats of another layout than that of 3D Gaussian splatting"
         )
     return 1 + rest // 3
-
-
-def _runs(count: int, record: np.dtype[np.void]) -> list[slice]:
-    """Cut records into blocks."""
-    rows = max(1, _BLOCK // record.itemsize)
-    return [slice(start, min(start + rows, count)) for start in range(0, count, rows)]
-
-
-def _binary_blocks(
-    path: Path, file: BufferedReader, header: PlyHeader
-) -> Iterator[NDArray[np.void]]:
-    runs = _runs(header.count, header.record)
-    block = np.empty(runs[0].stop if runs else 0, header.record)
-    for run in runs:
-        part = block[: run.stop - run.start]
-        if file.readinto(part.view(np.uint8).data) < part.nbytes:
-            raise FileFormatError(f"{path}: was cut off while it was read")
-        yield part
-
-
-def _text_blocks(path: Path, file: BufferedReader, header: PlyHeader) -> Iterator[NDArray[np.void]]:
-    width = len(header.properties)
-    record = np.dtype([(name, "f4") for name in header.properties])
-    with TextIOWrapper(file, "ascii") as text:
-        # A longer line comes in pieces, which have too few numbers and are refused as such.
-        pieces = iter(lambda: text.readline(_WIDEST * width), "")
-        lines = (line for line in pieces if line.strip())
-        for run in _runs(header.count, record):
-            rows = list(islice(lines, run.stop - run.start))
-            if len(rows) < run.stop - run.start:
-                raise FileFormatError(
-                    f"{path}: claims {header.count} records and holds {run.start + len(rows)}; it "
-                    "was cut off"
-                )
-            yield _table(path, rows, run.start, width).view(record)[:, 0]
-        if next(lines, None) is not None:
-            raise FileFormatError(f"{path}: holds more than the {header.count} records it claims")
-
-
-def _table(path: Path, rows: list[str], start: int, width: int) -> NDArray[np.float32]:
-    try:
-        values = np.loadtxt(rows, np.float32, comments=None, ndmin=2)
-        fits = values.shape[1] == width
-    except ValueError:
-        fits = False
-    if not fits:
-        raise FileFormatError(
-            f"{path}: records {start} to {start + len(rows)} are no lines of {width} numbers each; "
-            "the file is damaged"
-        )
-    return values

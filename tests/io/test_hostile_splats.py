@@ -95,7 +95,7 @@ EDITS = {
     "twice": ("property float z", "property float y", "two properties 'y'"),
     "type": ("property float z", "property half z", "'property half z', which has no meaning"),
     "no type": ("property float z", "property z", "'property z', which has no meaning"),
-    "several": ("property float rot_3", "property float rot_3\nelement face 0", "element 'face'"),
+    "several": ("property float rot_3", "property float rot_3\nelement face 2", "element 'face'"),
     "two vertex": ("property float rot_3", "property float rot_3\nelement vertex 7", "alone"),
     "compressed": ("element vertex", "element chunk 1\nelement vertex", "'chunk'.*unpack"),
     "no element": ("element vertex 7", "comment", "no meaning"),

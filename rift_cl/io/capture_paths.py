@@ -1,0 +1,104 @@
+"""Paths that are written inside a capture, followed only as far as the capture's own folder.
+
+A capture is passed from hand to hand, and whoever opens it has not read it: a name in it must not
+lead to any other file of the machine, by ``..``, by an absolute path or by a symbolic link.
+"""
+
+from __future__ import annotations
+
+import os.path
+import reprlib
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path, PureWindowsPath
+
+from rift_cl.errors import FileFormatError, InputError, PathEscapeError, RiftError
+
+# NeRF's synthetic captures leave the extension out; all of them are PNG.
+_SUFFIXES = ("", ".png", ".jpg", ".jpeg", ".exr", ".tif", ".tiff", ".hdr")
+
+
+@dataclass(frozen=True)
+class CaptureFolder:
+    """The folder that the names of a capture are looked for in.
+
+    Args:
+        root: the folder of the capture, absolute and without ``..``; no name leads out of it.
+        below: the folder in it that names start from.
+    """
+
+    root: Path
+    below: str = ""
+
+    def file(self, where: str, name: str) -> Path:
+        """The file of that name.
+
+        Args:
+            where: the place that names it, for errors.
+            name: its path from this folder; a backslash counts as a slash.
+
+        Raises:
+            PathEscapeError: it lies outside the folder.
+            InputError: it is not there.
+        """
+        found = self._find(where, name, ("",))
+        if found is None:
+            raise InputError(f"{where}: leads to {_short(name)}, which is not in {self.path}")
+        return found
+
+    def image(self, where: str, name: str) -> Path:
+        """The image of that name, which may lack its extension; errors are those of ``file``."""
+        found = self._find(where, name, _SUFFIXES)
+        if found is None:
+            raise InputError(f"{where}: the image {_short(name)} is not in {self.path}")
+        return found
+
+    def optional(self, where: str, *names: str) -> Path | None:
+        """The first of these files that is there, or None."""
+        found = (self._find(where, name, ("",)) for name in names)
+        return next((path for path in found if path is not None), None)
+
+    def name_of(self, path: Path) -> str:
+        """What a file of the folder is called in it."""
+        if path.is_relative_to(self.path):
+            return path.relative_to(self.path).as_posix()
+        return path.resolve().relative_to(self._real).as_posix()
+
+    @property
+    def path(self) -> Path:
+        """The folder that names start from."""
+        return self.root / self.below
+
+    @cached_property
+    def _real(self) -> Path:
+        return self.root.resolve()
+
+    def _find(self, where: str, name: str, suffixes: tuple[str, ...]) -> Path | None:
+        plain = name.replace("\\", "/")
+        if not plain.strip("/") or "\0" in plain or PureWindowsPath(plain).drive:
+            raise PathEscapeError(f"{where}: {_short(name)} is no path inside {self.root}")
+        try:
+            for suffix in suffixes:
+                path = Path(os.path.normpath(self.path / (plain + suffix)))
+                self._demand_inside(where, name, path)
+                if path.is_file():
+                    return path
+        except RiftError:
+            raise
+        except (OSError, ValueError, RuntimeError) as error:
+            reason = getattr(error, "strerror", None) or type(error).__name__
+            raise FileFormatError(
+                f"{where}: {_short(name)} cannot be followed as a path ({reason})"
+            ) from error
+        return None
+
+    def _demand_inside(self, where: str, name: str, path: Path) -> None:
+        if not path.resolve().is_relative_to(self._real):
+            raise PathEscapeError(
+                f"{where}: leads to {_short(name)}, which is outside the folder {self.root}; put "
+                "that file there and mend the path"
+            )
+
+
+def _short(name: str) -> str:
+    return reprlib.repr(name)

@@ -1,0 +1,100 @@
+"""Views from a COLMAP model: where its files lie, and cameras made of their records.
+
+Poses are world-to-camera with OpenCV's axes and pixel centres are at one half, as everywhere here,
+so that nothing has to be turned round.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import FileFormatError
+from rift_cl.geometry.camera import Camera
+from rift_cl.geometry.lens_distortion import lens_of
+from rift_cl.io import colmap_binary, colmap_text
+from rift_cl.io.capture_paths import CaptureFolder
+from rift_cl.io.colmap_records import CameraRecord, ImageRecord
+from rift_cl.io.poses import view_of_quaternion
+from rift_cl.io.view import Capture, View, check_views, finite_points, located
+
+MODEL_FOLDERS = ("sparse/0", "sparse", ".")
+_READERS: dict[str, ModuleType] = {".bin": colmap_binary, ".txt": colmap_text}
+
+
+def find_model(folder: Path) -> tuple[Path, str] | None:
+    """Folder of the COLMAP model that belongs to a capture's folder, and suffix of its files."""
+    for name in MODEL_FOLDERS:
+        for suffix in _READERS:
+            files = (folder / name / (part + suffix) for part in ("cameras", "images"))
+            if all(file.is_file() for file in files):
+                return folder / name, suffix
+    return None
+
+
+def open_model(folder: Path, model: Path, suffix: str) -> Capture:
+    """Read the views of a COLMAP model; see ``open_capture``.
+
+    Args:
+        folder: the folder that was asked for.
+        model: the folder of the model, which may be the same.
+        suffix: the suffix of its files, ``.bin`` or ``.txt``.
+    """
+    reader = _READERS[suffix]
+    cameras = _numbered(model / f"cameras{suffix}", reader.read_cameras(model / f"cameras{suffix}"))
+    path = model / f"images{suffix}"
+    records = sorted(reader.read_images(path), key=lambda record: record.name)
+    images = _images_folder(folder)
+    views = [_view(path, images, cameras, record) for record in records]
+    checked = check_views(path, views)
+    points, colors = _points(model / f"points3D{suffix}", reader)
+    return Capture(checked, points, colors, model)
+
+
+def _images_folder(folder: Path) -> CaptureFolder:
+    """The folder ``images`` beside the model or above it, or else the folder itself."""
+    above = [folder, folder.parent]
+    if folder.parent.name == "sparse":
+        above.append(folder.parent.parent)
+    found = next((place for place in above if (place / "images").is_dir()), None)
+    return CaptureFolder(folder) if found is None else CaptureFolder(found, "images")
+
+
+def _numbered(path: Path, records: list[CameraRecord]) -> dict[int, CameraRecord]:
+    cameras = {record.number: record for record in records}
+    if len(cameras) < len(records):
+        raise FileFormatError(f"{path}: two cameras have the same number")
+    return cameras
+
+
+def _view(
+    path: Path, images: CaptureFolder, cameras: dict[int, CameraRecord], record: ImageRecord
+) -> View:
+    where = f"{path}: image {record.name[:80]!r}"
+    camera = cameras.get(record.camera)
+    if camera is None:
+        raise FileFormatError(f"{where}: was taken by camera {record.camera}, which is not there")
+    image = images.file(where, record.name)
+    # COLMAP's own masks keep the image's extension, others replace it.
+    names = (f"{record.name}.png", str(Path(record.name).with_suffix(".png")))
+    mask = CaptureFolder(images.root, "masks").optional(where, *names)
+    with located(where):
+        view = view_of_quaternion(record.quaternion, record.shift)
+        pinhole = Camera((camera.height, camera.width), camera.K, view)
+        lens = lens_of(camera.model, camera.coefficients, camera.K)
+    return View(record.name, pinhole, image, mask, lens)
+
+
+def _points(
+    path: Path, reader: ModuleType
+) -> tuple[NDArray[np.float32] | None, NDArray[np.float32] | None]:
+    if not path.is_file():
+        return None, None
+    records = reader.read_points(path)
+    points = finite_points(str(path), records.positions)
+    if points is None:
+        return None, None
+    return points, np.asarray(records.colors, np.float32).reshape(-1, 3) / np.float32(255)

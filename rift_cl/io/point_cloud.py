@@ -1,0 +1,62 @@
+"""The sparse points of a capture, from the PLY file that its transforms.json names."""
+
+from __future__ import annotations
+
+from io import BufferedReader
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import FileFormatError
+from rift_cl.io.boundary import check_claim, reading
+from rift_cl.io.ply_body import read_blocks
+from rift_cl.io.ply_header import PlyHeader, read_header
+from rift_cl.io.view import finite_points
+
+_PLACE, _COLOR = ("x", "y", "z"), ("red", "green", "blue")
+Floats = NDArray[np.float32]
+
+
+def read_point_cloud(path: Path) -> tuple[Floats | None, Floats | None]:
+    """Read positions and colours, each float32 (P, 3) or None; colours in [0, 1].
+
+    Raises:
+        InputError: there is no such file.
+        FileFormatError: it is damaged, claims more than it holds, or holds no points.
+        NonFiniteError: a point is not finite.
+        ResourceLimitError: it does not fit into memory.
+    """
+    with reading(path, "the PLY file"), path.open("rb") as file:
+        header = read_header(path, file)
+        header.check_size(path, file.seek(0, 2))
+        names = header.properties
+        if not set(_PLACE) <= set(names):
+            raise FileFormatError(f"{path}: its vertices have {list(names)}, wanted x, y and z")
+        wanted = _PLACE + (_COLOR if set(_COLOR) <= set(names) else ())
+        check_claim(path, "the PLY file", 4 * len(wanted) * header.count, None)
+        columns = _read_columns(path, file, header, wanted)
+        points = finite_points(str(path), columns[:, :3])
+        if points is None or len(wanted) == len(_PLACE):
+            return points, None
+        return points, _scaled(columns[:, 3:], header)
+
+
+def _read_columns(
+    path: Path, file: BufferedReader, header: PlyHeader, wanted: tuple[str, ...]
+) -> Floats:
+    columns = np.empty((header.count, len(wanted)), np.float32)
+    start = 0
+    for block in read_blocks(path, file, header):
+        with np.errstate(over="ignore"):
+            for place, name in enumerate(wanted):
+                columns[start : start + len(block), place] = block[name]
+        start += len(block)
+    return columns
+
+
+def _scaled(colors: Floats, header: PlyHeader) -> Floats:
+    """Colours from 0 to 1; whole numbers fill the range of their type."""
+    kinds = [np.dtype(header.properties[name]) for name in _COLOR]
+    most = np.array([np.iinfo(kind).max if kind.kind in "iu" else 1 for kind in kinds], np.float32)
+    return np.asarray(np.clip(np.nan_to_num(colors) / most, 0, 1), np.float32)

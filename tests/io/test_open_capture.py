@@ -1,0 +1,257 @@
+"""One scene, written in every form: the same cameras, photographs and points come out of each."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import capture_files as made
+import numpy as np
+import pytest
+
+from rift_cl.geometry.lens_distortion import Lens
+from rift_cl.io import Capture, open_capture
+
+K = np.array([[20, 0, 6.5], [0, 21, 4.25], [0, 0, 1]])
+
+
+def check_cameras(capture: Capture) -> None:
+    """A point ahead of a camera, to its right and below: depth, then pixels, by the axes alone."""
+    assert len(capture.views) == len(made.NAMES)
+    for index, view in enumerate(capture.views):
+        assert view.camera.size == (made.HEIGHT, made.WIDTH)
+        assert view.camera.model == "pinhole"
+        place, (right, down, forward) = made.stand(index)
+        point = place + 3 * forward + 0.5 * right + 0.25 * down
+        seen = view.camera.view[:3, :3] @ point + view.camera.view[:3, 3]
+        np.testing.assert_allclose(seen, [0.5, 0.25, 3], atol=1e-12)
+        np.testing.assert_allclose(view.camera.center, place, atol=1e-12)
+        np.testing.assert_allclose(view.camera.K, K, atol=1e-12)
+
+
+def check_points(capture: Capture, *, colors: bool = True) -> None:
+    assert capture.points is not None and capture.points.dtype == np.float32
+    np.testing.assert_array_equal(capture.points, made.POINTS.astype(np.float32))
+    if not colors:
+        assert capture.point_colors is None
+        return
+    assert capture.point_colors is not None and capture.point_colors.dtype == np.float32
+    np.testing.assert_allclose(capture.point_colors, made.COLORS / 255, atol=1e-7)
+
+
+def test_a_transforms_json_of_nerfstudio(tmp_path: Path) -> None:
+    path = made.transforms(tmp_path)
+    for given in (path, tmp_path, str(tmp_path)):
+        capture = open_capture(given)
+        check_cameras(capture)
+        assert capture.path == path
+        assert capture.points is None and capture.point_colors is None
+        assert [view.name for view in capture.views] == [f"images/{name}" for name in made.NAMES]
+        assert [view.image for view in capture.views] == [
+            tmp_path / "images" / name for name in made.NAMES
+        ]
+        assert all(view.mask is None and view.lens is None for view in capture.views)
+
+
+@pytest.mark.parametrize("name", ["transforms_train.json", "mine.JSON"])
+def test_a_transforms_json_of_nerf(tmp_path: Path, name: str) -> None:
+    """One angle for all, no size, no extensions: 100 of 120 pixels, so that nothing is square."""
+    made.photographs(tmp_path / "train")
+    angle = 2 * np.arctan(made.WIDTH / 2 / 20)
+    frames = [
+        {"file_path": f"./train/{image[:-4]}", "rotation": 0.1, "transform_matrix": made.opengl(i)}
+        for i, image in enumerate(made.NAMES)
+    ]
+    (tmp_path / name).write_text(json.dumps({"camera_angle_x": angle, "frames": frames}))
+    capture = open_capture(tmp_path if name.startswith("transforms") else tmp_path / name)
+    assert [view.name for view in capture.views] == [f"train/{image}" for image in made.NAMES]
+    assert capture.views[0].image == tmp_path / "train" / "a.png"
+    for view in capture.views:
+        np.testing.assert_allclose(view.camera.K, [[20, 0, 6], [0, 20, 4], [0, 0, 1]])
+
+
+@pytest.mark.parametrize("folder", ["sparse/0", "sparse", "."])
+@pytest.mark.parametrize("write", [made.colmap_binary, made.colmap_text])
+def test_a_colmap_model(tmp_path: Path, folder: str, write: type) -> None:
+    made.photographs(tmp_path / "images")
+    model = write(tmp_path / folder)
+    for given in (tmp_path, model):
+        capture = open_capture(given)
+        check_cameras(capture)
+        check_points(capture)
+        assert capture.path == model
+        assert [view.name for view in capture.views] == made.NAMES
+        assert capture.views[2].image == tmp_path / "images" / "sub" / "c.png"
+
+
+def test_a_colmap_model_as_colmap_writes_it(tmp_path: Path) -> None:
+    pycolmap = pytest.importorskip("pycolmap", reason="COLMAP's Python package is not installed")
+    source = made.colmap_text(tmp_path / "sparse" / "0")
+    made.photographs(tmp_path / "images")
+    points = (source / "points3D.txt").read_text().splitlines()
+    # COLMAP follows the tracks, which lead nowhere here.
+    (source / "points3D.txt").write_text("\n".join(" ".join(p.split()[:8]) for p in points))
+    model = pycolmap.Reconstruction(str(source))
+    for form in ("text", "binary"):
+        target = tmp_path / form / "sparse"
+        target.mkdir(parents=True)
+        (model.write_text if form == "text" else model.write_binary)(str(target))
+        made.photographs(tmp_path / form / "images")
+        capture = open_capture(tmp_path / form)
+        check_cameras(capture)
+        assert capture.points is not None and len(capture.points) == len(made.POINTS)
+
+
+def test_binary_comes_before_text_and_transforms_before_both(tmp_path: Path) -> None:
+    made.colmap_text(tmp_path, ("SIMPLE_PINHOLE", [3.0, 6.0, 4.0]))
+    made.colmap_binary(tmp_path)
+    made.photographs(tmp_path)
+    check_cameras(open_capture(tmp_path))
+    made.transforms(tmp_path)
+    assert open_capture(tmp_path).path == tmp_path / "transforms.json"
+
+
+def test_a_model_without_points_or_with_none(tmp_path: Path) -> None:
+    made.photographs(tmp_path)
+    made.colmap_binary(tmp_path)
+    (tmp_path / "points3D.bin").write_bytes(bytes(8))
+    assert open_capture(tmp_path).points is None
+    (tmp_path / "points3D.bin").unlink()
+    assert open_capture(tmp_path).point_colors is None
+
+
+def test_a_name_with_a_blank_in_a_text_model(tmp_path: Path) -> None:
+    made.colmap_text(tmp_path)
+    lines = (tmp_path / "images.txt").read_text().replace("a.png", "a b.png")
+    (tmp_path / "images.txt").write_text(lines)
+    made.photographs(tmp_path, ["a b.png", *made.NAMES[1:]])
+    assert open_capture(tmp_path).views[0].name == "a b.png"
+
+
+@pytest.mark.parametrize("text", [True, False])
+@pytest.mark.parametrize("colors", [True, False])
+def test_points_of_a_transforms_json(tmp_path: Path, text: bool, colors: bool) -> None:
+    made.transforms(tmp_path, ply_file_path="points.ply")
+    made.point_cloud(tmp_path / "points.ply", text=text, colors=colors)
+    check_points(open_capture(tmp_path), colors=colors)
+
+
+def test_an_empty_face_list_does_not_matter(tmp_path: Path) -> None:
+    made.transforms(tmp_path, ply_file_path="points.ply")
+    path = made.point_cloud(tmp_path / "points.ply")
+    faces = b"element face 0\nproperty list uchar int vertex_indices\nend_header"
+    path.write_bytes(path.read_bytes().replace(b"end_header", faces))
+    check_points(open_capture(tmp_path))
+
+
+def test_a_frame_overrides_what_stands_for_all(tmp_path: Path) -> None:
+    path = made.transforms(tmp_path)
+    made.changed(path, 1, fl_x=33.0, cy=3.5, w=None)
+    made.changed(path, 2, camera_angle_x=np.pi / 2, k1=0.125)
+    first, second, third = open_capture(path).views
+    np.testing.assert_array_equal(first.camera.K, K)
+    np.testing.assert_array_equal(second.camera.K, [[33, 0, 6.5], [0, 21, 3.5], [0, 0, 1]])
+    np.testing.assert_allclose(third.camera.K[0, 0], made.WIDTH / 2)
+    assert first.lens is None and second.lens is None
+    assert third.lens == Lens("OPENCV", (0.125, 0, 0, 0), third.camera.K)
+
+
+@pytest.mark.parametrize(
+    ("fields", "model", "coefficients"),
+    [
+        ({"k1": 0.1, "p2": 0.2}, "OPENCV", (0.1, 0, 0, 0.2)),
+        ({"k1": 0.1, "k3": 0.3, "k4": 0}, "FULL_OPENCV", (0.1, 0, 0, 0, 0.3, 0, 0, 0)),
+        ({"camera_model": None, "k2": 0.1}, "OPENCV", (0, 0.1, 0, 0)),
+        ({"camera_model": None, "is_fisheye": True, "k4": 0.1}, "OPENCV_FISHEYE", (0, 0, 0, 0.1)),
+        ({"camera_model": "OPENCV_FISHEYE"}, "OPENCV_FISHEYE", (0, 0, 0, 0)),
+        ({"camera_model": "SIMPLE_RADIAL", "k1": 0.1, "k2": 0.0}, "SIMPLE_RADIAL", (0.1,)),
+        ({"camera_model": "PINHOLE", "k1": 0.0}, None, ()),
+        ({"k1": 0.0, "k2": 0, "p1": None}, None, ()),
+    ],
+)
+def test_lenses_of_a_transforms_json(
+    tmp_path: Path, fields: dict[str, object], model: str | None, coefficients: tuple[float, ...]
+) -> None:
+    lens = open_capture(made.transforms(tmp_path, **fields)).views[0].lens
+    assert lens == (None if model is None else Lens(model, coefficients, K))
+
+
+@pytest.mark.parametrize("write", [made.colmap_binary, made.colmap_text])
+@pytest.mark.parametrize(
+    ("camera", "lens"),
+    [
+        (
+            ("OPENCV", [*made.PINHOLE[1], 0.1, 0.2, 0.3, 0.4]),
+            Lens("OPENCV", (0.1, 0.2, 0.3, 0.4), K),
+        ),
+        (("FOV", [*made.PINHOLE[1], 0.5]), Lens("FOV", (0.5,), K)),
+        (("OPENCV", [*made.PINHOLE[1], 0, 0, 0, 0]), None),
+        (("SIMPLE_PINHOLE", [20, 6.5, 4.25]), None),
+    ],
+)
+def test_lenses_of_a_colmap_model(
+    tmp_path: Path, write: type, camera: tuple[str, list[float]], lens: Lens | None
+) -> None:
+    made.photographs(tmp_path)
+    write(tmp_path, camera)
+    view = open_capture(tmp_path).views[0]
+    assert view.lens == lens
+    assert view.camera.K[0, 0] == 20 and view.camera.K[1, 1] == (20 if len(camera[1]) == 3 else 21)
+
+
+def test_poses_with_few_digits_become_rotations(tmp_path: Path) -> None:
+    path = made.transforms(tmp_path)
+    exact = open_capture(path).views
+    for index in range(3):
+        made.changed(path, index, transform_matrix=np.round(made.opengl(index), 4).tolist())
+    for view, true in zip(open_capture(path).views, exact, strict=True):
+        rotation = view.camera.view[:3, :3]
+        np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-14)
+        np.testing.assert_allclose(rotation, true.camera.view[:3, :3], atol=1e-4)
+        np.testing.assert_allclose(view.camera.center, true.camera.center, atol=1e-4)
+
+
+def test_poses_may_leave_out_their_last_row(tmp_path: Path) -> None:
+    path = made.transforms(tmp_path)
+    for index in range(3):
+        made.changed(path, index, transform_matrix=made.opengl(index)[:3])
+    check_cameras(open_capture(path))
+
+
+def test_masks(tmp_path: Path) -> None:
+    path = made.transforms(tmp_path)
+    made.photographs(tmp_path / "masks")
+    made.changed(path, 1, mask_path="masks/a.png")
+    assert [view.mask for view in open_capture(path).views] == [
+        None,
+        tmp_path / "masks" / "a.png",
+        None,
+    ]
+
+
+def test_masks_of_a_colmap_model(tmp_path: Path) -> None:
+    made.photographs(tmp_path / "images")
+    made.colmap_text(tmp_path / "sparse")
+    made.photographs(tmp_path / "masks", ["a.png.png", "sub/c.png"])
+    masks = [view.mask for view in open_capture(tmp_path).views]
+    assert masks == [tmp_path / "masks" / "a.png.png", None, tmp_path / "masks" / "sub" / "c.png"]
+
+
+def test_only_headers_are_read_and_only_where_the_size_is_missing(tmp_path: Path) -> None:
+    path = made.transforms(tmp_path)
+    image = tmp_path / "images" / "a.png"
+    content = image.read_bytes()
+    image.write_bytes(b"no picture")
+    assert open_capture(path).views[0].camera.size == (made.HEIGHT, made.WIDTH)
+    made.transforms(tmp_path, w=None, h=None)
+    image.write_bytes(content[: content.index(b"IDAT") + 4])
+    assert open_capture(path).views[0].camera.size == (made.HEIGHT, made.WIDTH)
+
+
+def test_a_point_cloud_may_name_faces_that_it_has_not(tmp_path: Path) -> None:
+    made.transforms(tmp_path, ply_file_path="points.ply")
+    path = made.point_cloud(tmp_path / "points.ply")
+    faces = b"element face 0\nproperty list uchar int vertex_indices\nend_header"
+    path.write_bytes(path.read_bytes().replace(b"end_header", faces))
+    points = open_capture(tmp_path).points
+    assert points is not None and len(points) > 0

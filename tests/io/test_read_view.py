@@ -1,0 +1,132 @@
+"""The pixels of a view belong to its camera: laws of light, averages, alpha and masks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO
+import pytest
+from view_files import HEIGHT, WIDTH, K, display, linear, store, view_of
+
+from rift_cl.geometry.camera import Camera
+from rift_cl.io import camera_at, read_view, write_png
+
+RANDOM = np.random.default_rng(5)
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_codes_come_back_as_they_are(tmp_path: Path, channels: int) -> None:
+    codes = RANDOM.integers(0, 256, (HEIGHT, WIDTH, channels), dtype=np.uint8)
+    write_png(tmp_path / "a.png", codes)
+    image = read_view(view_of(tmp_path / "a.png"))
+    assert image.dtype == np.float32 and image.flags.c_contiguous
+    expected = codes if channels > 1 else np.repeat(codes, 3, axis=2)
+    np.testing.assert_allclose(image, expected / 255, atol=1e-7)
+
+
+def test_linear_light_is_that_of_srgb(tmp_path: Path) -> None:
+    codes = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, axis=2)
+    write_png(tmp_path / "a.png", codes)
+    image = read_view(view_of(tmp_path / "a.png"), light="linear")
+    np.testing.assert_allclose(image, linear(codes / 255), rtol=1e-5)
+
+
+@pytest.mark.parametrize("suffix", [".exr", ".hdr", ".tif"])
+def test_real_numbers_count_as_linear(tmp_path: Path, suffix: str) -> None:
+    pixels = np.full((HEIGHT, WIDTH, 3), 0.25, np.float32)
+    pixels[0, 0] = 3.5
+    view = view_of(store(tmp_path / f"a{suffix}", pixels, "float"))
+    np.testing.assert_allclose(read_view(view, light="linear"), pixels, rtol=0.01)
+    np.testing.assert_allclose(read_view(view), display(pixels), rtol=0.01)
+
+
+@pytest.mark.parametrize("downscale", [1, 2, 3, 7, 60])
+def test_a_smaller_image_is_seen_by_the_smaller_camera(tmp_path: Path, downscale: int) -> None:
+    """Light that is linear in the ray is, averaged, that of the ray through the block's middle."""
+
+    def ramp(camera: Camera) -> np.ndarray:
+        fx, fy, cx, cy = camera.intrinsics
+        x = (np.arange(camera.width) + 0.5 - cx) / fx
+        y = (np.arange(camera.height) + 0.5 - cy) / fy
+        return np.stack(np.broadcast_arrays(0.5 + x / 2, 0.5 + y[:, None], 0.3 + 0.1 * x), axis=-1)
+
+    full = Camera((HEIGHT, WIDTH), K, np.eye(4))
+    path = store(tmp_path / "a.exr", ramp(full).astype(np.float32), "float")
+    view = view_of(path)
+    camera = camera_at(view, downscale)
+    image = read_view(view, downscale=downscale, light="linear")
+    assert image.shape == (*camera.size, 3)
+    assert camera.size == (HEIGHT // downscale, WIDTH // downscale)
+    np.testing.assert_allclose(image, ramp(camera), atol=2e-6)
+
+
+def test_averages_are_taken_in_linear_light(tmp_path: Path) -> None:
+    codes = RANDOM.integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8)
+    write_png(tmp_path / "a.png", codes)
+    expected = linear(codes / 255).reshape(HEIGHT // 4, 4, WIDTH // 4, 4, 3).mean((1, 3))
+    view = view_of(tmp_path / "a.png")
+    np.testing.assert_allclose(read_view(view, downscale=4, light="linear"), expected, atol=1e-6)
+    np.testing.assert_allclose(read_view(view, downscale=4), display(expected), atol=1e-6)
+
+
+def test_what_is_transparent_gives_no_colour(tmp_path: Path) -> None:
+    """A block of red, half of it covered, beside green that is not there."""
+    codes = np.zeros((2, 2, 4), np.uint8)
+    codes[...] = [255, 0, 0, 255]
+    codes[:, 1] = [0, 255, 0, 0]
+    write_png(tmp_path / "a.png", codes)
+    image = read_view(view_of(tmp_path / "a.png"), downscale=2)
+    np.testing.assert_allclose(image, [[[1, 0, 0, 0.5]]], atol=1e-6)
+    codes[..., 3] = 0
+    write_png(tmp_path / "a.png", codes)
+    np.testing.assert_array_equal(read_view(view_of(tmp_path / "a.png"), downscale=2), [[[0] * 4]])
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "associated", "attributes"),
+    [
+        ("a.exr", "float", True, {}),
+        ("a.tif", "uint8", True, {}),
+        ("a.tif", "uint16", False, {"UnassociatedAlpha": 1}),
+        ("a.png", "uint8", False, {"UnassociatedAlpha": 1}),
+    ],
+)
+def test_alpha_is_straight_whatever_the_file_holds(
+    tmp_path: Path, name: str, kind: str, associated: bool, attributes: dict[str, int]
+) -> None:
+    pixels = np.zeros((2, 2, 4), np.float32)
+    pixels[...] = [0.5, 0.25, 1.0, 0.5]
+    pixels[0, 0, 3] = 0
+    stored = pixels * np.concatenate([pixels[..., 3:]] * 3 + [pixels[..., 3:] ** 0], axis=-1)
+    view = view_of(store(tmp_path / name, stored if associated else pixels, kind, **attributes))
+    image = read_view(view, light="linear" if name == "a.exr" else "display")
+    covered = pixels[..., 3] > 0
+    np.testing.assert_allclose(image[covered], pixels[covered], atol=0.01)
+    np.testing.assert_array_equal(image[..., 3] == 0, ~covered)
+
+
+def test_grey_with_alpha(tmp_path: Path) -> None:
+    codes = RANDOM.integers(0, 256, (4, 4, 2)).astype(np.uint8)
+    spec = OpenImageIO.ImageSpec(4, 4, 2, "uint8")
+    spec.channelnames, spec.alpha_channel = ("Y", "A"), 1
+    spec.attribute("oiio:UnassociatedAlpha", 1)
+    output = OpenImageIO.ImageOutput.create("png")
+    path = tmp_path / "a.png"
+    assert output.open(str(path), spec) and output.write_image(codes) and output.close()
+    image = read_view(view_of(path))
+    np.testing.assert_allclose(image, codes[..., [0, 0, 0, 1]] / 255, atol=1e-7)
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_a_mask_is_multiplied_into_alpha(tmp_path: Path, channels: int) -> None:
+    codes = RANDOM.integers(0, 256, (HEIGHT, WIDTH, 4), dtype=np.uint8)
+    mask = RANDOM.integers(0, 256, (HEIGHT, WIDTH, 1), dtype=np.uint8)
+    write_png(tmp_path / "mask.png", mask if channels == 1 else mask.repeat(channels, axis=2))
+    cover = (mask / 255) ** (2 if channels == 4 else 1)
+    for count in (3, 4):
+        write_png(tmp_path / "a.png", codes[..., :count])
+        image = read_view(view_of(tmp_path / "a.png", tmp_path / "mask.png"))
+        np.testing.assert_allclose(image[..., :3], codes[..., :3] / 255, atol=1e-6)
+        alpha = codes[..., 3:] / 255 if count == 4 else 1
+        np.testing.assert_allclose(image[..., 3:], cover * alpha, atol=1e-6)
