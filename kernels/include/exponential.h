@@ -3,7 +3,8 @@
  * i is the whole part of x and f in (-1, 0] the rest; 2^f is a polynomial of degree 5 with minimax
  * relative error 7.5e-8 (2.8e-7 with float32 rounding), summed in pairs so that its terms do not
  * wait for each other; 2^i is added to the exponent. x is held between -126, so that the exponent
- * cannot wrap, and 0, which rounding may pass. Built-in exponentials are calls that spill every
+ * cannot wrap, and 0, which rounding may pass; NaN, where the conic of a needle without width
+ * overflows, becomes -126, which is next to nothing. Built-in exponentials are calls that spill every
  * vector on PoCL, and native_exp2 has no promised error on a GPU. */
 
 #if LANES == 8
@@ -15,8 +16,8 @@
 #endif
 
 static lanes power_of_two(lanes x) {
-  x = x < -126.0f ? -126.0f : x;
-  x = x > 0 ? 0 : x;
+  x = x > -126.0f ? x : -126.0f;
+  x = x < 0 ? x : 0;
   const lanes_int whole = TO_INT(x);
   const lanes f = x - TO_FLOAT(whole), square = f * f;
   const lanes high = 0.00093878835f * f + 0.009188612f;

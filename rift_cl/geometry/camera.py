@@ -21,6 +21,8 @@ from rift_cl.geometry.numbers import real_numbers
 CameraModel = Literal["pinhole", "ortho", "fisheye"]
 # Poses that were written with a few digits still pass.
 _RIGID = 1e-3
+# Devices count in float32.
+_LARGEST = float(np.finfo(np.float32).max)
 # Pixels along an edge, so that the device can count them and their tiles.
 _MOST = 1 << 24
 
@@ -126,6 +128,8 @@ def _matrix(name: str, values: ArrayLike, order: int) -> NDArray[np.float64]:
         raise NonFiniteError(
             f"Camera: {name}{list(place)} is {matrix[place]}, every entry must be finite"
         )
+    if np.abs(matrix).max() > _LARGEST:
+        raise InputError(f"Camera: {name} holds {np.abs(matrix).max():g}, too large for float32")
     matrix.flags.writeable = False
     return matrix
 

@@ -135,7 +135,7 @@ class Fit:
         SplatScene.of(splats, self.device).save(settings.out / "scene.ply")
         groups: dict[str, list[ViewScore]] = {}
         for name, views in self._scored().items():
-            unseen = self._pictures(views, pictures.behind)
+            unseen = self._pictures(views, pictures)
             groups[name] = []
             for score in score_views(trainer.renderer, splats, unseen, pictures):
                 groups[name].append(score)
@@ -144,14 +144,16 @@ class Fit:
         page = fit_page(self.capture.path.name, groups, self.losses, self.metrics)
         self.folder.finish(settings, self.metrics, page, self.device)
 
-    def _pictures(self, views: tuple[View, ...], behind: Any = None) -> CapturePictures:
+    def _pictures(
+        self, views: tuple[View, ...], like: CapturePictures | None = None
+    ) -> CapturePictures:
         settings = self.settings
         return CapturePictures(
             self.device,
             views,
             downscale=settings.downscale,
             seed=settings.seed,
-            background=behind,
+            like=like,
         )
 
     def _start(self, pictures: CapturePictures) -> Parameters:

@@ -36,7 +36,7 @@ class CapturePictures:
         views: the photographs.
         downscale: whole factor by which they are made smaller.
         seed: of the random backgrounds.
-        background: (3,) in display light, of photographs without alpha; found if not given.
+        like: other photographs of the same scene, whose background these have; found if not given.
     """
 
     def __init__(
@@ -46,7 +46,7 @@ class CapturePictures:
         *,
         downscale: int = 1,
         seed: int = 0,
-        background: Floats | None = None,
+        like: CapturePictures | None = None,
     ) -> None:
         self.device = device
         self.views = views
@@ -54,9 +54,9 @@ class CapturePictures:
         self._downscale, self._seed = downscale, seed
         self._kept: dict[int, NDArray[np.uint8]] = {}
         self._room = int(_SHARE * (free_host_memory() or 1 << 30))
-        found = self._common_border() if background is None else background
-        self.behind = np.zeros(3, np.float32) if found is None else found
-        self._backed = found is not None
+        found = self._common_border() if like is None else like.behind
+        self.behind: Floats = np.zeros(3, np.float32) if found is None else found
+        self.backed: bool = found is not None if like is None else like.backed
         self._step = 0
 
     def image(self, number: int) -> Floats:
@@ -101,7 +101,7 @@ class CapturePictures:
         image = self.image(number)
         if image.shape[2] == 4:
             return np.asarray(image[..., 3] > _FOREGROUND)
-        if not self._backed:
+        if not self.backed:
             return None
         return np.asarray(np.abs(image - self.behind).max(axis=2) > _FOREGROUND)
 

@@ -24,8 +24,8 @@ from rift_cl.splat.tiles import Tiles
 
 # Bytes of a splat on the screen: screen, depth, box, code.
 _PROJECTED = 32 + 4 + 16 + 1
-# Bytes of a splat's part in the gradient by the camera.
-_CAMERA = 64
+# Bytes of a splat's part in the gradient by the camera, and of what does not grow.
+_CAMERA, _SMALL = 64, 4096
 
 
 @dataclass(frozen=True)
@@ -74,9 +74,11 @@ class FrameMemory:
         pixel = 4 * self.channels + 8
         if self.gradient:
             splat += 4 * (self.parameters + self.record + self.channels + 4) + _CAMERA
-            # The gradients that come in, and the background's parts that go out.
-            pixel += 8 * self.channels + 8
-        return self.splats * splat + self.pixels * pixel
+            # The gradients that come in, those of expected depth, the background's parts.
+            pixel += 12 * self.channels + 16
+        # Sums over columns leave their first level, a part of what they add up.
+        summed = 4 * self.pixels * self.channels + self.splats * _CAMERA if self.gradient else 0
+        return self.splats * splat + self.pixels * pixel + summed // 32 + _SMALL
 
     def lists(self, entries: int, tiles: int) -> int:
         """Bytes that the lists of so many tiles take, with the records of the gradient."""

@@ -9,6 +9,8 @@ from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
 
 SplatMode = Literal["light", "xray"]
+# Devices count in float32.
+_LARGEST = 3.4028234e38
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,11 @@ class SplatSettings:
             value = getattr(self, name)
             if not one_number(value) >= 0:
                 raise InputError(f"SplatSettings: {name} is {value!r}, wanted a number >= 0")
+        for name in ("near", "far", "radius_clip", "eps2d"):
+            if abs(one_number(getattr(self, name))) > _LARGEST:
+                raise InputError(
+                    f"SplatSettings: {name} is {getattr(self, name)!r}, too large for float32"
+                )
         edge = one_number(self.tile)
         if not (edge >= 1 and edge.is_integer()):
             raise InputError(f"SplatSettings: tile is {self.tile!r}, wanted a whole number >= 1")

@@ -209,9 +209,6 @@ def test_what_fits_no_bands_is_refused_in_one_sentence():
         check_fixed(memory, 1024)
 
 
-OUTGROWN = pytest.mark.xfail(strict=True, reason="it leaves out images that gradients need")
-
-
 @pytest.mark.parametrize(
     ("count", "sh", "colors", "depth", "changes"),
     [
@@ -220,8 +217,8 @@ OUTGROWN = pytest.mark.xfail(strict=True, reason="it leaves out images that grad
         (600, 0, 40, None, {"antialiased": True}),
         (600, 0, 1, None, {"mode": "xray"}),
         (0, 16, 0, None, {}),
-        pytest.param(0, 0, 40, None, {}, marks=OUTGROWN),
-        pytest.param(600, 1, 0, "expected", {}, marks=OUTGROWN),
+        (0, 0, 40, None, {}),
+        (600, 1, 0, "expected", {}),
     ],
 )
 def test_the_estimate_covers_what_is_allocated(

@@ -29,6 +29,8 @@ def test_camera_and_settings_must_agree(device):
         ({"near": 2.0, "far": 1.0}, "near is 2.0"),
         ({"far": np.inf}, "far is inf"),
         ({"near": "close"}, "near is 'close'"),
+        ({"far": 1e39}, "far is 1e\\+39, too large"),
+        ({"eps2d": 1e39}, "eps2d is 1e\\+39, too large"),
         ({"eps2d": -0.1}, "eps2d is -0.1"),
         ({"radius_clip": np.nan}, "radius_clip is nan"),
         ({"tile": 0}, "tile is 0"),
