@@ -90,9 +90,9 @@ def image_grid(
 
 
 def _pixels(name: str, image: ArrayLike) -> _Reals:
-    in_color = np.ndim(image) == 3 and np.shape(image)[2] == 3
-    pixels = _real(name, image, axes=3 if in_color else 2)
-    return np.clip(pixels, 0, 1) if in_color else pixels
+    if np.shape(image)[2:] == (3,):
+        return np.clip(_real(name, image, axes=3), 0, 1)
+    return _real(name, image, axes=2)
 
 
 def _windows(

@@ -106,7 +106,7 @@ def draw_all(
     tensors += [_pick(scene, tensor, ids) for tensor in kept]
     lead = 1 if ids else len(scene.batch) + 2
     flat = [tensor.reshape(-1, *tensor.shape[lead:]) for tensor in tensors]
-    parts = Parts(ids.counts if ids else [N] * (B * C), meta["means2d"])
+    parts = Parts(ids.counts if ids else [N] * (B * C), meta["means2d"], listed=True)
     drawn = rasterize_flat(scene.how, parts, *flat[:4], behind, *flat[4:])
     images, alphas, tiles, entries, offsets = drawn
     if render_mode.endswith("ED"):

@@ -24,18 +24,20 @@ class Parts(NamedTuple):
     Args:
         counts: splats of each view.
         means2d: their positions as the caller has them, in any shape: where ``absgrad`` is left.
+        listed: whether the tile lists are wanted on the host.
     """
 
     counts: list[int]
     means2d: torch.Tensor
+    listed: bool = False
 
 
 class Rasterize(torch.autograd.Function):
     """Screens to images (V, height, width, D) and alphas (V, height, width, 1).
 
-    Also gives, with nothing flowing through, each view's tile lists: the tiles of every splat
-    (total,), the splats of all entries (M,), and where each tile's begin (V, rows, across), all
-    int32 and counted over all views.
+    Also gives, with nothing flowing through, each view's tile lists if they are wanted: the tiles
+    of every splat (total,), the splats of all entries (M,), and where each tile's begin
+    (V, rows, across), all int32 and counted over all views; otherwise three empty tensors.
     """
 
     @staticmethod
@@ -57,7 +59,8 @@ class Rasterize(torch.autograd.Function):
         ctx.save_for_backward(means2d, conics, weights)
         images = [to_tensor(how.device, d.raster.image, means2d) for d in ctx.drawings]
         thin = [to_tensor(how.device, d.raster.transmittance, means2d) for d in ctx.drawings]
-        lists = _lists(how.device, ctx.drawings, means2d)
+        nothing = [means2d.new_empty(0, dtype=torch.int32) for _ in range(3)]
+        lists = _lists(how.device, ctx.drawings, means2d) if parts.listed else nothing
         ctx.mark_non_differentiable(*lists)
         return (torch.stack(images), 1 - torch.stack(thin)[..., None], *lists)
 

@@ -7,7 +7,6 @@ import pytest
 from projection_scenes import camera_of, random_splats
 
 import rift_cl as rift
-from rift_cl.errors import DeviceError, DTypeError, InputError, NonFiniteError, ShapeError
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 
@@ -240,54 +239,6 @@ def test_no_splats_and_one_pixel(device):
     assert images.shape == (2, 1, 1, 3) and not alphas.any()
     images.sum().backward()
     assert leaves["means"].grad.shape == (0, 3)
-
-
-BAD = {
-    "double": ({"means": lambda t: t.double()}, DTypeError, r"means.*float64.*call"),
-    "whole numbers": ({"opacities": lambda t: t.int()}, DTypeError, "opacities.*int32"),
-    "array": ({"scales": lambda t: t.numpy()}, DTypeError, "scales is a ndarray"),
-    "sparse": ({"means": lambda t: t.to_sparse()}, DTypeError, "means.*sparse"),
-    "shape": ({"quats": lambda t: t[:, :3]}, ShapeError, r"quats has shape \(60, 3\), wanted"),
-    "count": ({"opacities": lambda t: t[:-1]}, ShapeError, r"opacities has shape \(59,\)"),
-    "harmonics": ({"sh": lambda t: t[:, :5]}, ShapeError, "5 coefficients"),
-    "elsewhere": ({"scales": lambda t: t.to("meta")}, DeviceError, "scales is on the meta device"),
-    "views": ({"views": lambda t: t[0]}, ShapeError, "viewmats has shape"),
-    "no views": ({"views": lambda t: t[:0], "Ks": lambda t: t[:0]}, ShapeError, "one view or more"),
-    "pose": ({"views": lambda t: t * float("nan")}, NonFiniteError, "view"),
-    "mirror": ({"views": lambda t: -t}, InputError, "view"),
-    "singular": ({"Ks": lambda t: 0 * t}, InputError, "focal lengths"),
-    "lenses": ({"Ks": lambda t: t[:1]}, ShapeError, r"Ks has shape \(1, 3, 3\)"),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_what_cannot_be_drawn_is_named(device, case):
-    changes, error, words = BAD[case]
-    tensors = tensors_of(scene()) | dict(
-        zip(("views", "Ks"), map(torch.tensor, cameras()), strict=True)
-    )
-    tensors |= {name: change(tensors[name]) for name, change in changes.items()}
-    views, Ks = tensors.pop("views"), tensors.pop("Ks")
-    with pytest.raises(error, match=words):
-        render(tensors, views, Ks, device=device)
-
-
-def test_options_that_do_not_fit_are_named(device):
-    tensors, (views, Ks) = tensors_of(scene()), map(torch.tensor, cameras())
-    with pytest.raises(InputError, match="depth is 'far'"):
-        render(tensors, views, Ks, depth="far", device=device)
-    with pytest.raises(InputError, match="xray"):
-        render(
-            tensors, views, Ks, depth="expected", settings=SplatSettings(mode="xray"), device=device
-        )
-    with pytest.raises(InputError, match="nothing is drawn"):
-        render({n: tensors[n] for n in NAMES}, views, Ks, device=device)
-    with pytest.raises(InputError, match="either quats and scales"):
-        render(tensors | {"covars": torch.zeros(60, 6)}, views, Ks, device=device)
-    with pytest.raises(ShapeError, match="backgrounds"):
-        render(tensors, views, Ks, backgrounds=torch.zeros(2, 4), device=device)
-    with pytest.raises(ShapeError, match="size"):
-        render(tensors, views, Ks, size=(0, 5), device=device)
 
 
 def test_second_derivatives_are_refused(device):

@@ -119,6 +119,15 @@ def test_lists_in_a_ply_are_not_followed(tmp_path: Path) -> None:
         open_capture(tmp_path)
 
 
+def test_a_point_cloud_may_name_faces_that_it_has_not(tmp_path: Path) -> None:
+    made.transforms(tmp_path, ply_file_path="points.ply")
+    path = made.point_cloud(tmp_path / "points.ply")
+    faces = b"element face 0\nproperty list uchar int vertex_indices\nend_header"
+    path.write_bytes(path.read_bytes().replace(b"end_header", faces))
+    points = open_capture(tmp_path).points
+    assert points is not None and len(points) > 0
+
+
 def test_a_json_file_has_a_largest_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = made.transforms(tmp_path)
     size = path.stat().st_size

@@ -246,12 +246,3 @@ def test_only_headers_are_read_and_only_where_the_size_is_missing(tmp_path: Path
     made.transforms(tmp_path, w=None, h=None)
     image.write_bytes(content[: content.index(b"IDAT") + 4])
     assert open_capture(path).views[0].camera.size == (made.HEIGHT, made.WIDTH)
-
-
-def test_a_point_cloud_may_name_faces_that_it_has_not(tmp_path: Path) -> None:
-    made.transforms(tmp_path, ply_file_path="points.ply")
-    path = made.point_cloud(tmp_path / "points.ply")
-    faces = b"element face 0\nproperty list uchar int vertex_indices\nend_header"
-    path.write_bytes(path.read_bytes().replace(b"end_header", faces))
-    points = open_capture(tmp_path).points
-    assert points is not None and len(points) > 0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from projection_scenes import KINDS, Kind, random_splats, twin_of, upload
@@ -12,7 +10,6 @@ from rift_cl.cl.arithmetic import sum_columns
 from rift_cl.errors import DTypeError, ShapeError
 from rift_cl.splat.features import shade, shade_grad
 from rift_cl.splat.projection import project, project_grad
-from rift_cl.splat.raster import sum_slots
 from rift_cl.splat.settings import SplatSettings
 
 pytest.importorskip("torch", reason="the oracle of gradients is torch's autograd")
@@ -209,25 +206,6 @@ def test_columns_are_summed(device, shape):
     table = np.random.default_rng(0).standard_normal(shape).astype(np.float32) + 1
     total = device.get(sum_columns(device, device.array(table)))
     np.testing.assert_allclose(total, table.sum(axis=0, dtype=float), rtol=1e-6)
-
-
-def test_records_are_summed_in_bands_to_the_same_bits(device):
-    random = np.random.default_rng(0)
-    counts = random.integers(0, 40, 300)
-    slots = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-    records = random.standard_normal((slots[-1], 9)).astype(np.float32)
-    whole = device.get(made.sums_of(device, slots, records))
-    sums = None
-    for band in np.array_split(np.arange(40), 3):
-        place = np.arange(slots[-1]) - np.repeat(slots[:-1], counts)
-        here = np.isin(place, band)
-        owners = np.repeat(np.arange(300), counts)[here]
-        starts = np.concatenate([[0], np.cumsum(np.bincount(owners, minlength=300))])
-        lists = SimpleNamespace(slots=device.array(starts.astype(np.int32)))
-        sums = sum_slots(device, lists, device.array(records[here]), onto=sums)
-    assert device.get(sums).tobytes() == whole.tobytes()
-    expected = np.add.reduceat(np.append(records, np.zeros((1, 9)), 0), slots[:-1], dtype=float)
-    np.testing.assert_allclose(whole, expected * (counts > 0)[:, None], rtol=1e-4, atol=1e-5)
 
 
 def test_position_gradients_may_come_in_place_of_first_moments(device):
