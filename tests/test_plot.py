@@ -118,6 +118,14 @@ def test_the_same_figure_gives_the_same_bytes():
     assert first.startswith(b"\x89PNG\r\n\x1a\n")
 
 
+def test_colours_are_shown_as_they_are():
+    red = np.zeros((3, 4, 3))
+    red[..., 0] = 2
+    figure = grid([red, np.zeros((3, 4))], window=(-5, 5))
+    shown = [axes.images[0].get_array() for axes in figure.axes]
+    assert np.array_equal(shown[0], np.clip(red, 0, 1)) and shown[1].shape == (3, 4)
+
+
 @pytest.mark.parametrize(
     ("options", "error", "word"),
     [
@@ -140,7 +148,7 @@ def test_useless_options_are_named(options, error, word):
 @pytest.mark.parametrize(
     ("image", "error"),
     [
-        (np.zeros((3, 3, 3)), ShapeError),
+        (np.zeros((3, 3, 2)), ShapeError),
         (np.zeros((0, 3)), ShapeError),
         (np.array([[1.0, np.nan]]), NonFiniteError),
         (np.array([["a", "b"]]), DTypeError),

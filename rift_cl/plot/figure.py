@@ -1,0 +1,56 @@
+"""What all figures share: ink, size, values that can be drawn, and the way to a PNG.
+
+Only matplotlib's objects are used, never its global state, so that a program that plots for itself
+is not disturbed.
+"""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rift_cl.errors import DTypeError, NonFiniteError, ShapeError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DPI = 160
+INK, SOFT, LINE = "#1c1d1f", "#63666b", "#c9ccd0"
+POINTS = 8.5
+
+Reals = NDArray[np.float64]
+
+
+def real_values(name: str, values: ArrayLike, *, axes: int = 1) -> Reals:
+    """Values that can be drawn, with so many axes.
+
+    Raises:
+        ShapeError: they have other axes, or there are none.
+        DTypeError: they are not real numbers.
+        NonFiniteError: one is NaN or infinite.
+    """
+    array: NDArray[Any] = np.asarray(values)
+    if array.dtype.kind not in "biuf":
+        raise DTypeError(f"{name} has type {array.dtype}, wanted real numbers")
+    if array.ndim != axes or array.size == 0:
+        raise ShapeError(f"{name} has shape {array.shape}, wanted {axes} axes and a sample or more")
+    if not np.isfinite(array).all():
+        raise NonFiniteError(f"{name} holds NaN or infinity; replace such values before plotting")
+    return array.astype(np.float64)
+
+
+def new_figure(width: int, height: int) -> Figure:
+    """An empty figure of so many pixels."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white")
+
+
+def figure_png(figure: Figure) -> bytes:
+    """The figure as the content of a PNG file, the same bytes for the same figure."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=figure.dpi, metadata={"Software": None})
+    return buffer.getvalue()
