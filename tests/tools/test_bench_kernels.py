@@ -119,6 +119,17 @@ def test_operations_are_timed_and_scored(bench):
     assert bench[0]["cases"][0]["dot_test"] < 1e-6
 
 
+def test_every_row_of_a_table_has_its_columns(bench):
+    cells = 0
+    for line in bench[1].splitlines():
+        if line.startswith("|"):
+            cells = cells or line.count("|")
+            assert line.count("|") == cells, line
+        else:
+            cells = 0
+    assert "lane use" in bench[1]
+
+
 def test_without_peers_there_are_no_ratios(bench):
     assert all(case["speed_ups"] == [] for case in bench[0]["cases"])
     assert bench[0]["skipped"] == {}

@@ -137,7 +137,8 @@ def _scenes(scenes: list[dict[str, Any]]) -> Table:
         )
         for scene in scenes
     ]
-    columns = ("scene", "draw, ms", "gradient, ms", "entries", "lanes", "lane use")
+    names = [f"{split['operation']}, ms" for split in scenes[0]["splits"]] if scenes else []
+    columns = ("scene", *names, "entries", "lanes", "lane use")
     note = (
         "Every launch waited for, as for the kernels below; SH of degree 3, gradients of every "
         "parameter and of the camera left on the device."
