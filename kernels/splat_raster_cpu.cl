@@ -62,25 +62,21 @@ KERNEL void splat_raster_cpu(
     const int splat = entries[entry].x, next_splat = entries[entry + AHEAD < stop ? entry + AHEAD : entry].x;
     PREFETCH(screen + 8 * next_splat);
     PREFETCH(features + (long)next_splat * stride + first);
-    __global const float *s = screen + 8 * splat;
     __global const float *feature = features + (long)splat * stride + first;
-    const float mean_x = s[0] - x0, mean_y = s[1] - y0, weight = s[5];
-    const float a = 0.5f * TO_POWER * s[2], b = TO_POWER * s[3], c = 0.5f * TO_POWER * s[4];
-    const float extent_x = s[6], extent_y = s[7];
-    const int top = first_row_in(mean_y - extent_y), bottom = past_row_in(mean_y + extent_y);
+    const TileSplat s = splat_in_tile(screen + 8 * splat, x0, y0);
 #if !ADDITIVE && !SMOOTH
     if ((entry - start) % PATIENCE == PATIENCE - 1 && all_negative(state)) break;
 #endif
     for (int strip = 0; strip < STRIPS; strip++) {
       const float begin = strip * LANES + 0.5f;
-      if (begin > mean_x + extent_x || begin + (LANES - 1) < mean_x - extent_x) continue;
-      const lanes dx = (mean_x - begin) - LANE_NUMBERS;
-      const lanes quadratic = a * dx * dx, linear = b * dx;
-      lanes dy = mean_y - (top + 0.5f);
+      if (!reaches_strip(s, begin)) continue;
+      const lanes dx = (s.x - begin) - LANE_NUMBERS;
+      const lanes quadratic = s.a * dx * dx, linear = s.b * dx;
+      lanes dy = s.y - (s.top + 0.5f);
       lanes_int turned = 0;
-      for (int row = top; row < bottom; row++) {
+      for (int row = s.top; row < s.bottom; row++) {
         lanes *here = state[strip * TILE + row];
-        const lanes raw = weight * falloff(quadratic + dy * (linear + c * dy));
+        const lanes raw = s.weight * falloff(quadratic + dy * (linear + s.c * dy));
         dy = dy - 1.0f;
 #if ADDITIVE
         const lanes w = raw;
@@ -99,7 +95,7 @@ KERNEL void splat_raster_cpu(
         UNROLL for (int n = 0; n < CHANNELS; n++) here[1 + n] = here[1 + n] + w * feature[n];
       }
       if (!any_negative(turned)) continue;
-      for (int p = strip * TILE + top; p < strip * TILE + bottom; p++)
+      for (int p = strip * TILE + s.top; p < strip * TILE + s.bottom; p++)
         end[p] = state[p][0] < 0 && end[p] == stop ? entry : end[p];
     }
   }

@@ -69,24 +69,21 @@ KERNEL void splat_raster_grad_cpu(
     __global float *slot = slots + (long)entries[entry].y * RECORD_LENGTH;
     lanes sums[RECORD];
     UNROLL for (int n = 0; n < RECORD; n++) sums[n] = 0;
-    __global const float *s = screen + 8 * splat;
+    __global const float *conic = screen + 8 * splat + 2;
     __global const float *feature = features + (long)splat * stride + first;
-    const float mean_x = s[0] - x0, mean_y = s[1] - y0, weight = s[5];
-    const float a = 0.5f * TO_POWER * s[2], b = TO_POWER * s[3], c = 0.5f * TO_POWER * s[4];
-    const float extent_x = s[6], extent_y = s[7];
-    const int top = first_row_in(mean_y - extent_y), bottom = past_row_in(mean_y + extent_y);
+    const TileSplat s = splat_in_tile(screen + 8 * splat, x0, y0);
     for (int strip = 0; strip < STRIPS; strip++) {
       const float begin = strip * LANES + 0.5f;
-      if (begin > mean_x + extent_x || begin + (LANES - 1) < mean_x - extent_x) continue;
-      const lanes dx = (mean_x - begin) - LANE_NUMBERS;
-      const lanes quadratic = a * dx * dx, linear = b * dx;
-      lanes dy = mean_y - (top + 0.5f);
+      if (!reaches_strip(s, begin)) continue;
+      const lanes dx = (s.x - begin) - LANE_NUMBERS;
+      const lanes quadratic = s.a * dx * dx, linear = s.b * dx;
+      lanes dy = s.y - (s.top + 0.5f);
       /* Sums over rows of dL/dsigma times 1, dy, dy^2; dx is the same in all rows. */
       lanes zeroth = 0, first_y = 0, second_y = 0;
-      for (int row = top; row < bottom; row++) {
+      for (int row = s.top; row < s.bottom; row++) {
         const int p = strip * TILE + row;
         lanes *here = state[p];
-        const lanes power = quadratic + dy * (linear + c * dy), raw = weight * falloff(power);
+        const lanes power = quadratic + dy * (linear + s.c * dy), raw = s.weight * falloff(power);
         lanes cv = 0;
         UNROLL for (int n = 0; n < CHANNELS; n++) cv = cv + feature[n] * here[2 + n];
 #if ADDITIVE
@@ -117,8 +114,8 @@ KERNEL void splat_raster_grad_cpu(
         second_y = second_y + g * (dy * dy);
         UNROLL for (int n = 0; n < CHANNELS; n++) sums[6 + n] = sums[6 + n] + w * here[2 + n];
 #if ABSGRAD
-        sums[RECORD - 2] = sums[RECORD - 2] + absolute(g * (s[2] * dx + s[3] * dy));
-        sums[RECORD - 1] = sums[RECORD - 1] + absolute(g * (s[3] * dx + s[4] * dy));
+        sums[RECORD - 2] = sums[RECORD - 2] + absolute(g * (conic[0] * dx + conic[1] * dy));
+        sums[RECORD - 1] = sums[RECORD - 1] + absolute(g * (conic[1] * dx + conic[2] * dy));
 #endif
         dy = dy - 1.0f;
       }

@@ -65,3 +65,29 @@ static int past_row_in(float high) {
   const float v = high - 0.5f;
   return v < 0 ? 0 : v >= TILE ? TILE : (int)v + 1;
 }
+
+/* A splat as one tile sees it: places count from the tile's corner, power = a dx^2 + b dx dy +
+ * c dy^2 is that of falloff, and rows outside top .. bottom - 1 lie beyond its extents. */
+typedef struct {
+  float x, y, weight, a, b, c, extent_x;
+  int top, bottom;
+} TileSplat;
+
+static TileSplat splat_in_tile(__global const float *s, int x0, int y0) {
+  TileSplat t;
+  t.x = s[0] - x0;
+  t.y = s[1] - y0;
+  t.a = 0.5f * TO_POWER * s[2];
+  t.b = TO_POWER * s[3];
+  t.c = 0.5f * TO_POWER * s[4];
+  t.weight = s[5];
+  t.extent_x = s[6];
+  t.top = first_row_in(t.y - s[7]);
+  t.bottom = past_row_in(t.y + s[7]);
+  return t;
+}
+
+/* Whether a strip of LANES pixels, the first of which has its centre at `begin`, is within reach. */
+static int reaches_strip(TileSplat t, float begin) {
+  return begin <= t.x + t.extent_x && begin + (LANES - 1) >= t.x - t.extent_x;
+}
