@@ -23,7 +23,7 @@ from rift_cl.geometry.camera import CameraModel
 from rift_cl.interop.raster_function import Parts, rasterize_flat
 from rift_cl.interop.splat_functions import Drawer, Project, Shade
 from rift_cl.interop.tensors import check_tensor
-from rift_cl.splat.renderer import DepthKind
+from rift_cl.splat.renderer import DepthKind, check_depth
 from rift_cl.splat.settings import SplatSettings
 
 __all__ = ["Screens", "project", "rasterize", "render", "shade"]
@@ -184,7 +184,7 @@ def render(
         RiftError: of the kind and with the sentence that say what does not fit.
     """
     how = drawer(size, model=model, settings=settings, device=device)
-    _check_depth(depth, how.settings)
+    check_depth(depth, how.settings)
     screens = project(how, means, quats, scales, opacities, viewmats, Ks, covars=covars)
     views, count = screens.culled.shape
     parts = []
@@ -213,10 +213,3 @@ def expect_depth(images: torch.Tensor, alphas: torch.Tensor) -> torch.Tensor:
     """Images whose last channel is divided by alpha."""
     expected = images[..., -1:] / alphas.clamp(min=_LEAST_ALPHA)
     return torch.cat([images[..., :-1], expected], dim=-1)
-
-
-def _check_depth(depth: str | None, settings: SplatSettings) -> None:
-    if depth not in (None, "accumulated", "expected"):
-        raise InputError(f"depth is {depth!r}, wanted None, accumulated or expected")
-    if depth is not None and settings.mode == "xray":
-        raise InputError("depth has no meaning in xray mode, in which nothing hides anything")

@@ -109,7 +109,7 @@ class Fit:
         largest = max(camera.height * camera.width for camera in cameras)
         parameters = 11 + 3 * (self.settings.sh_degree + 1) ** 2
         memory = FrameMemory(self.settings.splats, parameters, largest, 3, gradient=True)
-        # Besides what a frame takes there are the raw values and Adam's two moments.
+        # Besides what a frame takes there are Adam's two moments of every parameter.
         need = memory.fixed + 8 * parameters * self.settings.splats
         return {
             "capture": str(self.capture.path),

@@ -53,6 +53,8 @@ class CapturePictures:
         self.cameras: Sequence[Camera] = [camera_at(view, downscale) for view in views]
         self._downscale, self._seed = downscale, seed
         self._kept: dict[int, NDArray[np.uint8]] = {}
+        # A step asks for one picture several times.
+        self._last: tuple[int, Floats] | None = None
         self._room = int(_SHARE * (free_host_memory() or 1 << 30))
         found = self._common_border() if like is None else like.behind
         self.behind: Floats = np.zeros(3, np.float32) if found is None else found
@@ -61,6 +63,11 @@ class CapturePictures:
 
     def image(self, number: int) -> Floats:
         """(height, width, 3 or 4) in display light, alpha straight."""
+        if self._last is None or self._last[0] != number:
+            self._last = number, self._decoded(number)
+        return self._last[1]
+
+    def _decoded(self, number: int) -> Floats:
         if number not in self._kept:
             image = read_view(self.views[number], downscale=self._downscale)
             codes = np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8)

@@ -30,6 +30,18 @@ from rift_cl.splat.splats import Splats
 DepthKind = Literal["accumulated", "expected"]
 
 
+def check_depth(depth: str | None, settings: SplatSettings) -> None:
+    """Check what depth is asked for.
+
+    Raises:
+        InputError: it is none that there is, or there is none in this mode.
+    """
+    if depth not in (None, "accumulated", "expected"):
+        raise InputError(f"depth is {depth!r}, wanted None, accumulated or expected")
+    if depth is not None and settings.mode == "xray":
+        raise InputError("depth has no meaning in xray mode, in which nothing hides anything")
+
+
 class Renderer:
     """Draws splats and differentiates the drawing.
 
@@ -95,6 +107,7 @@ class Renderer:
         grad_transmittance: Any = None,
         *,
         with_camera: bool = False,
+        with_background: bool = True,
     ) -> FrameGradients:
         """The gradient of a loss by everything that made a frame.
 
@@ -103,6 +116,7 @@ class Renderer:
             grad_image: dL/d image, (height, width, D) device array.
             grad_transmittance: dL/d transmittance, (height, width); zero if not given.
             with_camera: differentiate by pose and intrinsics as well.
+            with_background: differentiate by the background, if there is one.
 
         Raises:
             ShapeError: a gradient does not fit the frame.
@@ -132,7 +146,7 @@ class Renderer:
             colors=own_columns(device, gradients.features, frame.channels),
             sh=sh,
             camera=sum_columns(device, gradients.camera) if with_camera else None,
-            background=self._background_grad(frame, grad_image),
+            background=self._background_grad(frame, grad_image) if with_background else None,
         )
 
     def culled(self, frame: Frame) -> dict[str, int]:
@@ -143,10 +157,7 @@ class Renderer:
         }
 
     def _channels(self, splats: Splats, depth: DepthKind | None) -> Channels:
-        if depth not in (None, "accumulated", "expected"):
-            raise InputError(f"depth is {depth!r}, wanted None, accumulated or expected")
-        if depth is not None and self.settings.mode == "xray":
-            raise InputError("depth has no meaning in xray mode, in which nothing hides anything")
+        check_depth(depth, self.settings)
         return Channels.of(splats, depth=depth is not None)
 
     def _behind(self, background: Any, channels: Channels) -> Any:

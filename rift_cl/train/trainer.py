@@ -138,7 +138,7 @@ class Trainer:
             background=self.pictures.background(number),
         )
         value, by_image = self.loss(self.device, frame.image, self.pictures.target(number))
-        gradients = self.renderer.backward(frame, by_image)
+        gradients = self.renderer.backward(frame, by_image, with_background=False)
         finishing = parameters.step >= self.schedule.finish
         rates, renewal = self.schedule.rates(parameters.step), settings.renewal
         parameters.update(
