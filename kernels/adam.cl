@@ -4,8 +4,10 @@
  *     x -= rate m c1 / (sqrt(v c2) + epsilon),      c = 1 / (1 - beta^step).
  *
  * Parameters repeat with a period (the coefficients of one splat's colour, say), and each place of
- * the period has a rate of its own: `rates` holds two periods and LANES more, so that a run of
- * LANES parameters reads its rates from wherever it begins. Index space: (runs of RUN parameters). */
+ * the period has its own share of the rate: `shares` holds two periods and LANES more, so that a run
+ * of LANES parameters reads its shares from wherever it begins.
+ *
+ * Index space: (runs of RUN parameters). */
 
 #include "include/portable.h"
 
@@ -19,8 +21,8 @@ static lanes moved(lanes m, lanes v, lanes rate, float c1, float c2, float epsil
 
 KERNEL void adam(
     __global float *restrict x, __global float *restrict m, __global float *restrict v,
-    __global const float *restrict g, __global const float *restrict rates,
-    int period, float beta1, float beta2, float c1, float c2, float epsilon, ulong size)
+    __global const float *restrict g, __global const float *restrict shares,
+    int period, float rate, float beta1, float beta2, float c1, float c2, float epsilon, ulong size)
 {
   const ulong begin = (ulong)get_global_id(0) * RUN;
   const ulong end = begin + RUN < size ? begin + RUN : size;
@@ -32,14 +34,14 @@ KERNEL void adam(
     const lanes vi = beta2 * LOAD(v + i) + (1 - beta2) * gi * gi;
     STORE(m + i, mi);
     STORE(v + i, vi);
-    STORE(x + i, LOAD(x + i) - moved(mi, vi, LOAD(rates + place), c1, c2, epsilon));
+    STORE(x + i, LOAD(x + i) - moved(mi, vi, rate * LOAD(shares + place), c1, c2, epsilon));
     place += LANES;
     while (place >= period) place -= period;
   }
   for (; i < end; i++) {
     m[i] = beta1 * m[i] + (1 - beta1) * g[i];
     v[i] = beta2 * v[i] + (1 - beta2) * g[i] * g[i];
-    x[i] -= rates[place] * (m[i] * c1) / (sqrt(v[i] * c2) + epsilon);
+    x[i] -= rate * shares[place] * (m[i] * c1) / (sqrt(v[i] * c2) + epsilon);
     if (++place == period) place = 0;
   }
 }

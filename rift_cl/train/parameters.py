@@ -7,7 +7,7 @@ made from them after every step. One owner, the trainer, changes these arrays in
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,7 @@ class Parameters:
         second: Adam's means of their squares.
         drawn: what the rasterizer draws; shares positions, quaternions and harmonics with ``raw``.
         step: steps of Adam that were taken.
+        shares: of the rates along a period of parameters, on the device.
     """
 
     device: Device
@@ -45,6 +46,7 @@ class Parameters:
     second: dict[str, Any]
     drawn: Splats
     step: int = 0
+    shares: dict[tuple[int, float], Any] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -106,27 +108,32 @@ class Parameters:
         by = (found.means, found.quats, found.scales, found.opacities, gradients.sh)
         self.step += 1
         for name, gradient in zip(GROUPS, by, strict=True):
-            period = np.full(3 * self.raw["sh"].shape[1] if name == "sh" else 1, rates[name])
-            if name == "sh":
-                period[3:] *= sh_rest
-            self._adam(name, gradient, period)
+            self._adam(name, gradient, rates[name], sh_rest if name == "sh" else 1.0)
         _activate(self.device, self.raw, self.drawn)
 
-    def _adam(self, name: str, gradient: Any, period: NDArray[np.float64]) -> None:
+    def _adam(self, name: str, gradient: Any, rate: float, rest: float) -> None:
         device, size = self.device, self.raw[name].size
-        lanes = device.traits.macros["LANES"]
-        # Two periods and a run more, so that rates can be read from any place on.
-        table = np.resize(period, 2 * len(period) + lanes).astype(np.float32)
+        period = 3 * self.raw["sh"].shape[1] if name == "sh" else 1
         run = _CPU_RUN if device.traits.is_cpu else 1
         device.launch(
             "adam",
             (-(-size // run),),
-            *(self.raw[name], self.first[name], self.second[name], gradient, device.array(table)),
-            *(len(period), _BETA1, _BETA2),
+            *(self.raw[name], self.first[name], self.second[name], gradient),
+            *(self._shares(period, rest), period, float(rate), _BETA1, _BETA2),
             *(1 / (1 - _BETA1**self.step), 1 / (1 - _BETA2**self.step), _EPSILON),
             np.uint64(size),
             RUN=run,
         )
+
+    def _shares(self, period: int, rest: float) -> Any:
+        """Shares of the rate along a period, one for the first three; sent to the device once."""
+        if (period, rest) not in self.shares:
+            shares = np.where(np.arange(period) < 3, 1.0, rest)
+            # Two periods and a run more, so that shares can be read from any place on.
+            length = 2 * period + self.device.traits.macros["LANES"]
+            table = np.resize(shares, length).astype(np.float32)
+            self.shares[period, rest] = self.device.array(table)
+        return self.shares[period, rest]
 
     def shake(self, amount: float, seed: int) -> None:
         """Move faint splats at random; ``kernels/splat_noise.cl`` says how."""
