@@ -10,9 +10,17 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rift_cl.io.capture import Capture, View, camera_at, open_capture, read_view
+    from rift_cl.io.capture import (
+        Capture,
+        View,
+        camera_at,
+        holds_bare_photographs,
+        open_capture,
+        read_view,
+    )
     from rift_cl.io.image import read_image, write_png
     from rift_cl.io.output import atomic_path, make_folder, write_json, write_text
+    from rift_cl.io.photographs import PosedPhotographs, demand_photographs, pose_photographs
     from rift_cl.io.scan import open_scan
     from rift_cl.io.scan_file import ScanFile, ScanRows
     from rift_cl.io.splat_scene import SplatScene
@@ -20,6 +28,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Capture": "capture",
+    "PosedPhotographs": "photographs",
     "ScanFile": "scan_file",
     "ScanRows": "scan_file",
     "SplatScene": "splat_scene",
@@ -27,10 +36,13 @@ _HOMES = {
     "VolumeWriter": "volume",
     "atomic_path": "output",
     "camera_at": "capture",
+    "demand_photographs": "photographs",
+    "holds_bare_photographs": "capture",
     "make_folder": "output",
     "open_capture": "capture",
     "open_scan": "scan",
     "open_volume": "volume",
+    "pose_photographs": "photographs",
     "read_image": "image",
     "read_view": "capture",
     "read_volume": "volume",
@@ -41,6 +53,7 @@ _HOMES = {
 
 __all__ = [
     "Capture",
+    "PosedPhotographs",
     "ScanFile",
     "ScanRows",
     "SplatScene",
@@ -48,10 +61,13 @@ __all__ = [
     "VolumeWriter",
     "atomic_path",
     "camera_at",
+    "demand_photographs",
+    "holds_bare_photographs",
     "make_folder",
     "open_capture",
     "open_scan",
     "open_volume",
+    "pose_photographs",
     "read_image",
     "read_view",
     "read_volume",

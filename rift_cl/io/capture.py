@@ -8,17 +8,28 @@ from pathlib import Path
 from rift_cl.errors import InputError
 from rift_cl.io.boundary import reading
 from rift_cl.io.colmap_model import MODEL_FOLDERS, find_model, open_model
+from rift_cl.io.photograph_folder import photograph_names, photographs_in
 from rift_cl.io.transforms_json import open_transforms
 from rift_cl.io.view import Capture, View, camera_at
 from rift_cl.io.view_image import read_view
 
-__all__ = ["Capture", "View", "camera_at", "open_capture", "read_view"]
+__all__ = [
+    "Capture",
+    "View",
+    "camera_at",
+    "capture_name",
+    "holds_bare_photographs",
+    "open_capture",
+    "read_view",
+]
 
 # NeRF's synthetic scenes have a file for each part; the first is what is trained on.
 _TRANSFORMS = ("transforms.json", "transforms_train.json")
 
 
-def open_capture(path: str | os.PathLike[str]) -> Capture:
+def open_capture(
+    path: str | os.PathLike[str], *, images: str | os.PathLike[str] | None = None
+) -> Capture:
     """Find the posed photographs of a capture; the photographs themselves are not read.
 
     Args:
@@ -26,6 +37,8 @@ def open_capture(path: str | os.PathLike[str]) -> Capture:
             instant-ngp and nerfstudio; or a folder with one; or a folder with a COLMAP model
             in ``sparse/0``, in ``sparse`` or in itself, binary or text, and the photographs in
             ``images`` there or above. Masks of a COLMAP model lie in ``masks`` beside ``images``.
+        images: the folder of the photographs, or the one that has them in ``images``, where a
+            COLMAP model lies somewhere else; masks lie in ``masks`` there.
 
     Returns:
         Views in the order of the file, or in that of their names where they are COLMAP's.
@@ -40,22 +53,55 @@ def open_capture(path: str | os.PathLike[str]) -> Capture:
         ResourceLimitError: a list of views or points is larger than the memory allows.
     """
     with reading(Path(path), "the capture"):
-        path = Path(path).absolute()
-        # What lies above the folder is looked at too, so that its name has to be a plain one.
-        path = path.resolve() if ".." in path.parts else path
-        if not path.exists():
-            raise InputError(f"{path}: there is no such file or folder")
-        if not path.is_dir():
-            if path.suffix.lower() != ".json":
-                raise InputError(f"{path}: a capture is a .json file or a folder")
-            return open_transforms(path)
-        for name in _TRANSFORMS:
-            if (path / name).is_file():
-                return open_transforms(path / name)
+        path = _absolute(path)
+        file = _transforms(path)
+        if file is not None and images is None:
+            return open_transforms(file)
         model = find_model(path)
-    if model is None:
-        raise InputError(
-            f"{path}: holds no capture; looked for {' and '.join(_TRANSFORMS)}, and for cameras "
-            f"and images, .bin or .txt, of a COLMAP model in {', '.join(MODEL_FOLDERS)}"
-        )
-    return open_model(path, *model)
+    if model is not None:
+        return open_model(path, *model, None if images is None else photographs_in(Path(images)))
+    if images is not None:
+        raise InputError(f"{path}: holds no COLMAP model, to which images= could belong")
+    bare = photograph_names(photographs_in(path))
+    hint = f"; the poses of its {len(bare)} bare photographs can be found by 'rift fit'"
+    raise InputError(
+        f"{path}: holds no capture; looked for {' and '.join(_TRANSFORMS)}, and for cameras "
+        f"and images, .bin or .txt, of a COLMAP model in {', '.join(MODEL_FOLDERS)}"
+        f"{hint if bare else ''}"
+    )
+
+
+def capture_name(path: Path) -> str:
+    """How a capture is called: its folder, or a file that is not named transforms."""
+    path = path.resolve()
+    return path.parent.name if path.name == "transforms.json" else path.stem
+
+
+def holds_bare_photographs(path: str | os.PathLike[str]) -> bool:
+    """Whether a path is a folder with photographs that nobody has posed; see ``photographs``."""
+    with reading(Path(path), "the capture"):
+        path = _absolute(path)
+        if not path.is_dir() or _transforms(path) is not None or find_model(path) is not None:
+            return False
+    return bool(photograph_names(photographs_in(path)))
+
+
+def _absolute(path: str | os.PathLike[str]) -> Path:
+    path = Path(path).absolute()
+    # What lies above the folder is looked at too, so that its name has to be a plain one.
+    return path.resolve() if ".." in path.parts else path
+
+
+def _transforms(path: Path) -> Path | None:
+    """The transforms.json that a path is, or that lies in it; None where it may hold a model.
+
+    Raises:
+        InputError: there is no such path, or it can be no capture.
+    """
+    if not path.exists():
+        raise InputError(f"{path}: there is no such file or folder")
+    if not path.is_dir():
+        if path.suffix.lower() != ".json":
+            raise InputError(f"{path}: a capture is a .json file or a folder")
+        return path
+    return next((path / name for name in _TRANSFORMS if (path / name).is_file()), None)

@@ -35,19 +35,22 @@ def find_model(folder: Path) -> tuple[Path, str] | None:
     return None
 
 
-def open_model(folder: Path, model: Path, suffix: str) -> Capture:
+def open_model(
+    folder: Path, model: Path, suffix: str, images: CaptureFolder | None = None
+) -> Capture:
     """Read the views of a COLMAP model; see ``open_capture``.
 
     Args:
         folder: the folder that was asked for.
         model: the folder of the model, which may be the same.
         suffix: the suffix of its files, ``.bin`` or ``.txt``.
+        images: where the photographs are; looked for from ``folder`` on when not given.
     """
     reader = _READERS[suffix]
     cameras = _numbered(model / f"cameras{suffix}", reader.read_cameras(model / f"cameras{suffix}"))
     path = model / f"images{suffix}"
     records = sorted(reader.read_images(path), key=lambda record: record.name)
-    images = _images_folder(folder)
+    images = _images_folder(folder) if images is None else images
     views = [_view(path, images, cameras, record) for record in records]
     checked = check_views(path, views)
     points, colors = _points(model / f"points3D{suffix}", reader)

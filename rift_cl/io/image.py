@@ -43,8 +43,9 @@ def read_image(path: str | os.PathLike[str], *, budget: int | None = None) -> ND
     """Read an image as it is stored: (y, x) where there is one channel, else (y, x, channel).
 
     Integer codes are scaled to [0, 1] and stay in display light; the numbers of OpenEXR, HDR and
-    floating TIFF are returned as they are, which is linear light by custom. Alpha is not
-    multiplied in.
+    floating TIFF are returned as they are, which is linear light by custom. Alpha is straight:
+    where a file holds colours with alpha multiplied in, as OpenEXR does, they are divided by it.
+    Rows and columns are those of the file, whatever EXIF says about its orientation.
 
     Args:
         path: the file; content and extension have to agree.

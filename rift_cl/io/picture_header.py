@@ -8,6 +8,8 @@ from pathlib import Path
 from rift_cl.io.boundary import reading
 from rift_cl.io.pixels import image_format, opened_image
 
+_TAKEN_BY = ("Make", "Model", "Exif:FocalLength", "Exif:FocalLengthIn35mmFilm")
+
 
 @dataclass(frozen=True)
 class PictureHeader:
@@ -17,15 +19,21 @@ class PictureHeader:
         size: (height, width) in pixels.
         channels: numbers in a pixel.
         alpha: the last of them is alpha.
-        associated: alpha is multiplied into the colours.
         linear: the colours are proportional to light; integers are display light by custom.
+        eight_bit: each number is a code of 8 bits.
+        orientation: how EXIF wants it shown, 1 to 8; 1 as it is stored, 5 to 8 with the axes
+            swapped. No reader here turns a picture.
+        taken_by: maker and model of the camera and its focal lengths, as EXIF has them; empty
+            where it has none.
     """
 
     size: tuple[int, int]
     channels: int
     alpha: bool
-    associated: bool
     linear: bool
+    eight_bit: bool
+    orientation: int
+    taken_by: tuple[str, ...]
 
 
 def read_picture_header(path: Path) -> PictureHeader:
@@ -37,11 +45,13 @@ def read_picture_header(path: Path) -> PictureHeader:
     """
     with reading(path, "the image"), opened_image(path, image_format(path)) as source:
         spec = source.spec()
-        alpha = spec.alpha_channel >= 0
+        taken_by = (spec.getattribute(name) for name in _TAKEN_BY)
         return PictureHeader(
             size=(int(spec.height), int(spec.width)),
             channels=int(spec.nchannels),
-            alpha=alpha,
-            associated=alpha and spec.get_int_attribute("oiio:UnassociatedAlpha", 0) == 0,
+            alpha=spec.alpha_channel >= 0,
             linear=str(spec.format) in ("half", "float", "double"),
+            eight_bit=str(spec.format) == "uint8",
+            orientation=int(spec.get_int_attribute("Orientation", 1)),
+            taken_by=tuple(str(value) for value in taken_by if value is not None),
         )

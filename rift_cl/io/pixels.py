@@ -1,4 +1,4 @@
-"""Pixels through OpenImageIO: one function in, one out, no error left unread.
+"""Pixels through OpenImageIO: one function in, one out, no error left unread, alpha straight.
 
 OpenImageIO reports failure by return values, and for some formats by ``geterror`` alone: a PNG on
 a full disk counts as written otherwise. On the way in it would try every decoder it has on a file
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rift_cl.errors import FileFormatError, ResourceLimitError
 from rift_cl.io.boundary import check_claim, reading
 
-_SUFFIXES = {
+SUFFIXES = {
     ".png": "png",
     ".exr": "openexr",
     ".tif": "tiff",
@@ -70,6 +70,12 @@ def write_pixels(
 def read_pixels(path: Path, *, budget: int | None = None) -> NDArray[np.float32]:
     """Read (y, x, channel) as float32; integers are scaled to [0, 1], alpha is not multiplied in.
 
+    OpenEXR and most TIFF hold colours with alpha multiplied in; they are divided by it, in the
+    light that they are stored in. Where alpha is 0 there is nothing to divide by: what is stored
+    there, light that covers nothing, is returned as it is.
+
+    Rows and columns are those of the file: an EXIF orientation turns nothing (see ``read_view``).
+
     Raises:
         InputError: there is no such file.
         FileFormatError: the file is damaged, or is none of PNG, OpenEXR, TIFF, JPEG and HDR.
@@ -84,7 +90,8 @@ def read_pixels(path: Path, *, budget: int | None = None) -> NDArray[np.float32]
         message = _first_line(source.geterror())
         if pixels is None or message:
             raise FileFormatError(f"{path}: the image is damaged ({message})")
-        return np.asarray(pixels, np.float32).reshape(spec.height, spec.width, spec.nchannels)
+        shape = (spec.height, spec.width, spec.nchannels)
+        return _straight(np.asarray(pixels, np.float32).reshape(shape), spec)
 
 
 @contextmanager
@@ -124,13 +131,26 @@ def image_format(path: Path) -> str:
     with path.open("rb") as file:
         start = file.read(16)
     content = next((name for mark, name in _SIGNATURES.items() if start.startswith(mark)), None)
-    if content is None or _SUFFIXES.get(path.suffix.lower()) != content:
+    if content is None or SUFFIXES.get(path.suffix.lower()) != content:
         raise FileFormatError(
             f"{path}: the content is {content or 'of no known format'}, the name says "
             f"{path.suffix or 'nothing'}; an image is .png, .exr, .tif, .jpg or .hdr and what its "
             "name says"
         )
     return content
+
+
+def _straight(pixels: NDArray[np.float32], spec: Any) -> NDArray[np.float32]:
+    """Divide colours by the alpha that is multiplied into them; changes what it is given."""
+    alpha = spec.alpha_channel
+    if alpha < 0 or spec.get_int_attribute("oiio:UnassociatedAlpha", 0):
+        return pixels
+    cover = pixels[..., alpha]
+    with np.errstate(over="ignore"):
+        for channel in set(range(spec.nchannels)) - {alpha, spec.z_channel}:
+            color = pixels[..., channel]
+            np.divide(color, cover, out=color, where=cover > 0)
+    return pixels
 
 
 def _first_line(message: str) -> str:

@@ -32,6 +32,12 @@ def read_view(
 ) -> Image:
     """Read the photograph of a view, without its lens, as ``camera_at(view, downscale)`` sees it.
 
+    Rows and columns are those of the file, and EXIF's orientation is not followed, because poses
+    refer to pixels as they are stored: COLMAP does not turn photographs in any release (its pull
+    request 1318 did, 1406 took it back before 3.7 came out), nor do nerfstudio
+    (``-noautorotate`` in its pull request 1261) and instant-ngp. Poses of a program that turns
+    photographs first belong to the turned copies, which are to be named in the capture.
+
     Args:
         view: one of the views of a capture.
         downscale: whole factor to make the image smaller by; areas are averaged.
@@ -54,7 +60,7 @@ def read_view(
         raise InputError(f"read_view: light is {light!r}, wanted 'display' or 'linear'")
     camera_at(view, downscale)
     header = _checked_header(view, budget)
-    image = _photograph(view.image, header, budget)
+    image = read_photograph(view.image, header, budget)
     if view.mask is not None:
         image = _with_alpha(image)
         image[..., 3] *= _coverage(view.mask, budget)
@@ -90,14 +96,25 @@ def _checked_header(view: View, budget: int | None) -> PictureHeader:
 
 
 def _demand_fit(view: View, path: Path, header: PictureHeader) -> None:
+    demand_colors(path, header)
+    if header.size != view.camera.size:
+        turned = header.orientation >= 5 and header.size == view.camera.size[::-1]
+        advice = "; EXIF says that it is shown turned: turn its pixels, as those of the pose were"
+        raise ShapeError(
+            f"{path}: is {_size(header.size)} pixels, the camera of view {view.name!r} says "
+            f"{_size(view.camera.size)}{advice if turned else ''}"
+        )
+
+
+def demand_colors(path: Path, header: PictureHeader) -> None:
+    """Refuse a picture that is neither grey nor RGB.
+
+    Raises:
+        FileFormatError: it has another number of channels.
+    """
     if header.channels - header.alpha not in (1, 3):
         raise FileFormatError(
             f"{path}: has {header.channels} channels, wanted grey or RGB, with alpha or without"
-        )
-    if header.size != view.camera.size:
-        raise ShapeError(
-            f"{path}: is {_size(header.size)} pixels, the camera of view {view.name!r} says "
-            f"{_size(view.camera.size)}"
         )
 
 
@@ -105,8 +122,14 @@ def _size(size: tuple[int, int]) -> str:
     return f"{size[1]} x {size[0]} (width x height)"
 
 
-def _photograph(path: Path, header: PictureHeader, budget: int | None) -> Image:
-    """The photograph as RGB or RGBA with straight alpha, in the light that it is stored in."""
+def read_photograph(path: Path, header: PictureHeader, budget: int | None) -> Image:
+    """A photograph as RGB or RGBA with straight alpha, in the light that it is stored in.
+
+    Raises:
+        FileFormatError: it is damaged.
+        NonFiniteError: it holds NaN or infinity.
+        ResourceLimitError: it is larger than the budget.
+    """
     image = read_pixels(path, budget=budget)
     if header.linear and not np.isfinite(image).all():
         raise NonFiniteError(f"{path}: the image holds NaN or infinity")
@@ -114,8 +137,6 @@ def _photograph(path: Path, header: PictureHeader, budget: int | None) -> Image:
         image = np.take(image, [0, 0, 0, 1][: 3 + header.alpha], axis=2)
     if header.alpha:
         np.clip(image[..., 3], 0, 1, out=image[..., 3])
-    if header.associated:
-        _divide_by_alpha(image)
     return image
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
+import capture_files as made
 import pytest
+from photograph_files import NAMES
 
 
 @pytest.fixture
@@ -25,3 +29,19 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
         yield place
     finally:
         subprocess.run(["umount", "-l", str(place)], check=True)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Four bare photographs."""
+    made.photographs(tmp_path / "bare", NAMES)
+    return tmp_path / "bare"
+
+
+@pytest.fixture
+def seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], dict[str, Any]]:
+    """Put the stand-in in place of pycolmap; gives what it was asked."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent / "fake_pycolmap"))
+    path = tmp_path / "seen.json"
+    monkeypatch.setenv("FAKE_PYCOLMAP_SEEN", str(path))
+    return lambda: json.loads(path.read_text())

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO
 import pytest
+import view_files
 
 from rift_cl.errors import (
     DTypeError,
@@ -82,6 +83,32 @@ def test_jpeg(tmp_path: Path) -> None:
     pixels = np.full((16, 16, 3), 128, np.uint8)
     image = read_image(store(tmp_path / "a", pixels, "jpeg", ".jpg"))
     np.testing.assert_allclose(image, 128 / 255, atol=0.01)
+
+
+@pytest.mark.parametrize("name", ["a.exr", "a.tif", "b.tif", "a.png"])
+def test_alpha_is_straight_whatever_the_file_holds(tmp_path: Path, name: str) -> None:
+    """OpenEXR and most TIFF hold colours times alpha; where alpha is 0 they stay as they are."""
+    pixels = np.full((4, 4, 4), [0.5, 0.25, 1.0, 0.5], np.float32)
+    pixels[0, 0, 3] = 0
+    straight = name in ("b.tif", "a.png")
+    stored = pixels.copy()
+    if not straight:
+        stored[pixels[..., 3] > 0, :3] *= 0.5
+    kind = "uint8" if straight else "float"
+    attributes = {"oiio:UnassociatedAlpha": 1} if straight else {}
+    image = read_image(view_files.store(tmp_path / name, stored, kind, **attributes))
+    np.testing.assert_allclose(image, pixels, atol=0.6 / 255 if straight else 1e-6)
+
+
+def test_depth_beside_colours_is_not_divided_by_alpha(tmp_path: Path) -> None:
+    spec = OpenImageIO.ImageSpec(2, 2, 5, "float")
+    spec.channelnames, spec.alpha_channel, spec.z_channel = ("R", "G", "B", "A", "Z"), 3, 4
+    output = OpenImageIO.ImageOutput.create("openexr")
+    path = tmp_path / "a.exr"
+    pixels = np.full((2, 2, 5), [0.1, 0.2, 0.3, 0.5, 7], np.float32)
+    assert output.open(str(path), spec) and output.write_image(pixels) and output.close()
+    expected = np.full((2, 2, 5), [0.2, 0.4, 0.6, 0.5, 7])
+    np.testing.assert_allclose(read_image(path), expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("format", ["bmp", "targa", "jpeg", "tiff"])

@@ -88,8 +88,8 @@ def test_what_is_transparent_gives_no_colour(tmp_path: Path) -> None:
     [
         ("a.exr", "float", True, {}),
         ("a.tif", "uint8", True, {}),
-        ("a.tif", "uint16", False, {"UnassociatedAlpha": 1}),
-        ("a.png", "uint8", False, {"UnassociatedAlpha": 1}),
+        ("a.tif", "uint16", False, {"oiio:UnassociatedAlpha": 1}),
+        ("a.png", "uint8", False, {"oiio:UnassociatedAlpha": 1}),
     ],
 )
 def test_alpha_is_straight_whatever_the_file_holds(
@@ -130,3 +130,32 @@ def test_a_mask_is_multiplied_into_alpha(tmp_path: Path, channels: int) -> None:
         np.testing.assert_allclose(image[..., :3], codes[..., :3] / 255, atol=1e-6)
         alpha = codes[..., 3:] / 255 if count == 4 else 1
         np.testing.assert_allclose(image[..., 3:], cover * alpha, atol=1e-6)
+
+
+@pytest.mark.parametrize("light", ["display", "linear"])
+@pytest.mark.parametrize("downscale", [1, 4])
+@pytest.mark.parametrize(
+    ("name", "kind", "error"),
+    [
+        ("a.png", "uint8", 0.6 / 255),
+        ("a.tif", "uint8", 0.6 / 255),
+        ("a.png", "uint16", 1e-5),
+        ("a.tif", "uint16", 1e-5),
+        ("a.tif", "float", 1e-6),
+        ("a.exr", "half", 1e-3),
+        ("a.exr", "float", 1e-6),
+    ],
+)
+def test_either_light_from_every_depth(
+    tmp_path: Path, name: str, kind: str, error: float, downscale: int, light: str
+) -> None:
+    """One scene: integers hold its display codes, real numbers its light; both are asked for."""
+    scene = RANDOM.uniform(0.05, 1, (HEIGHT, WIDTH, 3))
+    stored = scene if kind in ("half", "float") else display(scene)
+    view = view_of(store(tmp_path / name, stored.astype(np.float32), kind))
+    blocks = (HEIGHT // downscale, downscale, WIDTH // downscale, downscale, 3)
+    expected = scene.reshape(blocks).mean((1, 3))
+    image = read_view(view, downscale=downscale, light=light)
+    # The curve is steeper than 1, up to 2.3 in linear light.
+    wanted = expected if light == "linear" else display(expected)
+    np.testing.assert_allclose(image, wanted, atol=2.5 * error)

@@ -20,11 +20,11 @@ def view_of(image: Path, mask: Path | None = None, lens: Lens | None = None) -> 
     return View("a", Camera((spec.height, spec.width), K, np.eye(4)), image, mask, lens)
 
 
-def store(path: Path, pixels: np.ndarray, kind: str, **attributes: int) -> Path:
-    """Write numbers with OpenImageIO itself, so that any type and any alpha can be had."""
+def store(path: Path, pixels: np.ndarray, kind: str, **attributes: object) -> Path:
+    """Write numbers with OpenImageIO itself, so that any type, alpha and EXIF can be had."""
     spec = OpenImageIO.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], kind)
     for name, value in attributes.items():
-        spec.attribute(f"oiio:{name}", value)
+        spec.attribute(name, value)
     output = OpenImageIO.ImageOutput.create(str(path))
     assert output.open(str(path), spec) and output.write_image(pixels) and output.close()
     return path

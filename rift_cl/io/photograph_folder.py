@@ -1,0 +1,160 @@
+"""The photographs of a folder that nobody has posed: which they are, and whether they are whole.
+
+Programs that find poses decode photographs by themselves, each in its own way. Here every one is
+decoded first, by the reader that a fit will use, so that what is damaged is left out beforehand;
+and where one is of a kind that such a program may read otherwise than we do, copies of plain
+8-bit colours are made of all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import InputError, PathEscapeError, RiftError
+from rift_cl.io.boundary import check_claim, reading
+from rift_cl.io.capture_paths import CaptureFolder
+from rift_cl.io.display_light import to_display
+from rift_cl.io.output import check_space, writing
+from rift_cl.io.picture_header import PictureHeader, read_picture_header
+from rift_cl.io.pixels import SUFFIXES, write_pixels
+from rift_cl.io.view_image import demand_colors, read_photograph
+from rift_cl.progress import Report
+
+# Formats that every release of COLMAP reads code for code.
+_PLAIN = (".png", ".jpg", ".jpeg")
+
+
+@dataclass(frozen=True)
+class Photograph:
+    """A photograph whose header was read.
+
+    Args:
+        name: its name in its folder.
+        path: the file.
+        header: what it says about itself.
+    """
+
+    name: str
+    path: Path
+    header: PictureHeader
+
+    @property
+    def plain(self) -> bool:
+        """Any program reads the same 8-bit colours from it."""
+        header = self.header
+        return header.eight_bit and not header.alpha and self.path.suffix.lower() in _PLAIN
+
+    @property
+    def camera(self) -> tuple[object, ...]:
+        """Photographs that have this in common were taken through one lens."""
+        return (*self.header.size, *self.header.taken_by)
+
+
+def photographs_in(folder: Path) -> CaptureFolder:
+    """Where the photographs of a folder lie: in ``images`` there, or else in itself."""
+    root = folder.absolute()
+    root = root.resolve() if ".." in root.parts else root
+    return CaptureFolder(root, "images" if (root / "images").is_dir() else "")
+
+
+def photograph_names(place: CaptureFolder) -> list[str]:
+    """Names of the pictures in a folder, in order; folders inside it are not looked into.
+
+    Raises:
+        InputError: there is no such folder, or it may not be read.
+    """
+    with reading(place.path, "the folder"):
+        entries = [entry for entry in place.path.iterdir() if entry.suffix.lower() in SUFFIXES]
+        hidden = [entry for entry in entries if entry.name.startswith(".")]
+        return sorted(entry.name for entry in entries if entry not in hidden and entry.is_file())
+
+
+def shown(name: str) -> str:
+    """A name as text that can be written, whatever bytes the disk has for it."""
+    return name.encode("utf-8", "backslashreplace").decode()
+
+
+def with_headers(
+    place: CaptureFolder, names: Sequence[str], left_out: dict[str, str]
+) -> list[Photograph]:
+    """Read the headers of photographs.
+
+    Args:
+        place: their folder.
+        names: their names.
+        left_out: receives, by name, why a photograph cannot be used.
+
+    Raises:
+        PathEscapeError: a photograph is a link that leads out of the folder.
+    """
+    found = []
+    for name in names:
+        try:
+            if not name.isprintable() or "\\" in name:
+                raise InputError(f"{place.path}: {name!r} is no name that a model can hold")
+            path = place.file(str(place.path), name)
+            header = read_picture_header(path)
+            demand_colors(path, header)
+        except PathEscapeError:
+            raise
+        except RiftError as error:
+            left_out[shown(name)] = shown(str(error))
+        else:
+            found.append(Photograph(name, path, header))
+    return found
+
+
+def whole_photographs(
+    photographs: Sequence[Photograph],
+    copies: Path | None,
+    whole: list[Photograph],
+    left_out: dict[str, str],
+) -> Iterator[Report]:
+    """Decode photographs, and make copies where they are wanted.
+
+    Args:
+        photographs: the photographs.
+        copies: a folder for 8-bit PNG copies, named with ``.png`` appended; None for none. Alpha
+            is multiplied into them, light beyond 1 is cut.
+        whole: receives those that can be decoded.
+        left_out: receives, by name, why one cannot.
+
+    Raises:
+        OutputError: the copies cannot be written.
+    """
+    if copies is not None:
+        with writing(copies):
+            copies.mkdir()
+        check_space(copies, sum(3 * np.prod(one.header.size, dtype=int) for one in photographs))
+    for count, photograph in enumerate(photographs):
+        try:
+            codes = _codes(photograph)
+        except RiftError as error:
+            left_out[photograph.name] = str(error)
+        else:
+            whole.append(photograph)
+            if copies is not None:
+                path = copies / f"{photograph.name}.png"
+                with writing(path):
+                    write_pixels(path, codes, format="png", attributes={})
+        yield Report(count + 1, len(photographs), "photographs read")
+
+
+def _codes(photograph: Photograph) -> NDArray[np.uint8]:
+    """8-bit colours (y, x, 3) in display light, over black."""
+    path, header = photograph.path, photograph.header
+    height, width = header.size
+    need = 4 * (header.channels + 8) * height * width
+    check_claim(path, "the photograph, with a copy of it,", need, None)
+    with reading(path, "the photograph"):
+        image = read_photograph(path, header, None)
+        if header.linear:
+            to_display(image[..., :3])
+        if header.alpha:
+            image[..., :3] *= image[..., 3:]
+        return np.rint(np.clip(image[..., :3], 0, 1) * 255).astype(np.uint8)

@@ -1,0 +1,75 @@
+"""EXIF's orientation turns no photograph: poses mean rows and columns as they are stored."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from view_files import K, store, view_of
+
+from rift_cl.errors import ShapeError
+from rift_cl.geometry.camera import Camera
+from rift_cl.io import View, read_image, read_view
+from rift_cl.io.picture_header import read_picture_header
+
+HEIGHT, WIDTH = 48, 64
+TYPES = ["jpg", "png", "tif"]
+
+
+def photograph(folder: Path, suffix: str, orientation: int) -> tuple[Path, np.ndarray]:
+    """A corner that is white, so that each of the eight orientations would look different."""
+    codes = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+    codes[:16, :32] = 255
+    path = store(folder / f"a{orientation}.{suffix}", codes, "uint8", Orientation=orientation)
+    assert read_picture_header(path).orientation == orientation
+    return path, codes / 255
+
+
+@pytest.mark.parametrize("suffix", TYPES)
+@pytest.mark.parametrize("orientation", [1, 3, 6, 8])
+def test_rows_and_columns_are_those_of_the_file(
+    tmp_path: Path, suffix: str, orientation: int
+) -> None:
+    path, codes = photograph(tmp_path, suffix, orientation)
+    np.testing.assert_allclose(read_view(view_of(path)), codes, atol=0.02)
+    np.testing.assert_allclose(read_image(path), codes, atol=0.02)
+
+
+def test_a_pose_of_the_turned_photograph_is_told_what_to_do(tmp_path: Path) -> None:
+    for orientation, advised in ((1, False), (6, True)):
+        path, _ = photograph(tmp_path, "jpg", orientation)
+        turned = View("a", Camera((WIDTH, HEIGHT), K, np.eye(4)), path, None, None)
+        with pytest.raises(ShapeError, match="is 64 x 48") as caught:
+            read_view(turned)
+        assert ("EXIF says that it is shown turned" in str(caught.value)) == advised
+
+
+COLMAP = """
+import pathlib, sqlite3, sys, pycolmap
+folder = pathlib.Path("{folder}")
+names = sorted(path.name for path in folder.iterdir())
+database = folder / "database.db"
+database.touch()
+pycolmap.import_images(str(database), str(folder), pycolmap.CameraMode.PER_IMAGE, names)
+found = sqlite3.connect(database).execute("select width, height from cameras").fetchall()
+assert found == [({width}, {height})] * len(names), found
+# Before pycolmap 4 pixels could be seen through features alone.
+if hasattr(pycolmap, "Bitmap") and hasattr(pycolmap.Bitmap, "width"):
+    for name in names:
+        pixels = pycolmap.Bitmap.read(str(folder / name), True).to_array()
+        assert pixels[:16, :32].min() > 240 and pixels[20:].max() < 15, name
+"""
+
+
+def test_colmap_turns_nothing_either(tmp_path: Path, python: Callable) -> None:
+    if find_spec("pycolmap") is None:
+        pytest.skip("COLMAP's Python package is not installed")
+    for suffix in TYPES:
+        for orientation in (1, 3, 6, 8):
+            photograph(tmp_path, suffix, orientation)
+    code = COLMAP.format(folder=tmp_path.as_posix(), width=WIDTH, height=HEIGHT)
+    done = python(code)
+    assert done.returncode == 0, done.stderr
