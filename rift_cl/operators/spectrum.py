@@ -1,0 +1,153 @@
+"""A response in the Fourier domain of images, applied on the device.
+
+The image is continued by zeros to powers of two, so that it does not meet itself across its
+borders; two channels share one complex transform, since the response is real and even. The
+operator, window times response times window, is its own adjoint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.arithmetic import sum_columns
+from rift_cl.cl.device import Device
+from rift_cl.cl.memory import as_device_array
+from rift_cl.errors import NonFiniteError, ShapeError
+
+Floats = NDArray[np.float64]
+Response = Callable[[Floats, Floats], Floats]
+
+# Zeros beyond an edge, as a share of it, and the shortest transform.
+_MARGIN, _SHORTEST = 16, 8
+# Columns that one work-item of a CPU goes through.
+_CPU_RUN = 4096
+
+
+def padded_length(length: int) -> int:
+    """The power of two that an edge is continued to."""
+    return max(_SHORTEST, 1 << (length + length // _MARGIN - 1).bit_length())
+
+
+class SpectralFilter:
+    """Multiplies the spectra of images of one size by a response.
+
+    Args:
+        device: where the images are.
+        size: (height, width) of the images.
+        response: of frequencies along y and along x, in cycles per pixel from -0.5 to 0.5, given
+            as arrays that broadcast; real, and even: it must not change when both change sign.
+
+    Raises:
+        ShapeError: an image of that size holds nothing.
+        NonFiniteError: the response is not finite.
+    """
+
+    def __init__(self, device: Device, size: tuple[int, int], response: Response) -> None:
+        if min(size) < 1:
+            raise ShapeError(f"SpectralFilter: size is {size}, wanted one pixel or more")
+        self.device = device
+        self.size = size
+        self.padded = rows, columns = padded_length(size[0]), padded_length(size[1])
+        along_y, along_x = (np.asarray(np.fft.fftfreq(n), np.float64) for n in self.padded)
+        weights = np.broadcast_to(response(along_y[None, :], along_x[:, None]), (columns, rows))
+        if not np.isfinite(weights).all():
+            raise NonFiniteError("SpectralFilter: the response is not finite everywhere")
+        # Transposed, as the spectrum stands when it is weighted.
+        self._weights = device.array(np.ascontiguousarray(weights, np.float32))
+        self._turns = {n: device.array(_turns(n)) for n in {rows, columns}}
+
+    def __call__(self, image: Any, *, channels: int | None = None, keep_norm: bool = False) -> Any:
+        """The filtered image, a new (height, width, D) device array.
+
+        Args:
+            image: (height, width, D) device array.
+            channels: of these, the first that count; all if not given. The rest becomes zero.
+            keep_norm: scale the result to the root mean square that the image had.
+
+        Raises:
+            ShapeError: the image has another size.
+        """
+        shape = (*self.size, image.shape[2] if len(image.shape) == 3 else 1)
+        as_device_array(self.device, image, shape, name="image")
+        count = shape[2] if channels is None else channels
+        fields = self._weighted(image, count)
+        return self._unpacked(*fields, shape, count, keep_norm=keep_norm)
+
+    def _weighted(self, image: Any, count: int) -> tuple[Any, Any]:
+        """The filtered fields in space, and the sums of squares of the image's rows."""
+        device, (rows, columns) = self.device, self.padded
+        fields = device.empty((2 * -(-count // 2), rows, columns))
+        spare = device.empty(fields.shape)
+        squares = device.empty((self.size[0], 1))
+        sizes = (*self.size, image.shape[2], rows, columns)
+        device.launch("fft_pack", (rows,), image, fields, squares, *sizes, CHANNELS=count)
+        fields, spare = self._transformed(fields, spare, rows, columns)
+        self._transpose(fields, spare, rows, columns)
+        fields, spare = self._transformed(spare, fields, columns, rows)
+        fields, spare = self._transformed(fields, spare, columns, rows, weights=self._weights)
+        self._transpose(fields, spare, columns, rows)
+        return self._transformed(spare, fields, rows, columns, inverse=True)[0], squares
+
+    def _unpacked(
+        self, fields: Any, squares: Any, shape: tuple[int, ...], count: int, *, keep_norm: bool
+    ) -> Any:
+        device, (height, width, depth), (rows, columns) = self.device, shape, self.padded
+        out, found = device.empty(shape), device.empty((height, 1))
+        sizes = (height, width, depth, rows, columns, 1 / (rows * columns))
+        device.launch("fft_unpack", (height,), fields, out, found, *sizes, CHANNELS=count)
+        if keep_norm:
+            run = _CPU_RUN if device.traits.is_cpu else 1
+            sums = (sum_columns(device, table) for table in (squares, found))
+            items, size = -(-out.size // run), np.uint64(out.size)
+            device.launch("keep_norm", (items,), out, *sums, size, RUN=run)
+        return out
+
+    def _transformed(
+        self,
+        fields: Any,
+        spare: Any,
+        length: int,
+        columns: int,
+        *,
+        weights: Any = None,
+        inverse: bool = False,
+    ) -> tuple[Any, Any]:
+        """Transform down the columns; what was transformed, and the buffer that is free now.
+
+        With ``weights`` it is the inverse transform of the weighted fields.
+        """
+        device, stride = self.device, 1
+        run = _CPU_RUN if device.traits.is_cpu else 1
+        count = fields.shape[0] // 2
+        parts = [np.int64(0), np.int64(count * length * columns)]
+        if inverse or weights is not None:
+            parts.reverse()
+        while stride < length:
+            radix = 4 if length // stride % 4 == 0 else 2
+            weighted = weights is not None and stride == 1
+            device.launch(
+                "fft_pass",
+                (-(-columns // run), length // radix, count),
+                *(fields, spare, self._turns[length], weights if weighted else fields, *parts),
+                *(columns, length, stride),
+                RADIX=radix,
+                RUN=run,
+                WEIGHTED=weighted,
+            )
+            fields, spare, stride = spare, fields, stride * radix
+        return fields, spare
+
+    def _transpose(self, fields: Any, spare: Any, rows: int, columns: int) -> None:
+        lanes = self.device.traits.macros["LANES"]
+        blocks = (columns // lanes, rows // lanes, fields.shape[0])
+        self.device.launch("fft_transpose", blocks, fields, spare, rows, columns)
+
+
+def _turns(length: int) -> NDArray[np.float32]:
+    """exp(-2 pi i k / n) as pairs."""
+    turns = np.exp(-2j * np.pi * np.arange(length) / length)
+    return np.stack([turns.real, turns.imag], axis=1).astype(np.float32)
