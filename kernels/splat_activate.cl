@@ -1,22 +1,26 @@
-/* From what is trained to what is drawn: scale = exp(log_scale), opacity = sigmoid(logit).
+/* From what is trained to what is drawn.
  *
- * Both are held inside what float32 can hold and a rasterizer can use. Index space: splats. */
+ *     scale = exp(log_scale),    opacity = sigmoid(logit), or exp(logit) with DENSITY,
+ *
+ * both held inside what float32 can hold and a rasterizer can use. With BAND no splat is finer than
+ * the cameras could see (the 3D filter of Mip-Splatting, Yu et al. 2024): it is blurred by a Gaussian
+ * of standard deviation b, and fades as it spreads,
+ *
+ *     scale' = sqrt(scale^2 + b^2),    opacity' = opacity prod scale / scale'.
+ *
+ * Index space: splats. */
 
 #include "include/portable.h"
-
-/* ln of the smallest and the largest scale. */
-#define LEAST_LOG -30.0f
-#define MOST_LOG 30.0f
+#include "include/activation.h"
 
 KERNEL void splat_activate(
     __global const float *restrict log_scales, __global const float *restrict logits,
-    __global float *restrict scales, __global float *restrict opacities, int count)
+    __global const float *restrict band, __global float *restrict scales,
+    __global float *restrict opacities, int count)
 {
   const long i = get_global_id(0);
   if (i >= count) return;
-  for (int k = 0; k < 3; k++) {
-    const float s = log_scales[3 * i + k];
-    scales[3 * i + k] = exp(s < LEAST_LOG ? LEAST_LOG : s > MOST_LOG ? MOST_LOG : s);
-  }
-  opacities[i] = 1 / (1 + exp(-logits[i]));
+  const Activation a = activated(log_scales, logits, band, i);
+  for (int k = 0; k < 3; k++) scales[3 * i + k] = a.drawn[k];
+  opacities[i] = a.opacity * a.faded;
 }

@@ -1,25 +1,35 @@
 /* Gradient of splat_activate, with penalties that keep splats small and few.
  *
- *     dL/dlog_scale = scale (dL/dscale + scale_penalty / 3N),
- *     dL/dlogit = opacity (1 - opacity) (dL/dopacity + opacity_penalty / N):
+ * With s, o what is trained, s', o' what is drawn, f = prod s / s' and b the limit of the band,
  *
- * the penalties are those of the loss opacity_penalty mean(opacity) + scale_penalty mean(scale)
- * (3DGS as MCMC, Kheradmand et al. 2024). In place: gradients come in by what is drawn and go out by
- * what is trained. Index space: splats. */
+ *     dL/dlog_scale = s (s / s' dL/ds' + scale_penalty / 3N) + o f b^2 / s'^2 dL/do',
+ *     dL/dlogit = slope (f dL/do' + opacity_penalty / N),
+ *
+ * where slope is o (1 - o), or o for densities: the penalties are those of the loss
+ * opacity_penalty mean(o) + scale_penalty mean(s) (3DGS as MCMC, Kheradmand et al. 2024). In place:
+ * gradients come in by what is drawn and go out by what is trained. Index space: splats. */
 
 #include "include/portable.h"
+#include "include/activation.h"
 
 KERNEL void splat_activate_grad(
-    __global const float *restrict scales, __global const float *restrict opacities,
-    __global float *restrict by_scales, __global float *restrict by_opacities,
-    float each_scale, float each_opacity, int count)
+    __global const float *restrict log_scales, __global const float *restrict logits,
+    __global const float *restrict band, __global float *restrict by_scales,
+    __global float *restrict by_opacities, float each_scale, float each_opacity, int count)
 {
   const long i = get_global_id(0);
   if (i >= count) return;
+  const Activation a = activated(log_scales, logits, band, i);
+  const float by_opacity = by_opacities[i];
   for (int k = 0; k < 3; k++) {
-    const float s = scales[3 * i + k];
-    by_scales[3 * i + k] = s * (by_scales[3 * i + k] + each_scale);
+    const float s = a.trained[k];
+    float by = s * (s / a.drawn[k] * by_scales[3 * i + k] + each_scale);
+#if BAND
+    const float b = band[i] / a.drawn[k];
+    by += a.opacity * a.faded * b * b * by_opacity;
+#endif
+    by_scales[3 * i + k] = by;
   }
-  const float o = opacities[i];
-  by_opacities[i] = o * (1 - o) * (by_opacities[i] + each_opacity);
+  const float slope = DENSITY ? a.opacity : a.opacity * (1 - a.opacity);
+  by_opacities[i] = slope * (a.faded * by_opacity + each_opacity);
 }

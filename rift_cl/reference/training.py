@@ -1,4 +1,7 @@
-"""A step of training by its definitions: twins of adam, splat_activate and splat_noise."""
+"""A step of training by its definitions.
+
+Twins of adam, splat_activate, splat_noise and splat_statistics.
+"""
 
 from __future__ import annotations
 
@@ -27,9 +30,36 @@ def adam_step(
     return x - rate * unbiased[0] / (np.sqrt(unbiased[1]) + epsilon), m, v
 
 
-def activate(log_scales: Floats, logits: Floats) -> tuple[Floats, Floats]:
-    """Scales and opacities."""
-    return np.exp(np.clip(log_scales, -30, 30)), 1 / (1 + np.exp(-logits))
+def activate(
+    log_scales: Floats,
+    logits: Floats,
+    *,
+    band: Floats | float = 0.0,
+    density: bool = False,
+) -> tuple[Floats, Floats]:
+    """Scales and opacities, or densities; ``band`` blurs splats as Mip-Splatting's 3D filter does.
+
+    The gradient of this is the gradient kernel's oracle, by finite differences.
+    """
+    trained = np.exp(np.clip(log_scales, -30, 30))
+    scales = np.sqrt(trained**2 + np.broadcast_to(band, logits.shape)[:, None] ** 2)
+    opacities = np.exp(np.clip(logits, -30, 30)) if density else 1 / (1 + np.exp(-logits))
+    return scales, opacities * np.prod(trained / scales, axis=1)
+
+
+def finest_seen(means: Floats, cameras: Floats, *, near: float, unseen: float) -> Floats:
+    """The length b of each splat's band, (N,), from (V, 17) cameras; twin of splat_band."""
+    finest = np.full(len(means), np.inf)
+    for row in cameras:
+        view: Floats = row[:12].reshape(3, 4)
+        focal, left, top, width, height = row[12:].tolist()
+        x, y, z = view[:, :3] @ means.T + view[:, 3:]
+        with np.errstate(all="ignore"):
+            u, v = focal * x / z + left, focal * y / z + top
+        inside = (z > near) & (np.abs(u - width / 2) < 0.65 * width)
+        inside &= np.abs(v - height / 2) < 0.65 * height
+        finest = np.where(inside, np.minimum(finest, z / focal), finest)
+    return np.asarray(np.where(np.isfinite(finest), np.sqrt(0.2) * finest, unseen))
 
 
 def noise(
@@ -43,6 +73,30 @@ def noise(
     xi = _normals(len(quats), seed, step)
     back = _turned(xi, w, -v)
     return np.asarray(amount * gate[:, None] * _turned(back * scales**2, w, v))
+
+
+def screen_statistics(
+    before: Floats,
+    grad_means2d: Floats,
+    extents: Floats,
+    drawn: NDArray[np.bool_],
+    size: tuple[int, int],
+) -> Floats:
+    """What is known of each splat after one more frame, (N, 3).
+
+    Args:
+        before: (N, 3) sum of gradients, number of frames, largest radius.
+        grad_means2d: (N, 2) gradient by the place on the screen, per pixel.
+        extents: (N, 2) half the sides of the splats' rectangles in pixels.
+        drawn: (N,) whether they are drawn at all.
+        size: (height, width) of the image.
+    """
+    height, width = size
+    magnitude = np.hypot(*(grad_means2d * [width / 2, height / 2]).T)
+    counts = drawn & np.isfinite(magnitude)
+    radius = np.maximum(before[:, 2], extents.max(axis=1) / max(height, width))
+    after = np.stack([before[:, 0] + magnitude, before[:, 1] + 1, radius], axis=1)
+    return np.where(counts[:, None], after, before)
 
 
 def _turned(x: Floats, w: Floats, v: Floats) -> Floats:

@@ -7,15 +7,14 @@ gradient, ``kernels/loss_grad.cl`` finishes it. Nothing waits for the device.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 from rift_cl.cl.arithmetic import sum_columns
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry.numbers import one_number
-
-LossKind = Literal["l1", "l2"]
+from rift_cl.train.settings import LossKind
 
 _WINDOW, _CHANNELS = 11, 4
 _ROWS, _STRIP, _MAPS = 4, 256, 3

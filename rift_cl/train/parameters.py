@@ -1,7 +1,8 @@
 """What is trained: splats before their activations, on the device, with Adam's moments.
 
-Scales are trained as logarithms and opacities as logits; what the rasterizer draws, ``drawn``, is
-made from them after every step. One owner, the trainer, changes these arrays in place.
+Scales are trained as logarithms, opacities as logits and densities as logarithms; what the
+rasterizer draws, ``drawn``, is made from them after every step. One owner, the trainer, changes
+these arrays in place.
 """
 
 from __future__ import annotations
@@ -37,6 +38,8 @@ class Parameters:
         second: Adam's means of their squares.
         drawn: what the rasterizer draws; shares positions, quaternions and harmonics with ``raw``.
         step: steps of Adam that were taken.
+        density: whether ``logits`` are logarithms of densities, for X-rays.
+        band: (N,) lengths below which splats have no detail, or None; see ``limit_band``.
         shares: of the rates along a period of parameters, on the device.
     """
 
@@ -46,6 +49,8 @@ class Parameters:
     second: dict[str, Any]
     drawn: Splats
     step: int = 0
+    density: bool = False
+    band: Any = None
     shares: dict[tuple[int, float], Any] = field(default_factory=dict)
 
     @classmethod
@@ -57,17 +62,23 @@ class Parameters:
         first: Arrays | None = None,
         second: Arrays | None = None,
         step: int = 0,
+        density: bool = False,
+        band: NDArray[np.float32] | None = None,
     ) -> Parameters:
         """Send host arrays to a device; moments are zero if not given."""
         sent = {name: device.array(raw[name]) for name in GROUPS}
-        return cls(
+        parameters = cls(
             device,
             sent,
             _moments(device, sent, first),
             _moments(device, sent, second),
-            _activated(device, sent),
+            _undrawn(device, sent),
             step,
+            density,
+            None if band is None else device.array(band),
         )
+        parameters.activate()
+        return parameters
 
     def __len__(self) -> int:
         """Number of splats."""
@@ -78,6 +89,12 @@ class Parameters:
         return tuple(
             {name: self.device.get(group[name]) for name in GROUPS}
             for group in (self.raw, self.first, self.second)
+        )
+
+    def replaced(self, raw: Arrays, first: Arrays, second: Arrays) -> Parameters:
+        """Other splats in the place of these, at the same step; their band is still to be set."""
+        return Parameters.of(
+            self.device, raw, first=first, second=second, step=self.step, density=self.density
         )
 
     def update(
@@ -102,14 +119,43 @@ class Parameters:
         self.device.launch(
             "splat_activate_grad",
             (count,),
-            *(self.drawn.scales, self.drawn.opacities, found.scales, found.opacities),
+            *(*self._before(), found.scales, found.opacities),
             *(scale_penalty / (3 * count), opacity_penalty / count, count),
+            **self._kind(),
         )
         by = (found.means, found.quats, found.scales, found.opacities, gradients.sh)
         self.step += 1
         for name, gradient in zip(GROUPS, by, strict=True):
             self._adam(name, gradient, rates[name], sh_rest if name == "sh" else 1.0)
-        _activate(self.device, self.raw, self.drawn)
+        self.activate()
+
+    def activate(self) -> None:
+        """Make what is drawn of what is trained."""
+        drawn, count = self.drawn, len(self)
+        given = (*self._before(), drawn.scales, drawn.opacities, count)
+        self.device.launch("splat_activate", (count,), *given, **self._kind())
+
+    def _before(self) -> tuple[Any, Any, Any]:
+        """What is activated; a kernel without a band takes any array in its place."""
+        logits = self.raw["logits"]
+        return self.raw["log_scales"], logits, logits if self.band is None else self.band
+
+    def _kind(self) -> dict[str, bool]:
+        return {"DENSITY": self.density, "BAND": self.band is not None}
+
+    def limit_band(self, cameras: Any, *, near: float, unseen: float) -> None:
+        """Let no splat be finer than what the cameras resolve where it is now.
+
+        Args:
+            cameras: (V, 17) device array, as ``kernels/splat_band.cl`` says.
+            near: cameras do not see what is nearer.
+            unseen: the length for splats that no camera sees.
+        """
+        count = len(self)
+        self.band = self.device.empty((count,))
+        given = (self.raw["means"], cameras, self.band, float(near), float(unseen))
+        self.device.launch("splat_band", (count,), *given, cameras.shape[0], count)
+        self.activate()
 
     def _adam(self, name: str, gradient: Any, rate: float, rest: float) -> None:
         device, size = self.device, self.raw[name].size
@@ -153,7 +199,8 @@ class Parameters:
             wider = self.device.zeros((count, wanted, 3))
             copy_columns(self.device, group["sh"], 0, wider, 0, 3 * had)
             group["sh"] = wider
-        self.drawn = _activated(self.device, self.raw)
+        self.drawn = _undrawn(self.device, self.raw)
+        self.activate()
 
 
 def _moments(device: Device, sent: Mapping[str, Any], given: Arrays | None) -> dict[str, Any]:
@@ -162,22 +209,8 @@ def _moments(device: Device, sent: Mapping[str, Any], given: Arrays | None) -> d
     return {name: device.array(given[name]) for name in GROUPS}
 
 
-def _activated(device: Device, raw: Mapping[str, Any]) -> Splats:
+def _undrawn(device: Device, raw: Mapping[str, Any]) -> Splats:
+    """Splats whose scales and opacities are still to be made."""
     count = raw["means"].shape[0]
-    drawn = Splats(
-        raw["means"],
-        raw["quats"],
-        device.empty((count, 3)),
-        device.empty((count,)),
-        sh=raw["sh"],
-    )
-    _activate(device, raw, drawn)
-    return drawn
-
-
-def _activate(device: Device, raw: Mapping[str, Any], drawn: Splats) -> None:
-    device.launch(
-        "splat_activate",
-        (len(drawn),),
-        *(raw["log_scales"], raw["logits"], drawn.scales, drawn.opacities, len(drawn)),
-    )
+    scales, opacities = device.empty((count, 3)), device.empty((count,))
+    return Splats(raw["means"], raw["quats"], scales, opacities, sh=raw["sh"])

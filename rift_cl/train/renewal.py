@@ -64,8 +64,7 @@ def renew(
         for moments in (first, second):
             moments[name] = _extended(moments[name], max(added, 0))
             moments[name][touched] = 0
-    step = parameters.step
-    return Parameters.of(parameters.device, raw, first=first, second=second, step=step)
+    return parameters.replaced(raw, first, second)
 
 
 def _share(

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, get_args
 
 from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
+from rift_cl.train.homogenisation import Homogenisation
 
+LossKind = Literal["l1", "l2"]
+StrategyName = Literal["mcmc", "default"]
 _DEGREES = (0, 1, 2, 3, 4)
+# Devices count in float32.
+_LARGEST = 3.4028234e38
 
 
 @dataclass(frozen=True)
@@ -22,6 +28,12 @@ class Rates:
         logits: of opacities' logits.
         sh: of the constant harmonic.
         sh_rest: of the others, as a share of that.
+        poses: of the cameras' turns, in radians, and shifts, in extents of the scene; falls as
+            that of positions does. At 0 the cameras stay where they are.
+        exposures: of each photograph's gains and offsets; falls likewise. At 0 there are none.
+
+    Raises:
+        InputError: a number is out of its range.
     """
 
     means: float = 1.6e-4
@@ -31,6 +43,15 @@ class Rates:
     logits: float = 5e-2
     sh: float = 2.5e-3
     sh_rest: float = 0.2
+    poses: float = 0.0
+    exposures: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check every number's range: a rate of 0 holds a group still."""
+        for item in fields(self):
+            if item.name != "means_last":
+                _check_number(self, item.name)
+        _check_number(self, "means_last", most=1, above=True)
 
 
 @dataclass(frozen=True)
@@ -46,6 +67,9 @@ class Renewal:
         noise: of the random walk, as a multiple of the positions' rate.
         opacity_penalty: weight of the mean opacity in the loss.
         scale_penalty: weight of the mean scale in the loss, per extent of the scene.
+
+    Raises:
+        InputError: a number is out of its range.
     """
 
     every: int = 100
@@ -56,6 +80,83 @@ class Renewal:
     noise: float = 5e5
     opacity_penalty: float = 0.01
     scale_penalty: float = 0.01
+
+    def __post_init__(self) -> None:
+        """Check every number's range."""
+        _check_whole(self, "every", 1)
+        _check_whole(self, "first", 0)
+        for name in ("last", "faint"):
+            _check_number(self, name, most=1)
+        for name in ("growth", "noise", "opacity_penalty", "scale_penalty"):
+            _check_number(self, name)
+
+
+@dataclass(frozen=True)
+class Densification:
+    """Splats are cloned, split and pruned (3DGS, Kerbl et al. 2023; constants of gsplat 1.5).
+
+    The original counts steps of a run of 30,000: the first densification at 500, the last before
+    15,000, opacities reset every 3,000. What follows from the course of the run is a share of its
+    steps here, so that 30,000 give the original's numbers. What follows from how fast Adam moves
+    is not: a mean gradient wants as many pictures in a short run, and an opacity takes as many
+    steps to come back after a reset.
+
+    Args:
+        every: steps between two densifications, over which gradients are averaged.
+        first: share of the steps before the first one.
+        last: share of the steps after which there are none, and no resets.
+        gradient: mean gradient from which a splat is cloned or split, by its place in an image
+            from -1 to 1; 2e-4 if not given, 8e-4 with ``absgrad``.
+        absgrad: go by the sum of the gradient's magnitudes over pixels (AbsGS).
+        small: largest scale of splats that are cloned rather than split, in extents of the scene.
+        faint: opacity below which splats are pruned; a reset leaves no opacity above twice that.
+        large: scale above which splats are pruned after the first reset, in extents of the scene.
+        large_on_screen: the same for the radius on the screen, as a share of the image's larger
+            side, 0.15 say; None for never, as in gsplat.
+        reset: share of the steps between two resets of opacities; 0 for none.
+        reset_least: but so many steps at least.
+        revised_opacity: give two splats in place of one the opacity 1 - sqrt(1 - o), with which
+            they hide together what one did (Rota Bulo et al. 2024).
+
+    Raises:
+        InputError: a number is out of its range.
+    """
+
+    every: int = 100
+    first: float = 1 / 60
+    last: float = 0.5
+    gradient: float | None = None
+    absgrad: bool = False
+    small: float = 0.01
+    faint: float = 0.005
+    large: float = 0.1
+    large_on_screen: float | None = None
+    reset: float = 0.1
+    reset_least: int = 500
+    revised_opacity: bool = False
+
+    def __post_init__(self) -> None:
+        """Check every number's range."""
+        for name in ("every", "reset_least"):
+            _check_whole(self, name, 1)
+        for name in ("first", "last", "reset"):
+            _check_number(self, name, most=1)
+        for name in ("gradient", "large_on_screen"):
+            if getattr(self, name) is not None:
+                _check_number(self, name, above=True)
+        for name in ("small", "large"):
+            _check_number(self, name, above=True)
+        _check_number(self, "faint", most=0.25, above=True)
+        if self.small > self.large:
+            raise InputError(
+                f"Densification: small is {self.small!r} and large is {self.large!r}, wanted "
+                "small <= large"
+            )
+
+    @property
+    def threshold(self) -> float:
+        """The mean gradient from which a splat is cloned or split."""
+        return self.gradient or (8e-4 if self.absgrad else 2e-4)
 
 
 @dataclass(frozen=True)
@@ -68,10 +169,17 @@ class TrainSettings:
         splats: most splats.
         sh_degree: of the colours' harmonics, 0 to 4.
         sh_every: steps after which the next degree joins.
-        ssim_weight: share of D-SSIM in the loss; the rest is L1.
+        loss: of pixels, ``l1`` or ``l2``.
+        ssim_weight: share of D-SSIM in the loss; the rest is that of pixels.
+        homogenisation: weight of high frequencies in the loss of pixels.
+        noise: standard deviation of the noise in the pictures; estimated from them if not given.
+        band_limit: let no splat be finer than what the cameras resolve (Mip-Splatting).
         finish: share of the steps, at the end, without noise and penalties and with fading rates.
         rates: of Adam.
-        renewal: of splats that have faded.
+        strategy: where splats come from and go to: ``mcmc`` renews them with random walks and
+            penalties, ``default`` densifies as 3DGS did at first, with neither.
+        renewal: of splats that have faded, with ``mcmc``.
+        densification: with ``default``.
 
     Raises:
         InputError: a number is out of its range.
@@ -82,22 +190,49 @@ class TrainSettings:
     splats: int = 20_000
     sh_degree: int = 3
     sh_every: int = 500
+    loss: LossKind = "l1"
     ssim_weight: float = 0.2
+    homogenisation: Homogenisation = field(default_factory=Homogenisation)
+    noise: float | None = None
+    band_limit: bool = False
     finish: float = 0.12
     rates: Rates = field(default_factory=Rates)
+    strategy: StrategyName = "mcmc"
     renewal: Renewal = field(default_factory=Renewal)
+    densification: Densification = field(default_factory=Densification)
 
     def __post_init__(self) -> None:
         """Check every number's range."""
         for name, least in (("steps", 1), ("splats", 1), ("sh_every", 1), ("seed", 0)):
-            value = one_number(getattr(self, name))
-            if not (value >= least and value.is_integer()):
-                raise InputError(
-                    f"TrainSettings: {name} is {getattr(self, name)!r}, wanted a whole number >= "
-                    f"{least}"
-                )
+            _check_whole(self, name, least)
         if self.sh_degree not in _DEGREES:
             raise InputError(f"TrainSettings: sh_degree is {self.sh_degree!r}, wanted 0 to 4")
         for name in ("ssim_weight", "finish"):
-            if not 0 <= one_number(getattr(self, name)) <= 1:
-                raise InputError(f"TrainSettings: {name} is {getattr(self, name)!r}, wanted 0 to 1")
+            _check_number(self, name, most=1)
+        if self.noise is not None:
+            _check_number(self, "noise")
+        if self.loss not in get_args(LossKind):
+            raise InputError(f"TrainSettings: loss is {self.loss!r}, wanted l1 or l2")
+        if self.strategy not in get_args(StrategyName):
+            wanted = " or ".join(get_args(StrategyName))
+            raise InputError(f"TrainSettings: strategy is {self.strategy!r}, wanted {wanted}")
+
+
+def _check_whole(settings: Any, name: str, least: int) -> None:
+    given = getattr(settings, name)
+    value = one_number(given)
+    if not (value >= least and value.is_integer()):
+        kind = type(settings).__name__
+        raise InputError(f"{kind}: {name} is {given!r}, wanted a whole number >= {least}")
+
+
+def _check_number(settings: Any, name: str, *, most: float = _LARGEST, above: bool = False) -> None:
+    """Check that a number lies from 0 to ``most``; ``above`` leaves 0 itself out."""
+    given = getattr(settings, name)
+    value = one_number(given)
+    if not 0 <= value <= most or (above and value == 0):
+        kind = type(settings).__name__
+        wanted = "a number > 0" if above else "a number >= 0"
+        if most < _LARGEST:
+            wanted = f"a number above 0, at most {most}" if above else f"0 to {most}"
+        raise InputError(f"{kind}: {name} is {given!r}, wanted {wanted}")

@@ -1,36 +1,43 @@
 """Fitting splats to posed pictures: one picture a step, everything on the device.
 
-A step draws a view, takes the gradient of the loss, and moves the splats by Adam. Splats that have
-faded are renewed now and then (``rift_cl.train.renewal``), and take random walks; in the last part
-of the run, the finish, noise and penalties are off and all rates fade, so that the picture settles.
+A step draws a view, takes the gradient of the loss, and moves the splats by Adam, and the view's
+pose and exposure if they are fitted too. Between steps the set of splats changes
+(``rift_cl.train.strategy``); in the last part of the run, the finish, nothing walks at random any
+more and all rates fade, so that the picture settles.
 
-What a run does depends on its settings, its pictures and the device alone: the order of the views,
-the noise and the renewal all come from the seed and the number of the step.
+What a run does depends on its settings, its pictures and the device alone: the order of the views
+and all that is random come from the seed and the number of the step. So ``state``, taken between
+any two steps, is all that a run needs to go on to the same bits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
+from rift_cl.errors import CheckpointError, ShapeError
 from rift_cl.geometry import Camera
 from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
-from rift_cl.train.image_loss import ImageLoss
+from rift_cl.train.band_limit import camera_table, unseen_length
+from rift_cl.train.exposures import Exposures
+from rift_cl.train.homogenised_loss import HomogenisedLoss
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.renewal import renew
+from rift_cl.train.poses import Poses
+from rift_cl.train.schedule import Schedule
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start import scene_extent
+from rift_cl.train.strategy import strategy_of
 
 # Steps between two reports; the loss comes to the host for each.
-_REPORT_EVERY = 25
-# Rates at the very end of the finish, as a share of those at its beginning.
-_LAST_SHARE = 0.05
+REPORT_EVERY = 25
+# Steps after which the limit of splats' bands is set anew.
+_BAND_EVERY = 100
 
 
 class Pictures(Protocol):
@@ -46,49 +53,6 @@ class Pictures(Protocol):
 
     def background(self, number: int) -> Any:
         """(3,) device array: what is behind the splats in that picture."""
-
-
-@dataclass(frozen=True)
-class Schedule:
-    """What changes from step to step.
-
-    Args:
-        settings: of the run.
-        extent: of the scene.
-    """
-
-    settings: TrainSettings
-    extent: float
-
-    @property
-    def finish(self) -> int:
-        """The step with which the finish begins."""
-        return round(self.settings.steps * (1 - self.settings.finish))
-
-    def rates(self, step: int) -> dict[str, float]:
-        """Adam's rates at a step, by group."""
-        rates, settings = self.settings.rates, self.settings
-        way = min(step / max(self.finish, 1), 1.0)
-        fade = 1.0
-        if step >= self.finish:
-            into = (step - self.finish) / max(settings.steps - self.finish, 1)
-            fade = _LAST_SHARE**into
-        return {
-            "means": fade * self.extent * rates.means * rates.means_last**way,
-            "quats": fade * rates.quats,
-            "log_scales": fade * rates.log_scales,
-            "logits": fade * rates.logits,
-            "sh": fade * rates.sh,
-        }
-
-    def renews(self, step: int) -> bool:
-        """Whether splats are renewed after a step."""
-        renewal = self.settings.renewal
-        return step >= renewal.first and step % renewal.every == 0 and step < self.settings.steps
-
-    def grows(self, step: int) -> bool:
-        """Whether splats are added when they are renewed after a step."""
-        return step < self.settings.steps * self.settings.renewal.last
 
 
 class Trainer:
@@ -112,65 +76,157 @@ class Trainer:
         self.parameters = parameters
         self.settings = settings
         self.device: Device = parameters.device
-        self.renderer = Renderer(drawing or SplatSettings(), device=self.device)
         self.schedule = Schedule(settings, scene_extent(pictures.cameras))
-        self.loss = ImageLoss(ssim_weight=settings.ssim_weight)
+        extent, views = self.schedule.extent, len(pictures.cameras)
+        self.strategy = strategy_of(
+            settings, parameters, extent=extent, finish=self.schedule.finish
+        )
+        drawing = self.strategy.drawing(drawing or SplatSettings())
+        self.renderer = Renderer(drawing, device=self.device)
+        self.poses = Poses(pictures.cameras, extent) if settings.rates.poses else None
+        self.exposures = Exposures(self.device, views) if settings.rates.exposures else None
+        self.loss = HomogenisedLoss(
+            self.device,
+            settings.homogenisation,
+            ssim_weight=settings.ssim_weight,
+            kind=settings.loss,
+            noise=settings.noise or 0.0,
+        )
+        self._band = self._band_of_cameras() if settings.band_limit else None
+        if self._band is not None and parameters.band is None:
+            self._limit_band()
 
-    def run(self) -> Iterator[Report]:
-        """Fit until all steps are done, from where the parameters stand; a report now and then."""
+    def run(self, stopped: Callable[[], bool] = lambda: False) -> Iterator[Report]:
+        """Fit until all steps are done, from where the parameters stand.
+
+        Args:
+            stopped: asked after each step whether to leave it at that.
+
+        Yields:
+            A report now and then, and one after the last step.
+        """
         total = self.settings.steps
         while self.parameters.step < total:
-            value = self.step()
+            value, stop = self.step(), stopped()
             done = self.parameters.step
-            if done % _REPORT_EVERY == 0 or done == total:
+            if done % REPORT_EVERY == 0 or done == total or stop:
                 loss = float(self.device.get(value)[0])
                 values = {"loss": loss, "splats": float(len(self.parameters))}
                 yield Report(done, total, "steps", values)
+            if stop:
+                return
 
     def step(self) -> Any:
         """One picture; the loss as a (1,) device array."""
         settings, parameters = self.settings, self.parameters
-        number = self.view_at(parameters.step)
-        self.pictures.begin(parameters.step)
+        step = parameters.step
+        number, rates = self.view_at(step), self.schedule.rates(step)
+        self.pictures.begin(step)
         frame = self.renderer.forward(
-            parameters.drawn,
-            self.pictures.cameras[number],
-            background=self.pictures.background(number),
+            parameters.drawn, self.camera(number), background=self.pictures.background(number)
         )
-        value, by_image = self.loss(self.device, frame.image, self.pictures.target(number))
-        gradients = self.renderer.backward(frame, by_image, with_background=False)
-        finishing = parameters.step >= self.schedule.finish
-        rates, renewal = self.schedule.rates(parameters.step), settings.renewal
-        parameters.update(
-            gradients,
-            rates,
-            sh_rest=settings.rates.sh_rest,
-            opacity_penalty=0.0 if finishing else renewal.opacity_penalty,
-            scale_penalty=0.0 if finishing else renewal.scale_penalty,
+        value, by_image = self._compared(frame.image, number, rates["exposures"])
+        gradients = self.renderer.backward(
+            frame, by_image, with_camera=self.poses is not None, with_background=False
         )
-        self._renew(rates["means"], finishing=finishing)
+        if self.poses is not None:
+            by_view = self.device.get(gradients.camera)[:12].reshape(3, 4).astype(float)
+            self.poses.update(number, by_view, rates["poses"])
+        penalties = self.strategy.before_step(step)
+        parameters.update(gradients, rates, sh_rest=settings.rates.sh_rest, **penalties)
+        self._add_degree()
+        self.parameters = self.strategy.after_step(parameters, frame, gradients, rates["means"])
+        renewed = self.parameters is not parameters
+        if self._band is not None and (renewed or self.parameters.step % _BAND_EVERY == 0):
+            self._limit_band()
         return value
 
-    def _renew(self, rate: float, *, finishing: bool) -> None:
-        """What happens between two steps: the next degree, new places, the random walk."""
-        settings, step = self.settings, self.parameters.step
-        degree = int(np.sqrt(self.parameters.raw["sh"].shape[1])) - 1
-        if step % settings.sh_every == 0 and degree < settings.sh_degree:
-            self.parameters.add_degree()
-        if self.schedule.renews(step):
-            grow = self.schedule.grows(step)
-            self.parameters = renew(
-                self.parameters,
-                settings.renewal,
-                most=settings.splats,
-                seed=settings.seed,
-                grow=grow,
+    def camera(self, number: int) -> Camera:
+        """The camera of a view, where it is believed to be by now."""
+        return self.pictures.cameras[number] if self.poses is None else self.poses.camera(number)
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """All that changes from step to step, as host arrays by name."""
+        parameters = self.parameters
+        raw, first, second = parameters.host()
+        groups: dict[str, Mapping[str, NDArray[Any]]] = {
+            "raw": raw,
+            "first": first,
+            "second": second,
+            "strategy": self.strategy.state(),
+            "loss": self.loss.state(),
+        }
+        if parameters.band is not None:
+            groups["band"] = {"lengths": self.device.get(parameters.band)}
+        for name, refined in (("poses", self.poses), ("exposures", self.exposures)):
+            if refined is not None:
+                groups[name] = refined.state()
+        state = {
+            f"{group}.{key}": array for group in groups for key, array in groups[group].items()
+        }
+        return {"step": np.array(parameters.step), **state}
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a state of a run with the same settings and pictures.
+
+        Raises:
+            CheckpointError: it is of another run.
+        """
+        groups = _grouped(state)
+        try:
+            self.parameters = Parameters.of(
+                self.device,
+                groups["raw"],
+                first=groups["first"],
+                second=groups["second"],
+                step=int(state["step"]),
+                density=self.parameters.density,
+                band=groups.get("band", {}).get("lengths"),
             )
-        if not finishing:
-            self.parameters.shake(settings.renewal.noise * rate, settings.seed)
+            self.strategy.restore(groups.get("strategy", {}))
+            self.loss.restore(groups["loss"])
+            for name, refined in (("poses", self.poses), ("exposures", self.exposures)):
+                if refined is not None:
+                    refined.restore(groups[name])
+        except (KeyError, ShapeError) as error:
+            raise CheckpointError(f"the checkpoint is of another run ({error})") from error
+
+    def _compared(self, image: Any, number: int, rate: float) -> tuple[Any, Any]:
+        """The loss of a picture and its gradient by what was drawn."""
+        target, exposures = self.pictures.target(number), self.exposures
+        exposed = image if exposures is None else exposures.applied(image, number)
+        value, by_exposed = self.loss(exposed, target)
+        if (self.parameters.step + 1) % REPORT_EVERY == 0:
+            self.loss.watch(exposed, target)
+        if exposures is None:
+            return value, by_exposed
+        return value, exposures.pulled_back(image, by_exposed, number, rate)
+
+    def _add_degree(self) -> None:
+        settings, parameters = self.settings, self.parameters
+        degree = int(np.sqrt(parameters.raw["sh"].shape[1])) - 1
+        if parameters.step % settings.sh_every == 0 and degree < settings.sh_degree:
+            parameters.add_degree()
+
+    def _band_of_cameras(self) -> tuple[Any, float]:
+        cameras = self.pictures.cameras
+        return self.device.array(camera_table(cameras)), unseen_length(cameras)
+
+    def _limit_band(self) -> None:
+        if self._band is not None:
+            near, (cameras, unseen) = self.renderer.settings.near, self._band
+            self.parameters.limit_band(cameras, near=near, unseen=unseen)
 
     def view_at(self, step: int) -> int:
         """The picture that is looked at in a step: all of them once, in a new order every time."""
         count = len(self.pictures.cameras)
         order = np.random.default_rng((self.settings.seed, step // count, 0x0DE)).permutation(count)
         return int(order[step % count])
+
+
+def _grouped(state: Mapping[str, NDArray[Any]]) -> dict[str, dict[str, NDArray[Any]]]:
+    groups: dict[str, dict[str, NDArray[Any]]] = {}
+    for name, array in state.items():
+        group, _, key = name.partition(".")
+        groups.setdefault(group, {})[key] = array
+    return groups

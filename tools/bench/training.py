@@ -1,4 +1,8 @@
-"""A step of training beside drawing: the loss, Adam, the random walk, and what each has to do."""
+"""A step of training beside drawing, and what each part of it has to do.
+
+The loss, plain and homogenised, Adam, the random walk, the limit of the splats' band, what
+densification gathers of a frame, and a photograph's exposure.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +12,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bench.costs import Cost
+from rift_cl.operators.spectrum import padded_length
+from rift_cl.train.band_limit import camera_table
+from rift_cl.train.exposures import Exposures
+from rift_cl.train.homogenisation import Homogenisation
+from rift_cl.train.homogenised_loss import HomogenisedLoss
 from rift_cl.train.image_loss import ImageLoss
 from rift_cl.train.parameters import Parameters
+from rift_cl.train.screen_statistics import ScreenStatistics
 
 if TYPE_CHECKING:
     from bench.splats import SplatCase
 
 _RATES = {"means": 1e-4, "quats": 1e-3, "log_scales": 5e-3, "logits": 5e-2, "sh": 2.5e-3}
-# Parameters of a splat with harmonics of degree 3.
-_PARAMETERS = 11 + 48
+# Parameters of a splat with harmonics of degree 3; cameras whose resolution limits splats.
+_PARAMETERS, _VIEWS = 11 + 48, 100
 
 
 def training_operations(case: SplatCase) -> dict[str, Callable[[], Any]]:
@@ -37,7 +47,24 @@ def training_operations(case: SplatCase) -> dict[str, Callable[[], Any]]:
         parameters.update(case.gradients, _RATES, sh_rest=0.2, **penalties)
         parameters.shake(1.0, 0)
 
-    return {"loss": lambda: loss(device, case.frame.image, target), "update": update}
+    statistics = ScreenStatistics(device, case.count)
+    homogenised = HomogenisedLoss(device, Homogenisation(0.5), ssim_weight=0.2, kind="l1")
+    cameras = device.array(camera_table([case.camera] * _VIEWS))
+    limited = Parameters.of(device, raw)
+    exposures = Exposures(device, 1)
+
+    def expose() -> None:
+        exposed = exposures.applied(case.frame.image, 0)
+        exposures.pulled_back(case.frame.image, exposed, 0, 0.0)
+
+    return {
+        "loss": lambda: loss(device, case.frame.image, target),
+        "update": update,
+        "statistics": lambda: statistics.add(case.frame, case.gradients),
+        "homogenised loss": lambda: homogenised(case.frame.image, target),
+        "band limit": lambda: limited.limit_band(cameras, near=0.01, unseen=1.0),
+        "exposure": expose,
+    }
 
 
 def _per(
@@ -60,11 +87,34 @@ def _samples(case: SplatCase) -> float:
     return 3 * case.pixels
 
 
+def _padded(case: SplatCase) -> float:
+    """Samples of all planes of the padded transform: two fields, real and imaginary."""
+    return 4 * padded_length(case.size) ** 2
+
+
+def _passed(case: SplatCase) -> float:
+    """The same, for every pass of the four transforms, radix 4 and at the end perhaps 2."""
+    passes = -(-(padded_length(case.size).bit_length() - 1) // 2)
+    return 4 * passes * _padded(case)
+
+
 TRAINING_COSTS: dict[str, Cost] = {
     "adam": _per("parameter", _numbers, 28, "value, moments, gradient in; value, moments out"),
     "splat_activate": _per("splat", _splats, 32, "scales and opacity in and out"),
     "splat_activate_grad": _per("splat", _splats, 48, "scales, opacity, gradients in and out"),
     "splat_noise": _per("splat", _splats, 56, "the splat in, its place out"),
+    "splat_statistics": _per(
+        "splat", _splats, 41, "gradient, extents, code in; statistics both", 8
+    ),
+    "splat_band": _per("splat", _splats, 16, "place in, length out; 100 cameras", 22 * _VIEWS),
+    "fft_pack": _per("padded sample", _padded, 4, "planes out; the image in is less"),
+    "fft_pass": _per("sample and pass", _passed, 8, "in and out", 8),
+    "fft_transpose": _per("padded sample", lambda case: 2 * _padded(case), 8, "in and out, twice"),
+    "fft_unpack": _per("sample", _samples, 8, "plane in, image out", 3),
+    "keep_norm": _per("sample", _samples, 8, "in and out", 1),
+    "axpby": _per("sample", _samples, 12, "two in, one out", 3),
+    "expose": _per("sample", _samples, 8, "in and out", 2),
+    "expose_grad": _per("sample", _samples, 20, "image and gradient in, gradient and parts out", 2),
     "ssim_map": _per("sample", _samples, 20, "two images in, three maps out", 215),
     "loss_grad": _per("sample", _samples, 24, "two images and three maps in, gradient out", 145),
 }

@@ -1,0 +1,36 @@
+/* What splat_activate and its gradient have in common: one splat's scales and opacity, before and
+ * after the limit of its band. */
+
+#ifndef DENSITY
+#define DENSITY 0
+#endif
+#ifndef BAND
+#define BAND 0
+#endif
+
+/* ln of the smallest and the largest scale, and density. */
+#define LEAST_LOG -30.0f
+#define MOST_LOG 30.0f
+
+static float held_exp(float x) { return exp(x < LEAST_LOG ? LEAST_LOG : x > MOST_LOG ? MOST_LOG : x); }
+
+/* Scales as trained and as drawn, the opacity as trained, and what the limit leaves of it. */
+typedef struct {
+  float trained[3], drawn[3], opacity, faded;
+} Activation;
+
+static Activation activated(
+    __global const float *log_scales, __global const float *logits, __global const float *band, long i)
+{
+  Activation a;
+  a.faded = 1;
+  for (int k = 0; k < 3; k++) {
+    a.trained[k] = a.drawn[k] = held_exp(log_scales[3 * i + k]);
+#if BAND
+    a.drawn[k] = sqrt(a.trained[k] * a.trained[k] + band[i] * band[i]);
+    a.faded *= a.trained[k] / a.drawn[k];
+#endif
+  }
+  a.opacity = DENSITY ? held_exp(logits[i]) : 1 / (1 + exp(-logits[i]));
+  return a;
+}

@@ -1,0 +1,102 @@
+"""The loss of a fit, homogenised: its gradient is weighted in the Fourier domain of the image.
+
+``rift_cl.train.homogenisation`` says why and how strongly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.arithmetic import axpby
+from rift_cl.cl.device import Device
+from rift_cl.operators.spectrum import SpectralFilter
+from rift_cl.train.homogenisation import Homogenisation
+from rift_cl.train.image_loss import ImageLoss
+from rift_cl.train.settings import LossKind
+
+# Exponents are rounded to so many parts of the largest, so that responses can be kept.
+_PARTS = 32
+# Share of the old value in the running mean of the squared residual.
+_MEMORY = 0.8
+
+
+class HomogenisedLoss:
+    """The loss of a fit, and its gradient by the image.
+
+    Args:
+        device: where the images are.
+        settings: how strongly frequencies are weighted; exponent 0 leaves the plain loss.
+        ssim_weight: share of D-SSIM.
+        kind: of the pixelwise part.
+        noise: standard deviation of the noise in the pictures.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        settings: Homogenisation,
+        *,
+        ssim_weight: float,
+        kind: LossKind,
+        noise: float = 0.0,
+    ) -> None:
+        self.device = device
+        self.settings = settings
+        self.noise = noise
+        self.mean_square = float("inf")
+        self._plain = ImageLoss(ssim_weight=ssim_weight, kind=kind)
+        self._pixels = ImageLoss(ssim_weight=0.0, kind=kind)
+        self._structure = ImageLoss(ssim_weight=1.0)
+        self._squares = ImageLoss(ssim_weight=0.0, kind="l2")
+        self._filters: dict[tuple[tuple[int, ...], float], SpectralFilter] = {}
+
+    @property
+    def exponent(self) -> float:
+        """The exponent that holds now."""
+        most = self.settings.exponent
+        share = self.settings.exponent_at(self.mean_square, self.noise) / most if most else 0.0
+        return round(share * _PARTS) / _PARTS * most
+
+    def __call__(self, image: Any, target: Any) -> tuple[Any, Any]:
+        """The loss, (1,), and its weighted gradient, as ``ImageLoss`` gives them."""
+        exponent = self.exponent
+        if exponent == 0:
+            return self._plain(self.device, image, target)
+        value, gradient = self._pixels(self.device, image, target)
+        weigh = self._filter(image.shape[:2], exponent)
+        gradient = weigh(gradient, channels=target.shape[2], keep_norm=True)
+        share = self._plain.ssim_weight
+        if share:
+            structure, by_structure = self._structure(self.device, image, target)
+            axpby(self.device, share, structure, 1 - share, value)
+            axpby(self.device, share, by_structure, 1 - share, gradient)
+        return value, gradient
+
+    def watch(self, image: Any, target: Any) -> None:
+        """Take note of how much is left: one picture's mean square residual; waits for it."""
+        if not self.settings.exponent:
+            return
+        found = float(self.device.get(self._squares(self.device, image, target)[0])[0])
+        known = np.isfinite(self.mean_square)
+        self.mean_square = _MEMORY * self.mean_square + (1 - _MEMORY) * found if known else found
+
+    def state(self) -> dict[str, NDArray[np.float64]]:
+        """What a checkpoint keeps."""
+        return {"mean_square": np.array(self.mean_square), "noise": np.array(self.noise)}
+
+    def restore(self, state: Mapping[str, NDArray[np.float64]]) -> None:
+        """Go on from a checkpoint."""
+        self.mean_square, self.noise = float(state["mean_square"]), float(state["noise"])
+
+    def _filter(self, size: tuple[int, ...], exponent: float) -> SpectralFilter:
+        if (size, exponent) not in self._filters:
+            kept = {key: value for key, value in self._filters.items() if key[1] == exponent}
+            response = partial(self.settings.response, longest=max(size), exponent=exponent)
+            kept[size, exponent] = SpectralFilter(self.device, (size[0], size[1]), response)
+            self._filters = kept
+        return self._filters[size, exponent]

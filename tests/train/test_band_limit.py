@@ -1,0 +1,105 @@
+"""No splat finer than the cameras resolve: the twin's limits, what is drawn, and its gradient."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_parameters import FREE, RATES, raw_values
+from test_start import ring
+
+from rift_cl.geometry import Camera
+from rift_cl.reference.training import activate, finest_seen
+from rift_cl.train.band_limit import camera_table, unseen_length
+from rift_cl.train.parameters import Parameters
+
+
+def limited(device, raw, cameras, **more):
+    parameters = Parameters.of(device, raw, **more)
+    unseen = unseen_length(cameras)
+    parameters.limit_band(device.array(camera_table(cameras)), near=0.01, unseen=unseen)
+    return parameters, unseen
+
+
+def test_limits_are_the_twins(device):
+    cameras, raw = ring(6), raw_values(300)
+    raw["means"] *= 3
+    parameters, unseen = limited(device, raw, cameras)
+    wanted = finest_seen(
+        raw["means"].astype(float), camera_table(cameras).astype(float), near=0.01, unseen=unseen
+    )
+    found = device.get(parameters.band)
+    np.testing.assert_allclose(found, wanted, rtol=1e-4)
+    assert (found < 0.99 * unseen).any() and (found == np.float32(unseen)).any()
+
+
+def test_what_is_drawn_is_blurred_and_keeps_its_mass(device):
+    raw = raw_values()
+    parameters, _ = limited(device, raw, ring(4))
+    band = device.get(parameters.band).astype(float)
+    scales, opacities = activate(
+        raw["log_scales"].astype(float), raw["logits"].astype(float), band=band
+    )
+    np.testing.assert_allclose(device.get(parameters.drawn.scales), scales, rtol=1e-5)
+    np.testing.assert_allclose(device.get(parameters.drawn.opacities), opacities, rtol=1e-5)
+    free, before = activate(raw["log_scales"].astype(float), raw["logits"].astype(float))
+    np.testing.assert_allclose(opacities * scales.prod(axis=1), before * free.prod(axis=1))
+
+
+@pytest.mark.parametrize("density", [False, True])
+@pytest.mark.parametrize("band", [False, True])
+def test_the_gradient_is_the_twins_difference(device, density, band):
+    raw, random = raw_values(23), np.random.default_rng(5)
+    lengths = random.uniform(0.01, 0.2, 23).astype(np.float32) if band else None
+    parameters = Parameters.of(device, raw, density=density, band=lengths)
+    by_scales, by_opacities = random.normal(size=(23, 3)), random.normal(size=23)
+    sent = {
+        "means": np.zeros((23, 3)), "quats": np.zeros((23, 4)),
+        "scales": by_scales, "opacities": by_opacities,
+    }  # fmt: skip
+    sent = {name: device.array(value.astype(np.float32)) for name, value in sent.items()}
+    found = SimpleNamespace(splats=SimpleNamespace(**sent), sh=device.zeros((23, 4, 3)))
+    parameters.update(found, RATES, **{**FREE, "opacity_penalty": 0.3, "scale_penalty": 0.2})
+
+    def loss(log_scales, logits):
+        limit = 0.0 if lengths is None else lengths.astype(float)
+        scales, opacities = activate(log_scales, logits, band=limit, density=density)
+        free, before = activate(log_scales, logits, density=density)
+        drawn = (by_scales * scales).sum() + (by_opacities * opacities).sum()
+        return drawn + 0.2 * free.mean() + 0.3 * before.mean()
+
+    given = {name: raw[name].astype(float) for name in ("log_scales", "logits")}
+    for name, gradient in (("log_scales", "scales"), ("logits", "opacities")):
+        wanted = np.zeros(given[name].shape)
+        for place in np.ndindex(wanted.shape):
+            ends = []
+            for step in (1e-5, -1e-5):
+                moved = {key: value.copy() for key, value in given.items()}
+                moved[name][place] += step
+                ends.append(loss(**moved))
+            wanted[place] = (ends[0] - ends[1]) / 2e-5
+        by = device.get(getattr(found.splats, gradient))
+        np.testing.assert_allclose(by, wanted, rtol=2e-4, atol=2e-5, err_msg=name)
+
+
+def test_a_camera_that_comes_nearer_lowers_the_limit(device):
+    def at(distance):
+        view = np.eye(4)
+        view[2, 3] = distance
+        return Camera((60, 80), [[90, 0, 40], [0, 90, 30], [0, 0, 1]], view)
+
+    raw = raw_values(1)
+    raw["means"][:] = 0
+    for cameras in ([at(4)], [at(4), at(2)], [at(4), at(2), at(-3)]):
+        parameters, _ = limited(device, raw, cameras)
+        nearest = min(camera.view[2, 3] for camera in cameras if camera.view[2, 3] > 0)
+        assert device.get(parameters.band)[0] == pytest.approx(np.sqrt(0.2) * nearest / 90)
+
+
+def test_an_orthographic_camera_resolves_the_same_at_every_depth(device):
+    camera = Camera((60, 80), [[50, 0, 40], [0, 50, 30], [0, 0, 1]], np.eye(4), "ortho")
+    raw = raw_values(5)
+    raw["means"] *= [0.1, 0.1, 30]
+    found = device.get(limited(device, raw, [camera])[0].band)
+    np.testing.assert_allclose(found, np.sqrt(0.2) / 50, rtol=1e-6)

@@ -1,0 +1,120 @@
+"""Poses and exposures: gradients against differences, and what was disturbed is found again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from test_start import ring
+
+from rift_cl.geometry import Camera
+from rift_cl.train.exposures import Exposures
+from rift_cl.train.poses import Poses, twist_gradient
+
+
+def disturbed(cameras, turn, shift, seed=0):
+    random = np.random.default_rng(seed)
+    found = []
+    for camera in cameras:
+        view = camera.view.copy()
+        view[:3, :3] = Rotation.from_rotvec(turn * random.normal(size=3)).as_matrix() @ view[:3, :3]
+        view[:3, 3] += shift * random.normal(size=3)
+        found.append(Camera(camera.size, camera.K, view, camera.model))
+    return found
+
+
+def test_the_gradient_of_a_twist_is_its_difference():
+    random = np.random.default_rng(1)
+    view, weights = ring(3)[1].view.copy(), random.normal(size=(3, 4))
+
+    def loss(twist):
+        turn = Rotation.from_rotvec(twist[:3]).as_matrix()
+        moved = turn @ view[:3]
+        moved[:, 3] += twist[3:]
+        return float((weights * moved).sum())
+
+    wanted = [(loss(1e-6 * axis) - loss(-1e-6 * axis)) / 2e-6 for axis in np.eye(6)]
+    np.testing.assert_allclose(twist_gradient(view, weights), wanted, rtol=1e-6, atol=1e-8)
+
+
+def test_poses_go_where_points_are_seen():
+    """Reprojection of known points, as a loss whose gradient by the view is plain algebra."""
+    truth = ring(4)
+    poses = Poses(disturbed(truth, 0.02, 0.05), 5.0)
+    points = np.concatenate([np.random.default_rng(2).normal(size=(50, 3)), np.ones((50, 1))], 1)
+
+    def residual(number):
+        return poses.views[number, :3] @ points.T - truth[number].view[:3] @ points.T
+
+    before = [np.abs(residual(number)).max() for number in range(4)]
+    for step in range(4000):
+        number = step % 4
+        by_view = 2 * residual(number) @ points / len(points)
+        poses.update(number, by_view, 2e-3 * 0.998 ** (step // 4))
+    after = [np.abs(residual(number)).max() for number in range(4)]
+    assert max(after) < 0.02 * min(before)
+    for view in poses.views:
+        np.testing.assert_allclose(view[:3, :3] @ view[:3, :3].T, np.eye(3), atol=1e-12)
+    assert poses.camera(2).size == truth[2].size
+
+
+def test_how_far_cameras_moved_is_told():
+    poses = Poses(ring(2), 1.0)
+    assert not poses.moved().any()
+    poses.views[0, :3, :3] = Rotation.from_rotvec([0.1, 0, 0]).as_matrix() @ poses.views[0, :3, :3]
+    turned, moved = poses.moved()[0]
+    assert turned == pytest.approx(0.1) and moved > 0.1
+    assert not poses.moved()[1].any()
+
+
+def test_a_gradient_that_is_not_finite_moves_nothing():
+    poses = Poses(ring(2), 1.0)
+    before = poses.views.copy()
+    poses.update(0, np.full((3, 4), np.nan), 0.1)
+    assert (poses.views == before).all()
+
+
+def test_a_gain_and_an_offset_for_each_colour_are_applied(device):
+    exposures, image = Exposures(device, 3), np.random.default_rng(0).uniform(size=(5, 7, 3))
+    exposures.values[1] = [[1.1, 0.9, 1.0], [0.1, 0.0, -0.2]]
+    sent = device.array(image.astype(np.float32))
+    found = device.get(exposures.applied(sent, 1))
+    np.testing.assert_allclose(found, image * [1.1, 0.9, 1.0] + [0.1, 0.0, -0.2], atol=1e-6)
+    np.testing.assert_array_equal(device.get(exposures.applied(sent, 0)), image.astype(np.float32))
+
+
+def test_exposures_that_differ_are_found_up_to_what_all_share(device):
+    random, exposures = np.random.default_rng(4), Exposures(device, 2)
+    image = random.uniform(size=(16, 16, 3)).astype(np.float32)
+    gains = np.array([[1.2, 1.0, 0.9], [0.8, 1.0, 1.1]])
+    targets = [(image * gain).astype(np.float32) for gain in gains]
+    sent = device.array(image)
+    for step in range(1200):
+        number = step % 2
+        exposed = device.get(exposures.applied(sent, number))
+        by_exposed = (2 * (exposed - targets[number]) / image.size).astype(np.float32)
+        by_image = exposures.pulled_back(sent, device.array(by_exposed), number, 0.01)
+        # Gains have moved by now; the gradient went through those that were applied.
+        assert device.get(by_image).shape == image.shape
+    np.testing.assert_allclose(exposures.values[:, 0], gains, atol=0.01)
+    np.testing.assert_allclose(exposures.values[:, 1], 0, atol=0.01)
+    np.testing.assert_allclose(exposures.values.mean(axis=0), [[1] * 3, [0] * 3], atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["poses", "exposures"])
+def test_a_state_brings_both_back(device, kind):
+    made = [Poses(ring(3), 2.0) if kind == "poses" else Exposures(device, 3) for _ in range(2)]
+    image = device.array(np.ones((4, 4, 3), np.float32))
+
+    def step(one):
+        if kind == "poses":
+            one.update(1, np.arange(12.0).reshape(3, 4), 0.01)
+        else:
+            one.pulled_back(image, image, 1, 0.01)
+
+    step(made[0])
+    made[1].restore(made[0].state())
+    for one in made:
+        step(one)
+    for name, array in made[0].state().items():
+        np.testing.assert_array_equal(array, made[1].state()[name], err_msg=name)
