@@ -1,0 +1,26 @@
+"""A small capture that comes with the package, so that a fit can be seen before one has pictures.
+
+It shows a glossy ornament with hairs and fibres, rendered by ``tools/render_ornament.py``; the
+commands are in ``ornament/README.txt``.
+"""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+_ORNAMENT = "ornament"
+_OFF_PATH = "off_path"
+
+
+def ornament() -> Path:
+    """The folder of 60 views of the ornament on a ring, with its transforms.json.
+
+    The package must lie on a disk as it does when pip installs it, not in a zip file.
+    """
+    return Path(str(files(__name__) / _ORNAMENT))
+
+
+def ornament_off_path() -> Path:
+    """The folder of 8 views of the ornament from elsewhere, with its transforms.json."""
+    return ornament() / _OFF_PATH

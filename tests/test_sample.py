@@ -1,0 +1,33 @@
+"""The capture inside the package: whole, small, and without a word about anything else."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rift_cl.io import open_capture, read_view
+from rift_cl.sample import ornament, ornament_off_path
+
+
+def test_every_picture_is_there_and_has_the_constant_background():
+    for folder, count in ((ornament(), 60), (ornament_off_path(), 8)):
+        views = open_capture(folder).views
+        assert len(views) == count
+        for view in views:
+            image = read_view(view)
+            assert image.shape == (120, 160, 3)
+            assert (np.rint(255 * image[:10, :10]) == 128).all()
+            assert 0.2 < (np.abs(image - 0.5).max(axis=2) > 0.02).mean() < 0.6
+
+
+def test_off_path_views_are_no_views_of_the_ring():
+    ring = np.array([view.camera.center for view in open_capture(ornament()).views])
+    assert np.ptp(ring[:, 2]) < 1e-9
+    for view in open_capture(ornament_off_path()).views:
+        assert np.linalg.norm(ring - view.camera.center, axis=1).min() > 0.2
+
+
+def test_the_sample_is_small_and_says_how_it_was_made():
+    files = [path for path in ornament().rglob("*") if path.is_file()]
+    assert sum(path.stat().st_size for path in files) <= 2_000_000
+    assert "tools/render_ornament.py" in (ornament() / "README.txt").read_text()
+    assert {path.suffix for path in files} == {".png", ".json", ".txt"}

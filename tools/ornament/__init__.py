@@ -1,0 +1,1 @@
+"""A glossy ornament with hairs and fibres, rendered by an independent path tracer."""
