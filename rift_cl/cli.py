@@ -13,15 +13,16 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import tyro
-from rich.console import Console
-from rich.table import Table
 
 from rift_cl import __version__
+from rift_cl.console_table import print_table
 from rift_cl.errors import RiftError
+from rift_cl.interruption import gentle_interrupt
 from rift_cl.progress import Report
 from rift_cl.progress_bar import print_line, show_progress
 
@@ -79,8 +80,11 @@ def _commands() -> dict[str, Callable[..., Callable[[], int]]]:
     from rift_cl.jobs.center import CenterSettings
     from rift_cl.jobs.demo import DemoSettings
     from rift_cl.jobs.devices import DevicesSettings
-    from rift_cl.jobs.fit import FitSettings
+    from rift_cl.jobs.evaluate import EvalSettings
+    from rift_cl.jobs.fit_settings import FitSettings
     from rift_cl.jobs.reconstruct import ReconstructSettings
+    from rift_cl.jobs.render_settings import RenderSettings
+    from rift_cl.jobs.view import ViewSettings
 
     return {
         "devices": _command(_devices, DevicesSettings),
@@ -88,6 +92,9 @@ def _commands() -> dict[str, Callable[..., Callable[[], int]]]:
         "reconstruct": _command(_reconstruct, ReconstructSettings),
         "center": _command(_center, CenterSettings),
         "fit": _command(_fit, FitSettings),
+        "eval": _command(_eval, EvalSettings),
+        "render": _command(_render, RenderSettings),
+        "view": _command(_view, ViewSettings),
         "cache": _command(_cache, CacheSettings),
     }
 
@@ -136,13 +143,13 @@ def _watch(reports: Iterable[Report], output: Output) -> None:
     show_progress(reports, quiet=output.quiet)
 
 
-def _print_table(
-    columns: Sequence[str], rows: Iterable[Sequence[Any]], *, caption: str = ""
-) -> None:
-    table = Table(*columns, caption=caption or None, caption_justify="left")
-    for row in rows:
-        table.add_row(*(f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row))
-    Console().print(table)
+def _ran(job: Any, settings: Any, output: Output) -> bool:
+    """Run a job, or say what it would do; whether it was run."""
+    if settings.dry_run:
+        print_table(("what", "plan"), job.plan().items())
+        return False
+    _watch(job.run(), output)
+    return True
 
 
 def _devices(settings: Any, output: Output) -> None:
@@ -156,10 +163,15 @@ def _devices(settings: Any, output: Output) -> None:
 
 def _demo(settings: Any, output: Output) -> None:
     from rift_cl.jobs.demo import COLUMNS, SCORING, DemoJob
+    from rift_cl.jobs.fit_report import COLUMNS as FIT_COLUMNS
+    from rift_cl.jobs.fit_report import SCORING as FIT_SCORING
+    from rift_cl.jobs.fit_report import score_rows
 
     job = DemoJob(settings)
     _watch(job.run(), output)
-    _print_table(COLUMNS, job.rows, caption=SCORING)
+    print_table(COLUMNS, job.rows, caption=SCORING)
+    if job.fit is not None:
+        print_table(FIT_COLUMNS, score_rows(job.fit.metrics), caption=FIT_SCORING)
     print(f"pictures and report.html are in {settings.out}")
 
 
@@ -167,11 +179,9 @@ def _reconstruct(settings: Any, output: Output) -> None:
     from rift_cl.jobs.reconstruct import Reconstruction
 
     job = Reconstruction(settings)
-    if settings.dry_run:
-        _print_table(("what", "plan"), job.plan().items())
+    if not _ran(job, settings, output):
         return
-    _watch(job.run(), output)
-    _print_table(("figure", "value"), job.metrics.items())
+    print_table(("figure", "value"), job.metrics.items())
     print(f"slices and report.html are in {settings.out}")
 
 
@@ -189,12 +199,43 @@ def _fit(settings: Any, output: Output) -> None:
     from rift_cl.jobs.fit_report import COLUMNS, SCORING, score_rows
 
     job = Fit(settings)
-    if settings.dry_run:
-        _print_table(("what", "plan"), job.plan().items())
+    job.announce = print_line
+    with gentle_interrupt(job.stop):
+        ran = _ran(job, settings, output)
+    if not ran:
         return
-    _watch(job.run(), output)
-    _print_table(COLUMNS, score_rows(job.metrics), caption=SCORING)
+    print_table(COLUMNS, score_rows(job.metrics), caption=SCORING)
     print(f"scene.ply and report.html are in {settings.out}")
+
+
+def _eval(settings: Any, output: Output) -> None:
+    from rift_cl.jobs.evaluate import Evaluation
+    from rift_cl.jobs.evaluate_report import score_table
+    from rift_cl.jobs.fit_report import SCORING
+
+    job = Evaluation(settings)
+    if not _ran(job, settings, output):
+        return
+    print_table(*score_table(job.metrics), caption=SCORING)
+    print(f"report.html and metrics.json are in {settings.out}")
+
+
+def _render(settings: Any, output: Output) -> None:
+    from rift_cl.jobs.render import Render
+
+    job = Render(settings)
+    if not _ran(job, settings, output):
+        return
+    print(f"frames, animation.png and report.html are in {settings.out}")
+
+
+def _view(settings: Any, output: Output) -> None:
+    from rift_cl.jobs.view import ViewJob
+
+    # Ctrl-C is the usual way to end it, and nothing is lost by it.
+    with ViewJob(settings) as job, suppress(KeyboardInterrupt):
+        print(f"{job.url} shows {settings.scene}; Ctrl-C ends it", flush=True)
+        _watch(job.run(), Output(quiet=True))
 
 
 def _cache(settings: Any, output: Output) -> None:

@@ -47,6 +47,12 @@ class CheckpointError(InputError):
     """A checkpoint is damaged or belongs to another run."""
 
 
+class StoppedError(RiftError):
+    """A person broke a run off; what was done so far is kept."""
+
+    exit_status = 130
+
+
 class DeviceError(RiftError, RuntimeError):
     """Something is wrong with the OpenCL device or its driver."""
 

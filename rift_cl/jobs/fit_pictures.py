@@ -1,14 +1,15 @@
 """The photographs of a fit: decoded once, sent to the device one at a time, over their background.
 
-Photographs are kept on the host as 8-bit codes where that loses nothing to a display, and are
-decoded again whenever they do not fit the budget. Those with alpha are laid over a background that
-is drawn by chance for each step, so that transparent places must become transparent.
+Photographs are kept on the host, in display light as codes of 8 or 16 bits, and are decoded again
+whenever they do not fit the budget; what a step sees is the same either way. Those with alpha are
+laid over a background that is drawn by chance for each step, so that transparent places must become
+transparent.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from rift_cl.cl.budget import free_host_memory
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Camera
 from rift_cl.io.capture import View, camera_at, read_view
+from rift_cl.io.display_light import to_display
 
 # Share of the free host memory that photographs may take.
 _SHARE = 0.4
@@ -25,7 +27,12 @@ _FOREGROUND = 2 / 255
 # A border is of one colour if so many of its samples are, to within so many codes.
 _UNIFORM, _CODES = 0.8, 1.5
 
+# Values that lie so near to 8-bit codes are such.
+_EXACT = 1e-3
+
 Floats = NDArray[np.float32]
+Kept = NDArray[Any]
+Light = Literal["display", "linear"]
 
 
 class CapturePictures:
@@ -36,6 +43,7 @@ class CapturePictures:
         views: the photographs.
         downscale: whole factor by which they are made smaller.
         seed: of the random backgrounds.
+        light: that pictures are in.
         like: other photographs of the same scene, whose background these have; found if not given.
     """
 
@@ -46,13 +54,15 @@ class CapturePictures:
         *,
         downscale: int = 1,
         seed: int = 0,
+        light: Light = "display",
         like: CapturePictures | None = None,
     ) -> None:
         self.device = device
         self.views = views
         self.cameras: Sequence[Camera] = [camera_at(view, downscale) for view in views]
+        self.light: Light = light
         self._downscale, self._seed = downscale, seed
-        self._kept: dict[int, NDArray[np.uint8]] = {}
+        self._kept: dict[int, Kept] = {}
         # A step asks for one picture several times.
         self._last: tuple[int, Floats] | None = None
         self._room = int(_SHARE * (free_host_memory() or 1 << 30))
@@ -62,20 +72,21 @@ class CapturePictures:
         self._step = 0
 
     def image(self, number: int) -> Floats:
-        """(height, width, 3 or 4) in display light, alpha straight."""
+        """(height, width, 3 or 4), alpha straight."""
         if self._last is None or self._last[0] != number:
             self._last = number, self._decoded(number)
         return self._last[1]
 
     def _decoded(self, number: int) -> Floats:
-        if number not in self._kept:
-            image = read_view(self.views[number], downscale=self._downscale)
-            codes = np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8)
-            if codes.nbytes > self._room:
-                return image
-            self._room -= codes.nbytes
-            self._kept[number] = codes
-        return np.asarray(self._kept[number], np.float32) / np.float32(255)
+        kept = self._kept.get(number)
+        if kept is None:
+            image = read_view(self.views[number], downscale=self._downscale, light=self.light)
+            kept = _codes_of(image) if self.light == "display" else image
+            if kept.nbytes <= self._room:
+                self._room -= kept.nbytes
+                self._kept[number] = kept
+        most = 1 if kept.dtype.kind == "f" else np.iinfo(kept.dtype).max
+        return np.asarray(kept, np.float32) / np.float32(most)
 
     def over(self, number: int, background: Floats) -> Floats:
         """(height, width, 3) over a background."""
@@ -84,6 +95,13 @@ class CapturePictures:
             return image
         alpha = image[..., 3:]
         return np.asarray(image[..., :3] * alpha + background * (1 - alpha), np.float32)
+
+    def shown(self, image: Floats) -> Floats:
+        """An image, drawn or photographed, in display light from 0 to 1: as people score it."""
+        held = np.clip(image, 0, 1)
+        if self.light == "linear":
+            to_display(held)
+        return held
 
     def begin(self, step: int) -> None:
         """Say which step comes: backgrounds hang on it."""
@@ -123,3 +141,12 @@ class CapturePictures:
         middle = np.median(border, axis=0)
         same = np.abs(border - middle).max(axis=1) <= _CODES / 255
         return np.asarray(middle, np.float32) if same.mean() >= _UNIFORM else None
+
+
+def _codes_of(image: Floats) -> Kept:
+    """Codes of 8 bits if the values are such, of 16 bits if not."""
+    held = np.clip(image, 0, 1)
+    codes = np.rint(held * 255)
+    if np.abs(held * 255 - codes).max() <= _EXACT:
+        return codes.astype(np.uint8)
+    return np.rint(held * 65535).astype(np.uint16)

@@ -13,7 +13,7 @@ from rift_cl.plot import curves, figure_png, image_grid
 
 _SHOWN = 3
 # Errors are shown this much brighter.
-_ERROR_GAIN = 5.0
+ERROR_GAIN = 5.0
 
 SCORING = (
     "PSNR in dB (peak 1) and SSIM in display light, means over the pictures. The foreground is "
@@ -44,23 +44,34 @@ def fit_page(
 ) -> Page:
     """The report of a finished fit."""
     page = Page(f"Splats fitted to {name}", f"{metrics['splats']} splats")
+    show_fit(page, groups, losses, metrics)
+    return page
+
+
+def show_fit(
+    page: Page,
+    groups: Mapping[str, Sequence[ViewScore]],
+    losses: Sequence[tuple[int, float]],
+    metrics: Mapping[str, Any],
+) -> None:
+    """Add to a page: mean scores, truth, fit and error of each group's pictures, the loss."""
     if metrics["scores"]:
         page.table(COLUMNS, score_rows(metrics), caption=SCORING)
     for group, scores in groups.items():
         page.section(f"Pictures: {group}")
         page.figure(
-            figure_png(_panels(scores)),
-            caption=f"The best, the middle and the worst by PSNR; errors {_ERROR_GAIN:g} times "
+            figure_png(view_panels(scores)),
+            caption=f"The best, the middle and the worst by PSNR; errors {ERROR_GAIN:g} times "
             "brighter.",
             alt="Pictures that were not trained on: truth, fit, error",
         )
         rows = [_row(score) for score in scores]
-        page.table(("picture", "degrees away", "PSNR", "SSIM", "blend PSNR"), rows, caption=SCORING)
+        columns = ("picture", "degrees away", "PSNR", "SSIM", "blend PSNR")
+        page.table(columns, rows, caption="Away from the nearest picture that was trained on.")
     page.section("Training")
     steps, values = zip(*losses, strict=True)
     figure = curves({"loss": (steps, values)}, xlabel="step", ylabel="loss")
     page.figure(figure_png(figure), caption="Of the pictures as they came.", alt="Loss by step")
-    return page
 
 
 def _row(score: ViewScore) -> tuple[Any, ...]:
@@ -69,13 +80,14 @@ def _row(score: ViewScore) -> tuple[Any, ...]:
     return (score.name, score.angle, values["fit_psnr"], values["fit_ssim"], blend)
 
 
-def _panels(scores: Sequence[ViewScore]) -> Any:
+def view_panels(scores: Sequence[ViewScore]) -> Any:
+    """Truth, picture and error of the best, the middle and the worst by PSNR."""
     order = sorted(scores, key=lambda score: -score.values["fit_psnr"])
     places = np.unique(np.linspace(0, len(order) - 1, _SHOWN).round().astype(int))
     images, titles = [], []
     for place in places.tolist():
         score = order[place]
-        error = np.abs(score.image - score.truth) * _ERROR_GAIN
+        error = np.abs(score.image - score.truth) * ERROR_GAIN
         images += [score.truth, score.image, np.clip(error, 0, 1)]
         titles += [score.name, f"{score.values['fit_psnr']:.1f} dB", "error"]
     return image_grid(images, titles=titles, columns=3, window=(0.0, 1.0))

@@ -8,8 +8,9 @@ differs from the background by more than two codes, or what alpha says.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,21 +45,25 @@ class ViewScore:
 
 
 def score_views(
-    renderer: Renderer, splats: Splats, unseen: CapturePictures, seen: CapturePictures
+    renderer: Renderer, splats: Splats, unseen: CapturePictures, seen: CapturePictures | None
 ) -> Iterator[ViewScore]:
-    """Draw and score every picture of ``unseen``; ``seen`` are the ones that were trained on."""
-    focus = focus_of(seen.cameras)
+    """Draw and score every picture of ``unseen``.
+
+    ``seen`` are the ones that were trained on; where nobody knows them there are no angles and no
+    baselines.
+    """
+    behind, focus = unseen.behind, focus_of((seen or unseen).cameras)
     for number, camera in enumerate(unseen.cameras):
-        behind = unseen.behind
         frame = renderer.forward(splats, camera, background=renderer.device.array(behind))
-        image = np.clip(renderer.device.get(frame.image), 0, 1)
-        truth = unseen.over(number, behind)
-        angles = _angles(seen.cameras, camera, focus)
-        front = unseen.foreground(number)
-        values = scores_of(image, truth, front, "fit")
-        for name, blend in _baselines(seen, angles, truth.shape, behind).items():
-            values |= scores_of(blend, truth, front, name)
-        yield ViewScore(unseen.views[number].name, float(angles.min()), values, truth, image)
+        image = unseen.shown(renderer.device.get(frame.image))
+        truth, front = unseen.shown(unseen.over(number, behind)), unseen.foreground(number)
+        values, angle = scores_of(image, truth, front, "fit"), float("nan")
+        if seen is not None:
+            angles = _angles(seen.cameras, camera, focus)
+            angle = float(angles.min())
+            for name, blend in _baselines(seen, angles, truth.shape, behind).items():
+                values |= scores_of(blend, truth, front, name)
+        yield ViewScore(unseen.views[number].name, angle, values, truth, image)
 
 
 def scores_of(
@@ -84,6 +89,17 @@ def mean_scores(scores: Sequence[ViewScore]) -> dict[str, float]:
     }
 
 
+def score_record(groups: Mapping[str, Sequence[ViewScore]]) -> dict[str, Any]:
+    """The mean scores of each group of pictures, and those of every picture; JSON."""
+    return {
+        "scores": {name: mean_scores(scores) for name, scores in groups.items()},
+        "views": {
+            name: [{"name": s.name, "angle": s.angle, **s.values} for s in scores]
+            for name, scores in groups.items()
+        },
+    }
+
+
 def _angles(cameras: Sequence[Camera], camera: Camera, focus: NDArray[np.float64]) -> Floats:
     """Degrees between a camera and others, as seen from where they look."""
     ways = np.array([other.center for other in cameras]) - focus
@@ -97,7 +113,7 @@ def _baselines(
 ) -> dict[str, Floats]:
     """The nearest training picture, and the mean of the two nearest, where their sizes agree."""
     nearest = np.argsort(angles, kind="stable")[:2].tolist()
-    pictures = [seen.over(number, behind) for number in nearest]
+    pictures = [seen.shown(seen.over(number, behind)) for number in nearest]
     if any(picture.shape != shape for picture in pictures):
         return {}
     return {"nearest": pictures[0], "blend": np.mean(pictures, axis=0, dtype=np.float32)}

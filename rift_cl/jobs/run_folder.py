@@ -31,12 +31,15 @@ class RunFolder:
         path: the folder; made when it is not there.
         job: the command's name.
         overwrite: whether an earlier run of the same command may be replaced.
+        resume: whether one that is there is gone on with.
 
     Raises:
         OutputError: the folder cannot be made, or holds something that would be lost.
     """
 
-    def __init__(self, path: Path, job: str, *, overwrite: bool) -> None:
+    def __init__(
+        self, path: Path, job: str, *, overwrite: bool = False, resume: bool = False
+    ) -> None:
         self.path = path
         self._job = job
         above = next(parent for parent in path.absolute().parents if parent.exists())
@@ -46,7 +49,7 @@ class RunFolder:
             used = path.exists() and (not path.is_dir() or any(path.iterdir()))
         if used and _job_of(path) != job:
             raise OutputError(f"{path}: holds other things already; name another folder (--out)")
-        if used and not overwrite:
+        if used and not (overwrite or resume):
             raise OutputError(
                 f"{path}: holds an earlier run; name another folder (--out) or add --overwrite"
             )

@@ -1,13 +1,16 @@
-"""A small scan whose answer is known, in the files that people have."""
+"""A small scan whose answer is known and a small capture, in the files that people have."""
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from test_trainer import Ball
 
 import rift_cl as rift
+from rift_cl.io.image import write_png
 
 BINS, VIEWS, ROWS, CENTER, PITCH = 96, 150, 3, 45.0, 0.2
 
@@ -43,3 +46,20 @@ def scan(tmp_path_factory) -> Scan:
     inner = (BINS - 70) // 2
     truth[inner:-inner, inner:-inner] = 0.2 * rift.phantom.shepp_logan(grid)
     return Scan(counts, npz, truth)
+
+
+@pytest.fixture(scope="session")
+def capture(tmp_path_factory):
+    """A ball of splats seen by eight cameras, as a NeRF capture with a grey background."""
+    folder = tmp_path_factory.mktemp("capture")
+    ball = Ball(rift.default_device())
+    frames = []
+    for number, (camera, image) in enumerate(zip(ball.cameras, ball.images, strict=True)):
+        write_png(folder / f"{number}.png", np.clip(image, 0, 1))
+        pose = np.linalg.inv(camera.view)
+        pose[:3, 1:3] *= -1
+        frames.append({"file_path": f"{number}.png", "transform_matrix": pose.tolist()})
+    fx, fy, cx, cy = ball.cameras[0].intrinsics
+    lens = {"fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy, "w": 80, "h": 60}
+    (folder / "transforms.json").write_text(json.dumps({**lens, "frames": frames}))
+    return folder

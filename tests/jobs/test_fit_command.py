@@ -7,28 +7,9 @@ import json
 import numpy as np
 import pytest
 from test_start import MIDDLE_OF_RING, ring
-from test_trainer import Ball
 
 import rift_cl as rift
 from rift_cl.cli import main
-from rift_cl.io.image import write_png
-
-
-@pytest.fixture(scope="module")
-def capture(tmp_path_factory):
-    """A ball of splats seen by eight cameras, as a NeRF capture with a grey background."""
-    folder = tmp_path_factory.mktemp("capture")
-    ball = Ball(rift.default_device())
-    frames = []
-    for number, (camera, image) in enumerate(zip(ball.cameras, ball.images, strict=True)):
-        write_png(folder / f"{number}.png", np.clip(image, 0, 1))
-        pose = np.linalg.inv(camera.view)
-        pose[:3, 1:3] *= -1
-        frames.append({"file_path": f"{number}.png", "transform_matrix": pose.tolist()})
-    fx, fy, cx, cy = ball.cameras[0].intrinsics
-    lens = {"fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy, "w": 80, "h": 60}
-    (folder / "transforms.json").write_text(json.dumps({**lens, "frames": frames}))
-    return folder
 
 
 def fit(capture, out, *more):

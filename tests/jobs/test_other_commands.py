@@ -11,10 +11,14 @@ import pytest
 import rift_cl as rift
 from rift_cl.cli import main
 
+# No fit: tests that look at other things should not wait for one.
+NO_FIT = ("--steps", "0")
+
 
 def test_demo(tmp_path, capsys):
     out = tmp_path / "demo"
-    assert main(["demo", "--out", str(out), "--size", "96", "--views", "8", "60", "150"]) == 0
+    sizes = ["--size", "96", "--views", "8", "60", "150"]
+    assert main(["demo", "--out", str(out), *sizes, *NO_FIT]) == 0
     rows = json.loads((out / "metrics.json").read_text())["views"]
     filtered = [row["psnr_filtered"] for row in rows]
     assert [row["count"] for row in rows] == [8, 60, 150]
@@ -25,13 +29,45 @@ def test_demo(tmp_path, capsys):
     assert {"filtered_8.png", "unfiltered_150.png", "report.html"} <= {
         p.name for p in out.iterdir()
     }
+    assert not (out / "ornament").exists()
     assert "PSNR filtered" in capsys.readouterr().out
+
+
+def test_demo_fits_the_sample_and_shows_both_ways(tmp_path, capsys):
+    out = tmp_path / "demo"
+    arguments = ["demo", "--out", str(out), "--size", "32", "--views", "4", "--splats", "300"]
+    assert main([*arguments, "--steps", "40"]) == 0
+    fit = json.loads((out / "metrics.json").read_text())["fit"]
+    assert fit == json.loads((out / "ornament" / "metrics.json").read_text())
+    assert set(fit["scores"]) == {"held out", "off_path"}
+    for scores in fit["scores"].values():
+        assert {"fit_psnr", "nearest_psnr", "blend_psnr"} <= set(scores)
+    assert 0 < len(rift.SplatScene.load(out / "ornament" / "scene.ply")) <= 300
+    page = (out / "report.html").read_text()
+    headings = ["Integration", "Regression", "Pictures: held out", "Pictures: off_path", "Training"]
+    assert [page.index(f"<h2>{heading}") for heading in headings] == sorted(
+        page.index(f"<h2>{heading}") for heading in headings
+    )
+    # Slices, two curves, pictures of two groups, the loss.
+    assert page.count("data:image/png;base64,") == 6
+    assert main([*arguments, *NO_FIT]) == 0
+    assert not (out / "ornament").exists()
+
+
+def test_demo_keeps_what_else_lies_under_the_fits_name(tmp_path, capsys):
+    out = tmp_path / "demo"
+    arguments = ["demo", "--out", str(out), "--size", "32", "--views", "4", *NO_FIT]
+    assert main(arguments) == 0
+    (out / "ornament").mkdir()
+    (out / "ornament" / "notes.txt").write_text("keep")
+    assert main(arguments) == 5
+    assert (out / "ornament" / "notes.txt").read_text() == "keep"
 
 
 def test_demo_can_be_repeated_but_takes_no_other_folder(tmp_path, capsys):
     arguments = ["demo", "--out", str(tmp_path / "demo"), "--size", "32", "--views", "4"]
-    assert main(arguments) == 0
-    assert main(arguments) == 0
+    assert main([*arguments, *NO_FIT]) == 0
+    assert main([*arguments, *NO_FIT]) == 0
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "notes.txt").write_text("keep")
     assert main(["demo", "--out", str(tmp_path / "mine")]) == 5
@@ -39,7 +75,13 @@ def test_demo_can_be_repeated_but_takes_no_other_folder(tmp_path, capsys):
 
 @pytest.mark.parametrize(
     ("arguments", "word"),
-    [(("--size", "4"), "--size"), (("--views", "0"), "--views"), (("--views",), "--views")],
+    [
+        (("--size", "4"), "--size"),
+        (("--views", "0"), "--views"),
+        (("--views",), "--views"),
+        (("--steps", "-1"), "steps is -1"),
+        (("--splats", "0"), "splats is 0"),
+    ],
 )
 def test_demo_arguments_are_told(tmp_path, capsys, arguments, word):
     assert main(["demo", "--out", str(tmp_path / "demo"), *arguments]) == 3
@@ -50,13 +92,15 @@ def test_demo_arguments_are_told(tmp_path, capsys, arguments, word):
 def test_a_demo_that_is_repeated_leaves_no_old_pictures(tmp_path, capsys):
     out = tmp_path / "demo"
     for views in ("3", "5"):
-        assert main(["demo", "--out", str(out), "--size", "32", "--views", views]) == 0
+        arguments = ["demo", "--out", str(out), "--size", "32", "--views", views, *NO_FIT]
+        assert main(arguments) == 0
     assert sorted(path.name for path in out.glob("*.png")) == ["filtered_5.png", "unfiltered_5.png"]
 
 
 @pytest.mark.parametrize("how", [">&-", "2>&-", "| head -0", "> /dev/full", "2> /dev/full"])
 def test_closed_and_full_streams_are_survived(how, tmp_path):
-    command = f"{shlex.quote(sys.executable)} -m rift_cl.cli demo --size 32 --views 4 --out d {how}"
+    python = shlex.quote(sys.executable)
+    command = f"{python} -m rift_cl.cli demo --size 32 --views 4 --steps 0 --out d {how}"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run(
         ["bash", "-c", command],

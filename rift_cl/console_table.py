@@ -1,0 +1,19 @@
+"""Tables on standard output: what a command found, for a person to read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+
+def print_table(
+    columns: Sequence[str], rows: Iterable[Sequence[Any]], *, caption: str = ""
+) -> None:
+    """Print a table; numbers have four digits that count."""
+    table = Table(*columns, caption=caption or None, caption_justify="left")
+    for row in rows:
+        table.add_row(*(f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row))
+    Console().print(table)

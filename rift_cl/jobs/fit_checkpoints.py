@@ -1,0 +1,86 @@
+"""A fit that can be broken off at any moment and taken up again, to the same bits.
+
+What a checkpoint says of its fit is compared with what is asked for now: to go on with other
+settings would give splats that no single command could give.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rift_cl import __version__
+from rift_cl.errors import CheckpointError
+from rift_cl.io.checkpoint import Checkpoint, newest_checkpoint, save_checkpoint
+from rift_cl.train.trainer import Trainer
+
+Losses = list[tuple[int, float]]
+
+
+class FitCheckpoints:
+    """The checkpoints of one fit.
+
+    Args:
+        folder: where they are.
+        decisive: what decides the fit's result; JSON.
+        device: the device's name, on which the bits depend as well.
+    """
+
+    def __init__(self, folder: Path, decisive: dict[str, Any], device: str) -> None:
+        self.folder = folder
+        self._facts: dict[str, Any] = {
+            "settings": decisive,
+            "rift_cl": __version__,
+            "device": device,
+        }
+
+    def save(self, trainer: Trainer, losses: Losses) -> None:
+        """Write one.
+
+        Raises:
+            OutputError: it cannot be written; those before it are still there.
+        """
+        arrays = trainer.state()
+        if losses:
+            arrays["losses"] = np.array(losses, float)
+        save_checkpoint(self.folder, Checkpoint(trainer.parameters.step, arrays, self._facts))
+
+    def restore(self, trainer: Trainer) -> Losses:
+        """Bring a trainer to the newest whole checkpoint; one that has not begun if there is none.
+
+        Returns:
+            The losses up to there.
+
+        Raises:
+            CheckpointError: it belongs to a fit with other settings, or all are damaged.
+        """
+        found, problems = newest_checkpoint(self.folder)
+        for problem in problems:
+            warnings.warn(f"{problem}: going on from the one before", stacklevel=2)
+        if found is None:
+            return []
+        self._compare(found.facts)
+        arrays = dict(found.arrays)
+        losses = arrays.pop("losses", np.empty((0, 2)))
+        trainer.restore(arrays)
+        return [(int(step), float(loss)) for step, loss in losses]
+
+    def _compare(self, facts: Any) -> None:
+        before, now = facts.get("settings", {}), self._facts["settings"]
+        differing = sorted(k for k in before.keys() | now.keys() if before.get(k) != now.get(k))
+        if differing:
+            name = differing[0]
+            raise CheckpointError(
+                f"{self.folder}: the fit to resume had {name} {before.get(name)!r}, now it is "
+                f"{now.get(name)!r}: give the same settings, or begin anew with --overwrite"
+            )
+        for name in ("device", "rift_cl"):
+            if facts.get(name) != self._facts[name]:
+                warnings.warn(
+                    f"the fit began with {name} {facts.get(name)!r} and goes on with "
+                    f"{self._facts[name]!r}: the last bits may differ",
+                    stacklevel=3,
+                )

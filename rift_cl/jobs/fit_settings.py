@@ -1,0 +1,147 @@
+"""What ``rift fit`` is asked for, and what of it the trainer and the rasterizer are told."""
+
+from __future__ import annotations
+
+import dataclasses
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from tyro.conf import Positional
+
+from rift_cl.errors import InputError
+from rift_cl.splat.settings import SplatSettings
+from rift_cl.train.homogenisation import Homogenisation
+from rift_cl.train.settings import Densification, Rates, TrainSettings
+
+# Rates of poses and exposures where they are refined.
+_POSE_RATE, _EXPOSURE_RATE = 1e-4, 1e-3
+# What may differ between a run and the one that goes on with it: it changes no bit of the result.
+_FREE = ("out", "resume", "overwrite", "dry_run", "checkpoint_every", "view", "device")
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """Fit splats to posed photographs.
+
+    Example: rift fit capture/transforms.json --out fit --steps 3000 --splats 20000
+    """
+
+    capture: Annotated[Path, Positional]
+    """A transforms.json, a folder with one, a COLMAP model, or a folder of bare photographs."""
+    out: Path = Path("rift-fit")
+    """Folder for scene.ply, report.html, config.json, metrics.json and checkpoints."""
+    steps: int = 3000
+    """Pictures that are looked at, one after the other."""
+    splats: int = 20_000
+    """Most splats."""
+    seed: int = 0
+    """Of everything that is random: the same seed gives the same splats, bit by bit."""
+    strategy: Literal["mcmc", "default"] = "mcmc"
+    """How splats find their places: renewal with random walks (mcmc), or cloning, splitting and
+    pruning as 3D Gaussian splatting did at first (default)."""
+    absgrad: bool = False
+    """With the default strategy: go by magnitudes of gradients, which do not cancel (AbsGS)."""
+    first_splats: float | None = None
+    """Share of the splats that a fit without sparse points begins with; 1 with mcmc, 0.2 with
+    the default strategy if not given."""
+    sh_degree: int = 3
+    """Degree of the colours' spherical harmonics, 0 to 4."""
+    eps2d: float = 0.1
+    """Variance that splats gain on the screen, in square pixels; 0.3 is usual and blurs small
+    pictures, 0.05 to 0.1 suits cameras that all keep one distance."""
+    homogenise: float = 0.0
+    """Exponent of the ramp that weighs the residual's frequencies; 0 for none, 0.5 to 1 to pull
+    at fine detail as strongly as at coarse."""
+    band_limit: bool = False
+    """Let no splat be finer than what the cameras resolve (Mip-Splatting's 3D filter)."""
+    refine_poses: bool = False
+    """Fit the cameras' poses as well."""
+    refine_exposures: bool = False
+    """Fit a gain and an offset of each photograph's colours as well."""
+    light: Literal["display", "linear"] = "display"
+    """Light that is fitted and scored: as a display shows it, or linear."""
+    downscale: int = 1
+    """Whole factor by which photographs are made smaller."""
+    hold_out: int = 8
+    """Every so many-th photograph is not trained on but scored; 0 for none."""
+    views: int = 0
+    """Train on so many photographs, evenly spaced; 0 for all."""
+    test: tuple[Path, ...] = ()
+    """More captures to score, never trained on."""
+    checkpoint_every: int = 1000
+    """Steps between two checkpoints, of which the last two are kept; 0 for none."""
+    resume: bool = False
+    """Go on from the last checkpoint in the same folder, to the same bits."""
+    view: bool = False
+    """Show the fit in a browser while it runs, on this machine alone."""
+    device: str | None = None
+    """Device to use: its number, cpu, gpu, or a part of its name; see 'rift devices'."""
+    overwrite: bool = False
+    """Replace an earlier fit in the same folder."""
+    dry_run: bool = False
+    """Say what would be done, and stop."""
+
+    def check(self) -> None:
+        """Check what neither the trainer nor the rasterizer will.
+
+        Raises:
+            InputError: an option makes no sense.
+        """
+        least = {"downscale": 1, "hold_out": 0, "views": 0, "checkpoint_every": 0}
+        for name, bound in least.items():
+            if getattr(self, name) < bound:
+                option = name.replace("_", "-")
+                raise InputError(f"--{option} is {getattr(self, name)}, wanted {bound} or more")
+        if not (self.first_splats is None or 0 < self.first_splats <= 1):
+            raise InputError(f"--first-splats is {self.first_splats}, wanted above 0, at most 1")
+        if self.resume and self.overwrite:
+            raise InputError("--resume goes on with what --overwrite throws away: give one of them")
+
+    @property
+    def first_count(self) -> int:
+        """Splats that a fit without sparse points begins with."""
+        usual = 1.0 if self.strategy == "mcmc" else 0.2
+        share = usual if self.first_splats is None else self.first_splats
+        return max(1, round(share * self.splats))
+
+    def training(self) -> TrainSettings:
+        """The trainer's part."""
+        return TrainSettings(
+            steps=self.steps,
+            seed=self.seed,
+            splats=self.splats,
+            strategy=self.strategy,
+            densification=Densification(absgrad=self.absgrad),
+            sh_degree=self.sh_degree,
+            homogenisation=Homogenisation(exponent=self.homogenise),
+            band_limit=self.band_limit,
+            rates=Rates(
+                poses=_POSE_RATE if self.refine_poses else 0.0,
+                exposures=_EXPOSURE_RATE if self.refine_exposures else 0.0,
+            ),
+        )
+
+    def drawing(self) -> SplatSettings:
+        """The rasterizer's part."""
+        return SplatSettings(eps2d=self.eps2d, absgrad=self.absgrad)
+
+    def decisive(self) -> dict[str, Any]:
+        """What decides the result, in words that JSON keeps: a resumed run must have the same."""
+        values = {k: v for k, v in dataclasses.asdict(self).items() if k not in _FREE}
+        values["capture"] = str(self.capture.absolute())
+        values["test"] = [str(path.absolute()) for path in self.test]
+        return values
+
+    def command(self) -> str:
+        """The command line that goes on with this fit."""
+        words = ["rift", "fit", str(self.capture)]
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if field.name in ("capture", "overwrite", "resume") or value == field.default:
+                continue
+            words.append("--" + field.name.replace("_", "-"))
+            if not isinstance(value, bool):
+                words += [str(entry) for entry in (value if isinstance(value, tuple) else (value,))]
+        return shlex.join([*words, "--resume"])

@@ -1,0 +1,166 @@
+"""``rift render``: pictures of a scene, from an orbit or along a capture's cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.budget import format_bytes
+from rift_cl.cl.discovery import open_device
+from rift_cl.errors import InputError
+from rift_cl.geometry import Camera
+from rift_cl.io.capture import open_capture
+from rift_cl.io.image import write_png
+from rift_cl.io.output import atomic_path, make_folder, write_json
+from rift_cl.io.pixels import write_pixels
+from rift_cl.jobs.animation import shrunk
+from rift_cl.jobs.camera_path import orbit, orbit_distance, resized, smooth_path, transforms_of
+from rift_cl.jobs.depth_picture import LEAST_ALPHA, depth_picture, depth_window
+from rift_cl.jobs.render_report import Sheet, render_page, write_bytes
+from rift_cl.jobs.render_settings import MOST_FRAMES, RenderSettings
+from rift_cl.jobs.run_folder import RunFolder
+from rift_cl.jobs.scene_input import in_display_light
+from rift_cl.progress import Report
+from rift_cl.splat.bands import FrameMemory
+from rift_cl.splat.renderer import DepthKind, Renderer
+
+# What an orbit is when nothing is said.
+_FRAMES, _ELEVATION, _FOV, _SIZE = 96, 20.0, 45.0, (640, 480)
+# Longer edge of the animation in pixels.
+_MOVING = 360
+
+
+class Render:
+    """A rendering that is planned; nothing is written yet.
+
+    Args:
+        settings: what to do.
+
+    Raises:
+        RiftError: the scene or the capture cannot be read, or a setting makes no sense.
+    """
+
+    def __init__(self, settings: RenderSettings) -> None:
+        settings.check()
+        self.settings = settings
+        self.scene = settings.open_scene()
+        self.bounds = settings.bounds(self.scene.splats)
+        self.cameras = self._path() if settings.path is not None else self._orbit()
+        self.device = open_device(settings.device)
+        self.folder = RunFolder(settings.out, "render", overwrite=settings.overwrite)
+        self.metrics: dict[str, Any] = {}
+
+    def _orbit(self) -> list[Camera]:
+        """Cameras round the scene; what is not set comes from the scene or its capture."""
+        settings, bounds = self.settings, self.bounds
+        size = (settings.size or _SIZE)[::-1]
+        fov = settings.fov or _FOV
+        found = bounds.elevation if bounds.elevation is not None else _ELEVATION
+        elevation = found if settings.elevation is None else settings.elevation
+        return orbit(
+            bounds,
+            frames=settings.frames or _FRAMES,
+            elevation=elevation,
+            distance=settings.distance or orbit_distance(bounds, size, fov),
+            size=size,
+            fov=fov,
+        )
+
+    def _path(self) -> list[Camera]:
+        settings = self.settings
+        cameras = [view.camera for view in open_capture(Path(settings.path or "")).views]
+        if settings.size is not None:
+            cameras = [resized(camera, settings.size[::-1]) for camera in cameras]
+        if len(cameras) + settings.between * (len(cameras) - 1) > MOST_FRAMES:
+            raise InputError(f"--between {settings.between} makes more than {MOST_FRAMES} frames")
+        return smooth_path(cameras, settings.between) if settings.between else cameras
+
+    def plan(self) -> dict[str, str]:
+        """What would be done, by name."""
+        bounds, scene = self.bounds, self.scene.splats
+        largest = max((camera.size for camera in self.cameras), key=lambda size: size[0] * size[1])
+        channels = 3 + self.settings.depth
+        parameters = 11 + scene.sh.shape[1] * 3
+        memory = FrameMemory(len(scene), parameters, largest[0] * largest[1], channels)
+        orbit = f"orbit at {np.linalg.norm(self.cameras[0].center - bounds.center):.4g}"
+        return {
+            "scene": f"{self.scene.name}, {len(scene)} splats",
+            "middle": "({:.4g}, {:.4g}, {:.4g})".format(*bounds.center),
+            "radius": f"{bounds.radius:.4g}",
+            "up": "({:.3g}, {:.3g}, {:.3g})".format(*bounds.up),
+            "cameras": str(self.settings.path) if self.settings.path is not None else orbit,
+            "frames": f"{len(self.cameras)}, at most {largest[1]} x {largest[0]} pixels",
+            "eps2d": f"{self.scene.drawing.eps2d:g}",
+            "device memory": f"{format_bytes(memory.fixed)} and the tile lists",
+            "device": self.device.name,
+        }
+
+    def run(self) -> Iterator[Report]:
+        """Do it; a report for each frame."""
+        folder, total = self.settings.out, len(self.cameras)
+        self.folder.make()
+        self.folder.mark()
+        self.folder.drop("frames", "depth", "*.png", "transforms.json")
+        make_folder(folder / "frames")
+        renderer = Renderer(self.scene.drawing, device=self.device)
+        splats = self.scene.splats.upload(self.device)
+        behind = self.device.array(self.scene.background)
+        window = (0.0, 0.0)
+        if self.settings.depth:
+            window = depth_window(renderer, splats, self.cameras)
+        depth: DepthKind | None = "expected" if self.settings.depth else None
+        sheet, names = Sheet(total), []
+        for number, camera in enumerate(self.cameras):
+            frame = renderer.forward(splats, camera, background=behind, depth=depth)
+            image = self.device.get(frame.image)
+            colors = in_display_light(image[..., :3], self.scene.light)
+            names.append(f"frames/{number:04}.png")
+            write_png(folder / names[-1], colors)
+            pictures = [colors]
+            if self.settings.depth:
+                alpha = np.clip(1 - self.device.get(frame.transmittance), 0, 1)
+                pictures.append(self._save_depth(number, image[..., -1], alpha, window))
+            sheet.add(number, [shrunk(picture, _MOVING) for picture in pictures])
+            yield Report(number + 1, total, "frames")
+        self._finish(sheet, names, window)
+
+    def _save_depth(
+        self,
+        number: int,
+        depth: NDArray[np.float32],
+        alpha: NDArray[np.float32],
+        window: tuple[float, float],
+    ) -> NDArray[np.float32]:
+        """Depth as an OpenEXR of float32, 0 where nothing is; gives back its picture."""
+        folder = make_folder(self.settings.out / "depth")
+        kept = np.where(alpha > LEAST_ALPHA, depth, 0).astype(np.float32)
+        with atomic_path(folder / f"{number:04}.exr") as part:
+            write_pixels(part, kept[..., None], format="openexr", attributes={})
+        picture = depth_picture(kept, alpha, window)
+        write_png(folder / f"{number:04}.png", picture)
+        return picture
+
+    def _finish(self, sheet: Sheet, names: list[str], window: tuple[float, float]) -> None:
+        folder, bounds = self.settings.out, self.bounds
+        write_json(folder / "transforms.json", transforms_of(self.cameras, names))
+        self.metrics = {
+            "frames": len(self.cameras),
+            "splats": len(self.scene.splats),
+            "center": bounds.center,
+            "radius": bounds.radius,
+            "up": bounds.up,
+            "eps2d": self.scene.drawing.eps2d,
+            "background": self.scene.background,
+            "depth_window": list(window) if self.settings.depth else None,
+        }
+        contact = sheet.contact()
+        write_bytes(folder / "contact.png", contact)
+        moving = sheet.moving(self.settings.rate)
+        if moving is not None:
+            write_bytes(folder / "animation.png", moving)
+        page = render_page(self.scene.name, contact, moving, self.metrics)
+        self.folder.finish(self.settings, self.metrics, page, self.device)

@@ -1,0 +1,79 @@
+"""What ``rift render`` takes, checked before any work."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from rift_cl.errors import InputError
+from rift_cl.jobs.orbit_input import OrbitInput
+
+_STEEPEST, _WIDEST = 89.0, 170.0
+# Pixels along an edge, and frames; more is a slip of the hand.
+_LONGEST, MOST_FRAMES = 16384, 100_000
+
+
+@dataclass(frozen=True)
+class RenderSettings(OrbitInput):
+    """Draw a scene from an orbit round it, or from the cameras of a capture.
+
+    Example: rift render fit --out film --frames 120 --elevation 15 --depth
+    """
+
+    out: Path = Path("rift-render")
+    """Folder for frames, animation.png, contact.png, transforms.json and report.html."""
+    path: Path | None = None
+    """A transforms.json or a COLMAP model: draw each of its views, instead of an orbit."""
+    between: int = 0
+    """Frames between each two views of --path."""
+    frames: int | None = None
+    """Frames of the orbit; 96 when not given."""
+    elevation: float | None = None
+    """Of the orbit above the horizon, in degrees; that of --capture, or 20, when not given."""
+    distance: float | None = None
+    """Of the orbit from the scene's middle, in scene units; so that all is seen when not given."""
+    fov: float | None = None
+    """Vertical field of view of the orbit in degrees; 45 when not given."""
+    size: tuple[int, int] | None = None
+    """Width and height in pixels; 640 480, or the views' own, when not given."""
+    rate: float = 24.0
+    """Frames of the animation in a second."""
+    depth: bool = False
+    """Write the expected depth as well: along the camera's axis, in scene units."""
+    overwrite: bool = False
+    """Replace an earlier rendering in the same folder."""
+    dry_run: bool = False
+    """Say what would be done, and stop."""
+
+    def check(self) -> None:
+        """Check every number's range.
+
+        Raises:
+            InputError: one is out of it, or two options contradict each other.
+        """
+        for name, low, high in (
+            ("between", 0, MOST_FRAMES),
+            ("frames", 1, MOST_FRAMES),
+            ("elevation", -_STEEPEST, _STEEPEST),
+            ("fov", 1, _WIDEST),
+            ("rate", 0.1, 100),
+        ):
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise InputError(f"--{name} is {value}, wanted {low:g} to {high:g}")
+        if self.distance is not None and not 0 < self.distance < math.inf:
+            raise InputError(f"--distance is {self.distance}, wanted a positive number")
+        if self.size is not None and not all(1 <= edge <= _LONGEST for edge in self.size):
+            shown = " ".join(map(str, self.size))
+            raise InputError(f"--size is {shown}, wanted 1 to {_LONGEST} pixels each")
+        if self.path is None and self.between:
+            raise InputError("--between is about the views of --path: name one")
+        if self.path is not None:
+            self._check_path()
+
+    def _check_path(self) -> None:
+        """What makes an orbit has no meaning along a path."""
+        for name in ("capture", "frames", "elevation", "distance", "up", "fov"):
+            if getattr(self, name) is not None:
+                raise InputError(f"--{name} is about an orbit, --path names cameras: leave one out")

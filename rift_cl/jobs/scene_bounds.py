@@ -1,0 +1,115 @@
+"""Where a scene lies: what an orbit turns about, and which way is up.
+
+Splats that float far off, or faint ones, must not pull the middle away: everything is a median or
+a percentile, weighted by opacity. Splats alone do not say which way is up; cameras do, since people
+hold them upright.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.geometry import Camera
+from rift_cl.io.splat_activations import opacities_of
+from rift_cl.io.splat_scene import SplatScene
+from rift_cl.train.start import focus_of
+
+Floats = NDArray[np.float64]
+
+# Share of the opacity that lies within the radius.
+_INSIDE = 0.9
+# A scene is flat if it is so much thinner than it is wide; its thin axis is then up or down.
+_FLAT = 0.6
+# What most files call up: z, or in COLMAP's camera-like axes, -y.
+_USUAL = np.array([[0.0, 0, 1], [0, -1, 0], [1, 0, 0]])
+# Cameras that look every way have no common up, which their mean shows by its length.
+_UPRIGHT = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class SceneBounds:
+    """The ball that a scene fills.
+
+    Args:
+        center: (3,) its middle.
+        radius: of the ball, in scene units.
+        up: (3,) unit vector.
+        distance: at which the cameras stood, or None.
+        elevation: above the horizon at which they stood, in degrees, or None.
+    """
+
+    center: Floats
+    radius: float
+    up: Floats
+    distance: float | None = None
+    elevation: float | None = None
+
+
+def bounds_of_splats(scene: SplatScene) -> SceneBounds:
+    """The ball that holds nine tenths of the opacity; up is the axis along which it is flat.
+
+    A scene that is flat along none has z up. The thin axis points as files usually have it: to z,
+    or else to -y, or else to x.
+    """
+    means = scene.means.astype(np.float64)
+    weights = opacities_of(scene.logit_opacities).astype(np.float64)
+    if weights.sum() <= 0:
+        weights = np.ones(len(means))
+    center = np.array([weighted_quantile(means[:, k], weights, 0.5) for k in range(3)])
+    away = np.linalg.norm(means - center, axis=1)
+    radius = weighted_quantile(away, weights, _INSIDE)
+    if radius <= 0:
+        # One splat, or several in one place: as large as it is itself.
+        radius = 3 * float(np.exp(np.median(scene.log_scales.max(axis=1))))
+    return SceneBounds(center, radius, _thin_axis(means - center, weights * (away <= radius)))
+
+
+def bounds_of_cameras(cameras: Sequence[Camera], splats: SceneBounds | None = None) -> SceneBounds:
+    """Where cameras look, how far off they stand, and their common up.
+
+    Args:
+        cameras: of the capture that the splats were fitted to.
+        splats: where the splats lie: their radius, and their up where cameras have none.
+    """
+    center = focus_of(cameras)
+    ways = np.array([camera.center for camera in cameras]) - center
+    mean = -np.mean([camera.view[1, :3] for camera in cameras], axis=0)
+    length = float(np.linalg.norm(mean))
+    up = _upward() if splats is None else splats.up
+    up = mean / length if length > _UPRIGHT else up
+    distances = np.linalg.norm(ways, axis=1)
+    distance = float(np.median(distances))
+    radius = distance / 2 if splats is None else splats.radius
+    if distance <= 0:
+        return SceneBounds(center, radius or 1.0, up)
+    rise = np.clip(ways @ up / np.where(distances > 0, distances, 1), -1, 1)
+    elevation = float(np.degrees(np.median(np.arcsin(rise))))
+    return SceneBounds(center, radius, up, distance, elevation)
+
+
+def weighted_quantile(values: Floats, weights: Floats, share: float) -> float:
+    """The least value below or at which so large a share of the weight lies."""
+    order = np.argsort(values, kind="stable")
+    sums = np.cumsum(weights[order])
+    place = int(np.searchsorted(sums, share * sums[-1]))
+    return float(values[order][min(place, len(values) - 1)])
+
+
+def _thin_axis(offsets: Floats, weights: Floats) -> Floats:
+    """The axis of least spread if it is much less than the others', else z."""
+    if np.count_nonzero(weights) < 4:
+        return _upward()
+    spread, axes = np.linalg.eigh((offsets * weights[:, None]).T @ offsets / weights.sum())
+    if not np.sqrt(max(spread[0], 0)) < _FLAT * np.sqrt(max(spread[1], 0)):
+        return _upward()
+    thin = axes[:, 0]
+    nearest = int(np.abs(_USUAL @ thin).argmax())
+    return np.asarray(thin * np.sign(_USUAL[nearest] @ thin), np.float64)
+
+
+def _upward() -> Floats:
+    return np.asarray(_USUAL[0], np.float64)

@@ -1,0 +1,80 @@
+"""``rift view``: a scene in the browser, drawn by our own kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from rift_cl.cl.discovery import open_device
+from rift_cl.jobs.orbit_input import OrbitInput
+from rift_cl.jobs.viewer import SplatViewer, orbit_camera
+from rift_cl.progress import Report
+from rift_cl.splat.renderer import Renderer
+
+# Seconds between two looks at whether a camera has come to rest.
+_PAUSE = 0.05
+
+
+@dataclass(frozen=True)
+class ViewSettings(OrbitInput):
+    """Show a scene in the browser of this computer, until Ctrl-C.
+
+    Example: rift view fit --port 8080 --size 1200
+    """
+
+    port: int = 8080
+    """Port to listen on, at 127.0.0.1 alone; 0 for any that is free."""
+    size: int = 960
+    """Longer edge of a picture in pixels, once the camera rests."""
+
+
+class ViewJob:
+    """A page that is served; it is there from now on, and draws while ``run`` runs.
+
+    Args:
+        settings: what to show.
+
+    Raises:
+        RiftError: the scene cannot be read, viser is absent, or the port is taken.
+    """
+
+    def __init__(self, settings: ViewSettings) -> None:
+        scene = settings.open_scene()
+        bounds = settings.bounds(scene.splats)
+        device = open_device(settings.device)
+        self._renderer = Renderer(scene.drawing, device=device)
+        self._splats = scene.splats.upload(device)
+        # Kernels are built before anybody waits for a picture.
+        self._renderer.forward(self._splats, orbit_camera(bounds, (16, 16)))
+        self._viewer = SplatViewer(
+            bounds,
+            port=settings.port,
+            size=settings.size,
+            background=scene.background,
+            light=scene.light,
+            title=scene.name,
+        )
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        return self._viewer.url
+
+    def run(self) -> Iterator[Report]:
+        """Draw whatever is asked for, without end; a report after each picture."""
+        frames = 0
+        while True:
+            drawn = self._viewer.serve(self._splats, self._renderer)
+            if drawn:
+                frames += drawn
+                yield Report(frames, frames, "frames")
+            else:
+                self._viewer.wait(_PAUSE)
+
+    def __enter__(self) -> ViewJob:
+        """The job itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop serving."""
+        self._viewer.close()

@@ -1,0 +1,240 @@
+"""A window in the browser onto splats that somebody owns: ``rift view``, or a fit in progress.
+
+viser (https://viser.studio) serves the page and tells where its camera is; every picture is drawn
+by our own kernels and sent as the page's background, so that the browser shows what ``Renderer``
+draws. A trainer changes its splats in place, so nothing is ever drawn from viser's threads: they
+note what is asked for, and the owner of the splats draws it when it calls ``serve``.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rift_cl.errors import InputError
+from rift_cl.geometry import Camera
+from rift_cl.io.poses import view_of_quaternion
+from rift_cl.jobs.camera_path import orbit, orbit_distance, pinhole
+from rift_cl.jobs.depth_picture import depth_and_alpha, depth_picture, window_of
+from rift_cl.jobs.fit_pictures import Light
+from rift_cl.jobs.scene_bounds import SceneBounds
+from rift_cl.jobs.scene_input import in_display_light
+from rift_cl.jobs.viewer_page import KINDS, ViewerPage
+from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.splats import Splats
+
+Floats = NDArray[np.float32]
+
+# A camera rests when it has not moved for so many seconds; until then a picture may take so long.
+_REST, _PICTURE = 0.2, 0.06
+# Longer edge of a picture while nobody knows how fast they are drawn, and the least there is.
+_FIRST, _LEAST = 240, 96
+# Quality of JPEG while the camera moves and while it rests.
+_ROUGH, _SHARP = 70, 92
+_ELEVATION, _FOV = 20.0, 45.0
+# Height and width, up to scale, of a window in which all of the scene is seen at first.
+_WINDOW = (3, 4)
+# Windows narrower or wider than this are drawn as if they were not.
+_NARROWEST = 0.1
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where the camera of a page is, as viser says it.
+
+    Args:
+        wxyz: camera-to-world rotation as a quaternion; the axes are OpenCV's.
+        position: of the camera in world coordinates.
+        fov: vertical field of view in radians.
+        aspect: width of the window divided by its height.
+    """
+
+    wxyz: tuple[float, ...]
+    position: tuple[float, ...]
+    fov: float
+    aspect: float
+
+    def camera(self, edge: int) -> Camera:
+        """The camera for a picture of which the longer edge has so many pixels.
+
+        Raises:
+            InputError: the page says nonsense.
+        """
+        aspect = min(max(self.aspect, _NARROWEST), 1 / _NARROWEST)
+        height, width = edge / max(aspect, 1), edge * min(aspect, 1)
+        size = max(1, round(height)), max(1, round(width))
+        if not 0 < self.fov < np.pi:
+            raise InputError(f"the page's field of view is {self.fov}, wanted 0 to pi")
+        # A quaternion turned about is the inverse rotation.
+        w, x, y, z = self.wxyz
+        view = view_of_quaternion((w, -x, -y, -z), (0, 0, 0))
+        with np.errstate(all="ignore"):
+            view[:3, 3] = -view[:3, :3] @ np.asarray(self.position, np.float64)
+        return pinhole(size, float(np.degrees(self.fov)), view)
+
+
+@dataclass
+class _Client:
+    """A page that is open: its newest pose, when that came, and what it was sent for."""
+
+    handle: Any
+    pose: Pose
+    since: float
+    rough: Any = None
+    sharp: Any = None
+
+
+class SplatViewer:
+    """A page on this computer alone; use it in a ``with`` statement, or ``close`` it.
+
+    Args:
+        bounds: what the camera turns about, and which way is up.
+        port: to listen on, at 127.0.0.1; 0 for any that is free.
+        size: longer edge in pixels of a picture whose camera rests.
+        background: (3,) behind the splats, in their light; black if not given.
+        light: that the splats' colours are in.
+        title: above the panel.
+
+    Raises:
+        InputError: viser is not installed, or the port cannot be had.
+    """
+
+    def __init__(
+        self,
+        bounds: SceneBounds,
+        *,
+        port: int = 8080,
+        size: int = 960,
+        background: ArrayLike | None = None,
+        light: Light = "display",
+        title: str = "RiFT",
+    ) -> None:
+        behind = np.zeros(3) if background is None else background
+        self._background: Floats = np.asarray(behind, np.float32)
+        self._light: Light = light
+        self._clients: dict[int, _Client] = {}
+        self._lock, self._asked = threading.Lock(), threading.Event()
+        self._splats: Splats | None = None
+        self._version = 0
+        # Pixels in a second, as the last picture was drawn and sent.
+        self._pace: float | None = None
+        self._page = ViewerPage(port=port, size=size, title=title, asked=self._asked.set)
+        first = orbit_camera(bounds, _WINDOW)
+        self._page.begin_at(first.center, bounds.center, bounds.up, _FOV)
+        self._page.watch(self._joined, self._moved, self._left)
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        return self._page.url
+
+    def serve(self, splats: Splats, renderer: Renderer, *, changed: bool = False) -> int:
+        """Draw what is asked for now and send it; call it from the thread that owns the splats.
+
+        Costs nothing where nobody looks. A page whose camera moves gets a smaller picture at
+        once, and one of full size when it rests.
+
+        Args:
+            splats: to draw, on the renderer's device.
+            renderer: draws them.
+            changed: the splats have changed since the last call though they are the same object,
+                so that pages whose camera rests want a new picture.
+
+        Returns:
+            How many pictures were drawn.
+        """
+        if changed or splats is not self._splats:
+            self._splats, self._version = splats, self._version + 1
+        self._asked.clear()
+        with self._lock:
+            clients = list(self._clients.values())
+        return sum(self._serve_one(client, splats, renderer) for client in clients)
+
+    def wait(self, seconds: float) -> None:
+        """Sleep until a page asks for something, but not longer than this."""
+        self._asked.wait(seconds)
+
+    def close(self) -> None:
+        """Stop serving; pages that are open stay as they are."""
+        self._page.close()
+
+    def __enter__(self) -> SplatViewer:
+        """The viewer itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()
+
+    def _serve_one(self, client: _Client, splats: Splats, renderer: Renderer) -> bool:
+        """Draw for one page if it wants anything that it does not have."""
+        pose, since = client.pose, client.since
+        kind, edge = self._page.kind, self._page.size
+        want = (pose, kind, edge, self._version)
+        resting = time.monotonic() - since >= _REST
+        if want == client.sharp or (want == client.rough and not resting):
+            return False
+        small = edge if resting else self._small(pose, edge)
+        try:
+            camera = pose.camera(small)
+        except InputError:
+            # What a page says is not ours to trust, and no reason to end a fit.
+            return False
+        begin = time.perf_counter()
+        picture = self._draw(splats, renderer, camera, kind)
+        quality = _ROUGH if small < edge else _SHARP
+        self._page.show(client.handle, picture, quality)
+        seconds = time.perf_counter() - begin
+        self._pace = camera.height * camera.width / seconds
+        self._page.tell(len(splats), camera.size, seconds)
+        client.rough = want
+        if small == edge:
+            client.sharp = want
+        return True
+
+    def _draw(self, splats: Splats, renderer: Renderer, camera: Camera, kind: str) -> Floats:
+        if kind == KINDS[0] or renderer.settings.mode == "xray":
+            device = renderer.device
+            behind = device.array(self._background)
+            frame = renderer.forward(splats, camera, background=behind)
+            return in_display_light(device.get(frame.image)[..., :3], self._light)
+        depth, alpha = depth_and_alpha(renderer, splats, camera)
+        return depth_picture(depth, alpha, window_of(depth, alpha))
+
+    def _small(self, pose: Pose, edge: int) -> int:
+        """The longer edge at which a picture is drawn in time, while the camera moves."""
+        if self._pace is None:
+            return min(edge, _FIRST)
+        share = min(pose.aspect, 1 / pose.aspect)
+        fits = int(np.sqrt(self._pace * _PICTURE / max(share, _NARROWEST)))
+        return min(edge, max(_LEAST, fits))
+
+    def _joined(self, handle: Any, pose: Pose) -> None:
+        with self._lock:
+            # A page that has just opened does not move.
+            since = time.monotonic() - _REST
+            self._clients[handle.client_id] = _Client(handle, pose, since)
+        self._asked.set()
+
+    def _moved(self, number: int, pose: Pose) -> None:
+        with self._lock:
+            client = self._clients.get(number)
+            if client is not None and client.pose != pose:
+                client.pose, client.since = pose, time.monotonic()
+        self._asked.set()
+
+    def _left(self, number: int) -> None:
+        with self._lock:
+            self._clients.pop(number, None)
+
+
+def orbit_camera(bounds: SceneBounds, size: tuple[int, int]) -> Camera:
+    """Where the camera of a page that is opened stands, for (height, width) pixels."""
+    elevation = _ELEVATION if bounds.elevation is None else bounds.elevation
+    distance = orbit_distance(bounds, _WINDOW, _FOV)
+    return orbit(bounds, frames=1, elevation=elevation, distance=distance, size=size, fov=_FOV)[0]
