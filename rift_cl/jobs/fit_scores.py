@@ -23,6 +23,7 @@ from rift_cl.splat.splats import Splats
 from rift_cl.train.start import focus_of
 
 Floats = NDArray[np.float32]
+Masks = tuple[NDArray[np.bool_] | None, NDArray[np.bool_] | None]
 
 
 @dataclass(frozen=True)
@@ -56,29 +57,42 @@ def score_views(
     for number, camera in enumerate(unseen.cameras):
         frame = renderer.forward(splats, camera, background=renderer.device.array(behind))
         image = unseen.shown(renderer.device.get(frame.image))
-        truth, front = unseen.shown(unseen.over(number, behind)), unseen.foreground(number)
-        values, angle = scores_of(image, truth, front, "fit"), float("nan")
+        truth = unseen.shown(unseen.over(number, behind))
+        masks = unseen.counted(number), unseen.foreground(number)
+        values, angle = scores_of(image, truth, masks, "fit"), float("nan")
         if seen is not None:
             angles = _angles(seen.cameras, camera, focus)
             angle = float(angles.min())
             for name, blend in _baselines(seen, angles, truth.shape, behind).items():
-                values |= scores_of(blend, truth, front, name)
+                values |= scores_of(blend, truth, masks, name)
         yield ViewScore(unseen.views[number].name, angle, values, truth, image)
 
 
-def scores_of(
-    image: Floats, truth: Floats, foreground: NDArray[np.bool_] | None, name: str
-) -> dict[str, float]:
-    """PSNR and SSIM of the whole picture and of the foreground, where there is one."""
+def scores_of(image: Floats, truth: Floats, masks: Masks, name: str) -> dict[str, float]:
+    """PSNR and SSIM of the whole picture and of the foreground, where there is one.
+
+    Args:
+        image: (height, width, C) what is scored.
+        truth: what it should be.
+        masks: the pixels that count at all, and the foreground; None where it is all of them, or
+            where nobody can tell.
+        name: goes before the scores' names.
+    """
+    counted, foreground = masks
+    if counted is not None:
+        image = np.where(counted[..., None], image, truth)
     channels = range(truth.shape[2])
     values = {
-        f"{name}_psnr": psnr(image, truth),
+        f"{name}_psnr": psnr(image, truth, mask=_of_samples(counted, truth)),
         f"{name}_ssim": float(np.mean([ssim(image[..., c], truth[..., c]) for c in channels])),
     }
     if foreground is not None and foreground.any() and not foreground.all():
-        mask = np.repeat(foreground[..., None], truth.shape[2], axis=2)
-        values[f"{name}_psnr_foreground"] = psnr(image, truth, mask=mask)
+        values[f"{name}_psnr_foreground"] = psnr(image, truth, mask=_of_samples(foreground, truth))
     return values
+
+
+def _of_samples(mask: NDArray[np.bool_] | None, truth: Floats) -> NDArray[np.bool_] | None:
+    return None if mask is None else np.repeat(mask[..., None], truth.shape[2], axis=2)
 
 
 def mean_scores(scores: Sequence[ViewScore]) -> dict[str, float]:

@@ -60,12 +60,20 @@ class SpectralFilter:
         self._weights = device.array(np.ascontiguousarray(weights, np.float32))
         self._turns = {n: device.array(_turns(n)) for n in {rows, columns}}
 
-    def __call__(self, image: Any, *, channels: int | None = None, keep_norm: bool = False) -> Any:
+    def __call__(
+        self,
+        image: Any,
+        *,
+        channels: int | None = None,
+        mask: Any = None,
+        keep_norm: bool = False,
+    ) -> Any:
         """The filtered image, a new (height, width, D) device array.
 
         Args:
             image: (height, width, D) device array.
             channels: of these, the first that count; all if not given. The rest becomes zero.
+            mask: (height, width) device array that the result is multiplied by, if given.
             keep_norm: scale the result to the root mean square that the image had.
 
         Raises:
@@ -74,8 +82,10 @@ class SpectralFilter:
         shape = (*self.size, image.shape[2] if len(image.shape) == 3 else 1)
         as_device_array(self.device, image, shape, name="image")
         count = shape[2] if channels is None else channels
+        if mask is not None:
+            as_device_array(self.device, mask, self.size, name="mask")
         fields = self._weighted(image, count)
-        return self._unpacked(*fields, shape, count, keep_norm=keep_norm)
+        return self._unpacked(*fields, mask, shape, count, keep_norm=keep_norm)
 
     def _weighted(self, image: Any, count: int) -> tuple[Any, Any]:
         """The filtered fields in space, and the sums of squares of the image's rows."""
@@ -93,12 +103,21 @@ class SpectralFilter:
         return self._transformed(spare, fields, rows, columns, inverse=True)[0], squares
 
     def _unpacked(
-        self, fields: Any, squares: Any, shape: tuple[int, ...], count: int, *, keep_norm: bool
+        self,
+        fields: Any,
+        squares: Any,
+        mask: Any,
+        shape: tuple[int, ...],
+        count: int,
+        *,
+        keep_norm: bool,
     ) -> Any:
         device, (height, width, depth), (rows, columns) = self.device, shape, self.padded
         out, found = device.empty(shape), device.empty((height, 1))
         sizes = (height, width, depth, rows, columns, 1 / (rows * columns))
-        device.launch("fft_unpack", (height,), fields, out, found, *sizes, CHANNELS=count)
+        masked = mask is not None
+        given = (fields, mask if masked else fields, out, found, *sizes)
+        device.launch("fft_unpack", (height,), *given, CHANNELS=count, MASKED=masked)
         if keep_norm:
             run = _CPU_RUN if device.traits.is_cpu else 1
             sums = (sum_columns(device, table) for table in (squares, found))

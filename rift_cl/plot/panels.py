@@ -69,11 +69,12 @@ def image_grid(
     windows = _windows(pixels, window, rows)
     stated = [f"{a:.3g} to {b:.3g}".replace("-", "\N{MINUS SIGN}") for a, b in windows]
     footer = stated[0] if len(set(stated)) == 1 else "by row: " + "; ".join(stated)
+    grey = any(image.ndim == 2 for image in pixels)
     panels = []
     for k, (image, title) in enumerate(zip(pixels, titles, strict=True)):
         high, wide = _drawn_size(image, round(size * DPI))
         panels.append(_Panel(image, _wrapped(title, wide), windows[k // columns], high, wide))
-    return _draw_grid(panels, columns, labels, f"Display window {footer}")
+    return _draw_grid(panels, columns, labels, f"Display window {footer}" if grey else "")
 
 
 def _pixels(name: str, image: ArrayLike) -> Reals:

@@ -62,26 +62,30 @@ class HomogenisedLoss:
         share = self.settings.exponent_at(self.mean_square, self.noise) / most if most else 0.0
         return round(share * _PARTS) / _PARTS * most
 
-    def __call__(self, image: Any, target: Any) -> tuple[Any, Any]:
-        """The loss, (1,), and its weighted gradient, as ``ImageLoss`` gives them."""
+    def __call__(self, image: Any, target: Any, *, weights: Any = None) -> tuple[Any, Any]:
+        """The loss, (1,), and its weighted gradient, as ``ImageLoss`` gives them.
+
+        The ramp spreads a residual; what comes to lie on pixels that do not count is left out.
+        """
         exponent = self.exponent
         if exponent == 0:
-            return self._plain(self.device, image, target)
-        value, gradient = self._pixels(self.device, image, target)
-        weigh = self._filter(image.shape[:2], exponent)
-        gradient = weigh(gradient, channels=target.shape[2], keep_norm=True)
+            return self._plain(self.device, image, target, weights=weights)
+        value, gradient = self._pixels(self.device, image, target, weights=weights)
+        ramp = self._filter(image.shape[:2], exponent)
+        gradient = ramp(gradient, channels=target.shape[2], mask=weights, keep_norm=True)
         share = self._plain.ssim_weight
         if share:
-            structure, by_structure = self._structure(self.device, image, target)
+            structure, by_structure = self._structure(self.device, image, target, weights=weights)
             axpby(self.device, share, structure, 1 - share, value)
             axpby(self.device, share, by_structure, 1 - share, gradient)
         return value, gradient
 
-    def watch(self, image: Any, target: Any) -> None:
+    def watch(self, image: Any, target: Any, *, weights: Any = None) -> None:
         """Take note of how much is left: one picture's mean square residual; waits for it."""
         if not self.settings.exponent:
             return
-        found = float(self.device.get(self._squares(self.device, image, target)[0])[0])
+        squares = self._squares(self.device, image, target, weights=weights)[0]
+        found = float(self.device.get(squares)[0])
         known = np.isfinite(self.mean_square)
         self.mean_square = _MEMORY * self.mean_square + (1 - _MEMORY) * found if known else found
 

@@ -51,6 +51,9 @@ class Pictures(Protocol):
     def target(self, number: int) -> Any:
         """(height, width, 3) device array in display light, over the background."""
 
+    def weights(self, number: int) -> Any:
+        """(height, width) device array, how much each pixel counts; None where all do."""
+
     def background(self, number: int) -> Any:
         """(3,) device array: what is behind the splats in that picture."""
 
@@ -193,11 +196,12 @@ class Trainer:
 
     def _compared(self, image: Any, number: int, rate: float) -> tuple[Any, Any]:
         """The loss of a picture and its gradient by what was drawn."""
-        target, exposures = self.pictures.target(number), self.exposures
+        pictures, exposures = self.pictures, self.exposures
+        target, weights = pictures.target(number), pictures.weights(number)
         exposed = image if exposures is None else exposures.applied(image, number)
-        value, by_exposed = self.loss(exposed, target)
+        value, by_exposed = self.loss(exposed, target, weights=weights)
         if (self.parameters.step + 1) % REPORT_EVERY == 0:
-            self.loss.watch(exposed, target)
+            self.loss.watch(exposed, target, weights=weights)
         if exposures is None:
             return value, by_exposed
         return value, exposures.pulled_back(image, by_exposed, number, rate)

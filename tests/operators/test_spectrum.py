@@ -85,6 +85,20 @@ def test_the_norm_is_kept_when_asked_for(device):
     )
 
 
+def test_a_mask_is_laid_over_the_result_before_its_norm_is_kept(device):
+    image, mask = picture((14, 22)), np.random.default_rng(9).uniform(size=(14, 22))
+    mask[:, :5] = 0
+    sent = device.array(mask.astype(np.float32))
+    apply = SpectralFilter(device, (14, 22), ramp)
+    free = device.get(apply(device.array(image)))
+    found = device.get(apply(device.array(image), mask=sent))
+    np.testing.assert_allclose(found, free * mask[..., None], atol=1e-6)
+    kept = device.get(apply(device.array(image), mask=sent, keep_norm=True))
+    assert np.linalg.norm(kept) == pytest.approx(np.linalg.norm(image), rel=1e-6)
+    with pytest.raises(ShapeError, match="mask"):
+        apply(device.array(image), mask=device.array(np.ones((22, 14), np.float32)))
+
+
 def test_a_picture_of_zeros_stays_one(device):
     apply = SpectralFilter(device, (10, 10), ramp)
     zeros = device.array(np.zeros((10, 10, 3), np.float32))

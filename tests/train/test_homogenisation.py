@@ -58,6 +58,14 @@ def test_structure_is_left_as_it_is(device):
     np.testing.assert_allclose(mixed, 0.7 * pixels + 0.3 * structure, atol=1e-8)
 
 
+def test_pixels_that_do_not_count_are_not_pulled_at(device):
+    weights = np.ones(SIZE, np.float32)
+    weights[:, :7] = 0
+    _, sent = pictures(device)
+    gradient = device.get(loss_of(device, 1.0)(*sent, weights=device.array(weights))[1])
+    assert not gradient[:, :7].any() and gradient[:, 7:].all()
+
+
 def test_a_step_along_the_gradient_lessens_the_loss(device):
     (image, _), sent = pictures(device)
     loss = loss_of(device, 1.0)

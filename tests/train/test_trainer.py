@@ -47,6 +47,9 @@ class Ball:
     def target(self, number):
         return self.device.array(self.images[number])
 
+    def weights(self, number):
+        return None
+
     def background(self, number):
         return self.grey
 
