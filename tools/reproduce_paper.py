@@ -1,11 +1,13 @@
 """Reproduce the figures of the paper "RiFT, Radiance Field Tomography".
 
     python tools/reproduce_paper.py --quick --out paper
-    python tools/reproduce_paper.py --full --out paper
+    python tools/reproduce_paper.py --full --ornament ornament --out paper
     python tools/reproduce_paper.py --report-only --out paper
 
 Each figure's result is a JSON file of its own, with the device, the version and the date;
-``report.html`` is drawn from those files alone, so that it can be redrawn without computing.
+``report.html`` is drawn from those files alone, so that it can be redrawn without computing. A run
+that was broken off goes on where it was: what a figure's file has already is not computed again,
+and fits, in ``fits``, go on from their last checkpoint.
 """
 
 from __future__ import annotations
@@ -19,14 +21,17 @@ from typing import Any
 
 import tyro
 
-from figures import figure_05, figure_06
+from figures import figure_05, figure_06, figure_11, figure_12, spectral_bias
+from figures.plan import Plan, find_ornament, sample_ornament
 from rift_cl.cl import Device, open_device
-from rift_cl.errors import RiftError
+from rift_cl.errors import InputError, RiftError
 from rift_cl.html_page import Page
 from rift_cl.io import make_folder, write_json, write_text
 from rift_cl.jobs.run_folder import environment
 
-FIGURES: tuple[ModuleType, ...] = (figure_05, figure_06)
+FIGURES: tuple[ModuleType, ...] = (figure_05, figure_06, figure_11, figure_12, spectral_bias)
+# Those that fit splats to the ornament.
+FITTED: tuple[ModuleType, ...] = (figure_11, figure_12, spectral_bias)
 
 
 @dataclass(frozen=True)
@@ -34,17 +39,56 @@ class Settings:
     """Reproduce the paper's figures."""
 
     out: Path = Path("paper")
-    """Folder for one JSON file per figure and report.html."""
+    """Folder for one JSON file per figure, report.html and the fits."""
     quick: bool = False
-    """Small sizes, in well under a minute (the default)."""
+    """Small sizes, and pictures that come with the package; a few minutes (the default)."""
     full: bool = False
-    """The paper's sizes."""
+    """The paper's sizes; hours on a CPU."""
+    ornament: Path | None = None
+    """Folder with the captures orbit, off_path and perhaps orbit_test (every 8th view of orbit
+    with less noise), as tools/render_ornament.py makes them; for the fits of --full."""
+    steps: int | None = None
+    """Of every fit; 400, or 10000 with --full, when not given."""
+    splats: int | None = None
+    """Most splats of every fit; 3000, or 30000 with --full, when not given."""
+    counts: tuple[int, ...] = ()
+    """Numbers of input views of the fits; 4 10 24 60, or 10 64 250 570 with --full, when not
+    given."""
+    seeds: tuple[int, ...] = (0, 1)
+    """Of the fits with and without homogenisation; the other figures take the first."""
     only: tuple[str, ...] = ()
     """Names of the figures to compute, such as figure_05; all when not given."""
     report_only: bool = False
     """Compute nothing; draw report.html again from the JSON files."""
     device: str | None = None
     """Device to use; see 'rift devices'."""
+
+    def plan(self) -> Plan:
+        """What the figures are computed with.
+
+        Raises:
+            InputError: an option makes no sense, or captures are missing.
+        """
+        unknown = set(self.only) - {figure.NAME for figure in FIGURES}
+        if unknown or (self.quick and self.full):
+            problem = f"unknown figures {sorted(unknown)}" if unknown else "both --quick and --full"
+            raise InputError(f"{problem}; figures: {sorted(f.NAME for f in FIGURES)}")
+        if self.ornament is not None and not self.full:
+            raise InputError("--ornament goes with --full; --quick has pictures of its own")
+        if not self.seeds:
+            raise InputError("--seeds has no number, wanted one or more")
+        given = None if self.ornament is None else find_ornament(self.ornament)
+        usual = (10_000, 30_000, (10, 64, 250, 570)) if self.full else (400, 3000, (4, 10, 24, 60))
+        return Plan(
+            full=self.full,
+            out=self.out,
+            device=self.device,
+            ornament=given if self.full else sample_ornament(),
+            counts=tuple(sorted(set(self.counts or usual[2]))),
+            steps=usual[0] if self.steps is None else self.steps,
+            splats=usual[1] if self.splats is None else self.splats,
+            seeds=self.seeds,
+        )
 
 
 def main() -> int:
@@ -58,33 +102,42 @@ def main() -> int:
 
 
 def _reproduce(settings: Settings) -> int:
-    known = {figure.NAME for figure in FIGURES}
-    unknown = set(settings.only) - known
-    if unknown or (settings.quick and settings.full):
-        problem = f"unknown figures {sorted(unknown)}" if unknown else "both --quick and --full"
-        print(f"reproduce_paper: {problem}; figures: {sorted(known)}", file=sys.stderr)
-        return 2
+    plan = settings.plan()
     make_folder(settings.out)
     if not settings.report_only:
         device = open_device(settings.device)
         for figure in FIGURES:
-            if not settings.only or figure.NAME in settings.only:
-                print(f"{figure.NAME} ...", file=sys.stderr)
-                _compute(figure, settings, device)
+            if settings.only and figure.NAME not in settings.only:
+                continue
+            if figure in FITTED and plan.ornament is None:
+                print(f"{figure.NAME} is left out: {plan.missing()}", file=sys.stderr)
+                continue
+            print(f"{figure.NAME} ...", file=sys.stderr)
+            _compute(figure, plan, device)
     write_text(settings.out / "report.html", _report(settings.out).html())
     print(f"report.html is in {settings.out}")
     return 0
 
 
-def _compute(figure: ModuleType, settings: Settings, device: Device) -> None:
-    record = {
-        "figure": figure.NAME,
-        "full": settings.full,
-        "seed": None,
-        "environment": environment(device),
-        "result": figure.compute(settings.full, device),
-    }
-    write_json(settings.out / f"{figure.NAME}.json", record)
+def _compute(figure: ModuleType, plan: Plan, device: Device) -> None:
+    path, settings = plan.out / f"{figure.NAME}.json", figure.settings(plan)
+    for result in figure.compute(plan, device, _kept(path, settings)):
+        record = {
+            "figure": figure.NAME,
+            "settings": settings,
+            "environment": environment(device),
+            "result": result,
+        }
+        write_json(path, record)
+
+
+def _kept(path: Path, settings: dict[str, Any]) -> dict[str, Any]:
+    """The result of an earlier run with the same settings, finished or not; empty if none."""
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        return dict(record["result"]) if record["settings"] == settings else {}
+    except (OSError, ValueError, LookupError, TypeError):
+        return {}
 
 
 def _report(folder: Path) -> Page:
@@ -96,8 +149,7 @@ def _report(folder: Path) -> Page:
         record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         page.section(figure.TITLE)
         figure.show(page, record["result"])
-        seed = "none drawn" if record["seed"] is None else record["seed"]
-        page.facts({"size": "full" if record["full"] else "quick", "seed": seed})
+        page.facts({"seed": "none drawn", **record["settings"]})
         page.facts(record["environment"])
     return page
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from figures.images import decode, encode
+from figures.plan import Plan
 from rift_cl import Device
 from rift_cl.html_page import Page
 from rift_cl.jobs.demo import COLUMNS, SCORING, study_panels, study_row
@@ -19,10 +21,15 @@ COUNTS = (2, 12, 24, 95, 512)
 _WINDOW = (0.0, 0.5)
 
 
-def compute(full: bool, device: Device) -> dict[str, Any]:
+def settings(plan: Plan) -> dict[str, Any]:
+    """What decides the result."""
+    return plan.size()
+
+
+def compute(plan: Plan, device: Device, kept: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """The slices and their scores; a smaller slice in the quick version."""
-    size = 512 if full else 256
-    return {"size": size, "views": [_pack(score) for score in view_study(size, COUNTS, device)]}
+    size = 512 if plan.full else 256
+    yield {"size": size, "views": [_pack(score) for score in view_study(size, COUNTS, device)]}
 
 
 def show(page: Page, result: dict[str, Any]) -> None:

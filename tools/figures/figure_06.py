@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
+from figures.plan import Plan
 from rift_cl import Device
 from rift_cl.html_page import Page
 from rift_cl.jobs.demo import COLUMNS, SCORES, SCORING, study_curves
@@ -16,11 +18,16 @@ COUNTS = (2, 3, 4, 6, 8, 12, 16, 24, 34, 48, 68, 95, 136, 192, 272, 384, 512, 76
 QUICK_COUNTS = COUNTS[::3]
 
 
-def compute(full: bool, device: Device) -> dict[str, Any]:
+def settings(plan: Plan) -> dict[str, Any]:
+    """What decides the result."""
+    return plan.size()
+
+
+def compute(plan: Plan, device: Device, kept: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """The scores; a smaller slice and fewer counts in the quick version."""
-    size, counts = (512, COUNTS) if full else (256, QUICK_COUNTS)
+    size, counts = (512, COUNTS) if plan.full else (256, QUICK_COUNTS)
     scores = view_study(size, counts, device)
-    return {"size": size, "views": [{"count": s.views, **s.scores} for s in scores]}
+    yield {"size": size, "views": [{"count": s.views, **s.scores} for s in scores]}
 
 
 def show(page: Page, result: dict[str, Any]) -> None:

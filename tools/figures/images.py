@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 
 def encode(image: NDArray[np.float32], window: tuple[float, float]) -> dict[str, Any]:
-    """An image (y, x) as JSON; values outside the window are clipped to it."""
+    """An image, (y, x) or (y, x, 3), as JSON; values outside the window are clipped to it."""
     low, high = window
     codes = np.rint(255 * np.clip((image - low) / (high - low), 0, 1)).astype(np.uint8)
     text = base64.b64encode(zlib.compress(codes.tobytes(), 9)).decode("ascii")

@@ -1,0 +1,89 @@
+"""A fit looked at while it is trained: which frequencies of its pictures are right, and when."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from figures.spectra import error_spectrum, ring_edges
+from rift_cl import Device
+from rift_cl.io import open_capture
+from rift_cl.jobs.fit_pictures import CapturePictures
+from rift_cl.jobs.fit_settings import FitSettings
+from rift_cl.jobs.fit_start import first_splats
+from rift_cl.metrics import psnr
+from rift_cl.progress_bar import show_progress
+from rift_cl.train.homogenisation import noise_of
+from rift_cl.train.trainer import Trainer
+
+# Shares of the steps after which the pictures are looked at.
+SHARES = (1 / 8, 1 / 4, 1 / 2, 1)
+_PICTURES, _NOISE_VIEWS = 12, 8
+
+
+def watched(settings: FitSettings, test: Any, device: Device) -> dict[str, Any]:
+    """Train as ``Fit`` would, and take the spectrum of the error now and then.
+
+    Args:
+        settings: of the fit; nothing is written to its folder.
+        test: the capture whose pictures are looked at.
+        device: where to work.
+
+    Returns:
+        JSON: the frequencies in cycles per pixel, and for each moment the step, the mean PSNR,
+        and by frequency the error's and the pictures' power over the truth's.
+    """
+    trainer, pictures = _trainer(settings, device)
+    views = open_capture(test).views
+    few = np.unique(np.linspace(0, len(views) - 1, _PICTURES).round().astype(int))
+    unseen = CapturePictures(device, [views[k] for k in few.tolist()], like=pictures)
+    edges, frequency = ring_edges(unseen.cameras[0].size)
+    moments = []
+    for share in SHARES:
+        step = max(1, round(share * settings.steps))
+        show_progress(_until(trainer, step), quiet=False)
+        moments.append({"step": step, **_spectra(trainer, unseen, edges)})
+    return {"frequency": frequency, "pictures": len(few), "moments": moments}
+
+
+def _trainer(settings: FitSettings, device: Device) -> tuple[Trainer, CapturePictures]:
+    capture = open_capture(settings.capture)
+    pictures = CapturePictures(device, capture.views, seed=settings.seed)
+    first = first_splats(
+        device,
+        capture,
+        pictures,
+        count=settings.splats,
+        guessed=settings.first_count,
+        seed=settings.seed,
+    )
+    training = settings.training()
+    if settings.homogenise:
+        few = np.linspace(0, len(capture.views) - 1, _NOISE_VIEWS).round().astype(int)
+        noise = noise_of([pictures.image(k)[..., :3] for k in np.unique(few).tolist()])
+        training = dataclasses.replace(training, noise=noise)
+    return Trainer(pictures, first, training, settings.drawing()), pictures
+
+
+def _until(trainer: Trainer, step: int) -> Iterator[Any]:
+    """Train up to a step."""
+    return trainer.run(lambda: trainer.parameters.step >= step)
+
+
+def _spectra(trainer: Trainer, unseen: CapturePictures, edges: Any) -> dict[str, Any]:
+    behind, device = unseen.behind, trainer.device
+    images, truths = [], []
+    for number, camera in enumerate(unseen.cameras):
+        frame = trainer.renderer.forward(
+            trainer.parameters.drawn, camera, background=device.array(behind)
+        )
+        images.append(unseen.shown(device.get(frame.image)))
+        truths.append(unseen.over(number, behind))
+    scores = [psnr(image, truth) for image, truth in zip(images, truths, strict=True)]
+    error, power = error_spectrum(
+        [image - behind for image in images], [truth - behind for truth in truths], edges
+    )
+    return {"psnr": float(np.mean(scores)), "error": error, "power": power}
