@@ -8,12 +8,16 @@ from __future__ import annotations
 
 import os
 import re
+import time
+from functools import lru_cache
 from pathlib import Path
 
 from rift_cl.cl.traits import Traits
 from rift_cl.errors import InputError, ResourceLimitError
 
 _HOST_SHARE = 0.6
+# Seconds for which what was read of free memory holds.
+_FRESH = 0.1
 _MOST = 1 << 63
 _UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
 
@@ -35,7 +39,15 @@ def parse_bytes(text: str) -> int:
 
 
 def free_host_memory() -> int | None:
-    """Bytes of host memory that are free to take, or None where the system does not say."""
+    """Bytes of host memory that are free to take, or None where the system does not say.
+
+    The answer may be a tenth of a second old: a step of training asks several times.
+    """
+    return _free_host_memory(int(time.monotonic() / _FRESH))
+
+
+@lru_cache(maxsize=1)
+def _free_host_memory(moment: int) -> int | None:
     try:
         text = Path("/proc/meminfo").read_text(encoding="ascii")
         return int(text.split("MemAvailable:")[1].split()[0]) * 1024

@@ -6,6 +6,7 @@ pickled as the selector that opens it: contexts do not travel, names do.
 
 from __future__ import annotations
 
+import math
 import threading
 from typing import Any, NamedTuple
 
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from rift_cl.cl.budget import memory_budget
 from rift_cl.cl.failures import named_errors
-from rift_cl.cl.memory import as_plain, as_real_array, download, upload
+from rift_cl.cl.memory import as_plain, as_real_array, download, send, upload
 from rift_cl.cl.process import claim_process
 from rift_cl.cl.program import Programs
 from rift_cl.cl.traits import Traits
@@ -91,7 +92,8 @@ class Device:
 
         opened = self._open()
         # Blocks that are kept for the next array count as well, until the room is needed.
-        wanted = int(np.prod(shape, dtype=np.int64)) * np.dtype(dtype).itemsize
+        count = shape if isinstance(shape, int) else math.prod(shape)
+        wanted = int(count) * np.dtype(dtype).itemsize
         room = self.budget if wanted >= _LARGE else self._limit or self.traits.memory
         if opened.pool.managed_bytes + wanted > room:
             opened.pool.free_held()
@@ -117,6 +119,10 @@ class Device:
         values = as_real_array(host, name="array")
         native = np.float32 if values.dtype.kind in "fb" else values.dtype.newbyteorder("=")
         return upload(self, as_plain(values, native))
+
+    def send(self, host: NDArray[np.float32]) -> Any:
+        """As ``array``, for float32 in C order, without waiting for what was enqueued before."""
+        return send(self, host)
 
     def get(self, array: Any) -> NDArray[Any]:
         """Copy a device array to the host."""

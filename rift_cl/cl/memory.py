@@ -100,6 +100,23 @@ def upload(device: Device, host: NDArray[Any]) -> Any:
     return array
 
 
+def send(device: Device, host: NDArray[Any]) -> Any:
+    """Copy a C-ordered host array into a buffer of its own, past the queue.
+
+    A copy through the queue would wait for all that was enqueued before. The buffer comes from the
+    driver and not from the pool, so this is for the few arrays of a step and not for volumes.
+    """
+    import pyopencl as cl
+    from pyopencl.array import Array
+
+    if host.size == 0:
+        return upload(device, host)
+    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
+    with named_errors(f"copying {host.nbytes} bytes to it", device.name):
+        buffer = cl.Buffer(device.context, flags, hostbuf=host)
+        return Array(device.queue, host.shape, host.dtype, data=buffer)
+
+
 def share(device: Device, host: NDArray[Any]) -> Any:
     """Give a device a C-ordered host array to read: without a copy where memory is shared.
 

@@ -130,16 +130,16 @@ class CapturePictures:
 
     def target(self, number: int) -> Any:
         """The picture on the device, over the background of this step."""
-        return self.device.array(self.over(number, self._behind(number)))
+        return self.device.send(self.over(number, self._behind(number)))
 
     def background(self, number: int) -> Any:
         """What is behind the splats in this step."""
-        return self.device.array(self._behind(number))
+        return self.device.send(self._behind(number))
 
     def weights(self, number: int) -> Any:
         """(height, width) device array, how much each pixel counts; None where all do."""
         shares = self._shares(number)
-        return None if shares is None else self.device.array(np.ascontiguousarray(shares))
+        return None if shares is None else self.device.send(np.ascontiguousarray(shares))
 
     def _behind(self, number: int) -> Floats:
         if self.image(number).shape[2] == 3 or not self._is_cut_out(number):

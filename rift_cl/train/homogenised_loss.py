@@ -82,7 +82,7 @@ class HomogenisedLoss:
 
     def watch(self, image: Any, target: Any, *, weights: Any = None) -> None:
         """Take note of how much is left: one picture's mean square residual; waits for it."""
-        if not self.settings.exponent:
+        if not (self.settings.exponent and self.settings.noise_aware and self.noise):
             return
         squares = self._squares(self.device, image, target, weights=weights)[0]
         found = float(self.device.get(squares)[0])

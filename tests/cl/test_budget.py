@@ -156,6 +156,7 @@ def test_free_memory_without_proc(monkeypatch):
         raise OSError
 
     monkeypatch.setattr(budget.Path, "read_text", refuse)
+    budget._free_host_memory.cache_clear()
     free = budget.free_host_memory()
     assert free is None or free > 1 << 20
 

@@ -7,6 +7,7 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.cl import Device
+from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.memory import as_device_array, is_device_array
 from rift_cl.errors import DeviceError, DTypeError, ShapeError
 
@@ -101,3 +102,13 @@ def test_finish_and_release(device):
     device.finish()
     device.release()
     assert device.get(device.zeros(3)).tolist() == [0, 0, 0]
+
+
+def test_what_is_sent_past_the_queue_is_a_copy_made_at_once(device):
+    host = np.arange(1000, dtype=np.float32).reshape(10, 100)
+    sent = device.send(host)
+    host[:] = 0
+    np.testing.assert_array_equal(device.get(sent), np.arange(1000).reshape(10, 100))
+    axpby(device, 1.0, device.array(np.ones((10, 100), np.float32)), 2.0, sent)
+    np.testing.assert_array_equal(device.get(sent), 2 * np.arange(1000).reshape(10, 100) + 1)
+    assert device.send(np.empty((0, 3), np.float32)).shape == (0, 3)
