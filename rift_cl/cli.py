@@ -195,17 +195,19 @@ def _center(settings: Any, output: Output) -> None:
 
 
 def _fit(settings: Any, output: Output) -> None:
+    from rift_cl.jobs import fit_report, xray_scores
     from rift_cl.jobs.fit import Fit
-    from rift_cl.jobs.fit_report import COLUMNS, SCORING, score_rows
+    from rift_cl.jobs.xray_fit import XrayFit
 
-    job = Fit(settings)
+    xray = settings.mode == "xray"
+    job, table = (XrayFit(settings), xray_scores) if xray else (Fit(settings), fit_report)
     job.announce = print_line
     with gentle_interrupt(job.stop):
         ran = _ran(job, settings, output)
     if not ran:
         return
-    print_table(COLUMNS, score_rows(job.metrics), caption=SCORING)
-    print(f"scene.ply and report.html are in {settings.out}")
+    print_table(table.COLUMNS, table.score_rows(job.metrics), caption=table.SCORING)
+    print(f"scene.ply{', slices' if xray else ''} and report.html are in {settings.out}")
 
 
 def _eval(settings: Any, output: Output) -> None:

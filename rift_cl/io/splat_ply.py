@@ -3,6 +3,10 @@
 One element ``vertex`` of floats: x y z, nx ny nz (zero, never read), f_dc_0 to 2, f_rest_0 to
 3 (K - 1) - 1, opacity, scale_0 to 2, rot_0 to 3. The rest of the harmonics is channel-major: every
 coefficient of red comes before the first of green.
+
+Splats of X-rays have a property ``log_density`` in place of ``opacity``, the natural logarithm of
+the density at the peak. To a viewer of photographs their file lacks a property: it can refuse it,
+but cannot show it as what it is not.
 """
 
 from __future__ import annotations
@@ -19,6 +23,7 @@ from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.ply_body import read_blocks, record_runs
 from rift_cl.io.ply_header import PlyHeader, read_header
+from rift_cl.splat.settings import SplatMode
 
 if TYPE_CHECKING:
     from rift_cl.io.splat_scene import SplatScene
@@ -29,22 +34,27 @@ Arrays = dict[str, NDArray[np.float32]]
 COEFFICIENTS = (1, 4, 9, 16, 25)
 
 _NORMALS = ("nx", "ny", "nz")
+_STRENGTHS: dict[SplatMode, str] = {"light": "opacity", "xray": "log_density"}
+_COMMENT = "comment X-ray splats: log_density is ln of the density at the peak, per unit of length"
 _LISTED = 4
 
 
-def read_ply(path: Path, file: BufferedReader, *, budget: int | None) -> Arrays:
-    """Read the arrays of a scene from a file that is open at its beginning.
+def read_ply(path: Path, file: BufferedReader, *, budget: int | None) -> tuple[SplatMode, Arrays]:
+    """Read the kind and the arrays of a scene from a file that is open at its beginning.
 
     Raises:
         FileFormatError: the file is damaged, or holds no splats.
         ResourceLimitError: they are larger than the budget; nothing was allocated.
     """
     header = read_header(path, file)
-    coefficients = _coefficients(path, header)
+    mode: SplatMode = "light"
+    if _STRENGTHS["xray"] in header.properties and _STRENGTHS["light"] not in header.properties:
+        mode = "xray"
+    coefficients = _coefficients(path, header, mode)
     header.check_size(path, file.seek(0, 2))
     check_claim(path, "the scene", 4 * (11 + 3 * coefficients) * header.count, budget)
     arrays = _empty(header.count, coefficients)
-    columns = _columns(arrays)
+    columns = _columns(arrays, mode)
     start = 0
     for block in read_blocks(path, file, header):
         # A number too large for float32 becomes infinite, and is refused with the others.
@@ -52,15 +62,17 @@ def read_ply(path: Path, file: BufferedReader, *, budget: int | None) -> Arrays:
             for name, column in columns.items():
                 column[start : start + len(block)] = block[name]
         start += len(block)
-    return arrays
+    return mode, arrays
 
 
 def encode_ply(scene: SplatScene) -> tuple[int, Iterator[bytes]]:
     """A scene as the bytes of a file: how many they are, and the blocks that they come in."""
-    columns = _columns(vars(scene))
+    columns = _columns(vars(scene), scene.mode)
     names = list(columns)
     names[3:3] = _NORMALS
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(scene)}"]
+    if scene.mode == "xray":
+        lines.insert(2, _COMMENT)
     lines += [f"property float {name}" for name in names]
     header = "\n".join([*lines, "end_header", ""]).encode()
     record = np.dtype([(name, "<f4") for name in names])
@@ -91,14 +103,14 @@ def scene_shapes(count: int, coefficients: int) -> dict[str, tuple[int, ...]]:
     }
 
 
-def _columns(arrays: dict[str, Any]) -> dict[str, NDArray[np.float32]]:
+def _columns(arrays: dict[str, Any], mode: SplatMode) -> dict[str, NDArray[np.float32]]:
     """Views of the arrays by the names of the properties, in the order of the file."""
     means, sh, quats = arrays["means"], arrays["sh"], arrays["quats"]
     rest = sh.shape[1] - 1
     columns: dict[str, NDArray[np.float32]] = dict(zip("xyz", means.T, strict=True))
     columns |= {f"f_dc_{c}": sh[:, 0, c] for c in range(3)}
     columns |= {f"f_rest_{c * rest + k}": sh[:, 1 + k, c] for c in range(3) for k in range(rest)}
-    columns["opacity"] = arrays["logit_opacities"]
+    columns[_STRENGTHS[mode]] = arrays["logit_opacities"]
     columns |= {f"scale_{i}": column for i, column in enumerate(arrays["log_scales"].T)}
     columns |= {f"rot_{i}": column for i, column in enumerate(quats.T)}
     return columns
@@ -111,14 +123,14 @@ def _empty(count: int, coefficients: int) -> Arrays:
     }
 
 
-def _coefficients(path: Path, header: PlyHeader) -> int:
+def _coefficients(path: Path, header: PlyHeader, mode: SplatMode) -> int:
     """The number of harmonics, after a look whether every property is there."""
     rest = sum(name.startswith("f_rest_") for name in header.properties)
     if rest % 3 or 1 + rest // 3 not in COEFFICIENTS:
         raise FileFormatError(
             f"{path}: has {rest} properties f_rest, wanted 0, 9, 24, 45 or 72 (degree 0 to 4)"
         )
-    wanted = _columns(_empty(0, 1 + rest // 3))
+    wanted = _columns(_empty(0, 1 + rest // 3), mode)
     missing = [name for name in wanted if name not in header.properties]
     if missing:
         more = ", ..." if len(missing) > _LISTED else ""

@@ -2,6 +2,9 @@
 
 A trainer works on logarithms of scales and logits of opacities, and its files keep them, so that
 a scene that was saved and loaded is the same to the bit. ``upload`` makes what is drawn of it.
+
+Splats of X-rays have densities in the place of opacities. They are a scene of another kind, and a
+property of another name in the file, so that no viewer takes the one for the other.
 """
 
 from __future__ import annotations
@@ -9,6 +12,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +25,7 @@ from rift_cl.io.output import atomic_path, check_space
 from rift_cl.io.splat_activations import log_scales_of, logits_of, opacities_of, scales_of
 from rift_cl.io.splat_file import encode_splat, read_splat
 from rift_cl.io.splat_ply import COEFFICIENTS, encode_ply, read_ply, scene_shapes
+from rift_cl.splat.settings import SplatMode
 from rift_cl.splat.splats import Splats
 
 _ENCODERS = {".ply": encode_ply, ".splat": encode_splat}
@@ -49,6 +54,7 @@ class SplatScene:
     quats: NDArray[np.float32]
     logit_opacities: NDArray[np.float32]
     sh: NDArray[np.float32]
+    mode: ClassVar[SplatMode] = "light"
 
     def __post_init__(self) -> None:
         """Bring the arrays into their normal form and check that they fit each other."""
@@ -88,6 +94,9 @@ class SplatScene:
             path: the file.
             budget: bytes that the splats may take; 60 % of the free memory when not given.
 
+        Returns:
+            An ``XrayScene`` where the file holds densities.
+
         Raises:
             InputError: there is no such file.
             FileFormatError: the file is damaged, or holds no splats.
@@ -96,10 +105,10 @@ class SplatScene:
         """
         path = Path(path)
         with reading(path, "the scene"):
-            arrays = _read(path, budget=budget)
+            kind, arrays = _read(path, budget=budget)
             for name, array in arrays.items():
                 check_finite(array, name=f"{path}: {name}")
-        return cls(**arrays)
+        return kind(**arrays)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file that appears complete or not at all.
@@ -109,12 +118,15 @@ class SplatScene:
                 rounded opacities, rotations and colours, and without the higher harmonics.
 
         Raises:
-            InputError: the ending is another, or an empty scene is to become a .splat file.
+            InputError: the ending is another, or an empty scene, or one of X-rays, is to become a
+                .splat file.
             OutputError: the file cannot be written.
         """
         path = Path(path)
         if path.suffix.lower() not in _ENCODERS:
             raise InputError(f"{path}: splats are written as .ply or .splat: end the name so")
+        if self.mode == "xray" and path.suffix.lower() == ".splat":
+            raise InputError(f"{path}: a .splat file holds opacities, not densities: save a .ply")
         size, blocks = _ENCODERS[path.suffix.lower()](self)
         check_space(path, size)
         with atomic_path(path) as part:
@@ -131,7 +143,7 @@ class SplatScene:
             means=self.means,
             quats=self.quats,
             scales=scales_of(self.log_scales),
-            opacities=opacities_of(self.logit_opacities),
+            opacities=self._opacities(),
             sh=self.sh,
         )
 
@@ -151,26 +163,47 @@ class SplatScene:
             raise InputError("SplatScene: wants splats with quats, scales and sh, and no colors")
         scales, opacities = device.get(splats.scales), device.get(splats.opacities)
         _demand_range("scales", scales, np.inf)
-        _demand_range("opacities", opacities, 1)
+        _demand_range("opacities", opacities, 1 if cls.mode == "light" else np.inf)
+        inverse = logits_of if cls.mode == "light" else log_scales_of
         return cls(
             means=device.get(splats.means),
             log_scales=log_scales_of(scales),
             quats=device.get(splats.quats),
-            logit_opacities=logits_of(opacities),
+            logit_opacities=inverse(opacities),
             sh=device.get(splats.sh),
         )
 
+    def _opacities(self) -> NDArray[np.float32]:
+        """What is drawn: opacities, or densities in xray mode."""
+        return opacities_of(self.logit_opacities)
 
-def _read(path: Path, *, budget: int | None) -> dict[str, NDArray[np.float32]]:
+
+class XrayScene(SplatScene):
+    """Splats of an X-ray scan; see ``SplatScene``.
+
+    ``logit_opacities`` are natural logarithms of the densities at the splats' peaks, per length;
+    they are drawn with ``SplatSettings(mode="xray")``.
+    """
+
+    mode: ClassVar[SplatMode] = "xray"
+
+    def _opacities(self) -> NDArray[np.float32]:
+        return scales_of(self.logit_opacities)
+
+
+def _read(
+    path: Path, *, budget: int | None
+) -> tuple[type[SplatScene], dict[str, NDArray[np.float32]]]:
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: is not a file")
     with path.open("rb") as file:
         start = file.read(4)
         file.seek(0)
         if start in _PLY_STARTS:
-            return read_ply(path, file, budget=budget)
+            mode, arrays = read_ply(path, file, budget=budget)
+            return XrayScene if mode == "xray" else SplatScene, arrays
         if path.suffix.lower() == ".splat":
-            return read_splat(path, file, budget=budget)
+            return SplatScene, read_splat(path, file, budget=budget)
     raise FileFormatError(f"{path}: is no PLY file, and no .splat file by its name")
 
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from collections.abc import Callable, Generator, Iterator
-from typing import Any
+from collections.abc import Generator, Iterator
+from typing import TypeVar
 
 import numpy as np
 
-from rift_cl.cl.discovery import open_device
-from rift_cl.errors import InputError, StoppedError
+from rift_cl.errors import InputError
 from rift_cl.io.capture import (
     Capture,
     View,
@@ -21,24 +20,25 @@ from rift_cl.io.capture import (
 )
 from rift_cl.io.photographs import demand_photographs, pose_photographs
 from rift_cl.io.splat_scene import SplatScene
-from rift_cl.jobs.fit_checkpoints import FitCheckpoints
 from rift_cl.jobs.fit_pictures import CapturePictures
 from rift_cl.jobs.fit_report import fit_page
-from rift_cl.jobs.fit_scores import ViewScore, score_record, score_views
+from rift_cl.jobs.fit_run import FitRun
+from rift_cl.jobs.fit_scores import score_record, score_views
 from rift_cl.jobs.fit_settings import FitSettings
 from rift_cl.jobs.fit_start import first_splats
-from rift_cl.jobs.run_folder import RunFolder
 from rift_cl.progress import Report
 from rift_cl.splat.bands import FrameMemory
 from rift_cl.train.homogenisation import noise_of
-from rift_cl.train.trainer import REPORT_EVERY, Trainer
+from rift_cl.train.trainer import Trainer
 
 # Photographs from which the noise is estimated.
 _NOISE_VIEWS = 8
 
+One = TypeVar("One")
 
-class Fit:
-    """A fit that is planned; nothing is written yet.
+
+class Fit(FitRun):
+    """A fit to photographs that is planned; nothing is written yet.
 
     Args:
         settings: what to do.
@@ -48,12 +48,7 @@ class Fit:
     """
 
     def __init__(self, settings: FitSettings) -> None:
-        settings.check()
-        self.settings = settings
-        self.training, self.drawing = settings.training(), settings.drawing()
-        self.folder = RunFolder(
-            settings.out, "fit", overwrite=settings.overwrite, resume=settings.resume
-        )
+        super().__init__(settings)
         # Poses of bare photographs are looked for when the work begins, or were found before.
         self.bare = holds_bare_photographs(settings.capture)
         self._posed = settings.out / "poses"
@@ -67,15 +62,6 @@ class Fit:
         self.tests = {capture_name(path): open_capture(path) for path in settings.test}
         if len(self.tests) < len(settings.test):
             raise InputError("--test names two captures of the same name: rename one folder")
-        self.device = open_device(settings.device)
-        self.checkpoints = FitCheckpoints(
-            settings.out / "checkpoints", settings.decisive(), self.device.name
-        )
-        self.losses: list[tuple[int, float]] = []
-        self.scores: dict[str, list[ViewScore]] = {}
-        self.metrics: dict[str, Any] = {}
-        self.announce: Callable[[str], None] = lambda line: None
-        self._stopping = False
 
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""
@@ -102,10 +88,6 @@ class Fit:
             "device": self.device.name,
         }
 
-    def stop(self) -> None:
-        """Break off after the step that is being taken; ``run`` then keeps a checkpoint."""
-        self._stopping = True
-
     def run(self) -> Iterator[Report]:
         """Do it; a report now and then.
 
@@ -119,11 +101,12 @@ class Fit:
             capture = yield from self._find_poses()
             self._split(capture)
         pictures = self._pictures(self.seen)
+        if settings.refine_exposures and pictures.any_cut_out():
+            raise InputError(
+                "--refine-exposures wants photographs of a whole scene: these are cut out, and "
+                "what stands behind them was never exposed"
+            )
         trainer = self._trainer(capture, pictures)
-        if settings.resume:
-            self.losses = self.checkpoints.restore(trainer)
-        else:
-            self.folder.drop("checkpoints")
         yield from self._trained(trainer, pictures)
         splats = trainer.parameters.drawn
         SplatScene.of(splats, self.device).save(settings.out / "scene.ply")
@@ -171,34 +154,6 @@ class Fit:
             training = dataclasses.replace(training, noise=noise)
         return Trainer(pictures, first, training, self.drawing)
 
-    def _trained(self, trainer: Trainer, pictures: CapturePictures) -> Iterator[Report]:
-        """Train, with a checkpoint now and then, at the end, and when broken off."""
-        every, kept = self.settings.checkpoint_every, trainer.parameters.step
-        reports = trainer.run(lambda: self._stopping)
-        if self.settings.view:
-            from rift_cl.jobs.fit_viewer import watched
-
-            title = self.settings.capture.name
-            reports = watched(reports, trainer, pictures, title=title, announce=self.announce)
-        for report in reports:
-            if report.done % REPORT_EVERY == 0 or report.done == report.total:
-                self.losses.append((report.done, report.values["loss"]))
-            ended = self._stopping or report.done == report.total
-            if every and (ended or report.done >= kept + every):
-                kept = report.done
-                self.checkpoints.save(trainer, self.losses)
-            yield report
-            self._heed(report.done)
-
-    def _heed(self, step: int) -> None:
-        """Break off if that was asked for."""
-        if not self._stopping:
-            return
-        where = f"interrupted after step {step} of {self.settings.steps}"
-        if not self.settings.checkpoint_every:
-            raise StoppedError(f"{where}; nothing was kept, since --checkpoint-every is 0")
-        raise StoppedError(f"{where}; to go on: {self.settings.command()}")
-
     def _pictures(
         self, views: tuple[View, ...], like: CapturePictures | None = None
     ) -> CapturePictures:
@@ -219,14 +174,15 @@ class Fit:
 
 
 def split_views(
-    views: tuple[View, ...], hold_out: int, count: int
-) -> tuple[tuple[View, ...], tuple[View, ...]]:
-    """The photographs to train on, and those that are held out: every ``hold_out``-th.
+    views: tuple[One, ...], hold_out: int, count: int, *, what: str = "photograph"
+) -> tuple[tuple[One, ...], tuple[One, ...]]:
+    """The views to train on, and those that are held out: every ``hold_out``-th.
 
     Args:
         views: all of them, in the capture's order.
         hold_out: 0 for none.
         count: train on so many, evenly spaced among the rest; 0 for all.
+        what: what a view is called.
 
     Raises:
         InputError: nothing is left to train on, or there are fewer than ``count``.
@@ -234,9 +190,9 @@ def split_views(
     seen = tuple(v for k, v in enumerate(views) if not hold_out or k % hold_out)
     unseen = tuple(v for k, v in enumerate(views) if hold_out and k % hold_out == 0)
     if not seen:
-        raise InputError(f"--hold-out {hold_out} leaves no photograph to train on")
+        raise InputError(f"--hold-out {hold_out} leaves no {what} to train on")
     if count > len(seen):
-        raise InputError(f"--views is {count}, there are {len(seen)} photographs to train on")
+        raise InputError(f"--views is {count}, there are {len(seen)} {what}s to train on")
     if count:
         seen = tuple(seen[int(k)] for k in np.arange(count) * len(seen) / count)
     return seen, unseen

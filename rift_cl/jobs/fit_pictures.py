@@ -101,6 +101,10 @@ class CapturePictures:
         alpha = image[..., 3:]
         return np.asarray(image[..., :3] * alpha + background * (1 - alpha), np.float32)
 
+    def any_cut_out(self) -> bool:
+        """Whether a photograph has alpha of its own."""
+        return any(self._is_cut_out(number) for number in range(len(self.views)))
+
     def _is_cut_out(self, number: int) -> bool:
         """Whether a photograph has alpha of its own."""
         if number not in self._own_alpha:

@@ -11,27 +11,34 @@ from typing import Annotated, Any, Literal
 from tyro.conf import Positional
 
 from rift_cl.errors import InputError
+from rift_cl.jobs.xray_options import XRAY_ONLY, XrayOptions
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.homogenisation import Homogenisation
 from rift_cl.train.settings import Densification, Rates, TrainSettings
+from rift_cl.train.xray_trainer import xray_settings
 
 # Rates of poses and exposures where they are refined.
-_POSE_RATE, _EXPOSURE_RATE = 1e-4, 1e-3
+_POSE_RATE, _EXPOSURE_RATE = 1e-3, 1e-2
 # What may differ between a run and the one that goes on with it: it changes no bit of the result.
-_FREE = ("out", "resume", "overwrite", "dry_run", "checkpoint_every", "view", "device")
+_FREE = (
+    *("out", "resume", "overwrite", "dry_run", "checkpoint_every", "view", "device"),
+    *("memory", "format"),
+)
 
 
 @dataclass(frozen=True)
-class FitSettings:
-    """Fit splats to posed photographs.
+class FitSettings(XrayOptions):
+    """Fit splats to posed photographs, or to the projections of an X-ray scan.
 
     Example: rift fit capture/transforms.json --out fit --steps 3000 --splats 20000
     """
 
     capture: Annotated[Path, Positional]
-    """A transforms.json, a folder with one, a COLMAP model, or a folder of bare photographs."""
+    """A transforms.json, a folder with one, a COLMAP model, or a folder of bare photographs; with
+    --mode xray a scan in an HDF5 or NPZ file."""
     out: Path = Path("rift-fit")
-    """Folder for scene.ply, report.html, config.json, metrics.json and checkpoints."""
+    """Folder for scene.ply, report.html, config.json, metrics.json and checkpoints; X-rays: for
+    slices as well."""
     steps: int = 3000
     """Pictures that are looked at, one after the other."""
     splats: int = 20_000
@@ -53,7 +60,7 @@ class FitSettings:
     pictures, 0.05 to 0.1 suits cameras that all keep one distance."""
     homogenise: float = 0.0
     """Exponent of the ramp that weighs the residual's frequencies; 0 for none, 0.5 to 1 to pull
-    at fine detail as strongly as at coarse."""
+    at fine detail as strongly as at coarse; for X-rays those along the detector's rows."""
     band_limit: bool = False
     """Let no splat be finer than what the cameras resolve (Mip-Splatting's 3D filter)."""
     refine_poses: bool = False
@@ -87,8 +94,9 @@ class FitSettings:
         """Check what neither the trainer nor the rasterizer will.
 
         Raises:
-            InputError: an option makes no sense.
+            InputError: an option makes no sense, or not in this mode.
         """
+        self.demand_mode()
         least = {"downscale": 1, "hold_out": 0, "views": 0, "checkpoint_every": 0}
         for name, bound in least.items():
             if getattr(self, name) < bound:
@@ -108,6 +116,14 @@ class FitSettings:
 
     def training(self) -> TrainSettings:
         """The trainer's part."""
+        if self.mode == "xray":
+            return xray_settings(
+                steps=self.steps,
+                seed=self.seed,
+                splats=self.splats,
+                exponent=self.homogenise,
+                band_limit=self.band_limit,
+            )
         return TrainSettings(
             steps=self.steps,
             seed=self.seed,
@@ -125,11 +141,16 @@ class FitSettings:
 
     def drawing(self) -> SplatSettings:
         """The rasterizer's part."""
-        return SplatSettings(eps2d=self.eps2d, absgrad=self.absgrad)
+        return SplatSettings(eps2d=self.eps2d, absgrad=self.absgrad, mode=self.mode)
 
     def decisive(self) -> dict[str, Any]:
         """What decides the result, in words that JSON keeps: a resumed run must have the same."""
         values = {k: v for k, v in dataclasses.asdict(self).items() if k not in _FREE}
+        if self.mode == "light":
+            # So that fits from before there were other modes still go on.
+            values = {k: v for k, v in values.items() if k not in ("mode", *XRAY_ONLY)}
+        else:
+            values["rows"] = None if self.rows is None else list(self.rows)
         values["capture"] = str(self.capture.absolute())
         values["test"] = [str(path.absolute()) for path in self.test]
         return values

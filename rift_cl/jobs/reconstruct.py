@@ -19,20 +19,24 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.budget import format_bytes, plan_chunks
 from rift_cl.cl.device import Device
-from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.io.scan_file import ScanFile
 from rift_cl.io.volume import open_volume
 from rift_cl.jobs.reconstruct_report import Preview, reconstruction_page
 from rift_cl.jobs.run_folder import RunFolder
-from rift_cl.jobs.scan_input import ScanInput, read_attenuation
+from rift_cl.jobs.scan_input import (
+    VOLUME_NAMES,
+    ScanInput,
+    check_center,
+    chosen_rows,
+    read_attenuation,
+)
 from rift_cl.operators import HighPass, Projector, Ramp
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Attenuation, backproject, fbp, find_center
 
 # Slices between two reports of progress.
 _SLAB = 16
-_NAMES = {"tiff": "slices", "zarr": "volume.zarr", "h5": "volume.h5"}
 
 
 @dataclass(frozen=True)
@@ -82,14 +86,14 @@ class Reconstruction:
         self.settings = settings
         self.device: Device = settings.open_device()
         self.scan: ScanFile = settings.open_scan()
-        self.rows = _rows(settings.rows, self.scan)
+        self.rows = chosen_rows(settings.rows, self.scan)
         self.pitch = (self.scan.pitch or 1.0) if settings.pitch is None else settings.pitch
         unit = self.scan.unit or ("bin" if self.pitch == 1.0 else "")
         self.unit = unit if settings.unit is None else settings.unit
         self.filter = _filter(settings)
         # Made now, so that a bad pitch or center is told before any work.
         self._geometry(settings.center)
-        _check_center(settings.center, self.scan)
+        check_center(settings.center, self.scan)
         self.folder = RunFolder(settings.out, "reconstruct", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
         self._preview = Preview.of(self.shape[0])
@@ -120,7 +124,7 @@ class Reconstruction:
             "volume": f"{self.shape} (z, y, x), {format_bytes(4 * math.prod(self.shape))}",
             "slabs": f"{len(self.slabs)} of at most {max(s.stop - s.start for s in self.slabs)}",
             "device": f"{self.device.name}, budget {format_bytes(self.device.budget)}",
-            "output": str(self.settings.out / _NAMES[self.settings.format]),
+            "output": str(self.settings.out / VOLUME_NAMES[self.settings.format]),
             "time": f"about {seconds:.3g} s, from one slice",
         }
 
@@ -139,7 +143,7 @@ class Reconstruction:
             raise
         # From here on the slices are this run's, and an earlier configuration no longer theirs.
         self.folder.mark()
-        formats = set(_NAMES.values()) - {_NAMES[self.settings.format]}
+        formats = set(VOLUME_NAMES.values()) - {VOLUME_NAMES[self.settings.format]}
         self.folder.drop(*formats)
         self.metrics["seconds"] = time.perf_counter() - begin
         page = reconstruction_page(self, self._preview)
@@ -147,7 +151,7 @@ class Reconstruction:
 
     def _write(self, center: float) -> Iterator[Report]:
         settings, count = self.settings, self.shape[0]
-        path = settings.out / _NAMES[settings.format]
+        path = settings.out / VOLUME_NAMES[settings.format]
         spacing = (self.pitch,) * 3
         self.metrics = {"center": center, "dead_pixels": 0, "starved_samples": 0}
         projectors: dict[int, Projector] = {}
@@ -199,23 +203,6 @@ class Reconstruction:
 def _cut(chunk: slice) -> list[slice]:
     starts = range(chunk.start, chunk.stop, _SLAB)
     return [slice(start, min(start + _SLAB, chunk.stop)) for start in starts]
-
-
-def _rows(wanted: tuple[int, int] | None, scan: ScanFile) -> tuple[int, int]:
-    rows = wanted or (0, scan.shape[1])
-    if not 0 <= rows[0] < rows[1] <= scan.shape[1]:
-        raise InputError(
-            f"--rows is {rows[0]} {rows[1]}, {scan.path} has the rows 0 to {scan.shape[1]}: give "
-            "the first and the one after the last"
-        )
-    return rows
-
-
-def _check_center(center: float | None, scan: ScanFile) -> None:
-    """A rotation axis may lie off the detector, but not where no ray meets the slice."""
-    bins = scan.shape[2]
-    if center is not None and not -bins < center < 2 * bins:
-        raise InputError(f"--center is {center:g}, the detector has the bins 0 to {bins - 1}")
 
 
 def _filter(settings: ReconstructSettings) -> Ramp | HighPass:

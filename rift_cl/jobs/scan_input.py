@@ -13,10 +13,13 @@ from tyro.conf import Positional
 from rift_cl.cl.budget import parse_bytes
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import open_device
-from rift_cl.errors import NonFiniteError
+from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.io.scan import open_scan
 from rift_cl.io.scan_file import ScanFile
 from rift_cl.reconstruct.flatfield import Attenuation, attenuation
+
+# How a volume is called in the folder of its run, by format.
+VOLUME_NAMES = {"tiff": "slices", "zarr": "volume.zarr", "h5": "volume.h5"}
 
 
 @dataclass(frozen=True)
@@ -76,3 +79,29 @@ def _check(frames: NDArray[np.float32], name: str, start: int) -> None:
             f"the first at view {view}, row {start + row}, bin {bin}: repair the file, or choose "
             "other rows"
         )
+
+
+def chosen_rows(wanted: tuple[int, int] | None, scan: ScanFile) -> tuple[int, int]:
+    """The detector rows that are asked for, all if none are.
+
+    Raises:
+        InputError: there are no such rows.
+    """
+    rows = wanted or (0, scan.shape[1])
+    if not 0 <= rows[0] < rows[1] <= scan.shape[1]:
+        raise InputError(
+            f"--rows is {rows[0]} {rows[1]}, {scan.path} has the rows 0 to {scan.shape[1]}: give "
+            "the first and the one after the last"
+        )
+    return rows
+
+
+def check_center(center: float | None, scan: ScanFile) -> None:
+    """A rotation axis may lie off the detector, but not where no ray meets the slice.
+
+    Raises:
+        InputError: it does.
+    """
+    bins = scan.shape[2]
+    if center is not None and not -bins < center < 2 * bins:
+        raise InputError(f"--center is {center:g}, the detector has the bins 0 to {bins - 1}")

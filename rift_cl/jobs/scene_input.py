@@ -68,6 +68,11 @@ class OpenedScene:
             raise InputError(f"{path}: holds no {_SCENE}; name a .ply or .splat file, or a fit")
         self.name: str = path.resolve().name
         self.splats = SplatScene.load(path if self.folder is None else path / _SCENE)
+        if self.splats.mode == "xray":
+            raise InputError(
+                f"{path}: is an X-ray scene, of densities and not of light; its slices lie with "
+                "its fit"
+            )
         if len(self.splats) == 0:
             raise InputError(f"{path}: holds no splats, there is nothing to draw")
         eps2d = self._fitted("eps2d") if settings.eps2d is None else settings.eps2d

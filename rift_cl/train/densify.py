@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.train.parameters import GROUPS, Parameters
+from rift_cl.train.quaternions import rotated
 from rift_cl.train.settings import Densification
 
 _SPLIT_SHRINK = 1.6
@@ -160,12 +161,8 @@ def _samples(raw: Raw, split: NDArray[np.intp], random: np.random.Generator) -> 
     """Where the halves of S splats lie, seen from their middle: drawn from it, (2S, 3)."""
     twice = np.concatenate([split, split])
     scales = np.exp(np.minimum(raw["log_scales"][twice].astype(float), _MOST_LOG))
-    quats = raw["quats"][twice].astype(float)
-    quats /= np.linalg.norm(quats, axis=1, keepdims=True)
-    w, v = quats[:, :1], quats[:, 1:]
     along = scales * random.standard_normal(scales.shape)
-    across = np.cross(v, along)
-    return np.asarray(along + 2 * (w * across + np.cross(v, across)))
+    return rotated(raw["quats"][twice].astype(float), along)
 
 
 def _shared_logits(logits: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -8,6 +8,12 @@ one before:
     o' = 1 - (1 - o)^(1/k),    s' = s o / sum over i = 1..k, j = 0..i-1 of
                                          binomial(i-1, j) (-1)^j o'^(j+1) / sqrt(j+1).
 
+Densities of X-rays add up, nothing hides anything: there a faint splat takes over one half of a
+splat that the projections pull at. Mass m, mean and covariance of the two together stay what they
+were, by shifts along the longest axis,
+
+    m' = m / 2,    mean' = mean +- a s e,    s' = s sqrt(1 - a^2)  along e.
+
 It happens seldom, on the host, in NumPy; what is random comes from (seed, step) alone.
 """
 
@@ -18,12 +24,16 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.errors import InputError
 from rift_cl.train.parameters import GROUPS, Parameters
+from rift_cl.train.quaternions import rotated
 from rift_cl.train.settings import Renewal
 
 # More splats than this in one place share it like so many.
 _MOST_IN_PLACE = 51
 _OPACITY_EDGE = 1e-6
+# Shift of the halves of a splat, in standard deviations.
+_APART = 0.5
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +52,12 @@ def renew(
 
     Returns:
         Parameters in which Adam's moments of all splats that were touched are zero.
+
+    Raises:
+        InputError: the splats have densities; ``renew_densities`` is for them.
     """
+    if parameters.density:
+        raise InputError("renew: these splats have densities, wanted opacities")
     raw, first, second = parameters.host()
     random = np.random.default_rng((seed, parameters.step, 0xA11))
     opacities = _sigmoid(raw["logits"].astype(float))
@@ -65,6 +80,61 @@ def renew(
             moments[name] = _extended(moments[name], max(added, 0))
             moments[name][touched] = 0
     return parameters.replaced(raw, first, second)
+
+
+def renew_densities(
+    parameters: Parameters, settings: Renewal, pull: NDArray[np.float32], *, seed: int
+) -> Parameters:
+    """Relocate splats of hardly any mass into the halves of others.
+
+    Args:
+        parameters: the splats; they are not changed.
+        settings: ``faint`` is the share of the mean mass up to which a splat counts as faded.
+        pull: (N,) how much the projections want of each splat: what is split is drawn by it.
+        seed: of the drawing by chance, with the step.
+
+    Returns:
+        As many splats, in which Adam's moments of all that were touched are zero. The mass of
+        those that were faded is lost.
+
+    Raises:
+        InputError: the splats have opacities; ``renew`` is for them.
+    """
+    if not parameters.density:
+        raise InputError("renew_densities: these splats have opacities, wanted densities")
+    raw, first, second = parameters.host()
+    random = np.random.default_rng((seed, parameters.step, 0xA12))
+    masses = raw["logits"].astype(float) + raw["log_scales"].sum(axis=1, dtype=float)
+    masses = np.exp(masses - masses.max())
+    faded = masses <= settings.faint * masses.mean()
+    chance = np.where(faded | ~np.isfinite(pull), 0, pull.astype(float))
+    places = np.flatnonzero(faded)[: np.count_nonzero(chance)]
+    if places.size == 0:
+        return parameters
+    hosts = random.choice(len(parameters), places.size, replace=False, p=chance / chance.sum())
+    for name in GROUPS:
+        raw[name][places] = raw[name][hosts]
+        for moments in (first, second):
+            moments[name][places] = moments[name][hosts] = 0
+    _halve(raw, hosts, places)
+    return parameters.replaced(raw, first, second)
+
+
+def _halve(
+    raw: dict[str, NDArray[np.float32]], hosts: NDArray[np.intp], places: NDArray[np.intp]
+) -> None:
+    """Make two halves of each host and the copy of it at the same index of ``places``."""
+    rows = np.arange(hosts.size)
+    longest = raw["log_scales"][hosts].argmax(axis=1)
+    along = np.zeros((hosts.size, 3))
+    along[rows, longest] = _APART * np.exp(raw["log_scales"][hosts, longest].astype(float))
+    shift = rotated(raw["quats"][hosts].astype(float), along)
+    shrink = np.float32(0.5 * np.log(1 - _APART**2))
+    for halves, side in ((hosts, 1), (places, -1)):
+        raw["means"][halves] += side * shift
+        raw["log_scales"][halves, longest] += shrink
+        # Half of the mass, in a volume that has shrunk.
+        raw["logits"][halves] -= np.float32(np.log(2)) + shrink
 
 
 def _share(

@@ -1,8 +1,9 @@
-"""Where splats come from and go to while they are trained: one protocol, two ways.
+"""Where splats come from and go to while they are trained: one protocol, three ways.
 
 ``MarkovChain`` renews splats that have faded and lets faint ones walk at random (3DGS as MCMC);
-``Densify`` clones, splits and prunes (3DGS as it was at first). A trainer asks for penalties before
-each step of Adam and for the splats to go on with after it, and keeps ``state`` in checkpoints.
+``Densify`` clones, splits and prunes (3DGS as it was at first); ``Halving`` renews X-ray splats,
+whose densities add up. A trainer asks for penalties before each step of Adam and for the splats to
+go on with after it, and keeps ``state`` in checkpoints.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from rift_cl.splat.frame import Frame, FrameGradients
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.densify import densify, reset_opacities
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.renewal import renew
+from rift_cl.train.renewal import renew, renew_densities
 from rift_cl.train.screen_statistics import ScreenStatistics
 from rift_cl.train.settings import TrainSettings
 
@@ -65,7 +66,7 @@ class Strategy(Protocol):
 def strategy_of(
     settings: TrainSettings, parameters: Parameters, *, extent: float, finish: int
 ) -> Strategy:
-    """The strategy of a run.
+    """The strategy of a run: for densities ``mcmc`` means ``Halving``.
 
     Args:
         settings: of the run.
@@ -78,6 +79,8 @@ def strategy_of(
     """
     if settings.strategy == "default":
         return Densify(settings, parameters, extent=extent)
+    if parameters.density:
+        return Halving(settings, parameters)
     return MarkovChain(settings, finish=finish)
 
 
@@ -131,7 +134,60 @@ class MarkovChain:
         _check_names(state, self.state())
 
 
-class Densify:
+class _Gathering:
+    """What strategies have in common that go by statistics of the splats on the screen."""
+
+    def __init__(self, settings: TrainSettings, seen: ScreenStatistics) -> None:
+        self.settings = settings
+        self._seen = seen
+
+    def drawing(self, drawing: SplatSettings) -> SplatSettings:
+        """With the magnitudes of screen gradients, if those are gathered."""
+        return replace(drawing, absgrad=drawing.absgrad or self._seen.absgrad)
+
+    def before_step(self, step: int) -> dict[str, float]:
+        """None."""
+        return dict.fromkeys(("opacity_penalty", "scale_penalty"), 0.0)
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """The statistics since they were last cleared."""
+        return {"statistics": self._seen.host()}
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from them; see ``Strategy``."""
+        _check_names(state, ("statistics",))
+        self._seen.restore(np.asarray(state["statistics"]))
+
+
+class Halving(_Gathering):
+    """X-ray splats without mass take over halves of others; see ``renew_densities``.
+
+    Their number stays, nothing walks at random and nothing is penalised.
+
+    Args:
+        settings: of the run.
+        parameters: the splats it begins with, which have densities.
+    """
+
+    def __init__(self, settings: TrainSettings, parameters: Parameters) -> None:
+        super().__init__(settings, ScreenStatistics(parameters.device, len(parameters)))
+
+    def after_step(
+        self, parameters: Parameters, frame: Frame, gradients: FrameGradients, rate: float
+    ) -> Parameters:
+        """Renewed now and then, by how strongly each splat was pulled at since the last time."""
+        step, renewal = parameters.step, self.settings.renewal
+        if step >= renewal.last * self.settings.steps:
+            return parameters
+        self._seen.add(frame, gradients)
+        if step >= renewal.first and step % renewal.every == 0:
+            pull = self._seen.host()[:, 0]
+            parameters = renew_densities(parameters, renewal, pull, seed=self.settings.seed)
+            self._seen.clear(len(parameters))
+        return parameters
+
+
+class Densify(_Gathering):
     """Splats are cloned, split and pruned; see ``rift_cl.train.densify``.
 
     Args:
@@ -149,24 +205,16 @@ class Densify:
                 "TrainSettings: strategy is 'default', which wants opacities, and these splats "
                 "have densities: use 'mcmc'"
             )
-        self.settings = settings
-        self.extent = extent
         absgrad = settings.densification.absgrad
-        self._seen = ScreenStatistics(parameters.device, len(parameters), absgrad=absgrad)
+        seen = ScreenStatistics(parameters.device, len(parameters), absgrad=absgrad)
+        super().__init__(settings, seen)
+        self.extent = extent
 
     @property
     def reset_every(self) -> int:
         """Steps between two resets of opacities; 0 for none."""
         how, steps = self.settings.densification, self.settings.steps
         return max(round(how.reset * steps), how.reset_least) if how.reset else 0
-
-    def drawing(self, drawing: SplatSettings) -> SplatSettings:
-        """With the magnitudes of screen gradients, if those are asked for."""
-        return replace(drawing, absgrad=drawing.absgrad or self._seen.absgrad)
-
-    def before_step(self, step: int) -> dict[str, float]:
-        """None."""
-        return {"opacity_penalty": 0.0, "scale_penalty": 0.0}
 
     def after_step(
         self, parameters: Parameters, frame: Frame, gradients: FrameGradients, rate: float
@@ -191,15 +239,6 @@ class Densify:
         if reset and step % reset == 0:
             parameters = reset_opacities(parameters, _RESET * how.faint)
         return parameters
-
-    def state(self) -> dict[str, NDArray[Any]]:
-        """The statistics since the last densification."""
-        return {"statistics": self._seen.host()}
-
-    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from them; see ``Strategy``."""
-        _check_names(state, ("statistics",))
-        self._seen.restore(np.asarray(state["statistics"]))
 
 
 def _check_names(state: Mapping[str, Any], wanted: Any) -> None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import splat_files as made
+from plyfile import PlyData
 from splat_files import sigmoid
 
 import rift_cl as rift
 from rift_cl.errors import DTypeError, InputError, NonFiniteError, ShapeError
+from rift_cl.io.splat_scene import XrayScene
 from rift_cl.splat.splats import Splats
 
 
@@ -99,3 +101,28 @@ def test_arrays_are_brought_into_one_form_and_not_copied_without_need() -> None:
     made.assert_same(rift.SplatScene(**turned), scene)
     with pytest.raises(AttributeError):
         scene.means = again.means  # type: ignore[misc]
+
+
+def test_a_scene_of_x_rays_keeps_its_densities_and_its_kind(tmp_path, device) -> None:
+    plain = made.scene(20, 0)
+    scene = XrayScene(**vars(plain))
+    scene.save(tmp_path / "scene.ply")
+    found = rift.SplatScene.load(tmp_path / "scene.ply")
+    assert found.mode == "xray" and plain.mode == "light"
+    made.assert_same(found, scene)
+    splats = found.upload(device)
+    np.testing.assert_allclose(
+        device.get(splats.opacities), np.exp(scene.logit_opacities), rtol=1e-5
+    )
+    again = XrayScene.of(splats, device)
+    np.testing.assert_allclose(again.logit_opacities, scene.logit_opacities, atol=1e-5)
+
+
+def test_no_viewer_takes_densities_for_opacities(tmp_path) -> None:
+    scene = XrayScene(**vars(made.scene(3, 0)))
+    scene.save(tmp_path / "scene.ply")
+    names = [p.name for p in PlyData.read(str(tmp_path / "scene.ply"))["vertex"].properties]
+    assert "log_density" in names and "opacity" not in names
+    assert b"comment X-ray splats" in (tmp_path / "scene.ply").read_bytes()
+    with pytest.raises(InputError, match=r"save a \.ply"):
+        scene.save(tmp_path / "scene.splat")

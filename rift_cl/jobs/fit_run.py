@@ -1,0 +1,84 @@
+"""What every fit does, whatever it looks at: it trains, can be stopped gently, and goes on later.
+
+``Fit`` (photographs) and ``XrayFit`` (projections) add what they read, how they score, and what
+they leave behind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from rift_cl.cl.discovery import open_device
+from rift_cl.errors import StoppedError
+from rift_cl.jobs.fit_checkpoints import FitCheckpoints
+from rift_cl.jobs.fit_scores import ViewScore
+from rift_cl.jobs.fit_settings import FitSettings
+from rift_cl.jobs.run_folder import RunFolder
+from rift_cl.progress import Report
+from rift_cl.train.trainer import REPORT_EVERY, Trainer
+
+
+class FitRun:
+    """A fit that is planned; nothing is written yet.
+
+    Args:
+        settings: what to do.
+
+    Raises:
+        RiftError: a setting makes no sense, or the folder is in use.
+    """
+
+    def __init__(self, settings: FitSettings) -> None:
+        settings.check()
+        self.settings = settings
+        self.training, self.drawing = settings.training(), settings.drawing()
+        self.folder = RunFolder(
+            settings.out, "fit", overwrite=settings.overwrite, resume=settings.resume
+        )
+        self.device = open_device(settings.device, settings.budget())
+        self.checkpoints = FitCheckpoints(
+            settings.out / "checkpoints", settings.decisive(), self.device.name
+        )
+        self.losses: list[tuple[int, float]] = []
+        self.scores: dict[str, list[ViewScore]] = {}
+        self.metrics: dict[str, Any] = {}
+        self.announce: Callable[[str], None] = lambda line: None
+        self._stopping = False
+
+    def stop(self) -> None:
+        """Break off after the step that is being taken; ``run`` then keeps a checkpoint."""
+        self._stopping = True
+
+    def _trained(self, trainer: Trainer, pictures: Any) -> Iterator[Report]:
+        """Train, with a checkpoint now and then, at the end, and when broken off."""
+        if self.settings.resume:
+            self.losses = self.checkpoints.restore(trainer)
+        else:
+            self.folder.mark()
+            self.folder.drop("checkpoints")
+        every, kept = self.settings.checkpoint_every, trainer.parameters.step
+        reports = trainer.run(lambda: self._stopping)
+        if self.settings.view:
+            from rift_cl.jobs.fit_viewer import watched
+
+            title = self.settings.capture.name
+            reports = watched(reports, trainer, pictures, title=title, announce=self.announce)
+        for report in reports:
+            if report.done % REPORT_EVERY == 0 or report.done == report.total:
+                self.losses.append((report.done, report.values["loss"]))
+            ended = self._stopping or report.done == report.total
+            if every and (ended or report.done >= kept + every):
+                kept = report.done
+                self.checkpoints.save(trainer, self.losses)
+            yield report
+            self._heed(report.done)
+
+    def _heed(self, step: int) -> None:
+        """Break off if that was asked for."""
+        if not self._stopping:
+            return
+        where = f"interrupted after step {step} of {self.settings.steps}"
+        if not self.settings.checkpoint_every:
+            raise StoppedError(f"{where}; nothing was kept, since --checkpoint-every is 0")
+        raise StoppedError(f"{where}; to go on: {self.settings.command()}")

@@ -1,0 +1,162 @@
+"""``rift fit --mode xray``: the projections of a parallel beam become Gaussian densities."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.io.splat_scene import XrayScene
+from rift_cl.io.volume import open_volume
+from rift_cl.jobs.fit import split_views
+from rift_cl.jobs.fit_run import FitRun
+from rift_cl.jobs.fit_scores import score_record
+from rift_cl.jobs.fit_settings import FitSettings
+from rift_cl.jobs.scan_input import VOLUME_NAMES
+from rift_cl.jobs.xray_input import Projections, XrayInput, XrayPictures
+from rift_cl.jobs.xray_report import xray_page
+from rift_cl.jobs.xray_scores import backprojected, drawn, relative_error, score_projections
+from rift_cl.progress import Report
+from rift_cl.splat.splats import Splats
+from rift_cl.train.homogenisation import noise_of
+from rift_cl.train.parameters import Parameters
+from rift_cl.train.xray_start import density_splats
+from rift_cl.train.xray_trainer import XrayTrainer
+from rift_cl.train.xray_voxels import Footprints
+
+# Standard deviations of splats at the start, as a share of the gaps between them.
+_SIZE = 0.8
+# Rows from which the noise is estimated, and projections that tell how good the start is.
+_FEW = 8
+
+Floats = NDArray[np.float32]
+
+
+class XrayFit(FitRun):
+    """A fit to projections that is planned; nothing is written yet.
+
+    Args:
+        settings: what to do.
+
+    Raises:
+        RiftError: the scan cannot be read, or a setting makes no sense.
+    """
+
+    def __init__(self, settings: FitSettings) -> None:
+        super().__init__(settings)
+        self.input = XrayInput(settings, self.device)
+        numbers = tuple(range(self.input.scan.shape[0]))
+        self.seen, self.unseen = split_views(
+            numbers, settings.hold_out, settings.views, what="projection"
+        )
+
+    def plan(self) -> dict[str, str]:
+        """What would be done, by name."""
+        scan, rows = self.input.scan, self.input.rows
+        bins, settings = scan.shape[2], self.settings
+        return {
+            "scan": f"{scan.path} ({scan.source}, {scan.kind})",
+            "trained on": f"{len(self.seen)} projections",
+            "held out": f"{len(self.unseen)} projections",
+            "rows": f"{rows[0]} to {rows[1] - 1}, {bins} bins each",
+            "splats": f"{settings.splats}",
+            "output": f"scene.ply and {VOLUME_NAMES[settings.format]}, "
+            f"{(rows[1] - rows[0], bins, bins)} (z, y, x)",
+            "host memory": f"{self.input.need / 2**20:.0f} MiB",
+            "device": self.device.name,
+        }
+
+    def run(self) -> Iterator[Report]:
+        """Do it; a report now and then.
+
+        Raises:
+            StoppedError: ``stop`` was called; a checkpoint was kept.
+        """
+        yield Report(0, self.settings.steps, "steps")
+        whole = self.input.read()
+        self.folder.make()
+        seen = whole.of(self.seen)
+        pictures = XrayPictures(self.device, seen)
+        trainer = self._trainer(seen, pictures)
+        first = self._start_error(trainer, seen)
+        yield from self._trained(trainer, pictures)
+        splats, volume = trainer.parameters.drawn, backprojected(self.device, seen)
+        if self.unseen:
+            self.scores["held out"] = []
+            unseen = whole.of(self.unseen)
+            for score in score_projections(trainer.renderer, splats, unseen, seen, volume):
+                self.scores["held out"].append(score)
+                done = len(self.scores["held out"])
+                yield Report(done, len(self.unseen), "projections held out")
+                self._heed(trainer.parameters.step)
+        self.metrics = {
+            "splats": len(splats),
+            "loss": self.losses[-1][1],
+            "center": whole.center,
+            "scale": whole.scale,
+            "start_error": first,
+            **score_record(self.scores),
+        }
+        self._leave(splats, volume, whole)
+
+    def _trainer(self, seen: Projections, pictures: XrayPictures) -> XrayTrainer:
+        settings, training, rows = self.settings, self.training, seen.values.shape[1]
+        volume = np.maximum(backprojected(self.device, seen, "hann"), 0)
+        # Without what was negative there is too much of it: as much as the projections say.
+        mass = np.maximum(seen.values.sum(axis=2, dtype=float).mean(axis=0), 0)
+        volume *= (mass / np.maximum(volume.sum(axis=(1, 2)), 1e-12))[:, None, None]
+        raw = density_splats(
+            volume,
+            seen.grid,
+            settings.splats,
+            seed=settings.seed,
+            dilation=settings.eps2d,
+            size=_SIZE,
+        )
+        first = Parameters.of(self.device, raw, density=True)
+        if settings.homogenise and min(len(self.seen), seen.values.shape[2]) >= _FEW:
+            few = np.unique(np.linspace(0, rows - 1, _FEW).round().astype(int))
+            noise = noise_of([seen.values[:, row, :, None] for row in few.tolist()])
+            training = dataclasses.replace(training, noise=noise)
+        return XrayTrainer(pictures, first, training, self.drawing, flat=rows == 1)
+
+    def _start_error(self, trainer: XrayTrainer, seen: Projections) -> float:
+        """The relative error of a few training projections before the first step."""
+        few = np.unique(np.linspace(0, len(self.seen) - 1, _FEW).round().astype(int)).tolist()
+        splats, cameras = trainer.parameters.drawn, trainer.pictures.cameras
+        images = [drawn(trainer.renderer, splats, cameras[number]) for number in few]
+        return relative_error(np.stack(images), seen.values[few])
+
+    def _leave(self, splats: Splats, volume: Floats, whole: Projections) -> None:
+        """Write splats, slices and report, in the scan's units."""
+        settings, source, pitch = self.settings, self.input, self.input.pitch
+        density = whole.scale / pitch
+        scene = XrayScene.of(splats, self.device)
+        XrayScene(
+            means=scene.means * np.float32(pitch),
+            log_scales=scene.log_scales + np.float32(log(pitch)),
+            quats=scene.quats,
+            logit_opacities=scene.logit_opacities + np.float32(log(density)),
+            sh=scene.sh,
+        ).save(settings.out / "scene.ply")
+        slices = density * self._voxels(splats, whole)
+        path, spacing = settings.out / VOLUME_NAMES[settings.format], (pitch,) * 3
+        with open_volume(
+            path, slices.shape, format=settings.format, spacing=spacing, unit=source.unit
+        ) as writer:
+            writer.write(0, slices)
+        self.folder.drop(*(set(VOLUME_NAMES.values()) - {path.name}))
+        shown = (slices, density * volume)
+        page = xray_page(source.scan.path.name, shown, self.scores, self.losses, self.metrics)
+        self.folder.finish(settings, self.metrics, page, self.device)
+
+    def _voxels(self, splats: Splats, whole: Projections) -> Floats:
+        names = ("means", "quats", "scales", "opacities")
+        means, quats, scales, peaks = (
+            self.device.get(getattr(splats, name)).astype(float) for name in names
+        )
+        footprints = Footprints(whole.grid, means, quats, scales, dilation=self.drawing.eps2d)
+        return footprints.sums(peaks).astype(np.float32)

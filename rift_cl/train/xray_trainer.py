@@ -1,0 +1,89 @@
+"""The trainer of X-ray splats: densities alone, and in one slice if the scan has only one.
+
+Line integrals need no colour: it is one, has no rate, and the loss looks at the first channel. A
+scan of one detector row says nothing about what is across it. Gradients there are no more than
+rounding, which Adam would blow up to whole steps, so that after each step the splats are put back
+into their slice.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rift_cl.cl.arithmetic import copy_columns
+from rift_cl.splat.settings import SplatSettings
+from rift_cl.train.homogenisation import Homogenisation
+from rift_cl.train.parameters import Parameters
+from rift_cl.train.settings import Rates, Renewal, TrainSettings
+from rift_cl.train.trainer import Pictures, Trainer
+from rift_cl.train.xray_start import FLAT
+
+# The start is near already, so that positions may move fast and need not slow down by much.
+RATES = Rates(means=6e-4, means_last=0.1, quats=2e-2, log_scales=2e-2, logits=4e-2, sh=0.0)
+RENEWAL = Renewal(first=100, every=100, last=0.7, faint=0.02)
+
+
+def xray_settings(
+    *, steps: int, seed: int, splats: int, exponent: float, band_limit: bool
+) -> TrainSettings:
+    """The settings of a fit to projections.
+
+    Args:
+        steps: projections that are looked at.
+        seed: of everything that is random.
+        splats: how many there are.
+        exponent: of the ramp along the detector's rows; orbits are dense along nothing else.
+        band_limit: as in ``TrainSettings``.
+    """
+    return TrainSettings(
+        steps=steps,
+        seed=seed,
+        splats=splats,
+        sh_degree=0,
+        loss="l2",
+        ssim_weight=0.0,
+        homogenisation=Homogenisation(exponent=exponent, along_rows=True),
+        band_limit=band_limit,
+        rates=RATES,
+        renewal=RENEWAL,
+    )
+
+
+class XrayTrainer(Trainer):
+    """A fit of densities in progress.
+
+    Args:
+        pictures: projections of one channel, of lengths in detector bins.
+        parameters: the splats to begin with, which have densities.
+        settings: of the fit.
+        drawing: of the rasterizer, in xray mode.
+        flat: whether there is but one detector row.
+    """
+
+    def __init__(
+        self,
+        pictures: Pictures,
+        parameters: Parameters,
+        settings: TrainSettings,
+        drawing: SplatSettings,
+        *,
+        flat: bool,
+    ) -> None:
+        super().__init__(pictures, parameters, settings, drawing)
+        count = len(parameters)
+        self._zero = self.device.zeros((count, 2)) if flat else None
+        thin = np.full((count, 1), np.log(FLAT), np.float32)
+        self._thin = self.device.array(thin) if flat else None
+
+    def step(self) -> Any:
+        """One projection; the loss as a (1,) device array."""
+        value = super().step()
+        if self._zero is not None:
+            raw = self.parameters.raw
+            copy_columns(self.device, self._zero, 0, raw["means"], 2, 1)
+            copy_columns(self.device, self._zero, 0, raw["quats"], 1, 2)
+            copy_columns(self.device, self._thin, 0, raw["log_scales"], 2, 1)
+            self.parameters.activate()
+        return value
