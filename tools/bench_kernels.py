@@ -9,7 +9,6 @@ shipped and not measured makes the run fail, so that none is forgotten.
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -20,8 +19,9 @@ import tyro
 
 import rift_cl as rift
 from bench.case import Case
+from bench.command import report, say
 from bench.contender import Contender, RiftOnDevice, RiftOnHost
-from bench.costs import COSTS, Cost, CoverageError, check_known, check_measured
+from bench.costs import COSTS, Cost, check_known, check_measured
 from bench.limits import LimitMeter, Limits
 from bench.operations import Split, operations, split_record, splits
 from bench.peers import PEERS, ScikitImage
@@ -29,7 +29,7 @@ from bench.race import compared
 from bench.rasterizers import RASTERIZERS
 from bench.splats import SPLAT_COSTS, SplatCase
 from bench.surroundings import surroundings
-from bench.tables import markdown, show, tables
+from bench.tables import markdown, tables
 from rift_cl.cl.source import kernel_names
 
 _SIZES = ("256x384", "512x768", "2048x1500")
@@ -130,7 +130,7 @@ def _draw(meter: LimitMeter, options: Options) -> list[Measured]:
     found, skipped, kinds = [], dict[str, str](), RASTERIZERS if options.peers else ()
     for count, size in options.splats or (_QUICK_SPLATS if options.quick else _SPLATS):
         case = SplatCase(count, size, meter.device)
-        _say(f"{case.name}: {', '.join(['kernels', *(kind.name for kind in kinds)])}")
+        say(f"{case.name}: {', '.join(['kernels', *(kind.name for kind in kinds)])}")
         rounds = options.rounds or (2 if options.quick else 8)
         kernel_splits = splits(meter, case, case.operations, repeats=rounds)
         lead = compared(
@@ -165,11 +165,11 @@ def _measure_one(
     skipped: dict[str, str],
     left_out: dict[str, str],
 ) -> Measured:
-    _say(f"{case.name}: kernels")
+    say(f"{case.name}: kernels")
     rounds = options.rounds or (2 if options.quick else 5 if case.updates < 1e8 else 3)
     runs = operations(meter.device, case)
     kernel_splits = splits(meter, case, runs, repeats=rounds)
-    _say(f"{case.name}: {', '.join(kind.name for kind in kinds)}")
+    say(f"{case.name}: {', '.join(kind.name for kind in kinds)}")
     once = len(kinds) > len(_OURS) and case.updates > _ONCE_UPDATES
     lead = compared(
         *(kinds, meter.device, case),
@@ -192,33 +192,17 @@ def _dot_test(device: rift.Device, case: Case, seed: int) -> float:
     return rift.dot_test(rift.Projector(case.grid, case.scan, device=device), seed=seed)
 
 
-def _write(path: Path, text: str) -> None:
-    part = path.with_name(f"{path.name}.part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(path)
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
-
-
 def main() -> int:
     """Run with the command line's arguments; the exit status."""
     options = tyro.cli(Options)
-    record: dict[str, Any] = {}
-    try:
-        for record in measure_all(options):
-            _write(options.json, json.dumps(record, indent=1) + "\n")
-            if options.markdown is not None:
-                _write(options.markdown, markdown(record))
-    except rift.RiftError as error:
-        _say(f"bench_kernels: {error}")
-        return error.exit_status
-    except CoverageError as error:
-        _say(f"bench_kernels: {error}")
-        return 1
-    show(tables(record))
-    return 0
+    return report(
+        "bench_kernels",
+        measure_all(options),
+        json_file=options.json,
+        markdown_file=options.markdown,
+        page=markdown,
+        tables=tables,
+    )
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ launches and that belongs to no stage makes the run fail.
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,10 +18,9 @@ from typing import Any
 import tyro
 
 import rift_cl as rift
-from bench.costs import CoverageError
+from bench.command import report, say
 from bench.race import compared
 from bench.surroundings import surroundings
-from bench.tables import show
 from bench.trainers import TRAINERS, RiftTrainer, TorchTilesAlone, TrainerContender
 from bench.training_case import TrainingCase
 from bench.training_stages import host_work, renewal_price, stages, ways
@@ -78,9 +76,9 @@ def measure_all(options: Options) -> Iterator[dict[str, Any]]:
 def _measure(case: TrainingCase, options: Options, skipped: dict[str, str]) -> dict[str, Any]:
     rounds = options.rounds or (1 if options.quick else 4)
     kinds = _trainers(options)
-    _say(f"{case.name}: {', '.join(kind.name for kind in kinds)}")
+    say(f"{case.name}: {', '.join(kind.name for kind in kinds)}")
     lead = compared(kinds, case.device, case, rounds=rounds, seed=0, skipped=skipped)
-    _say(f"{case.name}: stages")
+    say(f"{case.name}: stages")
     return {
         **case.record(),
         **lead,
@@ -96,33 +94,17 @@ def _trainers(options: Options) -> tuple[type[TrainerContender], ...]:
     return (RiftTrainer, TorchTilesAlone) if options.quick else TRAINERS
 
 
-def _write(path: Path, text: str) -> None:
-    part = path.with_name(f"{path.name}.part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(path)
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
-
-
 def main() -> int:
     """Run with the command line's arguments; the exit status."""
     options = tyro.cli(Options)
-    record: dict[str, Any] = {}
-    try:
-        for record in measure_all(options):
-            _write(options.json, json.dumps(record, indent=1) + "\n")
-            if options.markdown is not None:
-                _write(options.markdown, training_page(record))
-    except rift.RiftError as error:
-        _say(f"bench_training: {error}")
-        return error.exit_status
-    except CoverageError as error:
-        _say(f"bench_training: {error}")
-        return 1
-    show(training_tables(record))
-    return 0
+    return report(
+        "bench_training",
+        measure_all(options),
+        json_file=options.json,
+        markdown_file=options.markdown,
+        page=training_page,
+        tables=training_tables,
+    )
 
 
 if __name__ == "__main__":

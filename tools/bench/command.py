@@ -1,0 +1,53 @@
+"""What every benchmark does with its record: it is kept after each case, and shown at the end."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import rift_cl as rift
+from bench.costs import CoverageError
+from bench.tables import Table, show
+from rift_cl.io import write_text
+
+Record = dict[str, Any]
+
+
+def say(text: str) -> None:
+    """A line about what is being measured now."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def report(
+    name: str,
+    records: Iterable[Record],
+    *,
+    json_file: Path,
+    markdown_file: Path | None,
+    page: Callable[[Record], str],
+    tables: Callable[[Record], Iterable[Table]],
+) -> int:
+    """Write every record as it grows, print the tables of the last one; the exit status.
+
+    Args:
+        name: of the tool.
+        records: all that was measured so far, after each case.
+        json_file: for the record.
+        markdown_file: for the page, if there is to be one.
+        page: of a record.
+        tables: of a record.
+    """
+    record: Record = {}
+    try:
+        for record in records:
+            write_text(json_file, json.dumps(record, indent=1) + "\n")
+            if markdown_file is not None:
+                write_text(markdown_file, page(record))
+    except (rift.RiftError, CoverageError) as error:
+        say(f"{name}: {error}")
+        return error.exit_status if isinstance(error, rift.RiftError) else 1
+    show(tables(record))
+    return 0
