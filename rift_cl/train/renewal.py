@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 
 
 def renew(
-    parameters: Parameters, settings: Renewal, *, most: int, seed: int, grow: bool
+    parameters: Parameters, settings: Renewal, *, most: int, seed: int, growth: float
 ) -> Parameters:
     """Relocate faded splats and add new ones.
 
@@ -48,7 +48,7 @@ def renew(
         settings: how often, and what counts as faded.
         most: splats there may be.
         seed: of the drawing by chance, with the step.
-        grow: whether splats are added.
+        growth: share by which their number grows, up to the most there may be.
 
     Returns:
         Parameters in which Adam's moments of all splats that were touched are zero.
@@ -65,19 +65,18 @@ def renew(
     alive = np.flatnonzero(opacities > settings.faint)
     if alive.size == 0:
         return parameters
-    wanted = int(len(parameters) * settings.growth) if grow else 0
-    added = min(wanted, most - len(parameters))
+    added = max(0, min(round(len(parameters) * growth), most - len(parameters)))
     chance = opacities[alive] / opacities[alive].sum()
-    chosen = alive[random.choice(alive.size, faded.size + max(added, 0), p=chance)]
+    chosen = alive[random.choice(alive.size, faded.size + added, p=chance)]
     shared = np.bincount(chosen, minlength=len(parameters))
     _share(raw, opacities, shared)
-    places = np.concatenate([faded, np.arange(len(parameters), len(parameters) + max(added, 0))])
+    places = np.concatenate([faded, np.arange(len(parameters), len(parameters) + added)])
     touched = np.concatenate([places, np.flatnonzero(shared)])
     for name in GROUPS:
-        raw[name] = _extended(raw[name], max(added, 0))
+        raw[name] = _extended(raw[name], added)
         raw[name][places] = raw[name][chosen]
         for moments in (first, second):
-            moments[name] = _extended(moments[name], max(added, 0))
+            moments[name] = _extended(moments[name], added)
             moments[name][touched] = 0
     return parameters.replaced(raw, first, second)
 

@@ -62,7 +62,9 @@ class Renewal:
         every: steps between two renewals.
         first: step of the first one.
         last: share of the steps after which there are none.
-        growth: share by which the number of splats grows at each, up to the most there may be.
+        growth: share by which the number of splats grows at each, up to the most there may be;
+            more where the run would be too short for it.
+        full: share of the steps after which there should be as many as there may be.
         faint: opacity up to which a splat counts as faded.
         noise: of the random walk, as a multiple of the positions' rate.
         opacity_penalty: weight of the mean opacity in the loss.
@@ -76,6 +78,7 @@ class Renewal:
     first: int = 500
     last: float = 0.85
     growth: float = 0.05
+    full: float = 0.5
     faint: float = 0.005
     noise: float = 5e5
     opacity_penalty: float = 0.01
@@ -85,7 +88,7 @@ class Renewal:
         """Check every number's range."""
         _check_whole(self, "every", 1)
         _check_whole(self, "first", 0)
-        for name in ("last", "faint"):
+        for name in ("last", "full", "faint"):
             _check_number(self, name, most=1)
         for name in ("growth", "noise", "opacity_penalty", "scale_penalty"):
             _check_number(self, name)

@@ -24,6 +24,8 @@ from rift_cl.train.renewal import renew, renew_densities
 from rift_cl.train.screen_statistics import ScreenStatistics
 from rift_cl.train.settings import TrainSettings
 
+# A set of splats grows by no more than this at once.
+_MOST_GROWTH = 1.0
 # A reset leaves opacities so many times as large as the faintest that stay.
 _RESET = 2.0
 
@@ -119,11 +121,20 @@ class MarkovChain:
                 renewal,
                 most=settings.splats,
                 seed=settings.seed,
-                grow=step < settings.steps * renewal.last,
+                growth=self._growth(step, len(parameters)),
             )
         if step <= self.finish:
             parameters.shake(renewal.noise * rate, settings.seed)
         return parameters
+
+    def _growth(self, step: int, count: int) -> float:
+        """The usual growth, or what a short run needs to have all its splats in time."""
+        settings, renewal = self.settings, self.settings.renewal
+        if step >= settings.steps * renewal.last:
+            return 0.0
+        left = max(1, int(settings.steps * renewal.full - step) // renewal.every + 1)
+        needed = (settings.splats / count) ** (1 / left) - 1
+        return max(renewal.growth, min(needed, _MOST_GROWTH)) if renewal.growth else 0.0
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Nothing: all that is random comes from the seed and the step."""

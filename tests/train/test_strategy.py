@@ -80,6 +80,14 @@ def test_a_run_taken_up_in_the_middle_is_the_same_run(ball, settings):
         assert all(one[name].tobytes() == other[name].tobytes() for name in GROUPS)
 
 
+def test_a_short_run_gets_all_its_splats_by_its_middle(ball):
+    _, sizes = run(ball, *begun(ball, replace(MCMC, splats=200)), 30)
+    assert sizes[8] == 60 and 60 < sizes[9] < sizes[14] < 200
+    assert sizes[19] == 200 == sizes[-1]
+    still = replace(MCMC, splats=200, renewal=replace(MCMC.renewal, growth=0))
+    assert run(ball, *begun(ball, still), 30)[1] == [60] * 30
+
+
 def test_without_the_statistics_it_would_be_another_run(ball):
     straight, _ = run(ball, *begun(ball, DEFAULT), 22)
     first, strategy = begun(ball, DEFAULT)

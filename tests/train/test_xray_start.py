@@ -150,7 +150,7 @@ def test_splats_that_nothing_pulls_at_are_not_halved(device):
 def test_opacities_and_densities_are_not_taken_for_each_other(device):
     densities = densities_of(device)
     with pytest.raises(InputError, match="wanted opacities"):
-        renew(densities, RENEWAL, most=60, seed=0, grow=False)
+        renew(densities, RENEWAL, most=60, seed=0, growth=0.0)
     with pytest.raises(InputError, match="wanted densities"):
         renew_densities(replace(densities, density=False), RENEWAL, np.ones(60), seed=0)
     strategy = strategy_of(TrainSettings(), densities, extent=1.0, finish=10)

@@ -196,7 +196,7 @@ def renewal_price(case: TrainingCase, *, passes: int) -> dict[str, Any]:
     parameters = Parameters.of(case.device, {**case.raw, "logits": logits})
 
     def run() -> None:
-        renew(parameters, settings, most=case.count, seed=0, grow=False)
+        renew(parameters, settings, most=case.count, seed=0, growth=0.0)
         case.device.finish()
 
     run()
