@@ -147,7 +147,7 @@ class Fit(FitRun):
             guessed=settings.first_count,
             seed=settings.seed,
         )
-        if settings.homogenise:
+        if settings.exponent:
             count = len(pictures.views)
             few = np.unique(np.linspace(0, count - 1, _NOISE_VIEWS).round().astype(int))
             noise = noise_of([pictures.image(number)[..., :3] for number in few.tolist()])

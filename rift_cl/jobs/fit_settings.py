@@ -58,9 +58,10 @@ class FitSettings(XrayOptions):
     eps2d: float = 0.1
     """Variance that splats gain on the screen, in square pixels; 0.3 is usual and blurs small
     pictures, 0.05 to 0.1 suits cameras that all keep one distance."""
-    homogenise: float = 0.0
-    """Exponent of the ramp that weighs the residual's frequencies; 0 for none, 0.5 to 1 to pull
-    at fine detail as strongly as at coarse; for X-rays those along the detector's rows."""
+    homogenise: float | None = None
+    """Exponent of the ramp that weighs the residual's frequencies, so that fine detail is pulled
+    at as strongly as coarse; 0 for none. 0.5 if not given, and 0 for X-rays, where it is the
+    frequencies along the detector's rows."""
     band_limit: bool = False
     """Let no splat be finer than what the cameras resolve (Mip-Splatting's 3D filter)."""
     refine_poses: bool = False
@@ -108,6 +109,16 @@ class FitSettings(XrayOptions):
             raise InputError("--resume goes on with what --overwrite throws away: give one of them")
 
     @property
+    def exponent(self) -> float:
+        """Of the ramp, as it was measured to serve: short fits gain by it, long ones do not mind.
+
+        X-ray fits gained nothing by it at length, and lost where there was noise.
+        """
+        if self.homogenise is not None:
+            return self.homogenise
+        return 0.5 if self.mode == "light" else 0.0
+
+    @property
     def first_count(self) -> int:
         """Splats that a fit without sparse points begins with."""
         usual = 1.0 if self.strategy == "mcmc" else 0.2
@@ -121,7 +132,7 @@ class FitSettings(XrayOptions):
                 steps=self.steps,
                 seed=self.seed,
                 splats=self.splats,
-                exponent=self.homogenise,
+                exponent=self.exponent,
                 band_limit=self.band_limit,
             )
         return TrainSettings(
@@ -131,7 +142,7 @@ class FitSettings(XrayOptions):
             strategy=self.strategy,
             densification=Densification(absgrad=self.absgrad),
             sh_degree=self.sh_degree,
-            homogenisation=Homogenisation(exponent=self.homogenise),
+            homogenisation=Homogenisation(exponent=self.exponent),
             band_limit=self.band_limit,
             rates=Rates(
                 poses=_POSE_RATE if self.refine_poses else 0.0,

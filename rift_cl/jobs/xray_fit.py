@@ -117,7 +117,7 @@ class XrayFit(FitRun):
             size=_SIZE,
         )
         first = Parameters.of(self.device, raw, density=True)
-        if settings.homogenise and min(len(self.seen), seen.values.shape[2]) >= _FEW:
+        if settings.exponent and min(len(self.seen), seen.values.shape[2]) >= _FEW:
             few = np.unique(np.linspace(0, rows - 1, _FEW).round().astype(int))
             noise = noise_of([seen.values[:, row, :, None] for row in few.tolist()])
             training = dataclasses.replace(training, noise=noise)

@@ -61,7 +61,7 @@ def _trainer(settings: FitSettings, device: Device) -> tuple[Trainer, CapturePic
         seed=settings.seed,
     )
     training = settings.training()
-    if settings.homogenise:
+    if settings.exponent:
         few = np.linspace(0, len(capture.views) - 1, _NOISE_VIEWS).round().astype(int)
         noise = noise_of([pictures.image(k)[..., :3] for k in np.unique(few).tolist()])
         training = dataclasses.replace(training, noise=noise)
