@@ -6,7 +6,7 @@
  * with `stride` the product of the radices so far, butterfly b = q + stride p reads samples
  * b + k n/RADIX and writes
  *
- *     y[q + stride (RADIX p + k)] = w^(k p stride) sum_l i^(-k l 4/RADIX) x[b + l n/RADIX],
+ *     y[q + stride (RADIX p + k)] = w^(k p stride) sum_l w^(k l n/RADIX) x[b + l n/RADIX],
  *     w = exp(-2 pi i / n),  k, l = 0 .. RADIX - 1.
  *
  * Real and imaginary parts are planes of their own, `real` and `imaginary` floats from the start of
@@ -27,6 +27,8 @@
 #ifndef RUN
 #define RUN (LANES == 8 ? 4096 : 1)
 #endif
+
+#define HALF_ROOT3 0.86602540f
 
 /* Stores the complex product a z. */
 static void store_turned(
@@ -68,6 +70,14 @@ KERNEL void fft_pass(
 #if RADIX == 2
     store_turned(yr, yi, ar + br, ai + bi, wr[0], wi[0]);
     store_turned(yr + leap, yi + leap, ar - br, ai - bi, wr[1], wi[1]);
+#elif RADIX == 3
+    const lanes cr = READ(xr, 2 * step), ci = READ(xi, 2 * step);
+    /* a - (b + c) / 2, and sqrt(3)/2 (b - c), which a quarter of a turn adds to it. */
+    const lanes sr = br + cr, si = bi + ci, mr = ar - 0.5f * sr, mi = ai - 0.5f * si;
+    const lanes ur = HALF_ROOT3 * (br - cr), ui = HALF_ROOT3 * (bi - ci);
+    store_turned(yr, yi, ar + sr, ai + si, wr[0], wi[0]);
+    store_turned(yr + leap, yi + leap, mr + ui, mi - ur, wr[1], wi[1]);
+    store_turned(yr + 2 * leap, yi + 2 * leap, mr - ui, mi + ur, wr[2], wi[2]);
 #else
     const lanes cr = READ(xr, 2 * step), ci = READ(xi, 2 * step);
     const lanes dr = READ(xr, 3 * step), di = READ(xi, 3 * step);

@@ -1,7 +1,7 @@
 """A response in the Fourier domain of images, applied on the device.
 
-The image is continued by zeros to powers of two, so that it does not meet itself across its
-borders; two channels share one complex transform, since the response is real and even. The
+The image is continued by zeros, so that it does not meet itself across its borders, to edges that
+are products of twos and threes; two channels share one complex transform, since the response is real and even. The
 operator, window times response times window, is its own adjoint.
 """
 
@@ -28,8 +28,15 @@ _CPU_RUN = 4096
 
 
 def padded_length(length: int) -> int:
-    """The power of two that an edge is continued to."""
-    return max(_SHORTEST, 1 << (length + length // _MARGIN - 1).bit_length())
+    """What an edge is continued to: a product of twos and threes, and a multiple of eight."""
+    least = max(_SHORTEST, length + length // _MARGIN)
+    threes = [3**k for k in range(least.bit_length())]
+    return min(three * max(_SHORTEST, _power_above(-(-least // three))) for three in threes)
+
+
+def _power_above(number: int) -> int:
+    """The least power of two that is not below a number."""
+    return 1 << (number - 1).bit_length()
 
 
 class SpectralFilter:
@@ -146,7 +153,8 @@ class SpectralFilter:
         if inverse or weights is not None:
             parts.reverse()
         while stride < length:
-            radix = 4 if length // stride % 4 == 0 else 2
+            left = length // stride
+            radix = next(radix for radix in (4, 3, 2) if left % radix == 0)
             weighted = weights is not None and stride == 1
             device.launch(
                 "fft_pass",

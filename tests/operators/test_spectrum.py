@@ -9,7 +9,7 @@ from rift_cl.errors import NonFiniteError, ShapeError
 from rift_cl.operators.spectrum import SpectralFilter, padded_length
 from rift_cl.reference.spectrum import spectrally_filtered
 
-SIZES = [(1, 1), (3, 40), (33, 20), (60, 64)]
+SIZES = [(1, 1), (3, 40), (33, 20), (60, 64), (140, 23)]
 
 
 def ramp(ky, kx):
@@ -117,9 +117,16 @@ def test_the_same_picture_gives_the_same_bits(device):
     assert device.get(apply(image)).tobytes() == device.get(apply(image)).tobytes()
 
 
-def test_lengths_are_powers_of_two_with_a_margin():
-    lengths = [padded_length(n) for n in (1, 8, 9, 60, 61, 224, 240, 241, 480)]
-    assert lengths == [8, 8, 16, 64, 64, 256, 256, 256, 512]
+def test_lengths_are_twos_and_threes_with_a_margin():
+    lengths = [padded_length(n) for n in (1, 8, 9, 60, 61, 69, 224, 240, 241, 270, 480, 512)]
+    assert lengths == [8, 8, 16, 64, 64, 96, 256, 256, 256, 288, 512, 576]
+    for length in range(1, 400):
+        padded = left = padded_length(length)
+        assert padded >= length + length // 16 and padded % 8 == 0
+        for prime in (2, 3):
+            while left % prime == 0:
+                left //= prime
+        assert left == 1
 
 
 def test_what_cannot_be_filtered_is_refused(device):
