@@ -1,8 +1,8 @@
 """A response in the Fourier domain of images, applied on the device.
 
 The image is continued by zeros, so that it does not meet itself across its borders, to edges that
-are products of twos and threes; two channels share one complex transform, since the response is real and even. The
-operator, window times response times window, is its own adjoint.
+are products of twos and threes; two channels share one complex transform, since the response is
+real and even. The operator, window times response times window, is its own adjoint.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def padded_length(length: int) -> int:
     """What an edge is continued to: a product of twos and threes, and a multiple of eight."""
     least = max(_SHORTEST, length + length // _MARGIN)
     threes = [3**k for k in range(least.bit_length())]
-    return min(three * max(_SHORTEST, _power_above(-(-least // three))) for three in threes)
+    return min(int(three) * max(_SHORTEST, _power_above(-(-least // three))) for three in threes)
 
 
 def _power_above(number: int) -> int:
