@@ -31,6 +31,13 @@ FLAGS = (
     *("--disable-gpu", "--enable-unsafe-swiftshader"),
     *("--window-size=760,520", "--remote-debugging-port=0", "--remote-allow-origins=*"),
 )
+# The command line; a shell's background jobs ignore Ctrl-C, and so would what they start.
+RIFT = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from rift_cl.cli import main
+sys.exit(main())
+"""
 # Red above the middle, the others round it: where neither panel nor notes are.
 MEANS = np.array([[0, 0, 0], [0.6, 0, -0.5], [-0.6, 0, -0.5], [0, 0.5, -0.5], [0, -0.5, -0.5]])
 COLORS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 1], [1, 0, 1]], float)
@@ -156,7 +163,7 @@ def scene(tmp_path_factory):
 def served(scene):
     """The page's address, while ``rift view`` runs."""
     pytest.importorskip("viser", reason="viser is not installed")
-    command = [sys.executable, "-m", "rift_cl.cli", "view", str(scene[1])]
+    command = [sys.executable, "-c", RIFT, "view", str(scene[1])]
     command += ["--port", "0", "--size", "600", "--up", "0", "0", "1", "--background", *["0.5"] * 3]
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     process = subprocess.Popen(
