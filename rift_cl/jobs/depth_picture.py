@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rift_cl.geometry import Camera
 from rift_cl.jobs.camera_path import resized
+from rift_cl.jobs.few import evenly
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
 
@@ -46,9 +47,9 @@ def depth_window(
     Each of a few cameras has a window of its own, and the medians are taken, so that one that
     stands in a fog of wide splats does not take the colours from the others.
     """
-    looks = np.unique(np.linspace(0, len(cameras) - 1, _LOOKS).round().astype(int))
+    looks = evenly(len(cameras), _LOOKS)
     windows = []
-    for number in looks.tolist():
+    for number in looks:
         camera = cameras[number]
         share = min(1.0, _EDGE / max(camera.size))
         size = max(1, round(share * camera.height)), max(1, round(share * camera.width))

@@ -20,6 +20,7 @@ from rift_cl.io.capture import (
 )
 from rift_cl.io.photographs import demand_photographs, pose_photographs
 from rift_cl.io.splat_scene import SplatScene
+from rift_cl.jobs.few import evenly
 from rift_cl.jobs.fit_pictures import CapturePictures
 from rift_cl.jobs.fit_report import fit_page
 from rift_cl.jobs.fit_run import FitRun
@@ -149,8 +150,8 @@ class Fit(FitRun):
         )
         if settings.exponent:
             count = len(pictures.views)
-            few = np.unique(np.linspace(0, count - 1, _NOISE_VIEWS).round().astype(int))
-            noise = noise_of([pictures.image(number)[..., :3] for number in few.tolist()])
+            few = evenly(count, _NOISE_VIEWS)
+            noise = noise_of([pictures.image(number)[..., :3] for number in few])
             training = dataclasses.replace(training, noise=noise)
         return Trainer(pictures, first, training, self.drawing)
 

@@ -21,6 +21,7 @@ from rift_cl.geometry import Camera
 from rift_cl.io.capture import View, camera_at, read_view
 from rift_cl.io.display_light import to_display
 from rift_cl.io.picture_header import read_picture_header
+from rift_cl.jobs.few import evenly
 
 # Share of the free host memory that photographs may take.
 _SHARE = 0.4
@@ -163,9 +164,9 @@ class CapturePictures:
 
     def _common_border(self) -> Floats | None:
         """The colour that all borders of a few pictures have; None if they have none."""
-        few = np.unique(np.linspace(0, len(self.views) - 1, 8).round().astype(int))
+        few = evenly(len(self.views), 8)
         edges = []
-        for number in few.tolist():
+        for number in few:
             image, shares = self.image(number)[..., :3], self._shares(number)
             known = np.ones(image.shape[:2], bool) if shares is None else shares > _KNOWN
             for edge in ((0, slice(None)), (-1, slice(None)), (slice(None), 0), (slice(None), -1)):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from rift_cl.html_page import Page
+from rift_cl.jobs.few import evenly
 from rift_cl.jobs.fit_scores import ViewScore
 from rift_cl.plot import curves, figure_png, image_grid
 
@@ -83,9 +84,9 @@ def _row(score: ViewScore) -> tuple[Any, ...]:
 def view_panels(scores: Sequence[ViewScore]) -> Any:
     """Truth, picture and error of the best, the middle and the worst by PSNR."""
     order = sorted(scores, key=lambda score: -score.values["fit_psnr"])
-    places = np.unique(np.linspace(0, len(order) - 1, _SHOWN).round().astype(int))
+    places = evenly(len(order), _SHOWN)
     images, titles = [], []
-    for place in places.tolist():
+    for place in places:
         score = order[place]
         error = np.abs(score.image - score.truth) * ERROR_GAIN
         images += [score.truth, score.image, np.clip(error, 0, 1)]

@@ -8,6 +8,7 @@ import numpy as np
 
 from rift_cl.cl.device import Device
 from rift_cl.io.capture import Capture
+from rift_cl.jobs.few import evenly
 from rift_cl.jobs.fit_pictures import CapturePictures
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.start import hull_points, random_points, start_splats
@@ -46,11 +47,11 @@ def first_splats(
 def _guessed(pictures: CapturePictures, count: int, seed: int) -> Any:
     """Points in the visual hull, or where the cameras look if there is no background."""
     views = len(pictures.cameras)
-    few = np.unique(np.linspace(0, views - 1, _HULL_VIEWS).round().astype(int))
-    fronts = [pictures.foreground(number) for number in few.tolist()]
+    few = evenly(views, _HULL_VIEWS)
+    fronts = [pictures.foreground(number) for number in few]
     masks = [front for front in fronts if front is not None]
     if len(masks) == len(few):
-        cameras = [pictures.cameras[number] for number in few.tolist()]
+        cameras = [pictures.cameras[number] for number in few]
         points = hull_points(cameras, masks, count, seed)
         if points is not None:
             return points

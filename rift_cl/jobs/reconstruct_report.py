@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.html_page import Page
+from rift_cl.jobs.few import evenly
 from rift_cl.plot import figure_png, image_grid
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ class Preview:
     @classmethod
     def of(cls, count: int) -> Preview:
         """For a volume of ``count`` slices, kept evenly from the first to the last."""
-        kept = np.unique(np.linspace(0, count - 1, min(count, _PANELS)).round().astype(int))
+        kept = evenly(count, min(count, _PANELS))
         return cls(frozenset(int(i) for i in kept))
 
     def take(self, start: int, block: NDArray[np.float32]) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rift_cl.io.splat_scene import XrayScene
 from rift_cl.io.volume import open_volume
+from rift_cl.jobs.few import evenly
 from rift_cl.jobs.fit import split_views
 from rift_cl.jobs.fit_run import FitRun
 from rift_cl.jobs.fit_scores import score_record
@@ -118,14 +119,14 @@ class XrayFit(FitRun):
         )
         first = Parameters.of(self.device, raw, density=True)
         if settings.exponent and min(len(self.seen), seen.values.shape[2]) >= _FEW:
-            few = np.unique(np.linspace(0, rows - 1, _FEW).round().astype(int))
-            noise = noise_of([seen.values[:, row, :, None] for row in few.tolist()])
+            few = evenly(rows, _FEW)
+            noise = noise_of([seen.values[:, row, :, None] for row in few])
             training = dataclasses.replace(training, noise=noise)
         return XrayTrainer(pictures, first, training, self.drawing, flat=rows == 1)
 
     def _start_error(self, trainer: XrayTrainer, seen: Projections) -> float:
         """The relative error of a few training projections before the first step."""
-        few = np.unique(np.linspace(0, len(self.seen) - 1, _FEW).round().astype(int)).tolist()
+        few = evenly(len(self.seen), _FEW)
         splats, cameras = trainer.parameters.drawn, trainer.pictures.cameras
         images = [drawn(trainer.renderer, splats, cameras[number]) for number in few]
         return relative_error(np.stack(images), seen.values[few])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.html_page import Page
+from rift_cl.jobs.few import evenly
 from rift_cl.jobs.fit_scores import ViewScore
 from rift_cl.jobs.xray_scores import COLUMNS, SCORING, score_rows
 from rift_cl.plot import curves, figure_png, image_grid
@@ -75,7 +76,7 @@ def _row(score: ViewScore) -> tuple[Any, ...]:
 
 def _slices(splats: Floats, voxels: Floats) -> Any:
     count = len(splats)
-    few = np.unique(np.linspace(0, count - 1, min(count, _SLICES)).round().astype(int)).tolist()
+    few = evenly(count, min(count, _SLICES))
     images = [volume[k] for k in few for volume in (splats, voxels)]
     titles = [f"{name}, slice {k}" for k in few for name in ("splats", "fbp")]
     low, high = np.percentile(np.stack(images), [_TAIL, 100 - _TAIL])

@@ -11,6 +11,7 @@ import numpy as np
 from figures.spectra import error_spectrum, ring_edges
 from rift_cl import Device
 from rift_cl.io import open_capture
+from rift_cl.jobs.few import evenly
 from rift_cl.jobs.fit_pictures import CapturePictures
 from rift_cl.jobs.fit_settings import FitSettings
 from rift_cl.jobs.fit_start import first_splats
@@ -38,8 +39,8 @@ def watched(settings: FitSettings, test: Any, device: Device) -> dict[str, Any]:
     """
     trainer, pictures = _trainer(settings, device)
     views = open_capture(test).views
-    few = np.unique(np.linspace(0, len(views) - 1, _PICTURES).round().astype(int))
-    unseen = CapturePictures(device, [views[k] for k in few.tolist()], like=pictures)
+    few = evenly(len(views), _PICTURES)
+    unseen = CapturePictures(device, [views[k] for k in few], like=pictures)
     edges, frequency = ring_edges(unseen.cameras[0].size)
     moments = []
     for share in SHARES:
