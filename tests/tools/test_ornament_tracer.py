@@ -6,10 +6,8 @@ What needs the path tracer is skipped where Mitsuba is not installed.
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import json
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,17 +15,9 @@ import pytest
 from rift_cl.errors import InputError
 from rift_cl.io import read_image
 
-TOOLS = Path(__file__).parents[2] / "tools"
 needs_mitsuba = pytest.mark.skipif(
     find_spec("mitsuba") is None, reason="mitsuba is not installed (extra: render)"
 )
-
-
-@pytest.fixture
-def tool(monkeypatch):
-    """Import a module as the script does."""
-    monkeypatch.syspath_prepend(TOOLS)
-    return importlib.import_module
 
 
 @pytest.fixture

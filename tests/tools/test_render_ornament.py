@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import json
 import math
 import subprocess
@@ -18,13 +17,6 @@ from rift_cl.io import open_capture
 
 TOOLS = Path(__file__).parents[2] / "tools"
 SIZE = (24, 32)
-
-
-@pytest.fixture
-def tool(monkeypatch):
-    """Import a module as the script does."""
-    monkeypatch.syspath_prepend(TOOLS)
-    return importlib.import_module
 
 
 @pytest.fixture

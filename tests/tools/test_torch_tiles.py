@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,15 +12,6 @@ from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
 
 torch = pytest.importorskip("torch", reason="torch is not installed")
-
-TOOLS = Path(__file__).parents[2] / "tools"
-
-
-@pytest.fixture
-def tool(monkeypatch):
-    """Import a module as the script does."""
-    monkeypatch.syspath_prepend(TOOLS)
-    return importlib.import_module
 
 
 @pytest.fixture
