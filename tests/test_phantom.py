@@ -11,7 +11,7 @@ import pytest
 from rift_cl import phantom
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Grid, Parallel
-from rift_cl.phantom import Ellipsoid
+from rift_cl.phantom import Ellipsoid, rendering
 
 TILTED = Ellipsoid((0.3, -0.7, 1.1), (1.5, 2.0, 3.1), 0.6, 1.7)
 SMALL = Ellipsoid((-0.4, 1.9, -2.3), (0.9, 0.8, 0.35), -1.2, -0.6)
@@ -76,7 +76,7 @@ def test_an_edge_in_the_first_pixel_leaves_nothing_behind():
 def test_an_image_is_the_same_in_strips_of_any_height(monkeypatch):
     grid = Grid((33, 20), spacing=0.4)
     whole = phantom.render(PAIR, grid)
-    monkeypatch.setattr(phantom, "_STRIP_SAMPLES", 7 * 20)
+    monkeypatch.setattr(rendering, "_STRIP_SAMPLES", 7 * 20)
     np.testing.assert_array_equal(phantom.render(PAIR, grid), whole)
 
 
