@@ -21,7 +21,14 @@ from typing import Any
 
 import tyro
 
-from figures import figure_05, figure_06, figure_11, figure_12, spectral_bias
+from figures import (
+    figure_05,
+    figure_06,
+    figure_11,
+    figure_11_volume,
+    figure_12,
+    spectral_bias,
+)
 from figures.plan import Plan, find_ornament, sample_ornament
 from rift_cl.cl import Device, open_device
 from rift_cl.errors import InputError, RiftError
@@ -29,7 +36,14 @@ from rift_cl.html_page import Page
 from rift_cl.io import make_folder, write_json, write_text
 from rift_cl.jobs.run_folder import environment
 
-FIGURES: tuple[ModuleType, ...] = (figure_05, figure_06, figure_11, figure_12, spectral_bias)
+FIGURES: tuple[ModuleType, ...] = (
+    figure_05,
+    figure_06,
+    figure_11,
+    figure_11_volume,
+    figure_12,
+    spectral_bias,
+)
 # Those that fit splats to the ornament.
 FITTED: tuple[ModuleType, ...] = (figure_11, figure_12, spectral_bias)
 

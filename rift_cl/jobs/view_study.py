@@ -30,8 +30,8 @@ class ViewScore:
 
     Args:
         views: how many, evenly over pi.
-        unfiltered, filtered: the slices; the first after its affine fit.
-        scores: PSNR in dB (peak 1) and SSIM of both, inside the inscribed disc.
+        unfiltered, filtered: the slices, or volumes; the first after its affine fit.
+        scores: PSNR in dB (peak 1) and SSIM of both, where the mask is true.
     """
 
     views: int
@@ -55,15 +55,29 @@ def view_study(size: int, counts: Sequence[int], device: Device) -> Iterator[Vie
         scan = Parallel(angles, bins=detector_bins(size))
         A = Projector(grid, scan, device=device)
         y = shepp_logan_sinogram(grid, scan)
-        filtered = np.asarray(fbp(A, y))
-        fitted, _, _ = affine_fit(backproject(A, y), truth, mask=mask)
-        unfiltered = fitted.astype(np.float32)
-        scores = {
-            f"{metric.__name__}_{name}": metric(image, truth, mask=mask)
-            for name, image in (("unfiltered", unfiltered), ("filtered", filtered))
-            for metric in (psnr, ssim)
-        }
-        yield ViewScore(views, unfiltered, filtered, scores)
+        yield score_views(A, y, truth, mask)
+
+
+def score_views(
+    A: Projector, y: Image, truth: Image, mask: NDArray[np.bool_] | None = None
+) -> ViewScore:
+    """Reconstruct unfiltered and filtered, and score both.
+
+    Args:
+        A: the projector.
+        y: the measurement, of shape ``A.range``.
+        truth: what it is of, of shape ``A.domain``.
+        mask: samples that count; all if not given.
+    """
+    filtered = np.asarray(fbp(A, y))
+    fitted, _, _ = affine_fit(backproject(A, y), truth, mask=mask)
+    unfiltered = fitted.astype(np.float32)
+    scores = {
+        f"{metric.__name__}_{name}": metric(image, truth, mask=mask)
+        for name, image in (("unfiltered", unfiltered), ("filtered", filtered))
+        for metric in (psnr, ssim)
+    }
+    return ViewScore(len(A.scan.angles), unfiltered, filtered, scores)
 
 
 def detector_bins(size: int) -> int:

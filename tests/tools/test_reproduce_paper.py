@@ -9,6 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rift_cl import Grid, Parallel
+from rift_cl.phantom import Ellipsoid
+
 TOOLS = Path(__file__).parents[2] / "tools"
 TOOL = TOOLS / "reproduce_paper.py"
 # Fits so short that they show nothing but that all of it runs.
@@ -62,6 +65,35 @@ def test_the_papers_claim_holds(tmp_path):
     filtered = [row["psnr_filtered"] for row in many]
     assert max(unfiltered) - min(unfiltered) < 0.1
     assert filtered[-1] > filtered[0] + 10
+
+
+def test_a_volume_is_filtered_into_shape_from_projections_and_from_radial_lines(tmp_path):
+    assert run("--only", "figure_11_volume", "--out", tmp_path).returncode == 0
+    for name in ("projections", "radial k-space"):
+        found = result_of(tmp_path, "figure_11_volume")["views"]
+        rows = [row for row in found if row["input"] == name]
+        assert [row["count"] for row in rows] == [10, 64, 250, 570]
+        filtered = [row["psnr_filtered"] for row in rows]
+        assert filtered == sorted(filtered)
+        assert filtered[-1] > filtered[0] + 10
+        assert rows[-1]["psnr_filtered"] > rows[-1]["psnr_unfiltered"] + 10
+        assert rows[-1]["ssim_filtered"] > 0.9
+        unfiltered = [row["psnr_unfiltered"] for row in rows]
+        assert max(unfiltered) - min(unfiltered) < 0.1
+
+
+def test_radial_lines_hold_the_projections_mass_and_place(part):
+    kspace = part("radial_kspace")
+    body = [Ellipsoid((1.0, -2.0, 3.0), (4.0, 3.0, 5.0), 0.6, 0.8)]
+    grid, scan = Grid((24, 24, 24)), Parallel([0.3, 2.0], bins=40, center=17.5)
+    found = kspace.measure(body, grid, scan).astype(float)
+    mass = 4 / 3 * np.pi * 4 * 3 * 5 * 0.8
+    np.testing.assert_allclose(found.sum(axis=(1, 2)), mass, rtol=1e-5)
+    rows = (found.sum(axis=2) * np.arange(24)).sum(axis=1) / mass
+    bins = (found.sum(axis=1) * np.arange(40)).sum(axis=1) / mass
+    np.testing.assert_allclose(rows, 11.5 + 1.0, atol=0.05)
+    shadow = 17.5 + 3.0 * np.cos(scan.angles) - 2.0 * np.sin(scan.angles)
+    np.testing.assert_allclose(bins, shadow, atol=0.05)
 
 
 def test_every_count_has_both_protocols_and_the_views_off_the_ring(tiny):

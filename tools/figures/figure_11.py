@@ -1,4 +1,4 @@
-"""Figure 11: PSNR and SSIM against the number of input views, by regression and by integration."""
+"""Figure 11, regression: PSNR and SSIM of fitted splats against the number of input views."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ from figures.fits import FIXED, HELD_OUT, OFF_PATH, SETS, Fitted, fitted
 from figures.plan import Plan
 from rift_cl import Device
 from rift_cl.html_page import Page
-from rift_cl.jobs.demo import COLUMNS, SCORES, SCORING, study_curves
-from rift_cl.jobs.view_study import view_study
 from rift_cl.plot import curves, figure_png
 
 NAME = "figure_11"
-TITLE = "Figure 11: PSNR and SSIM against the number of input views"
+TITLE = "Figure 11, regression: PSNR and SSIM against the number of input views"
 
 _KINDS = {"psnr": "PSNR, dB", "psnr_foreground": "PSNR foreground, dB", "ssim": "SSIM"}
 _METHODS = {"fit": "splats", "blend": "blend of two", "nearest": "nearest view"}
@@ -42,15 +40,12 @@ def settings(plan: Plan) -> dict[str, Any]:
 
 
 def compute(plan: Plan, device: Device, kept: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The scores of the integration, then of one number of views after the other."""
-    size = 512 if plan.full else 256
-    study = view_study(size, plan.counts, device)
-    slices = [{"count": s.views, **s.scores} for s in study]
+    """The scores of one number of views after the other."""
     earlier = {row["count"]: row for row in kept.get("regression", [])}
     rows: list[dict[str, Any]] = []
     for count in plan.counts:
         rows.append(earlier.get(count) or _row(fitted(plan, count)))
-        yield {"size": size, "integration": slices, "regression": rows}
+        yield {"regression": rows}
 
 
 def _row(fit: Fitted) -> dict[str, Any]:
@@ -76,7 +71,6 @@ def show(page: Page, result: dict[str, Any]) -> None:
             series = {m: _points(rows, name, f"{key}_{kind}") for key, m in _METHODS.items()}
             _draw(page, series, _KINDS[kind], f"Splats beside no fit at all: {words}.")
     _tables(page, rows)
-    _integration(page, result)
 
 
 def _points(rows: Sequence[dict[str, Any]], name: str, key: str) -> tuple[list[int], list[float]]:
@@ -110,19 +104,3 @@ def _tables(page: Page, rows: Sequence[dict[str, Any]]) -> None:
             for kind, label in _KINDS.items()
         ]
         page.table(("views", "score", *_METHODS.values()), cells, caption=f"{words}. {_MEANS}")
-
-
-def _integration(page: Page, result: dict[str, Any]) -> None:
-    rows = result["integration"]
-    counts = [row["count"] for row in rows]
-    page.paragraph(
-        f"Integration: the Shepp-Logan phantom on {result['size']} x {result['size']} samples from "
-        "its exact projections, at the same numbers of views. This is a slice in two dimensions; "
-        "the paper's experiment reconstructs an object in three from simulated magnetic resonance "
-        "projections, which this tool does not do yet."
-    )
-    for metric, label in (("psnr", "PSNR, dB"), ("ssim", "SSIM")):
-        figure = study_curves(counts, rows, metric, label)
-        page.figure(figure_png(figure), caption=SCORING, alt=f"Slices: {label} against views")
-    cells = [(row["count"], *(row[key] for key in SCORES)) for row in rows]
-    page.table(COLUMNS, cells, caption=SCORING)
