@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rift_cl import metrics, phantom
     from rift_cl.cl import Device, default_device, devices, open_device
     from rift_cl.errors import RiftError
-    from rift_cl.geometry import Camera, Grid, Parallel
+    from rift_cl.geometry import Camera, FanBeam, Grid, Parallel
     from rift_cl.io import SplatScene
     from rift_cl.operators import HighPass, LinearOperator, Projector, Ramp, Response, dot_test
     from rift_cl.reconstruct import backproject, fbp
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Camera": "geometry",
     "Device": "cl",
+    "FanBeam": "geometry",
     "Grid": "geometry",
     "HighPass": "operators",
     "LinearOperator": "operators",
@@ -55,6 +56,7 @@ _MODULES = ("metrics", "phantom")
 __all__ = [
     "Camera",
     "Device",
+    "FanBeam",
     "Grid",
     "HighPass",
     "LinearOperator",

@@ -7,7 +7,6 @@ keeps projections, flats and darks in one array.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,7 +30,8 @@ class FrameStack:
     Args:
         dataset: name of the dataset.
         shape: shape of the whole dataset, to notice when it changes.
-        axes: one letter per axis of the dataset: n frame, r row, b bin.
+        axes: one letter per axis of the dataset: n frame, r row, b bin. MATLAB's are in the
+            opposite order.
         runs: (start, stop) along the frame axis, in order.
     """
 
@@ -53,7 +53,7 @@ class FrameStack:
     @property
     def bins(self) -> int:
         """Number of detector bins."""
-        return self.shape[-1]
+        return self.shape[self.axes.index("b")]
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,14 @@ def _unchanged(tree: Hdf5Tree, stack: FrameStack) -> Any:
 def _claim(node: Any, stack: FrameStack, rows: int) -> int:
     # A compressed chunk is unpacked whole, however few of its rows are wanted.
     chunk = math.prod(node.chunks) * node.dtype.itemsize if node.chunks else 0
-    return stack.frames * rows * stack.bins * 4 + chunk
+    rest = 4 * rows * stack.bins
+    # Frames in another order are read as they are stored, and then turned.
+    turned = 0 if _in_order(stack) else stack.frames * rest
+    return stack.frames * rest + chunk + turned
+
+
+def _in_order(stack: FrameStack) -> bool:
+    return stack.axes in ("nrb", "nb", "rb", "b")
 
 
 def _read(node: Any, stack: FrameStack, start: int, stop: int) -> Frames:
@@ -156,11 +163,14 @@ def _read(node: Any, stack: FrameStack, start: int, stop: int) -> Frames:
         ranges = {"n": slice(first, last), "r": slice(start, stop), "b": slice(None)}
         selection = tuple(ranges[axis] for axis in stack.axes)
         block = frames[done : done + last - first]
-        node.read_direct(block.reshape(_selected(stack, last - first, rows)), selection)
+        sizes = {"n": last - first, "r": rows, "b": stack.bins}
+        shape = [sizes[axis] for axis in stack.axes]
+        if _in_order(stack):
+            node.read_direct(block.reshape(shape), selection)
+        else:
+            stored = np.empty(shape, np.float32)
+            node.read_direct(stored, selection)
+            order = [stack.axes.index(axis) for axis in "nrb" if axis in stack.axes]
+            block[:] = stored.transpose(order).reshape(block.shape)
         done += last - first
     return frames
-
-
-def _selected(stack: FrameStack, frames: int, rows: int) -> Sequence[int]:
-    sizes = {"n": frames, "r": rows, "b": stack.bins}
-    return [sizes[axis] for axis in stack.axes]

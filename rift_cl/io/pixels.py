@@ -62,7 +62,7 @@ def write_pixels(
     if done:
         done = output.write_image(np.ascontiguousarray(pixels))
         done = output.close() and done
-    message = _first_line(output.geterror())
+    message = first_line(output.geterror())
     if not done or message:
         raise OSError(message or "OpenImageIO gives no reason")
 
@@ -87,7 +87,7 @@ def read_pixels(path: Path, *, budget: int | None = None) -> NDArray[np.float32]
             raise FileFormatError(f"{path}: holds deep pixels, a flat image is wanted")
         check_claim(path, "the image", spec.width * spec.height * spec.nchannels * 4, budget)
         pixels = source.read_image("float")
-        message = _first_line(source.geterror())
+        message = first_line(source.geterror())
         if pixels is None or message:
             raise FileFormatError(f"{path}: the image is damaged ({message})")
         shape = (spec.height, spec.width, spec.nchannels)
@@ -111,7 +111,7 @@ def opened_image(path: Path, format: str) -> Iterator[Any]:
     finally:
         OpenImageIO.attribute("try_all_readers", every)
     if source is None:
-        message = _first_line(OpenImageIO.geterror())
+        message = first_line(OpenImageIO.geterror())
         kind = ResourceLimitError if "limits:imagesize" in message else FileFormatError
         raise kind(f"{path}: the image cannot be read ({message})")
     try:
@@ -153,5 +153,6 @@ def _straight(pixels: NDArray[np.float32], spec: Any) -> NDArray[np.float32]:
     return pixels
 
 
-def _first_line(message: str) -> str:
+def first_line(message: str) -> str:
+    """What OpenImageIO says first; it repeats itself on further lines."""
     return (message.strip().splitlines() or [""])[0]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
+from rift_cl.geometry.fan import FanBeam
 
 Frames = NDArray[np.float32]
 Kind = Literal["transmission", "attenuation"]
@@ -64,7 +65,7 @@ class ScanFile:
     """A scan in a file, known by its headers and angles alone.
 
     Args:
-        path: the file.
+        path: the file, or the folder of files.
         shape: (angle, row, bin) of the projections of the sample.
         angles: direction of each projection in radians, float64, read-only.
         pitch: distance between detector bins in ``unit``; None where the file gives no positive
@@ -74,6 +75,13 @@ class ScanFile:
             "attenuation" for line integrals. Even counts may come without flats or darks.
         source: the layout that was recognised, for people.
         rows: reads the rows.
+        fan: source and detector where the rays are those of a fan beam; its lengths are in
+            ``unit``, and ``pitch`` is its pitch, on the detector. None for parallel rays.
+        background: bins at each end of the detector that only ever see what surrounds the
+            sample, where the layout is known for line integrals with an offset: the mean over
+            these bins of both ends is 0 in truth, and is to be subtracted from the view. 0 for
+            every other layout.
+        notes: what had to be assumed, a sentence each, to be shown to the person.
     """
 
     path: Path
@@ -84,6 +92,9 @@ class ScanFile:
     kind: Kind
     source: str
     rows: RowSource = field(repr=False)
+    fan: FanBeam | None = None
+    background: int = 0
+    notes: tuple[str, ...] = ()
 
     def read(self, start: int, stop: int) -> ScanRows:
         """Read detector rows ``start`` to ``stop``; the file is opened for that and closed again.

@@ -109,7 +109,7 @@ def test_files_that_hold_no_scan_list_what_they_hold(tmp_path: Path) -> None:
 
 def test_names_that_lie(tmp_path: Path) -> None:
     (tmp_path / "text.h5").write_text("not a scan")
-    with pytest.raises(FileFormatError, match="neither HDF5 nor NPZ"):
+    with pytest.raises(FileFormatError, match="says HDF5, the content is of no known kind"):
         open_scan(tmp_path / "text.h5")
     made.data_exchange(tmp_path / "really_hdf5.npz")
     with pytest.raises(FileFormatError, match="the name says NPZ, the content is HDF5"):

@@ -1,0 +1,89 @@
+"""What the readers of MAT files of both kinds have in common: a table of arrays by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import DTypeError, FileFormatError
+from rift_cl.io.boundary import HOW_TO_NAME
+
+_LISTED = 8
+
+
+class MatArray(Protocol):
+    """An array of a MAT file."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Its shape as MATLAB has it."""
+
+    @property
+    def real(self) -> bool:
+        """It holds real numbers."""
+
+
+class MatFile(Protocol):
+    """The arrays of a MAT file by name; those inside structures as ``structure.field``."""
+
+    path: Path
+
+    @property
+    def arrays(self) -> Mapping[str, MatArray]:
+        """What there is."""
+
+    def vector(self, name: str) -> NDArray[np.float64]:
+        """The numbers of an array that has them in a row; ShapeError if it has not."""
+
+    def text(self, name: str) -> str:
+        """A short text, or nothing where the array is none."""
+
+
+@dataclass(frozen=True)
+class MatStack:
+    """An array of frames.
+
+    Args:
+        name: its name.
+        shape: its shape as MATLAB has it.
+        axes: one letter for each of MATLAB's axes: n frame, r row, b bin.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    axes: str
+
+    def size(self, axis: str) -> int:
+        """Length of an axis; 1 where there is none."""
+        return self.shape[self.axes.index(axis)] if axis in self.axes else 1
+
+
+def contents(file: MatFile) -> str:
+    """A phrase that lists the first arrays of numbers, the largest first, and how to name one."""
+    found = [(name, array.shape) for name, array in file.arrays.items() if array.real]
+    if not found:
+        return "it holds no array of real numbers at all"
+    found.sort(key=lambda one: -np.prod(one[1], dtype=float))
+    listed = ", ".join(f"{name!r} {shape}" for name, shape in found[:_LISTED])
+    more = ", ..." if len(found) > _LISTED else ""
+    return f"it holds {listed}{more}: {HOW_TO_NAME}"
+
+
+def array_of(file: MatFile, name: str) -> MatArray:
+    """An array of real numbers.
+
+    Raises:
+        FileFormatError: there is no such array; the error lists those that there are.
+        DTypeError: it does not hold real numbers.
+    """
+    array = file.arrays.get(name)
+    if array is None:
+        raise FileFormatError(f"{file.path}: has no array {name!r}; {contents(file)}")
+    if not array.real:
+        raise DTypeError(f"{file.path}: {name!r} does not hold real numbers")
+    return array

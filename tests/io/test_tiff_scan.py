@@ -1,0 +1,214 @@
+"""TIFF folders and stacks: every type of sample, every way of naming flats, darks and angles."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO
+import pytest
+import tiff_files as made
+
+from rift_cl.errors import InputError
+from rift_cl.io import ScanFile, open_scan
+from rift_cl.io.tiff_float64 import Float64Pages
+
+
+def whole(scan: ScanFile) -> np.ndarray:
+    return scan.read(0, scan.shape[1]).projections
+
+
+def check_rows(scan: ScanFile, stack: np.ndarray) -> None:
+    """Every range of rows is that part of the stack."""
+    assert scan.shape == stack.shape
+    rows = stack.shape[1]
+    for start, stop in ((0, rows), (0, 1), (rows - 1, rows), (3, 4), (5, 13), (8, 16)):
+        read = scan.read(start, stop).projections
+        assert read.dtype == np.float32 and read.flags.c_contiguous
+        np.testing.assert_array_equal(read, stack[:, start:stop].astype(np.float32))
+
+
+STORED = ["u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8", ">u2", ">f4", ">f8"]
+
+
+@pytest.mark.parametrize("dtype", STORED)
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"rowsperstrip": 7},
+        {"rowsperstrip": 1, "bigtiff": True},
+        {"tile": (16, 16)},
+        {"compression": "zlib", "rowsperstrip": 8},
+        {"compression": "zlib", "tile": (16, 16)},
+        {"photometric": "miniswhite"},
+    ],
+    ids=str,
+)
+def test_every_sample_in_every_layout(tmp_path: Path, dtype: str, options: dict) -> None:
+    stack = made.frames(dtype=dtype)
+    options = {**options, "byteorder": dtype[0] if dtype[0] == ">" else "<"}
+    check_rows(open_scan(made.write_pages(tmp_path / "a.tif", stack, **options)), stack)
+
+
+@pytest.mark.parametrize("dtype", ["u2", "i4"])
+def test_differences_of_neighbours(tmp_path: Path, dtype: str) -> None:
+    stack = made.frames(dtype=dtype)
+    made.write_pages(tmp_path / "a.tif", stack, compression="zlib", predictor=2)
+    check_rows(open_scan(tmp_path / "a.tif"), stack)
+
+
+@pytest.mark.parametrize("kind", ["uint8", "uint16", "uint", "float", "double"])
+@pytest.mark.parametrize("packed", ["none", "zip", "lzw", "packbits"])
+def test_what_openimageio_writes(tmp_path: Path, kind: str, packed: str) -> None:
+    if kind == "double" and packed in ("lzw", "packbits"):
+        pytest.skip("refused; see test_tiff_faults")
+    dtype = {"uint8": "u1", "uint16": "u2", "uint": "u4", "float": "f4", "double": "f8"}[kind]
+    stack = made.frames(dtype=dtype)
+    output = OpenImageIO.ImageOutput.create("tiff")
+    for page, frame in enumerate(stack):
+        spec = OpenImageIO.ImageSpec(made.BINS, made.ROWS, 1, kind)
+        spec.attribute("compression", packed)
+        spec.attribute("tiff:write_exif", 0)
+        assert output.open(str(tmp_path / "a.tif"), spec, "AppendSubimage" if page else "Create")
+        assert output.write_image(frame[..., None])
+    output.close()
+    check_rows(open_scan(tmp_path / "a.tif"), stack)
+
+
+def test_float64_keeps_what_float32_cannot(tmp_path: Path) -> None:
+    stack = made.frames(dtype="f8") + 1e-9
+    made.write_pages(tmp_path / "a.tif", stack, compression="zlib", tile=(16, 16))
+    pages = Float64Pages(tmp_path / "a.tif")
+    np.testing.assert_array_equal(pages.rows(4, 3, 18, (made.ROWS, made.BINS)), stack[4, 3:18])
+
+
+def test_files_follow_their_numbers(tmp_path: Path) -> None:
+    stack = made.frames(12)
+    made.write_series(tmp_path / "a", "Proj {}.TIF", stack)
+    scan = open_scan(tmp_path / "a")
+    check_rows(scan, stack)
+    assert (scan.kind, scan.pitch, scan.fan, scan.source) == ("attenuation", None, None, "TIFF")
+    check_rows(pickle.loads(pickle.dumps(scan)), stack)
+
+
+def test_assumed_angles_are_told(tmp_path: Path) -> None:
+    scan = open_scan(made.write_series(tmp_path / "a", "p_{:04}.tif", made.frames()))
+    np.testing.assert_allclose(scan.angles, np.deg2rad(np.arange(6) * 30.0), rtol=1e-15)
+    assert not scan.angles.flags.writeable
+    told = " ".join(scan.notes)
+    assert "6 projections are taken as evenly spread over 180 degrees" in told
+    assert "No flats were found: the counts are taken for line integrals" in told
+
+
+@pytest.mark.parametrize(
+    ("theta", "degrees"),
+    [
+        ("360", np.arange(6) * 60.0),
+        ("-90:90", np.arange(6) * 30.0 - 90),
+        ("10.5:-19.5", 10.5 - np.arange(6) * 5.0),
+    ],
+)
+def test_turns(tmp_path: Path, theta: str, degrees: np.ndarray) -> None:
+    made.write_series(tmp_path / "a", "p_{:04}.tif", made.frames())
+    scan = open_scan(tmp_path / "a", theta=theta)
+    np.testing.assert_allclose(np.rad2deg(scan.angles), degrees, atol=1e-12)
+    assert not any("evenly" in note for note in scan.notes)
+
+
+DEGREES = np.array([0.0, 10, 5, -3.25, 1e2, 720])
+TEXTS = {
+    "a.txt": "# degrees\n0\n10\n5 # again\n-3.25\n\n1e2\n720\n",
+    "b.csv": "0, 10, 5, -3.25, 100, 720",
+    "c.csv": "\ufeff0,\r\n10,\r\n5,\r\n-3.25,\r\n100,\r\n720,\r\n",
+    "d.txt": "0 10;5\t-3.25 100  720\n",
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_angles_in_a_text(tmp_path: Path, name: str) -> None:
+    made.write_series(tmp_path / "a", "p_{:04}.tif", made.frames())
+    (tmp_path / name).write_bytes(TEXTS[name].encode())
+    scan = open_scan(tmp_path / "a", theta=str(tmp_path / name))
+    np.testing.assert_allclose(scan.angles, np.deg2rad(DEGREES), rtol=1e-15)
+
+
+@pytest.mark.parametrize("place", ["a/angles.txt", "a/theta.csv", "theta.npy", "angles.csv"])
+def test_angles_beside_the_projections(tmp_path: Path, place: str) -> None:
+    made.write_series(tmp_path / "a", "p_{:04}.tif", made.frames())
+    if place.endswith(".npy"):
+        np.save(tmp_path / place, DEGREES[:, None])
+    else:
+        (tmp_path / place).write_text(TEXTS["a.txt"])
+    scan = open_scan(tmp_path / "a")
+    np.testing.assert_allclose(scan.angles, np.deg2rad(DEGREES), rtol=1e-15)
+    assert place in scan.notes[0] and "degrees" in scan.notes[0]
+
+
+def test_degrees_that_look_like_radians_are_doubted(tmp_path: Path) -> None:
+    made.write_series(tmp_path / "a", "p_{:04}.tif", made.frames(20))
+    np.savetxt(tmp_path / "a" / "angles.txt", np.linspace(0, np.pi, 20))
+    assert any("if they are radians" in note for note in open_scan(tmp_path / "a").notes)
+
+
+def calibration(kind: str) -> np.ndarray:
+    return made.frames(*((2,) if kind == "flats" else (3,))) + {"flats": 500, "darks": 5}[kind]
+
+
+def check_calibrated(scan: ScanFile) -> None:
+    rows = scan.read(2, 9)
+    assert scan.kind == "transmission" and rows.flats is not None and rows.darks is not None
+    np.testing.assert_array_equal(rows.projections, made.frames()[:, 2:9])
+    np.testing.assert_array_equal(rows.flats, calibration("flats")[:, 2:9])
+    np.testing.assert_array_equal(rows.darks, calibration("darks")[:, 2:9])
+
+
+WAYS = {
+    "one folder": ("proj_{:04}.tif", "flat_{:04}.tif", "dark_{:04}.tif"),
+    "other names": ("s1_{}.tif", "s1_WhiteField_{}.tiff", "DF{}.tif"),
+    "folders inside": ("p{}.tif", "flats/f{}.tif", "Dark_Fields/d{}.tif"),
+    "folders beside": ("../projections/p{}.tif", "../flat/f{}.tif", "../dark/d{}.tif"),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_flats_and_darks_by_their_names(tmp_path: Path, way: str) -> None:
+    folder = tmp_path / "scan" / "projections"
+    for name, stack in zip(
+        WAYS[way], (made.frames(), calibration("flats"), calibration("darks")), strict=True
+    ):
+        path = folder / name.removeprefix("../projections/")
+        made.write_series(path.parent.resolve(), path.name, stack)
+    scan = open_scan(folder)
+    check_calibrated(scan)
+    assert "flats from" in scan.source and "darks from" in scan.source
+    if way == "folders beside":
+        check_calibrated(open_scan(folder.parent))
+
+
+def test_stacks_beside_each_other(tmp_path: Path) -> None:
+    made.write_pages(tmp_path / "flats.tif", calibration("flats"))
+    made.write_pages(tmp_path / "dark.tif", calibration("darks"))
+    made.write_pages(tmp_path / "sample.tif", made.frames())
+    check_calibrated(open_scan(tmp_path / "sample.tif"))
+    check_calibrated(open_scan(tmp_path))
+
+
+def test_named_flats_and_darks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made.write_series(tmp_path / "p", "p{}.tif", made.frames())
+    made.write_series(tmp_path / "other" / "before", "x{}.tif", calibration("flats"))
+    made.write_pages(tmp_path / "p" / "d" / "all.tif", calibration("darks"))
+    check_calibrated(open_scan(tmp_path / "p", flats="../other/before", darks="d/all.tif"))
+    monkeypatch.chdir(tmp_path / "other")
+    check_calibrated(open_scan("../p", flats="before", darks=str(tmp_path / "p" / "d")))
+    with pytest.raises(InputError, match=r"'gone' is not there; it was looked for as .*other.gone"):
+        open_scan("../p", flats="gone")
+
+
+def test_darks_without_flats_are_not_used(tmp_path: Path) -> None:
+    made.write_series(tmp_path, "p{}.tif", made.frames())
+    made.write_series(tmp_path, "dark{}.tif", calibration("darks"))
+    scan = open_scan(tmp_path)
+    assert (scan.kind, scan.read(0, 1).darks) == ("attenuation", None)
+    assert any("the darks are not used" in note for note in scan.notes)
