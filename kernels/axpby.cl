@@ -8,7 +8,7 @@
 #define RUN (LANES == 8 ? 4096 : 1)
 #endif
 
-KERNEL void axpby(__global const float *x, __global float *y, float a, float b, ulong size)
+KERNEL void axpby(__global const real *x, __global real *y, real a, real b, ulong size)
 {
   const ulong begin = (ulong)get_global_id(0) * RUN;
   const ulong end = begin + RUN < size ? begin + RUN : size;

@@ -13,8 +13,8 @@
 #endif
 
 KERNEL void plane_merge(
-    __global const float *restrict by_rows, __global const float *restrict by_columns,
-    __global float *restrict image, int slice0, int ny, int nx, int row_pitch, int column_pitch)
+    __global const real *restrict by_rows, __global const real *restrict by_columns,
+    __global real *restrict image, int slice0, int ny, int nx, int row_pitch, int column_pitch)
 {
   const int x0 = (int)get_global_id(0) * TILE, y0 = (int)get_global_id(1) * TILE;
   const int x1 = x0 + TILE < nx ? x0 + TILE : nx;

@@ -16,7 +16,7 @@
 #endif
 
 KERNEL void plane_split(
-    __global const float *restrict image, __global float *restrict plane,
+    __global const real *restrict image, __global real *restrict plane,
     int slice0, int rows, int width, int margin)
 {
   const int j0 = (int)get_global_id(0) * TILE, i0 = (int)get_global_id(1) * TILE;

@@ -20,7 +20,7 @@
 #endif
 
 KERNEL void radon_backproject(
-    __global const float *restrict table, __global float *restrict plane,
+    __global const real *restrict table, __global real *restrict plane,
     __global const long4 *restrict geometry, int first, int count, int columns, int rows, int width)
 {
   const int j = (int)get_global_id(0) * SEGMENT;
@@ -31,16 +31,16 @@ KERNEL void radon_backproject(
   for (int view0 = 0; view0 < count; view0 += VIEWS) {
     const int view1 = view0 + VIEWS < count ? view0 + VIEWS : count;
     for (int i = row0; i < row1; i++) {
-      __global float *pixels = plane + ((long)slice * rows + i) * width + j;
+      __global real *pixels = plane + ((long)slice * rows + i) * width + j;
       lanes sum[BLOCKS];
       UNROLL for (int n = 0; n < BLOCKS; n++) sum[n] = LOAD(pixels + n * LANES);
       for (int view = view0; view < view1; view++) {
         const long position = geometry[first + view].x + i * geometry[first + view].y;
         const int r = phase_of(position);
-        const float w = next_weight(position), u = 1.0f - w;
-        __global const float *at =
+        const real w = next_weight(position), u = 1.0f - w;
+        __global const real *at =
             table + (((long)slice * count + view) * PHASES + r) * columns + WHOLE(position) + j;
-        __global const float *next = r == PHASES - 1 ? at - (PHASES - 1) * columns + 1 : at + columns;
+        __global const real *next = r == PHASES - 1 ? at - (PHASES - 1) * columns + 1 : at + columns;
         UNROLL for (int n = 0; n < BLOCKS; n++) {
           sum[n] = sum[n] + u * LOAD(at + n * LANES);
           sum[n] = sum[n] + w * LOAD(next + n * LANES);

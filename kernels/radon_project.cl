@@ -30,8 +30,8 @@
     const long position = g.x + i * g.y; \
     const int j = k0 - WHOLE(position); \
     if (j <= -SEGMENT || j > width) continue; \
-    const float w = next_weight(position), u = 1.0f - w; \
-    __global const float *pixels = image + (long)i * pitch + SEGMENT + j; \
+    const real w = next_weight(position), u = 1.0f - w; \
+    __global const real *pixels = image + (long)i * pitch + SEGMENT + j; \
     UNROLL for (int b = 0; b < BLOCKS; b++) { \
       lanes value = LOAD(pixels + b * LANES); \
       here[b] = here[b] + u * value; \
@@ -41,7 +41,7 @@
   }
 
 KERNEL void radon_project(
-    __global float *restrict table, __global const float *restrict plane,
+    __global real *restrict table, __global const real *restrict plane,
     __global const long4 *restrict geometry, __global const int *restrict orders,
     __global const int *restrict all_starts, __global const int2 *restrict views, int first, int columns, int rows, int width)
 {
@@ -52,7 +52,7 @@ KERNEL void radon_project(
   if (k0 >= views[view].y) return;
   const long4 g = geometry[view];
   const int pitch = width + 2 * SEGMENT;
-  __global const float *image = plane + (long)slice * rows * pitch;
+  __global const real *image = plane + (long)slice * rows * pitch;
   __global const int *order = orders + (long)view * rows;
   __global const int *starts = all_starts + view * (PHASES + 1);
   lanes sums[PHASES][BLOCKS], next[BLOCKS];
@@ -63,7 +63,7 @@ KERNEL void radon_project(
     if (r == PHASES - 1) { ADD_ROWS(1) } else { ADD_ROWS(0) }
     UNROLL for (int b = 0; b < BLOCKS; b++) sums[r][b] = here[b];
   }
-  __global float *out = table + (((long)slice * count + number) * columns + k0) * PHASES;
+  __global real *out = table + (((long)slice * count + number) * columns + k0) * PHASES;
   for (int b = 0; b < BLOCKS; b++) {
     lanes block[PHASES];
     UNROLL for (int r = 0; r < PHASES; r++) block[r] = sums[r][b];

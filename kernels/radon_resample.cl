@@ -1,6 +1,6 @@
 /* Sinogram to phase tables (see include/phase_table.h).
  *
- *     table[slice][view][r][k] = scale * sum over bins b of hat(tau - b) y[view][slice][b],
+ *     table[slice][view][r][k] = scale * sum over bins b of footprint(tau - b) y[view][slice][b],
  *     tau = origin + step * (k + r / PHASES).
  *
  * Index space: (runs of LANES columns, views of this run, slices). The PHASES entries of a column
@@ -12,11 +12,12 @@
 
 #include "include/portable.h"
 #include "include/phase_table.h"
+#include "include/footprint.h"
 #include "include/transpose.h"
 
 KERNEL void radon_resample(
-    __global const float *restrict sinogram, __global float *restrict table,
-    __global const long4 *restrict geometry, __global const float2 *restrict hats,
+    __global const real *restrict sinogram, __global real *restrict table,
+    __global const long4 *restrict geometry, __global const real8 *restrict footprints,
     __global const int2 *restrict views, int first, int slice0, int slices,
     int bins, int columns, int taps)
 {
@@ -25,23 +26,21 @@ KERNEL void radon_resample(
   const int slice = (int)get_global_id(2);
   if (k0 >= views[view].y) return;
   const long4 g = geometry[view];
-  const float inverse_width = hats[view].x, scale = hats[view].y;
-  const float step = FIXED_TO_FLOAT(g.w) * (1.0f / PHASES);
-  const long width = (long)(4294967296.0f / inverse_width);
-  __global const float *y = sinogram + ((long)views[view].x * slices + slice0 + slice) * bins;
+  const real8 shape = footprints[view];
+  const long support = (long)(4294967296.0f * shape.SUPPORT);
+  __global const real *y = sinogram + ((long)views[view].x * slices + slice0 + slice) * bins;
   lanes entries[PHASES];
   UNROLL for (int n = 0; n < PHASES; n++) {
-    const long tau = LANES == 1 ? g.z + k0 * g.w + ((n * g.w) >> LOG2_PHASES) : g.z + (k0 + n) * g.w;
-    const long lowest = g.w < 0 ? tau + g.w : tau;
-    const int bin = WHOLE(lowest - width) + 1;
-    const lanes offset = FIXED_TO_FLOAT(tau - ((long)bin << 32)) + LANE_NUMBERS * step;
+    const int k = LANES == 1 ? k0 : k0 + n, phase = LANES == 1 ? n : 0;
+    const long tau = g.z + k * g.w, lowest = g.w < 0 ? tau + g.w : tau;
+    const int bin = WHOLE(lowest - support) + 1;
     lanes sum = 0;
     const int near = bin > 0 ? bin : 0, far = bins - bin < taps ? bins : bin + taps;
     for (int b = near; b < far; b++)
-      sum = sum + y[b] * hat(offset - (float)(b - bin), inverse_width);
-    entries[n] = scale * sum;
+      sum = sum + y[b] * footprint(DISTANCES(g, k, phase, b), shape);
+    entries[n] = shape.SCALE * sum;
   }
   TRANSPOSE(entries)
-  __global float *out = table + ((long)slice * count + number) * PHASES * columns + k0;
+  __global real *out = table + ((long)slice * count + number) * PHASES * columns + k0;
   UNROLL for (int r = 0; r < PHASES; r++) STORE(out + (long)r * columns, entries[r]);
 }

@@ -1,14 +1,15 @@
 /* Phase tables to sinogram: the transpose of radon_resample.
  *
- *     y[view][slice][b] = scale * sum over k, r of hat(tau - b) table[slice][view][k][r],
+ *     y[view][slice][b] = scale * sum over k, r of footprint(tau - b) table[slice][view][k][r],
  *     tau = origin + step * (k + r / PHASES).
  *
  * Index space: (bins, views of this run, slices). Each item gathers, for its bin, the `reach`
- * columns whose hats can touch it; the phases of a column lie together in memory and are taken
+ * columns whose footprints can touch it; the phases of a column lie together in memory and are taken
  * LANES at a time. No two items write the same bin: no atomics, and one order of summation. */
 
 #include "include/portable.h"
 #include "include/phase_table.h"
+#include "include/footprint.h"
 #include "include/transpose.h"
 
 /* Bins that one item takes, one after the other. */
@@ -17,8 +18,8 @@
 #endif
 
 KERNEL void radon_resample_adjoint(
-    __global float *restrict sinogram, __global const float *restrict table,
-    __global const long4 *restrict geometry, __global const float2 *restrict hats,
+    __global real *restrict sinogram, __global const real *restrict table,
+    __global const long4 *restrict geometry, __global const real8 *restrict footprints,
     __global const int2 *restrict views, int first, int slice0, int slices,
     int bins, int columns, int reach)
 {
@@ -27,24 +28,20 @@ KERNEL void radon_resample_adjoint(
   const int number = (int)get_global_id(1), count = (int)get_global_size(1), view = first + number;
   const int slice = (int)get_global_id(2), used = views[view].y;
   const long4 g = geometry[view];
-  const float inverse_width = hats[view].x, scale = hats[view].y;
-  const float step = FIXED_TO_FLOAT(g.w), per_bin = 1.0f / step;
-  const float reach_back = (per_bin < 0 ? -per_bin : per_bin) / inverse_width +
-                           (1.0f - 1.0f / PHASES) + 1e-3f + 1e-6f * columns;
-  __global const float *entries = table + ((long)slice * count + number) * PHASES * columns;
-  __global float *y = sinogram + ((long)views[view].x * slices + slice0 + slice) * bins;
+  const real8 shape = footprints[view];
+  const real per_bin = 1.0f / FIXED_TO_REAL(g.w);
+  const real reach_back = (per_bin < 0 ? -per_bin : per_bin) * shape.SUPPORT +
+                          (1.0f - 1.0f / PHASES) + 1e-3f + 1e-6f * columns;
+  __global const real *entries = table + ((long)slice * count + number) * PHASES * columns;
+  __global real *y = sinogram + ((long)views[view].x * slices + slice0 + slice) * bins;
   for (int b = b0; b < b1; b++) {
-    /* The first column with a phase inside the hat, or the one before where rounding hides it. */
-    const float center = ((float)(b - WHOLE(g.z)) - FIXED_TO_FLOAT(g.z & 0xffffffffL)) * per_bin;
-    const int start = (int)(center - reach_back + (float)columns) - columns + 1;
+    /* The first column with a phase in reach, or the one before where rounding hides it. */
+    const real center = ((real)(b - WHOLE(g.z)) - FIXED_TO_REAL(g.z & 0xffffffffL)) * per_bin;
+    const int start = (int)(center - reach_back + (real)columns) - columns + 1;
     lanes sum = 0;
-    for (int k = start < 0 ? 0 : start; k < start + reach && k < used; k++) {
-      const float offset = FIXED_TO_FLOAT(g.z + k * g.w - ((long)b << 32));
-      UNROLL for (int r = 0; r < PHASES; r += LANES) {
-        const lanes distance = offset + ((float)r + LANE_NUMBERS) * (step * (1.0f / PHASES));
-        sum = sum + hat(distance, inverse_width) * LOAD(entries + k * PHASES + r);
-      }
-    }
-    y[b] = scale * SUM_OF_LANES(sum);
+    for (int k = start < 0 ? 0 : start; k < start + reach && k < used; k++)
+      UNROLL for (int r = 0; r < PHASES; r += LANES)
+        sum = sum + footprint(DISTANCES(g, k, r, b), shape) * LOAD(entries + k * PHASES + r);
+    y[b] = shape.SCALE * SUM_OF_LANES(sum);
   }
 }

@@ -15,7 +15,7 @@
  * exact where the view's interpolant is straight; at its kinks it errs by O(1 / PHASES^2).
  *
  * Positions are 32.32 fixed-point: every kernel sees the same m, r and w, bit for bit, and the
- * error is 2^-33 of a column per row at any size.
+ * error is 2^-33 of a column per row at any size, in double precision as well.
  *
  * geometry[view] = (base, slope, origin, step): row i starts at column base + slope * i, and
  * column k of phase 0 lies on detector bin origin + step * k. */
@@ -31,19 +31,23 @@
 /* Columns that one work-item handles. */
 #define SEGMENT (LANES * BLOCKS)
 
-#define FIXED_TO_FLOAT(p) ((float)(p) * (1.0f / 4294967296.0f))
+#define FIXED_TO_REAL(p) ((real)(p) * (1.0f / 4294967296.0f))
 #define WHOLE(p) ((int)((p) >> 32))
 
 static int phase_of(long position) { return (int)((uint)position >> (32 - LOG2_PHASES)); }
 
 /* Weight of the next phase: the fraction below the phase, to the 24 bits that a float holds. */
-static float next_weight(long position) {
-  uint fraction = ((uint)position << LOG2_PHASES) >> 8;
-  return (float)(int)fraction * (1.0f / 16777216.0f);
+static real next_weight(long position) {
+  const uint fraction = (uint)position << LOG2_PHASES;
+#if DOUBLE
+  return (real)fraction * (1.0f / 4294967296.0f);
+#else
+  return (float)(int)(fraction >> 8) * (1.0f / 16777216.0f);
+#endif
 }
 
-/* A hat of half-width h bins about a bin's centre: linear interpolation where h is 1. */
-static lanes hat(lanes distance, float inverse_width) {
-  lanes value = 1.0f - absolute(distance) * inverse_width;
-  return value > 0 ? value : 0;
-}
+/* Distances in bins from bin b to the places of LANES phases, from `phase` on, of column k. Both
+ * resampling kernels ask here, so that they weight alike to the bit, however narrow a footprint. */
+#define DISTANCES(g, k, phase, b) \
+  (FIXED_TO_REAL((g).z + (k) * (g).w - ((long)(b) << 32)) + \
+   ((real)(phase) + LANE_NUMBERS) * (FIXED_TO_REAL((g).w) * (1.0f / PHASES)))

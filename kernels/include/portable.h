@@ -5,6 +5,10 @@
  * eight floats on a CPU (LANES 8, GROUP 1) and one float on a GPU (LANES 1, GROUP 64): its
  * arithmetic reads the same for both, since OpenCL's operators and ?: work on either.
  *
+ * With DOUBLE 1 the same source computes in double precision: `real` is what one lane holds, and
+ * `lanes_int` are whole numbers as wide, which ?: on lanes asks for. Scalars of such a kernel are
+ * `real` too (a vector of doubles takes a float on its side, a vector of floats takes no double).
+ *
  * Built-in functions: on PoCL 3.0 vload8, convert_int8, floor, mad, clamp are real calls round
  * which every live vector register is spilled, 2.5 to 60 times slower in an inner loop. Kernels
  * use the macros below, which avoid them there and are the built-ins elsewhere. */
@@ -19,20 +23,41 @@
 #define RIFT_POCL 0
 #endif
 
+#ifndef DOUBLE
+#define DOUBLE 0
+#endif
+
+#if DOUBLE
+#pragma OPENCL EXTENSION cl_khr_fp64 : enable
+typedef double real;
+typedef double8 real8;
+typedef long integer;
+typedef long8 integer8;
+#define TO_INTEGER8(v) convert_long8(v)
+#define TO_REAL8(v) convert_double8(v)
+#else
+typedef float real;
+typedef float8 real8;
+typedef int integer;
+typedef int8 integer8;
+#define TO_INTEGER8(v) convert_int8(v)
+#define TO_REAL8(v) convert_float8(v)
+#endif
+
 #define KERNEL __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1)))
 #define UNROLL _Pragma("unroll")
 
 #if LANES == 8
-typedef float8 lanes;
-typedef int8 lanes_int;
-#define LANE_NUMBERS ((float8)(0, 1, 2, 3, 4, 5, 6, 7))
+typedef real8 lanes;
+typedef integer8 lanes_int;
+#define LANE_NUMBERS ((real8)(0, 1, 2, 3, 4, 5, 6, 7))
 #define GATHER(p, i) \
-  ((float8)((p)[(i).s0], (p)[(i).s1], (p)[(i).s2], (p)[(i).s3], \
-            (p)[(i).s4], (p)[(i).s5], (p)[(i).s6], (p)[(i).s7]))
+  ((real8)((p)[(i).s0], (p)[(i).s1], (p)[(i).s2], (p)[(i).s3], \
+           (p)[(i).s4], (p)[(i).s5], (p)[(i).s6], (p)[(i).s7]))
 #else
-typedef float lanes;
-typedef int lanes_int;
-#define LANE_NUMBERS 0.0f
+typedef real lanes;
+typedef integer lanes_int;
+#define LANE_NUMBERS ((real)0)
 #define GATHER(p, i) ((p)[i])
 #endif
 
@@ -44,21 +69,21 @@ typedef int lanes_int;
 #endif
 
 #if LANES == 8 && RIFT_POCL
-typedef float8 lanes_at __attribute__((aligned(4)));
+typedef real8 lanes_at __attribute__((aligned(sizeof(real))));
 #define LOAD(p) (*(const __global lanes_at *)(p))
 #define STORE(p, v) (*(__global lanes_at *)(p) = (v))
-#define TO_INT(v) __builtin_convertvector(v, int8)
-#define TO_FLOAT(v) __builtin_convertvector(v, float8)
+#define TO_INT(v) __builtin_convertvector(v, integer8)
+#define TO_FLOAT(v) __builtin_convertvector(v, real8)
 #elif LANES == 8
 #define LOAD(p) vload8(0, p)
 #define STORE(p, v) vstore8(v, 0, p)
-#define TO_INT(v) convert_int8(v)
-#define TO_FLOAT(v) convert_float8(v)
+#define TO_INT(v) TO_INTEGER8(v)
+#define TO_FLOAT(v) TO_REAL8(v)
 #else
 #define LOAD(p) (*(p))
 #define STORE(p, v) (*(p) = (v))
-#define TO_INT(v) ((int)(v))
-#define TO_FLOAT(v) ((float)(v))
+#define TO_INT(v) ((integer)(v))
+#define TO_FLOAT(v) ((real)(v))
 #endif
 
 /* Largest whole number not above v, for |v| < 2^31. */

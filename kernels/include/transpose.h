@@ -1,17 +1,17 @@
-/* Transpose LANES vectors of LANES floats in registers; nothing to do for a single lane.
+/* Transpose LANES vectors of LANES numbers in registers; nothing to do for a single lane.
  *
  * Three rounds of two-source shuffles, each of which exchanges blocks of half the size of the
  * round before: 4x4 blocks, then 2x2, then single numbers (24 shuffles for 64 numbers). */
 
 #if LANES == 8
 #define EXCHANGE4(a, b, v, w) \
-  { const float8 low = (float8)((v).lo, (w).lo), high = (float8)((v).hi, (w).hi); a = low; b = high; }
+  { const real8 low = (real8)((v).lo, (w).lo), high = (real8)((v).hi, (w).hi); a = low; b = high; }
 #define EXCHANGE2(a, b, v, w) \
-  { const float8 low = (float8)((v).s01, (w).s01, (v).s45, (w).s45); \
-    const float8 high = (float8)((v).s23, (w).s23, (v).s67, (w).s67); a = low; b = high; }
+  { const real8 low = (real8)((v).s01, (w).s01, (v).s45, (w).s45); \
+    const real8 high = (real8)((v).s23, (w).s23, (v).s67, (w).s67); a = low; b = high; }
 #define EXCHANGE1(a, b, v, w) \
-  { const float8 low = (float8)((v).s0, (w).s0, (v).s2, (w).s2, (v).s4, (w).s4, (v).s6, (w).s6); \
-    const float8 high = (float8)((v).s1, (w).s1, (v).s3, (w).s3, (v).s5, (w).s5, (v).s7, (w).s7); \
+  { const real8 low = (real8)((v).s0, (w).s0, (v).s2, (w).s2, (v).s4, (w).s4, (v).s6, (w).s6); \
+    const real8 high = (real8)((v).s1, (w).s1, (v).s3, (w).s3, (v).s5, (w).s5, (v).s7, (w).s7); \
     a = low; b = high; }
 #define TRANSPOSE(v) \
   { UNROLL for (int t = 0; t < 4; t++) EXCHANGE4(v[t], v[t + 4], v[t], v[t + 4]) \

@@ -17,10 +17,11 @@ _CPU_RUN, _SUM_RUN = 4096, 64
 
 
 def axpby(device: Device, a: float, x: Any, b: float, y: Any) -> None:
-    """Y = a x + b y on device arrays of the same shape."""
+    """Y = a x + b y on device arrays of the same shape and type, float32 or float64."""
     run = _CPU_RUN if device.traits.is_cpu else 1
     size = -(-y.size // run)
-    device.launch("axpby", (size,), x, y, float(a), float(b), np.uint64(y.size), RUN=run)
+    macros = {"RUN": run, "DOUBLE": int(y.dtype == np.float64)}
+    device.launch("axpby", (size,), x, y, float(a), float(b), np.uint64(y.size), **macros)
 
 
 def sum_columns(device: Device, table: Any) -> Any:

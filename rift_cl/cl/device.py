@@ -110,15 +110,20 @@ class Device:
                 cl.enqueue_fill_buffer(self.queue, array.base_data, np.uint8(0), 0, array.nbytes)
         return array
 
-    def array(self, host: ArrayLike) -> Any:
-        """Copy a host array to the device: integers as they are, other numbers as float32.
+    def array(self, host: ArrayLike, dtype: DTypeLike | None = None) -> Any:
+        """Copy a host array to the device.
+
+        Args:
+            host: anything NumPy reads as an array of real numbers.
+            dtype: the type it shall have there; if not given, integers stay as they are and other
+                numbers become float32.
 
         Raises:
             DTypeError: the values are not real numbers.
         """
         values = as_real_array(host, name="array")
         native = np.float32 if values.dtype.kind in "fb" else values.dtype.newbyteorder("=")
-        return upload(self, as_plain(values, native))
+        return upload(self, as_plain(values, native if dtype is None else dtype))
 
     def send(self, host: NDArray[np.float32]) -> Any:
         """As ``array``, for float32 in C order, without waiting for what was enqueued before."""

@@ -2,11 +2,12 @@
 
 Drivers copy bytes: a Fortran-ordered array arrives transposed, a big-endian one as noise, a
 shorter one without a word. So every host array passes through ``as_host_array`` first, which
-gives back C-ordered native float32 of the wanted shape, or one clear error.
+gives back C-ordered native float32 (float64 where wanted) of the wanted shape, or one clear error.
 """
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,9 +22,31 @@ if TYPE_CHECKING:
 _BLOCK = 1 << 20
 
 
+def real_type(device: Device, dtype: DTypeLike) -> np.dtype[Any]:
+    """The type of the numbers that an operator works in: float32, or float64 if asked for.
+
+    Raises:
+        DTypeError: it is another type.
+        DeviceError: the device cannot compute in float64.
+    """
+    wanted = None
+    with suppress(TypeError):
+        wanted = np.dtype(dtype)
+    if wanted is None or wanted not in (np.float32, np.float64):
+        raise DTypeError(f"dtype is {dtype!r}, wanted 'float32' or 'float64'")
+    if wanted == np.float64 and not device.traits.fp64:
+        raise DeviceError(f"{device.name} cannot compute in float64 (no cl_khr_fp64): use float32")
+    return wanted
+
+
 def as_host_array(
-    values: Any, shape: tuple[int, ...], *, name: str, wants: str
-) -> NDArray[np.float32]:
+    values: Any,
+    shape: tuple[int, ...],
+    *,
+    name: str,
+    wants: str,
+    dtype: DTypeLike = np.float32,
+) -> NDArray[Any]:
     """Bring an array into the one form that may cross to a device.
 
     Args:
@@ -31,19 +54,20 @@ def as_host_array(
         shape: the shape it must have.
         name: what the caller calls it, for the error.
         wants: who wants this shape, for the error.
+        dtype: the type to bring it to.
 
     Returns:
-        The same values as C-ordered native float32; ``values`` itself where it already is that.
+        The same values, C-ordered, in native ``dtype``; ``values`` itself where it already is that.
 
     Raises:
         ShapeError: the shape differs.
         DTypeError: the values are not real numbers.
-        NonFiniteError: a value is NaN or infinite, or too large for float32.
+        NonFiniteError: a value is NaN or infinite, or too large for ``dtype``.
     """
     array = as_real_array(values, name=name)
     if array.shape != shape:
         raise ShapeError(f"{name} has shape {array.shape}, {wants} wants {shape}")
-    plain = as_plain(array, np.float32)
+    plain = as_plain(array, dtype)
     check_finite(plain, name=name)
     return plain
 
@@ -155,12 +179,19 @@ def download(device: Device, array: Any, out: NDArray[Any] | None = None) -> NDA
     return host
 
 
-def as_device_array(device: Device, array: Any, shape: tuple[int, ...], *, name: str) -> Any:
+def as_device_array(
+    device: Device,
+    array: Any,
+    shape: tuple[int, ...],
+    *,
+    name: str,
+    dtype: DTypeLike = np.float32,
+) -> Any:
     """Check a device array that a caller handed in.
 
     Raises:
         ShapeError: the shape or memory order is not the wanted one.
-        DTypeError: the values are not float32.
+        DTypeError: the values are not of type ``dtype``.
         DeviceError: the array belongs to another device.
     """
     if not is_device_array(array):
@@ -169,8 +200,9 @@ def as_device_array(device: Device, array: Any, shape: tuple[int, ...], *, name:
         )
     if array.shape != shape:
         raise ShapeError(f"{name} has shape {array.shape}, wanted {shape}")
-    if array.dtype != np.float32:
-        raise DTypeError(f"{name} has type {array.dtype} on the device, wanted float32")
+    if array.dtype != dtype:
+        wanted = np.dtype(dtype).name
+        raise DTypeError(f"{name} has type {array.dtype} on the device, wanted {wanted}")
     _check_whole(device, array, name=name)
     return array
 
@@ -188,15 +220,16 @@ def is_device_array(value: Any) -> bool:
     return hasattr(value, "base_data") and hasattr(value, "queue")
 
 
-def check_output(out: Any, shape: tuple[int, ...]) -> NDArray[np.float32]:
+def check_output(out: Any, shape: tuple[int, ...], dtype: DTypeLike = np.float32) -> NDArray[Any]:
     """Check a host array that a result is to be written into.
 
     Raises:
         ShapeError: its shape or memory order is not the wanted one.
-        DTypeError: it is no writable float32 array.
+        DTypeError: it is no writable array of type ``dtype``.
     """
-    if not isinstance(out, np.ndarray) or out.dtype != np.dtype("=f4") or not out.flags.writeable:
-        raise DTypeError("out must be a writable NumPy array of native float32")
+    wanted = np.dtype(dtype)
+    if not isinstance(out, np.ndarray) or out.dtype != wanted or not out.flags.writeable:
+        raise DTypeError(f"out must be a writable NumPy array of native {wanted.name}")
     if out.shape != shape or not out.flags.c_contiguous:
         raise ShapeError(f"out has shape {out.shape}, wanted a C-ordered array of shape {shape}")
     return out

@@ -16,6 +16,7 @@ import numpy as np
 
 from rift_cl.cl.failures import named_errors
 from rift_cl.cl.kernel_cache import build_lock
+from rift_cl.cl.memory import real_type
 from rift_cl.cl.process import claim_process
 from rift_cl.cl.source import kernel_source
 from rift_cl.errors import KernelBuildError
@@ -31,6 +32,7 @@ _PAUSES = (0.0, 0.1, 0.3)
 _building = threading.RLock()
 # A kernel and its macros as the compiler sees them: 1 and 1.0 are equal, but not the same.
 _Key = tuple[str, tuple[tuple[str, str], ...]]
+_DOUBLE = ("DOUBLE", "1")
 
 
 class _ThreadKernels(threading.local):
@@ -66,9 +68,12 @@ class Programs:
         Args:
             name: the kernel, which is also its file and its entry point.
             size: work-items along each axis; nothing is enqueued when one is zero.
-            arguments: device arrays, and Python ints and floats for ``int`` and ``float``;
-                NumPy scalars for what is neither.
+            arguments: device arrays, and Python ints and floats for ``int`` and ``real`` (which is
+                ``float`` unless ``DOUBLE`` is 1); NumPy scalars for what is neither.
             macros: the compile-time constants that this variant is built with.
+
+        Raises:
+            DeviceError: ``DOUBLE`` is 1 and the device has no doubles, or the driver failed.
         """
         claim_process()
         if 0 in size:
@@ -89,8 +94,9 @@ class Programs:
         queue = self._device.queue
         if key not in self._own.typed:
             # Numbers whose types are known beforehand are set many times faster.
+            real = np.float64 if _DOUBLE in key[1] else np.float32
             with _building:
-                kernel.set_scalar_arg_dtypes([_scalar_type(value) for value in values])
+                kernel.set_scalar_arg_dtypes([_scalar_type(value, real) for value in values])
             self._own.typed.add(key)
         kernel.set_args(*(_plain(value) for value in values))
         started = (key, max(size) > _SMALL_GRID)
@@ -122,6 +128,8 @@ class Programs:
         import pyopencl as cl
 
         name, macros = key
+        if _DOUBLE in macros:
+            real_type(self._device, np.float64)
         defines = {**self._device.traits.macros, **dict(macros)}
         options = [*OPTIONS, *(f"-D{macro}={value}" for macro, value in defines.items())]
         failure = ""
@@ -138,12 +146,12 @@ class Programs:
         raise _build_error(name, failure, options, self._device.name)
 
 
-def _scalar_type(value: Any) -> Any:
+def _scalar_type(value: Any, real: Any) -> Any:
     """The type of a number as the kernel takes it; None for what is no number."""
     if isinstance(value, int):
         return np.int32
     if isinstance(value, float):
-        return np.float32
+        return real
     return value.dtype.type if isinstance(value, np.generic) else None
 
 

@@ -23,8 +23,8 @@ def dot_test(A: LinearOperator, seed: int = 0) -> float:
     """
     random = np.random.default_rng(seed)
 
-    def white(shape: Shape) -> NDArray[np.float32]:
-        return random.standard_normal(shape).astype(np.float32)
+    def white(shape: Shape) -> NDArray[Any]:
+        return random.standard_normal(shape).astype(A.dtype)
 
     x = white(A.domain)
     pairs = [(x, A(x)), (white(A.domain), white(A.range))]

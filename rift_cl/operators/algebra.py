@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rift_cl.cl.arithmetic import axpby
-from rift_cl.errors import DeviceError, InputError, ShapeError
+from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
 from rift_cl.operators.linear import LinearOperator, Piece
 
 
@@ -17,7 +17,7 @@ class Adjoint(LinearOperator):
     """The adjoint of an operator."""
 
     def __init__(self, forward: LinearOperator) -> None:
-        super().__init__(forward.range, forward.domain, forward.device)
+        super().__init__(forward.range, forward.domain, forward.device, forward.dtype)
         self._forward = forward
 
     @property
@@ -44,9 +44,9 @@ class Scaled(LinearOperator):
     """A multiple of an operator."""
 
     def __init__(self, inner: LinearOperator, factor: float) -> None:
-        super().__init__(inner.domain, inner.range, inner.device)
+        super().__init__(inner.domain, inner.range, inner.device, inner.dtype)
         self._inner = inner
-        self._factor = _finite(factor)
+        self._factor = _finite(factor, self.dtype)
 
     def _apply(self, x: Any, out: Any) -> None:
         self._inner._apply(x, out)
@@ -74,27 +74,27 @@ class Sum(LinearOperator):
                 f"sum of operators {left.domain} -> {left.range} and {right.domain} -> "
                 f"{right.range}: both must map between the same shapes"
             )
-        _demand_one_device(left, right)
-        super().__init__(left.domain, left.range, left.device)
+        demand_one_kind(left, right)
+        super().__init__(left.domain, left.range, left.device, left.dtype)
         self._terms = (left, right)
 
     @property
     def scratch(self) -> int:
         """The second term's result, besides what the terms need themselves."""
-        other = 4 * max(math.prod(self.domain), math.prod(self.range))
+        other = self.dtype.itemsize * max(math.prod(self.domain), math.prod(self.range))
         return other + max(term.scratch for term in self._terms)
 
     def _apply(self, x: Any, out: Any) -> None:
         left, right = self._terms
         left._apply(x, out)
-        other = self.device.empty(out.shape)
+        other = self.device.empty(out.shape, self.dtype)
         right._apply(x, other)
         axpby(self.device, 1.0, other, 1.0, out)
 
     def _apply_adjoint(self, y: Any, out: Any) -> None:
         left, right = self._terms
         left._apply_adjoint(y, out)
-        other = self.device.empty(out.shape)
+        other = self.device.empty(out.shape, self.dtype)
         right._apply_adjoint(y, other)
         axpby(self.device, 1.0, other, 1.0, out)
 
@@ -108,35 +108,47 @@ class Product(LinearOperator):
                 f"product of operators: the inner one gives {inner.range}, the outer one takes "
                 f"{outer.domain}"
             )
-        _demand_one_device(outer, inner)
-        super().__init__(inner.domain, outer.range, outer.device)
+        demand_one_kind(outer, inner)
+        super().__init__(inner.domain, outer.range, outer.device, outer.dtype)
         self._outer, self._inner = outer, inner
 
     @property
     def scratch(self) -> int:
         """What passes between the two, besides what they need themselves."""
-        return 4 * math.prod(self._inner.range) + max(self._outer.scratch, self._inner.scratch)
+        between = self.dtype.itemsize * math.prod(self._inner.range)
+        return between + max(self._outer.scratch, self._inner.scratch)
 
     def _apply(self, x: Any, out: Any) -> None:
-        between = self.device.empty(self._inner.range)
+        between = self.device.empty(self._inner.range, self.dtype)
         self._inner._apply(x, between)
         self._outer._apply(between, out)
 
     def _apply_adjoint(self, y: Any, out: Any) -> None:
-        between = self.device.empty(self._inner.range)
+        between = self.device.empty(self._inner.range, self.dtype)
         self._outer._apply_adjoint(y, between)
         self._inner._apply_adjoint(between, out)
 
 
-def _finite(factor: float) -> float:
+def _finite(factor: float, dtype: np.dtype[Any]) -> float:
     with np.errstate(over="ignore"):
-        rounded = float(np.float32(factor))
+        rounded = float(dtype.type(factor))
     if not math.isfinite(rounded):
-        raise InputError(f"an operator cannot be multiplied by {factor}: it must fit a float32")
+        raise InputError(f"an operator cannot be multiplied by {factor}: it must fit a {dtype}")
     return rounded
 
 
-def _demand_one_device(first: LinearOperator, second: LinearOperator) -> None:
+def demand_one_kind(first: LinearOperator, second: LinearOperator) -> None:
+    """Refuse to combine operators whose arrays cannot be the same.
+
+    Raises:
+        DTypeError: one works in float32, the other in float64.
+        DeviceError: they are on two devices.
+    """
+    if first.dtype != second.dtype:
+        raise DTypeError(
+            f"operators in {first.dtype} and {second.dtype} cannot be combined: make both with "
+            "the same dtype"
+        )
     if first.device is not second.device:
         raise DeviceError(
             f"operators on two devices, {first.device.name} and {second.device.name}, cannot be "

@@ -1,8 +1,8 @@
 """Linear operators and their algebra: ``A(x)``, ``A.T(y)``, ``A @ B``, ``A + B``, ``2 * A``.
 
-An operator maps arrays of shape ``domain`` to arrays of shape ``range``. NumPy in gives NumPy
-out; a device array in gives a device array out, without a copy. The adjoint is an operator like
-any other, ``A.T.T is A``, and solvers need to know nothing else.
+An operator maps arrays of shape ``domain`` to arrays of shape ``range``, both of type ``dtype``.
+NumPy in gives NumPy out; a device array in gives a device array out, without a copy. The adjoint
+is an operator like any other, ``A.T.T is A``, and solvers need to know nothing else.
 
 Host arrays that are too large for the device are taken in pieces where the operator says how
 (``_pieces``); the result is the same to the bit.
@@ -17,7 +17,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
@@ -28,6 +28,7 @@ from rift_cl.cl.memory import (
     demand_apart,
     download,
     is_device_array,
+    real_type,
     share,
 )
 from rift_cl.errors import DeviceMemoryError, ResourceLimitError
@@ -45,12 +46,19 @@ class LinearOperator(ABC):
         domain: shape of what it takes.
         range: shape of what it gives.
         device: where it works.
+        dtype: type of what it takes and gives, float32 or float64.
+
+    Raises:
+        DeviceError: ``dtype`` is float64 and the device has none.
     """
 
-    def __init__(self, domain: Shape, range: Shape, device: Device) -> None:
+    def __init__(
+        self, domain: Shape, range: Shape, device: Device, dtype: DTypeLike = np.float32
+    ) -> None:
         self.domain = domain
         self.range = range
         self.device = device
+        self.dtype = real_type(device, dtype)
 
     @cached_property
     def T(self) -> LinearOperator:
@@ -70,21 +78,22 @@ class LinearOperator(ABC):
             name: what the caller calls ``x``, for the sentence of an error.
 
         Returns:
-            Array of shape ``range``, float32, on the side where ``x`` is.
+            Array of shape ``range`` and type ``dtype``, on the side where ``x`` is.
 
         Raises:
             InputError: ``x`` or ``out`` has the wrong shape or type, or holds NaN or infinity.
             DeviceMemoryError: not even the smallest piece fits the device.
         """
         if is_device_array(x):
-            x = as_device_array(self.device, x, self.domain, name=name)
-            y = self.device.empty(self.range) if out is None else out
-            y = as_device_array(self.device, y, self.range, name="out")
+            x = as_device_array(self.device, x, self.domain, name=name, dtype=self.dtype)
+            y = self.device.empty(self.range, self.dtype) if out is None else out
+            y = as_device_array(self.device, y, self.range, name="out", dtype=self.dtype)
             demand_apart(x, y, name=name)
             self._apply(x, y)
             return y
-        host = as_host_array(x, self.domain, name=name, wants="the operator")
-        y = np.empty(self.range, np.float32) if out is None else check_output(out, self.range)
+        host = as_host_array(x, self.domain, name=name, wants="the operator", dtype=self.dtype)
+        y = np.empty(self.range, self.dtype) if out is None else out
+        y = check_output(y, self.range, self.dtype)
         demand_apart(host, y, name=name)
         self._apply_host(host, y)
         return y
@@ -121,7 +130,7 @@ class LinearOperator(ABC):
         """The operator x -> -A x."""
         return self * -1.0
 
-    def _apply_host(self, x: NDArray[np.float32], y: NDArray[np.float32]) -> None:
+    def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
         budget = self.device.budget
         lack: DeviceMemoryError | None = None
         for halving in range(_HALVINGS + 1):
@@ -144,14 +153,14 @@ class LinearOperator(ABC):
 
     def _apply_piece(
         self,
-        x: NDArray[np.float32],
-        y: NDArray[np.float32],
+        x: NDArray[Any],
+        y: NDArray[Any],
         inside: tuple[slice, ...],
         outside: tuple[slice, ...],
     ) -> None:
         piece = np.ascontiguousarray(x[inside])
         part = y[outside]
-        target = self.device.empty(part.shape)
+        target = self.device.empty(part.shape, self.dtype)
         self._apply(share(self.device, piece), target)
         if part.flags.c_contiguous:
             download(self.device, target, part)
@@ -165,7 +174,7 @@ class LinearOperator(ABC):
 
     def _pieces(self, budget: int) -> Iterable[Piece]:
         """How to cut the work to fit a budget in bytes: in one, unless the operator knows how."""
-        arrays = 4 * (math.prod(self.domain) + math.prod(self.range))
+        arrays = self.dtype.itemsize * (math.prod(self.domain) + math.prod(self.range))
         plan_chunks(1, arrays, self.scratch, budget, what=f"{type(self).__name__} application")
         return [((), ())]
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
+from rift_cl.operators.footprint import footprint_records
 
 LOG2_PHASES = 3
 PHASES = 1 << LOG2_PHASES
@@ -32,7 +33,7 @@ class PhaseTable:
     Args:
         views: which view of the scan each is, and how many columns it needs, (n, 2) int32.
         geometry: (base, slope, origin, step) per view in 32.32 fixed point, (n, 4) int64.
-        hats: (1 / half-width in bins, scale) per view, (n, 2) float32.
+        footprints: what a pixel leaves on the detector, per view, (n, 8).
         orders: the rows of each view sorted by phase, (n, rows) int32.
         starts: where each phase begins in ``orders``, (n, PHASES + 1) int32.
         columns: columns of a table, in whole segments.
@@ -44,7 +45,7 @@ class PhaseTable:
 
     views: NDArray[np.int32]
     geometry: NDArray[np.int64]
-    hats: NDArray[np.float32]
+    footprints: NDArray[np.float64]
     orders: NDArray[np.int32]
     starts: NDArray[np.int32]
     columns: int
@@ -60,12 +61,15 @@ class PhaseTable:
         return PHASES * self.columns
 
 
-def phase_table(grid: Grid, scan: Parallel, *, along_x: bool, segment: int) -> PhaseTable:
+def phase_table(
+    grid: Grid, scan: Parallel, footprint: str = "linear", *, along_x: bool, segment: int
+) -> PhaseTable:
     """The table of the views that are walked along x, or of those along y.
 
     Args:
         grid: the image.
         scan: the scan.
+        footprint: one of ``FOOTPRINTS``.
         along_x: which of the two.
         segment: columns that one work-item handles.
     """
@@ -87,23 +91,24 @@ def phase_table(grid: Grid, scan: Parallel, *, along_x: bool, segment: int) -> P
             f"pitch is {scan.pitch:g}, samples are {grid.spacing} apart: a bin may be at most "
             f"{1 / _WITHIN[0]:g} times as wide as a sample, or as narrow"
         )
-    half_width = np.maximum(1.0, np.abs(step))
+    shadows = np.abs(step), np.abs(dy * sine / scan.pitch)
+    spread = footprint_records(footprint, *shadows, dx * dy / scan.pitch)
     padded = -(-width // segment) * segment
     used = ((base + np.maximum(slope, 0) * (rows - 1)) >> 32) + padded + 2
     orders, starts = _rows_by_phase(base, slope, rows)
     return PhaseTable(
         views=np.stack([views, used], axis=1).astype(np.int32),
         geometry=np.stack([base, slope, _fixed(origin), _fixed(step)], axis=1),
-        hats=np.stack([1 / half_width, dx * dy / (half_width * scan.pitch)], axis=1).astype("=f4"),
+        footprints=spread.records,
         orders=orders,
         starts=starts,
         columns=-(-int(np.max(used, initial=1)) // segment) * segment,
         rows=rows,
         width=width,
         padded=padded,
-        taps=int(np.ceil(np.max(2 * half_width + np.abs(step), initial=1.0))),
-        # The hat's width in columns, a column's own phases, and what rounding may add.
-        reach=int(np.max(2 * half_width / np.abs(step), initial=0.0) + 1 - 1 / PHASES + 0.1) + 1,
+        taps=int(np.ceil(np.max(2 * spread.support + np.abs(step), initial=1.0))),
+        # The footprint's width in columns, a column's own phases, and what rounding may add.
+        reach=int(np.max(2 * spread.support / np.abs(step), initial=0) + 1 - 1 / PHASES + 0.1) + 1,
     )
 
 

@@ -12,11 +12,14 @@ from collections.abc import Iterable, Iterator
 from functools import cached_property
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import DTypeLike
+
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
-from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
+from rift_cl.operators.footprint import check_footprint
 from rift_cl.operators.linear import LinearOperator, Piece
 from rift_cl.operators.phase_table import LOG2_PHASES, PhaseTable, phase_table
 
@@ -33,16 +36,25 @@ class Projector(LinearOperator):
     Args:
         grid: where the image lives, (ny, nx) or (nz, ny, nx).
         scan: how it is looked at.
-        footprint: how a pixel is spread over the bins. ``linear``: by linear interpolation
-            between the two bins about the pixel's centre; where bins are finer than the pixel's
-            shadow the hat widens to that shadow, so that no ray falls between pixels.
+        footprint: what a pixel leaves on the detector. ``linear``: it is spread by linear
+            interpolation between the two bins about its centre; where bins are finer than its
+            shadow the hat widens to that shadow, so that no ray falls between pixels. ``joseph``:
+            rays through the bins' centres interpolate linearly between the pixels of each row or
+            column they cross (Joseph 1982). ``strip``: the area that pixel and bin share, which
+            is right for a detector that counts over whole bins.
         device: where to work; the default device if not given.
+        dtype: ``float32``, or ``float64`` where the device has it: for an adjoint that is matched
+            to 1e-15 and for solvers that run far. Both types read one geometry, in which a step
+            from row to row is exact to 2^-33 of a column: projections are off by 2e-9 (smooth
+            images) to 6e-8 (white noise) at 512 x 512, in proportion to its edge. And both blend
+            8 phases to a column, whose error, near 1 % on white noise, float64 leaves as it is.
 
     The domain is ``grid.shape``; the range is (angles, bins), or (angles, nz, bins) for a volume.
     Values of the range are in the image's unit times the grid's unit of length.
 
     Raises:
-        InputError: the footprint is unknown.
+        InputError: the footprint or the type is unknown.
+        DeviceError: the device has no float64.
     """
 
     def __init__(
@@ -50,28 +62,29 @@ class Projector(LinearOperator):
         grid: Grid,
         scan: Parallel,
         footprint: str = "linear",
-        *,
         device: Device | None = None,
+        dtype: DTypeLike = np.float32,
     ) -> None:
-        if footprint != "linear":
-            raise InputError(f"footprint is {footprint!r}, wanted 'linear'")
         rows = grid.shape[:-2]
         shape = (len(scan.angles), *rows, scan.bins)
-        super().__init__(grid.shape, shape, device or default_device())
-        self.grid, self.scan = grid, scan
+        super().__init__(grid.shape, shape, device or default_device(), dtype)
+        self.grid, self.scan, self.footprint = grid, scan, check_footprint(footprint)
         lanes = self.device.traits.macros["LANES"]
-        blocks = 8 if lanes > 1 else 1
+        blocks = 32 // self.dtype.itemsize if lanes > 1 else 1
         self._segment = lanes * blocks
         self._table_bytes = _TABLE_BYTES["cpu" if self.device.traits.is_cpu else "gpu"]
-        self._macros = {"BLOCKS": blocks, "LOG2_PHASES": LOG2_PHASES}
+        self._precision = {"DOUBLE": int(self.dtype == np.float64)}
+        self._macros = {"BLOCKS": blocks, "LOG2_PHASES": LOG2_PHASES, **self._precision}
+        self._resampling = {"STRIP": int(footprint == "strip"), **self._macros}
 
     @cached_property
     def _walks(self) -> tuple[_Walk, _Walk]:
-        plane = self.grid.slice()
-        return (
-            _Walk(self.device, phase_table(plane, self.scan, along_x=True, segment=self._segment)),
-            _Walk(self.device, phase_table(plane, self.scan, along_x=False, segment=self._segment)),
+        plane, scan = self.grid.slice(), self.scan
+        by_rows, by_columns = (
+            phase_table(plane, scan, self.footprint, along_x=along_x, segment=self._segment)
+            for along_x in (True, False)
         )
+        return _Walk(self.device, by_rows, self.dtype), _Walk(self.device, by_columns, self.dtype)
 
     def _apply(self, x: Any, out: Any) -> None:
         for slab in _slabs(x):
@@ -83,16 +96,17 @@ class Projector(LinearOperator):
 
     def _split(self, walk: _Walk, image: Any, slab: _Slab, transpose: int) -> Any:
         table, margin = walk.table, self._segment
-        plane = self.device.zeros((slab.slices, table.rows, table.width + 2 * margin))
+        shape = (slab.slices, table.rows, table.width + 2 * margin)
+        plane = self.device.zeros(shape, self.dtype)
         tiles = (*self._tiles(table.width, table.rows), slab.slices)
-        shape = (table.rows, table.width, margin)
-        arguments = (image, plane, slab.first, *shape)
-        self.device.launch("plane_split", tiles, *arguments, TRANSPOSE=transpose)
+        arguments = (image, plane, slab.first, table.rows, table.width, margin)
+        macros = {"TRANSPOSE": transpose, **self._precision}
+        self.device.launch("plane_split", tiles, *arguments, **macros)
         return plane
 
     def _project(self, walk: _Walk, plane: Any, out: Any, slab: _Slab, run: _Run) -> None:
         table, (first, count) = walk.table, run
-        entries = self.device.empty((slab.slices, count, table.entries))
+        entries = self.device.empty((slab.slices, count, table.entries), self.dtype)
         segments = table.columns // self._segment
         work = (count, segments) if self.device.traits.is_cpu else (segments, count)
         self.device.launch(
@@ -106,10 +120,10 @@ class Projector(LinearOperator):
         self.device.launch(
             "radon_resample_adjoint",
             (-(-self.scan.bins // bins), count, slab.slices),
-            *(out, entries, walk.geometry, walk.hats, walk.views),
+            *(out, entries, walk.geometry, walk.footprints, walk.views),
             *(first, slab.first, slab.total, self.scan.bins, table.columns, table.reach),
             BINS=bins,
-            **self._macros,
+            **self._resampling,
         )
 
     def _apply_adjoint(self, y: Any, out: Any) -> None:
@@ -118,20 +132,21 @@ class Projector(LinearOperator):
             ny, nx = self.grid.shape[-2:]
             tiles = (*self._tiles(nx, ny), slab.slices)
             pitches = [walk.table.padded for walk in self._walks]
-            self.device.launch("plane_merge", tiles, *planes, out, slab.first, ny, nx, *pitches)
+            arguments = (*planes, out, slab.first, ny, nx, *pitches)
+            self.device.launch("plane_merge", tiles, *arguments, **self._precision)
 
     def _backproject(self, walk: _Walk, y: Any, slab: _Slab) -> Any:
         table = walk.table
-        plane = self.device.zeros((slab.slices, table.rows, table.padded))
+        plane = self.device.zeros((slab.slices, table.rows, table.padded), self.dtype)
         rows = 16 if self.device.traits.is_cpu else 1
         for first, count in self._runs(walk, slab):
-            entries = self.device.empty((slab.slices, count, table.entries))
+            entries = self.device.empty((slab.slices, count, table.entries), self.dtype)
             self.device.launch(
                 "radon_resample",
                 (table.columns // self.device.traits.macros["LANES"], count, slab.slices),
-                *(y, entries, walk.geometry, walk.hats, walk.views),
+                *(y, entries, walk.geometry, walk.footprints, walk.views),
                 *(first, slab.first, slab.total, self.scan.bins, table.columns, table.taps),
-                **self._macros,
+                **self._resampling,
             )
             self.device.launch(
                 "radon_backproject",
@@ -149,7 +164,8 @@ class Projector(LinearOperator):
 
     def _runs(self, walk: _Walk, slab: _Slab) -> Iterator[_Run]:
         """Runs of views whose tables fit the table memory, but no fewer than a cache's worth."""
-        most = max(_FEWEST_VIEWS, self._table_bytes // (4 * walk.table.entries * slab.slices))
+        each = self.dtype.itemsize * walk.table.entries * slab.slices
+        most = max(_FEWEST_VIEWS, self._table_bytes // each)
         for first in range(0, walk.count, most):
             yield _Run(first, min(most, walk.count - first))
 
@@ -164,7 +180,8 @@ class Projector(LinearOperator):
             sinograms: how many a slice needs at a time; more than one where others are made of it.
         """
         views, bins = len(self.scan.angles), self.scan.bins
-        each = 4 * (math.prod(self.grid.shape[-2:]) + sinograms * views * bins)
+        numbers = math.prod(self.grid.shape[-2:]) + sinograms * views * bins
+        each = self.dtype.itemsize * numbers
         runs = plan_chunks(self.grid.slices, each, self.scratch, budget, what="slice")
         if len(self.grid.shape) == 2:
             return [((), ())]
@@ -175,24 +192,25 @@ class Projector(LinearOperator):
         """Bytes needed besides the arrays that go in and come out."""
         slices = min(_SLAB, self.grid.slices)
         planes = [walk.table.rows * (walk.table.width + 2 * self._segment) for walk in self._walks]
-        tables = max(4 * walk.table.entries for walk in self._walks) * _FEWEST_VIEWS
+        tables = max(walk.table.entries for walk in self._walks) * _FEWEST_VIEWS
         records = sum(walk.nbytes for walk in self._walks)
-        return slices * (4 * sum(planes) + tables) + self._table_bytes + records
+        numbers = slices * (sum(planes) + tables)
+        return self.dtype.itemsize * numbers + self._table_bytes + records
 
 
 class _Walk:
     """A phase table and the device's copy of its records."""
 
-    def __init__(self, device: Device, table: PhaseTable) -> None:
+    def __init__(self, device: Device, table: PhaseTable, dtype: np.dtype[Any]) -> None:
         self.table = table
         self.count = len(table.views)
         self.views = device.array(table.views)
         self.geometry = device.array(table.geometry)
-        self.hats = device.array(table.hats)
+        self.footprints = device.array(table.footprints, dtype)
         self.orders = device.array(table.orders)
         self.starts = device.array(table.starts)
-        arrays = (table.views, table.geometry, table.hats, table.orders, table.starts)
-        self.nbytes = sum(array.nbytes for array in arrays)
+        arrays = (self.views, self.geometry, self.footprints, self.orders, self.starts)
+        self.nbytes: int = sum(array.nbytes for array in arrays)
 
 
 class _Slab(NamedTuple):

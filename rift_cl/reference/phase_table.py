@@ -1,8 +1,8 @@
 """The projector by phase tables, from first principles.
 
 Along an image row the ray coordinate t grows by equal steps, ``dx cos(angle)`` per column. So a
-view's interpolant g, the sum of its bins' hats, is first sampled at that step and at ``phases``
-sub-steps,
+view's interpolant g, the sum of its bins' footprints, is first sampled at that step and at
+``phases`` sub-steps,
 
     F[n] = g(origin + n step / phases),
 
@@ -10,9 +10,11 @@ and a pixel then reads g between the two samples about its own place, u columns 
 
     value = (1 - w) F[n] + w F[n + 1],      n + w = phases u.
 
-That is exact where g is straight between samples, and errs by O(1 / phases^2) next to its kinks,
-which are one part in ``phases`` of all places: on white noise the relative error falls by
-2^-1.5 for twice the phases. All pixels of a row have the same w, which is why the kernels do it.
+With hats for footprints that is exact where g is straight between samples, and errs by
+O(1 / phases) next to its kinks, which are one part in ``phases`` of all places: on white noise the
+relative error falls by 2^-1.5 for twice the phases. The footprint of a strip has corners in its
+slope only, where a pixel is seen aslant, and errs by O(1 / phases^2). All pixels of a row have the
+same w, which is why the kernels do it.
 
 The samples start at the first pixel of the row that comes earliest in the direction of the walk.
 A view is walked along x where a step in x moves further over the detector than one in y, along y
@@ -29,28 +31,34 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from rift_cl.geometry import Grid, Parallel
-from rift_cl.reference.footprint import hat_matrix
+from rift_cl.reference.footprint import footprint_matrix, footprint_of
 from rift_cl.reference.matrix import MatrixProjector
 
 
-def phase_table(grid: Grid, scan: Parallel, *, phases: int = 8) -> MatrixProjector:
-    """The projector whose matrix is ``phase_table_matrix(grid, scan)``."""
-    return MatrixProjector(phase_table_matrix(grid, scan, phases=phases), grid, scan)
+def phase_table(
+    grid: Grid, scan: Parallel, footprint: str = "linear", *, phases: int = 8
+) -> MatrixProjector:
+    """The projector whose matrix is ``phase_table_matrix(grid, scan, footprint)``."""
+    return MatrixProjector(phase_table_matrix(grid, scan, footprint, phases=phases), grid, scan)
 
 
-def phase_table_matrix(grid: Grid, scan: Parallel, *, phases: int = 8) -> Any:
+def phase_table_matrix(
+    grid: Grid, scan: Parallel, footprint: str = "linear", *, phases: int = 8
+) -> Any:
     """The matrix of the projector, sparse (angles * bins, ny * nx), in the unit of length.
 
     Args:
         grid: the image; of a volume, a slice.
         scan: how it is looked at.
+        footprint: ``linear``, ``joseph`` or ``strip``.
         phases: samples of a view to each step from pixel to pixel.
     """
     plane = grid.slice()
-    return sparse.vstack([_view(plane, scan, float(a), phases) for a in scan.angles], format="csr")
+    views = [_view(plane, scan, float(angle), footprint, phases) for angle in scan.angles]
+    return sparse.vstack(views, format="csr")
 
 
-def _view(grid: Grid, scan: Parallel, angle: float, phases: int) -> Any:
+def _view(grid: Grid, scan: Parallel, angle: float, footprint: str, phases: int) -> Any:
     (ny, nx), (dy, dx), pitch = grid.shape, grid.spacing, scan.pitch
     along_x, along_y = dx * math.cos(angle) / pitch, dy * math.sin(angle) / pitch
     y, x = grid.coordinates(0), grid.coordinates(1)
@@ -65,9 +73,9 @@ def _view(grid: Grid, scan: Parallel, angle: float, phases: int) -> Any:
     blend = _blend(phases * columns.ravel(), pixels.ravel())
     origin = corner + earliest * between_rows
     samples = origin + np.arange(blend.shape[1]) * (step / phases)
-    half_width = max(1.0, abs(step))
-    hats = hat_matrix(samples, half_width, scan.bins)
-    return (blend @ hats).T * (dx * dy / (half_width * pitch))
+    spread = footprint_of(footprint, abs(along_x), abs(along_y))
+    densities = footprint_matrix(samples, spread, scan.bins)
+    return (blend @ densities).T * (dx * dy / pitch)
 
 
 def _blend(places: NDArray[np.float64], pixels: NDArray[np.intp]) -> Any:

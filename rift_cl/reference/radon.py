@@ -1,11 +1,10 @@
-"""The X-ray transform with the linear footprint, exactly: what the phase tables approximate.
+"""The X-ray transform with each of the footprints, exactly: what the phase tables approximate.
 
-A pixel at (x, y) meets the detector at ``t = x cos(angle) + y sin(angle)``. Its shadow is taken
-for a hat about t, whose half-width is one bin, or the shadow's own width where that is more: the
-larger of ``|dx cos|`` and ``|dy sin|``. A hat of half-width h bins has the area h pitch, and a
-pixel the area dx dy, so that bin b receives
+A pixel at (x, y) meets the detector at ``t = x cos(angle) + y sin(angle)``, that is at the bin
+``t / pitch + center``. About it the pixel's mass dx dy is spread by its footprint
+(``rift_cl/reference/footprint.py``), a density in 1 / bin, so that bin b receives
 
-    dx dy / (h pitch) * max(0, 1 - |t / pitch + center - b| / h).
+    dx dy / pitch * density(t / pitch + center - b).
 """
 
 from __future__ import annotations
@@ -16,25 +15,32 @@ from typing import Any
 from scipy import sparse
 
 from rift_cl.geometry import Grid, Parallel
-from rift_cl.reference.footprint import hat_matrix
+from rift_cl.reference.footprint import footprint_matrix, footprint_of
 from rift_cl.reference.matrix import MatrixProjector
 
 
-def radon(grid: Grid, scan: Parallel) -> MatrixProjector:
-    """The projector whose matrix is ``radon_matrix(grid, scan)``."""
-    return MatrixProjector(radon_matrix(grid, scan), grid, scan)
+def radon(grid: Grid, scan: Parallel, footprint: str = "linear") -> MatrixProjector:
+    """The projector whose matrix is ``radon_matrix(grid, scan, footprint)``."""
+    return MatrixProjector(radon_matrix(grid, scan, footprint), grid, scan)
 
 
-def radon_matrix(grid: Grid, scan: Parallel) -> Any:
-    """The matrix of the transform, sparse (angles * bins, ny * nx), in the unit of length."""
+def radon_matrix(grid: Grid, scan: Parallel, footprint: str = "linear") -> Any:
+    """The matrix of the transform, sparse (angles * bins, ny * nx), in the unit of length.
+
+    Args:
+        grid: the image; of a volume, a slice.
+        scan: how it is looked at.
+        footprint: ``linear``, ``joseph`` or ``strip``.
+    """
     plane = grid.slice()
-    return sparse.vstack([_view(plane, scan, float(a)) for a in scan.angles], format="csr")
+    views = [_view(plane, scan, float(angle), footprint) for angle in scan.angles]
+    return sparse.vstack(views, format="csr")
 
 
-def _view(grid: Grid, scan: Parallel, angle: float) -> Any:
+def _view(grid: Grid, scan: Parallel, angle: float, footprint: str) -> Any:
     cosine, sine = math.cos(angle), math.sin(angle)
     (dy, dx), pitch = grid.spacing, scan.pitch
     t = grid.coordinates(1) * cosine + grid.coordinates(0)[:, None] * sine
-    half_width = max(1.0, abs(dx * cosine) / pitch, abs(dy * sine) / pitch)
-    hats = hat_matrix(t.ravel() / pitch + scan.center, half_width, scan.bins)
-    return hats.T * (dx * dy / (half_width * pitch))
+    spread = footprint_of(footprint, abs(dx * cosine) / pitch, abs(dy * sine) / pitch)
+    densities = footprint_matrix(t.ravel() / pitch + scan.center, spread, scan.bins)
+    return densities.T * (dx * dy / pitch)

@@ -88,6 +88,25 @@ def test_types_on_the_device(device):
         assert device.array(np.ones(3, dtype)).dtype == np.dtype(dtype).newbyteorder("=")
 
 
+def test_a_wanted_type_is_kept_on_the_device(device):
+    thirds = np.arange(5) / 3
+    for values in (thirds, thirds.astype(">f8"), [0.0, 1 / 3], np.arange(3)):
+        there = device.array(values, np.float64)
+        assert there.dtype == np.float64
+        assert np.array_equal(device.get(there), values)
+    assert device.array([1.0, 2.0], np.int32).dtype == np.int32
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_numbers_reach_a_kernel_in_the_type_of_its_arrays(device, dtype):
+    """A third is another number in float32: the sum tells which of them was passed."""
+    x, y = device.array(np.ones(9), dtype), device.array(np.full(9, 3.0), dtype)
+    axpby(device, 1 / 3, x, np.float64(1 / 7), y)
+    third, seventh = dtype(1 / 3), dtype(1 / 7)
+    np.testing.assert_allclose(device.get(y), third + 3 * seventh, rtol=2 * np.finfo(dtype).eps)
+    assert device.get(y).dtype == dtype
+
+
 def test_is_device_array_needs_no_driver(device):
     assert is_device_array(device.zeros(3))
     assert not any(is_device_array(value) for value in (np.zeros(3), [1.0], None, 3.0))

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from rift_cl import Device, Projector
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.reference import MatrixProjector, phase_table, radon
 
@@ -47,13 +48,38 @@ GEOMETRIES: dict[str, tuple[Grid, Parallel]] = {
 }
 
 
+# Those that differ for the other footprints: what is wide or narrow, cut off or aslant.
+FOOTPRINTED = (
+    "odd",
+    "wider than a segment",
+    "full turn",
+    "angles where the walk changes",
+    "a hair beside those",
+    "single pixel",
+    "single row",
+    "off-centre axis",
+    "off-centre grid",
+    "partly outside",
+    "anisotropic",
+    "very anisotropic",
+    "narrow bins",
+    "wide bins",
+    "stack",
+)
+
+
 class Geometry(NamedTuple):
-    """A grid and a scan, with the projector's twin and the transform it approximates."""
+    """A grid, a scan and a footprint, with the projector's twin and what it approximates."""
 
     grid: Grid
     scan: Parallel
+    footprint: str
     twin: MatrixProjector
     exact: MatrixProjector
+
+    def projector(self, device: Device, **settings: Any) -> Projector:
+        """The projector itself."""
+        return Projector(self.grid, self.scan, self.footprint, device=device, **settings)
 
     def white(self, seed: int) -> tuple[Any, Any]:
         """A white image and a white sinogram."""
@@ -64,14 +90,20 @@ class Geometry(NamedTuple):
         return image.astype(np.float32), sinogram.astype(np.float32)
 
 
-def _geometry(name: str) -> Geometry:
+def _geometry(name: str, footprint: str = "linear") -> Geometry:
     grid, scan = GEOMETRIES[name]
-    return Geometry(grid, scan, phase_table(grid, scan), radon(grid, scan))
+    pair = phase_table(grid, scan, footprint), radon(grid, scan, footprint)
+    return Geometry(grid, scan, footprint, *pair)
 
 
-@pytest.fixture(scope="session", params=GEOMETRIES)
+@pytest.fixture(
+    scope="session",
+    params=[(name, "linear") for name in GEOMETRIES]
+    + [(name, footprint) for name in FOOTPRINTED for footprint in ("joseph", "strip")],
+    ids="-".join,
+)
 def geometry(request: pytest.FixtureRequest) -> Geometry:
-    return _geometry(request.param)
+    return _geometry(*request.param)
 
 
 @pytest.fixture(

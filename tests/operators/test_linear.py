@@ -159,7 +159,9 @@ def test_empty_scans_are_refused_by_name():
 
 
 def test_an_unknown_footprint_is_refused(device):
-    with pytest.raises(InputError, match="footprint is 'round', wanted 'linear'"):
+    with pytest.raises(
+        InputError, match="footprint is 'round', wanted 'linear', 'joseph' or 'strip'"
+    ):
         rift.Projector(GRID, SCAN, "round", device=device)
 
 

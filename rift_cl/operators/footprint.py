@@ -1,0 +1,73 @@
+"""What a pixel leaves on the detector: three models of it, as the numbers that kernels read.
+
+``kernels/include/footprint.h`` has the profiles. A model is its half-width on the detector and a
+record for each view; whatever else the projector does is the same for all of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import InputError
+
+Floats = NDArray[np.float64]
+
+FOOTPRINTS = ("linear", "joseph", "strip")
+_RECORD = 8
+# Where a ramp has no width its inverse is never used, but must be a number.
+_NARROWEST = 1e-30
+
+
+@dataclass(frozen=True)
+class FootprintRecords:
+    """A footprint's numbers for a run of views.
+
+    Args:
+        support: half-widths in bins, (n,).
+        records: what the kernels read for each view, (n, 8); see ``footprint.h``.
+    """
+
+    support: Floats
+    records: Floats
+
+
+def check_footprint(name: str) -> str:
+    """The name itself.
+
+    Raises:
+        InputError: there is no such footprint.
+    """
+    if name not in FOOTPRINTS:
+        wanted = ", ".join(repr(known) for known in FOOTPRINTS[:-1]) + f" or {FOOTPRINTS[-1]!r}"
+        raise InputError(f"footprint is {name!r}, wanted {wanted}")
+    return name
+
+
+def footprint_records(name: str, step: Floats, cross_step: Floats, mass: float) -> FootprintRecords:
+    """The numbers of views.
+
+    Args:
+        name: of the footprint.
+        step: how far a view's pixel reaches over the detector by its longer shadow, in bins, (n,).
+        cross_step: and by its shorter one, (n,).
+        mass: what all bins of an endless detector receive from a pixel of one.
+    """
+    if name == "strip":
+        return _strip(step, cross_step, mass)
+    half_width = step if name == "joseph" else np.maximum(1.0, step)
+    return _packed(half_width, mass / half_width, 1 / half_width)
+
+
+def _strip(step: Floats, cross_step: Floats, mass: float) -> FootprintRecords:
+    short, middle, longest = np.sort([step, cross_step, np.ones_like(step)], axis=0)
+    inverse = 0.5 / np.maximum(short, _NARROWEST)
+    shape = (longest / 2, (short + middle) / 2, short, inverse, 1 / middle)
+    return _packed((short + middle + longest) / 2, mass / longest, *shape)
+
+
+def _packed(support: Floats, scale: Floats, *shape: Floats) -> FootprintRecords:
+    spare = [np.zeros_like(support)] * (_RECORD - 2 - len(shape))
+    return FootprintRecords(support, np.stack([support, scale, *shape, *spare], axis=1))
