@@ -220,6 +220,11 @@ def is_device_array(value: Any) -> bool:
     return hasattr(value, "base_data") and hasattr(value, "queue")
 
 
+def is_tensor(value: Any) -> bool:
+    """Whether a value is a ``torch.Tensor`` (asked without importing torch)."""
+    return hasattr(type(value), "__torch_function__")
+
+
 def check_output(out: Any, shape: tuple[int, ...], dtype: DTypeLike = np.float32) -> NDArray[Any]:
     """Check a host array that a result is to be written into.
 

@@ -21,26 +21,30 @@ def check_tensor(
     value: Any,
     shape: tuple[int | None, ...],
     like: torch.Tensor | None = None,
+    *,
+    dtype: torch.dtype = torch.float32,
 ) -> torch.Tensor:
-    """Check a float32 tensor that a caller handed in.
+    """Check a tensor that a caller handed in.
 
     Args:
         name: what the caller calls it.
         value: what came.
         shape: the shape it must have; None stands for any number.
         like: a tensor on whose device it must be.
+        dtype: the type it must have.
 
     Raises:
-        DTypeError: it is no dense float32 tensor.
+        DTypeError: it is no dense tensor of that type.
         ShapeError: the shape differs.
         DeviceError: it is on another device.
     """
     if not isinstance(value, torch.Tensor):
         raise DTypeError(f"{name} is a {type(value).__name__}, wanted a torch tensor")
-    if value.dtype != torch.float32 or value.layout != torch.strided:
+    if value.dtype != dtype or value.layout != torch.strided:
+        call = ".double()" if dtype == torch.float64 else ".float()"
         raise DTypeError(
-            f"{name} is a {value.layout} tensor of {value.dtype}, wanted a dense torch.float32: "
-            "call .to_dense() or .float()"
+            f"{name} is a {value.layout} tensor of {value.dtype}, wanted a dense {dtype}: "
+            f"call .to_dense() or {call}"
         )
     fits = len(value.shape) == len(shape) and all(
         wanted in (None, length) for length, wanted in zip(value.shape, shape, strict=True)

@@ -1,8 +1,9 @@
 """Linear operators and their algebra: ``A(x)``, ``A.T(y)``, ``A @ B``, ``A + B``, ``2 * A``.
 
 An operator maps arrays of shape ``domain`` to arrays of shape ``range``, both of type ``dtype``.
-NumPy in gives NumPy out; a device array in gives a device array out, without a copy. The adjoint
-is an operator like any other, ``A.T.T is A``, and solvers need to know nothing else.
+NumPy in gives NumPy out; a device array in gives a device array out, without a copy; a torch
+tensor, or a batch of them, gives a tensor that passes gradients on. The adjoint is an operator like
+any other, ``A.T.T is A``, and solvers need to know nothing else.
 
 Host arrays that are too large for the device are taken in pieces where the operator says how
 (``_pieces``); the result is the same to the bit.
@@ -14,6 +15,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from functools import cached_property
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -28,15 +30,19 @@ from rift_cl.cl.memory import (
     demand_apart,
     download,
     is_device_array,
+    is_tensor,
     real_type,
     share,
 )
-from rift_cl.errors import DeviceMemoryError, ResourceLimitError
+from rift_cl.errors import DeviceMemoryError, InputError, ResourceLimitError
 
 Shape = tuple[int, ...]
 # An index into an operator's domain and the index into its range that depends on it alone.
 Piece = tuple[tuple[slice, ...], tuple[slice, ...]]
 _HALVINGS = 6
+# What applies an operator to tensors; loaded when the first one comes, by its name, since an
+# operator knows nothing of torch.
+_TENSOR_BRIDGE = "rift_cl.interop.linear_torch"
 
 
 class LinearOperator(ABC):
@@ -72,9 +78,9 @@ class LinearOperator(ABC):
 
         Args:
             x: array of shape ``domain``; a device array, or anything NumPy takes for an array of
-                real numbers.
+                real numbers; or a torch tensor of shape (..., *domain) and type ``dtype``.
             out: where to put the result, of the same kind as ``x`` and not ``x`` itself; a new
-                array if not given.
+                array if not given. Not for tensors.
             name: what the caller calls ``x``, for the sentence of an error.
 
         Returns:
@@ -84,6 +90,10 @@ class LinearOperator(ABC):
             InputError: ``x`` or ``out`` has the wrong shape or type, or holds NaN or infinity.
             DeviceMemoryError: not even the smallest piece fits the device.
         """
+        if is_tensor(x):
+            if out is not None:
+                raise InputError(f"out is given and {name} a torch tensor: use what is returned")
+            return import_module(_TENSOR_BRIDGE).apply(self, x, name=name)
         if is_device_array(x):
             x = as_device_array(self.device, x, self.domain, name=name, dtype=self.dtype)
             y = self.device.empty(self.range, self.dtype) if out is None else out
