@@ -9,7 +9,7 @@
  *     y[q + stride (RADIX p + k)] = w^(k p stride) sum_l w^(k l n/RADIX) x[b + l n/RADIX],
  *     w = exp(-2 pi i / n),  k, l = 0 .. RADIX - 1.
  *
- * Real and imaginary parts are planes of their own, `real` and `imaginary` floats from the start of
+ * Real and imaginary parts are planes of their own, `re` and `im` numbers from the start of
  * the buffer: exchanging the two makes it the inverse transform, up to 1/n. `turns` holds w^j as
  * pairs. With WEIGHTED what is read is multiplied by `weights`, a plane for all fields. Columns are a
  * multiple of LANES.
@@ -28,11 +28,15 @@
 #define RUN (LANES == 8 ? 4096 : 1)
 #endif
 
+#if DOUBLE
+#define HALF_ROOT3 0.86602540378443865
+#else
 #define HALF_ROOT3 0.86602540f
+#endif
 
 /* Stores the complex product a z. */
 static void store_turned(
-    __global float *restrict re, __global float *restrict im, lanes zr, lanes zi, float ar, float ai)
+    __global real *restrict re, __global real *restrict im, lanes zr, lanes zi, real ar, real ai)
 {
   STORE(re, ar * zr - ai * zi);
   STORE(im, ar * zi + ai * zr);
@@ -45,14 +49,14 @@ static void store_turned(
 #endif
 
 KERNEL void fft_pass(
-    __global const float *restrict in, __global float *restrict out, __global const float *restrict turns,
-    __global const float *restrict weights, long real, long imaginary, int columns, int length, int stride)
+    __global const real *restrict in, __global real *restrict out, __global const real *restrict turns,
+    __global const real *restrict weights, long re, long im, int columns, int length, int stride)
 {
   const int b = (int)get_global_id(1), p = b / stride, q = b - p * stride;
   const long field = (long)get_global_id(2) * length * columns;
   const long step = (long)(length / RADIX) * columns, leap = (long)stride * columns;
   const long from = (long)b * columns, to = field + (q + (long)stride * RADIX * p) * columns;
-  float wr[RADIX], wi[RADIX];
+  real wr[RADIX], wi[RADIX];
   UNROLL for (int k = 0; k < RADIX; k++) {
     wr[k] = turns[2 * (k * p * stride)];
     wi[k] = turns[2 * (k * p * stride) + 1];
@@ -60,11 +64,11 @@ KERNEL void fft_pass(
   const int begin = (int)get_global_id(0) * RUN;
   const int end = begin + RUN < columns ? begin + RUN : columns;
   for (int c = begin; c < end; c += LANES) {
-    __global const float *restrict xr = in + real + field + from + c;
-    __global const float *restrict xi = in + imaginary + field + from + c;
-    __global float *restrict yr = out + real + to + c, *restrict yi = out + imaginary + to + c;
+    __global const real *restrict xr = in + re + field + from + c;
+    __global const real *restrict xi = in + im + field + from + c;
+    __global real *restrict yr = out + re + to + c, *restrict yi = out + im + to + c;
 #if WEIGHTED
-    __global const float *restrict weight = weights + from + c;
+    __global const real *restrict weight = weights + from + c;
 #endif
     const lanes ar = READ(xr, 0), ai = READ(xi, 0), br = READ(xr, step), bi = READ(xi, step);
 #if RADIX == 2

@@ -20,13 +20,13 @@
 #define SEGMENT (LANES * BLOCKS)
 
 KERNEL void filter_views(
-    __global const float *restrict sinogram, __global float *restrict filtered,
-    __global const float *restrict taps, __global const float *restrict gains,
+    __global const real *restrict sinogram, __global real *restrict filtered,
+    __global const real *restrict taps, __global const real *restrict gains,
     int rows, int rows_per_view, int bins)
 {
   const int b = (int)get_global_id(0) * SEGMENT, row0 = (int)get_global_id(1) * ROWS;
   if (b >= bins) return;
-  __global const float *y[ROWS];
+  __global const real *y[ROWS];
   lanes sum[ROWS][BLOCKS];
   UNROLL for (int i = 0; i < ROWS; i++) {
     /* Rows past the end repeat the last one and are not stored. */
@@ -34,20 +34,20 @@ KERNEL void filter_views(
     y[i] = sinogram + (long)row * bins;
     UNROLL for (int n = 0; n < BLOCKS; n++) sum[i][n] = 0;
   }
-  __global const float *h = taps + (bins - 1) + b;
+  __global const real *h = taps + (bins - 1) + b;
   for (int source = 0; source < bins; source++, h--) {
     lanes tap[BLOCKS];
     UNROLL for (int n = 0; n < BLOCKS; n++) tap[n] = LOAD(h + n * LANES);
     UNROLL for (int i = 0; i < ROWS; i++) {
-      const float value = y[i][source];
+      const real value = y[i][source];
       UNROLL for (int n = 0; n < BLOCKS; n++) sum[i][n] = sum[i][n] + value * tap[n];
     }
   }
   for (int i = 0; i < ROWS && row0 + i < rows; i++) {
     const int row = row0 + i;
-    __global float *out = filtered + (long)row * bins + b;
+    __global real *out = filtered + (long)row * bins + b;
     lanes values[BLOCKS];
     UNROLL for (int n = 0; n < BLOCKS; n++) values[n] = gains[row / rows_per_view] * sum[i][n];
-    for (int n = 0; n < SEGMENT && b + n < bins; n++) out[n] = ((const float *)values)[n];
+    for (int n = 0; n < SEGMENT && b + n < bins; n++) out[n] = ((const real *)values)[n];
   }
 }

@@ -22,6 +22,7 @@ from typing import Any
 import tyro
 
 from figures import (
+    compensation,
     figure_05,
     figure_06,
     figure_11,
@@ -43,6 +44,7 @@ FIGURES: tuple[ModuleType, ...] = (
     figure_11_volume,
     figure_12,
     spectral_bias,
+    compensation,
 )
 # Those that fit splats to the ornament.
 FITTED: tuple[ModuleType, ...] = (figure_11, figure_12, spectral_bias)

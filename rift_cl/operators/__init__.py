@@ -1,11 +1,17 @@
 """Linear operators on device arrays: projector, filters, and their algebra."""
 
 from rift_cl.operators.adjoint_check import dot_test
+from rift_cl.operators.compensation import COMPENSATIONS, Compensation
+from rift_cl.operators.compensation_3d import central_planes, radial_lines
 from rift_cl.operators.filters import Filter, HighPass, Ramp, Response, ViewFilter, as_filter
+from rift_cl.operators.footprint import FOOTPRINTS
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.operators.projector import Projector
 
 __all__ = [
+    "COMPENSATIONS",
+    "FOOTPRINTS",
+    "Compensation",
     "Filter",
     "HighPass",
     "LinearOperator",
@@ -14,5 +20,7 @@ __all__ = [
     "Response",
     "ViewFilter",
     "as_filter",
+    "central_planes",
     "dot_test",
+    "radial_lines",
 ]

@@ -1,19 +1,21 @@
 """Filters along the detector: the ramp and its windows, a tunable high-pass, any response.
 
 A filter is designed on the host as a convolution kernel in real space and applied on the device
-without wrap-around. The ramp is built from its exact samples in real space (Ramachandran and
-Lakshminarayanan 1971; Kak and Slaney, Principles of Computerized Tomographic Imaging, eq. 3.61),
-so that its value at frequency zero, and with it the level of a reconstruction, is right.
+without wrap-around; each view may have a response of its own. The ramp is built from its exact
+samples in real space (Ramachandran and Lakshminarayanan 1971; Kak and Slaney, Principles of
+Computerized Tomographic Imaging, eq. 3.61), so that its value at frequency zero, and with it the
+level of a reconstruction, is right.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
@@ -22,8 +24,11 @@ from rift_cl.cl.memory import check_finite
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
 from rift_cl.operators.linear import LinearOperator, Piece
+from rift_cl.operators.row_convolution import SHORT_ROW, RowConvolution
+from rift_cl.operators.row_transform import RowTransform
 
 Floats = NDArray[np.float64]
+Gains = ArrayLike | Callable[[Floats], ArrayLike]
 
 # Windows over u = frequency / (cutoff * Nyquist), 0 <= u <= 1.
 WINDOWS: dict[str, Callable[[Floats], Floats]] = {
@@ -145,10 +150,19 @@ class ViewFilter(LinearOperator):
         scan: the scan whose views are filtered.
         filter: the filter.
         rows: detector rows in a view, None for a sinogram of (angles, bins).
-        gains: a factor for each view, (angles,); 1 if not given.
+        gains: what the response is multiplied by in each view, (angles,); 1 if not given. Or a
+            function that takes frequencies, (n,) from 0 to the detector's Nyquist in cycles per
+            unit of length, to gains of (angles, n); what it gives at zero is the gain of the
+            filter's exact value there.
         device: where to work; the default device if not given.
+        dtype: float32 or float64.
 
     Domain and range are (angles, bins) or (angles, rows, bins). The operator is its own adjoint.
+    A filter that all views share is applied in real space to short rows; long rows, and those
+    whose views have responses of their own, take the way through the Fourier domain.
+
+    Raises:
+        InputError: gains have another shape or are not finite.
     """
 
     def __init__(
@@ -157,38 +171,65 @@ class ViewFilter(LinearOperator):
         filter: Filter,
         *,
         rows: int | None = None,
-        gains: ArrayLike | None = None,
+        gains: Gains | None = None,
         device: Device | None = None,
+        dtype: DTypeLike = np.float32,
     ) -> None:
         shape = (len(scan.angles), *(() if rows is None else (rows,)), scan.bins)
-        super().__init__(shape, shape, device or default_device())
-        factors = np.ones(shape[0]) if gains is None else np.asarray(gains, dtype=np.float64)
+        super().__init__(shape, shape, device or default_device(), dtype)
         if rows is not None and rows < 1:
             raise ShapeError(f"rows is {rows}, wanted at least 1 detector row")
-        if factors.shape != shape[:1]:
-            raise ShapeError(f"gains has shape {factors.shape}, wanted one for each of {shape[0]}")
-        check_finite(factors, name="gains")
-        cpu = self.device.traits.is_cpu
-        self._blocks, self._run = (2, 4) if cpu else (1, 1)
-        self._segment = self.device.traits.macros["LANES"] * self._blocks
-        taps = filter.taps(scan.bins, scan.pitch) * scan.pitch
-        self._taps = self.device.array(np.pad(taps, (0, self._segment)))
-        self._gains = self.device.array(factors)
+        factors, taps = _factors_and_taps(scan, filter, gains)
+        self._gains = self.device.array(factors, self.dtype)
+        self._convolve: RowConvolution | RowTransform
+        taps *= scan.pitch
+        if len(taps) == 1 and scan.bins <= SHORT_ROW:
+            self._convolve = RowConvolution(self.device, taps, self.dtype)
+        else:
+            self._convolve = RowTransform(self.device, taps, math.prod(shape[:-1]), self.dtype)
 
     def _apply(self, x: Any, out: Any) -> None:
-        views, bins = x.shape[0], x.shape[-1]
-        per_view = x.shape[1] if len(x.shape) == 3 else 1
-        size = (-(-bins // self._segment), -(-views * per_view // self._run))
-        arguments = (x, out, self._taps, self._gains, views * per_view, per_view, bins)
-        macros = {"BLOCKS": self._blocks, "ROWS": self._run}
-        self.device.launch("filter_views", size, *arguments, **macros)
+        self._convolve(x, out, self._gains, x.shape[1] if len(x.shape) == 3 else 1)
 
     def _apply_adjoint(self, y: Any, out: Any) -> None:
         self._apply(y, out)
 
+    @property
+    def scratch(self) -> int:
+        """Bytes needed besides the views that go in and come out."""
+        return self._convolve.scratch
+
     def _pieces(self, budget: int) -> Iterable[Piece]:
         if len(self.domain) == 2:
             return super()._pieces(budget)
-        each = 8 * self.domain[0] * self.domain[2]
-        runs = plan_chunks(self.domain[1], each, 0, budget, what="row of every view")
+        each = 2 * self.dtype.itemsize * self.domain[0] * self.domain[2]
+        runs = plan_chunks(self.domain[1], each, self.scratch, budget, what="row of every view")
         return [((slice(None), run), (slice(None), run)) for run in runs]
+
+
+def _factors_and_taps(scan: Parallel, filter: Filter, gains: Gains | None) -> tuple[Floats, Floats]:
+    """A factor for each view, and halves of kernels: one for all views, or one for each."""
+    views, bins = len(scan.angles), scan.bins
+    if not callable(gains):
+        factors = np.ones(views) if gains is None else np.asarray(gains, dtype=np.float64)
+        if factors.shape != (views,):
+            raise ShapeError(f"gains has shape {factors.shape}, wanted one for each of {views}")
+        check_finite(factors, name="gains")
+        return factors, filter.taps(bins, scan.pitch)[None, bins - 1 :].copy()
+    # Twice as fine as the object's size asks for; the filter's own taps reach as far, so that its
+    # value at zero is right.
+    half = 2 << (bins - 1).bit_length()
+    kernel = filter.taps(half, scan.pitch)
+    response = np.fft.rfft(np.concatenate([kernel[half - 1 :], [0], kernel[: half - 1]])).real
+    frequencies = np.arange(half + 1) / (2 * half * scan.pitch)
+    factors = np.asarray(gains(frequencies), dtype=np.float64)
+    if factors.shape != (views, half + 1):
+        raise ShapeError(
+            f"gains gives shape {factors.shape}, wanted one for each of {views} views and "
+            f"{half + 1} frequencies"
+        )
+    check_finite(factors, name="gains")
+    taps = np.empty((views, bins))
+    for view in range(views):
+        taps[view] = np.fft.irfft(response * factors[view], 2 * half)[:bins]
+    return np.ones(views), taps

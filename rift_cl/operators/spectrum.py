@@ -17,6 +17,7 @@ from rift_cl.cl.arithmetic import sum_columns
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import NonFiniteError, ShapeError
+from rift_cl.operators.column_transform import ColumnTransform
 
 Floats = NDArray[np.float64]
 Response = Callable[[Floats, Floats], Floats]
@@ -65,7 +66,7 @@ class SpectralFilter:
             raise NonFiniteError("SpectralFilter: the response is not finite everywhere")
         # Transposed, as the spectrum stands when it is weighted.
         self._weights = device.array(np.ascontiguousarray(weights, np.float32))
-        self._turns = {n: device.array(_turns(n)) for n in {rows, columns}}
+        self._transforms = {n: ColumnTransform(device, n) for n in {rows, columns}}
 
     def __call__(
         self,
@@ -102,12 +103,13 @@ class SpectralFilter:
         squares = device.empty((self.size[0], 1))
         sizes = (*self.size, image.shape[2], rows, columns)
         device.launch("fft_pack", (rows,), image, fields, squares, *sizes, CHANNELS=count)
-        fields, spare = self._transformed(fields, spare, rows, columns)
+        down, along = self._transforms[rows], self._transforms[columns]
+        fields, spare = down(fields, spare, columns)
         self._transpose(fields, spare, rows, columns)
-        fields, spare = self._transformed(spare, fields, columns, rows)
-        fields, spare = self._transformed(fields, spare, columns, rows, weights=self._weights)
+        fields, spare = along(spare, fields, rows)
+        fields, spare = along(fields, spare, rows, weights=self._weights)
         self._transpose(fields, spare, columns, rows)
-        return self._transformed(spare, fields, rows, columns, inverse=True)[0], squares
+        return down(spare, fields, columns, inverse=True)[0], squares
 
     def _unpacked(
         self,
@@ -132,49 +134,7 @@ class SpectralFilter:
             device.launch("keep_norm", (items,), out, *sums, size, RUN=run)
         return out
 
-    def _transformed(
-        self,
-        fields: Any,
-        spare: Any,
-        length: int,
-        columns: int,
-        *,
-        weights: Any = None,
-        inverse: bool = False,
-    ) -> tuple[Any, Any]:
-        """Transform down the columns; what was transformed, and the buffer that is free now.
-
-        With ``weights`` it is the inverse transform of the weighted fields.
-        """
-        device, stride = self.device, 1
-        run = _CPU_RUN if device.traits.is_cpu else 1
-        count = fields.shape[0] // 2
-        parts = [np.int64(0), np.int64(count * length * columns)]
-        if inverse or weights is not None:
-            parts.reverse()
-        while stride < length:
-            left = length // stride
-            radix = next(radix for radix in (4, 3, 2) if left % radix == 0)
-            weighted = weights is not None and stride == 1
-            device.launch(
-                "fft_pass",
-                (-(-columns // run), length // radix, count),
-                *(fields, spare, self._turns[length], weights if weighted else fields, *parts),
-                *(columns, length, stride),
-                RADIX=radix,
-                RUN=run,
-                WEIGHTED=weighted,
-            )
-            fields, spare, stride = spare, fields, stride * radix
-        return fields, spare
-
     def _transpose(self, fields: Any, spare: Any, rows: int, columns: int) -> None:
         lanes = self.device.traits.macros["LANES"]
         blocks = (columns // lanes, rows // lanes, fields.shape[0])
         self.device.launch("fft_transpose", blocks, fields, spare, rows, columns)
-
-
-def _turns(length: int) -> NDArray[np.float32]:
-    """exp(-2 pi i k / n) as pairs."""
-    turns = np.exp(-2j * np.pi * np.arange(length) / length)
-    return np.stack([turns.real, turns.imag], axis=1).astype(np.float32)

@@ -5,23 +5,55 @@ With p_j the view at angle j and h the ramp, the image is
 that view j stands for (Kak and Slaney, section 3.3). Without h the result is the image convolved
 with 1 / r: low frequencies are counted once for every view, which is the bias that the RiFT paper
 shows in its Figures 4 and 5.
+
+Where directions are few or lie unevenly, what a view stands for depends on frequency as well, and
+each view gets a filter of its own (rift_cl/operators/compensation.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rift_cl.cl.device import Device
 from rift_cl.errors import InputError
-from rift_cl.operators.filters import Filter, ViewFilter, as_filter
+from rift_cl.geometry import Grid, Parallel
+from rift_cl.operators.compensation import Compensation
+from rift_cl.operators.filters import Filter, Gains, ViewFilter, as_filter
 from rift_cl.operators.linear import LinearOperator, Piece
-from rift_cl.operators.projector import Projector
-from rift_cl.reconstruct.view_weights import view_weights
+from rift_cl.reconstruct.view_weights import view_gains
 
-FilterLike = str | Filter | Callable[[NDArray[np.float64]], ArrayLike]
+Floats = NDArray[np.float64]
+FilterLike = str | Filter | Callable[[Floats], ArrayLike]
+
+
+class ParallelProjector(Protocol):
+    """What an operator from images to sinograms must have to be inverted here.
+
+    ``Projector`` is one. Members are those of ``LinearOperator``, with the geometry, and with
+    ``pieces``, which cuts the work into slices that fit a budget.
+    """
+
+    grid: Grid
+    scan: Parallel
+    domain: tuple[int, ...]
+    range: tuple[int, ...]
+    device: Device
+    dtype: np.dtype[Any]
+
+    @property
+    def T(self) -> LinearOperator:
+        """The adjoint."""
+
+    def _apply(self, x: Any, out: Any) -> None: ...
+
+    def _apply_adjoint(self, y: Any, out: Any) -> None: ...
+
+    def pieces(self, budget: int, *, sinograms: int = 1) -> list[Piece]:
+        """How to cut the slices to fit a budget in bytes, with so many sinograms at a time."""
 
 
 class FilteredBackprojection(LinearOperator):
@@ -31,44 +63,61 @@ class FilteredBackprojection(LinearOperator):
         A: the projector whose geometry to use.
         filter: a name (``ram-lak``, ``shepp-logan``, ``cosine``, ``hamming``, ``hann``,
             ``high-pass``), a filter, or a function of frequency.
-        compensate: see ``view_weights``.
+        compensate: what each view stands for. ``uniform``: every view the same. ``voronoi``: half
+            the gaps to its neighbours. None: as ``voronoi`` where no gap is a hole, else as
+            ``uniform``. ``capped-voronoi``, ``pipe-menon`` and ``exact`` depend on frequency, and
+            are the ones for random, clustered and limited angles; on even angles they are the
+            plain ramp.
+        diameter: of the object, for these three, in the grid's unit of length; that of the
+            circle in the grid that the detector sees if not given.
+
+    Raises:
+        InputError: a name is unknown, or the diameter no length.
     """
 
     def __init__(
-        self, A: Projector, filter: FilterLike = "ram-lak", *, compensate: str | None = None
+        self,
+        A: ParallelProjector,
+        filter: FilterLike = "ram-lak",
+        *,
+        compensate: str | None = None,
+        diameter: float | None = None,
     ) -> None:
-        super().__init__(A.range, A.domain, A.device)
+        super().__init__(A.range, A.domain, A.device, A.dtype)
         self._A = A
+        size = object_diameter(A) if diameter is None else diameter
         self._filter = ViewFilter(
             A.scan,
             as_filter(filter),
             rows=A.range[1] if len(A.range) == 3 else None,
-            gains=view_weights(A.scan.angles, compensate) * _unspread(A),
+            gains=_scaled(view_gains(A.scan.angles, compensate, size), _unspread(A)),
             device=A.device,
+            dtype=A.dtype,
         )
 
     def _apply(self, x: Any, out: Any) -> None:
-        filtered = self.device.empty(x.shape)
+        filtered = self.device.empty(x.shape, self.dtype)
         self._filter._apply(x, filtered)
         self._A._apply_adjoint(filtered, out)
 
     def _apply_adjoint(self, y: Any, out: Any) -> None:
-        projected = self.device.empty(out.shape)
+        projected = self.device.empty(out.shape, self.dtype)
         self._A._apply(y, projected)
         self._filter._apply_adjoint(projected, out)
 
     def _pieces(self, budget: int) -> Iterable[Piece]:
         # The sinogram and the filtered one.
-        pieces = self._A.pieces(budget, sinograms=2)
+        pieces = self._A.pieces(budget - self._filter.scratch, sinograms=2)
         return [(inside, outside) for outside, inside in pieces]
 
 
 def fbp(
-    A: Projector,
+    A: ParallelProjector,
     y: Any,
     filter: FilterLike = "ram-lak",
     compensate: str | None = None,
     *,
+    diameter: float | None = None,
     out: Any = None,
 ) -> Any:
     """Reconstruct by filtered backprojection.
@@ -79,7 +128,8 @@ def fbp(
             the image's unit times the grid's unit of length.
         filter: a name (``ram-lak``, ``shepp-logan``, ``cosine``, ``hamming``, ``hann``,
             ``high-pass``), a filter, or a function of frequency.
-        compensate: how views are weighted, see ``view_weights``.
+        compensate: what each view stands for, see ``FilteredBackprojection``.
+        diameter: of the object, see there.
         out: where to put the result.
 
     Returns:
@@ -89,10 +139,11 @@ def fbp(
         InputError: ``y`` does not fit, is not finite, or a name is unknown.
     """
     _check_projector(A)
-    return FilteredBackprojection(A, filter, compensate=compensate)(y, out, name="y")
+    operator = FilteredBackprojection(A, filter, compensate=compensate, diameter=diameter)
+    return operator(y, out, name="y")
 
 
-def backproject(A: Projector, y: Any, *, out: Any = None) -> Any:
+def backproject(A: ParallelProjector, y: Any, *, out: Any = None) -> Any:
     """Backproject without a filter, every view alike: the paper's unfiltered baseline.
 
     Arguments, result and errors are those of ``fbp``. The result is the image convolved with
@@ -104,11 +155,23 @@ def backproject(A: Projector, y: Any, *, out: Any = None) -> Any:
 
 
 def _check_projector(A: Any) -> None:
-    if not isinstance(A, Projector):
+    if not (isinstance(A, LinearOperator) and hasattr(A, "scan") and hasattr(A, "pieces")):
         raise InputError(f"A is a {type(A).__name__}, wanted a Projector first, then the sinogram")
 
 
-def _unspread(A: Projector) -> float:
+def object_diameter(A: ParallelProjector) -> float:
+    """Diameter of the circle in the grid that the detector sees, in the grid's unit of length."""
+    edges = (n * d for n, d in zip(A.grid.shape[-2:], A.grid.spacing[-2:], strict=True))
+    return min(*edges, A.scan.bins * A.scan.pitch)
+
+
+def _scaled(gains: Floats | Compensation, factor: float) -> Gains:
+    if isinstance(gains, Compensation):
+        return lambda frequencies: factor * gains(frequencies)
+    return factor * gains
+
+
+def _unspread(A: ParallelProjector) -> float:
     # A.T spreads a bin over pixels with weights that add up to dx dy / pitch; the sum over
     # views that inverts the transform wants weights that add up to one.
     dy, dx = A.grid.spacing[-2:]

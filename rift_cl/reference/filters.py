@@ -54,18 +54,21 @@ def response_taps(
 def filter_rows(
     sinogram: ArrayLike, taps: Floats, pitch: float, gains: ArrayLike | None = None
 ) -> Floats:
-    """Convolve every detector row with a kernel; outside the detector a row counts as zero.
+    """Convolve every detector row with its kernel; outside the detector a row counts as zero.
 
     Args:
         sinogram: (angles, bins) or (angles, rows, bins).
-        taps: h[-(bins-1)] .. h[bins-1], in 1 / length^2.
+        taps: h[-(bins-1)] .. h[bins-1], in 1 / length^2; or one kernel for each view,
+            (angles, 2 bins - 1).
         pitch: distance between bins, the measure of the convolution's sum.
         gains: (angles,) factors of the views.
     """
     views = np.array(sinogram, dtype=np.float64)
     bins = views.shape[-1]
+    kernels = np.broadcast_to(taps, (len(views), 2 * bins - 1))
     for index in np.ndindex(views.shape[:-1]):
-        views[index] = pitch * np.convolve(views[index], taps)[bins - 1 : 2 * bins - 1]
+        kernel = kernels[index[0]]
+        views[index] = pitch * np.convolve(views[index], kernel)[bins - 1 : 2 * bins - 1]
     if gains is not None:
         views *= np.reshape(gains, (-1,) + (1,) * (views.ndim - 1))
     return views

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rift_cl.errors import InputError
-from rift_cl.reconstruct.view_weights import view_weights
+from rift_cl.operators.compensation import COMPENSATIONS
+from rift_cl.reconstruct.view_weights import view_gains, view_weights
 
 WAYS = (None, "voronoi")
 EVEN = np.linspace(0, np.pi, 12, endpoint=False)
@@ -78,6 +79,31 @@ def test_a_missing_wedge_is_nobody_s(end):
     wedge = np.linspace(0, end, 90)
     np.testing.assert_allclose(view_weights(wedge), np.pi / 90)
     assert view_weights(wedge, "voronoi")[0] > 0.3
+
+
+@pytest.mark.parametrize("angles", [EVEN, EVEN**2, np.linspace(0, 1, 5), np.zeros(3)])
+def test_uniform_weights_ask_for_nothing(angles):
+    count = len(angles)
+    np.testing.assert_array_equal(view_weights(angles, "uniform"), np.full(count, np.pi / count))
+
+
+@pytest.mark.parametrize("compensate", [None, "uniform", "voronoi"])
+def test_gains_that_are_weights(compensate):
+    gains = view_gains(EVEN**2, compensate, 50.0)
+    np.testing.assert_array_equal(gains, view_weights(EVEN**2, compensate))
+
+
+@pytest.mark.parametrize("compensate", COMPENSATIONS)
+def test_gains_that_depend_on_frequency(compensate):
+    gains = view_gains(EVEN**2, compensate, 50.0)(np.linspace(0, 0.5, 9))
+    assert gains.shape == (12, 9)
+    assert gains[:, 0].sum() == pytest.approx(np.pi)
+
+
+@pytest.mark.parametrize("compensate", COMPENSATIONS)
+def test_weights_are_no_functions(compensate):
+    with pytest.raises(InputError, match=f"compensate is '{compensate}'"):
+        view_weights(EVEN, compensate)
 
 
 @pytest.mark.parametrize("compensate", ["", "Voronoi", "nope", 1])
