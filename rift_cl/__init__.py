@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rift_cl.geometry import Camera, FanBeam, Grid, Parallel
     from rift_cl.io import SplatScene
     from rift_cl.operators import HighPass, LinearOperator, Projector, Ramp, Response, dot_test
-    from rift_cl.reconstruct import backproject, fbp
+    from rift_cl.reconstruct import backproject, cgls, fbp, sirt, tv
     from rift_cl.splat import Renderer, Splats, SplatSettings
 
 _HOMES = {
@@ -45,11 +45,14 @@ _HOMES = {
     "SplatSettings": "splat",
     "Splats": "splat",
     "backproject": "reconstruct",
+    "cgls": "reconstruct",
     "default_device": "cl",
     "devices": "cl",
     "dot_test": "operators",
     "fbp": "reconstruct",
     "open_device": "cl",
+    "sirt": "reconstruct",
+    "tv": "reconstruct",
 }
 _MODULES = ("metrics", "phantom")
 
@@ -70,6 +73,7 @@ __all__ = [
     "SplatSettings",
     "Splats",
     "backproject",
+    "cgls",
     "default_device",
     "devices",
     "dot_test",
@@ -77,6 +81,8 @@ __all__ = [
     "metrics",
     "open_device",
     "phantom",
+    "sirt",
+    "tv",
 ]
 
 

@@ -23,6 +23,7 @@ import tyro
 
 from figures import (
     compensation,
+    convergence,
     figure_05,
     figure_06,
     figure_11,
@@ -45,6 +46,7 @@ FIGURES: tuple[ModuleType, ...] = (
     figure_12,
     spectral_bias,
     compensation,
+    convergence,
 )
 # Those that fit splats to the ornament.
 FITTED: tuple[ModuleType, ...] = (figure_11, figure_12, spectral_bias)
