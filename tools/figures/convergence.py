@@ -19,10 +19,10 @@ from rift_cl import Device, Grid, Parallel, Projector, metrics, phantom
 from rift_cl.html_page import Page
 from rift_cl.plot import curves, figure_png, image_grid
 from rift_cl.progress import Report
-from rift_cl.reconstruct.cgls import Cgls
+from rift_cl.reconstruct.conjugate_gradients import Cgls
 from rift_cl.reconstruct.fista import Fista
 from rift_cl.reconstruct.pdhg import Pdhg
-from rift_cl.reconstruct.sirt import Sirt
+from rift_cl.reconstruct.simultaneous_iteration import Sirt
 from rift_cl.reconstruct.solver import Solver
 from rift_cl.reference.radon import radon
 
