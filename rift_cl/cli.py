@@ -82,7 +82,7 @@ def _commands() -> dict[str, Callable[..., Callable[[], int]]]:
     from rift_cl.jobs.devices import DevicesSettings
     from rift_cl.jobs.evaluate import EvalSettings
     from rift_cl.jobs.fit_settings import FitSettings
-    from rift_cl.jobs.reconstruct import ReconstructSettings
+    from rift_cl.jobs.reconstruct_settings import ReconstructSettings
     from rift_cl.jobs.render_settings import RenderSettings
     from rift_cl.jobs.view import ViewSettings
 
@@ -179,10 +179,12 @@ def _reconstruct(settings: Any, output: Output) -> None:
     from rift_cl.jobs.reconstruct import Reconstruction
 
     job = Reconstruction(settings)
+    if not output.quiet:
+        job.announce = print_line
     if not _ran(job, settings, output):
         return
     print_table(("figure", "value"), job.metrics.items())
-    print(f"slices and report.html are in {settings.out}")
+    print(job.result)
 
 
 def _center(settings: Any, output: Output) -> None:

@@ -1,75 +1,43 @@
 """``rift reconstruct``: a scan goes in, quantitative slices come out.
 
-Rows are read, corrected, reconstructed and written a slab at a time, as many together as the
-memory budget allows, so that the size of a scan is bounded by the disk alone.
+Rows are read, corrected, reconstructed and kept a slab at a time, as many together as the memory
+budget allows, so that the size of a scan is bounded by the disk alone, and that a run which was
+cut off goes on where it was.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.cl.budget import format_bytes, plan_chunks
+from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
-from rift_cl.geometry import Grid, Parallel
-from rift_cl.io.scan_file import ScanFile
+from rift_cl.errors import StoppedError
 from rift_cl.io.volume import open_volume
-from rift_cl.jobs.reconstruct_report import Preview, reconstruction_page
-from rift_cl.jobs.run_folder import RunFolder
-from rift_cl.jobs.scan_input import (
-    VOLUME_NAMES,
-    ScanInput,
-    check_center,
-    chosen_rows,
-    read_attenuation,
+from rift_cl.jobs.reconstruct_input import SliceInput
+from rift_cl.jobs.reconstruct_method import Inversion
+from rift_cl.jobs.reconstruct_report import (
+    PREVIEW_PICTURE,
+    Preview,
+    reconstruction_page,
+    write_preview,
 )
-from rift_cl.operators import HighPass, Projector, Ramp
+from rift_cl.jobs.reconstruct_settings import ReconstructSettings
+from rift_cl.jobs.reconstruct_slabs import SlabFolder, run_folder
+from rift_cl.jobs.scan_input import VOLUME_NAMES
 from rift_cl.progress import Report
-from rift_cl.reconstruct import Attenuation, backproject, fbp, find_center
 
-# Slices between two reports of progress.
-_SLAB = 16
+# Slices from which a run by a formula is worth a look before it goes on.
+_PREVIEW_FROM = 8
 
-
-@dataclass(frozen=True)
-class ReconstructSettings(ScanInput):
-    """Reconstruct a parallel-beam scan, slice by slice.
-
-    Example: rift reconstruct scan.h5 --out slices --filter shepp-logan --format zarr
-    """
-
-    out: Path = Path("rift-reconstruct")
-    """Folder for the slices, report.html, config.json and metrics.json."""
-    method: Literal["fbp", "backproject"] = "fbp"
-    """Filtered backprojection, or backprojection without a filter."""
-    filter: Literal["ram-lak", "shepp-logan", "cosine", "hamming", "hann", "high-pass"] = "ram-lak"
-    """Filter along the detector."""
-    cutoff: float = 1.0
-    """Where the filter's window ends, as a fraction of the Nyquist frequency."""
-    exponent: float = 1.0
-    """Of the high-pass |f|^exponent; 1 is the ramp."""
-    center: float | None = None
-    """Detector bin of the rotation axis; found automatically when not given."""
-    rows: tuple[int, int] | None = None
-    """First detector row, and the one after the last."""
-    pitch: float | None = None
-    """Distance between detector bins; the file's own, or 1 bin, when not given."""
-    unit: str | None = None
-    """Unit of the pitch, such as mm."""
-    format: Literal["tiff", "zarr", "h5"] = "tiff"
-    """A folder of TIFF slices, a Zarr store, or one HDF5 file."""
-    overwrite: bool = False
-    """Replace an earlier reconstruction in the same folder."""
-    dry_run: bool = False
-    """Show what would be done, and write nothing."""
+Floats = NDArray[np.float32]
 
 
 class Reconstruction:
@@ -83,129 +51,192 @@ class Reconstruction:
     """
 
     def __init__(self, settings: ReconstructSettings) -> None:
+        settings.check()
         self.settings = settings
         self.device: Device = settings.open_device()
-        self.scan: ScanFile = settings.open_scan()
-        self.rows = chosen_rows(settings.rows, self.scan)
-        self.pitch = (self.scan.pitch or 1.0) if settings.pitch is None else settings.pitch
-        unit = self.scan.unit or ("bin" if self.pitch == 1.0 else "")
-        self.unit = unit if settings.unit is None else settings.unit
-        self.filter = _filter(settings)
-        # Made now, so that a bad pitch or center is told before any work.
-        self._geometry(settings.center)
-        check_center(settings.center, self.scan)
-        self.folder = RunFolder(settings.out, "reconstruct", overwrite=settings.overwrite)
+        self.source = SliceInput(settings, self.device)
+        self.inversion = Inversion(settings, self.source, self.device)
+        # Made now, so that a part that is not inside the slice is told before any work.
+        self._kept = SlabFolder(settings.out / "slabs", self.shape)
+        self.folder = run_folder(settings, self._kept)
         self.metrics: dict[str, Any] = {}
-        self._preview = Preview.of(self.shape[0])
+        self.announce: Callable[[str], None] = lambda line: None
+        self._begin = time.perf_counter()
+
+    @property
+    def rows(self) -> tuple[int, int]:
+        """First detector row, and the one after the last."""
+        return self.source.rows
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Shape of the volume, (z, y, x)."""
-        bins = self.scan.shape[2]
-        return self.rows[1] - self.rows[0], bins, bins
+        """Shape of the volume, (z, y, x); of a full turn's, once the axis is known."""
+        return self.rows[1] - self.rows[0], *self.inversion.window.shape
+
+    @property
+    def result(self) -> str:
+        """What there is when it is done, and where."""
+        if self.settings.preview:
+            return (
+                f"{self.settings.out / PREVIEW_PICTURE} shows the middle slice; all "
+                f"{self.shape[0]} would take about {self.metrics['seconds_for_all']:.3g} s"
+            )
+        return f"slices and report.html are in {self.settings.out}"
 
     @cached_property
     def slabs(self) -> list[slice]:
         """Slices that are worked on together, counted from the first row that was asked for."""
-        views, _, bins = self.scan.shape
-        # Counts, line integrals and a temporary on the host, then sinogram and filtered sinogram
-        # on the device; the slice on both.
-        each = 4 * (5 * views * bins + 2 * bins * bins)
-        scratch = self._projector(1, None).scratch
-        chunks = plan_chunks(self.shape[0], each, scratch, self.device.budget, what="slice")
-        return [s for chunk in chunks for s in _cut(chunk)]
+        return self.inversion.slabs([slice(0, self.shape[0])])
 
     def plan(self) -> dict[str, str]:
         """What would be done, for ``--dry-run``; one slice is reconstructed to tell the time."""
+        self.source.locate()
         seconds = self._seconds_per_slice() * self.shape[0]
+        scan = self.source.scan
         return {
-            "scan": f"{self.scan.path} ({self.scan.source}, {self.scan.kind})",
-            "projections": f"{self.scan.shape} (angle, row, bin)",
+            "scan": f"{scan.path} ({scan.source}, {scan.kind})",
+            "projections": f"{scan.shape} (angle, row, bin)",
             "volume": f"{self.shape} (z, y, x), {format_bytes(4 * math.prod(self.shape))}",
+            "method": self.settings.method,
+            "assumed": " ".join(self.source.notes) or "nothing",
             "slabs": f"{len(self.slabs)} of at most {max(s.stop - s.start for s in self.slabs)}",
             "device": f"{self.device.name}, budget {format_bytes(self.device.budget)}",
-            "output": str(self.settings.out / VOLUME_NAMES[self.settings.format]),
+            "output": str(self._volume_path),
             "time": f"about {seconds:.3g} s, from one slice",
         }
 
     def run(self) -> Iterator[Report]:
-        """Do it; a report after every slab."""
-        begin = time.perf_counter()
-        center = self.settings.center
-        if center is None:
-            yield Report(0, self.shape[0], "slices")
-            center = self._find_center()
+        """Do it; a report after every slab, or after every step.
+
+        Raises:
+            StoppedError: it was broken off, and what was done is kept.
+        """
+        self._begin = time.perf_counter()
+        yield Report(0, self._total, self._what)
+        going_on = self.settings.resume and self._kept.begun
+        if going_on:
+            self.source.center = self._kept.center() or self.source.center
+        self.source.locate()
+        self._kept.shape = self.shape
         self.folder.make()
         try:
-            yield from self._write(center)
-        except BaseException:
-            self.folder.discard()
+            if self.settings.preview:
+                yield from self._look()
+                return
+            run = {**self.settings.decisive(), **self.source.identity(), "volume": str(self.shape)}
+            self._kept.go_on(run) if going_on else self._kept.begin(run)
+            yield from self._work(going_on=going_on)
+        except BaseException as error:
+            if not self._keep_what_is_done():
+                self.folder.discard()
+            elif isinstance(error, KeyboardInterrupt):
+                done = self.shape[0] - sum(s.stop - s.start for s in self._kept.missing())
+                raise StoppedError(
+                    f"interrupted; {done} of {self.shape[0]} slices are kept: the same command "
+                    "with --resume goes on"
+                ) from None
             raise
+        self._finish()
+
+    @property
+    def _volume_path(self) -> Path:
+        return self.settings.out / VOLUME_NAMES[self.settings.format]
+
+    @property
+    def _what(self) -> str:
+        return "steps" if self.settings.iterative else "slices"
+
+    @property
+    def _total(self) -> int:
+        return self.shape[0] * self.settings.most_steps
+
+    def _work(self, *, going_on: bool) -> Iterator[Report]:
+        """Every slice that is missing; first, of a long run, the middle one to look at."""
+        count = self.shape[0]
+        if not going_on and (count >= _PREVIEW_FROM or (self.settings.iterative and count > 1)):
+            yield from self._look()
+        done = count - sum(s.stop - s.start for s in self._kept.missing())
+        for slab in self.inversion.slabs(self._kept.missing()):
+            self._kept.save(slab.start, (yield from self._slab(slab, done)))
+            done += slab.stop - slab.start
+            values = {} if self.source.center is None else {"center": self.source.center}
+            yield Report(done * self.settings.most_steps, self._total, self._what, values)
+
+    def _look(self) -> Iterator[Report]:
+        """Reconstruct the middle slice, show it, and tell how long the others take."""
+        middle = self.shape[0] // 2
+        begin = time.perf_counter()
+        image = yield from self._slab(slice(middle, middle + 1), 0)
+        seconds = (time.perf_counter() - begin) * self.shape[0]
+        path = self.settings.out / PREVIEW_PICTURE
+        write_preview(path, image[0], f"slice {self.rows[0] + middle}", self.source.unit)
+        self.metrics["seconds_for_all"] = seconds
+        if not self.settings.preview:
+            self._kept.save(middle, image)
+        done = self._total if self.settings.preview else self.settings.most_steps
+        self.announce(f"{path} shows the middle slice; all take about {seconds:.3g} s")
+        yield Report(done, self._total, self._what, {"seconds for all": seconds})
+
+    def _slab(self, slab: slice, before: int) -> Generator[Report, None, Floats]:
+        first = self.rows[0]
+        integrals = self.source.read(first + slab.start, first + slab.stop)
+        for name, found in (
+            ("dead_pixels", integrals.dead),
+            ("starved_samples", integrals.starved),
+        ):
+            self.metrics[name] = self.metrics.get(name, 0) + found
+        steps = self.inversion.slices(slab.start, integrals.projections)
+        done = before * self.settings.most_steps
+        while True:
+            try:
+                report = next(steps)
+            except StopIteration as end:
+                slices: Floats = end.value
+                return slices
+            yield Report(done + report.done, self._total, self._what, report.values)
+
+    def _finish(self) -> None:
+        """Make the volume of the slabs, and the report."""
+        preview = Preview.of(self.shape[0])
+        settings, spacing = self.settings, (self.inversion.window.pixel,) * 3
+        spacing = (self.source.pitch, *spacing[1:])
+        with open_volume(
+            self._volume_path,
+            self.shape,
+            format=settings.format,
+            spacing=spacing,
+            unit=self.source.unit,
+        ) as volume:
+            for start, slab in self._kept.slabs():
+                volume.write(start, slab)
+                preview.take(start, slab)
         # From here on the slices are this run's, and an earlier configuration no longer theirs.
         self.folder.mark()
-        formats = set(VOLUME_NAMES.values()) - {VOLUME_NAMES[self.settings.format]}
-        self.folder.drop(*formats)
-        self.metrics["seconds"] = time.perf_counter() - begin
-        page = reconstruction_page(self, self._preview)
-        self.folder.finish(self.settings, self.metrics, page, self.device)
+        self.folder.drop(*set(VOLUME_NAMES.values()) - {VOLUME_NAMES[settings.format]})
+        if self.source.center is not None:
+            self.metrics = {"center": self.source.center, **self.metrics}
+        self.metrics.update(self.inversion.figures())
+        self.metrics.update(preview.statistics())
+        self.metrics["seconds"] = time.perf_counter() - self._begin
+        self.metrics.pop("seconds_for_all", None)
+        page = reconstruction_page(self, preview)
+        record = {**self.metrics, "assumed": self.source.notes}
+        self.folder.finish(settings, record, page, self.device)
+        self._kept.drop()
 
-    def _write(self, center: float) -> Iterator[Report]:
-        settings, count = self.settings, self.shape[0]
-        path = settings.out / VOLUME_NAMES[settings.format]
-        spacing = (self.pitch,) * 3
-        self.metrics = {"center": center, "dead_pixels": 0, "starved_samples": 0}
-        projectors: dict[int, Projector] = {}
-        with open_volume(
-            path, self.shape, format=settings.format, spacing=spacing, unit=self.unit
-        ) as volume:
-            for slab in self.slabs:
-                size = slab.stop - slab.start
-                A = projectors.setdefault(size, self._projector(size, center))
-                integrals = self._line_integrals(slab)
-                self.metrics["dead_pixels"] += integrals.dead
-                self.metrics["starved_samples"] += integrals.starved
-                slices = self._invert(A, integrals.projections)
-                volume.write(slab.start, slices)
-                self._preview.take(slab.start, slices)
-                yield Report(slab.stop, count, "slices", {"center": center})
-        self.metrics.update(self._preview.statistics())
-
-    def _line_integrals(self, slab: slice) -> Attenuation:
-        first = self.rows[0]
-        return read_attenuation(self.scan, first + slab.start, first + slab.stop)
-
-    def _invert(self, A: Projector, projections: NDArray[np.float32]) -> NDArray[np.float32]:
-        if self.settings.method == "backproject":
-            return np.asarray(backproject(A, projections))
-        return np.asarray(fbp(A, projections, self.filter))
-
-    def _find_center(self) -> float:
-        middle = sum(self.rows) // 2
-        row = read_attenuation(self.scan, middle, middle + 1).projections[:, 0]
-        return find_center(row, self.scan.angles, device=self.device).center
-
-    def _geometry(self, center: float | None) -> Parallel:
-        return Parallel(self.scan.angles, self.scan.shape[2], self.pitch, center)
-
-    def _projector(self, slices: int, center: float | None) -> Projector:
-        grid = Grid((slices, *self.shape[1:]), self.pitch)
-        return Projector(grid, self._geometry(center), device=self.device)
+    def _keep_what_is_done(self) -> bool:
+        """After a failure: whether slices are kept; else the traces of the run are removed."""
+        if self.settings.preview:
+            return False
+        todo = self._kept.missing()
+        if sum(s.stop - s.start for s in todo) < self.shape[0]:
+            return True
+        self._kept.drop()
+        return False
 
     def _seconds_per_slice(self) -> float:
-        A = self._projector(1, self.settings.center)
-        # Twice: the first time builds the kernels.
-        for _ in range(2):
-            begin = time.perf_counter()
-            self._invert(A, self._line_integrals(slice(0, 1)).projections)
-        return time.perf_counter() - begin
-
-
-def _cut(chunk: slice) -> list[slice]:
-    starts = range(chunk.start, chunk.stop, _SLAB)
-    return [slice(start, min(start + _SLAB, chunk.stop)) for start in starts]
-
-
-def _filter(settings: ReconstructSettings) -> Ramp | HighPass:
-    if settings.filter == "high-pass":
-        return HighPass(settings.exponent)
-    return Ramp(settings.filter, settings.cutoff)
+        first = self.rows[0]
+        begin = time.perf_counter()
+        integrals = self.source.read(first, first + 1)
+        reading = time.perf_counter() - begin
+        return reading + self.inversion.seconds(integrals.projections)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -27,7 +28,8 @@ class ScanInput:
     """Where a scan is and how to read it."""
 
     scan: Annotated[Path, Positional]
-    """HDF5 (Data Exchange, NXtomo, or any named dataset) or NPZ file."""
+    """HDF5 (Data Exchange, NXtomo, or any named dataset), NPZ, MAT or TIFF file, or a folder of
+    TIFF files."""
     dataset: str | None = None
     """Name of the projections in the file, where it is not the layout's own."""
     theta: str | None = None
@@ -40,21 +42,44 @@ class ScanInput:
     """Device to use: its number, cpu, gpu, or a part of its name; see 'rift devices'."""
     memory: str | None = None
     """Most memory to use, such as 512M or 4G."""
+    background: int | None = None
+    """For line integrals that are not zero in air: bins at each end of the detector, beyond the
+    object, whose mean is subtracted from every view; what the file's layout says if not given."""
 
     def open_device(self) -> Device:
         """The chosen device."""
         limit = None if self.memory is None else parse_bytes(self.memory)
         return open_device(self.device, limit)
 
-    def open_scan(self) -> ScanFile:
-        """The file's description."""
+    def open_scan(self, *, fan: bool = False) -> ScanFile:
+        """The file's description.
+
+        Args:
+            fan: whether the rays may be those of a fan beam.
+
+        Raises:
+            InputError: they are and may not be, or the background is wider than the detector.
+        """
         names = {"theta": self.theta, "flats": self.flats, "darks": self.darks}
         limit = None if self.memory is None else parse_bytes(self.memory)
-        return open_scan(self.scan, dataset=self.dataset, budget=limit, **names)
+        scan = open_scan(self.scan, dataset=self.dataset, budget=limit, **names)
+        if scan.fan is not None and not fan:
+            raise InputError(
+                f"{scan.path}: its rays are those of a fan beam, this command takes parallel ones; "
+                "'rift reconstruct' takes both"
+            )
+        if self.background is None:
+            return scan
+        if not 0 <= 2 * self.background <= scan.shape[2]:
+            raise InputError(
+                f"--background is {self.background}, wanted 0 to {scan.shape[2] // 2}: so many "
+                "bins at each end of the detector"
+            )
+        return dataclasses.replace(scan, background=self.background)
 
 
 def read_attenuation(scan: ScanFile, start: int, stop: int) -> Attenuation:
-    """Line integrals of some detector rows.
+    """Line integrals of some detector rows, less what the scan's background bins see.
 
     Raises:
         NonFiniteError: a sample is not finite; the sentence names the file, view, row and bin.
@@ -66,8 +91,24 @@ def read_attenuation(scan: ScanFile, start: int, stop: int) -> Attenuation:
         if frames is not None:
             _check(frames, f"{scan.path}: {name}", start)
     if scan.kind == "attenuation" or rows.flats is None:
-        return Attenuation(rows.projections, 0, 0)
-    return attenuation(rows.projections, rows.flats, rows.darks)
+        integrals = Attenuation(rows.projections, 0, 0)
+    else:
+        integrals = attenuation(rows.projections, rows.flats, rows.darks)
+    if scan.background:
+        subtract_background(integrals.projections, scan.background)
+    return integrals
+
+
+def subtract_background(projections: NDArray[np.float32], bins: int) -> None:
+    """Bring the mean of the outermost bins of both ends to zero, in every row of every view.
+
+    Args:
+        projections: line integrals (angle, row, bin); changed in place.
+        bins: at each end.
+    """
+    ends = np.concatenate([projections[..., :bins], projections[..., -bins:]], axis=-1)
+    offset = ends.mean(axis=-1, keepdims=True, dtype=np.float64)
+    projections -= offset.astype(np.float32)
 
 
 def _check(frames: NDArray[np.float32], name: str, start: int) -> None:

@@ -2,10 +2,15 @@
 
 from rift_cl.reconstruct.center import CenterSearch, find_center
 from rift_cl.reconstruct.conjugate_gradients import Cgls, cgls
+from rift_cl.reconstruct.fan_rebin import rebin_fan
 from rift_cl.reconstruct.filtered_backprojection import FilteredBackprojection, backproject, fbp
 from rift_cl.reconstruct.fista import Fista
 from rift_cl.reconstruct.flatfield import Attenuation, attenuation
+from rift_cl.reconstruct.offset_axis import find_offset_center, widened
+from rift_cl.reconstruct.padding import extended
 from rift_cl.reconstruct.pdhg import Pdhg
+from rift_cl.reconstruct.rings import remove_rings
+from rift_cl.reconstruct.seen_rays import SeenRays
 from rift_cl.reconstruct.simultaneous_iteration import Sirt, sirt
 from rift_cl.reconstruct.tv_reconstruction import tv
 
@@ -16,12 +21,18 @@ __all__ = [
     "FilteredBackprojection",
     "Fista",
     "Pdhg",
+    "SeenRays",
     "Sirt",
     "attenuation",
     "backproject",
     "cgls",
+    "extended",
     "fbp",
     "find_center",
+    "find_offset_center",
+    "rebin_fan",
+    "remove_rings",
     "sirt",
     "tv",
+    "widened",
 ]

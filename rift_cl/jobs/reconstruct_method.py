@@ -1,0 +1,243 @@
+"""The methods of ``rift reconstruct``: from the projections of a slab to its slices.
+
+Formulas take a slab at once. Methods that take steps go through it slice by slice: each slice then
+has its own steps, so that no result depends on how much memory there was for a slab.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.budget import plan_chunks
+from rift_cl.cl.device import Device
+from rift_cl.geometry import Grid, Parallel
+from rift_cl.jobs.reconstruct_input import SliceInput, demand_window
+from rift_cl.jobs.reconstruct_settings import ReconstructSettings
+from rift_cl.operators import Projector
+from rift_cl.progress import Report
+from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp
+from rift_cl.reconstruct.seen_rays import SeenRays
+from rift_cl.reconstruct.solver import Solver
+
+Floats = NDArray[np.float32]
+# Images and sinograms, float32, that a slice needs on host and device at a time: a formula's are
+# counts, line integrals, two temporaries and the filtered ones; a method's are its state as well.
+_ARRAYS = {"fbp": (2, 6), "backproject": (2, 6), "sirt": (5, 9), "cgls": (5, 10), "tv": (16, 10)}
+
+
+# Slices between two reports of progress; of those that take steps, each of which is reported.
+_SLAB, _ITERATIVE_SLAB = 16, 4
+# Steps that are timed, after a first one that builds the kernels.
+_TIMED_STEPS = 3
+# The usual weight of the total variation, as a share of what would level features of a few bins.
+_VARIATION = 0.1
+
+
+@dataclass(frozen=True)
+class Window:
+    """Where a slice lies: samples of the whole one, and the part of it that is wanted.
+
+    Args:
+        size: samples along each side of the whole slice, centred on the axis.
+        pixel: distance between samples.
+        roi: first column, the one after the last, first line, the one after the last.
+    """
+
+    size: int
+    pixel: float
+    roi: tuple[int, int, int, int]
+
+    @classmethod
+    def of(cls, settings: ReconstructSettings, source: SliceInput) -> Window:
+        """What the settings ask for, of a scan whose axis is known.
+
+        Raises:
+            InputError: the part is not inside the slice.
+        """
+        pixel = source.pitch if settings.pixel is None else settings.pixel
+        width = int(np.ceil(source.bins * source.pitch / pixel - 1e-6))
+        size = width if settings.size is None else settings.size
+        roi = settings.roi or (0, size, 0, size)
+        demand_window(roi, size)
+        return cls(size, pixel, roi)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Lines and columns that are wanted."""
+        left, right, top, bottom = self.roi
+        return bottom - top, right - left
+
+    def grid(self, slices: int) -> Grid:
+        """The samples that are wanted, of so many slices."""
+        left, right, top, bottom = self.roi
+        middle = self.size / 2
+        center = (((top + bottom) / 2 - middle), ((left + right) / 2 - middle))
+        return Grid((slices, *self.shape), self.pixel, (0.0, *(c * self.pixel for c in center)))
+
+    def around(self, width: float) -> tuple[Grid, tuple[slice, slice]]:
+        """An image at least so wide about the axis, and where in it the wanted part lies.
+
+        Methods that explain every ray need all that the rays meet.
+        """
+        margin = max(0, int(np.ceil((width / self.pixel - self.size) / 2)))
+        left, right, top, bottom = (edge + margin for edge in self.roi)
+        whole = Grid((self.size + 2 * margin,) * 2, self.pixel)
+        return whole, (slice(top, bottom), slice(left, right))
+
+
+@dataclass
+class Inversion:
+    """A method at work on the slices of one scan.
+
+    Args:
+        settings: the method and its options.
+        source: the scan; located.
+        device: where to work.
+        residuals: root mean square of the residual after each step, by slice.
+    """
+
+    settings: ReconstructSettings
+    source: SliceInput
+    device: Device
+    residuals: dict[int, list[float]] = field(default_factory=dict)
+    _projectors: dict[int, Projector] = field(default_factory=dict)
+
+    @property
+    def window(self) -> Window:
+        """Where the slices lie."""
+        return Window.of(self.settings, self.source)
+
+    @property
+    def need(self) -> int:
+        """Bytes that a slice takes, on host and device together, besides the projector's own."""
+        A = self.projector(1)
+        images, sinograms = _ARRAYS[self.settings.method]
+        views, bins = len(A.scan.angles), max(A.scan.bins, self.source.scan.shape[2])
+        views = max(views, self.source.scan.shape[0])
+        return 4 * (images * int(np.prod(A.grid.shape[-2:])) + sinograms * views * bins)
+
+    def projector(self, slices: int) -> Projector:
+        """The projector of so many slices, kept for the next slab of the same size."""
+        count = 0 if self.settings.iterative else slices
+        if count not in self._projectors:
+            self._projectors[count] = self._projector(slices)
+        return self._projectors[count]
+
+    def slabs(self, runs: list[slice]) -> list[slice]:
+        """Cut runs of slices into slabs that fit the budget.
+
+        Raises:
+            ResourceLimitError: not even one slice does.
+        """
+        scratch = self.projector(1).scratch
+        most = _ITERATIVE_SLAB if self.settings.iterative else _SLAB
+        cut = []
+        for run in runs:
+            count, budget = run.stop - run.start, self.device.budget
+            for chunk in plan_chunks(count, self.need, scratch, budget, what="slice"):
+                first, stop = run.start + chunk.start, run.start + chunk.stop
+                cut += [slice(at, min(at + most, stop)) for at in range(first, stop, most)]
+        return cut
+
+    def slices(self, first: int, projections: Floats) -> Generator[Report, None, Floats]:
+        """Reconstruct a slab; a report after every step of every slice.
+
+        Args:
+            first: number of the first slice, for ``residuals``.
+            projections: (angle, row, bin) as ``SliceInput.read`` gives them.
+
+        Returns:
+            (row, y, x), attenuation per unit of length.
+        """
+        if not self.settings.iterative:
+            return self._formula(projections)
+        _, part = self.window.around(self._width())
+        slab = np.empty((projections.shape[1], *self.window.shape), np.float32)
+        for row in range(projections.shape[1]):
+            solver = self._solver(np.ascontiguousarray(projections[:, row]))
+            curve = self.residuals.setdefault(first + row, [])
+            for report in solver.run(self.settings.most_steps):
+                curve.append(report.values["residual"])
+                yield Report(report.done, self.settings.most_steps, "steps", report.values)
+            slab[row] = self.device.get(solver.image)[part]
+        return slab
+
+    def figures(self) -> dict[str, float]:
+        """What came out of the steps, over all slices."""
+        curves = [curve for curve in self.residuals.values() if curve]
+        if not curves:
+            return {}
+        return {
+            "steps": float(np.mean([len(curve) for curve in curves])),
+            "residual": float(np.sqrt(np.mean([curve[-1] ** 2 for curve in curves]))),
+        }
+
+    def seconds(self, projections: Floats) -> float:
+        """How long a slice takes, from a first one or from its first steps."""
+        if not self.settings.iterative:
+            # Twice: the first time builds the kernels.
+            for _ in range(2):
+                begin = time.perf_counter()
+                self._formula(projections)
+            return time.perf_counter() - begin
+        solver = self._solver(np.ascontiguousarray(projections[:, 0]))
+        moments = [time.perf_counter() for _ in solver.run(1 + _TIMED_STEPS)]
+        each = (moments[-1] - moments[0]) / max(len(moments) - 1, 1)
+        return each * self.settings.most_steps
+
+    def _formula(self, projections: Floats) -> Floats:
+        prepared, _ = self.source.for_formula(projections)
+        A = self.projector(projections.shape[1])
+        if self.settings.method == "backproject":
+            return np.asarray(backproject(A, prepared))
+        settings = self.settings
+        return np.asarray(fbp(A, prepared, settings.view_filter(), settings.compensate))
+
+    def _solver(self, sinogram: Floats) -> Solver:
+        settings = self.settings
+        whole, seen = self.projector(1), self.source.seen
+        A: Projector | SeenRays = whole if seen is None else SeenRays(whole, seen)
+        precondition, noise = settings.precondition, settings.noise
+        if settings.method == "cgls":
+            return Cgls(A, sinogram, precondition=precondition, noise=noise)
+        nonnegative = settings.nonnegative
+        if settings.method == "sirt":
+            return Sirt(
+                A, sinogram, nonnegative=nonnegative, precondition=precondition, noise=noise
+            )
+        weight = usual_weight(sinogram) if settings.weight is None else settings.weight
+        return Pdhg(
+            A, sinogram, weight, nonnegative=nonnegative, precondition=precondition, noise=noise
+        )
+
+    def _projector(self, slices: int) -> Projector:
+        footprint = self.settings.footprint
+        if not self.settings.iterative:
+            scan: Parallel = self.source.formula_geometry()
+            return Projector(self.window.grid(slices), scan, footprint, device=self.device)
+        grid, _ = self.window.around(self._width())
+        return Projector(grid, self.source.geometry, footprint, device=self.device)
+
+    def _width(self) -> float:
+        """What the rays meet: twice the way from the axis to the farther end of the detector."""
+        scan = self.source.geometry
+        reach = max(scan.center + 0.5, scan.bins - 0.5 - scan.center) + self.source.pad
+        return float(2 * reach * scan.pitch)
+
+
+def usual_weight(sinogram: Floats) -> float:
+    """A weight of the total variation that suits most slices, in the solver's unit.
+
+    A disc of radius R and value u adds ``2 pi R u`` to the variation and, lowered by d,
+    ``views * 4/3 * 2 R * (d R)^2`` or so to the data term: the weight that lowers features of a
+    given number of bins by a given share goes with u, the views and the distance of bins. The
+    greatest line integrals over half of the detector's width stand for u.
+    """
+    views, bins = sinogram.shape
+    strong = float(np.percentile(np.abs(sinogram), 99))
+    return float(_VARIATION * views * strong / (bins / 2))

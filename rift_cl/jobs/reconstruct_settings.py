@@ -1,0 +1,166 @@
+"""What ``rift reconstruct`` is asked for, and which options mean something for which method."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from rift_cl.errors import InputError
+from rift_cl.jobs.scan_input import ScanInput
+from rift_cl.operators import HighPass, Ramp
+
+ITERATIVE = ("sirt", "cgls", "tv")
+Switch = Literal["auto", "on", "off"]
+# Options that belong to some methods only; the others take no notice of them, and say so.
+_ONLY = {
+    "filter": ("fbp",),
+    "cutoff": ("fbp",),
+    "exponent": ("fbp",),
+    "compensate": ("fbp",),
+    "steps": ITERATIVE,
+    "noise": ITERATIVE,
+    "precondition": ITERATIVE,
+    "weight": ("tv",),
+    "nonnegative": ("sirt", "tv"),
+}
+# Steps that serve as a beginning: SIRT is slow, CGLS gets noisy when it goes on for long.
+_STEPS = {"sirt": 100, "cgls": 30, "tv": 200}
+# With frequencies weighed, CGLS is near its best after the first few.
+_PRECONDITIONED_CGLS = 4
+# What may differ between a run and the one that goes on with it: it changes no bit of the result.
+_FREE = ("out", "device", "memory", "format", "overwrite", "resume", "dry_run", "preview")
+
+
+@dataclass(frozen=True)
+class ReconstructSettings(ScanInput):
+    """Reconstruct a parallel-beam or fan-beam scan, slice by slice.
+
+    Example: rift reconstruct scan.h5 --out slices --filter shepp-logan --format zarr
+    """
+
+    out: Path = Path("rift-reconstruct")
+    """Folder for the slices, preview.png, report.html, config.json and metrics.json."""
+    method: Literal["fbp", "backproject", "sirt", "cgls", "tv"] = "fbp"
+    """Filtered backprojection; backprojection without a filter; or steps towards the slice whose
+    projections are the measured ones (sirt, cgls), also with the fewest edges (tv)."""
+    filter: Literal["ram-lak", "shepp-logan", "cosine", "hamming", "hann", "high-pass"] | None = (
+        None
+    )
+    """fbp: filter along the detector; ram-lak if not given."""
+    cutoff: float | None = None
+    """fbp: where the filter's window ends, as a fraction of the Nyquist frequency; 1 if not
+    given."""
+    exponent: float | None = None
+    """fbp: of the high-pass |f|^exponent; 1, the ramp, if not given."""
+    compensate: Literal["voronoi", "capped-voronoi", "pipe-menon", "exact"] | None = None
+    """fbp: how views count that are unevenly spaced; as evenly spaced ones if not given."""
+    footprint: Literal["linear", "joseph", "strip"] = "linear"
+    """How a pixel is spread over the bins."""
+    steps: int | None = None
+    """sirt, cgls, tv: most steps for a slice; 100, 30 (with
+    --precondition 4), 200 if not given."""
+    noise: float | None = None
+    """sirt, cgls, tv: standard deviation of the noise of a line integral; steps end where the
+    slice explains the data that well."""
+    weight: float | None = None
+    """tv: of the total variation; the greater, the smoother."""
+    nonnegative: bool = False
+    """sirt, tv: no value below zero."""
+    precondition: Literal["ramp", "capped-voronoi"] | None = None
+    """sirt, cgls, tv: weigh the residual's frequencies by a filter, which takes fewer steps."""
+    center: float | None = None
+    """Detector bin of the rotation axis; found automatically when not given."""
+    rows: tuple[int, int] | None = None
+    """First detector row, and the one after the last."""
+    pitch: float | None = None
+    """Distance between detector bins; the file's own, or 1 bin, when not given."""
+    unit: str | None = None
+    """Unit of the pitch, such as mm."""
+    pixel: float | None = None
+    """Distance between samples of a slice; the bins' distance, at the rotation axis, when not
+    given."""
+    size: int | None = None
+    """Samples along each side of a slice; as many as cover the detector when not given."""
+    roi: tuple[int, int, int, int] | None = None
+    """Part of the slice: first column and the one after the last, first line and the one after
+    the last."""
+    rings: Switch = "auto"
+    """Take stripes out of the projections, which make rings; auto: where they are counts and the
+    views go round far enough."""
+    pad: Switch = "auto"
+    """Continue an object that is wider than the detector; auto: where the projections do not end
+    at zero."""
+    preview: bool = False
+    """Reconstruct the middle slice alone, as preview.png, and say how long all would take."""
+    format: Literal["tiff", "zarr", "h5"] = "tiff"
+    """A folder of TIFF slices, a Zarr store, or one HDF5 file."""
+    overwrite: bool = False
+    """Replace an earlier reconstruction in the same folder."""
+    resume: bool = False
+    """Go on with a reconstruction in the same folder that was cut off."""
+    dry_run: bool = False
+    """Show what would be done, and write nothing."""
+
+    def check(self) -> None:
+        """Check what depends on nothing but the settings.
+
+        Raises:
+            InputError: an option makes no sense, or none for this method.
+        """
+        usual = {field.name: field.default for field in dataclasses.fields(self)}
+        for name, methods in _ONLY.items():
+            if getattr(self, name) != usual[name] and self.method not in methods:
+                raise InputError(
+                    f"--{name} means nothing for --method {self.method}: leave it out, or choose "
+                    f"--method {' or '.join(methods)}"
+                )
+        # Made now, so that its arguments are checked before any work.
+        self.view_filter()
+        least = {"steps": 1, "size": 1, "background": 0}
+        for name, bound in least.items():
+            value = getattr(self, name)
+            if value is not None and value < bound:
+                raise InputError(f"--{name} is {value}, wanted {bound} or more")
+        for name in ("noise", "weight", "pixel"):
+            value = getattr(self, name)
+            if value is not None and not 0 < value < float("inf"):
+                raise InputError(f"--{name} is {value:g}, wanted a positive number")
+        if self.resume and self.overwrite:
+            raise InputError("--resume goes on with what --overwrite throws away: give one of them")
+
+    @property
+    def iterative(self) -> bool:
+        """Whether the method takes steps."""
+        return self.method in ITERATIVE
+
+    @property
+    def most_steps(self) -> int:
+        """Steps that a slice takes at most; 1 where the method is a formula."""
+        if not self.iterative:
+            return 1
+        few = self.method == "cgls" and self.precondition is not None
+        return self.steps or (_PRECONDITIONED_CGLS if few else _STEPS[self.method])
+
+    def view_filter(self) -> Ramp | HighPass:
+        """The filter along the detector.
+
+        Raises:
+            InputError: its options do not fit each other.
+        """
+        if self.filter == "high-pass":
+            if self.cutoff is not None:
+                raise InputError("--cutoff means nothing for --filter high-pass: leave it out")
+            return HighPass(1.0 if self.exponent is None else self.exponent)
+        if self.exponent is not None:
+            raise InputError("--exponent is the high-pass's: add --filter high-pass")
+        return Ramp(self.filter or "ram-lak", 1.0 if self.cutoff is None else self.cutoff)
+
+    def decisive(self) -> dict[str, Any]:
+        """The settings on which the slices depend, as text."""
+        return {
+            name: str(value)
+            for name, value in dataclasses.asdict(self).items()
+            if name not in _FREE
+        }

@@ -1,0 +1,200 @@
+"""Fan-beam views resampled to parallel ones, so that every parallel method serves fan scans.
+
+The ray that leaves the central one by the fan angle ``gamma`` in the view at angle ``a`` is the
+ray of a parallel scan at ``theta = a - gamma`` with ``t = source_to_axis * sin(gamma)`` (Kak and
+Slaney, section 3.4.1). A parallel view is kept where the scan has all of its rays, directly or,
+once views go half round, from the opposite side: ``(theta + pi, -t)`` is the same line. Views that
+are covered only in part, at the ends of a limited scan, are left out, since a filter takes what
+is missing for air; a method that explains rays one by one can use them (``whole=False``).
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates, spline_filter1d
+
+from rift_cl.errors import InputError, ShapeError
+from rift_cl.geometry import Parallel
+from rift_cl.geometry.fan import FanBeam
+
+Floats = NDArray[np.float64]
+Stack = NDArray[np.float32]
+Interpolation = Literal["linear", "cubic"]
+
+_ORDERS = {"linear": 1, "cubic": 3}
+# Views that are repeated beyond the ends of a full turn, more than a cubic spline's reach.
+_BORDER = 12
+# A view of which less is covered is not worth its place.
+_LEAST_COVERED = 0.1
+# A full turn may lack a view and a half, and an end of a scan this share of a step.
+_TURN_SLACK, _SLACK = 1.5, 1e-3
+
+
+class _Views(NamedTuple):
+    """Views in ascending order, some of a full turn's repeated beyond its ends.
+
+    Rays are read from ``first`` to ``last``, which for a full turn are the same direction.
+    """
+
+    angles: Floats
+    order: NDArray[np.intp]
+    turn: bool
+    first: float
+    last: float
+
+    @property
+    def step(self) -> float:
+        return float(np.median(np.diff(self.angles)))
+
+
+def rebin_fan(
+    projections: Stack,
+    angles: Floats,
+    fan: FanBeam,
+    *,
+    interpolation: Interpolation = "cubic",
+    whole: bool = True,
+) -> tuple[Stack, Parallel]:
+    """Resample fan-beam views to a parallel sinogram.
+
+    Args:
+        projections: line integrals, (angle, bin) or (angle, row, bin); rows are alike where the
+            fan is flat.
+        angles: the views' angles in radians, any order, as ``FanBeam`` counts them.
+        fan: source and detector.
+        interpolation: between views and between bins.
+        whole: only views with all of their rays; else those with some as well, with zeros where
+            ``covered_rays`` is False.
+
+    Returns:
+        The parallel projections, with the same axes, and their geometry: its lengths are in the
+        fan's unit, bins are as far apart as the fan's rays at the rotation axis, and angles are
+        about as far apart as the fan's views.
+
+    Raises:
+        ShapeError: the arrays do not fit each other.
+        InputError: the interpolation is unknown, or no parallel view is covered.
+    """
+    scan, _ = covered_rays(angles, np.shape(projections)[-1], fan, whole=whole)
+    stack = np.asarray(projections, np.float32)
+    if stack.ndim not in (2, 3) or stack.shape[0] != np.size(angles):
+        raise ShapeError(
+            f"projections have shape {stack.shape}, wanted ({np.size(angles)}, bin) or "
+            f"({np.size(angles)}, row, bin)"
+        )
+    if interpolation not in _ORDERS:
+        raise InputError(f"interpolation is {interpolation!r}, wanted linear or cubic")
+    views, order = _sorted(np.asarray(angles, np.float64)), _ORDERS[interpolation]
+    ways = _readings(views, scan, fan, stack.shape[-1])
+    seen = np.maximum(sum(weight for _, weight in ways), 1)
+    places = [(place, weight / seen) for place, weight in ways if weight.any()]
+    rows = stack[:, None] if stack.ndim == 2 else stack
+    out = np.empty((len(scan.angles), rows.shape[1], scan.bins), np.float32)
+    for row in range(rows.shape[1]):
+        out[:, row] = _resampled(rows[views.order, row], places, order)
+    return (out[:, 0] if stack.ndim == 2 else out), scan
+
+
+def covered_rays(
+    angles: Floats, bins: int, fan: FanBeam, *, whole: bool = True
+) -> tuple[Parallel, NDArray[np.bool_]]:
+    """The parallel scan to which a fan scan is resampled, and which of its rays are covered.
+
+    Args:
+        angles: the fan views' angles in radians.
+        bins: bins of the fan's detector.
+        fan: source and detector.
+        whole: only views with all of their rays.
+
+    Returns:
+        The geometry, and (angle, bin) whether a ray is covered.
+
+    Raises:
+        InputError: the views are fewer than two, or cover no parallel view.
+    """
+    views = _sorted(np.asarray(angles, np.float64))
+    gamma = fan.fan_angles(bins)
+    pitch = fan.pitch / fan.magnification
+    low, high = fan.source_to_axis * np.sin(gamma[[0, -1]]) / pitch
+    if views.turn:
+        # What one side does not reach, the other sees from behind.
+        low, high = -max(abs(low), abs(high)), max(abs(low), abs(high))
+    first, last = int(np.ceil(low - 1e-9)), int(np.floor(high + 1e-9))
+    # Half a turn, evenly divided: each direction once, about the middle of the views.
+    count = max(1, round(np.pi / views.step))
+    middle = (views.first + views.last) / 2 - gamma.mean()
+    directions = np.arange(count) * np.pi / count
+    if not views.turn:
+        directions += middle - directions.mean()
+    scan = Parallel(directions, last - first + 1, pitch, -first)
+    seen: NDArray[np.bool_] = np.any(
+        [weight > 0 for _, weight in _readings(views, scan, fan, bins)], axis=0
+    )
+    covered = seen.all(axis=1) if whole else seen.mean(axis=1) >= _LEAST_COVERED
+    if not covered.any():
+        raise InputError(
+            f"the views span {np.rad2deg(views.last - views.first):.3g} degrees, the fan "
+            f"{np.rad2deg(np.ptp(gamma)):.3g}: no parallel view is covered; the object has to be "
+            "looked at from more directions"
+        )
+    return Parallel(directions[covered], scan.bins, pitch, -first), seen[covered]
+
+
+def _sorted(angles: Floats) -> _Views:
+    if angles.ndim != 1 or angles.size < 2 or not np.isfinite(angles).all():
+        raise InputError("angles of a fan scan are wanted as two or more finite numbers, radians")
+    order = np.argsort(angles, kind="stable")
+    ascending = angles[order]
+    span, step = np.ptp(ascending), np.median(np.diff(ascending))
+    if not step > 0:
+        raise InputError("most views of the fan scan have one angle: is the array of angles right?")
+    if span < 2 * np.pi - _TURN_SLACK * step:
+        return _Views(ascending, order, False, float(ascending[0]), float(ascending[-1]))
+    once = ascending < ascending[0] + 2 * np.pi - step / 2
+    ascending, order = ascending[once], order[once]
+    border, first = min(_BORDER, ascending.size), float(ascending[0])
+    beyond = [ascending[-border:] - 2 * np.pi, ascending, ascending[:border] + 2 * np.pi]
+    order = np.concatenate([order[-border:], order, order[:border]])
+    return _Views(np.concatenate(beyond), order, True, first, first + 2 * np.pi)
+
+
+def _readings(
+    views: _Views, scan: Parallel, fan: FanBeam, bins: int
+) -> list[tuple[Floats, Floats]]:
+    """(view, bin) at which every parallel ray may be read, and 1 where there is such a reading.
+
+    A ray is read directly and from the opposite side, each in any turn.
+    """
+    gamma = np.arcsin(np.clip(scan.coordinates() / fan.source_to_axis, -1, 1))
+    theta = scan.angles[:, None]
+    slack = 0.0 if views.turn else _SLACK * views.step
+    ways = []
+    for ray, side in ((theta + gamma, gamma), (theta + np.pi - gamma, -gamma)):
+        bin = fan.center + fan.source_to_detector * np.tan(side) / fan.pitch
+        seen = (bin >= -_SLACK) & (bin <= bins - 1 + _SLACK)
+        for turns in (-1, 0, 1):
+            angle = ray + 2 * np.pi * turns
+            inside = seen & (angle >= views.first - slack)
+            inside &= angle < views.last if views.turn else angle <= views.last + slack
+            view = np.interp(angle, views.angles, np.arange(views.angles.size))
+            place = np.stack([view, np.broadcast_to(bin, view.shape)])
+            ways.append((place, inside.astype(np.float64)))
+    return ways
+
+
+def _resampled(sinogram: Stack, places: list[tuple[Floats, Floats]], order: int) -> Stack:
+    smooth = sinogram.astype(np.float64)
+    if order > 1:
+        for axis in (0, 1):
+            smooth = spline_filter1d(smooth, order, axis=axis, mode="mirror")
+    total = np.zeros(places[0][1].shape)
+    for place, weight in places:
+        used = weight > 0
+        values = map_coordinates(
+            smooth, place[:, used], order=order, mode="mirror", prefilter=False
+        )
+        total[used] += weight[used] * values
+    return total.astype(np.float32)

@@ -1,0 +1,152 @@
+"""Full turns with the rotation axis near one end of the detector, which sees nearly twice as far.
+
+Over a full turn every line is met twice, from opposite sides, at t and at -t. Where the detector
+reaches further on one side than on the other, lines near the axis are met twice and those beyond
+once. Weights w(t) that go smoothly from 0 to 1 across the part that is met twice, with
+``w(t) + w(-t) = 1``, count every line once (Wang, X-ray micro-CT with a displaced detector array,
+Medical Physics 29, 1634, 2002; for parallel rays without its cosine factors). Views and weights
+are then those of two half turns that look past each other, and filtered backprojection of the
+longer half, continued by zeros, is right to its far end.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import InputError
+from rift_cl.geometry import Parallel
+
+Floats = NDArray[np.float64]
+Stack = NDArray[np.float32]
+
+# An axis counts as offset where the shorter side is below this share of the longer.
+_OFFSET = 0.8
+# A full turn may lack as much of it as this many steps between views.
+_SLACK = 1.5
+# The least overlap at which an axis is looked for, in bins and as a share of the detector.
+_LEAST_BINS, _LEAST_SHARE = 8, 0.03
+# Bins over which differences are taken, so that noise does not decide.
+_SMOOTH = 2.0
+# Most pairs of opposite views that are compared.
+_PAIRS = 180
+
+
+def is_full_turn(angles: Floats) -> bool:
+    """Whether views go all round, so that every line is met from both sides."""
+    circle = np.sort(np.mod(angles, 2 * np.pi))
+    gaps = np.diff(circle, append=circle[0] + 2 * np.pi)
+    return angles.size > 2 and bool(gaps.max() <= _SLACK * 2 * np.pi / np.unique(circle).size)
+
+
+def is_offset(scan: Parallel) -> bool:
+    """Whether a full turn's axis lies so far from the detector's middle that it sees further."""
+    left, right = scan.center + 0.5, scan.bins - 0.5 - scan.center
+    short, long = min(left, right), max(left, right)
+    return is_full_turn(scan.angles) and 0 < short < _OFFSET * long
+
+
+def offset_weights(scan: Parallel) -> Floats:
+    """Weight of each bin of a full turn with an offset axis.
+
+    Returns:
+        (bins,) weights that add up to two for opposite bins, t and -t, that both exist, and are
+        two where only one does: a full turn's views count half, as each direction comes twice.
+
+    Raises:
+        InputError: the axis is not on the detector.
+    """
+    t = np.arange(scan.bins) - scan.center
+    short = min(scan.center, scan.bins - 1 - scan.center)
+    if not short > 0:
+        raise InputError(
+            f"the rotation axis is at bin {scan.center:g}, off a detector of {scan.bins} bins: "
+            "opposite views do not overlap"
+        )
+    away = t if scan.bins - 1 - scan.center > scan.center else -t
+    phase = np.clip(away / short, -1, 1)
+    weights: Floats = 1 + np.sin(np.pi / 2 * phase)
+    return weights
+
+
+def widened(projections: Stack, scan: Parallel) -> tuple[Stack, Parallel]:
+    """Weigh a full turn with an offset axis and continue its shorter side by zeros.
+
+    Args:
+        projections: line integrals, (angle, bin) or (angle, row, bin).
+        scan: its geometry.
+
+    Returns:
+        Projections as wide as twice the longer side, and their geometry.
+    """
+    left, right = scan.center, scan.bins - 1 - scan.center
+    missing = int(np.ceil(abs(right - left)))
+    before, after = (missing, 0) if right > left else (0, missing)
+    weighted = np.asarray(projections, np.float32) * offset_weights(scan).astype(np.float32)
+    margins = [(0, 0)] * (weighted.ndim - 1) + [(before, after)]
+    wide = Parallel(scan.angles, scan.bins + missing, scan.pitch, scan.center + before)
+    return np.pad(weighted, margins), wide
+
+
+def find_offset_center(sinogram: Stack, angles: Floats) -> tuple[float, float]:
+    """Look for the axis of a full turn anywhere on the detector, by mirrored opposite views.
+
+    The overlap of opposite views decides: slopes along the detector of each view are compared
+    with those of the opposite one, turned round, for every half bin as the axis.
+
+    Args:
+        sinogram: line integrals of one slice, (angle, bin).
+        angles: directions in radians; a full turn.
+
+    Returns:
+        The bin, and the correlation there, 1 at best.
+
+    Raises:
+        InputError: the views are no full turn, or the detector is too short.
+    """
+    bins = sinogram.shape[1]
+    least = max(_LEAST_BINS, round(_LEAST_SHARE * bins))
+    if not is_full_turn(angles) or bins < 2 * least:
+        raise InputError("the axis is looked for near a detector's end only in full turns")
+    views, opposite = _opposite(sinogram, angles)
+    centers = np.arange(least, 2 * (bins - 1) - least + 1) / 2
+    scores = np.array([_overlap_score(views, opposite, round(2 * center)) for center in centers])
+    best = int(scores.argmax())
+    return _peak(centers, scores, best), float(scores[best])
+
+
+def _opposite(sinogram: Stack, angles: Floats) -> tuple[Floats, Floats]:
+    """Slopes of some views, and of what is seen from the opposite side, interpolated."""
+    from scipy.ndimage import gaussian_filter1d
+
+    slopes = gaussian_filter1d(sinogram.astype(np.float64), _SMOOTH, axis=1, order=1)
+    order = np.argsort(np.mod(angles, 2 * np.pi))
+    circle, slopes = np.mod(angles, 2 * np.pi)[order], slopes[order]
+    chosen = np.unique(np.linspace(0, len(circle) - 1, min(_PAIRS, len(circle))).astype(int))
+    wanted = np.mod(circle[chosen] + np.pi, 2 * np.pi)
+    after = np.searchsorted(circle, wanted)
+    before, after = (after - 1) % circle.size, after % circle.size
+    gap = np.mod(circle[after] - circle[before], 2 * np.pi)
+    share = np.divide(
+        np.mod(wanted - circle[before], 2 * np.pi), gap, out=np.zeros(gap.size), where=gap > 0
+    )
+    share = np.clip(share, 0, 1)[:, None]
+    return slopes[chosen], (1 - share) * slopes[before] + share * slopes[after]
+
+
+def _overlap_score(views: Floats, opposite: Floats, turn: int) -> float:
+    last = views.shape[1] - 1
+    bins = np.arange(max(0, turn - last), min(last, turn) + 1)
+    one, other = views[:, bins], -opposite[:, turn - bins]
+    scale = np.linalg.norm(one) * np.linalg.norm(other)
+    return float((one * other).sum() / scale) if scale > 0 else 0.0
+
+
+def _peak(centers: Floats, scores: Floats, best: int) -> float:
+    """The top of a parabola through the best score and its neighbours."""
+    if not 0 < best < scores.size - 1:
+        return float(centers[best])
+    left, top, right = scores[best - 1 : best + 2]
+    bend = left - 2 * top + right
+    shift = 0.5 * (left - right) / bend if bend < 0 else 0.0
+    return float(centers[best] + 0.5 * np.clip(shift, -1, 1))

@@ -1,0 +1,73 @@
+"""Projections of an object that is wider than the detector, continued beyond its ends.
+
+A filter along the detector takes a projection that ends abruptly for an edge of the object: the
+slice grows bright towards the border of the field of view. Continued by its last value, which
+falls off smoothly to zero, the projection has no such edge (Ohnesorge et al., Efficient
+correction for CT image artifacts caused by objects extending outside the scan field of view,
+Medical Physics 27, 39, 2000, from which it differs by the plainer continuation). What lies beyond
+stays unknown, so that the level inside is right only up to a slow change.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import InputError
+from rift_cl.geometry import Parallel
+
+Stack = NDArray[np.float32]
+
+# Bins at each end whose mean is the value that is continued, as a share of the detector.
+_END = 0.01
+# Ends above this share of the strongest line integrals mean that the object goes on.
+_TRUNCATED = 0.05
+_STRONG = 99.0
+
+
+def is_truncated(projections: Stack) -> bool:
+    """Whether most views end above zero on one side, as those of too wide an object do.
+
+    Args:
+        projections: line integrals, (angle, bin) or (angle, row, bin), air at 0.
+    """
+    strong = float(np.percentile(projections, _STRONG))
+    ends = [np.median(end) for end in _ends(projections)]
+    return strong > 0 and float(max(ends)) > _TRUNCATED * strong
+
+
+def extended(
+    projections: Stack, scan: Parallel, *, bins: int | None = None
+) -> tuple[Stack, Parallel]:
+    """Continue every view on both sides by its last value, which falls off to zero.
+
+    Args:
+        projections: line integrals, (angle, bin) or (angle, row, bin).
+        scan: their geometry.
+        bins: added on each side; the detector's own width if not given.
+
+    Returns:
+        The longer projections and their geometry; the rotation axis stays where it is.
+
+    Raises:
+        InputError: ``bins`` is negative.
+    """
+    stack = np.asarray(projections, np.float32)
+    added = stack.shape[-1] if bins is None else bins
+    if added < 0:
+        raise InputError(f"bins is {added}, wanted 0 or more to add on each side")
+    if added == 0:
+        return stack, scan
+    # 1 next to the detector, 0 at the far end, level at both.
+    fall = (0.5 + 0.5 * np.cos(np.pi * (np.arange(added) + 0.5) / added)).astype(np.float32)
+    left, right = (end[..., None] for end in _ends(stack))
+    longer = np.concatenate([left * fall[::-1], stack, right * fall], axis=-1)
+    wide = Parallel(scan.angles, scan.bins + 2 * added, scan.pitch, scan.center + added)
+    return longer, wide
+
+
+def _ends(projections: Stack) -> tuple[Stack, Stack]:
+    count = max(1, round(_END * projections.shape[-1]))
+    first: Stack = projections[..., :count].mean(axis=-1, dtype=np.float64).astype(np.float32)
+    last: Stack = projections[..., -count:].mean(axis=-1, dtype=np.float64).astype(np.float32)
+    return first, last

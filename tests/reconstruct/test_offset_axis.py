@@ -1,0 +1,86 @@
+"""A full turn with the axis near one end of the detector: every line counts once."""
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.errors import InputError
+from rift_cl.metrics import psnr
+from rift_cl.reconstruct.offset_axis import (
+    find_offset_center,
+    is_full_turn,
+    is_offset,
+    offset_weights,
+    widened,
+)
+
+SIZE, BINS, VIEWS, CENTER = 160, 92, 480, 11.3
+ANGLES = np.arange(VIEWS) * 2 * np.pi / VIEWS
+GRID = rift.Grid((SIZE, SIZE))
+
+
+def half_sinogram(center, bins=BINS, angles=ANGLES):
+    scan = rift.Parallel(angles, bins, center=center)
+    return rift.phantom.shepp_logan_sinogram(GRID, scan).astype(np.float32), scan
+
+
+@pytest.mark.parametrize("center", [0.5, 7.0, 11.3, BINS - 9.6])
+def test_weights_of_a_line_and_its_opposite_add_up(center):
+    scan = rift.Parallel(ANGLES, BINS, center=center)
+    weights, t = offset_weights(scan), np.arange(BINS) - center
+    short = min(center, BINS - 1 - center)
+    opposite = np.interp(-t, t, weights, left=0, right=0)
+    inside = np.abs(t) <= short
+    if center % 0.5 == 0:  # there, opposite bins are bins
+        np.testing.assert_allclose((weights + opposite)[inside], 2)
+    once = np.abs(t) > short
+    assert np.all(np.isclose(weights[once], 2))
+
+
+@pytest.mark.parametrize("center", [CENTER, BINS - 1 - CENTER])
+def test_the_slice_is_that_of_a_detector_twice_as_wide(center):
+    truth = rift.phantom.shepp_logan(GRID)
+    sinogram, scan = half_sinogram(center)
+    joined, wide = widened(sinogram, scan)
+    image = rift.fbp(rift.Projector(GRID, wide), joined)
+    naive = rift.fbp(rift.Projector(GRID, scan), sinogram)
+    whole, scan = half_sinogram(80.0, 161, ANGLES[: VIEWS // 2])
+    best = psnr(rift.fbp(rift.Projector(GRID, scan), whole), truth)
+    assert psnr(image, truth) > best - 0.7
+    assert psnr(naive, truth) < best - 8
+
+
+def test_only_full_turns_with_an_axis_off_the_middle_are_offset():
+    half = ANGLES[: VIEWS // 2]
+    assert is_offset(rift.Parallel(ANGLES, BINS, center=CENTER))
+    assert not is_offset(rift.Parallel(half, BINS, center=CENTER))
+    assert not is_offset(rift.Parallel(ANGLES, BINS))
+    assert not is_offset(rift.Parallel(ANGLES, BINS, center=-3))
+    assert is_full_turn(np.append(ANGLES, 2 * np.pi))
+    assert is_full_turn(np.random.default_rng(0).permutation(ANGLES))
+    assert not is_full_turn(half)
+
+
+@pytest.mark.parametrize("center", [6.0, CENTER, 30.25, BINS - 8.4])
+@pytest.mark.parametrize("noise", [0, 0.02])
+def test_the_axis_is_found_near_an_end(center, noise):
+    sinogram, _ = half_sinogram(center)
+    noisy = sinogram + np.random.default_rng(2).normal(0, noise * sinogram.max(), sinogram.shape)
+    found, score = find_offset_center(noisy.astype(np.float32), ANGLES)
+    assert found == pytest.approx(center, abs=0.25)
+    assert 0 < score <= 1
+
+
+def test_an_odd_number_of_views_has_opposites_too():
+    angles = np.arange(241) * 2 * np.pi / 241
+    sinogram, _ = half_sinogram(CENTER, angles=angles)
+    assert find_offset_center(sinogram, angles)[0] == pytest.approx(CENTER, abs=0.25)
+
+
+def test_half_turns_and_axes_off_the_detector_are_told():
+    sinogram, scan = half_sinogram(CENTER)
+    with pytest.raises(InputError, match="full turns"):
+        find_offset_center(sinogram[: VIEWS // 2], ANGLES[: VIEWS // 2])
+    with pytest.raises(InputError, match="overlap"):
+        offset_weights(rift.Parallel(ANGLES, BINS, center=-4))
+    assert scan.bins == BINS
