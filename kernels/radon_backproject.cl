@@ -1,6 +1,8 @@
 /* Phase tables to image rows (see include/phase_table.h): the inner loop of backprojection.
  *
- *     plane[slice][i][j] += sum over views of (1-w) F[r][m+j] + w F[r+1][m+j].
+ *     plane[slice][i][j] = before + sum over views of (1-w) F[r][m+j] + w F[r+1][m+j],
+ *
+ * before = plane[slice][i][j] if `add` is set, else 0.
  *
  * Index space: (segments of columns, runs of ROWS rows, slices). Each item owns ROWS x SEGMENT
  * pixels and keeps a row's SEGMENT sums in registers; views are taken VIEWS at a time, so that
@@ -13,15 +15,16 @@
 #include "include/phase_table.h"
 
 #ifndef ROWS
-#define ROWS (LANES == 8 ? 16 : 1)
+#define ROWS (LANES == 8 ? 64 : 1)
 #endif
 #ifndef VIEWS
-#define VIEWS 16
+#define VIEWS 8
 #endif
 
 KERNEL void radon_backproject(
     __global const real *restrict table, __global real *restrict plane,
-    __global const long4 *restrict geometry, int first, int count, int columns, int rows, int width)
+    __global const long4 *restrict geometry, int first, int count, int columns, int rows, int width,
+    int add)
 {
   const int j = (int)get_global_id(0) * SEGMENT;
   const int row0 = (int)get_global_id(1) * ROWS;
@@ -33,7 +36,11 @@ KERNEL void radon_backproject(
     for (int i = row0; i < row1; i++) {
       __global real *pixels = plane + ((long)slice * rows + i) * width + j;
       lanes sum[BLOCKS];
-      UNROLL for (int n = 0; n < BLOCKS; n++) sum[n] = LOAD(pixels + n * LANES);
+      if (add || view0 > 0) {
+        UNROLL for (int n = 0; n < BLOCKS; n++) sum[n] = LOAD(pixels + n * LANES);
+      } else {
+        UNROLL for (int n = 0; n < BLOCKS; n++) sum[n] = 0;
+      }
       for (int view = view0; view < view1; view++) {
         const long position = geometry[first + view].x + i * geometry[first + view].y;
         const int r = phase_of(position);

@@ -26,6 +26,8 @@ from rift_cl.operators.phase_table import LOG2_PHASES, PhaseTable, phase_table
 # Tables of a run of views together: on a CPU they should stay in its caches.
 _TABLE_BYTES = {"cpu": 4 << 20, "gpu": 64 << 20}
 _FEWEST_VIEWS = 16
+# A CPU reads tables the more often from its cache the more rows it takes in a run.
+_ROW_RUNS, _ITEMS_PER_UNIT = (64, 32, 16), 8
 # Slices that are worked on together, which bounds the scratch memory of any volume.
 _SLAB = 16
 
@@ -137,8 +139,9 @@ class Projector(LinearOperator):
 
     def _backproject(self, walk: _Walk, y: Any, slab: _Slab) -> Any:
         table = walk.table
-        plane = self.device.zeros((slab.slices, table.rows, table.padded), self.dtype)
-        rows = 16 if self.device.traits.is_cpu else 1
+        shape = (slab.slices, table.rows, table.padded)
+        plane = (self.device.empty if walk.count else self.device.zeros)(shape, self.dtype)
+        rows = self._row_run(slab.slices, table)
         for first, count in self._runs(walk, slab):
             entries = self.device.empty((slab.slices, count, table.entries), self.dtype)
             self.device.launch(
@@ -152,11 +155,20 @@ class Projector(LinearOperator):
                 "radon_backproject",
                 (table.padded // self._segment, -(-table.rows // rows), slab.slices),
                 *(entries, plane, walk.geometry),
-                *(first, count, table.columns, table.rows, table.padded),
+                *(first, count, table.columns, table.rows, table.padded, int(first > 0)),
                 ROWS=rows,
                 **self._macros,
             )
         return plane
+
+    def _row_run(self, slices: int, table: PhaseTable) -> int:
+        """Rows that one work-item backprojects onto: many, but work for every compute unit."""
+        traits = self.device.traits
+        if not traits.is_cpu:
+            return 1
+        runs = table.padded // self._segment * slices
+        wanted = -(-_ITEMS_PER_UNIT * traits.compute_units // runs)
+        return next((n for n in _ROW_RUNS if n * wanted <= table.rows), _ROW_RUNS[-1])
 
     def _tiles(self, width: int, rows: int) -> tuple[int, int]:
         tile = 16 if self.device.traits.is_cpu else 1
