@@ -29,7 +29,9 @@ KERNEL void tv_dual_step(
       v[k] = u[k * p.size + p.at] + steps[a] * difference(image, &p, a);
       square += v[k] * v[k];
     }
-    const real norm = sqrt(square), share = norm > radius ? radius / norm : 1;
+    /* 1 inside the ball, where the ratio is more, or not a number of two zeros; not a choice whether
+     * to divide, which would be mispredicted on noise. */
+    const real ratio = radius / sqrt(square), share = ratio < 1 ? ratio : 1;
     UNROLL for (int k = 0; k < AXES; k++) moved[k * p.size + p.at] = share * v[k];
   }
 }

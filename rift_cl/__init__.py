@@ -24,7 +24,15 @@ if TYPE_CHECKING:
     from rift_cl.errors import RiftError
     from rift_cl.geometry import Camera, FanBeam, Grid, Parallel
     from rift_cl.io import SplatScene
-    from rift_cl.operators import HighPass, LinearOperator, Projector, Ramp, Response, dot_test
+    from rift_cl.operators import (
+        FastProjector,
+        HighPass,
+        LinearOperator,
+        Projector,
+        Ramp,
+        Response,
+        dot_test,
+    )
     from rift_cl.reconstruct import backproject, cgls, fbp, sirt, tv
     from rift_cl.splat import Renderer, Splats, SplatSettings
 
@@ -32,6 +40,7 @@ _HOMES = {
     "Camera": "geometry",
     "Device": "cl",
     "FanBeam": "geometry",
+    "FastProjector": "operators",
     "Grid": "geometry",
     "HighPass": "operators",
     "LinearOperator": "operators",
@@ -60,6 +69,7 @@ __all__ = [
     "Camera",
     "Device",
     "FanBeam",
+    "FastProjector",
     "Grid",
     "HighPass",
     "LinearOperator",

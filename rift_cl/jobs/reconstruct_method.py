@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
-from rift_cl.geometry import Grid, Parallel
+from rift_cl.geometry import Grid
 from rift_cl.jobs.reconstruct_input import SliceInput, demand_window
 from rift_cl.jobs.reconstruct_settings import ReconstructSettings
-from rift_cl.operators import Projector
+from rift_cl.operators import FastProjector, Projector
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp
 from rift_cl.reconstruct.seen_rays import SeenRays
@@ -28,8 +28,6 @@ Floats = NDArray[np.float32]
 # Images and sinograms, float32, that a slice needs on host and device at a time: a formula's are
 # counts, line integrals, two temporaries and the filtered ones; a method's are its state as well.
 _ARRAYS = {"fbp": (2, 6), "backproject": (2, 6), "sirt": (5, 9), "cgls": (5, 10), "tv": (16, 10)}
-
-
 # Slices between two reports of progress; of those that take steps, each of which is reported.
 _SLAB, _ITERATIVE_SLAB = 16, 4
 # Steps that are timed, after a first one that builds the kernels.
@@ -105,7 +103,7 @@ class Inversion:
     source: SliceInput
     device: Device
     residuals: dict[int, list[float]] = field(default_factory=dict)
-    _projectors: dict[int, Projector] = field(default_factory=dict)
+    _projectors: dict[int, Projector | FastProjector] = field(default_factory=dict)
 
     @property
     def window(self) -> Window:
@@ -121,7 +119,7 @@ class Inversion:
         views = max(views, self.source.scan.shape[0])
         return 4 * (images * int(np.prod(A.grid.shape[-2:])) + sinograms * views * bins)
 
-    def projector(self, slices: int) -> Projector:
+    def projector(self, slices: int) -> Projector | FastProjector:
         """The projector of so many slices, kept for the next slab of the same size."""
         count = 0 if self.settings.iterative else slices
         if count not in self._projectors:
@@ -201,7 +199,7 @@ class Inversion:
     def _solver(self, sinogram: Floats) -> Solver:
         settings = self.settings
         whole, seen = self.projector(1), self.source.seen
-        A: Projector | SeenRays = whole if seen is None else SeenRays(whole, seen)
+        A: Projector | FastProjector | SeenRays = whole if seen is None else SeenRays(whole, seen)
         precondition, noise = settings.precondition, settings.noise
         if settings.method == "cgls":
             return Cgls(A, sinogram, precondition=precondition, noise=noise)
@@ -215,13 +213,15 @@ class Inversion:
             A, sinogram, weight, nonnegative=nonnegative, precondition=precondition, noise=noise
         )
 
-    def _projector(self, slices: int) -> Projector:
-        footprint = self.settings.footprint
-        if not self.settings.iterative:
-            scan: Parallel = self.source.formula_geometry()
-            return Projector(self.window.grid(slices), scan, footprint, device=self.device)
-        grid, _ = self.window.around(self._width())
-        return Projector(grid, self.source.geometry, footprint, device=self.device)
+    def _projector(self, slices: int) -> Projector | FastProjector:
+        settings, device = self.settings, self.device
+        if settings.iterative:
+            grid, scan = self.window.around(self._width())[0], self.source.geometry
+        else:
+            grid, scan = self.window.grid(slices), self.source.formula_geometry()
+        if settings.error is not None:
+            return FastProjector(grid, scan, settings.error, device=device)
+        return Projector(grid, scan, settings.footprint, device=device)
 
     def _width(self) -> float:
         """What the rays meet: twice the way from the axis to the farther end of the detector."""

@@ -58,6 +58,9 @@ class ReconstructSettings(ScanInput):
     """fbp: how views count that are unevenly spaced; as evenly spaced ones if not given."""
     footprint: Literal["linear", "joseph", "strip"] = "linear"
     """How a pixel is spread over the bins."""
+    error: float | None = None
+    """Relative error, such as 1e-3, that projections and backprojections may have; if given, they
+    go through the Fourier transform, which is several times faster for large slices."""
     steps: int | None = None
     """sirt, cgls, tv: most steps for a slice; 100, 30 (with
     --precondition 4), 200 if not given."""
@@ -127,6 +130,8 @@ class ReconstructSettings(ScanInput):
             value = getattr(self, name)
             if value is not None and not 0 < value < float("inf"):
                 raise InputError(f"--{name} is {value:g}, wanted a positive number")
+        if self.error is not None and self.footprint != "linear":
+            raise InputError(f"--error goes with --footprint linear, not with {self.footprint}")
         if self.resume and self.overwrite:
             raise InputError("--resume goes on with what --overwrite throws away: give one of them")
 

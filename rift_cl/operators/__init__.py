@@ -3,6 +3,7 @@
 from rift_cl.operators.adjoint_check import dot_test
 from rift_cl.operators.compensation import COMPENSATIONS, Compensation
 from rift_cl.operators.compensation_3d import central_planes, radial_lines
+from rift_cl.operators.fast_projector import FastProjector
 from rift_cl.operators.filters import Filter, HighPass, Ramp, Response, ViewFilter, as_filter
 from rift_cl.operators.footprint import FOOTPRINTS
 from rift_cl.operators.linear import LinearOperator
@@ -12,6 +13,7 @@ __all__ = [
     "COMPENSATIONS",
     "FOOTPRINTS",
     "Compensation",
+    "FastProjector",
     "Filter",
     "HighPass",
     "LinearOperator",

@@ -14,7 +14,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates, spline_filter1d
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
@@ -186,6 +185,8 @@ def _readings(
 
 
 def _resampled(sinogram: Stack, places: list[tuple[Floats, Floats]], order: int) -> Stack:
+    from scipy.ndimage import map_coordinates, spline_filter1d
+
     smooth = sinogram.astype(np.float64)
     if order > 1:
         for axis in (0, 1):

@@ -33,8 +33,8 @@ FilterLike = str | Filter | Callable[[Floats], ArrayLike]
 class ParallelProjector(Protocol):
     """What an operator from images to sinograms must have to be inverted here.
 
-    ``Projector`` is one. Members are those of ``LinearOperator``, with the geometry, and with
-    ``pieces``, which cuts the work into slices that fit a budget.
+    ``Projector`` and ``FastProjector`` are. Members are those of ``LinearOperator``, with the
+    geometry, and with ``pieces``, which cuts the work into slices that fit a budget.
     """
 
     grid: Grid

@@ -22,7 +22,6 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, median_filter, uniform_filter1d
 
 from rift_cl.errors import ShapeError
 
@@ -81,6 +80,8 @@ def _without_stripes(sinogram: Floats) -> Floats:
 
 def _fill_dead(sinogram: Floats) -> None:
     """Interpolate bins that follow no view, or jump from view to view."""
+    from scipy.ndimage import uniform_filter1d
+
     smooth = uniform_filter1d(sinogram, min(_VIEWS, len(sinogram)), axis=0, mode="nearest")
     rough = np.abs(sinogram - smooth).mean(axis=0, dtype=np.float64)
     usual = np.maximum(_median(rough, _odd(_WINDOW, rough.size)), 1e-3 * rough.mean())
@@ -131,6 +132,8 @@ def _interpolate(columns: Floats, bad: Mask) -> None:
 
 def _narrow(bad: Mask) -> Mask:
     """Bad bins and their neighbours, less runs too wide for a stripe and those at the border."""
+    from scipy.ndimage import binary_dilation
+
     wide: Mask = binary_dilation(bad)
     edges = np.flatnonzero(np.diff(np.pad(wide, 1).astype(np.int8)))
     for start, stop in edges.reshape(-1, 2):
@@ -174,6 +177,8 @@ def _outliers(values: Profile) -> Mask:
 
 
 def _median(values: NDArray[Value], window: int) -> NDArray[Value]:
+    from scipy.ndimage import median_filter
+
     smooth: NDArray[Value] = median_filter(values, window, mode="reflect")
     return smooth
 

@@ -53,6 +53,8 @@ def half(tmp_path_factory):
     [
         ("--method", "fbp", "--compensate", "capped-voronoi"),
         ("--method", "fbp", "--footprint", "strip"),
+        ("--method", "fbp", "--error", 1e-3),
+        ("--method", "cgls", "--steps", 8, "--error", 1e-3),
         ("--method", "sirt", "--steps", 40, "--nonnegative"),
         ("--method", "cgls", "--steps", 8, "--footprint", "joseph"),
         ("--method", "cgls", "--steps", 2, "--precondition", "ramp"),

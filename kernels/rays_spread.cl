@@ -1,0 +1,97 @@
+/* Rays to the regular grid of frequencies: backprojection's inner loop (see include/fourier_rays.h).
+ *
+ *     grid[y][x] = sum over samples of phi(x - px) phi(y - py) ray[l],      p = l * step,
+ *
+ * over both halves of every ray; the half that is not stored is the conjugate of the other. Of the
+ * grid, the half x >= 0 is made, in tiles. A work-item gathers what falls on its tile: `starts` says
+ * which visits are the tile's. A visit is the tile at one of the places where the periodic grid
+ * repeats it, and the rays that cross it there, `count` of them from `first` on in the order of
+ * their angle. No two items write the same cell: no atomics, and one order of summation.
+ *
+ * Index space: tiles. A CPU sums in an array of its own, whose rows have room for a kernel that
+ * overhangs the tile. */
+
+#include "include/portable.h"
+#include "include/fourier_rays.h"
+
+#ifndef TILE
+#define TILE (LANES == 8 ? 32 : 4)
+#endif
+#if LANES == 8
+#define OVERHANG TABLE_PITCH
+#define ADD(p, v) { lane_sum *sum_at = (lane_sum *)(p); *sum_at = *sum_at + (v); }
+typedef float8 lane_sum __attribute__((aligned(4)));
+#define INSIDE(x) 1
+#else
+#define OVERHANG 0
+#define ADD(p, v) *(p) += (v);
+#define INSIDE(x) ((uint)(x) < TILE)
+#endif
+#define ACROSS (TILE + 2 * OVERHANG)
+#define CELLS (ACROSS * ACROSS)
+
+KERNEL void rays_spread(
+    __global const float *restrict rays, __global float *restrict grid,
+    __global const float *restrict table, __global const long2 *restrict steps,
+    __global const float2 *restrict inverses, __global const int4 *restrict visits,
+    __global const int *restrict starts, int count, int samples,
+    int tiles, int across, int rows, int columns)
+{
+  const int tile = (int)get_global_id(0);
+  if (tile >= tiles) return;
+  float re[CELLS], im[CELLS];
+  for (int n = 0; n < CELLS; n++) re[n] = im[n] = 0;
+  for (int v = starts[tile]; v < starts[tile + 1]; v++) {
+    const int4 visit = visits[v];
+    const float low_x = visit.x - 0.5f * WIDTH, high_x = low_x + (TILE + WIDTH);
+    const float low_y = visit.y - 0.5f * WIDTH, high_y = low_y + (TILE + WIDTH);
+    for (int n = visit.z; n < visit.z + visit.w; n++) {
+      const int ray = n < count ? n : n - count;
+      /* Where the ray enters the tile and where it leaves it, on either axis, and a sample more. */
+      const float2 inverse = inverses[ray];
+      const float ax = low_x * inverse.x, bx = high_x * inverse.x;
+      const float ay = low_y * inverse.y, by = high_y * inverse.y;
+      const float near_y = ay < by ? ay : by, far_y = ay < by ? by : ay;
+      float enter = ax > near_y ? ax : near_y, leave = bx < far_y ? bx : far_y;
+      if (enter < (float)-samples) enter = (float)-samples;
+      if (leave > (float)samples) leave = (float)samples;
+      if (enter > leave) continue;
+      int l = (int)enter - 1, last = (int)leave + 1;
+      if (l <= -samples) l = 1 - samples;
+      if (last >= samples) last = samples - 1;
+      const long step_x = steps[ray].x, step_y = steps[ray].y;
+      long px = l * step_x - ((long)visit.x << 32), py = l * step_y - ((long)visit.y << 32);
+      __global const float *values = rays + (long)ray * samples;
+      for (; l <= last; l++, px += step_x, py += step_y) {
+        const int x = first_cell(px), y = first_cell(py);
+        if (x <= -WIDTH || x >= TILE || y <= -WIDTH || y >= TILE) continue;
+        const int m = l < 0 ? -l : l;
+        const float qr = values[m], qi = values[(long)count * samples + m];
+        const float pr = qr, pi = l < 0 ? -qi : qi;
+        lane_array down[TABLE_PITCH / LANES];
+        const uint fraction_x = offset_of(px), fraction_y = offset_of(py);
+        UNROLL for (int k = 0; k < TABLE_PITCH; k += LANES)
+          down[k / LANES].vector = weights_at(table, fraction_y, k);
+        UNROLL for (int k = 0; k < WIDTH; k += LANES) {
+          if (!INSIDE(x + k)) continue;
+          const lanes w = weights_at(table, fraction_x, k), wr = pr * w, wi = pi * w;
+          UNROLL for (int r = 0; r < WIDTH; r++) {
+            if (!INSIDE(y + r)) continue;
+            const int at = (OVERHANG + y + r) * ACROSS + OVERHANG + x + k;
+            const float d = down[r / LANES].number[r % LANES];
+            ADD(re + at, d * wr)
+            ADD(im + at, d * wi)
+          }
+        }
+      }
+    }
+  }
+  const int x0 = tile % across * TILE, y0 = tile / across * TILE;
+  for (int r = 0; r < TILE && y0 + r < rows; r++) {
+    __global float *out = grid + (long)(y0 + r) * columns + MARGIN + x0;
+    for (int k = 0; k < TILE && MARGIN + x0 + k < columns; k++) {
+      out[k] = re[(OVERHANG + r) * ACROSS + OVERHANG + k];
+      out[(long)rows * columns + k] = im[(OVERHANG + r) * ACROSS + OVERHANG + k];
+    }
+  }
+}

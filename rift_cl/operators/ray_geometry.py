@@ -1,0 +1,162 @@
+"""Where the views of a parallel scan lie in the image's spectrum: rays, and what crosses a tile.
+
+By the Fourier slice theorem sample l of a view's transform is the image's spectrum at
+``l / (length pitch)`` cycles per unit of length in the view's direction. Counted in cells of the
+padded image's spectrum that is ``l * step``. Rays are reflected to point to the right, since a real
+image's spectrum is its own conjugate there, and stand in the order of their angle.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import InputError
+from rift_cl.geometry import Grid, Parallel
+from rift_cl.operators.gridding import fast_lengths
+
+# Bins on either side of the image's shadow that are read as well, besides the hat's own width.
+_BESIDE = 8
+_STEP = 16
+# A view that begins further from the detector than this, in bins, misses it as well from here.
+_FAR = float(1 << 29)
+_FINEST = 64
+# Reciprocals of steps that are next to nothing.
+_LARGEST_INVERSE = 1e9
+_ANGLE_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Rays:
+    """The rays of a scan in the order of their angle.
+
+    Args:
+        order: which view each is, (n,) int32.
+        starts: bin in the first row of its transform, (n,) int32.
+        turns: by how much sample l is turned, in 2^-32 turns for each l, (n,) uint32.
+        half_shadows: half-width of a pixel's shadow in bins, over 2 length, (n,) float64.
+        signs: -1 for rays that were reflected, (n,) float64.
+        directions: cells along (x, y) for each cycle per ``length`` bins, times the edges, (n, 2).
+        window: bins that the image's shadow can reach.
+        length: samples of a transform.
+    """
+
+    order: NDArray[np.int32]
+    starts: NDArray[np.int32]
+    turns: NDArray[np.uint32]
+    half_shadows: NDArray[np.float64]
+    signs: NDArray[np.float64]
+    directions: NDArray[np.float64]
+    window: int
+    length: int
+
+
+def rays(grid: Grid, scan: Parallel) -> Rays:
+    """The rays of a scan of one slice.
+
+    Raises:
+        InputError: bins are too fine for this method.
+    """
+    (dy, dx), pitch = grid.spacing, scan.pitch
+    if pitch * _FINEST < min(dx, dy):
+        raise InputError(
+            f"pitch is {pitch:g}, samples are {grid.spacing} apart: FastProjector wants bins of at "
+            f"least 1/{_FINEST} of a sample; use Projector"
+        )
+    y, x = (grid.coordinates(axis) for axis in (0, 1))
+    middle_y, middle_x = float(y[len(y) // 2]), float(x[len(x) // 2])
+    radius = math.hypot(len(x) // 2 * dx, len(y) // 2 * dy) / pitch
+    cosine, sine = np.cos(scan.angles), np.sin(scan.angles)
+    shadows = np.maximum(1.0, np.maximum(np.abs(dx * cosine), np.abs(dy * sine)) / pitch)
+    reach = radius + float(shadows.max()) + _BESIDE
+    length = fast_lengths(math.ceil(2 * reach) + 1, _STEP)[0]
+    seen = scan.center + (middle_x * cosine + middle_y * sine) / pitch
+    starts = np.clip(np.ceil(seen - reach), -_FAR, _FAR)
+    turns = np.clip(seen - starts, 0, 2 * reach) / length
+    directions = np.stack([dx * cosine, dy * sine], axis=1) / (length * pitch)
+    signs = np.where((cosine < 0) | ((cosine == 0) & (sine < 0)), -1.0, 1.0)
+    directions *= signs[:, None]
+    order = np.argsort(np.arctan2(directions[:, 1], directions[:, 0]), kind="stable")
+    return Rays(
+        order=order.astype(np.int32),
+        starts=starts[order].astype(np.int32),
+        turns=(np.rint(turns[order] * 2.0**32).astype(np.int64) & 0xFFFFFFFF).astype(np.uint32),
+        half_shadows=shadows[order] / (2 * length),
+        signs=signs[order],
+        directions=directions[order],
+        window=math.floor(2 * reach) + 1,
+        length=length,
+    )
+
+
+def fixed_steps(found: Rays, edges: tuple[int, int]) -> NDArray[np.int64]:
+    """Cells along (x, y) from sample to sample, in 32.32 fixed point, (n, 2)."""
+    return np.rint(found.directions * (edges[1], edges[0]) * 2.0**32).astype(np.int64)
+
+
+def inverse_steps(steps: NDArray[np.int64]) -> NDArray[np.float32]:
+    """Samples from cell to cell along (x, y), (n, 2), large where there is next to no step."""
+    with np.errstate(divide="ignore"):
+        inverse = np.clip(2.0**32 / steps, -_LARGEST_INVERSE, _LARGEST_INVERSE)
+    return inverse.astype(np.float32)
+
+
+def tile_visits(
+    steps: NDArray[np.int64], samples: int, edges: tuple[int, int], width: int, tile: int
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Which rays may cross which tile of the stored half of the grid.
+
+    Args:
+        steps: of the rays, in the order of their angle, (n, 2).
+        samples: of a ray on either side of zero, zero included.
+        edges: of the grid along (y, x).
+        width: of the kernel, in cells.
+        tile: edge of a tile, in cells.
+
+    Returns:
+        Visits (x, y, first ray, rays), (v, 4), tile by tile, the tile's first cell being given
+        where the ray meets it; and where each tile's visits begin, (tiles + 1,).
+    """
+    (rows, edge), reach = edges, np.abs(steps).max(axis=0) * (samples - 1) / 2.0**32 + width
+    across, down = -(-(edge // 2 + 1) // tile), -(-rows // tile)
+    numbers = np.arange(across * down)
+    found = []
+    for turn_x in range(-math.ceil(reach[0] / edge) - 1, math.ceil(reach[0] / edge) + 1):
+        for turn_y in range(-math.ceil(reach[1] / rows) - 1, math.ceil(reach[1] / rows) + 1):
+            x = numbers % across * tile + turn_x * edge
+            y = numbers // across * tile + turn_y * rows
+            near = (x <= reach[0]) & (x + tile >= -reach[0])
+            near &= (y <= reach[1]) & (y + tile >= -reach[1])
+            found.append(np.stack([numbers, x, y], axis=1)[near])
+    places = np.concatenate(found)
+    places = places[np.argsort(places[:, 0], kind="stable")]
+    first, count = _crossing(steps, places[:, 1:], width, tile)
+    visits = np.concatenate([places[:, 1:], first[:, None], count[:, None]], axis=1)
+    starts = np.searchsorted(places[:, 0], np.arange(across * down + 1))
+    return visits[:, :].astype(np.int32), starts.astype(np.int32)
+
+
+def _crossing(
+    steps: NDArray[np.int64], corners: NDArray[np.int64], width: int, tile: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The rays, of all lines through zero, whose angles a tile and its surroundings span."""
+    angles = np.arctan2(steps[:, 1].astype(float), steps[:, 0].astype(float))
+    half = tile / 2 + width / 2
+    middle = corners + (tile - 1) / 2
+    turned = np.arctan2(middle[:, 1], middle[:, 0])
+    offsets = []
+    for along, up in ((-half, -half), (-half, half), (half, -half), (half, half)):
+        corner = np.arctan2(middle[:, 1] + up, middle[:, 0] + along)
+        offsets.append((corner - turned + np.pi) % (2 * np.pi) - np.pi)
+    low, high = np.min(offsets, axis=0), np.max(offsets, axis=0)
+    everything = (np.abs(middle) <= half).all(axis=1)
+    begin = turned + low
+    begin -= np.pi * np.floor((begin + np.pi / 2) / np.pi)
+    doubled = np.concatenate([angles, angles + np.pi, angles + 2 * np.pi])
+    first = np.searchsorted(doubled, begin - _ANGLE_ROUNDING)
+    last = np.searchsorted(doubled, begin + (high - low) + _ANGLE_ROUNDING, side="right")
+    count = np.where(everything, len(angles), np.minimum(last - first, len(angles)))
+    return np.where(everything, 0, first % len(angles)), count

@@ -1,0 +1,53 @@
+"""The device's copy of what the fast projector knows beforehand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rift_cl.cl.device import Device
+from rift_cl.operators.column_transform import ColumnTransform
+from rift_cl.operators.gridding import Gridding
+from rift_cl.operators.ray_geometry import Rays, fixed_steps, inverse_steps, tile_visits
+
+_TILE = {"cpu": 32, "gpu": 4}
+
+
+class RayTables:
+    """Rays, gridding kernel and tiles, on the device.
+
+    Args:
+        device: where to keep them.
+        rays: of the scan.
+        gridding: the kernel.
+        columns: that pairs of views are laid out in.
+        samples: of a ray.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        rays: Rays,
+        gridding: Gridding,
+        columns: int,
+        samples: int,
+    ) -> None:
+        self.tile = _TILE["cpu" if device.traits.is_cpu else "gpu"]
+        steps = fixed_steps(rays, gridding.edges)
+        visits, tiles = tile_visits(steps, samples, gridding.edges, gridding.width, self.tile)
+        self.order, self.starts = device.array(rays.order), device.array(rays.starts)
+        padding = (0, 2 * columns - len(rays.order))
+        factors = (rays.turns, rays.half_shadows, rays.signs)
+        self.factors = tuple(device.array(np.pad(factor, padding)) for factor in factors)
+        self.steps, self.inverses = device.array(steps), device.array(inverse_steps(steps))
+        self.visits, self.tiles = device.array(visits), device.array(tiles)
+        self.kernel = device.array(gridding.table())
+        self.views = ColumnTransform(device, rays.length)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the device that these take."""
+        arrays: list[Any] = [self.order, self.starts, *self.factors, self.steps, self.inverses]
+        arrays += [self.visits, self.tiles, self.kernel]
+        return sum(int(array.nbytes) for array in arrays) + self.views.nbytes
