@@ -10,7 +10,7 @@ shipped and not measured makes the run fail, so that none is forgotten.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,19 +21,22 @@ import rift_cl as rift
 from bench.case import Case
 from bench.command import report, say
 from bench.contender import Contender, RiftOnDevice, RiftOnHost
-from bench.costs import COSTS, Cost, check_known, check_measured
+from bench.costs import check_known, check_measured
+from bench.groups import KNOWN, groups
 from bench.limits import LimitMeter, Limits
-from bench.operations import Split, operations, split_record, splits
+from bench.operations import Split, split_record, splits
 from bench.peers import PEERS, ScikitImage
+from bench.projections import projection_tasks
 from bench.race import compared
 from bench.rasterizers import RASTERIZERS
-from bench.splats import SPLAT_COSTS, SplatCase
+from bench.splats import SplatCase
 from bench.surroundings import surroundings
 from bench.tables import markdown, tables
 from rift_cl.cl.source import kernel_names
 
 _SIZES = ("256x384", "512x768", "2048x1500")
 _QUICK_SIZES = ("256x384",)
+_GROUPS_AT, _QUICK_GROUPS_AT = "512x768", "128x192"
 # Splats, and pixels along a side.
 _SPLATS = ((10_000, 256), (10_000, 512), (100_000, 256), (100_000, 512))
 _QUICK_SPLATS = ((10_000, 256),)
@@ -55,6 +58,7 @@ class Options:
         quick: one size and few repeats.
         device: which OpenCL device, as RIFT_DEVICE selects it.
         sizes: PIXELSxVIEWS, any number of them.
+        groups: PIXELSxVIEWS at which filters, footprints, vectors and solvers are measured.
         splats: (splats, pixels along a side) of the scenes that are drawn.
         slices: slices of the stack that is measured beside each image; 1 for no stack.
         rounds: how often each measurement is repeated; by size when not given.
@@ -67,6 +71,7 @@ class Options:
     quick: bool = False
     device: str | None = None
     sizes: tuple[str, ...] = ()
+    groups: str | None = None
     splats: tuple[tuple[int, int], ...] = ()
     slices: int = 16
     rounds: int | None = None
@@ -80,10 +85,9 @@ class Measured:
     splits: list[Split]
     record: dict[str, Any]
 
-    def finished(self, limits: Limits, costs: Mapping[str, Cost] = COSTS) -> dict[str, Any]:
+    def finished(self, limits: Limits) -> dict[str, Any]:
         """The JSON record, shares of the limits included."""
-        records = [split_record(split, limits, costs) for split in self.splits]
-        return {**self.record, "splits": records}
+        return {**self.record, "splits": [split_record(split, limits) for split in self.splits]}
 
 
 def measure_all(options: Options) -> Iterator[dict[str, Any]]:
@@ -99,25 +103,25 @@ def measure_all(options: Options) -> Iterator[dict[str, Any]]:
     """
     sizes = options.sizes or (_QUICK_SIZES if options.quick else _SIZES)
     cases = [Case.parse(size) for size in sizes]
-    known = {**COSTS, **SPLAT_COSTS}
-    check_known(kernel_names(), known)
+    check_known(kernel_names(), KNOWN)
     device = rift.open_device(options.device)
     meter, skipped = LimitMeter(device), dict[str, str]()
     driven = [name for name in kernel_names() if _drives(name, device)]
-    drawn = _draw(meter, options)
+    drawn, grouped = _draw(meter, options), _measure_groups(meter, options)
     measured: list[Measured] = []
     for case in cases:
         measured += _measure(meter, case, options, skipped)
-        done = [split for found in (*measured, *drawn) for split in found.splits]
+        done = [split for found in (*measured, *drawn, *grouped) for split in found.splits]
         check_measured(driven, {name for split in done for name in split.kernels})
         yield {
             **surroundings(device),
             "seed": options.seed,
             "limits": {**asdict(meter.best()), "raw": [asdict(each) for each in meter.measured]},
-            "formulas": {name: known[name].formula for name in driven},
+            "formulas": {name: KNOWN[name].formula for name in driven},
             "skipped": skipped,
             "cases": [found.finished(meter.best()) for found in measured],
-            "splats": [found.finished(meter.best(), SPLAT_COSTS) for found in drawn],
+            "groups": [found.finished(meter.best()) for found in grouped],
+            "splats": [found.finished(meter.best()) for found in drawn],
         }
 
 
@@ -132,11 +136,22 @@ def _draw(meter: LimitMeter, options: Options) -> list[Measured]:
         case = SplatCase(count, size, meter.device)
         say(f"{case.name}: {', '.join(['kernels', *(kind.name for kind in kinds)])}")
         rounds = options.rounds or (2 if options.quick else 8)
-        kernel_splits = splits(meter, case, case.operations, repeats=rounds)
+        kernel_splits = splits(meter, case.tasks, repeats=rounds)
         lead = compared(
             kinds, meter.device, case, rounds=rounds, seed=options.seed, skipped=skipped
         )
         found.append(Measured(kernel_splits, {**case.record(), **lead, "left_out": dict(skipped)}))
+    return found
+
+
+def _measure_groups(meter: LimitMeter, options: Options) -> list[Measured]:
+    case = Case.parse(options.groups or (_QUICK_GROUPS_AT if options.quick else _GROUPS_AT))
+    rounds, found = options.rounds or (2 if options.quick else 5), []
+    for group in groups(meter.device, case):
+        say(group.name)
+        kernel_splits = splits(meter, group.tasks(), repeats=rounds)
+        sizes = {split.task.operation: split.task.case.record() for split in kernel_splits}
+        found.append(Measured(kernel_splits, {"name": group.name, "sizes": sizes}))
     return found
 
 
@@ -167,8 +182,7 @@ def _measure_one(
 ) -> Measured:
     say(f"{case.name}: kernels")
     rounds = options.rounds or (2 if options.quick else 5 if case.updates < 1e8 else 3)
-    runs = operations(meter.device, case)
-    kernel_splits = splits(meter, case, runs, repeats=rounds)
+    kernel_splits = splits(meter, projection_tasks(meter.device, case), repeats=rounds)
     say(f"{case.name}: {', '.join(kind.name for kind in kinds)}")
     once = len(kinds) > len(_OURS) and case.updates > _ONCE_UPDATES
     lead = compared(

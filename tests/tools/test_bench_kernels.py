@@ -19,7 +19,6 @@ import pytest
 import rift_cl as rift
 from rift_cl.cl.source import kernel_names
 from rift_cl.errors import InputError
-from rift_cl.operators.phase_table import PHASES, phase_table
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "tools" / "bench_kernels.py"
@@ -48,7 +47,8 @@ def bench(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bench")
     where = ("--json", folder / "bench.json", "--markdown", folder / "bench.md")
     done = run(
-        "--sizes", "32x24", "--slices", "2", "--rounds", "1", "--splats", "9000", "40", *where
+        *("--sizes", "32x24", "--groups", "32x24", "--slices", "2", "--rounds", "1"),
+        *("--splats", "9000", "40", *where),
     )
     assert done.returncode == 0, done.stderr
     assert sorted(path.name for path in folder.iterdir()) == ["bench.json", "bench.md"]
@@ -92,17 +92,19 @@ def test_every_kernel_has_positive_rates_in_every_case(bench):
             assert positive(kernel["multiply_add_share"]) or kernel["kernel"] == "plane_split"
     (scene,) = bench[0]["splats"]
     assert 0 < scene["lane_use"] <= 1
-    both = [kernel for case in (cases[0], scene) for kernel in kernels_of(case)]
+    tables = (cases[0], scene, *bench[0]["groups"])
+    found = [kernel for table in tables for kernel in kernels_of(table)]
     other = "_gpu" if rift.default_device().traits.is_cpu else "_cpu"
     driven = {name for name in kernel_names() if not name.endswith(other)}
-    assert {kernel["kernel"] for kernel in both} == driven
-    for kernel in both:
+    assert {kernel["kernel"] for kernel in found} == driven
+    for kernel in found:
         assert all(positive(kernel[key]) for key in ("min_s", "rate_per_s", "bytes_per_s"))
         assert kernel["min_s"] == pytest.approx(min(kernel["raw_s"]), abs=1e-6)
 
 
 def test_shares_of_an_operation_add_up(bench):
-    for split in bench[0]["cases"][0]["splits"]:
+    tables = (bench[0]["cases"][0], *bench[0]["groups"])
+    for split in [split for table in tables for split in table["splits"]]:
         shares = [kernel["share"] for kernel in split["kernels"]]
         assert sum(shares) + split["rest"]["share"] == pytest.approx(1)
 
@@ -151,23 +153,6 @@ def test_unknown_kernel_stops_the_run(tool, monkeypatch, tmp_path, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_kernel_that_nothing_launches_is_noticed(tool):
-    costs = tool("bench.costs")
-    costs.check_measured(["radon_project"], ["radon_project", "plane_split"])
-    with pytest.raises(costs.CoverageError, match="plane_split"):
-        costs.check_measured(["radon_project", "plane_split"], ["radon_project"])
-
-
-def test_counted_entries_are_those_of_the_tables(tool):
-    case = tool("bench.case").Case(96, 50)
-    used = 0
-    for along_x in (True, False):
-        table = phase_table(case.plane, case.scan, along_x=along_x, segment=1)
-        # The table rounds up to whole columns and adds two for the overhang.
-        used += PHASES * int(np.sum(table.views[:, 1] - 2))
-    assert tool("bench.costs").entries(case) == pytest.approx(used, rel=0.01)
-
-
 @pytest.mark.parametrize("slices", [1, 3])
 def test_inputs_may_be_written_to(tool, slices):
     # scikit-image refuses read-only images, and would be reported as a peer that failed.
@@ -176,16 +161,25 @@ def test_inputs_may_be_written_to(tool, slices):
     assert case.image.shape == case.grid.shape
 
 
-def test_scikit_image_takes_part(tool):
+@pytest.mark.parametrize("name", ["ScikitImage", "RiftAsScikitImage"])
+def test_scikit_image_takes_part_and_so_do_we_in_its_place(tool, name):
     peers, race, case = tool("bench.peers"), tool("bench.race"), tool("bench.case").Case(32, 24)
     skipped: dict[str, str] = {}
-    lined = race.line_up([peers.ScikitImage], rift.default_device(), case, skipped)
+    lined = race.line_up([getattr(peers, name)], rift.default_device(), case, skipped)
     (entry,) = race.race(lined, rounds=1, warm_up=False, skipped=skipped)
     accuracy = race.race_record(entry, seed=0)["accuracy"]
     assert skipped == {}
     assert accuracy["fbp_psnr_db"] > 18
     assert accuracy["forward_error"] < 0.15
     assert accuracy["adjoint_mismatch"] < 0.1
+
+
+def test_ours_in_place_of_another_is_left_out_where_that_is_not_installed(tool, monkeypatch):
+    peers, race, case = tool("bench.peers"), tool("bench.race"), tool("bench.case").Case(16, 4)
+    monkeypatch.setattr(peers, "find_spec", lambda name: None)
+    skipped: dict[str, str] = {}
+    assert race.line_up([peers.RiftAsScikitImage], rift.default_device(), case, skipped) == []
+    assert "not installed" in skipped["rift_cl, as scikit-image"]
 
 
 def test_launches_are_recorded_and_the_device_is_left_as_it_was(tool):

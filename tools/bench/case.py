@@ -26,11 +26,15 @@ class Case:
         n: pixels along a side.
         views: number of views, over half a turn.
         slices: slices in the stack; 1 is a single image of shape (n, n).
+        footprint: what a pixel leaves on the detector.
+        dtype: of the images.
     """
 
     n: int
     views: int
     slices: int = 1
+    footprint: str = "linear"
+    dtype: str = "float32"
 
     @classmethod
     def parse(cls, text: str) -> Case:
@@ -53,13 +57,28 @@ class Case:
         return f"{self.n}² × {self.views} views{stack}"
 
     @property
+    def rows(self) -> int:
+        """Detector rows of all views."""
+        return self.slices * self.views
+
+    @property
+    def filters(self) -> int:
+        """Filters along the detector: one that all views share."""
+        return 1
+
+    @property
+    def itemsize(self) -> int:
+        """Bytes of a number."""
+        return np.dtype(self.dtype).itemsize
+
+    @property
     def bins(self) -> int:
         """Bins that see the whole square from every direction."""
         return math.ceil(math.sqrt(2) * self.n) + 2
 
     def record(self) -> dict[str, Any]:
         """How the JSON file tells it from others."""
-        names = ("name", "n", "views", "bins", "slices", "updates")
+        names = ("name", "n", "views", "bins", "slices", "footprint", "dtype", "updates")
         return {name: getattr(self, name) for name in names}
 
     @property
@@ -86,6 +105,10 @@ class Case:
     def scan(self) -> rift.Parallel:
         """The scan, its axis in the middle of the detector."""
         return rift.Parallel(self.angles, self.bins)
+
+    def projector(self, device: rift.Device) -> rift.Projector:
+        """The operator."""
+        return rift.Projector(self.grid, self.scan, self.footprint, device, self.dtype)
 
     @cached_property
     def truth(self) -> Floats:

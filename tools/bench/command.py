@@ -10,7 +10,7 @@ from typing import Any
 
 import rift_cl as rift
 from bench.costs import CoverageError
-from bench.tables import Table, show
+from bench.table import Table, show
 from rift_cl.io import write_text
 
 Record = dict[str, Any]

@@ -29,6 +29,10 @@ def relative(found: Floats, exact: Floats) -> float:
     return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
 
 
+class LeftOutError(RuntimeError):
+    """One of ours cannot take part here, though nothing is wrong with it."""
+
+
 class Contender(ABC):
     """Some operations by one package, at one size.
 

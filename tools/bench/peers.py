@@ -1,4 +1,4 @@
-"""The peers: ASTRA, silx, gratopy and scikit-image behind the contender's interface.
+"""The peers: ASTRA, silx, gratopy and scikit-image, and ours in scikit-image's place.
 
 Conventions, found by comparison with exact sinograms: ASTRA and silx let y grow upwards, which
 turns the sign of the angles; gratopy's detector runs the other way as well; scikit-image has its
@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from functools import cached_property
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any, ClassVar
 
 import numpy as np
 
 import rift_cl as rift
 from bench.case import Case, Floats
-from bench.contender import TomographyContender
+from bench.contender import LeftOutError, TomographyContender
 from rift_cl import phantom
 
 
@@ -165,10 +166,11 @@ class ScikitImage(TomographyContender):
     """scikit-image, on the CPU; ``radon`` sees the disc alone, with n bins."""
 
     name = "scikit-image"
+    module: ClassVar[str] = "skimage.transform"
 
     def __init__(self, device: rift.Device, case: Case) -> None:
         super().__init__(device, case)
-        self._transform = import_module("skimage.transform")
+        self._transform = import_module(self.module)
         self._degrees = -np.rad2deg(case.angles)
 
     @cached_property
@@ -199,6 +201,22 @@ class ScikitImage(TomographyContender):
         return self._transform.iradon(sinogram.T, self._degrees, **settings)
 
 
+class RiftAsScikitImage(ScikitImage):
+    """Ours under scikit-image's names, NumPy in and out; it knows the default device alone."""
+
+    name = "rift_cl, as scikit-image"
+    module = "rift_cl.interop.skimage"
+    ours = True
+    repeats = 3
+
+    def __init__(self, device: rift.Device, case: Case) -> None:
+        if find_spec("skimage") is None:
+            raise LeftOutError("scikit-image is not installed")
+        if device.selector != rift.default_device().selector:
+            raise LeftOutError("it works on the device that RIFT_DEVICE selects, not on this one")
+        super().__init__(device, case)
+
+
 PEERS: tuple[type[TomographyContender], ...] = (
     AstraLine,
     AstraLinear,
@@ -206,4 +224,5 @@ PEERS: tuple[type[TomographyContender], ...] = (
     Silx,
     Gratopy,
     ScikitImage,
+    RiftAsScikitImage,
 )

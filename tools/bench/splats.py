@@ -18,6 +18,7 @@ import numpy as np
 import rift_cl as rift
 from bench.case import Floats
 from bench.costs import Cost
+from bench.operations import Task
 from bench.training import TRAINING_COSTS, training_operations
 from rift_cl.geometry import Camera
 from rift_cl.splat.frame import Frame, FrameGradients
@@ -109,19 +110,20 @@ class SplatCase:
         return Renderer(device=self.device).forward(self.splats, self.camera, background=background)
 
     @cached_property
-    def operations(self) -> dict[str, Callable[[], Any]]:
-        """The operations by name, on device arrays."""
+    def tasks(self) -> list[Task]:
+        """What is done with the scene, on device arrays."""
         grad = self.device.array(self.grad_image)
         noise = np.random.default_rng(2).normal(size=(self.size, self.size, 4))
         deep = self.device.array(noise)
         renderer = Renderer(device=self.device)
-        return {
+        runs = {
             "draw": self._forward,
             "gradient": lambda: renderer.backward(self.frame, grad, with_camera=True),
             "depth": lambda: renderer.forward(self.splats, self.camera, depth="expected"),
             "depth gradient": lambda: renderer.backward(self.depth_frame, deep, with_camera=True),
             **training_operations(self),
         }
+        return [Task(name, self, run, SPLAT_COSTS) for name, run in runs.items()]
 
     @property
     def entries(self) -> int:

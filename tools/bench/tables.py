@@ -1,18 +1,19 @@
-"""The record of a run as tables: on the terminal by rich, in the documentation as Markdown."""
+"""The record of a run of kernels and operations as tables, and as a page of the documentation."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table as RichTable
+from bench.table import (
+    NONE,
+    Table,
+    markdown_lines,
+    number_or_none,
+    percent,
+    times,
+)
 
-_NONE = "–"
-# Columns where the output goes to a file.
-_WIDTH = 170
 _LEGEND = (
     "Gup/s: 10⁹ pixels times views per second. PSNR (peak 1) and SSIM of the reconstruction from "
     "the head's exact sinogram, in the disc; forward error: relative L2 distance of the projected "
@@ -26,25 +27,6 @@ _RASTERIZERS = (
 )
 
 
-@dataclass(frozen=True)
-class Table:
-    """A table with a title above and notes below.
-
-    Args:
-        title: what it shows.
-        columns: heads; the first ``texts`` of them are text, the others numbers.
-        rows: as many cells as heads in each.
-        notes: sentences that belong under it.
-        texts: number of text columns.
-    """
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    notes: Sequence[str] = ()
-    texts: int = 1
-
-
 def tables(record: dict[str, Any]) -> Iterator[Table]:
     """Every table of a run."""
     yield _limits(record)
@@ -55,27 +37,14 @@ def tables(record: dict[str, Any]) -> Iterator[Table]:
             yield _contenders(case, record["skipped"])
         if case["speed_ups"]:
             yield _speed_ups(case)
+    for group in record["groups"]:
+        yield _kernels(group)
     if record["splats"]:
         yield _scenes(record["splats"])
     if any(scene["contenders"] for scene in record["splats"]):
         yield _rasterizers(record["splats"])
     for scene in record["splats"]:
         yield _kernels(scene)
-
-
-def show(found: Iterable[Table]) -> None:
-    """Print tables on the terminal."""
-    console = Console(width=None if sys.stdout.isatty() else _WIDTH)
-    for table in found:
-        drawn = RichTable(title=table.title, title_justify="left")
-        for number, column in enumerate(table.columns):
-            text = number < table.texts
-            drawn.add_column(column, justify="left" if text else "right", overflow="fold")
-        for row in table.rows:
-            drawn.add_row(*row)
-        console.print(drawn)
-        for note in table.notes:
-            console.print(note, style="dim")
 
 
 def markdown(record: dict[str, Any]) -> str:
@@ -94,16 +63,7 @@ def markdown(record: dict[str, Any]) -> str:
         "Times are the shortest of several, in milliseconds, with the median in parentheses. "
         "Other programs ran on the same machine; they can only have made a time longer.",
     ]
-    for table in tables(record):
-        lines += ["", f"## {table.title}", "", *_markdown_rows(table)]
-        lines += [line for note in table.notes for line in ("", note)]
-    return "\n".join(lines) + "\n"
-
-
-def _markdown_rows(table: Table) -> Iterator[str]:
-    rule = [":--" if number < table.texts else "--:" for number in range(len(table.columns))]
-    for row in (table.columns, rule, *table.rows):
-        yield f"| {' | '.join(row)} |"
+    return "\n".join([*lines, *markdown_lines(tables(record))]) + "\n"
 
 
 def _limits(record: dict[str, Any]) -> Table:
@@ -116,7 +76,8 @@ def _limits(record: dict[str, Any]) -> Table:
     ]
     note = (
         "Multiply-adds are measured on the vectors that our kernels use (eight floats on a CPU, "
-        "one on a GPU); the driver may not use the widest that the hardware has."
+        "one on a GPU); the driver may not use the widest that the hardware has. Work in float64 "
+        "is held against the same limit."
     )
     return Table(f"Limits of {record['device']['name']}", ("what", "value"), rows, (note,))
 
@@ -130,10 +91,10 @@ def _scenes(scenes: list[dict[str, Any]]) -> Table:
     rows = [
         (
             scene["name"],
-            *(_times(split["total"]) for split in scene["splits"]),
+            *(times(split["total"]) for split in scene["splits"]),
             str(scene["entries"]),
             f"{scene['lanes'] / 1e6:.1f} M",
-            _percent(scene["lane_use"]),
+            percent(scene["lane_use"]),
         )
         for scene in scenes
     ]
@@ -152,10 +113,10 @@ def _rasterizers(scenes: list[dict[str, Any]]) -> Table:
         by_name = {record["name"]: record for record in scene["contenders"]}
         for up in scene["speed_ups"]:
             name, pair = up["operation"], (by_name[up["ours"]], by_name[up["peer"]])
-            times = (_times(each["operations"][name]) for each in pair)
-            distance = _number(pair[1]["accuracy"][name], ".0e")
+            both = (times(each["operations"][name]) for each in pair)
+            distance = number_or_none(pair[1]["accuracy"][name], ".0e")
             lead = f"{up['by_min']:.1f}×"
-            rows.append((scene["name"], name, up["peer"], *times, lead, distance))
+            rows.append((scene["name"], name, up["peer"], *both, lead, distance))
     reasons = {name: why for scene in scenes for name, why in scene["left_out"].items()}
     notes = [_RASTERIZERS, *(f"{name} left out: {reason}" for name, reason in reasons.items())]
     columns = ("scene", "operation", "fastest peer", "rift_cl, ms", "peer, ms", "times faster")
@@ -168,7 +129,7 @@ def _kernels(case: dict[str, Any]) -> Table:
     for split in case["splits"]:
         rows += [(split["operation"], *_kernel_cells(kernel)) for kernel in split["kernels"]]
         rest = split["rest"]
-        cells = (_NONE, _times(rest), _percent(rest["share"]), _NONE, _NONE, _NONE)
+        cells = (NONE, times(rest), percent(rest["share"]), NONE, NONE, NONE)
         rows.append((split["operation"], "the rest", *cells))
     note = (
         "Every launch waited for. The rest: clearing memory, the design of the filter, Python "
@@ -184,11 +145,11 @@ def _kernel_cells(kernel: dict[str, Any]) -> tuple[str, ...]:
     return (
         f"`{kernel['kernel']}`",
         str(kernel["launches"]),
-        _times(kernel),
-        _percent(kernel["share"]),
+        times(kernel),
+        percent(kernel["share"]),
         f"{kernel['rate_per_s'] / 1e9:.2f} G{kernel['unit']}/s",
-        _percent(share) if share else _NONE,
-        _percent(kernel["bandwidth_share"]),
+        percent(share) if share else NONE,
+        percent(kernel["bandwidth_share"]),
     )
 
 
@@ -201,10 +162,10 @@ def _contenders(case: dict[str, Any], skipped: dict[str, str]) -> Table:
         notes.append("At this size every peer ran once, without a warm-up.")
     left_out = {**skipped, **case["left_out"]} if case["slices"] == 1 else {}
     notes += [f"{name} left out: {reason}" for name, reason in left_out.items()]
-    times = ("forward, ms", "backward, ms", "fbp, ms")
+    measured = ("forward, ms", "backward, ms", "fbp, ms")
     rates = ("forward, Gup/s", "backward, Gup/s")
     accuracy = ("PSNR, dB", "SSIM", "forward error", "adjoint")
-    columns = ("package", "arrays", *times, *rates, *accuracy)
+    columns = ("package", "arrays", *measured, *rates, *accuracy)
     per_slice = ", times per slice" if case["slices"] > 1 else ""
     return Table(f"Operations, {case['name']}{per_slice}", columns, rows, notes, texts=2)
 
@@ -215,12 +176,12 @@ def _contender_cells(record: dict[str, Any], slices: int) -> tuple[str, ...]:
     return (
         record["name"],
         record["arrays"],
-        *(_times(done[name], slices) if name in done else _NONE for name in names),
+        *(times(done[name], slices) if name in done else NONE for name in names),
         *(f"{done[name]['updates_per_s'] / 1e9:.2f}" for name in names[:2]),
-        _number(accuracy["fbp_psnr_db"], ".2f"),
-        _number(accuracy["fbp_ssim"], ".4f"),
-        _number(accuracy["forward_error"], ".4f"),
-        _number(accuracy["adjoint_mismatch"], ".0e"),
+        number_or_none(accuracy["fbp_psnr_db"], ".2f"),
+        number_or_none(accuracy["fbp_ssim"], ".4f"),
+        number_or_none(accuracy["forward_error"], ".4f"),
+        number_or_none(accuracy["adjoint_mismatch"], ".0e"),
     )
 
 
@@ -232,19 +193,3 @@ def _speed_ups(case: dict[str, Any]) -> Table:
     columns = ("operation", "ours", "fastest peer", "by minimum", "by median")
     title = f"Times faster than the fastest peer, {case['name']}"
     return Table(title, columns, rows, texts=3)
-
-
-def _times(record: dict[str, Any], slices: int = 1) -> str:
-    return f"{_ms(record['min_s'] / slices)} ({_ms(record['median_s'] / slices)})"
-
-
-def _ms(seconds: float) -> str:
-    return f"{seconds * 1e3:.3g}" if seconds < 1 else f"{seconds * 1e3:.0f}"
-
-
-def _percent(share: float) -> str:
-    return f"{share:.1%}"
-
-
-def _number(value: float | None, form: str) -> str:
-    return _NONE if value is None else format(value, form)

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bench.costs import Cost
+from bench.row_filters import ROW_COSTS
+from bench.transform_work import transform_bytes, transform_flops
 from rift_cl.operators.spectrum import padded_length
 from rift_cl.train.band_limit import camera_table
 from rift_cl.train.exposures import Exposures
@@ -92,13 +94,14 @@ def _padded(case: SplatCase) -> float:
     return 4 * padded_length(case.size) ** 2
 
 
-def _passed(case: SplatCase) -> float:
-    """The same, for every pass of the four transforms, radix 4, 3 and 2."""
-    left, passes = padded_length(case.size), 0
-    while left > 1:
-        left //= next(radix for radix in (4, 3, 2) if left % radix == 0)
-        passes += 1
-    return 4 * passes * _padded(case)
+def _transforms(work: Callable[[int], float]) -> Callable[[SplatCase], float]:
+    """The work of four transforms of every column of two fields."""
+
+    def total(case: SplatCase) -> float:
+        edge = padded_length(case.size)
+        return 4 * 2 * edge * work(edge)
+
+    return total
 
 
 TRAINING_COSTS: dict[str, Cost] = {
@@ -111,7 +114,9 @@ TRAINING_COSTS: dict[str, Cost] = {
     ),
     "splat_band": _per("splat", _splats, 16, "place in, length out; 100 cameras", 22 * _VIEWS),
     "fft_pack": _per("padded sample", _padded, 4, "planes out; the image in is less"),
-    "fft_pass": _per("sample and pass", _passed, 8, "in and out", 8),
+    "fft_pass": ROW_COSTS["fft_pass"]._replace(
+        units=_transforms(transform_flops), bytes=_transforms(transform_bytes)
+    ),
     "fft_transpose": _per("padded sample", lambda case: 2 * _padded(case), 8, "in and out, twice"),
     "fft_unpack": _per("sample", _samples, 8, "plane in, image out", 3),
     "keep_norm": _per("sample", _samples, 8, "in and out", 1),

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from bench.tables import Table
+from bench.table import NONE, Table, markdown_lines, milliseconds, times
 
-_NONE = "–"
 COMMANDS = """\
     python tools/bench_training.py --json training.json
     python tools/bench_training.py --peers --json training.json --markdown docs/training.md
@@ -63,12 +62,7 @@ def training_page(record: dict[str, Any]) -> str:
         "Times are the shortest of several, in milliseconds, with the median in parentheses. "
         "Other programs ran on the same machine; they can only have made a time longer.",
     ]
-    for table in training_tables(record):
-        rule = [":--" if number < table.texts else "--:" for number in range(len(table.columns))]
-        rows = [f"| {' | '.join(row)} |" for row in (table.columns, rule, *table.rows)]
-        lines += ["", f"## {table.title}", "", *rows]
-        lines += [line for note in table.notes for line in ("", note)]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *markdown_lines(training_tables(record))]) + "\n"
 
 
 def _race(record: dict[str, Any]) -> Table:
@@ -80,8 +74,8 @@ def _race(record: dict[str, Any]) -> Table:
             rows.append(
                 (
                     *(scene["name"], entry["name"], f"{done['steps_per_s']:.3g}"),
-                    _times(done, scene["views"]),
-                    f"{ups[0]:.1f}×" if ups else _NONE,
+                    times(done, scene["views"]),
+                    f"{ups[0]:.1f}×" if ups else NONE,
                     *(f"{losses['steps']:.0f}", f"{losses['first']:.5f}", f"{losses['last']:.5f}"),
                     _difference(scene, entry),
                 )
@@ -96,7 +90,7 @@ def _race(record: dict[str, Any]) -> Table:
 
 def _difference(scene: dict[str, Any], entry: dict[str, Any]) -> str:
     if entry["ours"]:
-        return _NONE
+        return NONE
     (ours,) = (each["accuracy"]["last"] for each in scene["contenders"] if each["ours"])
     return f"{abs(entry['accuracy']['last'] / ours - 1):.0e}"
 
@@ -112,12 +106,12 @@ def _host(record: dict[str, Any]) -> Table:
             (
                 *(
                     scene["name"],
-                    _times(step),
-                    _times(busy),
+                    times(step),
+                    times(busy),
                     f"{busy['min_s'] / step['min_s']:.0%}",
                 ),
-                *(f"{sum(wait['per_step'] for wait in waits):.3g}", _ms(waited)),
-                *(_times(renewal), f"{each:.1%}"),
+                *(f"{sum(wait['per_step'] for wait in waits):.3g}", milliseconds(waited)),
+                *(times(renewal), f"{each:.1%}"),
             )
         )
     columns = ("scene", "a step, ms", "host, ms", "of the step", "waits in a step", "waited, ms")
@@ -129,7 +123,7 @@ def _waits(scene: dict[str, Any]) -> Table:
     rows = [
         (
             *(way, wait["kind"], f"`{wait['place']}` {wait['function']}"),
-            *(f"{wait['per_step']:.3g}", str(wait["bytes"]), _ms(wait["seconds"])),
+            *(f"{wait['per_step']:.3g}", str(wait["bytes"]), milliseconds(wait["seconds"])),
         )
         for way, waits in scene["host"]["waits"].items()
         for wait in waits
@@ -147,23 +141,15 @@ def _stages(scene: dict[str, Any], way: str) -> Table:
         rows.append(
             (
                 stage if stage != last else "",
-                f"`{row['kernel']}`" if row["kernel"] else _NONE,
-                f"{row['launches']:.3g}" if row["launches"] else _NONE,
-                _times(row),
+                f"`{row['kernel']}`" if row["kernel"] else NONE,
+                f"{row['launches']:.3g}" if row["launches"] else NONE,
+                times(row),
                 f"{row['share']:.1%}",
                 f"{share:.1%}" if stage != last else "",
             )
         )
         last = stage
-    total = _times(scene["stages"][way]["total"])
+    total = times(scene["stages"][way]["total"])
     columns = ("stage", "kernel", "launches", "ms", "of the step", "the stage")
     notes = (f"In all {total} ms. {_STAGES}",)
     return Table(f"Stages, {scene['name']}, {way}", columns, rows, notes, texts=2)
-
-
-def _times(record: dict[str, Any], parts: int = 1) -> str:
-    return f"{_ms(record['min_s'] / parts)} ({_ms(record['median_s'] / parts)})"
-
-
-def _ms(seconds: float) -> str:
-    return f"{seconds * 1e3:.3g}" if seconds < 1 else f"{seconds * 1e3:.0f}"
