@@ -18,7 +18,7 @@ from rift_cl.cl.device import Device
 from rift_cl.geometry import Grid
 from rift_cl.jobs.reconstruct_input import SliceInput, demand_window
 from rift_cl.jobs.reconstruct_settings import ReconstructSettings
-from rift_cl.operators import FastProjector, Projector
+from rift_cl.operators import FastProjector, ParallelProjector, Projector
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp
 from rift_cl.reconstruct.seen_rays import SeenRays
@@ -103,7 +103,7 @@ class Inversion:
     source: SliceInput
     device: Device
     residuals: dict[int, list[float]] = field(default_factory=dict)
-    _projectors: dict[int, Projector | FastProjector] = field(default_factory=dict)
+    _projectors: dict[int, ParallelProjector] = field(default_factory=dict)
 
     @property
     def window(self) -> Window:
@@ -119,7 +119,7 @@ class Inversion:
         views = max(views, self.source.scan.shape[0])
         return 4 * (images * int(np.prod(A.grid.shape[-2:])) + sinograms * views * bins)
 
-    def projector(self, slices: int) -> Projector | FastProjector:
+    def projector(self, slices: int) -> ParallelProjector:
         """The projector of so many slices, kept for the next slab of the same size."""
         count = 0 if self.settings.iterative else slices
         if count not in self._projectors:
@@ -199,7 +199,7 @@ class Inversion:
     def _solver(self, sinogram: Floats) -> Solver:
         settings = self.settings
         whole, seen = self.projector(1), self.source.seen
-        A: Projector | FastProjector | SeenRays = whole if seen is None else SeenRays(whole, seen)
+        A: ParallelProjector | SeenRays = whole if seen is None else SeenRays(whole, seen)
         precondition, noise = settings.precondition, settings.noise
         if settings.method == "cgls":
             return Cgls(A, sinogram, precondition=precondition, noise=noise)
@@ -213,7 +213,7 @@ class Inversion:
             A, sinogram, weight, nonnegative=nonnegative, precondition=precondition, noise=noise
         )
 
-    def _projector(self, slices: int) -> Projector | FastProjector:
+    def _projector(self, slices: int) -> ParallelProjector:
         settings, device = self.settings, self.device
         if settings.iterative:
             grid, scan = self.window.around(self._width())[0], self.source.geometry

@@ -7,6 +7,7 @@ from rift_cl.operators.fast_projector import FastProjector
 from rift_cl.operators.filters import Filter, HighPass, Ramp, Response, ViewFilter, as_filter
 from rift_cl.operators.footprint import FOOTPRINTS
 from rift_cl.operators.linear import LinearOperator
+from rift_cl.operators.parallel_projector import ParallelProjector
 from rift_cl.operators.projector import Projector
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "Filter",
     "HighPass",
     "LinearOperator",
+    "ParallelProjector",
     "Projector",
     "Ramp",
     "Response",

@@ -11,26 +11,22 @@ view, where every pixel of every view costs ``Projector`` something.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
 from functools import cached_property
 from typing import Any
 
-from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
-from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.operators.gridding import LOG2_ROWS, choose
-from rift_cl.operators.linear import LinearOperator, Piece
 from rift_cl.operators.padded_spectrum import PaddedSpectrum, in_steps
+from rift_cl.operators.parallel_projector import ParallelProjector
 from rift_cl.operators.ray_geometry import rays
 from rift_cl.operators.ray_tables import RayTables
 
 _MOST_LOBES = 8
 
 
-class FastProjector(LinearOperator):
+class FastProjector(ParallelProjector):
     """Line integrals of an image, or of every slice of a volume, with an error that is named.
 
     It approximates the transform with the footprint ``linear`` of ``Projector``, which reads views
@@ -48,9 +44,7 @@ class FastProjector(LinearOperator):
             with them, as far as phase tables give those.
         device: where to work; the default device if not given.
 
-    The domain is ``grid.shape``; the range is (angles, bins), or (angles, nz, bins) for a volume.
-    Values of the range are in the image's unit times the grid's unit of length. Bins of which the
-    hats lie further than eight bins from the image's shadow are taken for zero.
+    Bins of which the hats lie further than eight bins from the image's shadow are taken for zero.
 
     Raises:
         InputError: the error is smaller than this method allows, or bins are very much finer than
@@ -70,10 +64,8 @@ class FastProjector(LinearOperator):
             raise InputError(f"error is {error!r}, wanted a number from 1e-6 to 0.1")
         if lobes not in range(_MOST_LOBES + 1):
             raise InputError(f"lobes is {lobes!r}, wanted a whole number from 0 to {_MOST_LOBES}")
-        rows = grid.shape[:-2]
-        shape = (len(scan.angles), *rows, scan.bins)
-        super().__init__(grid.shape, shape, device or default_device())
-        self.grid, self.scan, self.error, self.lobes = grid, scan, float(error), int(lobes)
+        super().__init__(grid, scan, device)
+        self.error, self.lobes = float(error), int(lobes)
         self._rays = found = rays(grid.slice(), scan)
         self.samples = lobes * found.length if lobes else found.length // 2
         spread = len(scan.angles) * self.samples
@@ -194,23 +186,6 @@ class FastProjector(LinearOperator):
 
     def _blocks(self, columns: int, rows: int) -> tuple[int, int]:
         return columns // self.device.traits.macros["LANES"], -(-rows // self._run)
-
-    def _pieces(self, budget: int) -> Iterable[Piece]:
-        return self.pieces(budget)
-
-    def pieces(self, budget: int, *, sinograms: int = 1) -> list[Piece]:
-        """How to cut the slices to fit a budget in bytes.
-
-        Args:
-            budget: bytes there are.
-            sinograms: how many a slice needs at a time; more than one where others are made of it.
-        """
-        bins = len(self.scan.angles) * self.scan.bins
-        each = 4 * (math.prod(self.grid.shape[-2:]) + sinograms * bins)
-        runs = plan_chunks(self.grid.slices, each, self.scratch, budget, what="slice")
-        if len(self.grid.shape) == 2:
-            return [((), ())]
-        return [((run,), (slice(None), run)) for run in runs]
 
     @property
     def scratch(self) -> int:

@@ -7,20 +7,17 @@ method; ``rift_cl/reference/radon.py`` has the matrix that it approximates.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike
 
-from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
-from rift_cl.cl.discovery import default_device
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.operators.footprint import check_footprint
-from rift_cl.operators.linear import LinearOperator, Piece
+from rift_cl.operators.parallel_projector import ParallelProjector
 from rift_cl.operators.phase_table import LOG2_PHASES, PhaseTable, phase_table
 
 # Tables of a run of views together: on a CPU they should stay in its caches.
@@ -32,7 +29,7 @@ _ROW_RUNS, _ITEMS_PER_UNIT = (64, 32, 16), 8
 _SLAB = 16
 
 
-class Projector(LinearOperator):
+class Projector(ParallelProjector):
     """Line integrals of an image, or of every slice of a volume.
 
     Args:
@@ -51,9 +48,6 @@ class Projector(LinearOperator):
             images) to 6e-8 (white noise) at 512 x 512, in proportion to its edge. And both blend
             8 phases to a column, whose error, near 1 % on white noise, float64 leaves as it is.
 
-    The domain is ``grid.shape``; the range is (angles, bins), or (angles, nz, bins) for a volume.
-    Values of the range are in the image's unit times the grid's unit of length.
-
     Raises:
         InputError: the footprint or the type is unknown.
         DeviceError: the device has no float64.
@@ -67,10 +61,8 @@ class Projector(LinearOperator):
         device: Device | None = None,
         dtype: DTypeLike = np.float32,
     ) -> None:
-        rows = grid.shape[:-2]
-        shape = (len(scan.angles), *rows, scan.bins)
-        super().__init__(grid.shape, shape, device or default_device(), dtype)
-        self.grid, self.scan, self.footprint = grid, scan, check_footprint(footprint)
+        super().__init__(grid, scan, device, dtype)
+        self.footprint = check_footprint(footprint)
         lanes = self.device.traits.macros["LANES"]
         blocks = 32 // self.dtype.itemsize if lanes > 1 else 1
         self._segment = lanes * blocks
@@ -180,24 +172,6 @@ class Projector(LinearOperator):
         most = max(_FEWEST_VIEWS, self._table_bytes // each)
         for first in range(0, walk.count, most):
             yield _Run(first, min(most, walk.count - first))
-
-    def _pieces(self, budget: int) -> Iterable[Piece]:
-        return self.pieces(budget)
-
-    def pieces(self, budget: int, *, sinograms: int = 1) -> list[Piece]:
-        """How to cut the slices to fit a budget in bytes.
-
-        Args:
-            budget: bytes there are.
-            sinograms: how many a slice needs at a time; more than one where others are made of it.
-        """
-        views, bins = len(self.scan.angles), self.scan.bins
-        numbers = math.prod(self.grid.shape[-2:]) + sinograms * views * bins
-        each = self.dtype.itemsize * numbers
-        runs = plan_chunks(self.grid.slices, each, self.scratch, budget, what="slice")
-        if len(self.grid.shape) == 2:
-            return [((), ())]
-        return [((run,), (slice(None), run)) for run in runs]
 
     @property
     def scratch(self) -> int:

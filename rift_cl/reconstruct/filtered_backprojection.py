@@ -13,47 +13,20 @@ each view gets a filter of its own (rift_cl/operators/compensation.py).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rift_cl.cl.device import Device
 from rift_cl.errors import InputError
-from rift_cl.geometry import Grid, Parallel
 from rift_cl.operators.compensation import Compensation
 from rift_cl.operators.filters import Filter, Gains, ViewFilter, as_filter
 from rift_cl.operators.linear import LinearOperator, Piece
+from rift_cl.operators.parallel_projector import ParallelProjector
 from rift_cl.reconstruct.view_weights import view_gains
 
 Floats = NDArray[np.float64]
 FilterLike = str | Filter | Callable[[Floats], ArrayLike]
-
-
-class ParallelProjector(Protocol):
-    """What an operator from images to sinograms must have to be inverted here.
-
-    ``Projector`` and ``FastProjector`` are. Members are those of ``LinearOperator``, with the
-    geometry, and with ``pieces``, which cuts the work into slices that fit a budget.
-    """
-
-    grid: Grid
-    scan: Parallel
-    domain: tuple[int, ...]
-    range: tuple[int, ...]
-    device: Device
-    dtype: np.dtype[Any]
-
-    @property
-    def T(self) -> LinearOperator:
-        """The adjoint."""
-
-    def _apply(self, x: Any, out: Any) -> None: ...
-
-    def _apply_adjoint(self, y: Any, out: Any) -> None: ...
-
-    def pieces(self, budget: int, *, sinograms: int = 1) -> list[Piece]:
-        """How to cut the slices to fit a budget in bytes, with so many sinograms at a time."""
 
 
 class FilteredBackprojection(LinearOperator):
@@ -155,7 +128,7 @@ def backproject(A: ParallelProjector, y: Any, *, out: Any = None) -> Any:
 
 
 def _check_projector(A: Any) -> None:
-    if not (isinstance(A, LinearOperator) and hasattr(A, "scan") and hasattr(A, "pieces")):
+    if not isinstance(A, ParallelProjector):
         raise InputError(f"A is a {type(A).__name__}, wanted a Projector first, then the sinogram")
 
 

@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 
 from rift_cl.cl.elementwise import copy, multiply
 from rift_cl.errors import ShapeError
-from rift_cl.operators.fast_projector import FastProjector
 from rift_cl.operators.linear import LinearOperator
-from rift_cl.operators.projector import Projector
+from rift_cl.operators.parallel_projector import ParallelProjector
 
 
 class SeenRays(LinearOperator):
@@ -29,7 +28,7 @@ class SeenRays(LinearOperator):
         ShapeError: the rays are not those of the projector.
     """
 
-    def __init__(self, A: Projector | FastProjector, seen: ArrayLike) -> None:
+    def __init__(self, A: ParallelProjector, seen: ArrayLike) -> None:
         mask = np.asarray(seen, np.float32)
         if mask.shape != A.range:
             raise ShapeError(f"seen has shape {mask.shape}, wanted the projector's {A.range}")

@@ -1,0 +1,58 @@
+"""What all projectors of parallel beams have in common, however they compute."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from rift_cl.cl.budget import plan_chunks
+from rift_cl.cl.device import Device
+from rift_cl.cl.discovery import default_device
+from rift_cl.geometry import Grid, Parallel
+from rift_cl.operators.linear import LinearOperator, Piece
+
+
+class ParallelProjector(LinearOperator):
+    """Line integrals of an image, or of every slice of a volume; slices do not depend on others.
+
+    Args:
+        grid: where the image lives, (ny, nx) or (nz, ny, nx).
+        scan: how it is looked at.
+        device: where to work; the default device if not given.
+        dtype: of its arrays.
+
+    The domain is ``grid.shape``; the range is (angles, bins), or (angles, nz, bins) for a volume.
+    Values of the range are in the image's unit times the grid's unit of length.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        scan: Parallel,
+        device: Device | None = None,
+        dtype: DTypeLike = np.float32,
+    ) -> None:
+        shape = (len(scan.angles), *grid.shape[:-2], scan.bins)
+        super().__init__(grid.shape, shape, device or default_device(), dtype)
+        self.grid, self.scan = grid, scan
+
+    def _pieces(self, budget: int) -> Iterable[Piece]:
+        return self.pieces(budget)
+
+    def pieces(self, budget: int, *, sinograms: int = 1) -> list[Piece]:
+        """How to cut the slices to fit a budget in bytes.
+
+        Args:
+            budget: bytes there are.
+            sinograms: how many a slice needs at a time; more than one where others are made of it.
+        """
+        views, bins = len(self.scan.angles), self.scan.bins
+        numbers = math.prod(self.grid.shape[-2:]) + sinograms * views * bins
+        each = self.dtype.itemsize * numbers
+        runs = plan_chunks(self.grid.slices, each, self.scratch, budget, what="slice")
+        if len(self.grid.shape) == 2:
+            return [((), ())]
+        return [((run,), (slice(None), run)) for run in runs]
