@@ -85,6 +85,9 @@ def read_pixels(path: Path, *, budget: int | None = None) -> NDArray[np.float32]
         spec = source.spec()
         if spec.deep or spec.depth > 1:
             raise FileFormatError(f"{path}: holds deep pixels, a flat image is wanted")
+        if spec.tile_width and str(spec.format) == "double":
+            # OpenImageIO 3.2 gives back memory that it never filled.
+            raise FileFormatError(f"{path}: float64 in tiles; save it in strips, or as float32")
         check_claim(path, "the image", spec.width * spec.height * spec.nchannels * 4, budget)
         pixels = source.read_image("float")
         message = first_line(source.geterror())

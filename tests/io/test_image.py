@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO
 import pytest
+import tifffile
 import view_files
 
 from rift_cl.errors import (
@@ -163,3 +164,12 @@ def test_the_readers_of_others_are_left_as_they_were(tmp_path: Path) -> None:
     write_png(tmp_path / "a.png", np.zeros((2, 2)))
     read_image(tmp_path / "a.png")
     assert OpenImageIO.get_int_attribute("try_all_readers", -1) == before
+
+
+def test_tiles_of_float64_are_refused_before_they_are_read_wrong(tmp_path: Path) -> None:
+    path, image = tmp_path / "a.tif", RANDOM.random((40, 30))
+    tifffile.imwrite(path, image)
+    np.testing.assert_allclose(read_image(path), image, atol=1e-7)
+    tifffile.imwrite(path, image, tile=(16, 16))
+    with pytest.raises(FileFormatError, match="float64 in tiles; save it in strips"):
+        read_image(path)
