@@ -148,7 +148,7 @@ def test_the_report_is_drawn_from_the_files_alone(tiny, tmp_path):
     page = (tmp_path / "report.html").read_text()
     assert page.count("<h2>") == 3
     # Figure 11: 9 of fits and 2 of slices; two rows of pictures; four kinds of spectra.
-    assert page.count("<img ") == 17
+    assert page.count("<img ") == 15
 
 
 def test_full_without_the_ornament_leaves_its_figures_out(tmp_path):
