@@ -45,6 +45,7 @@ class Scaled(LinearOperator):
 
     def __init__(self, inner: LinearOperator, factor: float) -> None:
         super().__init__(inner.domain, inner.range, inner.device, inner.dtype)
+        self.grid, self.scan = inner.grid, inner.scan
         self._inner = inner
         self._factor = _finite(factor, self.dtype)
 
@@ -76,6 +77,8 @@ class Sum(LinearOperator):
             )
         demand_one_kind(left, right)
         super().__init__(left.domain, left.range, left.device, left.dtype)
+        self.grid = left.grid if left.grid == right.grid else None
+        self.scan = left.scan if left.scan == right.scan else None
         self._terms = (left, right)
 
     @property
@@ -110,6 +113,7 @@ class Product(LinearOperator):
             )
         demand_one_kind(outer, inner)
         super().__init__(inner.domain, outer.range, outer.device, outer.dtype)
+        self.grid, self.scan = inner.grid, outer.scan
         self._outer, self._inner = outer, inner
 
     @property

@@ -17,6 +17,7 @@ from typing import Any
 from rift_cl.cl.device import Device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
+from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.gridding import LOG2_ROWS, choose
 from rift_cl.operators.padded_spectrum import PaddedSpectrum, in_steps
 from rift_cl.operators.parallel_projector import ParallelProjector
@@ -37,8 +38,10 @@ class FastProjector(ParallelProjector):
     Args:
         grid: where the image lives, (ny, nx) or (nz, ny, nx).
         scan: how it is looked at.
-        error: the most that the result may differ from that transform's: the norm of the
-            difference over the norm of the result.
+        error: what the result may differ by from that transform's, the norm of the difference
+            over the norm of the result: for data as rough as white noise or smoother, on a detector
+            that sees the image. Rougher data (a checkerboard, a lone corner pixel) may differ by a
+            little more, and float32 rounds at 1e-6.
         lobes: of sinc^2 that are kept. 0: nothing beyond the detector's Nyquist frequency. 1: a
             reconstruction's edges ring no more than with straight lines. 3: the same values as
             with them, as far as phase tables give those.
@@ -60,14 +63,14 @@ class FastProjector(ParallelProjector):
         lobes: int = 1,
         device: Device | None = None,
     ) -> None:
-        if not isinstance(error, (int, float)) or not 0 < error <= 0.1:
+        if not 0 < one_number(error) <= 0.1:
             raise InputError(f"error is {error!r}, wanted a number from 1e-6 to 0.1")
-        if lobes not in range(_MOST_LOBES + 1):
+        if one_number(lobes) not in range(_MOST_LOBES + 1):
             raise InputError(f"lobes is {lobes!r}, wanted a whole number from 0 to {_MOST_LOBES}")
         super().__init__(grid, scan, device)
         self.error, self.lobes = float(error), int(lobes)
         self._rays = found = rays(grid.slice(), scan)
-        self.samples = lobes * found.length if lobes else found.length // 2
+        self.samples = self.lobes * found.length if self.lobes else found.length // 2
         spread = len(scan.angles) * self.samples
         self.gridding = choose((grid.shape[-2], grid.shape[-1]), spread, float(error))
         self._columns = in_steps(-(-len(scan.angles) // 2))

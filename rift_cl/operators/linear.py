@@ -35,6 +35,7 @@ from rift_cl.cl.memory import (
     share,
 )
 from rift_cl.errors import DeviceMemoryError, InputError, ResourceLimitError
+from rift_cl.geometry import Grid, Parallel
 
 Shape = tuple[int, ...]
 # An index into an operator's domain and the index into its range that depends on it alone.
@@ -48,6 +49,8 @@ _TENSOR_BRIDGE = "rift_cl.interop.linear_torch"
 class LinearOperator(ABC):
     """A linear map between arrays on one device.
 
+    ``grid`` and ``scan`` are those of what it takes and gives, where it knows them.
+
     Args:
         domain: shape of what it takes.
         range: shape of what it gives.
@@ -57,6 +60,9 @@ class LinearOperator(ABC):
     Raises:
         DeviceError: ``dtype`` is float64 and the device has none.
     """
+
+    grid: Grid | None = None
+    scan: Parallel | None = None
 
     def __init__(
         self, domain: Shape, range: Shape, device: Device, dtype: DTypeLike = np.float32
@@ -87,7 +93,8 @@ class LinearOperator(ABC):
             Array of shape ``range`` and type ``dtype``, on the side where ``x`` is.
 
         Raises:
-            InputError: ``x`` or ``out`` has the wrong shape or type, or holds NaN or infinity.
+            InputError: ``x`` or ``out`` has the wrong shape or type, or an ``x`` on the host
+                holds NaN or infinity; what is on a device is not looked at.
             DeviceMemoryError: not even the smallest piece fits the device.
         """
         if is_tensor(x):

@@ -28,6 +28,9 @@ class ParallelProjector(LinearOperator):
     Values of the range are in the image's unit times the grid's unit of length.
     """
 
+    grid: Grid
+    scan: Parallel
+
     def __init__(
         self,
         grid: Grid,
@@ -42,17 +45,19 @@ class ParallelProjector(LinearOperator):
     def _pieces(self, budget: int) -> Iterable[Piece]:
         return self.pieces(budget)
 
-    def pieces(self, budget: int, *, sinograms: int = 1) -> list[Piece]:
+    def pieces(self, budget: int, *, sinograms: int = 1, fixed: int = 0) -> list[Piece]:
         """How to cut the slices to fit a budget in bytes.
 
         Args:
             budget: bytes there are.
             sinograms: how many a slice needs at a time; more than one where others are made of it.
+            fixed: bytes needed besides, whatever the number of slices.
         """
         views, bins = len(self.scan.angles), self.scan.bins
         numbers = math.prod(self.grid.shape[-2:]) + sinograms * views * bins
         each = self.dtype.itemsize * numbers
-        runs = plan_chunks(self.grid.slices, each, self.scratch, budget, what="slice")
+        needed = self.scratch + fixed
+        runs = plan_chunks(self.grid.slices, each, needed, budget, what="slice")
         if len(self.grid.shape) == 2:
             return [((), ())]
         return [((run,), (slice(None), run)) for run in runs]

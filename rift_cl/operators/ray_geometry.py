@@ -136,7 +136,7 @@ def tile_visits(
     first, count = _crossing(steps, places[:, 1:], width, tile)
     visits = np.concatenate([places[:, 1:], first[:, None], count[:, None]], axis=1)
     starts = np.searchsorted(places[:, 0], np.arange(across * down + 1))
-    return visits[:, :].astype(np.int32), starts.astype(np.int32)
+    return visits.astype(np.int32), starts.astype(np.int32)
 
 
 def _crossing(

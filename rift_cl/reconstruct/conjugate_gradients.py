@@ -13,10 +13,14 @@ from typing import Any
 
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.reductions import dot
+from rift_cl.errors import InputError
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.reconstruct.data_term import DataTerm
 from rift_cl.reconstruct.residual_weight import Precondition
 from rift_cl.reconstruct.solver import Solver, SolverState, solve
+
+# Squares below this have lost digits, or all of them, in float32.
+_FAINTEST = 1e-30
 
 
 @dataclass
@@ -37,6 +41,7 @@ class _State(SolverState):
 class Cgls(Solver):
     """Conjugate gradients that have begun; arguments and errors are those of ``cgls``."""
 
+    arrays = 3, 5
     _now: _State
 
     def __init__(
@@ -48,7 +53,7 @@ class Cgls(Solver):
         precondition: Precondition = None,
         noise: float | None = None,
     ) -> None:
-        data = DataTerm(A, y, precondition, noise)
+        data = DataTerm(A, y, precondition, noise, self.arrays)
         super().__init__(data, noise)
         image, residual, direction = data.start(start), data.data(), data.image()
         data.residual(image, residual)
@@ -58,6 +63,11 @@ class Cgls(Solver):
         data.gradient(residual if weighted is None else weighted, direction)
         axpby(data.device, 0.0, direction, -1.0, direction)
         slope = dot(data.device, direction, direction)
+        if 0 < slope < _FAINTEST:
+            raise InputError(
+                f"y and A are so small that squares do not fit {data.dtype}: scale lengths and "
+                "values to near 1"
+            )
         rms = data.rms(residual)
         self._now = _State(image, residual, 0, rms, weighted, direction, slope)
         self._spare = data.data(), data.data(), data.image()

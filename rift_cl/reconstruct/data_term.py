@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from rift_cl.cl.arithmetic import axpby
+from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.elementwise import copy
 from rift_cl.cl.memory import as_device_array, as_host_array, is_device_array
 from rift_cl.cl.reductions import dot, norm
@@ -35,13 +36,20 @@ class DataTerm:
         y: the data, of shape ``A.range``, on the host or on A's device.
         precondition: see ``residual_weight``.
         noise: standard deviation of the noise of a sample of y, if known.
+        arrays: of the shape of x and of the shape of y that the method keeps on the device.
 
     Raises:
         InputError: A is no operator, or y, ``precondition`` or ``noise`` cannot be used.
+        ResourceLimitError: they do not fit the device's budget.
     """
 
     def __init__(
-        self, A: LinearOperator, y: Any, precondition: Precondition, noise: float | None
+        self,
+        A: LinearOperator,
+        y: Any,
+        precondition: Precondition,
+        noise: float | None,
+        arrays: tuple[int, int] = (1, 2),
     ) -> None:
         if not isinstance(A, LinearOperator):
             raise InputError(
@@ -50,7 +58,11 @@ class DataTerm:
         if noise is not None and not one_number(noise) >= 0:
             raise InputError(f"noise is {noise!r}, wanted a standard deviation, 0 or more")
         self.A, self.device, self.dtype = A, A.device, A.dtype
-        self.y = self.on_device(y, A.range, name="y")
+        images, sinograms = (math.prod(shape) for shape in (A.domain, A.range))
+        each = self.dtype.itemsize * (arrays[0] * images + arrays[1] * sinograms)
+        plan_chunks(1, each, A.scratch, self.device.budget, what="solver")
+        self.y = self.data()
+        copy(self.device, self.on_device(y, A.range, name="y"), self.y)
         self.weight = residual_weight(A, self.y, precondition, noise)
         self.unit_gain = self.weight is None or isinstance(precondition, str)
         """Whether F keeps the size of white noise; not known of an operator of the caller's."""

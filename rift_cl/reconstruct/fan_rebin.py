@@ -13,11 +13,13 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from rift_cl.cl.memory import check_finite
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
 from rift_cl.geometry.fan import FanBeam
+from rift_cl.geometry.numbers import real_numbers
 
 Floats = NDArray[np.float64]
 Stack = NDArray[np.float32]
@@ -30,6 +32,8 @@ _BORDER = 12
 _LEAST_COVERED = 0.1
 # A full turn may lack a view and a half, and an end of a scan this share of a step.
 _TURN_SLACK, _SLACK = 1.5, 1e-3
+# Angles closer than this are the same, in radians.
+_SAME = 1e-6
 
 
 class _Views(NamedTuple):
@@ -77,7 +81,6 @@ def rebin_fan(
         ShapeError: the arrays do not fit each other.
         InputError: the interpolation is unknown, or no parallel view is covered.
     """
-    scan, _ = covered_rays(angles, np.shape(projections)[-1], fan, whole=whole)
     stack = np.asarray(projections, np.float32)
     if stack.ndim not in (2, 3) or stack.shape[0] != np.size(angles):
         raise ShapeError(
@@ -86,7 +89,11 @@ def rebin_fan(
         )
     if interpolation not in _ORDERS:
         raise InputError(f"interpolation is {interpolation!r}, wanted linear or cubic")
-    views, order = _sorted(np.asarray(angles, np.float64)), _ORDERS[interpolation]
+    check_finite(stack, name="projections")
+    turned, group = _in_one_turn(angles)
+    scan, _ = covered_rays(turned, stack.shape[-1], fan, whole=whole)
+    stack = _means(stack, group) if len(turned) < len(group) else stack[np.argsort(group)]
+    views, order = _views(turned), _ORDERS[interpolation]
     ways = _readings(views, scan, fan, stack.shape[-1])
     seen = np.maximum(sum(weight for _, weight in ways), 1)
     places = [(place, weight / seen) for place, weight in ways if weight.any()]
@@ -114,7 +121,7 @@ def covered_rays(
     Raises:
         InputError: the views are fewer than two, or cover no parallel view.
     """
-    views = _sorted(np.asarray(angles, np.float64))
+    views = _views(_in_one_turn(angles)[0])
     gamma = fan.fan_angles(bins)
     pitch = fan.pitch / fan.magnification
     low, high = fan.source_to_axis * np.sin(gamma[[0, -1]]) / pitch
@@ -142,14 +149,38 @@ def covered_rays(
     return Parallel(directions[covered], scan.bins, pitch, -first), seen[covered]
 
 
-def _sorted(angles: Floats) -> _Views:
-    if angles.ndim != 1 or angles.size < 2 or not np.isfinite(angles).all():
-        raise InputError("angles of a fan scan are wanted as two or more finite numbers, radians")
-    order = np.argsort(angles, kind="stable")
-    ascending = angles[order]
+def _in_one_turn(angles: ArrayLike) -> tuple[Floats, NDArray[np.intp]]:
+    """The distinct angles of views, those of further turns brought into the first; ascending.
+
+    Returns:
+        (n,) angles, and (views,) which of them each view has.
+    """
+    values = real_numbers(angles)
+    if values is None or values.ndim != 1 or values.size < 1 or not np.isfinite(values).all():
+        raise InputError("angles of a fan scan are wanted as finite numbers, in radians")
+    if np.ptp(values) > 2 * np.pi + _SAME:
+        lowest = values.min()
+        values = lowest + np.mod(values - lowest + _SAME, 2 * np.pi) - _SAME
+    order = np.argsort(values, kind="stable")
+    new = np.concatenate([[True], np.diff(values[order]) > _SAME])
+    group = np.empty(values.size, np.intp)
+    group[order] = np.cumsum(new) - 1
+    return values[order][new], group
+
+
+def _means(stack: Stack, group: NDArray[np.intp]) -> Stack:
+    """The mean of the views of each group."""
+    sums = np.zeros((group.max() + 1, *stack.shape[1:]))
+    np.add.at(sums, group, stack)
+    counts = np.bincount(group).reshape((-1,) + (1,) * (stack.ndim - 1))
+    return (sums / counts).astype(np.float32)
+
+
+def _views(ascending: Floats) -> _Views:
+    if ascending.size < 2:
+        raise InputError("the fan scan has views of one angle alone, wanted two or more angles")
     span, step = np.ptp(ascending), np.median(np.diff(ascending))
-    if not step > 0:
-        raise InputError("most views of the fan scan have one angle: is the array of angles right?")
+    order = np.arange(ascending.size)
     if span < 2 * np.pi - _TURN_SLACK * step:
         return _Views(ascending, order, False, float(ascending[0]), float(ascending[-1]))
     once = ascending < ascending[0] + 2 * np.pi - step / 2

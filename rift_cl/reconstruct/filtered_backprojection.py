@@ -12,6 +12,7 @@ each view gets a filter of its own (rift_cl/operators/compensation.py).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -19,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError
+from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.compensation import Compensation
 from rift_cl.operators.filters import Filter, Gains, ViewFilter, as_filter
 from rift_cl.operators.linear import LinearOperator, Piece
@@ -58,7 +60,9 @@ class FilteredBackprojection(LinearOperator):
     ) -> None:
         super().__init__(A.range, A.domain, A.device, A.dtype)
         self._A = A
-        size = object_diameter(A) if diameter is None else diameter
+        size = object_diameter(A) if diameter is None else one_number(diameter)
+        if not size > 0:
+            raise InputError(f"diameter is {diameter!r}, wanted the object's, a positive length")
         self._filter = ViewFilter(
             A.scan,
             as_filter(filter),
@@ -78,9 +82,15 @@ class FilteredBackprojection(LinearOperator):
         self._A._apply(y, projected)
         self._filter._apply_adjoint(projected, out)
 
+    @property
+    def scratch(self) -> int:
+        """The filtered sinogram, besides what filter and projector need."""
+        views = self.dtype.itemsize * math.prod(self.domain)
+        return views + self._filter.scratch + self._A.scratch
+
     def _pieces(self, budget: int) -> Iterable[Piece]:
         # The sinogram and the filtered one.
-        pieces = self._A.pieces(budget - self._filter.scratch, sinograms=2)
+        pieces = self._A.pieces(budget, sinograms=2, fixed=self._filter.scratch)
         return [(inside, outside) for outside, inside in pieces]
 
 
@@ -119,7 +129,7 @@ def fbp(
 def backproject(A: ParallelProjector, y: Any, *, out: Any = None) -> Any:
     """Backproject without a filter, every view alike: the paper's unfiltered baseline.
 
-    Arguments, result and errors are those of ``fbp``. The result is the image convolved with
+    ``A``, ``y``, ``out`` and errors are those of ``fbp``. The result is the image convolved with
     1 / r, in the image's unit times a length; compare it after an affine fit.
     """
     _check_projector(A)

@@ -13,10 +13,12 @@ adjoint once.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import copy
+from rift_cl.errors import InputError
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.reconstruct.residual_weight import Precondition
 from rift_cl.reconstruct.solver import check_steps
@@ -51,6 +53,8 @@ class Fista(VariationSolver):
     ``inner`` is the number of denoising steps within each step.
     """
 
+    arrays = 14, 6
+    least = MappingProxyType({"step": 0.0, "t": 1.0, "largest": 1e-300})
     _now: _State
 
     def __init__(
@@ -69,6 +73,8 @@ class Fista(VariationSolver):
             A, y, weight, nonnegative=nonnegative, precondition=precondition, noise=noise
         )
         self._inner = check_steps(inner, name="inner") if weight > 0 else 0
+        if weight > 0 and self._inner == 0:
+            raise InputError("inner is 0, wanted one denoising step or more")
         data = self.data
         begun = self._begin(start)
         before, seen = data.image(), data.data()

@@ -28,6 +28,8 @@ _SLACK = 1.5
 _LEAST_BINS, _LEAST_SHARE = 8, 0.03
 # Bins over which differences are taken, so that noise does not decide.
 _SMOOTH = 2.0
+# Angles closer than this are the same, in radians.
+_SAME = 1e-6
 # Most pairs of opposite views that are compared.
 _PAIRS = 180
 
@@ -36,7 +38,9 @@ def is_full_turn(angles: Floats) -> bool:
     """Whether views go all round, so that every line is met from both sides."""
     circle = np.sort(np.mod(angles, 2 * np.pi))
     gaps = np.diff(circle, append=circle[0] + 2 * np.pi)
-    return angles.size > 2 and bool(gaps.max() <= _SLACK * 2 * np.pi / np.unique(circle).size)
+    # Turns that repeat each other differ by rounding.
+    distinct = max(int(np.count_nonzero(gaps > _SAME)), 1)
+    return angles.size > 2 and bool(gaps.max() <= _SLACK * 2 * np.pi / distinct)
 
 
 def is_offset(scan: Parallel) -> bool:

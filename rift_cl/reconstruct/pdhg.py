@@ -43,6 +43,7 @@ class _State(VariationState):
 class Pdhg(VariationSolver):
     """PDHG that has begun; arguments and errors are those of ``tv``."""
 
+    arrays = 8, 7
     _now: _State
 
     def __init__(

@@ -50,7 +50,7 @@ _ROWS = 2048
 # Samples of the spectrum that are averaged, as far as they are independent.
 _AVERAGED = 256
 # Frequencies for each bin over which the gain to white noise is averaged.
-_FINE = 16
+_FINE, _COARSE = 16, 2
 NAMES = ("ramp", *COMPENSATIONS)
 
 
@@ -77,13 +77,13 @@ def residual_weight(
         return None
     if isinstance(precondition, LinearOperator):
         return _checked(A, precondition)
-    if precondition not in NAMES:
+    if not isinstance(precondition, str) or precondition not in NAMES:
         raise InputError(
             f"precondition is {precondition!r}, wanted None, one of {', '.join(NAMES)}, or a "
             "LinearOperator on A.range"
         )
-    scan = getattr(A, "scan", None)
-    if not isinstance(scan, Parallel):
+    scan = A.scan
+    if scan is None:
         raise InputError(
             f"precondition is {precondition!r}, but A ({type(A).__name__}) has no scan to build it "
             "for: pass a LinearOperator on A.range"
@@ -107,7 +107,8 @@ def _checked(A: LinearOperator, F: LinearOperator) -> LinearOperator:
 
 def _ramp(A: LinearOperator, scan: Parallel, name: str, share: Share) -> LinearOperator:
     """The ramp times the square of a share, with a mean gain of 1."""
-    count = _FINE * scan.bins
+    # A compensation is a table of views and frequencies, in float64: fewer do for its mean.
+    count = (_FINE if name == "ramp" else _COARSE) * scan.bins
     middle = np.arange(0.5, count) * (0.5 / scan.pitch / count)
     given: dict[str, Any] = {
         "rows": A.range[1] if len(A.range) == 3 else None,
@@ -128,16 +129,18 @@ def _ramp(A: LinearOperator, scan: Parallel, name: str, share: Share) -> LinearO
 
 def _kept_share(A: LinearOperator, scan: Parallel, y: Any, noise: float | None) -> Share:
     """The share of a frequency that is kept, as a function of frequencies in cycles per length."""
-    if not noise:
+    # Beyond these a square is no number any more.
+    variance = 0.0 if noise is None else min(noise, 1e150) ** 2
+    if variance == 0:
         return np.ones_like
     frequencies, power = mean_power(download(A.device, y), scan.pitch)
-    signal = np.minimum.accumulate(np.maximum(power - noise**2, 0))
+    signal = np.minimum.accumulate(np.maximum(power - variance, 0))
     diameter = _diameter(A, scan)
 
     def share(f: Floats) -> Floats:
         seen = len(scan.angles) / (math.pi * np.maximum(f, 1e-6 / diameter) * diameter)
         found = np.maximum(seen, 1) * np.interp(f, frequencies, signal)
-        return np.maximum(found / (found + noise**2), _LEAST)
+        return np.maximum(found / (found + variance), _LEAST)
 
     return share
 
@@ -145,10 +148,9 @@ def _kept_share(A: LinearOperator, scan: Parallel, y: Any, noise: float | None) 
 def _diameter(A: LinearOperator, scan: Parallel) -> float:
     """Of the object: the grid's longer edge, as far as the detector sees it."""
     seen = scan.bins * scan.pitch
-    grid = getattr(A, "grid", None)
-    if grid is None:
+    if A.grid is None:
         return seen
-    plane = grid.slice()
+    plane = A.grid.slice()
     longest = max(n * h for n, h in zip(plane.shape, plane.spacing, strict=True))
     return min(seen, float(longest))
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rift_cl.cl.elementwise import copy, multiply
-from rift_cl.errors import ShapeError
+from rift_cl.errors import DTypeError, ShapeError
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.operators.parallel_projector import ParallelProjector
 
@@ -26,12 +26,15 @@ class SeenRays(LinearOperator):
 
     Raises:
         ShapeError: the rays are not those of the projector.
+        DTypeError: they are not booleans.
     """
 
     def __init__(self, A: ParallelProjector, seen: ArrayLike) -> None:
-        mask = np.asarray(seen, np.float32)
+        mask = np.asarray(seen)
         if mask.shape != A.range:
             raise ShapeError(f"seen has shape {mask.shape}, wanted the projector's {A.range}")
+        if mask.dtype != np.bool_:
+            raise DTypeError(f"seen holds {mask.dtype}, wanted booleans: compare it with a number")
         super().__init__(A.domain, A.range, A.device, A.dtype)
         self.grid, self.scan = A.grid, A.scan
         self._A, self._seen = A, A.device.array(mask, A.dtype)

@@ -56,6 +56,7 @@ class _State(SolverState):
 class Sirt(Solver):
     """SIRT that has begun; arguments and errors are those of ``sirt``."""
 
+    arrays = 5, 6
     _now: _State
 
     def __init__(
@@ -71,7 +72,7 @@ class Sirt(Solver):
     ) -> None:
         if not 0 < one_number(relaxation) < 2:
             raise InputError(f"relaxation is {relaxation!r}, wanted a number between 0 and 2")
-        data = DataTerm(A, y, precondition, noise)
+        data = DataTerm(A, y, precondition, noise, self.arrays)
         super().__init__(data, noise)
         self._nonnegative = nonnegative
         self._rays, self._pixels, self._length = None, None, float(relaxation)

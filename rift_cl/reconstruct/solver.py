@@ -13,11 +13,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from types import MappingProxyType
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import copy
 from rift_cl.cl.memory import as_device_array, check_output, download, is_device_array
 from rift_cl.errors import CheckpointError, InputError
@@ -26,6 +28,8 @@ from rift_cl.progress import Report
 from rift_cl.reconstruct.data_term import DataTerm
 
 SAFETY = 1.0
+# What rounding may make of a residual that many steps have updated, relative to the data.
+_SAME_RESIDUAL = 1e-3
 
 
 @dataclass
@@ -53,6 +57,10 @@ class Solver(ABC):
         noise: standard deviation of the noise of a sample of y; None: stop by count alone.
     """
 
+    arrays: ClassVar[tuple[int, int]]
+    """Arrays of the shape of x and of the shape of y that it keeps on the device."""
+    least: ClassVar[Mapping[str, float]] = MappingProxyType({"step": 0.0})
+    """The least values of numbers of its state."""
     _now: SolverState
 
     def __init__(self, data: DataTerm, noise: float | None) -> None:
@@ -88,6 +96,8 @@ class Solver(ABC):
         total = check_steps(steps)
         while self._now.step < total and not self.finished:
             self._advance()
+            if self._exhausted:
+                return
             values = {"residual": self._now.rms, **self._figures()}
             yield Report(self._now.step, total, "iterations", values)
 
@@ -116,6 +126,10 @@ class Solver(ABC):
         spoilt = [name for name, value in found.items() if not np.isfinite(value).all()]
         if spoilt:
             raise CheckpointError(f"state holds NaN or infinity in {', '.join(spoilt)}")
+        low = [name for name, least in self.least.items() if found[name] < least]
+        if low:
+            raise CheckpointError(f"state holds {found[low[0]]} for {low[0]}: it is damaged")
+        self._demand_own(found)
         for name, value in entries.items():
             if is_device_array(value):
                 fresh = self.data.device.array(found[name], self.data.dtype)
@@ -123,6 +137,20 @@ class Solver(ABC):
             else:
                 setattr(self._now, name, type(value)(found[name]))
         self._exhausted = False
+
+    def _demand_own(self, found: Mapping[str, NDArray[Any]]) -> None:
+        """Make sure that the residual of a state is that of its image, with this A and y.
+
+        Raises:
+            CheckpointError: it is not.
+        """
+        data, residual = self.data, self.data.data()
+        data.residual(data.device.array(found["image"], data.dtype), residual)
+        given = data.device.array(found["residual"], data.dtype)
+        axpby(data.device, -1.0, residual, 1.0, given)
+        size = data.rms(residual) + data.rms(data.y)
+        if data.rms(given) > _SAME_RESIDUAL * size:
+            raise CheckpointError("state of another A or another y: its residual is not theirs")
 
     def _entries(self) -> Iterator[tuple[str, Any]]:
         for field in fields(self._now):

@@ -57,11 +57,10 @@ class VariationSolver(Solver):
     ) -> None:
         if not one_number(weight) >= 0:
             raise InputError(f"weight is {weight!r}, wanted a number, 0 or more")
-        data = DataTerm(A, y, precondition, noise)
+        data = DataTerm(A, y, precondition, noise, self.arrays)
         super().__init__(data, noise)
         self._weight, self._nonnegative = float(weight), bool(nonnegative)
-        grid = getattr(A, "grid", None)
-        spacing = (1.0,) * len(A.domain) if grid is None else grid.spacing
+        spacing = (1.0,) * len(A.domain) if A.grid is None else A.grid.spacing
         self.variation = TotalVariation(data.device, A.domain, spacing, data.dtype)
 
     def _begin(self, start: Any) -> dict[str, Any]:

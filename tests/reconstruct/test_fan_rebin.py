@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.geometry.fan import FanBeam
 from rift_cl.reconstruct.fan_rebin import covered_rays, rebin_fan
 
@@ -105,6 +105,24 @@ def test_views_in_any_order_and_turn_give_the_same():
     turned, later = rebin_fan(sinogram, angles + 2 * np.pi, fan)
     np.testing.assert_allclose(later.angles - 2 * np.pi, scan.angles, atol=1e-9)
     np.testing.assert_allclose(turned, parallel, atol=1e-3)
+
+
+def test_further_turns_count_as_much_as_the_first():
+    fan, angles, sinogram = fan_scan(**SCANS["full turn"])
+    once, scan = rebin_fan(sinogram, angles, fan)
+    turns = np.concatenate([angles, angles + 2 * np.pi])
+    both, same = rebin_fan(np.concatenate([0 * sinogram, 2 * sinogram]), turns, fan)
+    np.testing.assert_allclose(same.angles, scan.angles, atol=1e-6)
+    np.testing.assert_allclose(both, once, atol=1e-3)
+    golden = 2.399963 * np.arange(400)
+    assert covered_rays(golden, BINS, fan)[1].all(axis=1).sum() > 100
+
+
+def test_a_value_that_is_no_number_is_told():
+    fan, angles, sinogram = fan_scan(**SCANS["wedge"])
+    sinogram[3, 4] = np.nan
+    with pytest.raises(NonFiniteError, match="projections"):
+        rebin_fan(sinogram, angles, fan)
 
 
 def test_rows_are_alike():
