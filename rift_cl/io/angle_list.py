@@ -27,6 +27,25 @@ _TURN = re.compile(rf"(?:({_NUMBER}):)?({_NUMBER})")
 Angles = NDArray[np.float64]
 
 
+def given_angles(text: str, count: int) -> Angles | None:
+    """Angles that are said outside the scan: an even turn, or a file of them.
+
+    Args:
+        text: see ``even_angles``; or the name of a file, see ``file_angles``.
+        count: number of angles.
+
+    Returns:
+        The angles in radians, read-only, or None where the text names neither.
+
+    Raises:
+        InputError: a file's; see ``file_angles`` for its kinds.
+    """
+    angles = even_angles(text, count)
+    if angles is None and text.lower().endswith(SUFFIXES):
+        angles = file_angles(Path(text).absolute(), count)
+    return angles
+
+
 def even_angles(text: str, count: int) -> Angles | None:
     """Angles evenly over a turn, in radians; the end of the turn is not one of them.
 

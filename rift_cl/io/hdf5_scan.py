@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError
+from rift_cl.io.angle_list import given_angles
 from rift_cl.io.hdf5_frames import FrameStack, Hdf5Rows, calibration_stack, projection_stack
 from rift_cl.io.hdf5_tree import Hdf5Tree, open_tree
 from rift_cl.io.hdf5_values import read_angles
@@ -59,7 +60,7 @@ def _named(tree: Hdf5Tree, names: ArrayNames, *, budget: int | None) -> ScanFile
 def _data_exchange(tree: Hdf5Tree, names: ArrayNames, *, budget: int | None) -> ScanFile:
     projections = projection_stack(tree, _DATA)
     theta = names.theta or _THETA
-    if tree.find(theta) is None:
+    if names.theta is None and tree.find(theta) is None:
         raise FileFormatError(
             f"{tree.path}: a Data Exchange scan without its angles {theta!r}; name them with "
             f"theta= (--theta); {tree.contents()}"
@@ -90,6 +91,10 @@ def _present(
 
 
 def _angles(tree: Hdf5Tree, name: str, projections: FrameStack) -> NDArray[np.float64]:
+    if tree.find(name) is None:
+        given = given_angles(name, projections.frames)
+        if given is not None:
+            return given
     return check_angles(tree.path, name, read_angles(tree, name), projections=projections.frames)
 
 

@@ -9,7 +9,6 @@ else is named by the caller.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,6 +155,11 @@ def _views(
     axes = "nrb" if len(shape) == 3 else flat or ("bn" if turned else "nb")
     stack = MatStack(name, shape, axes)
     angles, notes = _angles(file, theta, stack.size("n"))
+    if axes == "nb" and flat is None and given is None:
+        notes += (
+            f"Array {name!r} {shape} is taken as (angle, bin); if it is (bin, angle), name an "
+            "array of its angles.",
+        )
     if stack.axes == "bn" and flat is None:
         notes += (f"Array {name!r} {shape} is (bin, angle), as there are {angles.size} angles.",)
     return stack, angles, notes
@@ -163,9 +167,7 @@ def _views(
 
 def _angles(file: MatFile, theta: str, count: int) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     if theta not in file.arrays:
-        angles = angle_list.even_angles(theta, count)
-        if angles is None and theta.lower().endswith(angle_list.SUFFIXES):
-            angles = angle_list.file_angles(Path(theta).absolute(), count)
+        angles = angle_list.given_angles(theta, count)
         if angles is not None:
             return angles, angle_list.unit_note(angles)
     array_of(file, theta)

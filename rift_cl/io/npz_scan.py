@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, ShapeError
+from rift_cl.io.angle_list import given_angles
 from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.npz_archive import NpzArchive
 from rift_cl.io.scan_file import (
@@ -90,12 +91,14 @@ def open_npz_scan(path: Path, names: ArrayNames, *, budget: int | None) -> ScanF
             if calibration:
                 _check_calibration(archive, calibration, shape)
         theta = str(names.theta)
-        angles = check_angles(path, theta, _vector(archive, theta), projections=shape[0])
+        given = None if theta in archive else given_angles(theta, shape[0])
+        if given is None:
+            given = check_angles(path, theta, _vector(archive, theta), projections=shape[0])
         pitch = usable_pitch(float(_vector(archive, "pitch")[0])) if "pitch" in archive else None
     kind: Kind = "transmission" if names.flats else "attenuation"
     frames = (shape[0], shape[1] if len(shape) == 3 else 1, shape[-1])
     rows = NpzRows(path, name, names.flats, names.darks, shape, budget)
-    return ScanFile(path, frames, angles, pitch, "", kind, "NPZ", rows)
+    return ScanFile(path, frames, given, pitch, "", kind, "NPZ", rows)
 
 
 @contextmanager

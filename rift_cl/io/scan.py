@@ -57,8 +57,8 @@ def open_scan(
         dataset: name of the projections, (angle, row, bin), or of a sinogram, (angle, bin);
             or the name of an HDF5 group that holds one NXtomo scan of several.
         theta: name of the angles. HDF5: degrees unless their ``units`` say radians; MAT: degrees
-            unless ``rad`` is part of the name. TIFF and MAT: also a file of degrees (.txt, .csv,
-            .npy), or a turn that is evenly divided, ``0:180`` or ``360``, its end left out.
+            unless ``rad`` is part of the name. Of all but NXtomo also a file of degrees (.txt,
+            .csv, .npy), or a turn that is evenly divided, ``0:180`` or ``360``, its end left out.
         flats: name of frames with the beam but without the sample; for TIFF, of a file or folder.
             Arrays named by ``dataset`` without them count as attenuation, and so does TIFF.
         darks: name of frames without the beam.

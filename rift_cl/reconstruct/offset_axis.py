@@ -22,8 +22,9 @@ Stack = NDArray[np.float32]
 
 # An axis counts as offset where the shorter side is below this share of the longer.
 _OFFSET = 0.8
-# A full turn may lack as much of it as this many steps between views.
-_SLACK = 1.5
+# A full turn may lack as much of it as this many steps between views, or this angle: a view or
+# two that were lost, and the jitter of a turntable, leave it what it is.
+_SLACK, _HOLE = 1.5, np.pi / 36
 # The least overlap at which an axis is looked for, in bins and as a share of the detector.
 _LEAST_BINS, _LEAST_SHARE = 8, 0.03
 # Bins over which differences are taken, so that noise does not decide.
@@ -40,12 +41,12 @@ def is_full_turn(angles: Floats) -> bool:
     gaps = np.diff(circle, append=circle[0] + 2 * np.pi)
     # Turns that repeat each other differ by rounding.
     distinct = max(int(np.count_nonzero(gaps > _SAME)), 1)
-    return angles.size > 2 and bool(gaps.max() <= _SLACK * 2 * np.pi / distinct)
+    return angles.size > 2 and bool(gaps.max() <= max(_SLACK * 2 * np.pi / distinct, _HOLE))
 
 
 def is_offset(scan: Parallel) -> bool:
     """Whether a full turn's axis lies so far from the detector's middle that it sees further."""
-    left, right = scan.center + 0.5, scan.bins - 0.5 - scan.center
+    left, right = scan.center, scan.bins - 1 - scan.center
     short, long = min(left, right), max(left, right)
     return is_full_turn(scan.angles) and 0 < short < _OFFSET * long
 

@@ -143,6 +143,19 @@ def test_npz(tmp_path: Path) -> None:
     assert rows.darks is None
 
 
+def test_angles_may_be_said_outside_any_file(tmp_path: Path) -> None:
+    made.data_exchange(tmp_path / "a.h5")
+    made.npz(tmp_path / "a.npz")
+    np.savetxt(tmp_path / "t.txt", made.DEGREES[::-1])
+    for name in ("a.h5", "a.npz"):
+        even = open_scan(tmp_path / name, theta="0:180")
+        np.testing.assert_allclose(np.rad2deg(even.angles), 30 * np.arange(made.FRAMES), atol=1e-12)
+        listed = open_scan(tmp_path / name, theta=str(tmp_path / "t.txt"))
+        np.testing.assert_allclose(np.rad2deg(listed.angles), made.DEGREES[::-1], atol=1e-12)
+        with pytest.raises(FileFormatError, match="thta"):
+            open_scan(tmp_path / name, theta="thta")
+
+
 def test_npz_named_arrays(tmp_path: Path) -> None:
     data = made.npz(tmp_path / "a.npz")
     with np.load(tmp_path / "a.npz") as file:
