@@ -104,16 +104,12 @@ def _challenge(file: MatFile, scan: str, names: ArrayNames) -> MatLayout:
 def _dendrites(file: MatFile, names: ArrayNames) -> MatLayout:
     projections, angles, notes = _views(file, "sinoRD", names.theta or "anglesRad", flat="bn")
     bins = min(_DENDRITES_BACKGROUND, projections.size("b") // 4)
-    offset = (
-        "The numbers carry an offset outside the sample, which is the mean over the outer "
-        f"{bins} bins of both ends and is to be subtracted from each view."
-    )
     return MatLayout(
         projections=projections,
         angles=angles,
         source="MAT, ToMoBAR sinoRD",
         background=bins,
-        notes=(offset, *notes),
+        notes=notes,
     )
 
 

@@ -53,6 +53,9 @@ def sorted_kinds(folder: Path, names: Iterable[str]) -> dict[FrameKind, list[str
         FileFormatError: a name says two things, or the projections are named in several ways.
     """
     kinds: dict[FrameKind, list[str]] = {"projections": [], "flats": [], "darks": []}
+    names = list(names)
+    if lone_series(names):
+        return {**kinds, "projections": names}
     for name in names:
         said = [kind for kind, words in _WORDS.items() if words & _words(Path(name).stem)]
         if len(said) > 1:
@@ -70,6 +73,17 @@ def sorted_kinds(folder: Path, names: Iterable[str]) -> dict[FrameKind, list[str
             "the projections; put each into a folder of its own"
         )
     return kinds
+
+
+def lone_series(names: Iterable[str]) -> bool:
+    """Whether all files are one series that is named after an object such as ``dark_rock``.
+
+    A word for flats or darks in it says nothing of the frames; ``dark_0001`` alone does.
+    """
+    names = list(names)
+    words = _words(Path(names[0]).stem) if names else frozenset()
+    more = not words <= _CALIBRATION | _FILLERS
+    return bool(words & _CALIBRATION) and more and len({_series(name) for name in names}) == 1
 
 
 def folder_of(kind: FrameKind, place: Path) -> Path | None:

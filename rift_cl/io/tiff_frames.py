@@ -76,6 +76,12 @@ class TiffRows:
     darks: TiffStack | None
     budget: int | None
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Every file that is read: of the projections, then the flats, then the darks."""
+        stacks = (self.projections, self.flats, self.darks)
+        return tuple(path for stack in stacks if stack for path in stack.files)
+
     def read(self, start: int, stop: int) -> ScanRows:
         """Read detector rows ``start`` to ``stop`` of every stack."""
         stacks = [stack for stack in (self.projections, self.flats, self.darks) if stack]

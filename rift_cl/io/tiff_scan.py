@@ -20,6 +20,7 @@ from rift_cl.io.tiff_folder import (
     folder_of,
     gap,
     inside,
+    lone_series,
     projection_folder,
     sorted_kinds,
     tiff_names,
@@ -40,12 +41,14 @@ class _Place:
         files: the projections.
         folders: folders in which flats, darks and angles are looked for, the nearest first.
         beside: flats and darks among the projections' own files.
+        notes: what was assumed of the files' names.
     """
 
     path: Path
     files: tuple[Path, ...]
     folders: tuple[Path, ...]
     beside: dict[FrameKind, tuple[Path, ...]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 def open_tiff_scan(path: Path, names: ArrayNames, *, budget: int | None) -> ScanFile:
@@ -64,6 +67,7 @@ def open_tiff_scan(path: Path, names: ArrayNames, *, budget: int | None) -> Scan
     flats, flats_from = _calibration(place, "flats", names.flats, projections)
     darks, darks_from = _calibration(place, "darks", names.darks, projections)
     angles, notes = _angles(place, names.theta, projections)
+    notes = place.notes + notes
     kind: Kind = "transmission" if flats else "attenuation"
     if flats is None:
         notes += (_unused(projections, darks_from),)
@@ -96,7 +100,17 @@ def _folder(path: Path) -> _Place:
     beside: dict[FrameKind, tuple[Path, ...]] = {
         kind: inside(path, kinds[kind]) for kind in ("flats", "darks") if kinds[kind]
     }
-    return _Place(scan, inside(path, kinds["projections"]), around, beside)
+    files = inside(path, kinds["projections"])
+    return _Place(scan, files, around, beside, _named_alike(names))
+
+
+def _named_alike(names: list[str]) -> tuple[str, ...]:
+    if not lone_series(names):
+        return ()
+    return (
+        f"All files are one series ({names[0]!r}, ...): they are taken for the projections, though "
+        "their names hold a word for flats or darks.",
+    )
 
 
 def _file(path: Path) -> _Place:

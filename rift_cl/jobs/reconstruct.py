@@ -7,30 +7,28 @@ cut off goes on where it was.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Generator, Iterator
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
 from rift_cl.errors import StoppedError
-from rift_cl.io.volume import open_volume
 from rift_cl.jobs.reconstruct_input import SliceInput
 from rift_cl.jobs.reconstruct_method import Inversion
 from rift_cl.jobs.reconstruct_report import (
     PREVIEW_PICTURE,
     Preview,
+    planned,
     reconstruction_page,
     write_preview,
 )
 from rift_cl.jobs.reconstruct_settings import ReconstructSettings
 from rift_cl.jobs.reconstruct_slabs import SlabFolder, run_folder
+from rift_cl.jobs.reconstruct_volume import demand_place, open_slices, volume_path
 from rift_cl.jobs.scan_input import VOLUME_NAMES
 from rift_cl.progress import Report
 
@@ -61,6 +59,8 @@ class Reconstruction:
         self.folder = run_folder(settings, self._kept)
         self.metrics: dict[str, Any] = {}
         self.announce: Callable[[str], None] = lambda line: None
+        # Whether the slabs that are there are this run's, and whether it found them there.
+        self._ours, self._gone_on = False, False
         self._begin = time.perf_counter()
 
     @property
@@ -91,19 +91,7 @@ class Reconstruction:
     def plan(self) -> dict[str, str]:
         """What would be done, for ``--dry-run``; one slice is reconstructed to tell the time."""
         self.source.locate()
-        seconds = self._seconds_per_slice() * self.shape[0]
-        scan = self.source.scan
-        return {
-            "scan": f"{scan.path} ({scan.source}, {scan.kind})",
-            "projections": f"{scan.shape} (angle, row, bin)",
-            "volume": f"{self.shape} (z, y, x), {format_bytes(4 * math.prod(self.shape))}",
-            "method": self.settings.method,
-            "assumed": " ".join(self.source.notes) or "nothing",
-            "slabs": f"{len(self.slabs)} of at most {max(s.stop - s.start for s in self.slabs)}",
-            "device": f"{self.device.name}, budget {format_bytes(self.device.budget)}",
-            "output": str(self._volume_path),
-            "time": f"about {seconds:.3g} s, from one slice",
-        }
+        return planned(self, self._seconds_per_slice() * self.shape[0])
 
     def run(self) -> Iterator[Report]:
         """Do it; a report after every slab, or after every step.
@@ -113,34 +101,54 @@ class Reconstruction:
         """
         self._begin = time.perf_counter()
         yield Report(0, self._total, self._what)
-        going_on = self.settings.resume and self._kept.begun
-        if going_on:
-            self.source.center = self._kept.center() or self.source.center
-        self.source.locate()
-        self._kept.shape = self.shape
+        self._settle()
         self.folder.make()
         try:
             if self.settings.preview:
                 yield from self._look()
                 return
-            run = {**self.settings.decisive(), **self.source.identity(), "volume": str(self.shape)}
-            self._kept.go_on(run) if going_on else self._kept.begin(run)
-            yield from self._work(going_on=going_on)
+            demand_place(self.settings, self.source, self.inversion.window)
+            if not self._gone_on:
+                self._ours = True
+                self._kept.begin(self._facts())
+            yield from self._work()
         except BaseException as error:
             if not self._keep_what_is_done():
                 self.folder.discard()
             elif isinstance(error, KeyboardInterrupt):
-                done = self.shape[0] - sum(s.stop - s.start for s in self._kept.missing())
                 raise StoppedError(
-                    f"interrupted; {done} of {self.shape[0]} slices are kept: the same command "
-                    "with --resume goes on"
+                    f"interrupted; {self._kept.done} of {self.shape[0]} slices are kept: the same "
+                    "command with --resume goes on"
                 ) from None
             raise
         self._finish()
 
-    @property
-    def _volume_path(self) -> Path:
-        return self.settings.out / VOLUME_NAMES[self.settings.format]
+    def _settle(self) -> None:
+        """Find the axis, and whether there is something to go on with; nothing is written.
+
+        Raises:
+            InputError: the axis cannot be found, or a part that is wanted is not in the slice.
+            CheckpointError: what there is to go on with belongs to another run.
+        """
+        going_on = self.settings.resume and self._kept.begun
+        if going_on and self.settings.center is None:
+            self.source.center = self._kept.center()
+        self.source.locate()
+        if going_on and not self.settings.preview:
+            self._kept.go_on(self._facts())
+            self._ours = self._gone_on = True
+        self._kept.shape = self.shape
+        if self._gone_on:
+            self.source.notes.append(
+                f"Gone on after {self._kept.done} of {self.shape[0]} slices; steps, seconds and "
+                "dead pixels are those of the rest."
+            )
+        for note in self.source.notes:
+            self.announce(note)
+
+    def _facts(self) -> dict[str, str]:
+        """What decides the slices."""
+        return {**self.settings.decisive(), **self.source.identity(), "volume": str(self.shape)}
 
     @property
     def _what(self) -> str:
@@ -150,12 +158,16 @@ class Reconstruction:
     def _total(self) -> int:
         return self.shape[0] * self.settings.most_steps
 
-    def _work(self, *, going_on: bool) -> Iterator[Report]:
-        """Every slice that is missing; first, of a long run, the middle one to look at."""
+    @property
+    def _looks_first(self) -> bool:
         count = self.shape[0]
-        if not going_on and (count >= _PREVIEW_FROM or (self.settings.iterative and count > 1)):
+        return count >= _PREVIEW_FROM or (self.settings.iterative and count > 1)
+
+    def _work(self) -> Iterator[Report]:
+        """Every slice that is missing; first, of a long run, the middle one to look at."""
+        if not self._gone_on and self._looks_first:
             yield from self._look()
-        done = count - sum(s.stop - s.start for s in self._kept.missing())
+        done = self._kept.done
         for slab in self.inversion.slabs(self._kept.missing()):
             self._kept.save(slab.start, (yield from self._slab(slab, done)))
             done += slab.stop - slab.start
@@ -165,14 +177,14 @@ class Reconstruction:
     def _look(self) -> Iterator[Report]:
         """Reconstruct the middle slice, show it, and tell how long the others take."""
         middle = self.shape[0] // 2
-        begin = time.perf_counter()
         image = yield from self._slab(slice(middle, middle + 1), 0)
-        seconds = (time.perf_counter() - begin) * self.shape[0]
         path = self.settings.out / PREVIEW_PICTURE
         write_preview(path, image[0], f"slice {self.rows[0] + middle}", self.source.unit)
-        self.metrics["seconds_for_all"] = seconds
         if not self.settings.preview:
             self._kept.save(middle, image)
+        # Not the time that it took, in which kernels were built.
+        seconds = self._seconds_per_slice() * self.shape[0]
+        self.metrics["seconds_for_all"] = seconds
         done = self._total if self.settings.preview else self.settings.most_steps
         self.announce(f"{path} shows the middle slice; all take about {seconds:.3g} s")
         yield Report(done, self._total, self._what, {"seconds for all": seconds})
@@ -180,12 +192,9 @@ class Reconstruction:
     def _slab(self, slab: slice, before: int) -> Generator[Report, None, Floats]:
         first = self.rows[0]
         integrals = self.source.read(first + slab.start, first + slab.stop)
-        for name, found in (
-            ("dead_pixels", integrals.dead),
-            ("starved_samples", integrals.starved),
-        ):
-            self.metrics[name] = self.metrics.get(name, 0) + found
-        steps = self.inversion.slices(slab.start, integrals.projections)
+        found = {"dead_pixels": integrals.dead, "starved_samples": integrals.starved}
+        self.metrics.update({name: self.metrics.get(name, 0) + n for name, n in found.items()})
+        steps = self.inversion.slices(first + slab.start, integrals.projections)
         done = before * self.settings.most_steps
         while True:
             try:
@@ -198,21 +207,15 @@ class Reconstruction:
     def _finish(self) -> None:
         """Make the volume of the slabs, and the report."""
         preview = Preview.of(self.shape[0])
-        settings, spacing = self.settings, (self.inversion.window.pixel,) * 3
-        spacing = (self.source.pitch, *spacing[1:])
-        with open_volume(
-            self._volume_path,
-            self.shape,
-            format=settings.format,
-            spacing=spacing,
-            unit=self.source.unit,
-        ) as volume:
+        with open_slices(self.settings, self.source, self.inversion.window) as volume:
             for start, slab in self._kept.slabs():
                 volume.write(start, slab)
                 preview.take(start, slab)
         # From here on the slices are this run's, and an earlier configuration no longer theirs.
         self.folder.mark()
-        self.folder.drop(*set(VOLUME_NAMES.values()) - {VOLUME_NAMES[settings.format]})
+        self.folder.drop(*set(VOLUME_NAMES.values()) - {volume_path(self.settings).name})
+        if not self._looks_first:
+            self.folder.drop(PREVIEW_PICTURE)
         if self.source.center is not None:
             self.metrics = {"center": self.source.center, **self.metrics}
         self.metrics.update(self.inversion.figures())
@@ -221,15 +224,14 @@ class Reconstruction:
         self.metrics.pop("seconds_for_all", None)
         page = reconstruction_page(self, preview)
         record = {**self.metrics, "assumed": self.source.notes}
-        self.folder.finish(settings, record, page, self.device)
+        self.folder.finish(self.settings, record, page, self.device)
         self._kept.drop()
 
     def _keep_what_is_done(self) -> bool:
         """After a failure: whether slices are kept; else the traces of the run are removed."""
-        if self.settings.preview:
+        if not self._ours:
             return False
-        todo = self._kept.missing()
-        if sum(s.stop - s.start for s in todo) < self.shape[0]:
+        if self._gone_on or self._kept.done:
             return True
         self._kept.drop()
         return False

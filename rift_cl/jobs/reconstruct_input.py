@@ -12,10 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.errors import InputError
 from rift_cl.geometry import Parallel
+from rift_cl.jobs.reconstruct_notes import notes_of
 from rift_cl.jobs.reconstruct_settings import ReconstructSettings
-from rift_cl.jobs.scan_input import check_center, chosen_rows, read_attenuation
+from rift_cl.jobs.scan_input import (
+    check_center,
+    chosen_rows,
+    read_attenuation,
+    scan_identity,
+)
 from rift_cl.reconstruct import Attenuation, find_center
 from rift_cl.reconstruct.fan_rebin import covered_rays, rebin_fan
 from rift_cl.reconstruct.offset_axis import (
@@ -30,8 +35,6 @@ from rift_cl.reconstruct.rings import remove_rings
 Floats = NDArray[np.float32]
 # Stripes are told from the object where views go round so far: a flat face is a stripe in fewer.
 _RINGS_FROM = np.deg2rad(150)
-# A gap between directions that is worth a word, in mean steps and in radians.
-_GAP_STEPS, _GAP = 2.0, np.deg2rad(5)
 # An axis found this far from the detector's middle, as a share of its width, is an offset one.
 _MIDDLE = 0.25
 # The detector is continued by this share of its width on each side.
@@ -67,10 +70,11 @@ class SliceInput:
         self.pad = 0
         # (angle, bin) whether a ray was measured, where some were not.
         self.seen: NDArray[np.bool_] | None = None
-        self._offset = False
         self.notes: list[str] = [*self.scan.notes]
         # Made now, so that a bad pitch or center is told before any work.
         self.geometry = self._parallel()
+        # Whether a full turn's axis is so far off the middle that slices reach beyond the detector.
+        self.offset = self._sees_farther()
         self.rings = self._rings_wanted()
 
     @property
@@ -81,13 +85,21 @@ class SliceInput:
     @property
     def bins(self) -> int:
         """Bins between the farther end of the detector and its mirror image, or the detector's."""
-        if not self._offset:
-            return self.geometry.bins
-        return self.geometry.bins + int(np.ceil(abs(self.geometry.bins - 1 - 2 * self._axis)))
+        scan = self.geometry
+        if not self.offset:
+            return scan.bins
+        return scan.bins + int(np.ceil(abs(scan.bins - 1 - 2 * scan.center)))
 
     @property
-    def _axis(self) -> float:
-        return self.geometry.center
+    def settled(self) -> bool:
+        """Whether the axis is known, or nothing has to look for it."""
+        return self.fan is not None or self.center is not None
+
+    @property
+    def most_bins(self) -> int:
+        """The most that ``bins`` may come to once the axis is known."""
+        may_grow = not self.settled and is_full_turn(self.scan.angles)
+        return 2 * self.bins if may_grow else self.bins
 
     def locate(self) -> None:
         """Find the axis, and whether it is offset and the object wider than the detector.
@@ -99,35 +111,19 @@ class SliceInput:
         """
         middle = sum(self.rows) // 2
         row = self._mended(middle, middle + 1).projections
-        if self.fan is None and self.center is None:
+        if not self.settled:
             self.center = self._find_center(np.ascontiguousarray(row[:, 0]))
-            self.notes.append(f"The rotation axis was found at bin {self.center:.2f}.")
         self.geometry = self._parallel()
-        self._offset = self.fan is None and is_offset(self.geometry)
-        self._say_directions()
-        if self.rings:
-            self.notes.append("Stripes were taken out of the projections (rings).")
-        if self.scan.background:
-            self.notes.append(
-                f"Air was brought to zero by the outermost {self.scan.background} bins of each end."
-            )
-        wide = self.settings.pad == "on"
-        if self.settings.pad == "auto":
-            wide = not self._offset and is_truncated(row)
-        if wide:
+        self.offset = self._sees_farther()
+        truncated = is_truncated(row)
+        wanted = self.settings.pad == "auto" and truncated and not self.offset
+        if wanted or self.settings.pad == "on":
             self.pad = max(1, self.scan.shape[2] // _PAD_SHARE)
-            self.notes.append(
-                "The object is wider than the detector, or was said to be: projections were "
-                "continued smoothly beyond its ends, and what lies outside is a guess."
-            )
+        self.notes += notes_of(self, truncated=truncated)
 
     def identity(self) -> dict[str, str]:
         """The file and the axis, which decide the slices besides the settings."""
-        path = self.scan.path
-        return {
-            "scan file": f"{path}, changed at {path.stat().st_mtime_ns}",
-            "axis": repr(self.center),
-        }
+        return {**scan_identity(self.scan), "axis": repr(self.center)}
 
     def read(self, start: int, stop: int) -> Attenuation:
         """Parallel projections of some rows of the file, before a formula's weights and margins."""
@@ -142,7 +138,7 @@ class SliceInput:
     def for_formula(self, projections: Floats) -> tuple[Floats, Parallel]:
         """Projections as a backprojection wants them, and their geometry."""
         scan = self.geometry
-        if self._offset:
+        if self.offset:
             projections, scan = widened(projections, scan)
         if self.pad:
             projections, scan = extended(projections, scan, bins=self.pad)
@@ -167,6 +163,9 @@ class SliceInput:
             return scan
         return Parallel(self.scan.angles, self.scan.shape[2], self._pitch, self.center)
 
+    def _sees_farther(self) -> bool:
+        return self.fan is None and is_offset(self.geometry)
+
     def _find_center(self, row: Floats) -> float:
         angles, bins = self.scan.angles, self.scan.shape[2]
         if is_full_turn(angles) and bins >= 4 * 8:
@@ -180,39 +179,3 @@ class SliceInput:
             return self.settings.rings == "on"
         counts = self.scan.kind == "transmission"
         return counts and bool(np.ptp(self.scan.angles) >= _RINGS_FROM)
-
-    def _say_directions(self) -> None:
-        """Note what was made of the angles."""
-        angles = self.geometry.angles
-        if self.fan is not None:
-            self.notes.append(
-                f"Fan-beam views were resampled to {len(angles)} parallel ones, over "
-                f"{np.rad2deg(np.ptp(angles)):.1f} degrees."
-            )
-        if self._offset:
-            self.notes.append(
-                f"The axis, bin {self.geometry.center:.2f}, lies off the middle of the detector in "
-                "a full turn: opposite views were joined, and slices reach to the farther end."
-            )
-        directions = np.sort(np.mod(angles, np.pi))
-        gaps = np.diff(directions, append=directions[0] + np.pi)
-        gap = float(gaps.max())
-        if gap > max(_GAP_STEPS * np.pi / len(angles), _GAP):
-            self.notes.append(
-                f"No view looks along {np.rad2deg(gap):.0f} degrees of the half-circle: edges "
-                "in these directions are blurred."
-            )
-
-
-def demand_window(roi: tuple[int, int, int, int], size: int) -> None:
-    """Make sure that a part of a slice is inside it.
-
-    Raises:
-        InputError: it is not.
-    """
-    left, right, top, bottom = roi
-    if not (0 <= left < right <= size and 0 <= top < bottom <= size):
-        raise InputError(
-            f"--roi is {left} {right} {top} {bottom}, the slice has the columns and lines 0 to "
-            f"{size}: give the first column and the one after the last, then the same of lines"
-        )

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
-from rift_cl.geometry import Grid
-from rift_cl.jobs.reconstruct_input import SliceInput, demand_window
+from rift_cl.jobs.reconstruct_input import SliceInput
 from rift_cl.jobs.reconstruct_settings import ReconstructSettings
+from rift_cl.jobs.reconstruct_window import Window
 from rift_cl.operators import FastProjector, ParallelProjector, Projector
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp
@@ -36,58 +36,6 @@ _TIMED_STEPS = 3
 _VARIATION = 0.1
 
 
-@dataclass(frozen=True)
-class Window:
-    """Where a slice lies: samples of the whole one, and the part of it that is wanted.
-
-    Args:
-        size: samples along each side of the whole slice, centred on the axis.
-        pixel: distance between samples.
-        roi: first column, the one after the last, first line, the one after the last.
-    """
-
-    size: int
-    pixel: float
-    roi: tuple[int, int, int, int]
-
-    @classmethod
-    def of(cls, settings: ReconstructSettings, source: SliceInput) -> Window:
-        """What the settings ask for, of a scan whose axis is known.
-
-        Raises:
-            InputError: the part is not inside the slice.
-        """
-        pixel = source.pitch if settings.pixel is None else settings.pixel
-        width = int(np.ceil(source.bins * source.pitch / pixel - 1e-6))
-        size = width if settings.size is None else settings.size
-        roi = settings.roi or (0, size, 0, size)
-        demand_window(roi, size)
-        return cls(size, pixel, roi)
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Lines and columns that are wanted."""
-        left, right, top, bottom = self.roi
-        return bottom - top, right - left
-
-    def grid(self, slices: int) -> Grid:
-        """The samples that are wanted, of so many slices."""
-        left, right, top, bottom = self.roi
-        middle = self.size / 2
-        center = (((top + bottom) / 2 - middle), ((left + right) / 2 - middle))
-        return Grid((slices, *self.shape), self.pixel, (0.0, *(c * self.pixel for c in center)))
-
-    def around(self, width: float) -> tuple[Grid, tuple[slice, slice]]:
-        """An image at least so wide about the axis, and where in it the wanted part lies.
-
-        Methods that explain every ray need all that the rays meet.
-        """
-        margin = max(0, int(np.ceil((width / self.pixel - self.size) / 2)))
-        left, right, top, bottom = (edge + margin for edge in self.roi)
-        whole = Grid((self.size + 2 * margin,) * 2, self.pixel)
-        return whole, (slice(top, bottom), slice(left, right))
-
-
 @dataclass
 class Inversion:
     """A method at work on the slices of one scan.
@@ -96,7 +44,7 @@ class Inversion:
         settings: the method and its options.
         source: the scan; located.
         device: where to work.
-        residuals: root mean square of the residual after each step, by slice.
+        residuals: root mean square of the residual after each step, by detector row.
     """
 
     settings: ReconstructSettings
@@ -146,7 +94,7 @@ class Inversion:
         """Reconstruct a slab; a report after every step of every slice.
 
         Args:
-            first: number of the first slice, for ``residuals``.
+            first: detector row of the first slice, for ``residuals``.
             projections: (angle, row, bin) as ``SliceInput.read`` gives them.
 
         Returns:
@@ -186,7 +134,8 @@ class Inversion:
         solver = self._solver(np.ascontiguousarray(projections[:, 0]))
         moments = [time.perf_counter() for _ in solver.run(1 + _TIMED_STEPS)]
         each = (moments[-1] - moments[0]) / max(len(moments) - 1, 1)
-        return each * self.settings.most_steps
+        # Steps that end early in the slices that are done do so in the others.
+        return each * self.figures().get("steps", self.settings.most_steps)
 
     def _formula(self, projections: Floats) -> Floats:
         prepared, _ = self.source.for_formula(projections)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,9 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.cl.budget import format_bytes
 from rift_cl.html_page import Page
 from rift_cl.io.output import atomic_path
 from rift_cl.jobs.few import evenly
+from rift_cl.jobs.reconstruct_volume import volume_path
 from rift_cl.plot import curves, figure_png, image_grid
 
 if TYPE_CHECKING:
@@ -61,6 +64,22 @@ class Preview:
         """Least, greatest and mean value of the whole volume."""
         mean = self._sum / self._count
         return {"minimum": self._lowest, "maximum": self._highest, "mean": mean}
+
+
+def planned(job: Reconstruction, seconds: float) -> dict[str, str]:
+    """What would be done, in words; ``seconds`` is what it would take."""
+    scan, device = job.source.scan, job.device
+    return {
+        "scan": f"{scan.path} ({scan.source}, {scan.kind})",
+        "projections": f"{scan.shape} (angle, row, bin)",
+        "volume": f"{job.shape} (z, y, x), {format_bytes(4 * math.prod(job.shape))}",
+        "method": job.settings.method,
+        "assumed": " ".join(job.source.notes) or "nothing",
+        "slabs": f"{len(job.slabs)} of at most {max(s.stop - s.start for s in job.slabs)}",
+        "device": f"{device.name}, budget {format_bytes(device.budget)}",
+        "output": str(volume_path(job.settings)),
+        "time": f"about {seconds:.3g} s, from one slice",
+    }
 
 
 def write_preview(path: Path, image: NDArray[np.float32], title: str, unit: str) -> None:

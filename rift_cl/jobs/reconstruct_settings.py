@@ -74,7 +74,8 @@ class ReconstructSettings(ScanInput):
     precondition: Literal["ramp", "capped-voronoi"] | None = None
     """sirt, cgls, tv: weigh the residual's frequencies by a filter, which takes fewer steps."""
     center: float | None = None
-    """Detector bin of the rotation axis; found automatically when not given."""
+    """Detector bin of the rotation axis; found automatically when not given, but for fan beams, of
+    which it is taken at the detector's middle."""
     rows: tuple[int, int] | None = None
     """First detector row, and the one after the last."""
     pitch: float | None = None

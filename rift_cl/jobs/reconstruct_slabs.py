@@ -52,7 +52,8 @@ class SlabFolder:
         """
         self.drop()
         make_folder(self.path)
-        check_space(self.path / _RUN, 4 * int(np.prod(self.shape)))
+        # The slabs stay until the volume that is made of them is complete.
+        check_space(self.path / _RUN, 2 * 4 * int(np.prod(self.shape)))
         write_json(self.path / _RUN, dict(run))
 
     def center(self) -> float | None:
@@ -64,6 +65,8 @@ class SlabFolder:
 
     def go_on(self, run: Mapping[str, Any]) -> None:
         """Make sure that what is there belongs to this run.
+
+        Reads nothing but the record, and changes nothing.
 
         Raises:
             CheckpointError: it does not; the sentence names what differs.
@@ -85,6 +88,11 @@ class SlabFolder:
                 f"{self.path}: its {_RUN} cannot be read ({error}): begin anew with --overwrite"
             ) from error
         return record if isinstance(record, dict) else {}
+
+    @property
+    def done(self) -> int:
+        """How many slices are there."""
+        return int(self.shape[0] - sum(run.stop - run.start for run in self.missing()))
 
     def missing(self) -> list[slice]:
         """Runs of slices that are not there yet, in order."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -17,6 +18,7 @@ from rift_cl.cl.discovery import open_device
 from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.io.scan import open_scan
 from rift_cl.io.scan_file import ScanFile
+from rift_cl.io.tiff_frames import TiffRows
 from rift_cl.reconstruct.flatfield import Attenuation, attenuation
 
 # How a volume is called in the folder of its run, by format.
@@ -33,11 +35,12 @@ class ScanInput:
     dataset: str | None = None
     """Name of the projections in the file, where it is not the layout's own."""
     theta: str | None = None
-    """Name of the angles in the file."""
+    """Name of the angles in the file; or a file of degrees (.txt, .csv, .npy); or a turn that is
+    evenly divided, 0:180 or 360, its end left out."""
     flats: str | None = None
-    """Name of the frames without the sample."""
+    """Name of the frames without the sample; for TIFF, their folder or file."""
     darks: str | None = None
-    """Name of the frames without the beam."""
+    """Name of the frames without the beam; for TIFF, their folder or file."""
     device: str | None = None
     """Device to use: its number, cpu, gpu, or a part of its name; see 'rift devices'."""
     memory: str | None = None
@@ -76,6 +79,29 @@ class ScanInput:
                 "bins at each end of the detector"
             )
         return dataclasses.replace(scan, background=self.background)
+
+
+def scan_identity(scan: ScanFile) -> dict[str, str]:
+    """What tells a scan from others, and from itself before a change; sentences by name."""
+    angles = np.ascontiguousarray(scan.angles).tobytes()
+    told = {"angles": f"{scan.angles.size} with the hash {_hash(angles)}"}
+    if not isinstance(scan.rows, TiffRows):
+        return {"scan file": f"{scan.path}, changed at {scan.path.stat().st_mtime_ns}", **told}
+    # A folder's own date tells nothing: what is beside the frames changes it, their content not.
+    lines = []
+    for path in scan.rows.files:
+        state = path.stat()
+        lines.append(f"{path.name}\0{state.st_size}\0{state.st_mtime_ns}\n")
+    frames = _hash("".join(lines).encode("utf-8", "surrogateescape"))
+    return {
+        "scan file": str(scan.path),
+        "frames": f"{len(lines)} files with the hash {frames}",
+        **told,
+    }
+
+
+def _hash(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:16]
 
 
 def read_attenuation(scan: ScanFile, start: int, stop: int) -> Attenuation:

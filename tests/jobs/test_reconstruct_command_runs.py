@@ -105,7 +105,7 @@ def test_a_preview_is_a_picture_of_the_middle_slice(scan, tmp_path):
     reports = list(job.run())
     assert {path.name for path in out.iterdir()} == {"preview.png", "config.json"}
     assert (out / "preview.png").read_bytes().startswith(b"\x89PNG")
-    assert "preview.png shows the middle slice; all take about" in said[0]
+    assert "preview.png shows the middle slice; all take about" in said[-1]
     assert reports[-1].done == reports[-1].total
     assert "all 3 would take" in job.result
     # The slices may follow in the same folder.

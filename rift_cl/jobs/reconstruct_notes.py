@@ -1,0 +1,97 @@
+"""What ``rift reconstruct`` assumed of a scan and mended in it, in sentences for people."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from rift_cl.jobs.reconstruct_input import SliceInput
+
+# A gap between directions that is worth a word, in mean steps and in radians.
+_GAP_STEPS, _GAP = 2.0, np.deg2rad(5)
+
+
+def notes_of(source: SliceInput, *, truncated: bool) -> list[str]:
+    """All that is to be said of a scan whose axis is known.
+
+    Args:
+        source: the scan; located.
+        truncated: whether projections end above zero.
+    """
+    notes = _axis(source, truncated=truncated)
+    if source.fan is not None:
+        angles = source.geometry.angles
+        notes.append(
+            f"Fan-beam views were resampled to {len(angles)} parallel ones, over "
+            f"{np.rad2deg(np.ptp(angles)):.1f} degrees."
+        )
+    if source.offset:
+        notes.append(_offset(source))
+    notes += _gap(source.geometry.angles)
+    if source.rings:
+        notes.append("Stripes were taken out of the projections (rings).")
+    if source.scan.background:
+        notes.append(
+            f"Air was brought to zero by the outermost {source.scan.background} bins of each end."
+        )
+    if source.pad:
+        notes.append(_wide(source))
+    return notes
+
+
+def _axis(source: SliceInput, *, truncated: bool) -> list[str]:
+    """Where the axis is, unless a person said it."""
+    if source.settings.center is not None:
+        return []
+    if source.fan is not None:
+        center = source.fan.center
+        middle = center == (source.scan.shape[2] - 1) / 2
+        where = "at the detector's middle" if middle else "where the file says"
+        return [
+            f"The axis was taken {where}, bin {center:.2f}; give it with --center if it is not."
+        ]
+    notes = [f"The rotation axis was found at bin {source.center:.2f}."]
+    if truncated and not source.offset:
+        notes.append(
+            "The object is wider than the detector, so that the axis found may be off by some "
+            "bins: check it with 'rift center', or give --center."
+        )
+    return notes
+
+
+def _offset(source: SliceInput) -> str:
+    off = (
+        f"The axis, bin {source.geometry.center:.2f}, lies off the middle of the detector in a "
+        "full turn"
+    )
+    # Steps explain every view as it is: nothing is joined for them.
+    joined = "" if source.settings.iterative else "opposite views were joined, and "
+    return f"{off}: {joined}slices reach to the farther end."
+
+
+def _wide(source: SliceInput) -> str:
+    wide = "The object is wider than the detector, or was said to be"
+    if source.settings.iterative:
+        return (
+            f"{wide}: slices were worked on with a margin of {source.pad} bins on each side, and "
+            "what lies there is a guess."
+        )
+    return (
+        f"{wide}: projections were continued smoothly beyond its ends, and what lies outside is "
+        "a guess."
+    )
+
+
+def _gap(angles: NDArray[np.float64]) -> list[str]:
+    directions = np.sort(np.mod(angles, np.pi))
+    gaps = np.diff(directions, append=directions[0] + np.pi)
+    gap = float(gaps.max())
+    if gap <= max(_GAP_STEPS * np.pi / len(angles), _GAP):
+        return []
+    return [
+        f"No view looks along {np.rad2deg(gap):.0f} degrees of the half-circle: edges in these "
+        "directions are blurred."
+    ]
