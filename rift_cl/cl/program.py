@@ -16,8 +16,8 @@ import numpy as np
 
 from rift_cl.cl.failures import named_errors
 from rift_cl.cl.kernel_cache import build_lock
-from rift_cl.cl.memory import real_type
 from rift_cl.cl.process import claim_process
+from rift_cl.cl.real_type import real_type
 from rift_cl.cl.source import kernel_source
 from rift_cl.errors import KernelBuildError
 

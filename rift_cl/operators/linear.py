@@ -31,9 +31,9 @@ from rift_cl.cl.memory import (
     download,
     is_device_array,
     is_tensor,
-    real_type,
     share,
 )
+from rift_cl.cl.real_type import real_type
 from rift_cl.errors import DeviceMemoryError, InputError, ResourceLimitError
 from rift_cl.geometry import Grid, Parallel
 
