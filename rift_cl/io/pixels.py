@@ -53,6 +53,8 @@ def write_pixels(
     spec = OpenImageIO.ImageSpec(
         wide, high, channels, "uint8" if pixels.dtype == np.uint8 else "float"
     )
+    # Otherwise TIFF and OpenEXR get the time of writing, and no two runs the same bytes.
+    spec.attribute("DateTime", "")
     for name, value in attributes.items():
         spec.attribute(name, value)
     output = OpenImageIO.ImageOutput.create(format)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 import zlib
 from pathlib import Path
@@ -21,6 +22,7 @@ from rift_cl.errors import (
     ShapeError,
 )
 from rift_cl.io import read_image, write_png
+from rift_cl.io.pixels import write_pixels
 
 RANDOM = np.random.default_rng(3)
 
@@ -173,3 +175,15 @@ def test_tiles_of_float64_are_refused_before_they_are_read_wrong(tmp_path: Path)
     tifffile.imwrite(path, image, tile=(16, 16))
     with pytest.raises(FileFormatError, match="float64 in tiles; save it in strips"):
         read_image(path)
+
+
+@pytest.mark.parametrize("format", ["tiff", "openexr", "png"])
+def test_no_file_holds_the_time_of_writing(tmp_path: Path, format: str) -> None:
+    """The same pixels give the same bytes, whenever they are written."""
+    pixels = np.zeros((2, 3, 1), np.uint8 if format == "png" else np.float32)
+    path = tmp_path / "a"
+    write_pixels(path, pixels, format=format, attributes={"tiff:write_exif": 0})
+    source = OpenImageIO.ImageInput.create(format)
+    assert source.open(str(path), OpenImageIO.ImageSpec())
+    assert not source.spec().getattribute("DateTime")
+    assert not re.search(rb"20\d\d:\d\d:\d\d ", path.read_bytes())

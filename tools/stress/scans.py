@@ -49,6 +49,8 @@ def _tiff(dtype: str, tile: int = 0, **attributes: str) -> bytes:
             spec = OpenImageIO.ImageSpec(_BINS, _ROWS, 1, kind)
             spec.attribute("tiff:write_exif", 0)
             spec.attribute("tiff:RowsPerStrip", 8)
+            # OpenImageIO writes the time otherwise; the same seed is to give the same files.
+            spec.attribute("DateTime", "")
             for name, value in attributes.items():
                 spec.attribute(name, value)
             spec.tile_width = spec.tile_height = tile
