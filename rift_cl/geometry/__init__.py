@@ -1,8 +1,9 @@
 """Where things are: grids of samples, scans and cameras that look at them. Values, no OpenCL."""
 
+from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.camera import Camera
 from rift_cl.geometry.fan import FanBeam
 from rift_cl.geometry.grid import Grid
 from rift_cl.geometry.scan import Parallel
 
-__all__ = ["Camera", "FanBeam", "Grid", "Parallel"]
+__all__ = ["Aperture", "Camera", "FanBeam", "Grid", "Parallel"]

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
+from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.numbers import real_numbers
 
 CameraModel = Literal["pinhole", "ortho", "fisheye"]
@@ -38,18 +39,21 @@ class Camera:
         view: (4, 4) world-to-camera matrix, a rotation and a shift. Kept as ``K`` is.
         model: ``pinhole``; ``ortho`` (parallel rays); ``fisheye`` (equidistant: the distance
             from the principal point is proportional to the angle from the axis).
+        aperture: the opening of a thin lens, for a pinhole camera that is sharp at one depth;
+            None for one that is sharp everywhere.
 
     Raises:
         ShapeError: the image is empty, or a matrix has the wrong shape.
         NonFiniteError: a matrix holds NaN or infinity.
-        InputError: ``K`` is singular, skewed or mirrored, ``view`` is no rigid motion, or the
-            model is unknown.
+        InputError: ``K`` is singular, skewed or mirrored, ``view`` is no rigid motion, the
+            model is unknown, or has no aperture.
     """
 
     size: tuple[int, int]
     K: NDArray[np.float64]
     view: NDArray[np.float64]
     model: CameraModel
+    aperture: Aperture | None
 
     def __init__(
         self,
@@ -57,6 +61,7 @@ class Camera:
         K: ArrayLike,
         view: ArrayLike,
         model: CameraModel = "pinhole",
+        aperture: Aperture | None = None,
     ) -> None:
         """Check the arguments and bring them into their normal form."""
         object.__setattr__(self, "size", _size(size))
@@ -66,6 +71,12 @@ class Camera:
             wanted = ", ".join(get_args(CameraModel))
             raise InputError(f"Camera: model is {model!r}, wanted one of {wanted}")
         object.__setattr__(self, "model", model)
+        if aperture is not None and (not isinstance(aperture, Aperture) or model != "pinhole"):
+            raise InputError(
+                f"Camera: aperture is {aperture!r} with model {model!r}, wanted an Aperture, and "
+                "the pinhole model"
+            )
+        object.__setattr__(self, "aperture", aperture)
 
     def __eq__(self, other: object) -> bool:
         """Cameras are equal when every pixel sees the same ray."""
@@ -77,10 +88,10 @@ class Camera:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies are made by the constructor, so that their matrices are read-only as well."""
-        return Camera, (self.size, self.K, self.view, self.model)
+        return Camera, (self.size, self.K, self.view, self.model, self.aperture)
 
-    def _key(self) -> tuple[tuple[int, int], bytes, bytes, str]:
-        return self.size, self.K.tobytes(), self.view.tobytes(), self.model
+    def _key(self) -> tuple[Any, ...]:
+        return self.size, self.K.tobytes(), self.view.tobytes(), self.model, self.aperture
 
     @property
     def height(self) -> int:

@@ -68,7 +68,7 @@ def camera_at(view: View, downscale: int) -> Camera:
         )
     K = camera.K / [[factor], [factor], [1]]
     size = (camera.height // int(factor), camera.width // int(factor))
-    return Camera(size, K, camera.view, camera.model)
+    return Camera(size, K, camera.view, camera.model, camera.aperture)
 
 
 @contextmanager

@@ -12,31 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
+from rift_cl.geometry.pose import look_at
 from rift_cl.jobs.scene_bounds import SceneBounds
 
 Floats = NDArray[np.float64]
 
 # An orbit leaves so much room round the scene.
 _ROOM = 1.05
-
-
-def look_at(center: ArrayLike, target: ArrayLike, up: ArrayLike) -> Floats:
-    """World-to-camera matrix (4, 4) of a camera that looks at a point, upright.
-
-    Raises:
-        InputError: the camera stands at the point, or looks along ``up``.
-    """
-    place, above = np.asarray(center, np.float64), np.asarray(up, np.float64)
-    forward = np.asarray(target, np.float64) - place
-    right = np.cross(forward, above)
-    ahead, across = float(np.linalg.norm(forward)), float(np.linalg.norm(right))
-    if not across > 1e-9 * ahead * float(np.linalg.norm(above)):
-        raise InputError("a camera that looks straight up or down has no upright position")
-    forward, right = forward / ahead, right / across
-    view = np.eye(4)
-    view[:3, :3] = [right, np.cross(forward, right), forward]
-    view[:3, 3] = -view[:3, :3] @ place
-    return view
 
 
 def pinhole(size: tuple[int, int], fov: float, view: ArrayLike) -> Camera:
@@ -94,7 +76,7 @@ def resized(camera: Camera, size: tuple[int, int]) -> Camera:
     scale = size[0] / camera.height
     cx = size[1] / 2 + (cx - camera.width / 2) * scale
     K = np.array([[fx * scale, 0, cx], [0, fy * scale, cy * scale], [0, 0, 1]])
-    return Camera(size, K, camera.view, camera.model)
+    return Camera(size, K, camera.view, camera.model, camera.aperture)
 
 
 def smooth_path(cameras: Sequence[Camera], between: int) -> list[Camera]:

@@ -38,7 +38,7 @@ class Poses:
     def camera(self, number: int) -> Camera:
         """A camera where it is believed to be by now."""
         given = self._given[number]
-        return Camera(given.size, given.K, self.views[number], given.model)
+        return Camera(given.size, given.K, self.views[number], given.model, given.aperture)
 
     def update(self, number: int, by_view: Floats, rate: float) -> None:
         """Move a camera by a step.

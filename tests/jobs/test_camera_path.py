@@ -16,8 +16,8 @@ from rift_cl.io.capture import open_capture
 from rift_cl.io.image import write_png
 from rift_cl.io.output import write_json
 from rift_cl.io.splat_scene import SplatScene
+from rift_cl.geometry.pose import look_at
 from rift_cl.jobs.camera_path import (
-    look_at,
     orbit,
     orbit_distance,
     pinhole,
