@@ -12,11 +12,11 @@ from test_start import MIDDLE_OF_RING, ring
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
+from rift_cl.geometry.pose import look_at
 from rift_cl.io.capture import open_capture
 from rift_cl.io.image import write_png
 from rift_cl.io.output import write_json
 from rift_cl.io.splat_scene import SplatScene
-from rift_cl.geometry.pose import look_at
 from rift_cl.jobs.camera_path import (
     orbit,
     orbit_distance,

@@ -12,9 +12,9 @@ import pytest
 
 from rift_cl.cli import main
 from rift_cl.errors import InputError
+from rift_cl.geometry.pose import look_at
 from rift_cl.io.splat_scene import SplatScene
 from rift_cl.jobs import viewer as viewer_module
-from rift_cl.geometry.pose import look_at
 from rift_cl.jobs.scene_bounds import SceneBounds
 from rift_cl.jobs.viewer import Pose, SplatViewer
 from rift_cl.splat.renderer import Renderer
