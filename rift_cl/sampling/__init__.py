@@ -1,1 +1,1 @@
-"""Where to look from: which frequencies of a target a set of views samples, and which views to take."""
+"""Where to look from: what frequencies of a target views sample, and what views to take."""
