@@ -74,6 +74,9 @@ class Settings:
     given."""
     seeds: tuple[int, ...] = (0, 1)
     """Of the fits with and without homogenisation; the other figures take the first."""
+    noises: tuple[float, ...] = (0.0,)
+    """Of the fits with and without homogenisation: standard deviations of white noise that is
+    added to the training pictures, in display light."""
     only: tuple[str, ...] = ()
     """Names of the figures to compute, such as figure_05; all when not given."""
     report_only: bool = False
@@ -95,6 +98,8 @@ class Settings:
             raise InputError("--ornament goes with --full; --quick has pictures of its own")
         if not self.seeds:
             raise InputError("--seeds has no number, wanted one or more")
+        if not self.noises or not all(0 <= noise < 1 for noise in self.noises):
+            raise InputError(f"--noises is {list(self.noises)}, wanted numbers from 0, below 1")
         given = None if self.ornament is None else find_ornament(self.ornament)
         usual = (10_000, 30_000, (10, 64, 250, 570)) if self.full else (400, 3000, (4, 10, 24, 60))
         return Plan(
@@ -106,6 +111,7 @@ class Settings:
             steps=usual[0] if self.steps is None else self.steps,
             splats=usual[1] if self.splats is None else self.splats,
             seeds=self.seeds,
+            noises=self.noises,
         )
 
 

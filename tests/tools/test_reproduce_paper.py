@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rift_cl import Grid, Parallel
+from rift_cl.io import open_capture, read_image
 from rift_cl.phantom import Ellipsoid
 
 TOOLS = Path(__file__).parents[2] / "tools"
@@ -218,3 +219,34 @@ def test_colour_pictures_come_back_to_half_a_code(part):
     image = np.random.default_rng(2).uniform(0, 1, (5, 7, 3)).astype(np.float32)
     back = images.decode(json.loads(json.dumps(images.encode(image, (0.0, 1.0)))))
     assert np.abs(back - image).max() <= 0.5 / 255 + 1e-6
+
+
+def test_noise_is_the_same_each_time_and_in_the_colours_alone(part, tmp_path):
+    choice, plan = part("view_choice"), part("plan")
+    source = plan.sample_ornament().ring
+    folders = [
+        choice.write_capture(source, [3, 5], tmp_path / name, noise=noise)
+        for name, noise in (("a", 0.1), ("b", 0.1), ("c", 0.0))
+    ]
+    noisy, again, plain = (
+        [read_image(view.image) for view in open_capture(folder).views] for folder in folders
+    )
+    for one, same, true in zip(noisy, again, plain, strict=True):
+        np.testing.assert_array_equal(one, same)
+        assert (one - true)[..., :3].std() == pytest.approx(0.1, rel=0.1)
+        np.testing.assert_array_equal(one[..., 3:], true[..., 3:])
+    drawn = [(one - true)[..., :3].ravel() for one, true in zip(noisy, plain, strict=True)]
+    assert abs(np.corrcoef(drawn)[0, 1]) < 0.05
+
+
+def test_noise_has_scores_of_its_own(part, tmp_path, monkeypatch):
+    """Noisy fits stand beside the others, under the same seeds."""
+    bias = part("spectral_bias")
+    monkeypatch.setattr(bias, "_spectra", lambda *_: {"moments": []})
+    monkeypatch.setattr(bias, "_scores", lambda _, *case: dict(zip(bias._OF, case, strict=True)))
+    plan = part("plan").Plan(False, tmp_path, None, None, (4,), 2, 3, (0, 1), (0.0, 0.2))
+    *_, result = bias.compute(plan, None, {})
+    found = [tuple(run[key] for key in bias._OF) for run in result["scores"]]
+    assert found == [
+        (4, noise, ramp, seed) for noise in (0.0, 0.2) for ramp in (0.0, 0.5) for seed in (0, 1)
+    ]

@@ -48,8 +48,13 @@ class Fitted:
         return self.metrics[kind][dict(zip(SETS, self.settings.test, strict=True))[name].name]
 
 
-def fit_settings(plan: Plan, count: int, *, exponent: float = 0.0, seed: int) -> FitSettings:
-    """The settings of a fit to some of the ring's views; writes the captures it wants."""
+def fit_settings(
+    plan: Plan, count: int, *, exponent: float = 0.0, seed: int, noise: float = 0.0
+) -> FitSettings:
+    """The settings of a fit to some of the ring's views; writes the captures it wants.
+
+    Only what is trained on is noisy.
+    """
     captures, total = plan.captures, fixed_views(plan.captures)
     choice = choose_views(count, *total)
     fits = plan.out / "fits" / ("full" if plan.full else "quick")
@@ -57,9 +62,10 @@ def fit_settings(plan: Plan, count: int, *, exponent: float = 0.0, seed: int) ->
     ring = captures.ring
     test = captures.test or write_capture(ring, choice.fixed, fits / FIXED)
     held_out = write_capture(ring, choice.held_out, place / HELD_OUT)
-    name = f"fit_{plan.steps}_steps_{plan.splats}_splats_ramp_{exponent:g}_seed_{seed}"
+    noisy = f"_noise_{noise:g}" if noise else ""
+    name = f"fit_{plan.steps}_steps_{plan.splats}_splats_ramp_{exponent:g}_seed_{seed}{noisy}"
     return FitSettings(
-        capture=write_capture(ring, choice.trained, place / "trained"),
+        capture=write_capture(ring, choice.trained, place / f"trained{noisy}", noise=noise),
         test=(held_out, test, captures.off_path),
         out=place / name,
         steps=plan.steps,
@@ -73,11 +79,12 @@ def fit_settings(plan: Plan, count: int, *, exponent: float = 0.0, seed: int) ->
     )
 
 
-def fitted(plan: Plan, count: int, *, exponent: float = 0.0, seed: int | None = None) -> Fitted:
+def fitted(
+    plan: Plan, count: int, *, exponent: float = 0.0, seed: int | None = None, noise: float = 0.0
+) -> Fitted:
     """A fit that is done, now or by an earlier run."""
-    settings = fit_settings(
-        plan, count, exponent=exponent, seed=plan.seeds[0] if seed is None else seed
-    )
+    seed = plan.seeds[0] if seed is None else seed
+    settings = fit_settings(plan, count, exponent=exponent, seed=seed, noise=noise)
     if not _complete(settings):
         print(f"{count} views, {settings.out.name} ...", file=sys.stderr)
         show_progress(Fit(settings).run(), quiet=False)

@@ -45,6 +45,8 @@ class Plan:
         steps: of a fit.
         splats: most splats of a fit.
         seeds: of the fits whose spread is looked at; the first is that of all others.
+        noises: standard deviations of noise in the pictures, of the fits with and without
+            homogenisation; all others have none.
     """
 
     full: bool
@@ -55,6 +57,7 @@ class Plan:
     steps: int
     splats: int
     seeds: tuple[int, ...]
+    noises: tuple[float, ...] = (0.0,)
 
     @property
     def captures(self) -> Ornament:

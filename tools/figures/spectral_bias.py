@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from figures.fits import FIXED, OFF_PATH, Fitted, fit_settings, fitted
+from figures.fits import FIXED, OFF_PATH, fit_settings, fitted
 from figures.moments import watched
 from figures.plan import Plan
 from rift_cl import Device
@@ -27,6 +28,8 @@ _SCORES = {
     "off foreground": (OFF_PATH, "fit_psnr_foreground"),
     "off SSIM": (OFF_PATH, "fit_ssim"),
 }
+# What a run is of.
+_OF = ("count", "noise", "exponent", "seed")
 _XLABEL = "spatial frequency, cycles per pixel"
 
 
@@ -36,20 +39,20 @@ def settings(plan: Plan) -> dict[str, Any]:
 
 
 def compute(plan: Plan, device: Device, kept: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """Spectra during the training with the most views, then the scores at every number of them."""
+    """The scores at every number of views, then spectra during the training with the most."""
     most = max(plan.counts)
     earlier = {_key(run): run for run in kept.get("spectra", []) + kept.get("scores", [])}
-    spectra: list[dict[str, Any]] = []
     scores: list[dict[str, Any]] = []
+    for count, noise in itertools.product(plan.counts, plan.noises):
+        for exponent, seed in _runs(plan):
+            run = earlier.get(("scores", count, noise, exponent, seed))
+            scores.append(run or _scores(plan, count, noise, exponent, seed))
+            yield {"spectra": [], "scores": scores}
+    spectra: list[dict[str, Any]] = []
     for exponent, seed in _runs(plan):
-        run = earlier.get(("spectra", most, exponent, seed))
+        run = earlier.get(("spectra", most, 0.0, exponent, seed))
         spectra.append(run or _spectra(plan, most, exponent, seed, device))
         yield {"spectra": spectra, "scores": scores}
-    for count in plan.counts:
-        for exponent, seed in _runs(plan):
-            run = earlier.get(("scores", count, exponent, seed))
-            scores.append(run or _scores(fitted(plan, count, exponent=exponent, seed=seed)))
-            yield {"spectra": spectra, "scores": scores}
 
 
 def _runs(plan: Plan) -> list[tuple[float, int]]:
@@ -58,27 +61,28 @@ def _runs(plan: Plan) -> list[tuple[float, int]]:
 
 def _key(run: dict[str, Any]) -> tuple[Any, ...]:
     kind = "spectra" if "moments" in run else "scores"
-    return kind, run["count"], run["exponent"], run["seed"]
+    return kind, run["count"], run.get("noise", 0.0), run["exponent"], run["seed"]
 
 
 def _spectra(plan: Plan, count: int, exponent: float, seed: int, device: Device) -> dict[str, Any]:
     print(f"{count} views, ramp {exponent:g}, seed {seed}, watched ...", file=sys.stderr)
     asked = fit_settings(plan, count, exponent=exponent, seed=seed)
     found = watched(asked, asked.test[1], device)
-    return {"count": count, "exponent": exponent, "seed": seed, **found}
+    return {"count": count, "noise": 0.0, "exponent": exponent, "seed": seed, **found}
 
 
-def _scores(fit: Fitted) -> dict[str, Any]:
+def _scores(plan: Plan, count: int, noise: float, exponent: float, seed: int) -> dict[str, Any]:
+    fit = fitted(plan, count, exponent=exponent, seed=seed, noise=noise)
     named = {name: fit.scores(group).get(key) for name, (group, key) in _SCORES.items()}
-    asked = fit.settings
-    return {"count": fit.count, "exponent": asked.homogenise, "seed": asked.seed, **named}
+    return {"count": count, "noise": noise, "exponent": exponent, "seed": seed, **named}
 
 
 def show(page: Page, result: dict[str, Any]) -> None:
-    """Draw the spectra and the tables."""
-    _show_spectra(page, result["spectra"])
+    """Draw the tables and the spectra."""
     if result["scores"]:
         _show_scores(page, result["scores"])
+    if result["spectra"]:
+        _show_spectra(page, result["spectra"])
 
 
 def _show_spectra(page: Page, runs: Sequence[dict[str, Any]]) -> None:
@@ -140,26 +144,25 @@ def _draw_power(page: Page, runs: Sequence[dict[str, Any]]) -> None:
 
 
 def _show_scores(page: Page, runs: Sequence[dict[str, Any]]) -> None:
-    cells = [
-        (run["count"], run["exponent"], run["seed"], *(run[name] for name in _SCORES))
-        for run in runs
-    ]
+    cells = [(*(run[key] for key in _OF), *(run[name] for name in _SCORES)) for run in runs]
     caption = (
         "Mean scores of the fixed test sets, PSNR in dB: every 8th view of the ring, and views "
         "off it. The fits of one seed begin with the same splats and see the same order of views."
     )
-    page.table(("views", "ramp", "seed", *_SCORES), cells, caption=caption)
-    gains = [_gain(count, runs) for count in dict.fromkeys(run["count"] for run in runs)]
+    page.table(("views", "noise", "ramp", "seed", *_SCORES), cells, caption=caption)
+    cases = dict.fromkeys((run["count"], run["noise"]) for run in runs)
+    gains = [_gain(*case, runs) for case in cases]
     page.table(
-        ("views", "seeds", *_SCORES),
+        ("views", "noise", "seeds", *_SCORES),
         [row for row in gains if row is not None],
         caption="What the ramp adds to each score, a mean over the seeds.",
     )
 
 
-def _gain(count: int, runs: Sequence[dict[str, Any]]) -> tuple[Any, ...] | None:
+def _gain(count: int, noise: float, runs: Sequence[dict[str, Any]]) -> tuple[Any, ...] | None:
     """The mean difference of the scores, over the seeds that have both fits."""
-    found = {(run["exponent"], run["seed"]): run for run in runs if run["count"] == count}
+    same = [run for run in runs if (run["count"], run["noise"]) == (count, noise)]
+    found = {(run["exponent"], run["seed"]): run for run in same}
     seeds = [s for e, s in found if e == EXPONENTS[1] and (EXPONENTS[0], s) in found]
     if not seeds:
         return None
@@ -168,4 +171,4 @@ def _gain(count: int, runs: Sequence[dict[str, Any]]) -> tuple[Any, ...] | None:
         None if pairs[0][0][name] is None else float(np.mean([b[name] - a[name] for a, b in pairs]))
         for name in _SCORES
     ]
-    return count, len(seeds), *means
+    return count, noise, len(seeds), *means

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from figures.plan import Ornament
 from rift_cl.errors import InputError
-from rift_cl.io import make_folder, open_capture, write_json
+from rift_cl.io import make_folder, open_capture, read_image, write_json, write_png
 
 EVERY = 8
 
@@ -88,8 +89,15 @@ def fixed_views(ornament: Ornament) -> tuple[int, tuple[int, ...]]:
     return len(ring), tuple(sorted(set(away.argmin(axis=1).tolist())))
 
 
-def write_capture(source: Path, places: Sequence[int], folder: Path) -> Path:
+def write_capture(source: Path, places: Sequence[int], folder: Path, *, noise: float = 0.0) -> Path:
     """Write some views of a capture as one of its own, under names that tell their places.
+
+    Args:
+        source: the folder of the capture.
+        places: of the views in it.
+        folder: of the new one.
+        noise: standard deviation of white noise that is added to the colours, in display light;
+            a view gets the same each time. What leaves [0, 1] is clipped, codes have 8 bit.
 
     Raises:
         InputError: the folder has views of another capture.
@@ -104,8 +112,16 @@ def write_capture(source: Path, places: Sequence[int], folder: Path) -> Path:
     frames, views = [], open_capture(source).views
     for place in places:
         image = views[place].image
-        name = f"images/{place:04d}{image.suffix}"
-        shutil.copyfile(image, folder / name)
+        name = f"images/{place:04d}{'.png' if noise else image.suffix}"
+        if noise:
+            write_png(folder / name, _noisy(read_image(image), noise, seed=place))
+        else:
+            shutil.copyfile(image, folder / name)
         frames.append({**top["frames"][place], "file_path": name})
     write_json(file, {**top, "source": origin, "frames": frames})
     return folder
+
+
+def _noisy(pixels: NDArray[np.float32], deviation: float, *, seed: int) -> NDArray[np.float32]:
+    drawn = np.random.default_rng(seed).normal(0, deviation, (*pixels.shape[:2], 3))
+    return np.concatenate([pixels[..., :3] + np.float32(drawn), pixels[..., 3:]], axis=2)
