@@ -3,8 +3,9 @@
  * One pixel covers depth / f at a splat's depth; a Gaussian of variance 0.2 of that, squared, is what
  * Mip-Splatting (Yu et al. 2024, section 4.1) blurs a splat by. Only cameras count in whose image the
  * splat lies, or within MARGIN of its size round it. A splat that no camera sees gets `unseen`.
- * A camera has 17 numbers: the upper three rows of its view matrix, the longer of its focal lengths,
- * the principal point, width and height.
+ * A camera has 20 numbers: the upper three rows of its view matrix, the longer of its focal lengths,
+ * the principal point, width and height; of its aperture the radius, one over the distance in focus
+ * and the wavelength, which are not looked at here.
  *
  * Index space: splats. */
 
@@ -13,7 +14,7 @@
 
 #define SHARE 0.4472136f
 #define MARGIN 0.15f
-#define NUMBERS 17
+#define NUMBERS 20
 /* Coarser than anything. */
 #define NOTHING 1e30f
 

@@ -18,6 +18,7 @@
 #include "include/portable.h"
 #include "include/small_matrix.h"
 #include "include/camera.h"
+#include "include/aperture.h"
 #include "include/gaussian.h"
 
 #ifndef TILE

@@ -12,13 +12,16 @@
  * needed for H = V V^T: -Q S2 Q / 2 + what the factor adds, and then M^T dL/dH M.
  *
  * With DEPTH the last feature is the splat's depth. With CAMERA_GRADIENT each splat leaves its
- * part of dL/d(view, rows of 4), dL/d(fx, fy, cx, cy) in camera_parts. Nothing flows through
- * extents and culls; splats that are not drawn get zeros. Index space: splats. */
+ * part of dL/d(view, rows of 4), dL/d(fx, fy, cx, cy) in camera_parts, and with DEFOCUS as well of
+ * dL/d(radius, focus) in aperture_parts. Nothing flows through extents and culls; splats that are
+ * not drawn get zeros. Index space: splats. */
 
 #include "include/portable.h"
 #include "include/small_matrix.h"
 #include "include/camera.h"
+#include "include/aperture.h"
 #include "include/gaussian.h"
+#include "include/gaussian_grad.h"
 
 #ifndef CHANNELS
 #define CHANNELS 3
@@ -45,41 +48,14 @@
 #define SHAPE_GRADIENT grad_quats, grad_scales
 #endif
 
-/* dL/d of V's rows, of M's rows, and of ln factor. */
-typedef struct {
-  float3 v0, v1, m0, m1;
-  float log_factor;
-} ViewGradient;
+#if DEFOCUS
+#define APERTURE_GRADIENTS , __global float *restrict aperture_parts
+#else
+#define APERTURE_GRADIENTS
+#endif
 
 static void clear(__global float *p, int length) {
   for (int k = 0; k < length; k++) p[k] = 0;
-}
-
-/* From the moments to the screen derivative M and root F, through dilation and factor. */
-static ViewGradient dilate_grad(const Gaussian *g, const float *s) {
-  ViewGradient out;
-  out.log_factor = ANTIALIASED && g->factor <= LEAST_COMPENSATION ? 0 : -s[0];
-  /* adj(V V^T) V, and U. */
-  const float3 a0 = cross3(g->v1, g->normal), a1 = cross3(g->normal, g->v0);
-  const float3 u0 = (a0 + g->eps * g->v0) * g->inverse, u1 = (a1 + g->eps * g->v1) * g->inverse;
-  const float3 w0 = s[3] * u0 + s[4] * u1, w1 = s[4] * u0 + s[5] * u1;
-  const float2 x = apply_conic(g, (float2)(w0.x, w1.x));
-  const float2 y = apply_conic(g, (float2)(w0.y, w1.y));
-  const float2 z = apply_conic(g, (float2)(w0.z, w1.z));
-  out.v0 = -(float3)(x.x, y.x, z.x);
-  out.v1 = -(float3)(x.y, y.y, z.y);
-#if XRAY || ANTIALIASED
-  out.v0 -= out.log_factor * u0;
-  out.v1 -= out.log_factor * u1;
-#endif
-#if ANTIALIASED
-  const float share = out.log_factor == 0 ? 0 : out.log_factor / g->undilated;
-  out.v0 += share * a0;
-  out.v1 += share * a1;
-#endif
-  out.m0 = apply3(g->root, out.v0);
-  out.m1 = apply3(g->root, out.v1);
-  return out;
 }
 
 #if COVARIANCES
@@ -93,17 +69,21 @@ static void shape_grad(
   const float2 r0 = apply_conic(g, (float2)(s[3] * q0.x + s[4] * q0.y, s[4] * q0.x + s[5] * q0.y));
   const float2 r1 = apply_conic(g, (float2)(s[3] * q1.x + s[4] * q1.y, s[4] * q1.x + s[5] * q1.y));
   float xx = -0.5f * r0.x, xy = -0.5f * r1.x, yy = -0.5f * r1.y;
-#if XRAY || ANTIALIASED
+#if XRAY || ANTIALIASED || DEFOCUS
   const float half_factor = 0.5f * view->log_factor;
   xx -= half_factor * q0.x;
   xy -= half_factor * q0.y;
   yy -= half_factor * q1.y;
 #endif
-#if ANTIALIASED
-  const float share = view->log_factor == 0 ? 0 : half_factor / g->undilated;
+#if ANTIALIASED || DEFOCUS
+  const float share = view->log_factor == 0 ? 0 : half_factor / g->kept;
   xx += share * dot3(g->v1, g->v1);
   xy -= share * dot3(g->v0, g->v1);
   yy += share * dot3(g->v0, g->v0);
+#endif
+#if DEFOCUS
+  xx += share * g->kept_eps;
+  yy += share * g->kept_eps;
 #endif
   const float3 left = xx * g->m0 + xy * g->m1, right = xy * g->m0 + yy * g->m1;
   float3 rows[3];
@@ -189,6 +169,9 @@ static CameraGradient screen_grad(
   screen.du = apply3(camera.rotation, view->m0);
   screen.dv = apply3(camera.rotation, view->m1);
   CameraGradient out = to_screen_grad(camera, g->point, screen);
+#if DEFOCUS
+  add_blur_grad(camera, g->point.z, view->variance, &out);
+#endif
   out.point.z += depth;
   return out;
 }
@@ -199,7 +182,7 @@ KERNEL void splat_project_grad(
     float near_plane, float far_plane, float eps2d, int count,
     __global float *restrict grad_means, SHAPE_GRADIENTS, __global float *restrict grad_opacities,
     __global float *restrict grad_features, __global float *restrict grad_means2d,
-    __global float *restrict grad_means2d_abs, __global float *restrict camera_parts)
+    __global float *restrict grad_means2d_abs, __global float *restrict camera_parts APERTURE_GRADIENTS)
 {
   const long i = get_global_id(0);
   if (i >= count) return;
@@ -214,6 +197,9 @@ KERNEL void splat_project_grad(
     clear(grad_means2d + 2 * i, 2);
     clear_shape(SHAPE_GRADIENT, i);
     if (CAMERA_GRADIENT) clear(camera_parts + 16 * i, 16);
+#if DEFOCUS && CAMERA_GRADIENT
+    clear(aperture_parts + 2 * i, 2);
+#endif
     return;
   }
   const Camera camera = CAMERA;
@@ -228,4 +214,8 @@ KERNEL void splat_project_grad(
   shape_grad(&g, s, &view, SHAPE_GRADIENT, i);
   store3(grad_means, i, apply_transposed3(camera.rotation, point.point));
   if (CAMERA_GRADIENT) camera_grad(&g, &view, &point, camera_parts + 16 * i);
+#if DEFOCUS && CAMERA_GRADIENT
+  aperture_parts[2 * i] = point.radius;
+  aperture_parts[2 * i + 1] = point.focus;
+#endif
 }

@@ -22,14 +22,23 @@ from typing import Any
 import tyro
 
 from figures import (
+    aperture_filter,
+    capture_support,
     compensation,
     convergence,
+    figure_02_04,
     figure_05,
     figure_06,
+    figure_07,
+    figure_09,
     figure_11,
     figure_11_volume,
     figure_12,
+    merit_study,
+    planned_ornament,
+    planned_views,
     spectral_bias,
+    surface_views,
 )
 from figures.plan import Plan, find_ornament, sample_ornament
 from rift_cl.cl import Device, open_device
@@ -39,17 +48,32 @@ from rift_cl.io import make_folder, write_json, write_text
 from rift_cl.jobs.run_folder import environment
 
 FIGURES: tuple[ModuleType, ...] = (
+    figure_02_04,
     figure_05,
     figure_06,
+    figure_07,
+    figure_09,
     figure_11,
     figure_11_volume,
     figure_12,
     spectral_bias,
     compensation,
     convergence,
+    merit_study,
+    surface_views,
+    planned_views,
+    planned_ornament,
+    aperture_filter,
+    capture_support,
 )
 # Those that fit splats to the ornament.
-FITTED: tuple[ModuleType, ...] = (figure_11, figure_12, spectral_bias)
+FITTED: tuple[ModuleType, ...] = (
+    figure_11,
+    figure_12,
+    spectral_bias,
+    planned_ornament,
+    aperture_filter,
+)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@
  * pixels that is px = clamp(u, -0.15 W, 1.15 W) - cx, with du = (fx, 0, -px) / z.
  *
  * `volume` is det [du; dv; ray] with the unit ray along which J sees (its null direction): pixel
- * area times length along the ray, per unit of volume. Line integrals need it. */
+ * area times length along the ray, per unit of volume. Line integrals need it.
+ * With DEFOCUS a camera has an aperture besides: see aperture.h. */
 
 #define PINHOLE 0
 #define ORTHO 1
@@ -20,18 +21,31 @@
 #ifndef MODEL
 #define MODEL PINHOLE
 #endif
+#ifndef DEFOCUS
+#define DEFOCUS 0
+#endif
 #define MARGIN 0.15f
 
-/* Rows of the world-to-camera matrix, then (fx, fy, cx, cy), then the image. */
-#define CAMERA_PARAMETERS \
+/* Rows of the world-to-camera matrix, then (fx, fy, cx, cy), then the image, then (R, 1/F, L). */
+#define PINHOLE_PARAMETERS \
   float4 view_x, float4 view_y, float4 view_z, float4 intrinsics, int width, int height
-#define CAMERA \
+#define PINHOLE_CAMERA \
   camera_of(view_x, view_y, view_z, intrinsics, (float)width, (float)height)
+#if DEFOCUS
+#define CAMERA_PARAMETERS PINHOLE_PARAMETERS, float4 aperture
+#define CAMERA with_aperture(PINHOLE_CAMERA, aperture)
+#else
+#define CAMERA_PARAMETERS PINHOLE_PARAMETERS
+#define CAMERA PINHOLE_CAMERA
+#endif
 
 typedef struct {
   rows3 rotation;
   float3 shift;
   float fx, fy, cx, cy, width, height;
+#if DEFOCUS
+  float radius, inverse_focus, diffraction;
+#endif
 } Camera;
 
 typedef struct {
@@ -48,6 +62,9 @@ typedef struct {
 typedef struct {
   float3 point;
   float fx, fy, cx, cy;
+#if DEFOCUS
+  float radius, focus;
+#endif
 } CameraGradient;
 
 static Camera camera_of(

@@ -7,7 +7,8 @@
  *
  *     det(V V^T) = |v0 x v1|^2     and     adj(V V^T) w = (v1 . k, -v0 . k),  k = w.x v1 - w.y v0,
  *
- * keep about as many digits as the numbers that go in. */
+ * keep about as many digits as the numbers that go in. With DEFOCUS eps is eps2d plus the blur of
+ * the aperture at the splat's depth. */
 
 #ifndef COVARIANCES
 #define COVARIANCES 0
@@ -58,6 +59,7 @@ typedef struct {
   float3 m0, m1, v0, v1, normal;
   float undilated, dilated; /* determinants of V V^T and of V V^T + eps I */
   float eps, inverse;       /* inverse of the dilated one */
+  float kept, kept_eps;     /* determinant of V V^T + kept_eps I, which the factor is measured by */
   float factor;             /* weight = opacity * factor */
 } Gaussian;
 
@@ -123,15 +125,23 @@ static int read_shape(Gaussian *g, SHAPES, long i) {
 #endif
 
 /* What opacity is multiplied with: the line integral through a unit peak, with the dilated
- * screen covariance so that dilation keeps the mass; Mip-Splatting's compensation; or nothing. */
+ * screen covariance so that dilation keeps the mass; Mip-Splatting's compensation; or nothing.
+ * What an aperture spreads keeps its light, whatever eps2d does. */
 static float factor_of(const Gaussian *g) {
-#if XRAY
+#if DEFOCUS
+  return sqrt(g->kept / g->dilated) * (ANTIALIASED && g->kept_eps > 0 ? LEAST_COMPENSATION : 1);
+#elif XRAY
   return SQRT_TWO_PI * g->root_det * g->screen.volume / sqrt(g->dilated);
 #elif ANTIALIASED
   return larger(LEAST_COMPENSATION, sqrt(g->undilated / g->dilated));
 #else
   return 1;
 #endif
+}
+
+/* Determinant of V V^T + eps I. */
+static float dilated_determinant(const Gaussian *g, float eps) {
+  return g->undilated + eps * (dot3(g->v0, g->v0) + dot3(g->v1, g->v1)) + eps * eps;
 }
 
 /* Project splat i; gives VISIBLE, or why not. */
@@ -150,11 +160,22 @@ static int see_gaussian(
   g->v0 = apply_transposed3(g->root, g->m0);
   g->v1 = apply_transposed3(g->root, g->m1);
   g->normal = cross3(g->v0, g->v1);
-  g->eps = eps;
   g->undilated = dot3(g->normal, g->normal);
-  g->dilated = g->undilated + eps * (dot3(g->v0, g->v0) + dot3(g->v1, g->v1)) + eps * eps;
+  g->kept = g->undilated;
+  g->kept_eps = 0;
+#if DEFOCUS
+  const float sharp = dilated_determinant(g, eps);
+  if (!ANTIALIASED || g->undilated <= LEAST_COMPENSATION * LEAST_COMPENSATION * sharp) {
+    g->kept = sharp;
+    g->kept_eps = eps;
+  }
+  eps += blur_variance(camera, g->point.z);
+#endif
+  g->eps = eps;
+  g->dilated = dilated_determinant(g, eps);
   if (not_finite(g->screen.u) || not_finite(g->screen.v) || not_finite(g->dilated)) return DEGENERATE;
   if (!(g->dilated > 1 / MOST_AREA) || g->dilated > MOST_AREA) return DEGENERATE;
+  if (DEFOCUS && !(g->kept > 1 / MOST_AREA)) return DEGENERATE;
   g->inverse = 1 / g->dilated;
   g->factor = factor_of(g);
   return not_finite(g->factor) ? DEGENERATE : VISIBLE;

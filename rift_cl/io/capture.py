@@ -10,15 +10,17 @@ from rift_cl.io.boundary import reading
 from rift_cl.io.colmap_model import MODEL_FOLDERS, find_model, open_model
 from rift_cl.io.photograph_folder import photograph_names, photographs_in
 from rift_cl.io.transforms_json import open_transforms
-from rift_cl.io.view import Capture, View, camera_at
+from rift_cl.io.view import Capture, View, as_pinholes, camera_at
 from rift_cl.io.view_image import read_view
 
 __all__ = [
     "Capture",
     "View",
+    "as_pinholes",
     "camera_at",
     "capture_name",
     "holds_bare_photographs",
+    "holds_capture",
     "open_capture",
     "read_view",
 ]
@@ -28,7 +30,10 @@ _TRANSFORMS = ("transforms.json", "transforms_train.json")
 
 
 def open_capture(
-    path: str | os.PathLike[str], *, images: str | os.PathLike[str] | None = None
+    path: str | os.PathLike[str],
+    *,
+    images: str | os.PathLike[str] | None = None,
+    photographs: bool = True,
 ) -> Capture:
     """Find the posed photographs of a capture; the photographs themselves are not read.
 
@@ -39,6 +44,8 @@ def open_capture(
             ``images`` there or above. Masks of a COLMAP model lie in ``masks`` beside ``images``.
         images: the folder of the photographs, or the one that has them in ``images``, where a
             COLMAP model lies somewhere else; masks lie in ``masks`` there.
+        photographs: whether they have to be there; without them, views can be counted with but
+            not read, and a ``transforms.json`` must say how large they are.
 
     Returns:
         Views in the order of the file, or in that of their names where they are COLMAP's.
@@ -56,10 +63,11 @@ def open_capture(
         path = _absolute(path)
         file = _transforms(path)
         if file is not None and images is None:
-            return open_transforms(file)
+            return open_transforms(file, photographs=photographs)
         model = find_model(path)
     if model is not None:
-        return open_model(path, *model, None if images is None else photographs_in(Path(images)))
+        folder = None if images is None else photographs_in(Path(images))
+        return open_model(path, *model, folder, photographs=photographs)
     if images is not None:
         raise InputError(f"{path}: holds no COLMAP model, to which images= could belong")
     bare = photograph_names(photographs_in(path))
@@ -84,6 +92,21 @@ def holds_bare_photographs(path: str | os.PathLike[str]) -> bool:
         if not path.is_dir() or _transforms(path) is not None or find_model(path) is not None:
             return False
     return bool(photograph_names(photographs_in(path)))
+
+
+def holds_capture(path: str | os.PathLike[str]) -> bool:
+    """Whether a path is a .json file, or a folder with posed photographs.
+
+    Raises:
+        InputError: there is no such path.
+    """
+    with reading(Path(path), "the capture"):
+        path = _absolute(path)
+        if not path.exists():
+            raise InputError(f"{path}: there is no such file or folder")
+        if not path.is_dir():
+            return path.suffix.lower() == ".json"
+        return _transforms(path) is not None or find_model(path) is not None
 
 
 def _absolute(path: str | os.PathLike[str]) -> Path:

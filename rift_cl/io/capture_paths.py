@@ -25,10 +25,12 @@ class CaptureFolder:
     Args:
         root: the folder of the capture, absolute and without ``..``; no name leads out of it.
         below: the folder in it that names start from.
+        complete: whether files that are named must be there.
     """
 
     root: Path
     below: str = ""
+    complete: bool = True
 
     def file(self, where: str, name: str) -> Path:
         """The file of that name.
@@ -39,19 +41,19 @@ class CaptureFolder:
 
         Raises:
             PathEscapeError: it lies outside the folder.
-            InputError: it is not there.
+            InputError: it is not there, and the folder is to be complete.
         """
         found = self._find(where, name, ("",))
-        if found is None:
+        if found is None and self.complete:
             raise InputError(f"{where}: leads to {_short(name)}, which is not in {self.path}")
-        return found
+        return found or self._named(name, "")
 
     def image(self, where: str, name: str) -> Path:
         """The image of that name, which may lack its extension; errors are those of ``file``."""
         found = self._find(where, name, _SUFFIXES)
-        if found is None:
+        if found is None and self.complete:
             raise InputError(f"{where}: the image {_short(name)} is not in {self.path}")
-        return found
+        return found or self._named(name, "")
 
     def optional(self, where: str, *names: str) -> Path | None:
         """The first of these files that is there, or None."""
@@ -79,7 +81,7 @@ class CaptureFolder:
             raise PathEscapeError(f"{where}: {_short(name)} is no path inside {self.root}")
         try:
             for suffix in suffixes:
-                path = Path(os.path.normpath(self.path / (plain + suffix)))
+                path = self._named(name, suffix)
                 self._demand_inside(where, name, path)
                 if path.is_file():
                     return path
@@ -91,6 +93,9 @@ class CaptureFolder:
                 f"{where}: {_short(name)} cannot be followed as a path ({reason})"
             ) from error
         return None
+
+    def _named(self, name: str, suffix: str) -> Path:
+        return Path(os.path.normpath(self.path / (name.replace("\\", "/") + suffix)))
 
     def _demand_inside(self, where: str, name: str, path: Path) -> None:
         if not path.resolve().is_relative_to(self._real):

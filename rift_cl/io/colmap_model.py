@@ -6,6 +6,7 @@ so that nothing has to be turned round.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -36,7 +37,12 @@ def find_model(folder: Path) -> tuple[Path, str] | None:
 
 
 def open_model(
-    folder: Path, model: Path, suffix: str, images: CaptureFolder | None = None
+    folder: Path,
+    model: Path,
+    suffix: str,
+    images: CaptureFolder | None = None,
+    *,
+    photographs: bool = True,
 ) -> Capture:
     """Read the views of a COLMAP model; see ``open_capture``.
 
@@ -45,12 +51,13 @@ def open_model(
         model: the folder of the model, which may be the same.
         suffix: the suffix of its files, ``.bin`` or ``.txt``.
         images: where the photographs are; looked for from ``folder`` on when not given.
+        photographs: whether they have to be there.
     """
     reader = _READERS[suffix]
     cameras = _numbered(model / f"cameras{suffix}", reader.read_cameras(model / f"cameras{suffix}"))
     path = model / f"images{suffix}"
     records = sorted(reader.read_images(path), key=lambda record: record.name)
-    images = _images_folder(folder) if images is None else images
+    images = replace(images or _images_folder(folder), complete=photographs)
     views = [_view(path, images, cameras, record) for record in records]
     checked = check_views(path, views)
     points, colors = _points(model / f"points3D{suffix}", reader)

@@ -1,8 +1,9 @@
 """Views from a transforms.json: the flavours of NeRF's synthetic scenes, instant-ngp, nerfstudio.
 
 Intrinsics stand once for all frames or in each of them, where they take precedence. Poses are
-camera-to-world with OpenGL's axes. Fields that say nothing about where and through what lens a
-photograph was taken are left alone.
+camera-to-world with OpenGL's axes. A lens with an opening has 'aperture_radius', 'focus_distance'
+(without it the focus is at infinity) and 'wavelength', in the poses' unit. Fields that say nothing
+about where and through what lens a photograph was taken are left alone.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import reprlib
 from pathlib import Path
 
 from rift_cl.errors import FileFormatError, InputError
+from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.camera import Camera
 from rift_cl.geometry.lens_distortion import LENS_MODELS, lens_of
 from rift_cl.io.capture_paths import CaptureFolder
@@ -33,10 +35,10 @@ _MODELS = (
 )
 
 
-def open_transforms(path: Path) -> Capture:
+def open_transforms(path: Path, *, photographs: bool = True) -> Capture:
     """Read the views of a transforms.json; see ``open_capture``."""
     top = read_json_object(path)
-    folder = CaptureFolder(path.parent)
+    folder = CaptureFolder(path.parent, complete=photographs)
     views = [_view(folder, frame, top) for frame in top.objects("frames")]
     checked = check_views(path, views)
     ply = top.text("ply_file_path")
@@ -59,8 +61,9 @@ def _view(folder: CaptureFolder, frame: Fields, top: Fields) -> View:
     K = _intrinsics(own, fields, size)
     pose = own.pose("transform_matrix")
     model, coefficients = _distortion(fields)
+    aperture = _aperture(fields)
     with located(where):
-        camera = Camera(size, K, view_of_opengl(pose))
+        camera = Camera(size, K, view_of_opengl(pose), aperture=aperture)
         lens = lens_of(model, coefficients, K)
     mask_file = None if mask is None else folder.file(where, mask)
     return View(folder.name_of(image), camera, image, mask_file, lens)
@@ -68,6 +71,11 @@ def _view(folder: CaptureFolder, frame: Fields, top: Fields) -> View:
 
 def _size(fields: Fields, image: Path) -> tuple[int, int]:
     height, width = fields.whole("h"), fields.whole("w")
+    if (height is None or width is None) and not image.exists():
+        raise InputError(
+            f"{fields.where}: has no 'w' and 'h', and the image {image} that would tell is not "
+            "there"
+        )
     if height is None or width is None:
         with located(fields.where):
             header = read_picture_header(image)
@@ -100,6 +108,20 @@ def _focal(own: Fields, fields: Fields, axis: str, extent: int) -> float | None:
                 )
             return extent / 2 / math.tan(angle / 2)
     return None
+
+
+def _aperture(fields: Fields) -> Aperture | None:
+    """The opening of the lens; None for a pinhole, whose radius is 0 or not there."""
+    radius = fields.number("aperture_radius") or 0.0
+    focus, wavelength = fields.number("focus_distance"), fields.number("wavelength") or 0.0
+    for name, value, fits, wanted in (
+        ("aperture_radius", radius, radius >= 0, "a length, 0 for a pinhole"),
+        ("focus_distance", focus, focus is None or focus > 0, "a positive distance"),
+        ("wavelength", wavelength, wavelength >= 0, "a length, 0 for no diffraction"),
+    ):
+        if radius and not fits:
+            raise InputError(f"{fields.where}: {name!r} is {value:g}, wanted {wanted}")
+    return Aperture(radius, math.inf if focus is None else focus, wavelength) if radius else None
 
 
 def _distortion(fields: Fields) -> tuple[str, list[float]]:

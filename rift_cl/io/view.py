@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ class View:
 
     Args:
         name: what the capture calls it, unique there.
-        camera: the pinhole that would have seen the photograph without its lens.
+        camera: what would have seen the photograph without its lens's distortion.
         image: the photograph.
         mask: an image of the same size, white where the photograph counts; or None.
         lens: what the photograph was distorted by; None where it is a pinhole's already.
@@ -69,6 +69,16 @@ def camera_at(view: View, downscale: int) -> Camera:
     K = camera.K / [[factor], [factor], [1]]
     size = (camera.height // int(factor), camera.width // int(factor))
     return Camera(size, K, camera.view, camera.model, camera.aperture)
+
+
+def as_pinholes(capture: Capture) -> Capture:
+    """The same views, as if no lens had had an opening."""
+    views = tuple(replace(view, camera=_pinhole(view.camera)) for view in capture.views)
+    return replace(capture, views=views)
+
+
+def _pinhole(camera: Camera) -> Camera:
+    return Camera(camera.size, camera.K, camera.view, camera.model)
 
 
 @contextmanager

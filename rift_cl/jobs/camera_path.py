@@ -5,13 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.geometry import Camera
+from rift_cl.geometry import Aperture, Camera
 from rift_cl.geometry.pose import look_at
 from rift_cl.jobs.scene_bounds import SceneBounds
 
@@ -84,7 +83,7 @@ def smooth_path(cameras: Sequence[Camera], between: int) -> list[Camera]:
 
     Positions lie on a uniform Catmull-Rom spline through the given ones (Catmull and Rom 1974)
     whose ends go straight on; rotations turn evenly about one axis from each to the next (slerp,
-    Shoemake 1985); focal lengths and principal points change evenly.
+    Shoemake 1985); focal lengths, principal points and apertures change evenly.
 
     Raises:
         InputError: two cameras differ in size or model, so that no picture lies between them.
@@ -121,22 +120,42 @@ def _between(a: Camera, b: Camera, way: float, center: Floats) -> Camera:
     view = np.eye(4)
     view[:3, :3] = (Rotation.from_rotvec(way * turn) * first).as_matrix()
     view[:3, 3] = -view[:3, :3] @ center
-    return Camera(a.size, (1 - way) * a.K + way * b.K, view, a.model)
+    return Camera(a.size, (1 - way) * a.K + way * b.K, view, a.model, _opening(a, b, way))
 
 
-def transforms_of(cameras: Sequence[Camera], names: Sequence[str]) -> dict[str, Any]:
-    """The cameras as a transforms.json in nerfstudio's convention.
+def _opening(a: Camera, b: Camera, way: float) -> Aperture | None:
+    """Radius and inverse focus change evenly; a pinhole has the radius 0 and the other's focus."""
+    first, second = a.aperture or b.aperture, b.aperture or a.aperture
+    if first is None or second is None:
+        return None
+    radii = [0.0 if camera.aperture is None else camera.aperture.radius for camera in (a, b)]
+    near = (1 - way) / first.focus + way / second.focus
+    wavelength = (1 - way) * first.wavelength + way * second.wavelength
+    radius = (1 - way) * radii[0] + way * radii[1]
+    return Aperture(radius, 1 / near if near else math.inf, wavelength)
+
+
+def opened(camera: Camera, radius: float | None, focus: float | None, middle: Floats) -> Camera:
+    """A camera with another aperture or focus.
 
     Args:
-        cameras: pinholes.
-        names: of their pictures, relative to the file.
+        camera: with an aperture or without.
+        radius: of the aperture, 0 for none; the camera's own if not given.
+        focus: the depth that is sharp; the camera's own, or that of the middle, if not given.
+        middle: (3,) of the scene.
+
+    Raises:
+        InputError: the middle is behind the camera, and no focus is given.
     """
-    frames = []
-    for camera, name in zip(cameras, names, strict=True):
-        pose = np.linalg.inv(camera.view)
-        pose[:3, 1:3] *= -1
-        fx, fy, cx, cy = camera.intrinsics
-        size = {"w": camera.width, "h": camera.height}
-        lens = {"fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy, **size}
-        frames.append({"file_path": name, **lens, "transform_matrix": pose})
-    return {"camera_model": "PINHOLE", "frames": frames}
+    own = camera.aperture
+    if radius is None:
+        radius = 0.0 if own is None else own.radius
+    if radius == 0:
+        return Camera(camera.size, camera.K, camera.view, camera.model)
+    if focus is None:
+        depth = float(camera.view[2, :3] @ middle + camera.view[2, 3])
+        focus = depth if own is None else own.focus
+    if focus <= 0:
+        raise InputError("--aperture wants --focus: the scene's middle is behind a camera")
+    lens = Aperture(radius, focus, 0.0 if own is None else own.wavelength)
+    return Camera(camera.size, camera.K, camera.view, camera.model, lens)

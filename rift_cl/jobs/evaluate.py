@@ -11,9 +11,9 @@ from tyro.conf import Positional
 
 from rift_cl.cl.discovery import open_device
 from rift_cl.errors import InputError
-from rift_cl.io.capture import View, camera_at, capture_name, open_capture
+from rift_cl.io.capture import View, camera_at, capture_name
 from rift_cl.jobs.evaluate_report import eval_page
-from rift_cl.jobs.fit import split_views
+from rift_cl.jobs.fit import open_seen, split_views
 from rift_cl.jobs.fit_pictures import CapturePictures
 from rift_cl.jobs.fit_scores import ViewScore, score_record, score_views
 from rift_cl.jobs.run_folder import RunFolder
@@ -76,14 +76,15 @@ class Evaluation:
         self.metrics: dict[str, Any] = {}
 
     def _scored(self, path: Path) -> tuple[View, ...]:
-        views, every = open_capture(path).views, self.settings.hold_out
+        views = open_seen(path, pinhole=self.scene.pinhole).views
+        every = self.settings.hold_out
         return views[::every] if every else views
 
     def _seen(self) -> tuple[View, ...]:
         """What was trained on; empty where nobody says."""
         if self.settings.train is None:
             return ()
-        views = open_capture(self.settings.train).views
+        views = open_seen(self.settings.train, pinhole=self.scene.pinhole).views
         seen, _ = split_views(views, self.settings.hold_out, 0)
         files = {view.image.resolve() for view in seen}
         for name, scored in self.groups.items():

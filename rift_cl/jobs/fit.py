@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections.abc import Generator, Iterator
+from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -13,6 +14,7 @@ from rift_cl.errors import InputError
 from rift_cl.io.capture import (
     Capture,
     View,
+    as_pinholes,
     camera_at,
     capture_name,
     holds_bare_photographs,
@@ -55,12 +57,14 @@ class Fit(FitRun):
         self._posed = settings.out / "poses"
         if self.bare and not self._posed.exists():
             demand_photographs(settings.capture)
-        self.capture = None if self.bare else open_capture(settings.capture)
+        self.capture = None if self.bare else open_seen(settings.capture, pinhole=settings.pinhole)
         self.seen: tuple[View, ...] = ()
         self.unseen: tuple[View, ...] = ()
         if self.capture is not None:
             self._split(self.capture)
-        self.tests = {capture_name(path): open_capture(path) for path in settings.test}
+        self.tests = {
+            capture_name(path): open_seen(path, pinhole=settings.pinhole) for path in settings.test
+        }
         if len(self.tests) < len(settings.test):
             raise InputError("--test names two captures of the same name: rename one folder")
 
@@ -148,7 +152,7 @@ class Fit(FitRun):
             guessed=settings.first_count,
             seed=settings.seed,
         )
-        if settings.exponent:
+        if settings.asks_for_noise:
             count = len(pictures.views)
             few = evenly(count, _NOISE_VIEWS)
             noise = noise_of([pictures.image(number)[..., :3] for number in few])
@@ -172,6 +176,12 @@ class Fit(FitRun):
         """The pictures that are scored, by the name of their group."""
         groups = {"held out": self.unseen} if self.unseen else {}
         return groups | {name: capture.views for name, capture in self.tests.items()}
+
+
+def open_seen(path: Path, *, pinhole: bool) -> Capture:
+    """A capture, through lenses that it names or, if ``pinhole``, as if none had an opening."""
+    capture = open_capture(path)
+    return as_pinholes(capture) if pinhole else capture
 
 
 def split_views(

@@ -13,8 +13,8 @@ from tyro.conf import Positional
 from rift_cl.errors import InputError
 from rift_cl.jobs.xray_options import XRAY_ONLY, XrayOptions
 from rift_cl.splat.settings import SplatSettings
-from rift_cl.train.homogenisation import Homogenisation
-from rift_cl.train.settings import Densification, Rates, TrainSettings
+from rift_cl.train.homogenisation import Homogenisation, WeightKind
+from rift_cl.train.settings import BandLimit, Densification, Rates, TrainSettings
 from rift_cl.train.xray_trainer import xray_settings
 
 # Rates of poses and exposures where they are refined.
@@ -62,8 +62,15 @@ class FitSettings(XrayOptions):
     """Exponent of the ramp that weighs the residual's frequencies, so that fine detail is pulled
     at as strongly as coarse; 0 for none. 0.5 if not given, and 0 for X-rays, where it is the
     frequencies along the detector's rows."""
-    band_limit: bool = False
-    """Let no splat be finer than what the cameras resolve (Mip-Splatting's 3D filter)."""
+    homogenise_by: WeightKind = "ramp"
+    """What that exponent is of: the ramp, as for views that lie evenly, or one over how often all
+    views together cover a frequency (coverage)."""
+    band_limit: BandLimit | None = None
+    """Let no splat be finer than what the cameras resolve: half a pixel of the finest camera
+    (pixels, Mip-Splatting's 3D filter), or what all cameras know above noise (coverage)."""
+    pinhole: bool = False
+    """Take every lens for a pinhole, sharp at every depth, whatever the captures say of its
+    opening ('aperture_radius' and 'focus_distance' of a transforms.json)."""
     refine_poses: bool = False
     """Fit the cameras' poses as well."""
     refine_exposures: bool = False
@@ -105,6 +112,11 @@ class FitSettings(XrayOptions):
                 raise InputError(f"--{option} is {getattr(self, name)}, wanted {bound} or more")
         if not (self.first_splats is None or 0 < self.first_splats <= 1):
             raise InputError(f"--first-splats is {self.first_splats}, wanted above 0, at most 1")
+        if self.homogenise_by == "coverage" and not self.exponent:
+            raise InputError(
+                "--homogenise-by coverage weighs nothing while the exponent is 0: add --homogenise "
+                "0.5, say, or leave it out"
+            )
         if self.resume and self.overwrite:
             raise InputError("--resume goes on with what --overwrite throws away: give one of them")
 
@@ -117,6 +129,11 @@ class FitSettings(XrayOptions):
         if self.homogenise is not None:
             return self.homogenise
         return 0.5 if self.mode == "light" else 0.0
+
+    @property
+    def asks_for_noise(self) -> bool:
+        """Whether the pictures' noise must be known."""
+        return self.exponent > 0 or self.band_limit == "coverage"
 
     @property
     def first_count(self) -> int:
@@ -133,6 +150,7 @@ class FitSettings(XrayOptions):
                 seed=self.seed,
                 splats=self.splats,
                 exponent=self.exponent,
+                weight=self.homogenise_by,
                 band_limit=self.band_limit,
             )
         return TrainSettings(
@@ -142,7 +160,7 @@ class FitSettings(XrayOptions):
             strategy=self.strategy,
             densification=Densification(absgrad=self.absgrad),
             sh_degree=self.sh_degree,
-            homogenisation=Homogenisation(exponent=self.exponent),
+            homogenisation=Homogenisation(self.exponent, weight=self.homogenise_by),
             band_limit=self.band_limit,
             rates=Rates(
                 poses=_POSE_RATE if self.refine_poses else 0.0,
@@ -157,6 +175,13 @@ class FitSettings(XrayOptions):
     def decisive(self) -> dict[str, Any]:
         """What decides the result, in words that JSON keeps: a resumed run must have the same."""
         values = {k: v for k, v in dataclasses.asdict(self).items() if k not in _FREE}
+        # So that fits from before there was a choice still go on.
+        if self.homogenise_by == "ramp":
+            del values["homogenise_by"]
+        if self.band_limit != "coverage":
+            values["band_limit"] = self.band_limit == "pixels"
+        if not self.pinhole:
+            del values["pinhole"]
         if self.mode == "light":
             # So that fits from before there were other modes still go on.
             values = {k: v for k, v in values.items() if k not in ("mode", *XRAY_ONLY)}

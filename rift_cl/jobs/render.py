@@ -17,8 +17,9 @@ from rift_cl.io.capture import open_capture
 from rift_cl.io.image import write_png
 from rift_cl.io.output import atomic_path, make_folder, write_json
 from rift_cl.io.pixels import write_pixels
+from rift_cl.io.transforms_record import transforms_of
 from rift_cl.jobs.animation import shrunk
-from rift_cl.jobs.camera_path import orbit, orbit_distance, resized, smooth_path, transforms_of
+from rift_cl.jobs.camera_path import opened, orbit, orbit_distance, resized, smooth_path
 from rift_cl.jobs.depth_picture import LEAST_ALPHA, depth_picture, depth_window
 from rift_cl.jobs.render_report import Sheet, render_page, write_bytes
 from rift_cl.jobs.render_settings import MOST_FRAMES, RenderSettings
@@ -49,7 +50,14 @@ class Render:
         self.settings = settings
         self.scene = settings.open_scene()
         self.bounds = settings.bounds(self.scene.splats)
-        self.cameras = self._path() if settings.path is not None else self._orbit()
+        cameras = self._path() if settings.path is not None else self._orbit()
+        self.cameras = [
+            opened(camera, settings.aperture, settings.focus, self.bounds.center)
+            for camera in cameras
+        ]
+        lenses = [camera.aperture for camera in self.cameras if camera.aperture is not None]
+        if settings.focus is not None and not lenses:
+            raise InputError("--focus is about a lens with an opening: give its --aperture as well")
         self.device = open_device(settings.device)
         self.folder = RunFolder(settings.out, "render", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}

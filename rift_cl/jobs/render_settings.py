@@ -35,6 +35,12 @@ class RenderSettings(OrbitInput):
     """Of the orbit from the scene's middle, in scene units; so that all is seen when not given."""
     fov: float | None = None
     """Vertical field of view of the orbit in degrees; 45 when not given."""
+    aperture: float | None = None
+    """Radius of the lens's opening, in scene units, so that one depth alone is sharp; 0 for a
+    pinhole. That of the views of --path, or 0, when not given."""
+    focus: float | None = None
+    """Depth that is sharp, in scene units; that of the views of --path, or of the scene's middle,
+    when not given."""
     size: tuple[int, int] | None = None
     """Width and height in pixels; 640 480, or the views' own, when not given."""
     rate: float = 24.0
@@ -62,8 +68,12 @@ class RenderSettings(OrbitInput):
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
                 raise InputError(f"--{name} is {value}, wanted {low:g} to {high:g}")
-        if self.distance is not None and not 0 < self.distance < math.inf:
-            raise InputError(f"--distance is {self.distance}, wanted a positive number")
+        for name in ("distance", "focus"):
+            value = getattr(self, name)
+            if value is not None and not 0 < value < math.inf:
+                raise InputError(f"--{name} is {value}, wanted a positive number")
+        if self.aperture is not None and not 0 <= self.aperture < math.inf:
+            raise InputError(f"--aperture is {self.aperture}, wanted 0 or a positive number")
         if self.size is not None and not all(1 <= edge <= _LONGEST for edge in self.size):
             shown = " ".join(map(str, self.size))
             raise InputError(f"--size is {shown}, wanted 1 to {_LONGEST} pixels each")

@@ -28,6 +28,9 @@ _FLAT = 0.6
 _USUAL = np.array([[0.0, 0, 1], [0, -1, 0], [1, 0, 0]])
 # Cameras that look every way have no common up, which their mean shows by its length.
 _UPRIGHT = 0.2
+# Mean square of the second most horizontal direction, from which on there are two; and the cosine
+# of how far from the mean up may lie (60 degrees).
+_SPREAD, _NEAR_MEAN = 0.01, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,10 +80,9 @@ def bounds_of_cameras(cameras: Sequence[Camera], splats: SceneBounds | None = No
     """
     center = focus_of(cameras)
     ways = np.array([camera.center for camera in cameras]) - center
-    mean = -np.mean([camera.view[1, :3] for camera in cameras], axis=0)
-    length = float(np.linalg.norm(mean))
-    up = _upward() if splats is None else splats.up
-    up = mean / length if length > _UPRIGHT else up
+    up = common_up(cameras)
+    if up is None:
+        up = _upward() if splats is None else splats.up
     distances = np.linalg.norm(ways, axis=1)
     distance = float(np.median(distances))
     radius = distance / 2 if splats is None else splats.radius
@@ -89,6 +91,25 @@ def bounds_of_cameras(cameras: Sequence[Camera], splats: SceneBounds | None = No
     rise = np.clip(ways @ up / np.where(distances > 0, distances, 1), -1, 1)
     elevation = float(np.degrees(np.median(np.arcsin(rise))))
     return SceneBounds(center, radius, up, distance, elevation)
+
+
+def common_up(cameras: Sequence[Camera]) -> Floats | None:
+    """The direction (3,) that cameras have above, or None where they have none in common.
+
+    Cameras that look down from one side all lean the same way, and so does the mean of what their
+    pictures have above. But pictures of upright cameras have the horizon from left to right: up is
+    across those directions, if they are not all alike.
+    """
+    mean = -np.mean([camera.view[1, :3] for camera in cameras], axis=0)
+    length = float(np.linalg.norm(mean))
+    if not length > _UPRIGHT:
+        return None
+    sideways = np.array([camera.view[0, :3] for camera in cameras])
+    spread, axes = np.linalg.eigh(sideways.T @ sideways / len(cameras))
+    across = np.asarray(axes[:, 0] * np.sign(axes[:, 0] @ mean), np.float64)
+    if spread[1] > _SPREAD and across @ mean > _NEAR_MEAN * length:
+        return across
+    return np.asarray(mean / length)
 
 
 def weighted_quantile(values: Floats, weights: Floats, share: float) -> float:

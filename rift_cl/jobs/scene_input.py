@@ -86,6 +86,11 @@ class OpenedScene:
         factor = self._fitted("downscale")
         return 1 if factor is None else int(factor)
 
+    @property
+    def pinhole(self) -> bool:
+        """Whether the fit took every lens for a pinhole, so that blur is in the splats."""
+        return self._settings is not None and self._settings.flag("pinhole")
+
     def _fitted(self, name: str) -> float | None:
         """A number among the settings of the fit."""
         return None if self._settings is None else self._settings.number(name)

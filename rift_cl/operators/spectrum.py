@@ -8,6 +8,7 @@ real and even. The operator, window times response times window, is its own adjo
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -60,13 +61,18 @@ class SpectralFilter:
         self.device = device
         self.size = size
         self.padded = rows, columns = padded_length(size[0]), padded_length(size[1])
-        along_y, along_x = (np.asarray(np.fft.fftfreq(n), np.float64) for n in self.padded)
-        weights = np.broadcast_to(response(along_y[None, :], along_x[:, None]), (columns, rows))
-        if not np.isfinite(weights).all():
-            raise NonFiniteError("SpectralFilter: the response is not finite everywhere")
-        # Transposed, as the spectrum stands when it is weighted.
-        self._weights = device.array(np.ascontiguousarray(weights, np.float32))
+        self._weights = self._sampled(response)
         self._transforms = {n: ColumnTransform(device, n) for n in {rows, columns}}
+
+    def with_response(self, response: Response) -> SpectralFilter:
+        """Another response for images of the same size; the transforms are shared.
+
+        Raises:
+            NonFiniteError: the response is not finite.
+        """
+        other = copy(self)
+        other._weights = other._sampled(response)
+        return other
 
     def __call__(
         self,
@@ -94,6 +100,14 @@ class SpectralFilter:
             as_device_array(self.device, mask, self.size, name="mask")
         fields = self._weighted(image, count)
         return self._unpacked(*fields, mask, shape, count, keep_norm=keep_norm)
+
+    def _sampled(self, response: Response) -> Any:
+        """The response at the transform's frequencies, transposed as the spectrum then stands."""
+        along_y, along_x = (np.asarray(np.fft.fftfreq(n), np.float64) for n in self.padded)
+        weights = np.broadcast_to(response(along_y[None, :], along_x[:, None]), self.padded[::-1])
+        if not np.isfinite(weights).all():
+            raise NonFiniteError("SpectralFilter: the response is not finite everywhere")
+        return self.device.array(np.ascontiguousarray(weights, np.float32))
 
     def _weighted(self, image: Any, count: int) -> tuple[Any, Any]:
         """The filtered fields in space, and the sums of squares of the image's rows."""

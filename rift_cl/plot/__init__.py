@@ -1,7 +1,19 @@
-"""Figures of reports: panels of images and families of curves, drawn without a display."""
+"""Figures of reports, drawn without a display: images, curves, frequencies, directions, cameras."""
 
+from rift_cl.plot.camera_plot import Stands, camera_plot
 from rift_cl.plot.curves import curves
+from rift_cl.plot.direction_map import direction_maps
 from rift_cl.plot.figure import figure_png
+from rift_cl.plot.frequency_map import FrequencySlice, frequency_maps
 from rift_cl.plot.panels import image_grid
 
-__all__ = ["curves", "figure_png", "image_grid"]
+__all__ = [
+    "FrequencySlice",
+    "Stands",
+    "camera_plot",
+    "curves",
+    "direction_maps",
+    "figure_png",
+    "frequency_maps",
+    "image_grid",
+]

@@ -10,14 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.plot.figure import INK, LINE, POINTS, SOFT, new_figure, real_values
+from rift_cl.plot.figure import COLORS, INK, LINE, POINTS, SOFT, new_figure, real_values
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito's palette, told apart by colour-blind readers; its yellow is too pale for lines.
-_COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", INK)
 _DASHES = ("-", "--", ":", "-.")
 
 
@@ -27,6 +25,7 @@ def curves(
     xlabel: str,
     ylabel: str,
     log_x: bool = False,
+    log_y: bool = False,
     title: str = "",
     mark: float | None = None,
 ) -> Figure:
@@ -37,6 +36,7 @@ def curves(
         xlabel: quantity and unit along x.
         ylabel: quantity and unit along y.
         log_x: whether x is logarithmic.
+        log_y: whether y is.
         title: a text above the axes.
         mark: a position along x that is shown by a dashed line and its value.
 
@@ -44,7 +44,7 @@ def curves(
         ShapeError: there is no curve, or x and y of one are not (n,) with one n of 1 or more.
         DTypeError: a curve is not of real numbers.
         NonFiniteError: a curve holds NaN or infinity.
-        InputError: ``log_x`` is true and an x or ``mark`` is not positive.
+        InputError: ``log_x`` is true and an x or ``mark`` is not positive, or so is a y.
     """
     lines = [
         (real_values(f"x of {n}", x), real_values(f"y of {n}", y)) for n, (x, y) in series.items()
@@ -52,15 +52,15 @@ def curves(
     if not lines or any(x.shape != y.shape for x, y in lines):
         found = {name: (np.size(x), np.size(y)) for name, (x, y) in series.items()}
         raise ShapeError(f"curves: series has sizes {found}, wanted curves with as many x as y")
-    least = min([float(x.min()) for x, _ in lines] + ([] if mark is None else [mark]))
-    if log_x and least <= 0:
-        raise InputError(f"curves: x goes down to {least:g}, but log_x needs positive numbers")
+    marked = [] if mark is None else [mark]
+    _check_scale("x", log_x, min([float(x.min()) for x, _ in lines] + marked))
+    _check_scale("y", log_y, min(float(y.min()) for _, y in lines))
     figure = new_figure(1024, 576)
     figure.set_layout_engine("constrained", w_pad=0.1, h_pad=0.1)
-    axes = figure.add_subplot(xscale="log" if log_x else "linear")
+    axes = figure.add_subplot(xscale=_scale(log_x), yscale=_scale(log_y))
     for k, (x, y) in enumerate(lines):
-        dash, dots = _DASHES[k // len(_COLORS) % len(_DASHES)], "o" if len(x) <= 16 else ""
-        color = _COLORS[k % len(_COLORS)]
+        dash, dots = _DASHES[k // len(COLORS) % len(_DASHES)], "o" if len(x) <= 16 else ""
+        color = COLORS[k % len(COLORS)]
         axes.plot(x, y, dash, color=color, linewidth=1.4, marker=dots, markersize=3)
     if mark is not None:
         axes.axvline(mark, color=SOFT, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
@@ -69,6 +69,17 @@ def curves(
     _style(axes, xlabel, ylabel, title)
     _name_curves(axes, list(series))
     return figure
+
+
+def _check_scale(axis: str, log: bool, least: float) -> None:
+    if log and least <= 0:
+        raise InputError(
+            f"curves: {axis} goes down to {least:g}, but log_{axis} needs positive numbers"
+        )
+
+
+def _scale(log: bool) -> str:
+    return "log" if log else "linear"
 
 
 def _style(axes: Axes, xlabel: str, ylabel: str, title: str) -> None:

@@ -15,10 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 from rift_cl.errors import DTypeError, NonFiniteError, ShapeError
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 DPI = 160
 INK, SOFT, LINE = "#1c1d1f", "#63666b", "#c9ccd0"
+# Okabe and Ito's palette, told apart by colour-blind readers; its yellow is too pale for lines.
+COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", INK)
 POINTS = 8.5
 
 Reals = NDArray[np.float64]
@@ -47,6 +50,12 @@ def new_figure(width: int, height: int) -> Figure:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white")
+
+
+def add_panel(figure: Figure, left: float, top: float, wide: float, high: float) -> Axes:
+    """Axes whose frame has so many pixels, and lies so many from the figure's left and top edge."""
+    width, height = figure.get_size_inches() * DPI
+    return figure.add_axes((left / width, 1 - (top + high) / height, wide / width, high / height))
 
 
 def figure_png(figure: Figure) -> bytes:

@@ -11,7 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.plot.figure import DPI, INK, POINTS, SOFT, Reals, new_figure, real_values
+from rift_cl.plot.figure import (
+    DPI,
+    INK,
+    POINTS,
+    SOFT,
+    Reals,
+    add_panel,
+    new_figure,
+    real_values,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -134,9 +143,7 @@ def _draw_grid(
 
 
 def _draw_panel(figure: Figure, panel: _Panel, x: int, y: int) -> None:
-    width, height = figure.get_size_inches() * DPI
-    bottom = 1 - (y + panel.high) / height
-    axes = figure.add_axes((x / width, bottom, panel.wide / width, panel.high / height))
+    axes = add_panel(figure, x, y, panel.wide, panel.high)
     axes.set_axis_off()
     look = "nearest" if panel.high >= panel.image.shape[0] else "antialiased"
     low, high = panel.window

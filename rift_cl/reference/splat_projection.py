@@ -84,15 +84,18 @@ def project_splats(
         centers, jacobians, rays = _map(camera, points)
         to_screen = jacobians @ camera.view[:3, :3]
         plain = to_screen @ covars @ to_screen.transpose(0, 2, 1)
-        wide = plain + eps2d * np.eye(2)
+        sharp = plain + eps2d * np.eye(2)
+        wide = sharp + _blur(camera, points[:, 2])[:, None, None] * np.eye(2)
         determinants = np.linalg.det(wide)
         conics = np.stack([wide[:, 1, 1], -wide[:, 0, 1], wide[:, 0, 0]], 1) / determinants[:, None]
         factors = np.ones(len(means))
         if mode == "xray":
             factors = _line_integrals(jacobians, rays, covars, determinants)
         elif antialiased:
-            kept = np.linalg.det(plain) / determinants
+            kept = np.linalg.det(plain) / np.linalg.det(sharp)
             factors = np.sqrt(np.maximum(kept, _LEAST_COMPENSATION**2))
+        if camera.aperture is not None:
+            factors *= np.sqrt(np.linalg.det(sharp) / determinants)
         weights = opacities * factors
         extents = _reach(weights, mode)[:, None] * np.sqrt(wide[:, [0, 1], [0, 1]])
         radii = np.ceil(extents)
@@ -103,6 +106,21 @@ def project_splats(
     return ProjectedSplats(
         centers, wide, conics, weights, points[:, 2], factors, extents, radii, boxes, culled
     )
+
+
+def _blur(camera: Camera, depths: Floats) -> Floats:
+    """Variance that a thin lens adds at these depths, in square pixels.
+
+    A disc of diameter d has the variance d^2 / 16 along each axis. The Airy pattern's variance is
+    infinite; in its place stands that of the Gaussian of the same light and the same peak, which
+    is (sqrt(2) / pi f lambda / (2 R))^2 (Zhang, Zerubia and Olivo-Marin 2007 compare the choices).
+    """
+    aperture, (fx, fy, _, _) = camera.aperture, camera.intrinsics
+    if aperture is None:
+        return np.zeros_like(depths)
+    across = aperture.blur(depths) / depths
+    airy = np.sqrt(2) / np.pi * aperture.wavelength / (2 * aperture.radius)
+    return np.asarray(fx * fy * (across**2 / 16 + airy**2))
 
 
 def _line_integrals(

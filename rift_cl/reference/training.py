@@ -1,12 +1,14 @@
 """A step of training by its definitions.
 
-Twins of adam, splat_activate, splat_noise and splat_statistics.
+Twins of adam, splat_activate, splat_band, splat_band_coverage, splat_noise and splat_statistics.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+
+from rift_cl.reference.coverage import optical_transfer
 
 Floats = NDArray[np.float64]
 
@@ -48,18 +50,55 @@ def activate(
 
 
 def finest_seen(means: Floats, cameras: Floats, *, near: float, unseen: float) -> Floats:
-    """The length b of each splat's band, (N,), from (V, 17) cameras; twin of splat_band."""
-    finest = np.full(len(means), np.inf)
-    for row in cameras:
-        view: Floats = row[:12].reshape(3, 4)
-        focal, left, top, width, height = row[12:].tolist()
-        x, y, z = view[:, :3] @ means.T + view[:, 3:]
-        with np.errstate(all="ignore"):
-            u, v = focal * x / z + left, focal * y / z + top
-        inside = (z > near) & (np.abs(u - width / 2) < 0.65 * width)
-        inside &= np.abs(v - height / 2) < 0.65 * height
-        finest = np.where(inside, np.minimum(finest, z / focal), finest)
+    """The length b of each splat's band, (N,), from (V, 20) cameras; twin of splat_band."""
+    finest = np.min([_pixel_at(means, row, near) for row in cameras], axis=0)
     return np.asarray(np.where(np.isfinite(finest), np.sqrt(0.2) * finest, unseen))
+
+
+def finest_known(
+    means: Floats, cameras: Floats, *, near: float, unseen: float, diameter: float, snr: float
+) -> Floats:
+    """The length b where all cameras together set it, (N,); twin of splat_band_coverage.
+
+    Of 2,000 frequencies from one cycle per diameter to half a pixel's inverse, the last one known.
+    """
+    pixels = np.array([_pixel_at(means, row, near) for row in cameras])
+    finest = pixels.min(axis=0)
+    seen = np.isfinite(finest)
+    highest = np.where(seen, 0.5 / np.where(seen, finest, 1), 1 / diameter)
+    found = np.minimum(1 / diameter, highest)
+    for share in np.linspace(0, 1, 2000):
+        k = (1 / diameter) ** (1 - share) * highest**share
+        # The mean of exp(-8 (q u)^2) over u from 0 to 1, for q of 1 and more.
+        q = diameter * k
+        clear = np.sqrt(np.pi / 32) / q * _passed(k, pixels, cameras) * snr / q**2 > 1
+        found = np.where(clear, k, found)
+    return np.asarray(np.where(seen, np.sqrt(0.2) / (2 * found), unseen))
+
+
+def _passed(k: Floats, pixels: Floats, cameras: Floats) -> Floats:
+    """Sum of the squares of what cameras' optics pass, up to half a cycle per pixel, (N,)."""
+    total = np.zeros(len(k))
+    for row, a in zip(cameras, pixels, strict=True):
+        edge = np.where(np.isfinite(a), a, 1.0)
+        z, (radius, nearness, wavelength) = edge * row[12], row[17:].tolist()
+        cutoff = 2 * radius / (wavelength * z) if wavelength else np.inf
+        blur = 2 * radius * np.abs(1 - z * nearness)
+        passed = optical_transfer(k, edge, cutoff, blur).value ** 2
+        total += np.where(a * k <= 0.5 + 1e-9, passed, 0)
+    return total
+
+
+def _pixel_at(means: Floats, row: Floats, near: float) -> Floats:
+    """Edge of a camera's pixel at each point; inf where it is not seen, by a margin of 15 %."""
+    view: Floats = row[:12].reshape(3, 4)
+    focal, left, top, width, height = row[12:17].tolist()
+    x, y, z = view[:, :3] @ means.T + view[:, 3:]
+    with np.errstate(all="ignore"):
+        u, v = focal * x / z + left, focal * y / z + top
+    inside = (z > near) & (np.abs(u - width / 2) < 0.65 * width)
+    inside &= np.abs(v - height / 2) < 0.65 * height
+    return np.where(inside, z / focal, np.inf)
 
 
 def noise(

@@ -24,8 +24,8 @@ from rift_cl.splat.tiles import Tiles
 
 # Bytes of a splat on the screen: screen, depth, box, code.
 _PROJECTED = 32 + 4 + 16 + 1
-# Bytes of a splat's part in the gradient by the camera, and of what does not grow.
-_CAMERA, _SMALL = 64, 4096
+# Bytes of a splat's part in the gradient by the camera and its aperture, and of what does not grow.
+_CAMERA, _SMALL = 72, 4096
 
 
 @dataclass(frozen=True)

@@ -28,12 +28,14 @@ class ViewGradients:
         means2d: (N, 2) by the positions on its screen.
         means2d_abs: (N, 2) the sum over pixels of its magnitudes; None without ``absgrad``.
         camera: (16,) by pose and intrinsics; None if not asked for.
+        aperture: (2,) by the aperture's radius and focus; None as well where there is none.
         background: by its background; None where there was none.
     """
 
     means2d: Any
     means2d_abs: Any
     camera: Any
+    aperture: Any
     background: Any
 
 
@@ -93,7 +95,7 @@ def views_grad(
         frames: one or more frames of the same splats.
         grad_images: dL/d image of each.
         grad_transmittances: dL/d transmittance of each; zero if not given.
-        with_camera: differentiate by poses and intrinsics as well.
+        with_camera: differentiate by poses, intrinsics and apertures as well.
 
     Returns:
         What the splats share, and what each camera has for itself.
@@ -110,8 +112,8 @@ def views_grad(
     for frame, image, transmittance in zip(frames, grad_images, thin, strict=True):
         found = renderer.backward(frame, image, transmittance, with_camera=with_camera)
         total = _add(renderer.device, total, _shared(found))
-        own = (found.splats.means2d, found.splats.means2d_abs, found.camera, found.background)
-        views.append(ViewGradients(*own))
+        screen, lens = (found.splats.means2d, found.splats.means2d_abs), found.aperture
+        views.append(ViewGradients(*screen, found.camera, lens, found.background))
     assert total is not None
     return total, views
 

@@ -68,6 +68,8 @@ class FrameGradients:
         sh: (N, K, 3) by the spherical harmonics; None where there are none.
         camera: (16,): by the upper three rows of the view matrix, then fx, fy, cx, cy; None if
             not asked for.
+        aperture: (2,): by the aperture's radius and focus; None if the camera's is not asked
+            for, or has none.
         background: by the background as it was given; None where there was none.
     """
 
@@ -75,4 +77,5 @@ class FrameGradients:
     colors: Any
     sh: Any
     camera: Any
+    aperture: Any
     background: Any

@@ -23,7 +23,8 @@ class Projected:
     Args:
         screen: (N, 8): mean x, mean y, conic a, b, c, weight, extent x, extent y; pixels. Weight
             is opacity times a factor: 1, or Mip-Splatting's compensation, or in xray mode the
-            line integral through a unit peak. Extents are half the sides of the rectangle round
+            line integral through a unit peak; times what keeps the light that an aperture
+            spreads. Extents are half the sides of the rectangle round
             all that is drawn of a splat.
         depths: (N,) distances along the camera's axis, in scene units.
         boxes: (N, 4) int32 tile rectangles (x0, y0, x1, y1), x1 and y1 exclusive.
@@ -48,6 +49,8 @@ class SplatGradients:
         means2d_abs: (N, 2) the sum over pixels of its magnitudes; None without ``absgrad``.
         camera: (N, 16) each splat's part in the gradient by the camera, for ``sum_columns``:
             the upper 3 rows of the view matrix, then fx, fy, cx, cy; None if not asked for.
+        aperture: (N, 2) each splat's part in the gradient by the aperture's radius and focus;
+            None as with the camera, and for a camera without aperture.
     """
 
     means: Any
@@ -59,3 +62,4 @@ class SplatGradients:
     means2d: Any
     means2d_abs: Any
     camera: Any
+    aperture: Any = None

@@ -6,6 +6,7 @@ The drivers of ``kernels/splat_project.cl`` and its gradient, which say what is 
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.geometry import Camera
+from rift_cl.geometry import Aperture, Camera
 from rift_cl.splat.projected import Projected, SplatGradients
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
@@ -22,13 +23,15 @@ from rift_cl.splat.splats import Splats
 _MODELS = {"pinhole": 0, "ortho": 1, "fisheye": 2}
 # Moments of dL/dsigma that stand before the features' gradients; numbers of the camera's.
 MOMENTS, _CAMERA = 6, 16
+# Devices count in float32.
+_LARGEST = float(np.finfo(np.float32).max)
 
 
 def project(device: Device, splats: Splats, camera: Camera, settings: SplatSettings) -> Projected:
     """Project splats to the screen and find the tiles that each may touch.
 
     Raises:
-        InputError: the camera cannot be used with these settings.
+        InputError: the camera cannot be used with these settings, or its aperture with float32.
         ShapeError: one of the splats' arrays is a strided view.
         DeviceError: one of them lives on another device.
         DeviceMemoryError: the device has too little memory.
@@ -93,7 +96,9 @@ def project_grad(
             f"project_grad: sums has shape {sums.shape}, wanted (N, {fixed} + channels)"
         )
     as_device_array(device, sums, (len(splats), fixed + channels), name="sums")
-    out = _empty_gradients(device, splats, channels, settings.absgrad, with_camera)
+    out = _empty_gradients(
+        device, splats, channels, settings.absgrad, camera if with_camera else None
+    )
     device.launch(
         "splat_project_grad",
         (len(splats),),
@@ -102,6 +107,7 @@ def project_grad(
         *(float(settings.near), float(settings.far), float(settings.eps2d), len(splats)),
         *(out.means, *((out.quats, out.scales) if splats.covars is None else (out.covars,))),
         *(out.opacities, out.features, out.means2d, out.means2d_abs, out.camera),
+        *(() if camera.aperture is None else (out.aperture,)),
         **_macros(splats, camera, settings),
         CHANNELS=channels,
         ABSGRAD=settings.absgrad,
@@ -118,6 +124,11 @@ def _check(device: Device, splats: Splats, camera: Camera, settings: SplatSettin
             as_device_array(device, array, array.shape, name=name)
     if settings.mode == "xray" and camera.model == "fisheye":
         raise InputError("xray mode wants a pinhole or ortho camera, this one is fisheye")
+    if settings.mode == "xray" and camera.aperture is not None:
+        raise InputError(
+            "xray mode wants a camera without aperture: X-rays pass no lens, so that line "
+            "integrals are sharp at every depth"
+        )
     if camera.model == "pinhole" and settings.near <= 0:
         raise InputError(
             f"SplatSettings: near is {settings.near}, a pinhole camera wants a positive distance"
@@ -130,6 +141,7 @@ def _macros(splats: Splats, camera: Camera, settings: SplatSettings) -> dict[str
         "XRAY": settings.mode == "xray",
         "ANTIALIASED": settings.antialiased,
         "COVARIANCES": splats.covars is not None,
+        "DEFOCUS": camera.aperture is not None,
     }
 
 
@@ -140,13 +152,29 @@ def _shapes(splats: Splats) -> tuple[Any, ...]:
 def _camera_arguments(camera: Camera) -> tuple[Any, ...]:
     """What ``camera.h`` wants: by value, so that no copy waits for the queue."""
     rows: NDArray[np.float32] = camera.view[:3].astype(np.float32, order="C")
-    return (*rows, np.array(camera.intrinsics, np.float32), camera.width, camera.height)
+    pinhole = (*rows, np.array(camera.intrinsics, np.float32), camera.width, camera.height)
+    return pinhole if camera.aperture is None else (*pinhole, _of_aperture(camera.aperture))
+
+
+def _of_aperture(aperture: Aperture) -> NDArray[np.float32]:
+    """Radius, inverse focus, and the diffraction's standard deviation per focal length.
+
+    Raises:
+        InputError: one of them is too large for float32.
+    """
+    radius = aperture.radius
+    diffraction = aperture.wavelength / (math.sqrt(2) * math.pi * radius)
+    numbers = (radius, 1 / aperture.focus, diffraction)
+    if max(numbers) > _LARGEST:
+        raise InputError(f"{aperture}: too wide, too near or too small for float32")
+    return np.array([*numbers, 0], np.float32)
 
 
 def _empty_gradients(
-    device: Device, splats: Splats, channels: int, absgrad: bool, with_camera: bool
+    device: Device, splats: Splats, channels: int, absgrad: bool, camera: Camera | None
 ) -> SplatGradients:
     count, given = len(splats), splats.covars is not None
+    lens = camera is not None and camera.aperture is not None
     return SplatGradients(
         means=device.empty((count, 3)),
         quats=None if given else device.empty((count, 4)),
@@ -156,5 +184,6 @@ def _empty_gradients(
         features=device.empty((count, channels)),
         means2d=device.empty((count, 2)),
         means2d_abs=device.empty((count, 2)) if absgrad else None,
-        camera=device.empty((count, _CAMERA)) if with_camera else None,
+        camera=None if camera is None else device.empty((count, _CAMERA)),
+        aperture=device.empty((count, 2)) if lens else None,
     )

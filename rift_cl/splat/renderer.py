@@ -78,7 +78,7 @@ class Renderer:
                 sum of weights times depths, or ``expected``, that divided by alpha.
 
         Raises:
-            InputError: there is nothing to draw, or no depth in this mode.
+            InputError: there is nothing to draw, or no depth or no lens in this mode.
             ShapeError: the background does not fit.
             ResourceLimitError: not even one row of tiles fits the memory budget.
         """
@@ -115,7 +115,7 @@ class Renderer:
             frame: what ``forward`` returned.
             grad_image: dL/d image, (height, width, D) device array.
             grad_transmittance: dL/d transmittance, (height, width); zero if not given.
-            with_camera: differentiate by pose and intrinsics as well.
+            with_camera: differentiate by pose, intrinsics and aperture as well.
             with_background: differentiate by the background, if there is one.
 
         Raises:
@@ -146,6 +146,9 @@ class Renderer:
             colors=own_columns(device, gradients.features, frame.channels),
             sh=sh,
             camera=sum_columns(device, gradients.camera) if with_camera else None,
+            aperture=None
+            if gradients.aperture is None
+            else sum_columns(device, gradients.aperture),
             background=self._background_grad(frame, grad_image) if with_background else None,
         )
 

@@ -9,7 +9,11 @@ of the pixelwise part is multiplied by a ramp in the Fourier domain of the image
 and scaled back to the norm it had; that of D-SSIM, a high-pass itself, stays as it is. X-ray views
 of an orbit are too dense along the detector's rows alone: there k is the frequency along x.
 
-A ramp amplifies noise as well, and once only noise is left of the residual a flat weight is the
+Both are what views that lie evenly sample. Where they do not, the weight may be what was counted
+instead: one over the coverage L of the frequency by all views, to the power p, which is k^p for
+even views on a sphere (``rift_cl.train.coverage_weight``).
+
+Either amplifies noise as well, and once only noise is left of the residual a flat weight is the
 best there is. So the exponent falls with the share of the residual that is noise,
 
     p = exponent (1 - noise^2 / mean square residual),    not below zero.
@@ -19,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +34,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
 
 Floats = NDArray[np.float64]
+WeightKind = Literal["ramp", "coverage"]
 
 _STEEPEST = 4.0
 # Immerkaer's mask, which leaves out what is linear along an edge; its norm is 6. Noise is read off
@@ -44,25 +50,30 @@ class Homogenisation:
     Args:
         exponent: of the ramp; 0 leaves the plain loss, 1 is the whole ramp.
         noise_aware: let the exponent fall as the residual comes down to the pictures' noise.
-        along_rows: take the frequency along x alone, as for projections of an orbit.
+        along_rows: take the ramp's frequency along x alone, as for projections of an orbit.
+        weight: what the exponent is of: ``ramp``, or ``coverage``, one over what was counted.
 
     Raises:
-        InputError: the exponent is out of its range.
+        InputError: the exponent is out of its range, or the weight unknown.
     """
 
     exponent: float = 0.0
     noise_aware: bool = True
     along_rows: bool = False
+    weight: WeightKind = "ramp"
 
     def __post_init__(self) -> None:
-        """Check the exponent."""
+        """Check the exponent and the weight's name."""
         if not 0 <= one_number(self.exponent) <= _STEEPEST:
             raise InputError(
                 f"Homogenisation: exponent is {self.exponent!r}, wanted 0 to {_STEEPEST:g}"
             )
+        if self.weight not in get_args(WeightKind):
+            wanted = " or ".join(get_args(WeightKind))
+            raise InputError(f"Homogenisation: weight is {self.weight!r}, wanted {wanted}")
 
     def response(self, ky: Floats, kx: Floats, *, longest: int, exponent: float) -> Floats:
-        """The weight of frequencies in cycles per pixel, for an image with that longer edge."""
+        """The ramp at frequencies in cycles per pixel, for an image with that longer edge."""
         square = (kx**2 if self.along_rows else ky**2 + kx**2) + 1 / longest**2
         return np.asarray(square ** (exponent / 2))
 

@@ -14,13 +14,17 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.device import Device
-from rift_cl.operators.spectrum import SpectralFilter
+from rift_cl.errors import InputError
+from rift_cl.operators.spectrum import Response, SpectralFilter
+from rift_cl.train.coverage_weight import CoverageWeight
 from rift_cl.train.homogenisation import Homogenisation
 from rift_cl.train.image_loss import ImageLoss
 from rift_cl.train.settings import LossKind
 
 # Exponents are rounded to so many parts of the largest, so that responses can be kept.
 _PARTS = 32
+# Bytes of responses that are kept; those of further views are made anew at every look.
+_KEPT = 64 << 20
 # Share of the old value in the running mean of the squared residual.
 _MEMORY = 0.8
 
@@ -34,6 +38,10 @@ class HomogenisedLoss:
         ssim_weight: share of D-SSIM.
         kind: of the pixelwise part.
         noise: standard deviation of the noise in the pictures.
+        coverage: of the views; wanted where the settings weigh by it.
+
+    Raises:
+        InputError: it is wanted and missing.
     """
 
     def __init__(
@@ -44,16 +52,24 @@ class HomogenisedLoss:
         ssim_weight: float,
         kind: LossKind,
         noise: float = 0.0,
+        coverage: CoverageWeight | None = None,
     ) -> None:
         self.device = device
         self.settings = settings
+        if settings.weight == "ramp":
+            coverage = None
+        elif coverage is None and settings.exponent:
+            raise InputError("HomogenisedLoss: weight is 'coverage', wanted the views' coverage")
+        self.coverage = coverage
         self.noise = noise
         self.mean_square = float("inf")
         self._plain = ImageLoss(ssim_weight=ssim_weight, kind=kind)
         self._pixels = ImageLoss(ssim_weight=0.0, kind=kind)
         self._structure = ImageLoss(ssim_weight=1.0)
         self._squares = ImageLoss(ssim_weight=0.0, kind="l2")
-        self._filters: dict[tuple[tuple[int, ...], float], SpectralFilter] = {}
+        self._shapes: dict[tuple[int, ...], SpectralFilter] = {}
+        self._filters: dict[tuple[tuple[int, ...], int], SpectralFilter] = {}
+        self._filtered = 0.0
 
     @property
     def exponent(self) -> float:
@@ -62,16 +78,19 @@ class HomogenisedLoss:
         share = self.settings.exponent_at(self.mean_square, self.noise) / most if most else 0.0
         return round(share * _PARTS) / _PARTS * most
 
-    def __call__(self, image: Any, target: Any, *, weights: Any = None) -> tuple[Any, Any]:
+    def __call__(
+        self, image: Any, target: Any, *, weights: Any = None, view: int = 0
+    ) -> tuple[Any, Any]:
         """The loss, (1,), and its weighted gradient, as ``ImageLoss`` gives them.
 
         The ramp spreads a residual; what comes to lie on pixels that do not count is left out.
+        ``view`` is the picture's number, which coverage hangs on.
         """
         exponent = self.exponent
         if exponent == 0:
             return self._plain(self.device, image, target, weights=weights)
         value, gradient = self._pixels(self.device, image, target, weights=weights)
-        ramp = self._filter(image.shape[:2], exponent)
+        ramp = self._filter(image.shape[:2], exponent, view)
         gradient = ramp(gradient, channels=target.shape[2], mask=weights, keep_norm=True)
         share = self._plain.ssim_weight
         if share:
@@ -97,10 +116,24 @@ class HomogenisedLoss:
         """Go on from a checkpoint."""
         self.mean_square, self.noise = float(state["mean_square"]), float(state["noise"])
 
-    def _filter(self, size: tuple[int, ...], exponent: float) -> SpectralFilter:
-        if (size, exponent) not in self._filters:
-            kept = {key: value for key, value in self._filters.items() if key[1] == exponent}
-            response = partial(self.settings.response, longest=max(size), exponent=exponent)
-            kept[size, exponent] = SpectralFilter(self.device, (size[0], size[1]), response)
-            self._filters = kept
-        return self._filters[size, exponent]
+    def _filter(self, size: tuple[int, ...], exponent: float, view: int) -> SpectralFilter:
+        """The filter of a view's image, kept while the exponent holds."""
+        if exponent != self._filtered:
+            self._filters, self._filtered = {}, exponent
+        key = size, 0 if self.coverage is None else view
+        if key in self._filters:
+            return self._filters[key]
+        response = self._response(size, exponent, view)
+        if size in self._shapes:
+            found = self._shapes[size].with_response(response)
+        else:
+            found = SpectralFilter(self.device, (size[0], size[1]), response)
+            self._shapes[size] = found
+        if (len(self._filters) + 1) * 4 * found.padded[0] * found.padded[1] <= _KEPT:
+            self._filters[key] = found
+        return found
+
+    def _response(self, size: tuple[int, ...], exponent: float, view: int) -> Response:
+        if self.coverage is not None:
+            return self.coverage.response(view, exponent)
+        return partial(self.settings.response, longest=max(size), exponent=exponent)

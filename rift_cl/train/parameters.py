@@ -18,6 +18,7 @@ from rift_cl.cl.arithmetic import copy_columns
 from rift_cl.cl.device import Device
 from rift_cl.splat.frame import FrameGradients
 from rift_cl.splat.splats import Splats
+from rift_cl.train.band_limit import Detail
 
 GROUPS = ("means", "quats", "log_scales", "logits", "sh")
 _BETA1, _BETA2, _EPSILON = 0.9, 0.999, 1e-15
@@ -143,18 +144,25 @@ class Parameters:
     def _kind(self) -> dict[str, bool]:
         return {"DENSITY": self.density, "BAND": self.band is not None}
 
-    def limit_band(self, cameras: Any, *, near: float, unseen: float) -> None:
+    def limit_band(
+        self, cameras: Any, *, near: float, unseen: float, detail: Detail | None = None
+    ) -> None:
         """Let no splat be finer than what the cameras resolve where it is now.
 
         Args:
-            cameras: (V, 17) device array, as ``kernels/splat_band.cl`` says.
+            cameras: (V, 20) device array, as ``kernels/splat_band.cl`` says.
             near: cameras do not see what is nearer.
             unseen: the length for splats that no camera sees.
+            detail: of the pictures, where coverage sets the limit; None for pixels alone.
         """
-        count = len(self)
-        self.band = self.device.empty((count,))
+        device, count, views = self.device, len(self), cameras.shape[0]
+        self.band = device.empty((count,))
         given = (self.raw["means"], cameras, self.band, float(near), float(unseen))
-        self.device.launch("splat_band", (count,), *given, cameras.shape[0], count)
+        if detail is None:
+            device.launch("splat_band", (count,), *given, views, count)
+        else:
+            runs = -(-count // device.traits.macros["LANES"])
+            device.launch("splat_band_coverage", (runs,), *given, *detail, views, count)
         self.activate()
 
     def _adam(self, name: str, gradient: Any, rate: float, rest: float) -> None:

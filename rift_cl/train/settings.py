@@ -11,6 +11,7 @@ from rift_cl.train.homogenisation import Homogenisation
 
 LossKind = Literal["l1", "l2"]
 StrategyName = Literal["mcmc", "default"]
+BandLimit = Literal["pixels", "coverage"]
 _DEGREES = (0, 1, 2, 3, 4)
 # Devices count in float32.
 _LARGEST = 3.4028234e38
@@ -175,8 +176,9 @@ class TrainSettings:
         loss: of pixels, ``l1`` or ``l2``.
         ssim_weight: share of D-SSIM in the loss; the rest is that of pixels.
         homogenisation: weight of high frequencies in the loss of pixels.
-        noise: standard deviation of the noise in the pictures; estimated from them if not given.
-        band_limit: let no splat be finer than what the cameras resolve (Mip-Splatting).
+        noise: standard deviation of the noise in the pictures; none if not given.
+        band_limit: let no splat be finer than what the cameras resolve: half a pixel of the finest
+            camera (``pixels``, Mip-Splatting), or what all know above noise (``coverage``).
         finish: share of the steps, at the end, without noise and penalties and with fading rates.
         rates: of Adam.
         strategy: where splats come from and go to: ``mcmc`` renews them with random walks and
@@ -197,7 +199,7 @@ class TrainSettings:
     ssim_weight: float = 0.2
     homogenisation: Homogenisation = field(default_factory=Homogenisation)
     noise: float | None = None
-    band_limit: bool = False
+    band_limit: BandLimit | None = None
     finish: float = 0.12
     rates: Rates = field(default_factory=Rates)
     strategy: StrategyName = "mcmc"
@@ -216,6 +218,9 @@ class TrainSettings:
             _check_number(self, "noise")
         if self.loss not in get_args(LossKind):
             raise InputError(f"TrainSettings: loss is {self.loss!r}, wanted l1 or l2")
+        if self.band_limit is not None and self.band_limit not in get_args(BandLimit):
+            wanted = "None, " + " or ".join(get_args(BandLimit))
+            raise InputError(f"TrainSettings: band_limit is {self.band_limit!r}, wanted {wanted}")
         if self.strategy not in get_args(StrategyName):
             wanted = " or ".join(get_args(StrategyName))
             raise InputError(f"TrainSettings: strategy is {self.strategy!r}, wanted {wanted}")

@@ -47,6 +47,17 @@ def focus_of(cameras: Sequence[Camera]) -> Floats:
     return np.asarray(np.linalg.solve(normal, (across @ centers[:, :, None]).sum(axis=0))[:, 0])
 
 
+def field_diameter(cameras: Sequence[Camera]) -> float:
+    """How wide pictures are where the cameras look: the size of a target that fills them."""
+    middle = focus_of(cameras)
+    widths = []
+    for camera in cameras:
+        depth = abs(float(camera.view[2, :3] @ middle + camera.view[2, 3]))
+        reach = 1.0 if camera.model == "ortho" else depth
+        widths.append(max(camera.size) * reach / camera.intrinsics[0])
+    return float(np.median(widths))
+
+
 def random_points(cameras: Sequence[Camera], count: int, seed: int) -> Floats:
     """Points at random in the volume that at least half of the cameras see, (N, 3).
 

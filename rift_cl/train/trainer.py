@@ -24,7 +24,8 @@ from rift_cl.geometry import Camera
 from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
-from rift_cl.train.band_limit import camera_table, unseen_length
+from rift_cl.train.band_limit import Detail, camera_table, unseen_length
+from rift_cl.train.coverage_weight import CoverageWeight
 from rift_cl.train.exposures import Exposures
 from rift_cl.train.homogenised_loss import HomogenisedLoss
 from rift_cl.train.parameters import Parameters
@@ -94,6 +95,7 @@ class Trainer:
             ssim_weight=settings.ssim_weight,
             kind=settings.loss,
             noise=settings.noise or 0.0,
+            coverage=self._coverage(),
         )
         self._band = self._band_of_cameras() if settings.band_limit else None
         if self._band is not None and parameters.band is None:
@@ -199,7 +201,7 @@ class Trainer:
         pictures, exposures = self.pictures, self.exposures
         target, weights = pictures.target(number), pictures.weights(number)
         exposed = image if exposures is None else exposures.applied(image, number)
-        value, by_exposed = self.loss(exposed, target, weights=weights)
+        value, by_exposed = self.loss(exposed, target, weights=weights, view=number)
         if (self.parameters.step + 1) % REPORT_EVERY == 0:
             self.loss.watch(exposed, target, weights=weights)
         if exposures is None:
@@ -212,14 +214,24 @@ class Trainer:
         if parameters.step % settings.sh_every == 0 and degree < settings.sh_degree:
             parameters.add_degree()
 
-    def _band_of_cameras(self) -> tuple[Any, float]:
-        cameras = self.pictures.cameras
-        return self.device.array(camera_table(cameras)), unseen_length(cameras)
+    def _coverage(self) -> CoverageWeight | None:
+        chosen = self.settings.homogenisation
+        if chosen.weight == "ramp" or not chosen.exponent:
+            return None
+        return CoverageWeight(self.pictures.cameras, self.device)
+
+    def _band_of_cameras(self) -> tuple[Any, float, Detail | None]:
+        pictures, settings = self.pictures, self.settings
+        detail = None
+        if settings.band_limit == "coverage":
+            detail = Detail.of(self.device, pictures, settings.noise or 0.0)
+        cameras = pictures.cameras
+        return self.device.array(camera_table(cameras)), unseen_length(cameras), detail
 
     def _limit_band(self) -> None:
         if self._band is not None:
-            near, (cameras, unseen) = self.renderer.settings.near, self._band
-            self.parameters.limit_band(cameras, near=near, unseen=unseen)
+            near, (cameras, unseen, detail) = self.renderer.settings.near, self._band
+            self.parameters.limit_band(cameras, near=near, unseen=unseen, detail=detail)
 
     def view_at(self, step: int) -> int:
         """The picture that is looked at in a step: all of them once, in a new order every time."""

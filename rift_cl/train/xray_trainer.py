@@ -14,9 +14,9 @@ import numpy as np
 
 from rift_cl.cl.arithmetic import copy_columns
 from rift_cl.splat.settings import SplatSettings
-from rift_cl.train.homogenisation import Homogenisation
+from rift_cl.train.homogenisation import Homogenisation, WeightKind
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.settings import Rates, Renewal, TrainSettings
+from rift_cl.train.settings import BandLimit, Rates, Renewal, TrainSettings
 from rift_cl.train.trainer import Pictures, Trainer
 from rift_cl.train.xray_start import FLAT
 
@@ -26,7 +26,13 @@ RENEWAL = Renewal(first=100, every=100, last=0.7, faint=0.02)
 
 
 def xray_settings(
-    *, steps: int, seed: int, splats: int, exponent: float, band_limit: bool
+    *,
+    steps: int,
+    seed: int,
+    splats: int,
+    exponent: float,
+    weight: WeightKind = "ramp",
+    band_limit: BandLimit | None = None,
 ) -> TrainSettings:
     """The settings of a fit to projections.
 
@@ -34,7 +40,9 @@ def xray_settings(
         steps: projections that are looked at.
         seed: of everything that is random.
         splats: how many there are.
-        exponent: of the ramp along the detector's rows; orbits are dense along nothing else.
+        exponent: of the ramp along the detector's rows, since orbits are dense along nothing else,
+            or of the inverse coverage.
+        weight: which of the two.
         band_limit: as in ``TrainSettings``.
     """
     return TrainSettings(
@@ -44,7 +52,7 @@ def xray_settings(
         sh_degree=0,
         loss="l2",
         ssim_weight=0.0,
-        homogenisation=Homogenisation(exponent=exponent, along_rows=True),
+        homogenisation=Homogenisation(exponent, along_rows=True, weight=weight),
         band_limit=band_limit,
         rates=RATES,
         renewal=RENEWAL,

@@ -13,7 +13,7 @@ import rift_cl as rift
 from rift_cl.cli import main
 from rift_cl.io.image import write_png
 from rift_cl.io.output import write_json
-from rift_cl.jobs.camera_path import transforms_of
+from rift_cl.io.transforms_record import transforms_of
 
 
 @pytest.fixture(scope="module")

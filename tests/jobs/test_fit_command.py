@@ -70,6 +70,7 @@ def test_more_captures_are_scored_beside_it(capture, tmp_path):
         (["--eps2d", "-1"], "eps2d is -1"),
         (["--sh-degree", "9"], "sh_degree is 9"),
         (["--test", "nowhere"], "nowhere"),
+        (["--homogenise", "0", "--homogenise-by", "coverage"], "--homogenise-by coverage weighs"),
     ],
 )
 def test_what_makes_no_sense_is_named_and_leaves_nothing(capture, tmp_path, capsys, more, words):

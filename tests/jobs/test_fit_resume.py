@@ -6,6 +6,7 @@ import hashlib
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from rift_cl.jobs.fit_settings import FitSettings
 
 # Little of everything that has a state: both strategies, homogenisation, refinement, the band.
 VARIANTS = {
-    "mcmc": {"homogenise": 0.5, "band_limit": True},
+    "mcmc": {"homogenise": 0.5, "homogenise_by": "coverage", "band_limit": "coverage"},
     "default": {"strategy": "default", "refine_poses": True, "refine_exposures": True},
 }
 
@@ -108,3 +109,12 @@ def test_one_that_is_killed_goes_on_to_the_same_bits(capture, tmp_path):
         assert not (cut / "scene.ply").exists(), "it was through before it could be killed"
     assert subprocess.run([*command, "--resume", "--quiet"], check=False).returncode == 0
     assert digest(cut) == digest(whole)
+
+
+def test_fits_from_before_there_was_a_choice_go_on():
+    """They say of the band's limit whether there is one, and nothing of the weight."""
+    for limit, before in ((None, False), ("pixels", True), ("coverage", "coverage")):
+        found = settings(Path("capture"), Path("out"), band_limit=limit).decisive()
+        assert found["band_limit"] == before and "homogenise_by" not in found
+    found = settings(Path("capture"), Path("out"), homogenise_by="coverage").decisive()
+    assert found["homogenise_by"] == "coverage"

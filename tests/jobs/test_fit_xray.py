@@ -49,7 +49,8 @@ def test_a_scan_becomes_densities_slices_and_a_report(scans, tmp_path, capsys, r
     path, truth = scans[rows]
     out = tmp_path / "fit"
     splats = 400 * rows
-    assert fit(path, out, "--homogenise", "0.5", splats=splats) == 0
+    by = "coverage" if rows == 1 else "ramp"
+    assert fit(path, out, "--homogenise", "0.5", "--homogenise-by", by, splats=splats) == 0
     assert "held out" in capsys.readouterr().out
     slices = read_volume(out / "slices")
     metrics = json.loads((out / "metrics.json").read_text())

@@ -15,7 +15,7 @@ from rift_cl.io.capture import open_capture
 from rift_cl.io.image import read_image, write_png
 from rift_cl.io.output import write_json
 from rift_cl.io.splat_scene import SplatScene
-from rift_cl.jobs.camera_path import transforms_of
+from rift_cl.io.transforms_record import transforms_of
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 

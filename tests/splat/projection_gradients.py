@@ -66,7 +66,8 @@ def run(device, values, kind, *, channels=3, depth_channel=False, shaded=True, o
             device, splats.means, splats.sh, camera, features=features, gradients=gradients
         )
     host = {name: device.get(array) for name, array in vars(gradients).items() if array is not None}
-    host["camera"] = device.get(sum_columns(device, gradients.camera))
+    for name in {"camera", "aperture"} & set(host):
+        host[name] = device.get(sum_columns(device, getattr(gradients, name)))
     if shaded:
         host["sh"] = device.get(by_sh)
     sums = np.zeros((len(counts), records.shape[1]))
@@ -82,6 +83,7 @@ def oracle(values, kind, sums, drawn, *, depth_channel=False, shaded=True):
     }
     view = torch.tensor(kind.camera.view[:3], requires_grad=True)
     lens = torch.tensor(kind.camera.intrinsics, dtype=torch.float64, requires_grad=True)
+    opening = aperture_of(kind)
     seen = {name: leaf[torch.tensor(drawn)] for name, leaf in leaves.items()}
     covars = (
         twin.from_six(seen["covars"])
@@ -94,13 +96,24 @@ def oracle(values, kind, sums, drawn, *, depth_channel=False, shaded=True):
         seen["opacities"],
         view,
         lens,
+        opening,
         camera=kind.camera,
         settings=kind.settings,
     )
     colors = twin.shade(seen["means"], seen["sh"], view) if shaded else None
     twin.loss(screen, torch.tensor(sums[drawn]), colors, depth_channel=depth_channel).backward()
     found = {name: leaf.grad.numpy() for name, leaf in leaves.items() if leaf.grad is not None}
+    if opening is not None:
+        found["aperture"] = opening.grad.numpy()
     return found | {"camera": np.concatenate([view.grad.numpy().ravel(), lens.grad.numpy()])}
+
+
+def aperture_of(kind):
+    """Radius and focus as a leaf; None without an aperture."""
+    if kind.aperture is None:
+        return None
+    numbers = [kind.aperture.radius, kind.aperture.focus]
+    return torch.tensor(numbers, dtype=torch.float64, requires_grad=True)
 
 
 def error(found, right):

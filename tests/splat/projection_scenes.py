@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rift_cl.geometry import Camera
+from rift_cl.geometry import Aperture, Camera
 from rift_cl.reference.splat_projection import covariances, project_splats
 from rift_cl.splat.projection import project
 from rift_cl.splat.settings import SplatSettings
@@ -20,14 +20,14 @@ def turned(seed):
     return rotation * np.sign(np.linalg.det(rotation))
 
 
-def camera_of(model, *, distance=4.0, focal=None, size=(97, 143), seed=5):
+def camera_of(model, *, distance=4.0, focal=None, size=(97, 143), seed=5, aperture=None):
     """A camera of odd numbers that looks at the origin; every number is a float32."""
     focal = focal or {"pinhole": 150.0, "ortho": 41.0, "fisheye": 120.0}[model]
     view = np.eye(4)
     view[:3, :3] = turned(seed)
     view[:3, 3] = [0.11, -0.07, distance]
     K = np.array([[focal, 0, 66.3], [0, 0.9 * focal, 51.7], [0, 0, 1]])
-    return Camera(size, K.astype(np.float32), view.astype(np.float32), model)
+    return Camera(size, K.astype(np.float32), view.astype(np.float32), model, aperture)
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,15 @@ class Kind:
     model: str = "pinhole"
     covars: bool = False
     settings: SplatSettings = field(default_factory=SplatSettings)
+    aperture: Aperture | None = None
 
     @property
     def camera(self):
-        return camera_of(self.model)
+        return camera_of(self.model, aperture=self.aperture)
+
+
+# Blurs by up to 10 pixels, and through diffraction by as much as the tests' dilation.
+LENS = Aperture(0.25, 3.75, 0.002)
 
 
 KINDS = {
@@ -52,6 +57,10 @@ KINDS = {
     "pinhole xray": Kind(settings=SplatSettings(mode="xray")),
     "ortho xray": Kind("ortho", settings=SplatSettings(mode="xray", eps2d=0.1)),
     "pinhole xray covariances": Kind("pinhole", True, SplatSettings(mode="xray")),
+    "lens": Kind(aperture=LENS),
+    "lens antialiased": Kind(settings=SplatSettings(antialiased=True), aperture=LENS),
+    "lens covariances": Kind(covars=True, aperture=LENS),
+    "lens antialiased covariances": Kind("pinhole", True, SplatSettings(antialiased=True), LENS),
 }
 
 

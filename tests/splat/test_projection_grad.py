@@ -8,6 +8,7 @@ from projection_scenes import KINDS, Kind, random_splats, twin_of, upload
 
 from rift_cl.cl.arithmetic import sum_columns
 from rift_cl.errors import DTypeError, ShapeError
+from rift_cl.geometry import Aperture
 from rift_cl.splat.features import shade, shade_grad
 from rift_cl.splat.projection import project, project_grad
 from rift_cl.splat.settings import SplatSettings
@@ -23,15 +24,18 @@ def test_gradients_are_autograds(device, name):
     found, sums, drawn = run(device, values, kind)
     right = oracle(values, kind, sums, drawn)
     shape = {"covars"} if kind.covars else {"quats", "scales"}
-    assert set(right) == {"means", "opacities", "sh", "camera"} | shape
+    lens = set() if kind.aperture is None else {"aperture"}
+    assert set(right) == {"means", "opacities", "sh", "camera"} | shape | lens
+    assert ("aperture" in found) == bool(lens)
     np.testing.assert_allclose(found["features"], sums[:, 6:], rtol=1e-5, atol=1e-5)
     for what, wanted in right.items():
         assert np.linalg.norm(wanted) > 0, what
         assert error(found[what], wanted) < 3e-5, what
-        if what != "camera":
+        if what not in ("camera", "aperture"):
             assert errors_by_splat(found[what][drawn], wanted[drawn]).max() < 2e-4, what
             assert not found[what][~drawn].any(), what
-    np.testing.assert_allclose(found["camera"], right["camera"], rtol=2e-4)
+    for what in {"camera"} | lens:
+        np.testing.assert_allclose(found[what], right[what], rtol=2e-4)
 
 
 @pytest.mark.parametrize("coefficients", [1, 4, 9, 25])
@@ -88,14 +92,16 @@ def test_gradients_of_needles(device):
         assert errors.max() < 1e-2, what
 
 
+@pytest.mark.parametrize("aperture", [None, Aperture(0.02, 3.75)], ids=str)
 @pytest.mark.parametrize("covars", [False, True])
-def test_compensation_that_is_held_passes_nothing_on(device, covars):
-    kind = Kind(covars=covars, settings=SplatSettings(antialiased=True))
+def test_compensation_that_is_held_passes_nothing_on(device, covars, aperture):
+    kind = Kind(covars=covars, settings=SplatSettings(antialiased=True), aperture=aperture)
     values = random_splats(120, wide=0.8)
     values["scales"] = np.minimum(values["scales"], 1e-3)
     values["opacities"][:] = 0.95
     found, sums, drawn = run(device, values, kind, shaded=False)
-    assert (twin_of(values, kind).factors[drawn] == 0.005).mean() > 0.5
+    sharp = twin_of(values, Kind(covars=covars, settings=kind.settings))
+    assert (sharp.factors[drawn] == 0.005).mean() > 0.5
     right = oracle(values, kind, sums, drawn, shaded=False)
     for what in {"means", "scales", "covars"} & set(right):
         assert error(found[what], right[what]) < 1e-4, what
@@ -112,7 +118,9 @@ def test_every_channel_and_the_depth_find_their_place(device):
         assert error(found[what], right[what]) < 3e-5, what
 
 
-@pytest.mark.parametrize("name", ["pinhole", "ortho xray", "fisheye antialiased covariances"])
+@pytest.mark.parametrize(
+    "name", ["pinhole", "ortho xray", "fisheye antialiased covariances", "lens antialiased"]
+)
 def test_gradients_are_differences_of_the_numpy_twin(device, name):
     """A second oracle, which shares nothing with the first."""
     kind, values = KINDS[name], random_splats(100, seed=2)

@@ -10,6 +10,7 @@ import pytest
 from projection_scenes import camera_of, random_splats
 
 import rift_cl as rift
+from rift_cl.geometry import Aperture
 from rift_cl.reference.splat_projection import covariances, project_splats, shade_splats
 from rift_cl.reference.splat_raster import Rules, raster
 from rift_cl.reference.tile_lists import tile_lists
@@ -25,6 +26,8 @@ WAYS = {
     "ortho": ("ortho", {}),
     "xray, cone": ("pinhole", {"mode": "xray"}),
     "xray, parallel": ("ortho", {"mode": "xray"}),
+    "lens": ("lens", {}),
+    "lens, antialiased": ("lens", {"antialiased": True}),
 }
 
 
@@ -33,18 +36,24 @@ def values_of(model):
     values = random_splats(25, coefficients=4, wide=0.8)
     values["opacities"] = np.clip(values["opacities"], 0.1, 0.8)
     values["scales"] = np.maximum(values["scales"], 0.05)
-    focal = {"pinhole": 45.0, "ortho": 11.0, "fisheye": 40.0}[model]
-    camera = camera_of(model, focal=focal)
+    focal = {"ortho": 11.0, "fisheye": 40.0}.get(model, 45.0)
+    camera = camera_of(model.replace("lens", "pinhole"), focal=focal)
     values["background"] = np.float32([0.2, 0.5, 0.9])
     values["view"] = camera.view[:3]
     values["lens"] = np.array([focal, focal * 1.05, 20.3, 16.6])
+    if model == "lens":
+        values["aperture"] = np.array([0.3, 3.8])
     return {name: np.asarray(value, np.float32).astype(float) for name, value in values.items()}
 
 
 def camera_from(values, model):
     fx, fy, cx, cy = values["lens"]
     view = np.vstack([values["view"], [0, 0, 0, 1]])
-    return rift.Camera(SIZE, [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], view, model)
+    K = [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]
+    if model != "lens":
+        return rift.Camera(SIZE, K, view, model)
+    radius, focus = map(float, values["aperture"])
+    return rift.Camera(SIZE, K, view, aperture=Aperture(radius, focus, wavelength=0.02))
 
 
 def twin(values, model, changes):
@@ -82,6 +91,8 @@ def test_gradients_are_differences(device, way):
     camera = device.get(found.camera)
     gradients = {name: device.get(getattr(found.splats, name)) for name in list(own)[:4]}
     gradients |= {"sh": device.get(found.sh), "view": camera[:12], "lens": camera[12:]}
+    if model == "lens":
+        gradients["aperture"] = device.get(found.aperture)
     if changes.get("mode") != "xray":
         gradients["background"] = device.get(found.background)
     for name, gradient in gradients.items():

@@ -52,7 +52,21 @@ def _jacobian_at(camera, lens, q):
     return q, q / q.norm(dim=1, keepdim=True)
 
 
-def screen(means, covars, opacities, view, lens, *, camera, settings):
+def _blur(camera, lens, opening, depths):
+    """Variance of the disc, and of the Gaussian with the Airy pattern's light and peak.
+
+    That peak is pi R^2 / (wavelength f)^2, a Gaussian's is 1 / (2 pi variance).
+    """
+    if opening is None:
+        return torch.zeros_like(depths)
+    radius, focus = opening
+    diameter = 2 * radius * torch.abs(1 / depths - 1 / focus)
+    peak = np.pi * radius**2
+    airy = camera.aperture.wavelength**2 / (2 * np.pi * peak)
+    return lens[0] * lens[1] * (diameter**2 / 16 + airy)
+
+
+def screen(means, covars, opacities, view, lens, opening=None, *, camera, settings):
     """Pixel positions (N, 2), conics (N, 2, 2), weights, depths."""
     rotation, shift = view[:, :3], view[:, 3]
     points = means @ rotation.T + shift
@@ -60,15 +74,19 @@ def screen(means, covars, opacities, view, lens, *, camera, settings):
     jacobian = vmap(jacrev(lambda q: _pixel(camera.model, lens, q)))(at)
     map_ = jacobian @ rotation
     plain = map_ @ covars @ map_.transpose(1, 2)
-    wide = plain + settings.eps2d * torch.eye(2, dtype=plain.dtype)
+    sharp = plain + settings.eps2d * torch.eye(2, dtype=plain.dtype)
+    blur = _blur(camera, lens, opening, points[:, 2])
+    wide = sharp + blur[:, None, None] * torch.eye(2, dtype=plain.dtype)
     factor = torch.ones_like(opacities)
     if settings.mode == "xray":
         volume = torch.linalg.det(torch.cat([jacobian, ray[:, None]], 1))
         along = volume**2 * torch.linalg.det(covars)
         factor = torch.sqrt(2 * np.pi * along / torch.linalg.det(wide))
     elif settings.antialiased:
-        kept = torch.linalg.det(plain) / torch.linalg.det(wide)
+        kept = torch.linalg.det(plain) / torch.linalg.det(sharp)
         factor = torch.sqrt(torch.clamp(kept, min=LEAST_COMPENSATION**2))
+    if opening is not None:
+        factor = factor * torch.sqrt(torch.linalg.det(sharp) / torch.linalg.det(wide))
     pixels = vmap(lambda q: _pixel(camera.model, lens, q))(points)
     return pixels, torch.linalg.inv(wide), opacities * factor, points[:, 2]
 

@@ -10,16 +10,22 @@ from test_parameters import FREE, RATES, raw_values
 from test_start import ring
 
 from rift_cl.geometry import Camera
-from rift_cl.reference.training import activate, finest_seen
-from rift_cl.train.band_limit import camera_table, unseen_length
+from rift_cl.geometry.aperture import Aperture
+from rift_cl.reference.training import activate, finest_known, finest_seen
+from rift_cl.train.band_limit import Detail, camera_table, unseen_length
 from rift_cl.train.parameters import Parameters
 
 
-def limited(device, raw, cameras, **more):
-    parameters = Parameters.of(device, raw, **more)
-    unseen = unseen_length(cameras)
-    parameters.limit_band(device.array(camera_table(cameras)), near=0.01, unseen=unseen)
+def limited(device, raw, cameras, detail=None):
+    parameters = Parameters.of(device, raw)
+    unseen, table = unseen_length(cameras), device.array(camera_table(cameras))
+    parameters.limit_band(table, near=0.01, unseen=unseen, detail=detail)
     return parameters, unseen
+
+
+def opened(camera, radius, focus, wavelength):
+    lens = Aperture(radius, focus, wavelength)
+    return Camera(camera.size, camera.K, camera.view, aperture=lens)
 
 
 def test_limits_are_the_twins(device):
@@ -103,3 +109,55 @@ def test_an_orthographic_camera_resolves_the_same_at_every_depth(device):
     raw["means"] *= [0.1, 0.1, 30]
     found = device.get(limited(device, raw, [camera])[0].band)
     np.testing.assert_allclose(found, np.sqrt(0.2) / 50, rtol=1e-6)
+
+
+@pytest.mark.parametrize("lens", [None, (0.05, 3.0, 0.0), (0.2, np.inf, 1e-3)])
+def test_limits_by_coverage_are_the_twins(device, lens):
+    cameras, raw = ring(7), raw_values(61)
+    raw["means"] *= 3
+    if lens is not None:
+        cameras = [opened(camera, *lens) for camera in cameras[:4]] + list(cameras[4:])
+    detail = Detail(diameter=2.5, snr=900.0)
+    parameters, unseen = limited(device, raw, cameras, detail)
+    found = device.get(parameters.band)
+    given = raw["means"].astype(float), camera_table(cameras).astype(float)
+    wanted = finest_known(*given, near=0.01, unseen=unseen, **detail._asdict())
+    pixels = finest_seen(*given, near=0.01, unseen=unseen)
+    seen = found != np.float32(unseen)
+    assert seen.any() and not seen.all()
+    # Eight halvings leave 2 % of the range of frequencies.
+    np.testing.assert_allclose(found, wanted, rtol=0.03)
+    assert (found >= 0.999 * pixels).all() and (found > 1.5 * pixels)[seen].any()
+
+
+def test_without_noise_coverage_is_limited_by_pixels(device):
+    cameras, raw = ring(6), raw_values(50)
+    by_pixels = device.get(limited(device, raw, cameras)[0].band)
+    found = device.get(limited(device, raw, cameras, Detail(2.0, 1e30))[0].band)
+    np.testing.assert_allclose(found, by_pixels, rtol=1e-4)
+
+
+def test_eight_times_the_views_know_twice_as_fine_detail(device):
+    """The share of directions falls as 1 / k and the power as 1 / k^2: views as k^3."""
+    raw = raw_values(20)
+    raw["means"] *= 0.05
+    few, many = (
+        device.get(limited(device, raw, ring(3) * count, Detail(2.0, 20.0))[0].band)
+        for count in (1, 8)
+    )
+    np.testing.assert_allclose(few / many, 2, rtol=0.05)
+
+
+def test_detail_is_what_the_contrast_says_of_a_power_law(device):
+    random = np.random.default_rng(0)
+    f = np.fft.fftfreq(128)
+    k = np.hypot(f[:, None], f)
+    spectrum = np.fft.fft2(random.normal(size=(8, 128, 128))) / np.maximum(128 * k, 1)
+    images = 0.3 * np.fft.ifft2(spectrum).real[..., None]
+    sent = [device.array(image.astype(np.float32)) for image in images]
+    camera = Camera((128, 128), [[90, 0, 64], [0, 90, 64], [0, 0, 1]], np.eye(4))
+    pictures = SimpleNamespace(cameras=[camera] * 8, target=lambda number: sent[number])
+    found = Detail.of(device, pictures, 0.01)
+    assert found.snr == pytest.approx(0.3**2 / 0.01**2, rel=0.3)
+    assert found.diameter == pytest.approx(128 / 90)
+    assert Detail.of(device, pictures, 0.0).snr == 1e30

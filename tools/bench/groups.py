@@ -13,6 +13,7 @@ from typing import NamedTuple
 import rift_cl as rift
 from bench.case import Case
 from bench.costs import Cost
+from bench.coverages import COVERAGE_COSTS, coverage_tasks
 from bench.fast_projections import FAST_COSTS, fast_tasks
 from bench.operations import Task
 from bench.projections import COSTS, footprint_tasks
@@ -28,6 +29,7 @@ KNOWN: Mapping[str, Cost] = {
     **FAST_COSTS,
     **VOLUME_COSTS,
     **SPLINE_COSTS,
+    **COVERAGE_COSTS,
     **COSTS,
 }
 
@@ -61,4 +63,5 @@ def groups(device: rift.Device, case: Case) -> list[Group]:
         Group(f"a step of conjugate gradients, {case.name}", partial(step_tasks, *at)),
         Group(f"splines, {case.name}", partial(spline_tasks, *at)),
         Group(f"the fast projector, {case.name}", partial(fast_tasks, *at)),
+        Group("coverage", partial(coverage_tasks, device, views, quarter)),
     ]

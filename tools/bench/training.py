@@ -113,6 +113,9 @@ TRAINING_COSTS: dict[str, Cost] = {
         "splat", _splats, 41, "gradient, extents, code in; statistics both", 8
     ),
     "splat_band": _per("splat", _splats, 16, "place in, length out; 100 cameras", 22 * _VIEWS),
+    "splat_band_coverage": _per(
+        "splat", _splats, 16, "place in, length out; 100 cameras, 8 halvings", 8 * 60 * _VIEWS
+    ),
     "fft_pack": _per("padded sample", _padded, 4, "planes out; the image in is less"),
     "fft_pass": ROW_COSTS["fft_pass"]._replace(
         units=_transforms(transform_flops), bytes=_transforms(transform_bytes)

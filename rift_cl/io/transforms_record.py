@@ -1,0 +1,47 @@
+"""Cameras as a transforms.json says them, the other way round from ``transforms_json``.
+
+nerfstudio's flavour: each frame has intrinsics of its own and a camera-to-world pose with OpenGL's
+axes; the opening of a lens is ``aperture_radius``, ``focus_distance`` and ``wavelength``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rift_cl.geometry.camera import Camera
+
+
+def transforms_of(
+    cameras: Sequence[Camera], names: Sequence[str], fields: Sequence[Mapping[str, Any]] = ()
+) -> dict[str, Any]:
+    """The cameras as the content of a transforms.json.
+
+    Args:
+        cameras: pinholes, with an aperture or without.
+        names: of their pictures, relative to the file.
+        fields: more of what is known of each camera; readers leave names alone that they do not
+            know.
+    """
+    more = fields or [{}] * len(cameras)
+    frames = [_frame(*entry) for entry in zip(cameras, names, more, strict=True)]
+    return {"camera_model": "PINHOLE", "frames": frames}
+
+
+def _frame(camera: Camera, name: str, more: Mapping[str, Any]) -> dict[str, Any]:
+    pose = np.linalg.inv(camera.view)
+    pose[:3, 1:3] *= -1
+    fx, fy, cx, cy = camera.intrinsics
+    frame = {"file_path": name, "w": camera.width, "h": camera.height}
+    frame |= {"fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy}
+    lens = camera.aperture
+    if lens is not None:
+        frame["aperture_radius"] = lens.radius
+        if lens.focus < math.inf:
+            frame["focus_distance"] = lens.focus
+        if lens.wavelength:
+            frame["wavelength"] = lens.wavelength
+    return {**frame, **more, "transform_matrix": pose}

@@ -1,0 +1,74 @@
+"""What ``rift analyze`` shows: figures first, then the pictures that they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rift_cl.cl.device import Device
+from rift_cl.geometry import Camera
+from rift_cl.html_page import Page
+from rift_cl.jobs.analyze_facts import Findings
+from rift_cl.jobs.coverage_pictures import add_coverage, camera_figure, direction_figure
+from rift_cl.jobs.sampled import Floats, Sampled, place_of
+from rift_cl.plot import figure_png
+
+_HEADINGS = ("What is missing", "What limits detail", "What to add")
+
+
+def analysis_page(
+    sampled: Sampled,
+    points: Mapping[str, Floats],
+    findings: Sequence[Findings],
+    metrics: Mapping[str, Any],
+    added: Sequence[Camera],
+    device: Device,
+) -> Page:
+    """The report of a finished analysis."""
+    target, unit = sampled.target, sampled.unit
+    page = Page(f"What {sampled.name} sampled", findings[0].sentences[0])
+    page.facts(
+        {
+            **sampled.facts,
+            "views that see the target's middle": metrics["seen_by"],
+            "target": f"{target.diameter:.4g} {sampled.units} about {place_of(target)}",
+            "power that stays unknown": f"{metrics['unknown']:.3%}, of a target whose power falls "
+            f"as 1/k^2 up to {target.highest:.3g} cycles per {unit}",
+        }
+    )
+    for note in sampled.notes:
+        page.paragraph(note)
+    for heading, found in zip(_HEADINGS, findings, strict=True):
+        if not found.sentences:
+            continue
+        page.section(heading)
+        for sentence in found.sentences:
+            page.paragraph(sentence)
+        for columns, rows, caption in found.tables:
+            page.table(columns, rows, caption=caption)
+    _views(page, sampled, added, device)
+    page.section("What the views sample")
+    add_coverage(page, sampled, points, device)
+    return page
+
+
+def _views(page: Page, sampled: Sampled, added: Sequence[Camera], device: Device) -> None:
+    if sampled.cameras:
+        page.section("Where the cameras stand")
+        groups = {"at hand": sampled.cameras, "to add": tuple(added)}
+        page.figure(
+            figure_png(camera_figure(groups, sampled)),
+            caption="The target is the grey disc; lines point where the cameras look.",
+            alt="Cameras from above and from the side",
+        )
+    if sampled.is_flat:
+        return
+    page.section("Directions")
+    page.figure(
+        figure_png(direction_figure(sampled, device, added)),
+        caption="The upper hemisphere, up in the middle; opposite directions count as one, so "
+        "that a view from below is shown above. Left, lines of sight. Right, how many views see "
+        "detail along each direction, at 8 cycles per diameter; hatched is what lies on no view's "
+        "slice.",
+        alt="Hemispheres of lines of sight and of directions of detail",
+    )

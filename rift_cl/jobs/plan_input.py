@@ -1,0 +1,180 @@
+"""What is planned for: the target, the cameras to choose among, and what they have to keep to."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from rift_cl.errors import InputError
+from rift_cl.geometry.camera_type import CameraType
+from rift_cl.io.camera_file import CameraChoice, read_cameras, with_lens
+from rift_cl.io.lens_file import open_lens
+from rift_cl.io.volume import read_volume
+from rift_cl.jobs.analyze_input import open_sampled
+from rift_cl.jobs.analyze_settings import AnalyzeSettings
+from rift_cl.jobs.keep_out_words import keep_out_of
+from rift_cl.jobs.plan_settings import PlanSettings
+from rift_cl.jobs.sampled import Floats, Sampled
+from rift_cl.sampling.constraints import Budget, Constraints, Ranges
+from rift_cl.sampling.paths import Free, Ring, Spline, TiltedRings
+from rift_cl.sampling.paths import Path as Way
+from rift_cl.sampling.pilot import Pilot
+from rift_cl.sampling.prior import PowerLaw, Prior, directions_for
+from rift_cl.sampling.target import Target
+
+DIAMETER = 100.0
+# What most people have: 24 megapixels of 3.9 micrometres, 50 mm, closed far enough for depth.
+USUAL = CameraChoice(CameraType("24 MP, 50 mm, f/11", 50.0, 11.0, 3.9e-3, (4000, 6000)))
+# Points of the sphere that stands for an opaque target.
+_SURFACE = 24
+
+
+@dataclass(frozen=True, eq=False)
+class PlanInput:
+    """What a plan is made of; lengths in millimetres.
+
+    Args:
+        target: what is looked at.
+        constraints: what the views have to keep to.
+        choices: cameras that may be used.
+        have: views that are taken already, or None.
+        notes: what had to be assumed, a sentence each.
+    """
+
+    target: Target
+    constraints: Constraints
+    choices: tuple[CameraChoice, ...]
+    have: Sampled | None
+    notes: tuple[str, ...]
+
+    @property
+    def types(self) -> tuple[CameraType, ...]:
+        """The cameras that may be used."""
+        return tuple(choice.kind for choice in self.choices)
+
+
+def plan_input(settings: PlanSettings) -> PlanInput:
+    """Read what the settings name, and fill in what they leave out.
+
+    Raises:
+        RiftError: a file cannot be read, or constraints or a camera make no sense.
+    """
+    notes: list[str] = []
+    have = None if settings.have is None else _have(settings, settings.have)
+    target = _target(settings, have, notes)
+    choices = _choices(settings, notes)
+    constraints = _constraints(settings, choices, have)
+    return PlanInput(target, constraints, choices, have, tuple(notes))
+
+
+def _have(settings: PlanSettings, path: Path) -> Sampled:
+    asked = AnalyzeSettings(
+        source=path, center=_in_units(settings), diameter=_over(settings.diameter, settings.unit),
+        unit=settings.unit,
+    )  # fmt: skip
+    asked.check()
+    have = open_sampled(asked)
+    if have.is_flat:
+        raise InputError(f"--have {path} is a scan, wanted a capture with cameras")
+    return have
+
+
+def _in_units(settings: PlanSettings) -> tuple[float, float, float] | None:
+    if settings.center is None:
+        return None
+    x, y, z = (value / settings.unit for value in settings.center)
+    return x, y, z
+
+
+def _over(length: float | None, unit: float) -> float | None:
+    return None if length is None else length / unit
+
+
+def _target(settings: PlanSettings, have: Sampled | None, notes: list[str]) -> Target:
+    if have is not None:
+        center, diameter = have.target.center, have.target.diameter
+        notes.extend(have.notes)
+    else:
+        center = np.array(settings.center or (0.0, 0.0, 0.0))
+        diameter = settings.diameter or DIAMETER
+        if settings.diameter is None:
+            notes.append(f"The target is taken to be {DIAMETER:g} mm across (--diameter).")
+    prior = _prior(settings, diameter, notes)
+    points, normals = center[None], None
+    if settings.mode == "surface":
+        ways = directions_for(3, _SURFACE // 2)
+        normals = np.concatenate([ways, -ways])
+        points = center + diameter / 2 * normals
+        notes.append("A sphere stands for the target's surface; nothing of it is in the way.")
+    return Target(
+        center=center,
+        diameter=diameter,
+        points=points,
+        normals=normals,
+        mode=settings.mode,
+        prior=prior,
+        snr=settings.snr,
+        band=settings.band,
+    )
+
+
+def _prior(settings: PlanSettings, diameter: float, notes: list[str]) -> Prior:
+    if settings.pilot is None:
+        notes.append(
+            "The target's power is taken to fall as 1/k^2, alike in all directions (--pilot)."
+        )
+        return PowerLaw(2.0)
+    volume = read_volume(settings.pilot)
+    spacing = settings.pilot_spacing
+    if spacing is None:
+        spacing = diameter / max(volume.shape)
+        notes.append(
+            f"Samples of the pilot are taken to lie {spacing:.4g} mm apart, so that the target "
+            "fills it (--pilot-spacing)."
+        )
+    return Pilot(volume, spacing)
+
+
+def _choices(settings: PlanSettings, notes: list[str]) -> tuple[CameraChoice, ...]:
+    choices = [choice for path in settings.camera for choice in read_cameras(path)]
+    if not choices:
+        choices = [USUAL]
+        notes.append(
+            f"The camera is taken to be one with {USUAL.kind.name}, pixels of "
+            f"{USUAL.kind.pixel * 1e3:g} micrometres (--camera)."
+        )
+    if settings.lens is not None:
+        lens = open_lens(settings.lens)
+        choices = [replace(c, kind=_named(c, with_lens(c.kind, lens))) for c in choices]
+    return tuple(choices)
+
+
+def _named(choice: CameraChoice, made: CameraType) -> CameraType:
+    return replace(made, name=f"{choice.kind.name} with {made.name}")
+
+
+def _constraints(
+    settings: PlanSettings, choices: tuple[CameraChoice, ...], have: Sampled | None
+) -> Constraints:
+    budget = None
+    if settings.budget is not None:
+        budget = Budget(settings.budget, {choice.kind.name: choice.cost for choice in choices})
+    ways: dict[str, Way] = {"free": Free(), "ring": Ring(), "spline": Spline()}
+    way = ways[settings.path] if settings.path in ways else TiltedRings(settings.rings)
+    up: Floats = np.array([0.0, 0, 1]) if have is None else have.up
+    low, high = (math.radians(angle) for angle in settings.elevation)
+    first, last = (math.radians(angle) for angle in settings.azimuth)
+    return Constraints(
+        elevation=(low, high),
+        azimuth=(first, last),
+        distance=settings.distance,
+        keepouts=tuple(keep_out_of(text) for text in settings.keep_out),
+        cover=settings.cover,
+        path=way,
+        budget=budget,
+        ranges={c.kind.name: Ranges(**c.ranges) for c in choices if c.ranges},
+        up=(float(up[0]), float(up[1]), float(up[2])),
+    )

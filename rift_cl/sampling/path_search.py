@@ -1,0 +1,106 @@
+"""The best path of a family: many starts are tried, the best few are moved."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import InputError
+from rift_cl.sampling.candidates import settings_of
+from rift_cl.sampling.curves import Curve, curves_of
+from rift_cl.sampling.objective import Objective
+from rift_cl.sampling.path_layout import PathLayout
+from rift_cl.sampling.polish import permitted, polish
+from rift_cl.sampling.site import (
+    DISTANCE,
+    EXPOSURE,
+    F_NUMBER,
+    FOCAL,
+    FOCUS,
+    Site,
+)
+from rift_cl.sampling.spending import paid
+from rift_cl.sampling.stations import Stations
+
+Floats = NDArray[np.float64]
+# Paths that are moved after the best start of each; settings that are tried with each start.
+_MOVED, _TRIED = 3, 3
+
+
+def best_path(objective: Objective, views: int, *, moved: bool) -> Stations:
+    """Views along the best path that was found; fewer than asked for where a budget ends first.
+
+    Args:
+        objective: what is to be small, and where.
+        views: how many.
+        moved: whether the best starts are polished.
+
+    Raises:
+        InputError: no path that was tried keeps to the constraints.
+    """
+    site = objective.site
+    curves = curves_of(site.constraints)
+    found: list[tuple[float, PathLayout]] = []
+    for kind in range(len(site.types)):
+        rows = settings_of(objective, kind, views)[:_TRIED]
+        for layout in (
+            PathLayout(site, curve, kind, count, np.concatenate([start, _shared(site, kind, row)]))
+            for row in rows
+            for count in [paid(site, kind, float(row[EXPOSURE]), views)]
+            for curve in curves
+            for start in curve.starts
+            if count > 0 and _fits(site, kind, curve, start)
+        ):
+            stations = layout.stations(layout.start)
+            if permitted(site, stations):
+                found.append((objective.value(stations), layout))
+    if not found:
+        raise InputError(_no_path(site, curves, views))
+    found.sort(key=lambda entry: entry[0])
+    ends = [layout.stations(layout.start) for _, layout in found[:1]]
+    if moved:
+        ends += [polish(objective, layout) for _, layout in found[:_MOVED]]
+    return min(ends, key=objective.value)
+
+
+def _fits(site: Site, kind: int, curve: Curve, start: Floats) -> bool:
+    """Whether a start differs from others where distance cannot be chosen."""
+    fixed = np.ptp(site.limits[kind, DISTANCE]) <= 0.02 * site.limits[kind, DISTANCE, 0]
+    return not (fixed and start[-1] > 0)
+
+
+def _shared(site: Site, kind: int, row: Floats) -> Floats:
+    """A row's focal length, f-number, focus and exposure as shares of their ranges."""
+    limits = site.limits[kind]
+    longest, _, _ = site.longest(kind, limits[DISTANCE, 0], limits[FOCUS, 0])
+    room = max(min(limits[FOCAL, 1], float(longest)) - limits[FOCAL, 0], 0)
+    zoom = (row[FOCAL] - limits[FOCAL, 0]) / room if room > 0 else 0.0
+    low, high = limits[F_NUMBER]
+    stop = math.log(row[F_NUMBER] / low) / math.log(high / low) if high > low else 0.0
+    rest = [
+        (row[column] - limits[column, 0]) / max(float(np.ptp(limits[column])), 1e-300)
+        for column in (FOCUS, EXPOSURE)
+    ]
+    return np.asarray(np.clip([zoom, stop, *rest], 0, 1))
+
+
+def _no_path(site: Site, curves: list[Curve], views: int) -> str:
+    """Why no start will do."""
+    name = type(site.constraints.path).__name__
+    tried, lost = 0, np.zeros(len(site.constraints.keepouts), int)
+    for curve in curves:
+        for start in curve.starts:
+            shared = np.zeros(4)
+            layout = PathLayout(site, curve, 0, views, np.concatenate([start, shared]))
+            stations = layout.stations(layout.start)
+            tried += 1
+            places, center = stations.places(site), site.target.center
+            for index, keepout in enumerate(site.constraints.keepouts):
+                lost[index] += (keepout.clearance(places, center)[0] < 0).any()
+    shares = ", ".join(f"keepouts[{i}] cuts {n}" for i, n in enumerate(lost.tolist()))
+    return (
+        f"Constraints: no path {name} with {views} views keeps clear of the keep-outs (of {tried} "
+        f"tried {shares}): take the path Free, or Spline, or limit elevations"
+    )

@@ -1,0 +1,174 @@
+"""Choose views: greedily among candidates, then moved to where the merit is lowest nearby."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import InputError
+from rift_cl.geometry import Camera
+from rift_cl.geometry.camera_type import CameraType
+from rift_cl.geometry.numbers import one_number
+from rift_cl.sampling.candidates import candidates
+from rift_cl.sampling.constraints import Constraints
+from rift_cl.sampling.free_layout import FreeLayout
+from rift_cl.sampling.greedy import Limits, bound, choose
+from rift_cl.sampling.looks import Looks
+from rift_cl.sampling.merit import CoverageMerit
+from rift_cl.sampling.objective import Objective
+from rift_cl.sampling.path_search import best_path
+from rift_cl.sampling.paths import Free
+from rift_cl.sampling.polish import polish
+from rift_cl.sampling.pool import pool_of
+from rift_cl.sampling.prior import checked_power
+from rift_cl.sampling.site import Site, default_types
+from rift_cl.sampling.spending import prices, require_paid, total
+from rift_cl.sampling.stations import Stations, turned
+from rift_cl.sampling.target import Target
+from rift_cl.sampling.view_plan import Plan
+
+Floats = NDArray[np.float64]
+Method = Literal["greedy", "greedy+mma"]
+_MOST_VIEWS = 100_000
+# Frequencies that hold a target's power, below which a plan is not to be trusted.
+_FEW = 10
+
+
+def plan(
+    target: Target,
+    views: int,
+    constraints: Constraints | None = None,
+    cameras: Sequence[CameraType] = (),
+    *,
+    method: Method = "greedy+mma",
+    fixed: Sequence[Camera] | Plan = (),
+    seed: int = 0,
+    kind: CoverageMerit = "wiener",
+) -> Plan:
+    """Choose where to look from.
+
+    All views look at the target's centre, upright about ``constraints.up``. Free views are chosen
+    one after another among some 500 directions with each camera type, then all are moved together
+    (method of moving asymptotes, analytic gradient). Views on a path share one type and setting.
+
+    Args:
+        target: what is looked at.
+        views: how many; fewer where a budget ends first.
+        constraints: what they keep to; none when not given.
+        cameras: what they can be taken with, lengths in the unit of the world; when none is given,
+            a camera that is sharp everywhere and finer than the target's band.
+        method: ``greedy`` leaves the second step out.
+        fixed: views that were taken already; the new ones go where those left most unknown.
+        seed: turns the candidates; the same gives the same plan.
+        kind: of the merit: ``wiener``, ``logdet`` or ``worst``.
+
+    Raises:
+        InputError: an argument makes no sense, or no view keeps to the constraints.
+    """
+    if not (one_number(views).is_integer() and 1 <= views <= _MOST_VIEWS):
+        raise InputError(f"plan: views is {views!r}, wanted a whole number, 1 or more")
+    for name, value, known in (("method", method, Method), ("kind", kind, CoverageMerit)):
+        if value not in get_args(known):
+            raise InputError(f"plan: {name} is {value!r}, wanted one of {get_args(known)}")
+    limits = Constraints() if constraints is None else constraints
+    site = Site(target, limits, tuple(cameras) or default_types(target))
+    require_paid(site)
+    _warn_of_few_frequencies(target)
+    taken, weights = _taken(fixed, site)
+    seen = Looks.of(taken, target.points, weights) if taken else None
+    objective = Objective(site, kind, seen)
+    found, least = _chosen(objective, int(views), method, seed)
+    stations = Stations(found.kind, turned(found.table, site))
+    return Plan(objective, stations, objective.value(stations), least, taken, weights, seed)
+
+
+def next_views(
+    taken: Plan | Sequence[Camera],
+    target: Target,
+    views: int,
+    constraints: Constraints | None = None,
+    cameras: Sequence[CameraType] = (),
+    *,
+    method: Method = "greedy+mma",
+    seed: int = 0,
+    kind: CoverageMerit = "wiener",
+) -> Plan:
+    """Choose further views, given those that were taken.
+
+    Args:
+        taken: a plan that was carried out, whose constraints and camera types hold on where none
+            are given; or the cameras of the views.
+        target: what is looked at, with what is now known of it: ``Pilot(reconstruction, spacing)``
+            for its prior turns new views to where the first found detail.
+        views: how many more; the rest as for ``plan``.
+        constraints: what they keep to.
+        cameras: what they can be taken with.
+        method: as for ``plan``.
+        seed: as for ``plan``.
+        kind: as for ``plan``.
+
+    Raises:
+        InputError: nothing was taken, or as for ``plan``.
+    """
+    if not isinstance(taken, Plan) and not len(taken):
+        raise InputError("next_views: no view was taken, wanted a plan or cameras; see plan")
+    if isinstance(taken, Plan):
+        constraints = taken.objective.site.constraints if constraints is None else constraints
+        cameras = cameras or taken.objective.site.types
+    return plan(
+        target, views, constraints, cameras, method=method, fixed=taken, seed=seed, kind=kind
+    )
+
+
+def _warn_of_few_frequencies(target: Target) -> None:
+    """Say so where a steep prior leaves a few frequencies to decide about all views."""
+    power = checked_power(target.prior, target.k, target.diameter)
+    count = float(power.sum() ** 2 / (power**2).sum())
+    if target.mode == "volume" and count < _FEW:
+        warnings.warn(
+            f"the target's power lies in about {count:.0f} of its {len(power)} frequencies, and "
+            "views would be fitted to those: lower its band to where power is above noise, or "
+            "give more frequencies (rift_cl.sampling.target.half_ball)",
+            stacklevel=3,
+        )
+
+
+def _chosen(objective: Objective, views: int, method: Method, seed: int) -> tuple[Stations, float]:
+    """The views, and a bound of their merit."""
+    site = objective.site
+    offered = candidates(objective, views, seed)
+    pool = pool_of(objective, offered)
+    if isinstance(site.constraints.path, Free):
+        choice = choose(pool, Limits(views, prices(site, offered), total(site)))
+        found = offered.take(choice.order)
+        if method == "greedy+mma":
+            found = polish(objective, FreeLayout(site, found))
+    else:
+        found = best_path(objective, views, moved=method == "greedy+mma")
+    whole = Stations.joined([offered, found])
+    limits = Limits(views, prices(site, whole), total(site))
+    places = list(range(len(offered), len(whole)))
+    return found, bound(pool.with_views(found), limits, places)
+
+
+def _taken(fixed: Sequence[Camera] | Plan, site: Site) -> tuple[tuple[Camera, ...], Floats]:
+    """The views that were taken, and the relative photons of each."""
+    if isinstance(fixed, Plan):
+        light = fixed.objective.site.brightness / site.brightness
+        weights = np.concatenate([fixed.fixed_weights, fixed.weights])
+        return (*fixed.fixed, *fixed.cameras), weights * light
+    return tuple(fixed), np.array([_photons(camera, site) for camera in fixed])
+
+
+def _photons(camera: Camera, site: Site) -> float:
+    """Relative photons of a camera of unknown exposure; 1 where even its aperture is unknown."""
+    if not isinstance(camera, Camera):
+        raise InputError(f"plan: fixed holds {camera!r}, wanted cameras")
+    if camera.aperture is None:
+        return 1.0
+    distance = float(np.linalg.norm(camera.center - site.target.center))
+    return (2 * camera.aperture.radius / distance) ** 2 / site.brightness

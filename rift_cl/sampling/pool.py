@@ -1,0 +1,102 @@
+"""Candidates as a greedy choice needs them: what is known with some of them, and with one more."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from rift_cl.reference.coverage import coverage
+from rift_cl.sampling.looks import Looks
+from rift_cl.sampling.objective import Objective, some
+from rift_cl.sampling.stations import Stations
+from rift_cl.sampling.surface_pool import SurfacePool
+
+Floats = NDArray[np.float64]
+
+
+class Pool(Protocol):
+    """C candidates, of which some are chosen."""
+
+    @property
+    def start(self) -> float:
+        """The merit before the first is chosen."""
+
+    def __len__(self) -> int:
+        """C."""
+
+    def clear(self) -> None:
+        """Choose none."""
+
+    def merit_with(self, index: int) -> float:
+        """The merit of what is chosen, and one more."""
+
+    def add(self, index: int) -> None:
+        """Choose one more."""
+
+    def ceilings(self) -> Floats:
+        """(C,) by how much one more of each lowers the merit at the most."""
+
+    def with_views(self, stations: Stations) -> Pool:
+        """A pool with some more candidates, and none chosen."""
+
+    def mixed(self, amounts: Floats) -> tuple[float, Floats]:
+        """The merit of so much of each candidate (C,), and how fast it falls with each."""
+
+
+def pool_of(objective: Objective, stations: Stations) -> Pool:
+    """The candidates at some stations."""
+    looks = objective.looks(stations)
+    if objective.site.target.mode == "surface":
+        return SurfacePool(objective, looks)
+    return _VolumePool(objective, _each(objective, looks))
+
+
+def _each(objective: Objective, looks: Looks) -> Floats:
+    target = objective.site.target
+    views = (some(looks, slice(view, view + 1)) for view in range(looks.views))
+    return np.stack([coverage(one, target.k, target.diameter) for one in views])
+
+
+class _VolumePool:
+    """Candidates for a volume, where coverage adds up.
+
+    Args:
+        objective: what is to be small.
+        each: (C, P, K) coverage by every candidate.
+    """
+
+    def __init__(self, objective: Objective, each: Floats) -> None:
+        self._objective, self._each = objective, each
+        # A view knows a slab alone, so that most of its coverage is zero.
+        self._flat = csr_array(each.reshape(len(each), -1))
+        self._known = np.zeros(each.shape[1:])
+        self.start = objective.scored(self._known).value
+
+    def __len__(self) -> int:
+        return len(self._each)
+
+    def clear(self) -> None:
+        self._known = np.zeros_like(self._known)
+
+    def merit_with(self, index: int) -> float:
+        return self._objective.scored(self._known + self._each[index]).value
+
+    def add(self, index: int) -> None:
+        self._known = self._known + self._each[index]
+
+    def with_views(self, stations: Stations) -> Pool:
+        own = _each(self._objective, self._objective.looks(stations))
+        return _VolumePool(self._objective, np.concatenate([self._each, own]))
+
+    def ceilings(self) -> Floats:
+        # A convex merit falls by no more than its slope says.
+        slope = self._objective.scored(self._known).gradient
+        return np.asarray(-(self._flat @ slope.ravel()))
+
+    def mixed(self, amounts: Floats) -> tuple[float, Floats]:
+        known = np.asarray(self._flat.T @ amounts).reshape(self._known.shape)
+        scored = self._objective.scored(known)
+        return scored.value, np.asarray(-(self._flat @ scored.gradient.ravel()))

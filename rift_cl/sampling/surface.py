@@ -1,0 +1,190 @@
+"""Opaque targets: what views know of the texture and the sheen of a surface.
+
+A picture of a surface is no projection of a volume, so the slice theorem says nothing about it. At
+each point, the texture of the tangent plane has frequencies of its own; a view at an angle squeezes
+them along its tilt, gets the less light the more it grazes, and sees nothing from behind. How
+brightness changes with the direction needs views from several sides of each point.
+
+That other parts of the target stand in the way is not known here; points are seen by their normals.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from rift_cl.errors import InputError
+from rift_cl.reference.coverage import (
+    Floats,
+    LooksGradient,
+    LooksLike,
+    Transfer,
+    optical_transfer,
+)
+from rift_cl.sampling import criteria
+from rift_cl.sampling.criteria import Scored
+from rift_cl.sampling.prior import checked_power
+
+if TYPE_CHECKING:
+    from rift_cl.sampling.target import Target
+
+# Frequencies of a tangent plane.
+_TEXTURE = 150
+_MOST_DEGREE = 8
+
+
+class _Seen(NamedTuple):
+    """Texture frequencies of one point, as V views see them; arrays (V, K) unless said.
+
+    Args:
+        q: (K, 3) in the tangent plane.
+        cosine: (V, 1) of the angle to the normal, 0 from behind.
+        along: ``q . v / cosine``, what the tilt adds to the frequency.
+        transfer: at the frequency across the line of sight.
+    """
+
+    q: Floats
+    cosine: Floats
+    along: Floats
+    transfer: Transfer
+
+
+def surface_merit(
+    looks: LooksLike, target: Target, kind: str = "wiener", degree: int = 3
+) -> tuple[float, LooksGradient]:
+    """Texture error and angular error of a surface, added; each from 0 to 1.
+
+    The texture's coverage is ``sum w cos MTF^2``, scored by ``criteria``. The angular error is the
+    share that stays unknown of brightness as spherical harmonics to a degree with equal variances:
+    ``tr (1 + snr G)^-1 / (degree + 1)^2``, where G sums ``w cos Y Y'`` over the views of a point
+    (scaled so that its mean trace per view is (degree + 1)^2); with ``logdet`` it is minus its
+    bits per coefficient.
+
+    Args:
+        looks: V views of the target's points.
+        target: of mode ``surface``; the prior is taken in the tangent planes' own axes.
+        kind: ``wiener``, ``logdet`` or ``worst``, the last for the texture alone.
+        degree: of the harmonics; 0 for brightness that does not depend on the direction.
+
+    Returns:
+        The value, lower is better, and its derivative by the looks.
+
+    Raises:
+        InputError: the target has no normals, or the degree is not 0 to 8.
+    """
+    if target.normals is None:
+        raise InputError("surface_merit: the target has no normals, wanted one for each point")
+    if degree not in range(_MOST_DEGREE + 1):
+        raise InputError(f"surface_merit: degree is {degree!r}, wanted 0 to {_MOST_DEGREE}")
+    texture, gradient = _texture(looks, target, target.normals, kind)
+    angular, by_direction, by_weight = _angular(looks, target, target.normals, kind, degree)
+    whole = gradient._replace(
+        direction=gradient.direction + by_direction, weight=gradient.weight + by_weight
+    )
+    return texture + angular, whole
+
+
+def texture_coverage(looks: LooksLike, target: Target) -> Floats:
+    """Coverage (P, K) of the frequencies of each point's tangent plane."""
+    points = range(looks.weight.shape[1])
+    normals = np.zeros((len(points), 3)) if target.normals is None else target.normals
+    return np.stack([_sum(looks, p, _seen(looks, p, normals[p], _plane(target))) for p in points])
+
+
+def _plane(target: Target) -> Floats:
+    from rift_cl.sampling.target import half_disc
+
+    return half_disc(target.highest, _TEXTURE)
+
+
+def _texture(
+    looks: LooksLike, target: Target, normals: Floats, kind: str
+) -> tuple[float, LooksGradient]:
+    plane = _plane(target)
+    power = checked_power(target.prior, plane, target.diameter)
+    seen = [_seen(looks, p, normal, plane) for p, normal in enumerate(normals)]
+    coverage = np.stack([_sum(looks, p, one) for p, one in enumerate(seen)])
+    scored: Scored = (
+        criteria.worst(coverage, power, target.snr, plane)
+        if kind == "worst"
+        else (criteria.wiener if kind == "wiener" else criteria.logdet)(coverage, power, target.snr)
+    )
+    parts = [_gradient(looks, p, normals[p], one, scored.gradient[p]) for p, one in enumerate(seen)]
+    return scored.value, LooksGradient(
+        *(np.stack(values, axis=1) for values in zip(*parts, strict=True))
+    )
+
+
+def _seen(looks: LooksLike, point: int, normal: Floats, plane: Floats) -> _Seen:
+    axis = np.eye(3)[np.argmin(np.abs(normal))]
+    first = np.cross(axis, normal)
+    first /= np.linalg.norm(first)
+    q = plane[:, :1] * first + plane[:, 1:2] * np.cross(normal, first)
+    direction = looks.direction[:, point]
+    cosine = np.maximum(direction @ normal, 0)[:, None]
+    along = (direction @ q.T) / np.maximum(cosine, 1e-9)
+    k = np.sqrt((q**2).sum(1) + along**2)
+    optics = (looks.pixel, looks.cutoff, looks.blur)
+    transfer = optical_transfer(k, *(values[:, point, None] for values in optics))
+    return _Seen(q, cosine, along, transfer)
+
+
+def _sum(looks: LooksLike, point: int, seen: _Seen) -> Floats:
+    light = looks.weight[:, point, None] * seen.cosine
+    return np.asarray((light * seen.transfer.value**2).sum(0))
+
+
+def _gradient(
+    looks: LooksLike, point: int, normal: Floats, seen: _Seen, upstream: Floats
+) -> tuple[Any, ...]:
+    """Of one point: by direction (V, 3), weight, pixel, cutoff and blur (V,)."""
+    passed, weight = seen.transfer, looks.weight[:, point, None]
+    by_light = (upstream * passed.value**2).sum(1)
+    by_value = 2 * upstream * weight * seen.cosine * passed.value
+    # The frequency's square is |q|^2 + along^2, and along is q . v / n . v.
+    by_along = 2 * by_value * passed.square * seen.along / np.maximum(seen.cosine, 1e-9)
+    by_cosine = by_light * weight[:, 0] - (by_along * seen.along).sum(1)
+    by_direction = by_along @ seen.q + (by_cosine * (seen.cosine[:, 0] > 0))[:, None] * normal
+    optics = [(by_value * part).sum(1) for part in (passed.pixel, passed.cutoff, passed.blur)]
+    direction = _tangential(by_direction, looks.direction[:, point])
+    return direction, by_light * seen.cosine[:, 0], *optics
+
+
+def _tangential(vectors: Floats, direction: Floats) -> Floats:
+    return np.asarray(vectors - (vectors * direction).sum(1, keepdims=True) * direction)
+
+
+def _angular(
+    looks: LooksLike, target: Target, normals: Floats, kind: str, degree: int
+) -> tuple[float, Floats, Floats]:
+    """Mean over points, and its derivatives by direction (V, P, 3) and weight (V, P).
+
+    ``tr (1 + snr B B')^-1`` and ``det`` are those of ``1 + snr B' B``, V x V, but for the unit
+    eigenvalues; and the products of harmonics there are sums of Legendre polynomials of the angle
+    between two views, by the addition theorem.
+    """
+    count = (degree + 1) ** 2
+    series = 2 * np.arange(degree + 1) + 1.0
+    slopes = legendre.legder(series)
+    v = looks.direction.transpose(1, 0, 2)
+    cosine = np.einsum("pvd,pd->pv", v, normals)
+    light = looks.weight.T * np.maximum(cosine, 0)
+    between = v @ v.transpose(0, 2, 1)
+    kernel = legendre.legval(between, series)
+    inverse = np.linalg.inv(np.eye(v.shape[1]) + target.snr * light[:, :, None] * kernel)
+    if kind == "logdet":
+        value = np.linalg.slogdet(inverse)[1].mean() / (count * np.log(2))
+        outer, scale = inverse, -target.snr / (count * np.log(2) * len(v))
+    else:
+        traces = np.trace(inverse, axis1=1, axis2=2)
+        value = (count - v.shape[1] + traces.mean()) / count
+        outer, scale = inverse @ inverse, -target.snr / (count * len(v))
+    by_light = scale * np.einsum("pvw,pwv->pv", kernel, outer)
+    by_kernel = scale * outer.transpose(0, 2, 1) * light[:, :, None]
+    by_between = (by_kernel + by_kernel.transpose(0, 2, 1)) * legendre.legval(between, slopes)
+    by_cosine = by_light * looks.weight.T * (cosine > 0)
+    by_direction = by_between @ v + by_cosine[..., None] * normals[:, None]
+    across = by_direction - (by_direction * v).sum(2, keepdims=True) * v
+    return float(value), across.transpose(1, 0, 2), (by_light * np.maximum(cosine, 0)).T

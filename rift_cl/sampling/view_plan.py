@@ -1,0 +1,193 @@
+"""A plan of views: the cameras, what they are set to, and what they are worth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import InputError
+from rift_cl.geometry import Camera
+from rift_cl.geometry.camera_type import CameraType
+from rift_cl.geometry.numbers import one_number
+from rift_cl.sampling.baselines import Baseline, baselines
+from rift_cl.sampling.greedy import Choice, Limits, choose
+from rift_cl.sampling.objective import Objective
+from rift_cl.sampling.paths import Free
+from rift_cl.sampling.pool import pool_of
+from rift_cl.sampling.prior import PowerLaw
+from rift_cl.sampling.site import AZIMUTH, DISTANCE, ELEVATION, EXPOSURE, FOCUS
+from rift_cl.sampling.spending import cost
+from rift_cl.sampling.stations import Stations
+
+Floats = NDArray[np.float64]
+# Merits this close, as a share, are called equal: in mean squared error that is 0.3 dB.
+_SAME = 0.07
+
+
+class Knee(NamedTuple):
+    """What each further view brings, when the most useful come first.
+
+    Args:
+        merits: before the first new view, and with one, two, ...
+        gains: by how much each view lowers the merit.
+        views: after so many the next brings less than ``share``; None if all bring more.
+        share: of what those before it brought on average.
+    """
+
+    merits: Floats
+    gains: Floats
+    views: int | None
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Views that a planner chose.
+
+    Args:
+        objective: what was to be small, and where.
+        stations: the views.
+        merit: what it came to, views that were there already included; lower is better.
+        bound: no choice of as many views among the planner's candidates and these gets below it.
+        fixed: the views that were there already.
+        fixed_weights: (V,) relative photons of each of those.
+        seed: of the candidates.
+    """
+
+    objective: Objective
+    stations: Stations
+    merit: float
+    bound: float
+    fixed: tuple[Camera, ...]
+    fixed_weights: Floats
+    seed: int
+
+    def __len__(self) -> int:
+        """How many new views there are."""
+        return len(self.stations)
+
+    @cached_property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The new views."""
+        return self.stations.cameras(self.objective.site)
+
+    @cached_property
+    def types(self) -> tuple[CameraType, ...]:
+        """What each new view is taken with, as it is set: focal length, f-number, exposure."""
+        return self.stations.camera_types(self.objective.site)
+
+    @property
+    def weights(self) -> Floats:
+        """(V,) relative photons of each view: the ``weights`` of ``merit`` and ``coverage``."""
+        looks = self.objective.looks(self.stations)
+        return np.asarray(looks.weight.max(1))
+
+    @property
+    def poses(self) -> Floats:
+        """(V, 4, 4) world-to-camera matrices."""
+        return np.stack([camera.view for camera in self.cameras])
+
+    @property
+    def directions(self) -> Floats:
+        """(V, 3) unit vectors from the target's centre to the cameras."""
+        return np.asarray(self.stations.frames(self.objective.site)[:, 0])
+
+    @property
+    def azimuth(self) -> Floats:
+        """(V,) radians."""
+        return self.stations.table[:, AZIMUTH]
+
+    @property
+    def elevation(self) -> Floats:
+        """(V,) radians."""
+        return self.stations.table[:, ELEVATION]
+
+    @property
+    def distance(self) -> Floats:
+        """(V,) from the target's centre."""
+        return self.stations.table[:, DISTANCE]
+
+    @property
+    def focus(self) -> Floats:
+        """(V,) distance of the plane in focus from each camera."""
+        return self.stations.table[:, DISTANCE] + self.stations.table[:, FOCUS]
+
+    @property
+    def exposure(self) -> Floats:
+        """(V,) in the unit of ``CameraType.exposure``."""
+        return self.stations.table[:, EXPOSURE]
+
+    @property
+    def cost(self) -> float:
+        """What the views cost of the budget; 0 without one."""
+        return cost(self.objective.site, self.stations)
+
+    def knee(self, share: float = 0.25) -> Knee:
+        """What each further view brings, and after how many that is little.
+
+        Args:
+            share: what counts as little, of what the views before it brought on average.
+
+        Raises:
+            InputError: the share is not between 0 and 1.
+        """
+        if not 0 < one_number(share) < 1:
+            raise InputError(f"knee: share is {share!r}, wanted a number between 0 and 1")
+        merits = np.array(self._ordered.merits)
+        gains = -np.diff(merits)
+        average = np.cumsum(gains) / np.arange(1, len(gains) + 1)
+        little = np.flatnonzero(gains[1:] < share * average[:-1])
+        return Knee(merits, gains, int(little[0]) + 1 if len(little) else None, share)
+
+    @property
+    def order(self) -> list[int]:
+        """The views, the most useful first, each given those before it."""
+        return self._ordered.order
+
+    @cached_property
+    def _ordered(self) -> Choice:
+        limits = Limits(len(self), np.zeros(len(self)), math.inf)
+        return choose(pool_of(self.objective, self.stations), limits, again=False)
+
+    @cached_property
+    def elsewhere(self) -> float:
+        """The merit at more frequencies than the plan was made with, so that none was favoured."""
+        return self.objective.elsewhere.value(self.stations)
+
+    @cached_property
+    def baselines(self) -> dict[str, Baseline]:
+        """What is done without a plan, at the same cost under the same constraints, by name."""
+        return baselines(self.objective, len(self), self.seed)
+
+    def verdict(self) -> str:
+        """In words, what planning was worth against the best of the baselines."""
+        if not self.baselines:
+            return "Nothing to compare with: no simple arrangement keeps to the constraints."
+        best = min(self.baselines.values(), key=lambda baseline: baseline.elsewhere)
+        gain = (best.elsewhere - self.elsewhere) / max(abs(best.elsewhere), 1e-300)
+        where = f"{self._target_in_words()} target, {self._cameras_in_words()} cameras"
+        if gain <= _SAME:
+            apart = f"{abs(gain):.1%} apart" if gain > -_SAME else f"{-gain:.0%} better"
+            return f"Planning gains nothing ({where}): {best.described} is as good ({apart})."
+        more = "more bits" if self.objective.kind == "logdet" else "less stays unknown"
+        return (
+            f"Planning pays ({where}): {gain:.0%} {more} than with the best simple arrangement, "
+            f"{best.described}."
+        )
+
+    def _target_in_words(self) -> str:
+        return (
+            "isotropic" if isinstance(self.objective.site.target.prior, PowerLaw) else "anisotropic"
+        )
+
+    def _cameras_in_words(self) -> str:
+        limits = self.objective.site.constraints
+        flat = self.objective.site.target.is_flat
+        whole = limits.full_circle and (flat or float(np.ptp(limits.elevation)) > math.pi - 1e-6)
+        free = whole and not limits.keepouts and isinstance(limits.path, Free)
+        return "free" if free else "constrained"

@@ -1,0 +1,126 @@
+"""Depth of field, and the best aperture for a deep target, against the exact OTF."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from rift_cl.errors import InputError
+from rift_cl.geometry import Aperture
+from rift_cl.geometry.depth_of_field import (
+    BEST_APERTURE,
+    BEST_CUTOFF,
+    SAFE_APERTURE,
+    SAFE_CUTOFF,
+    diffraction_depth,
+    finite_depth_optimum,
+    hyperfocal,
+    sharp_range,
+    worst_depth_cutoff,
+)
+from rift_cl.geometry.optics import defocus_mtf, diffraction_mtf
+
+GREEN = 550e-6
+
+
+@pytest.mark.parametrize("focus", [150.0, 900.0])
+def test_blur_at_the_limits_is_what_was_allowed(focus: float) -> None:
+    focal, aperture = 8000.0, Aperture(2.0, focus)
+    found = sharp_range(4.0, focus, 1.5, focal)
+    assert found.near < focus < found.far
+    for z in found:
+        assert aperture.blur(z) * focal / z == pytest.approx(1.5)
+    assert found.depth == found.far - found.near
+
+
+def test_from_the_hyperfocal_distance_on_all_is_sharp() -> None:
+    far = hyperfocal(4.0, 1.0, 8000.0)
+    assert sharp_range(4.0, far, 1.0, 8000.0) == pytest.approx((far / 2, math.inf))
+    assert sharp_range(4.0, math.inf, 1.0, 8000.0) == pytest.approx((far, math.inf))
+    assert sharp_range(4.0, far * 0.99, 1.0, 8000.0).far < math.inf
+
+
+@pytest.mark.parametrize(("N", "depth"), [(4, 20), (8, 80), (16, 321)])
+def test_the_depth_that_diffraction_grants_grows_with_the_square_of_n(
+    N: float, depth: float
+) -> None:
+    found = diffraction_depth(16 / N, 270, GREEN)
+    assert found == pytest.approx(depth, abs=0.5)
+    theta = math.atan(16 / N / 540)
+    assert found == pytest.approx(GREEN / (1 - math.cos(theta)), rel=1e-6)
+
+
+@pytest.mark.parametrize(("depth", "distance"), [(60, 270), (200, 1000), (20, 1000)])
+def test_the_best_aperture_for_a_deep_target_is_where_the_exact_otf_has_it(
+    depth: float, distance: float
+) -> None:
+    """One curve for every target: A over z sqrt(2 wavelength / depth)."""
+    unit = distance * math.sqrt(2 * GREEN / depth)
+    widths = np.arange(0.6, 3, 0.05)
+    cutoffs = [worst_depth_cutoff(w * unit, distance, depth, GREEN) for w in widths]
+    best = int(np.argmax(cutoffs))
+    assert widths[best] == pytest.approx(BEST_APERTURE, abs=0.06)
+    assert max(cutoffs) * math.sqrt(GREEN * depth) == pytest.approx(BEST_CUTOFF, abs=0.01)
+    found = finite_depth_optimum(depth, distance, GREEN)
+    assert found.diameter == pytest.approx(BEST_APERTURE * unit)
+    exact = worst_depth_cutoff(found.diameter, distance, depth, GREEN)
+    assert found.cutoff == pytest.approx(exact, rel=0.01)
+
+
+def test_the_safe_aperture_keeps_clear_of_the_fall() -> None:
+    unit = 270 * math.sqrt(2 * GREEN / 60)
+    scaled = {
+        w: worst_depth_cutoff(w * unit, 270, 60, GREEN) * math.sqrt(GREEN * 60)
+        for w in (SAFE_APERTURE, BEST_APERTURE, 2.0)
+    }
+    assert scaled[SAFE_APERTURE] == pytest.approx(SAFE_CUTOFF, abs=0.01)
+    assert scaled[2.0] < 0.7 * scaled[BEST_APERTURE]
+    assert finite_depth_optimum(60, 270, GREEN, safe=True).cutoff == pytest.approx(
+        SAFE_CUTOFF / math.sqrt(GREEN * 60)
+    )
+
+
+def test_the_simple_product_would_stop_the_lens_down_too_far() -> None:
+    """Why a planner of apertures wants the cut-off in its blur disc: 1.14 for 1.78."""
+    v, best = np.linspace(0, 1, 4001), {}
+    for cutoff in (math.inf, 1.0):
+        widths = np.arange(0.8, 2.2, 0.02)
+        # Of A over A*: defocus is w^2 / 8 wavelengths, the cut-off w sqrt(2 / (wavelength depth)).
+        found = [
+            w * math.sqrt(2) * v[np.argmax(diffraction_mtf(v) * defocus_mtf(v, w**2, cutoff) < 0.1)]
+            for w in widths
+        ]
+        best[cutoff] = widths[int(np.argmax(found))], max(found)
+    assert best[math.inf] == pytest.approx((1.14, 1.00), abs=0.02)
+    assert best[1.0] == pytest.approx((1.74, 1.80), abs=0.03)
+
+
+def test_neither_distance_nor_lens_moves_the_limit_but_planes_of_focus_do() -> None:
+    near, far = (finite_depth_optimum(60, z, GREEN) for z in (270, 2700))
+    assert near.cutoff == far.cutoff == pytest.approx(10.1, abs=0.05)
+    four = finite_depth_optimum(60, 270, GREEN, planes=4)
+    assert four.cutoff == pytest.approx(2 * near.cutoff)
+
+
+@pytest.mark.parametrize("bad", [0, -1.0, math.nan, "deep"])
+def test_lengths_are_positive(bad: float) -> None:
+    for call in (
+        lambda: sharp_range(bad, 100, 1, 100),
+        lambda: sharp_range(1, bad, 1, 100),
+        lambda: hyperfocal(1, bad, 100),
+        lambda: diffraction_depth(1, bad, GREEN),
+        lambda: finite_depth_optimum(bad, 270, GREEN),
+        lambda: finite_depth_optimum(60, 270, GREEN, planes=bad),  # type: ignore[arg-type]
+        lambda: worst_depth_cutoff(1, 270, 60, bad),
+    ):
+        with pytest.raises(InputError):
+            call()
+
+
+def test_a_target_does_not_reach_to_the_lens_and_levels_lie_between_nothing_and_all() -> None:
+    with pytest.raises(InputError, match="reaches to the lens"):
+        finite_depth_optimum(600, 270, GREEN)
+    with pytest.raises(InputError, match="level"):
+        worst_depth_cutoff(4, 270, 60, GREEN, level=1.0)

@@ -1,0 +1,133 @@
+"""Orlov, Tuy and Crowther: rings, spheres and single views, and the cone that a ring leaves out."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from looks_of_all_kinds import ring_directions, ring_of_cameras
+
+from rift_cl.errors import InputError, ShapeError
+from rift_cl.geometry import Parallel
+from rift_cl.sampling.density import half_sphere
+from rift_cl.sampling.looks import Looks
+from rift_cl.sampling.orlov import orlov
+from rift_cl.sampling.sufficiency import (
+    crowther,
+    crowther_resolution,
+    crowther_views,
+    sufficiency,
+)
+from rift_cl.sampling.target import Target
+from rift_cl.sampling.tuy import tuy
+
+SPACE = Target((0, 0, 0), 1.0)
+
+
+@pytest.mark.parametrize("degrees", [15, 30, 50])
+@pytest.mark.parametrize("frequency", [8.0, 200.0])
+def test_a_ring_at_an_elevation_misses_a_cone_less_half_a_slice(degrees, frequency):
+    elevation = math.radians(degrees)
+    found = orlov(Looks.along(ring_directions(2000, elevation)), SPACE, frequency=frequency)
+    seen_beside = math.asin(0.5 / frequency)
+    assert found.missing == pytest.approx(1 - math.cos(elevation - seen_beside), abs=2e-3)
+    assert found.angle == pytest.approx(elevation, abs=2e-3)
+    assert abs(found.axis[2]) > 0.999
+    assert not found.satisfied and "no slice" in found.sentence
+
+
+def test_a_ring_in_its_plane_and_a_sphere_miss_nothing():
+    for directions in (ring_directions(200), half_sphere(600)):
+        found = orlov(Looks.along(directions), SPACE, frequency=8.0)
+        assert found.satisfied and found.missing == 0
+        assert "every direction" in found.sentence
+
+
+def test_one_view_misses_all_but_its_slice():
+    found = orlov(Looks.along([[0, 0, 1]]), SPACE, frequency=10.0)
+    assert found.missing == pytest.approx(0.95, abs=2e-3)
+    assert abs(found.axis[2]) == pytest.approx(1, abs=1e-3)
+
+
+def test_a_wedge_in_the_plane_is_found():
+    """Lines of sight over 120 of 180 degrees leave a wedge of 60 in the plane's frequencies."""
+    angles = np.linspace(0, 2 * np.pi / 3, 400)
+    found = orlov(Parallel(angles, 100, 1e-3), Target.flat(1.0), frequency=50.0)
+    assert found.missing == pytest.approx(1 / 3 - 2 * 0.01 / np.pi, abs=2e-3)
+    assert found.angle == pytest.approx(np.pi / 6, abs=2e-3)
+    toward = math.atan2(found.axis[1], found.axis[0]) % np.pi
+    # Frequencies lie along the detector, (cos, sin) of the angle.
+    assert toward == pytest.approx(5 * np.pi / 6, abs=2e-3)
+
+
+def test_crowthers_count_is_that_of_an_even_set():
+    assert crowther_views(100.0, 1.0) == 315
+    assert crowther_views(1.0, math.pi / 20) == 20
+    assert crowther_resolution(100.0, 315) == pytest.approx(math.pi * 100 / 315)
+    scan = Parallel(np.arange(60) * np.pi / 60, 100, 1e-3)
+    found = crowther(scan, Target.flat(1.0))
+    # The furthest direction is told up to K / (pi D); nine tenths of all up to a ninth part more.
+    assert found.frequency == pytest.approx(60 / np.pi / 0.9, rel=0.01)
+    assert found.needed == crowther_views(1.0, 1 / 16) == 51
+    assert "60 views" in found.sentence
+
+
+def test_more_views_reach_further_and_a_cluster_does_not():
+    reached = [
+        crowther(Looks.along(half_sphere(count)), SPACE).frequency for count in (10, 40, 160)
+    ]
+    assert reached[0] < reached[1] < reached[2]
+    cluster = half_sphere(4000)[-160:]
+    assert crowther(Looks.along(cluster), SPACE).frequency < reached[0]
+
+
+def test_one_ring_fails_tuy_and_two_meet_it():
+    one = ring_of_cameras(60)
+    two = one + ring_of_cameras(60, axis=0)
+    target = Target((0, 0, 0), 4.0)
+    found = tuy(one, target)
+    assert not found.satisfied and abs(found.normal[2]) > 0.99
+    assert found.distance == pytest.approx(2, abs=1e-6)
+    assert tuy(two, target).satisfied
+    assert "every plane" in tuy(two, target).sentence.lower()
+    # Of a target as large as the rings they miss planes again.
+    assert not tuy(two, Target((0, 0, 0), 18.0)).satisfied
+
+
+def test_one_camera_works():
+    found = sufficiency(ring_of_cameras(1), SPACE)
+    assert found.tuy is not None and found.tuy.unmet > 0.9
+    assert found.crowther.views == 1 and found.orlov.missing > 0.9
+    assert found.sentence.count(".") >= 3
+
+
+def test_parallel_rays_have_no_tuy():
+    assert sufficiency(Looks.along(half_sphere(20)), SPACE).tuy is None
+
+
+def test_only_views_that_see_a_point_count():
+    cameras = ring_of_cameras(8, focal=4000.0)
+    target = Target((0, 0, 0), 1.0, points=[[0, 0, 0], [0, 2.0, 0]])
+    assert crowther(cameras, target, point=0).views == 8
+    assert crowther(cameras, Target((0, 0, 0), 1.0, points=[[0, 0.1, 0]])).views == 8
+    with pytest.raises(InputError, match="outside every picture"):
+        sufficiency(cameras, Target((50, 0, 0), 1.0))
+
+
+def test_bad_arguments_are_refused():
+    looks = Looks.along([[0, 0, 1]])
+    with pytest.raises(InputError, match="frequency is"):
+        orlov(looks, SPACE, frequency=-1)
+    with pytest.raises(InputError, match="point is 3"):
+        orlov(looks, SPACE, point=3)
+    with pytest.raises(InputError, match="wanted positive"):
+        crowther_views(1.0, 0.0)
+    with pytest.raises(InputError, match="wanted positive"):
+        crowther_resolution(1.0, 0)
+    with pytest.raises(InputError, match="tolerance"):
+        tuy(ring_of_cameras(2), SPACE, tolerance=0)
+    with pytest.raises(InputError, match="empty"):
+        tuy([], SPACE)
+    with pytest.raises(ShapeError, match="at least one view"):
+        sufficiency([], SPACE)
