@@ -51,9 +51,10 @@ static lanes known(
     const lanes t = resolved ? a * k : 0.5f;
     lanes passed = square_pixel(half_turn_of(t), t);
     if (c[17] > 0) {
-      const lanes z = a * c[12], b = 2 * c[17] * absolute(1 - z * c[18]) * k;
+      const lanes z = a * c[12], v = k * z * c[19] / (2 * c[17]);
+      const lanes b = 2 * c[17] * absolute(1 - z * c[18]) * k * (1 - v);
       const lanes disc = resolved & (b > 1e-6f) ? b : 1e-6f;
-      passed *= defocus(half_turn_of(disc), disc) * diffraction(k * z * c[19] / (2 * c[17]));
+      passed *= defocus(half_turn_of(disc), disc) * diffraction(v);
     }
     sum += resolved ? passed * passed : 0;
   }

@@ -10,6 +10,8 @@
  *
  * An ellipse ends where weight * exp(-sigma) falls below 1/255, and at EXTENT standard deviations
  * at the latest; line integrals, which no display rounds, and SMOOTH cut-offs end at EXTENT always.
+ * What ends there is the share (1/255) / weight of a splat's light: next to nothing in focus, but
+ * all of it where an aperture spreads a small splat over so many pixels that no weight is left.
  *
  * Splats that are not drawn get zeros and the reason in `culled`, the first of: not finite or
  * degenerate in what was given (2), out of depth (1), too large to tell (2), too faint (3),

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from rift_cl import metrics, phantom
     from rift_cl.cl import Device, default_device, devices, open_device
     from rift_cl.errors import RiftError
-    from rift_cl.geometry import Camera, FanBeam, Grid, Parallel
-    from rift_cl.io import SplatScene
+    from rift_cl.geometry import Aperture, Camera, CameraType, FanBeam, Grid, Parallel
+    from rift_cl.io import SplatScene, open_lens
     from rift_cl.operators import (
         FastProjector,
         HighPass,
@@ -34,17 +34,25 @@ if TYPE_CHECKING:
         dot_test,
     )
     from rift_cl.reconstruct import backproject, cgls, fbp, sirt, tv
+    from rift_cl.sampling import Constraints, Looks, Plan, Target, next_views, plan
+    from rift_cl.sampling.coverage import coverage
+    from rift_cl.sampling.merit import merit
     from rift_cl.splat import Renderer, Splats, SplatSettings
 
 _HOMES = {
+    "Aperture": "geometry",
     "Camera": "geometry",
+    "CameraType": "geometry",
+    "Constraints": "sampling",
     "Device": "cl",
     "FanBeam": "geometry",
     "FastProjector": "operators",
     "Grid": "geometry",
     "HighPass": "operators",
     "LinearOperator": "operators",
+    "Looks": "sampling",
     "Parallel": "geometry",
+    "Plan": "sampling",
     "Projector": "operators",
     "Ramp": "operators",
     "Renderer": "splat",
@@ -53,27 +61,38 @@ _HOMES = {
     "SplatScene": "io",
     "SplatSettings": "splat",
     "Splats": "splat",
+    "Target": "sampling",
     "backproject": "reconstruct",
     "cgls": "reconstruct",
+    "coverage": "sampling.coverage",
     "default_device": "cl",
     "devices": "cl",
     "dot_test": "operators",
     "fbp": "reconstruct",
+    "merit": "sampling.merit",
+    "next_views": "sampling",
     "open_device": "cl",
+    "open_lens": "io",
+    "plan": "sampling",
     "sirt": "reconstruct",
     "tv": "reconstruct",
 }
 _MODULES = ("metrics", "phantom")
 
 __all__ = [
+    "Aperture",
     "Camera",
+    "CameraType",
+    "Constraints",
     "Device",
     "FanBeam",
     "FastProjector",
     "Grid",
     "HighPass",
     "LinearOperator",
+    "Looks",
     "Parallel",
+    "Plan",
     "Projector",
     "Ramp",
     "Renderer",
@@ -82,15 +101,21 @@ __all__ = [
     "SplatScene",
     "SplatSettings",
     "Splats",
+    "Target",
     "backproject",
     "cgls",
+    "coverage",
     "default_device",
     "devices",
     "dot_test",
     "fbp",
+    "merit",
     "metrics",
+    "next_views",
     "open_device",
+    "open_lens",
     "phantom",
+    "plan",
     "sirt",
     "tv",
 ]

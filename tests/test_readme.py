@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 
 def test_code_runs(capsys):
     code = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
-    assert len(code) == 3
+    assert len(code) == 4
     names = {}
     for block in code:
         if "import torch" not in block or find_spec("torch"):

@@ -2,8 +2,22 @@
 
 from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.camera import Camera
+from rift_cl.geometry.camera_reduction import reduce_camera
+from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.fan import FanBeam
+from rift_cl.geometry.gaussian_lens import GaussianLens
 from rift_cl.geometry.grid import Grid
+from rift_cl.geometry.lens_prescription import LensPrescription
 from rift_cl.geometry.scan import Parallel
 
-__all__ = ["Aperture", "Camera", "FanBeam", "Grid", "Parallel"]
+__all__ = [
+    "Aperture",
+    "Camera",
+    "CameraType",
+    "FanBeam",
+    "GaussianLens",
+    "Grid",
+    "LensPrescription",
+    "Parallel",
+    "reduce_camera",
+]

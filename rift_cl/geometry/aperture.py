@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
+from rift_cl.geometry.optics import positive_or_infinite
 
 
 @dataclass(frozen=True)
@@ -37,18 +38,20 @@ class Aperture:
     wavelength: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the lengths."""
+        """Check the lengths, and keep them as plain numbers."""
         radius, wavelength = one_number(self.radius), one_number(self.wavelength)
         if not 0 < radius < math.inf:
             raise InputError(
                 f"Aperture: radius is {self.radius!r}, wanted a positive length; leave the "
                 "aperture out for a pinhole"
             )
-        focus = self.focus if self.focus == math.inf else one_number(self.focus)
+        focus = positive_or_infinite(self.focus)
         if not focus > 0:
             raise InputError(f"Aperture: focus is {self.focus!r}, wanted a positive distance")
         if not 0 <= wavelength < math.inf:
             raise InputError(f"Aperture: wavelength is {self.wavelength!r}, wanted 0 or a length")
+        for name, value in (("radius", radius), ("focus", focus), ("wavelength", wavelength)):
+            object.__setattr__(self, name, value)
 
     def blur(self, depth: ArrayLike) -> NDArray[Any]:
         """Diameter of the blur disc of a point at a depth, measured in the plane of that depth.
@@ -61,9 +64,10 @@ class Aperture:
         """Incoherent cut-off of diffraction in cycles per unit of length at a depth.
 
         2 NA / wavelength = 2 radius / (wavelength depth): twice the paper's equation 2, which is
-        the coherent one. Infinite without a wavelength.
+        the coherent one. Infinite without a wavelength, and at the lens itself.
         """
         depth = np.asarray(depth, np.float64)
         if self.wavelength == 0:
             return np.full(depth.shape, np.inf)
-        return np.asarray(2 * self.radius / (self.wavelength * depth))
+        with np.errstate(divide="ignore"):
+            return np.asarray(2 * self.radius / (self.wavelength * depth))

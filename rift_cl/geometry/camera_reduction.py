@@ -112,6 +112,7 @@ def _paraxial(
 ) -> tuple[Loss, ...]:
     """What real rays do that paraxial ones do not: aberrations."""
     image = lens.length + gaussian.image_position(distance)
+    point = gaussian.entrance_pupil - distance
     # Rings of the same area each, and the edge itself.
     rings = np.append(np.sqrt((np.arange(_RINGS) + 0.5) / _RINGS), 1.0)
     pupil = np.stack([np.zeros_like(rings), rings], 1)
@@ -123,7 +124,7 @@ def _paraxial(
     corner = math.hypot(*camera.size) * camera.pixel / 2
     tangent = corner / camera.image_distance(distance)
     landed = abs(float(chief_ray(lens, gaussian, tangent, distance)[-1].at(image)[0, 1]))
-    colours = [gaussian_lens(lens, w).image_position(distance) for w in lens.wavelengths]
+    colours = [_image_of(gaussian_lens(lens, w), point) for w in lens.wavelengths]
     return (
         Loss("spherical aberration, focus of the marginal ray", marginal, "mm"),
         Loss("radius of its spot on the axis, RMS", spot / camera.pixel, "pixels"),
@@ -133,10 +134,17 @@ def _paraxial(
     )
 
 
+def _image_of(colour: GaussianLens, point: float) -> float:
+    """Where one colour has its image of a point that stands still; its pupil is its own."""
+    return colour.image_position(colour.entrance_pupil - point)
+
+
 def _thin(gaussian: GaussianLens, camera: CameraType, distance: float) -> tuple[Loss, ...]:
     """What is lost when both principal planes and both pupils become one plane."""
     P, m = gaussian.pupil_magnification, camera.magnification(distance)
-    simple = gaussian.focal_length / (distance - gaussian.focal_length)
+    beyond = distance - gaussian.focal_length
+    # A lens whose exit pupil is the larger one is sharp where one with equal pupils never is.
+    simple = gaussian.focal_length / beyond if beyond > 0 else math.inf
     return (
         Loss("space between the principal planes, left out", gaussian.hiatus, "mm"),
         Loss(

@@ -16,6 +16,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.camera import Camera
 from rift_cl.geometry.numbers import one_number
+from rift_cl.geometry.optics import positive_or_infinite
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,9 @@ class CameraType:
             raise InputError(
                 f"CameraType {self.name!r}: wavelength is {self.wavelength!r}, wanted 0 or a length"
             )
-        made = self.camera(np.eye(4), math.inf)
-        object.__setattr__(self, "size", made.size)
+        # A wrong size is refused by Camera, in its words.
+        object.__setattr__(self, "size", Camera(self.size, np.eye(3), np.eye(4)).size)
+        self.camera(np.eye(4), math.inf)
 
     @property
     def pupil_radius(self) -> float:
@@ -87,7 +89,7 @@ class CameraType:
         Raises:
             InputError: no image is formed of a plane that close.
         """
-        distance = math.inf if focus == math.inf else one_number(focus)
+        distance = positive_or_infinite(focus)
         if not distance > self.nearest_focus:
             raise InputError(
                 f"CameraType {self.name!r}: focus is {focus!r}, wanted a distance beyond "
@@ -113,12 +115,10 @@ class CameraType:
             InputError: the focus is too close, or the view is no pose.
         """
         focal = self.image_distance(focus) / self.pixel
-        size = self.size
-        # A wrong size is refused by Camera below, in its words.
-        middle = [side / 2 for side in size] if len(size) == 2 else [0.0, 0.0]
-        K = np.array([[focal, 0, middle[1]], [0, focal, middle[0]], [0, 0, 1]])
+        height, width = self.size
+        K = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
         aperture = Aperture(self.pupil_radius, focus, self.wavelength)
-        return Camera(size, K, view, aperture=aperture)
+        return Camera(self.size, K, view, aperture=aperture)
 
     def photons(self, focus: float) -> float:
         """Relative number of photons per area of the sensor, from a surface of one brightness.

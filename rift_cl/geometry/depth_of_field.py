@@ -14,7 +14,7 @@ import numpy as np
 
 from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
-from rift_cl.geometry.optics import check_positive, incoherent_cutoff
+from rift_cl.geometry.optics import check_positive, incoherent_cutoff, positive_or_infinite
 from rift_cl.geometry.pupil import defocused_otf
 
 # Best aperture over z sqrt(2 wavelength / depth), and the cut-off there over
@@ -69,11 +69,12 @@ def sharp_range(diameter: float, focus: float, blur: float, focal_pixels: float)
         InputError: an argument is not positive.
     """
     check_positive(diameter=diameter, blur=blur, focal_pixels=focal_pixels)
-    if focus != math.inf:
-        check_positive(focus=focus)
+    distance = positive_or_infinite(focus)
+    if not distance > 0:
+        raise InputError(f"focus is {focus!r}, wanted a positive distance")
     step = blur / (diameter * focal_pixels)
-    far = 1 / focus - step
-    return SharpRange(1 / (1 / focus + step), 1 / far if far > 0 else math.inf)
+    far = 1 / distance - step
+    return SharpRange(1 / (1 / distance + step), 1 / far if far > 0 else math.inf)
 
 
 def hyperfocal(diameter: float, blur: float, focal_pixels: float) -> float:
@@ -163,10 +164,11 @@ def worst_depth_cutoff(
     if not 0 < one_number(level) < 1:
         raise InputError(f"level is {level!r}, wanted a number between 0 and 1")
     waves = diameter**2 * depth / (16 * wavelength * distance**2)
-    v = np.linspace(0, 1, 2001 + int(200 * min(waves, 100)))
-    mtf = np.abs(defocused_otf(v, waves))
-    first = int(np.argmax(mtf < level))
+    # The OTF has its first zero before 1 / waves, at 0.15 / waves where there are many.
+    v = np.linspace(0, min(1, 1 / waves), 2001)
+    otf = defocused_otf(v, waves)
+    first = int(np.argmax(otf < level))
     # Between the two samples, along the straight line through them.
-    step = (mtf[first - 1] - level) / (mtf[first - 1] - mtf[first])
+    step = (otf[first - 1] - level) / (otf[first - 1] - otf[first])
     found = v[first - 1] + step * (v[first] - v[first - 1])
     return float(found) * incoherent_cutoff(diameter, distance, wavelength)

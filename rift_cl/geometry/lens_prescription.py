@@ -61,6 +61,8 @@ class Surface:
             raise InputError(f"conic is {self.conic!r}, wanted a finite number")
         if self.semi_diameter is not None and not one_number(self.semi_diameter) > 0:
             raise InputError(f"semi_diameter is {self.semi_diameter!r}, wanted a positive length")
+        if self.glass is not None and not isinstance(self.glass, Glass):
+            raise InputError(f"glass is {self.glass!r}, wanted a Glass, or None for air")
 
     @property
     def curvature(self) -> float:
@@ -110,9 +112,9 @@ class LensPrescription:
         if count == 0 or self.surfaces[-1].glass is not None:
             problem = "the last surface leads into glass" if count else "there is no surface"
             raise InputError(f"{where}: {problem}, wanted surfaces from air to air")
-        if not 0 <= self.stop < count:
+        if not _counts(self.stop, count):
             raise InputError(
-                f"{where}: stop is {self.stop}, wanted a surface from 0 to {count - 1}"
+                f"{where}: stop is {self.stop!r}, wanted a surface from 0 to {count - 1}"
             )
         if self.opening_is not in ("pupil", "f_number", "stop"):
             raise InputError(
@@ -127,10 +129,10 @@ class LensPrescription:
 
     def _check_light(self, where: str) -> None:
         count = len(self.wavelengths)
-        if not 1 <= count <= MOST_WAVELENGTHS or not 0 <= self.primary < count:
+        if not 1 <= count <= MOST_WAVELENGTHS or not _counts(self.primary, count):
             raise InputError(
-                f"{where}: has {count} wavelengths, of which number {self.primary} is the primary "
-                f"one; wanted 1 to {MOST_WAVELENGTHS}, counted from 0"
+                f"{where}: has {count} wavelengths, of which number {self.primary!r} is the "
+                f"primary one; wanted 1 to {MOST_WAVELENGTHS}, counted from 0"
             )
         if self.weights == ():
             object.__setattr__(self, "weights", (1.0,) * count)
@@ -170,3 +172,8 @@ class LensPrescription:
         """
         behind = [s.glass.index(wavelength) if s.glass else 1.0 for s in self.surfaces]
         return [1.0, *behind]
+
+
+def _counts(number: object, count: int) -> bool:
+    """Whether it is a whole number from 0 to below the count."""
+    return isinstance(number, int) and 0 <= number < count

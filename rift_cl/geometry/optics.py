@@ -8,6 +8,7 @@ chapter 6; the product of the MTFs is a model whose error ``pupil.defocused_otf`
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -175,10 +176,19 @@ def check_positive(**values: float) -> None:
             raise InputError(f"{name} is {value!r}, wanted a positive number")
 
 
+def positive_or_infinite(value: Any) -> float:
+    """Read one positive number, or infinity; NaN if the value is anything else."""
+    number = real_numbers(value)
+    if number is None or np.ndim(number) > 0 or not number > 0:
+        return float("nan")
+    return float(number)
+
+
 def _cutoff(value: float) -> float:
-    if not (value == np.inf or one_number(value) > 0):
+    number = positive_or_infinite(value)
+    if not number > 0:
         raise InputError(f"cutoff is {value!r}, wanted a positive frequency or infinity")
-    return float(value)
+    return number
 
 
 def _length(name: str, value: float) -> float:

@@ -13,7 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry.numbers import one_number
-from rift_cl.geometry.optics import Floats, check_positive, diffraction_mtf, frequencies
+from rift_cl.geometry.optics import (
+    Floats,
+    check_positive,
+    diffraction_mtf,
+    frequencies,
+    positive_or_infinite,
+)
 
 # A pupil of this many samples across is an autocorrelation of 1 GiB.
 _MOST_SAMPLES = 4096
@@ -34,10 +40,10 @@ def defocus_waves(diameter: float, depth: ArrayLike, focus: float, wavelength: f
         InputError: a length is not positive.
     """
     check_positive(diameter=diameter, wavelength=wavelength)
-    z = frequencies("defocus_waves: depth", depth)
-    if not (z > 0).all() or not (focus == np.inf or one_number(focus) > 0):
+    z, distance = frequencies("defocus_waves: depth", depth), positive_or_infinite(focus)
+    if not (z > 0).all() or not distance > 0:
         raise InputError(f"defocus_waves: depths and focus ({focus!r}) are wanted as positive")
-    return np.asarray(diameter**2 / (8 * wavelength) * (1 / z - 1 / focus))
+    return np.asarray(diameter**2 / (8 * wavelength) * (1 / z - 1 / distance))
 
 
 def defocused_otf(v: ArrayLike, waves: float) -> Floats:
@@ -59,14 +65,18 @@ def defocused_otf(v: ArrayLike, waves: float) -> Floats:
     if not abs(amount) <= _MOST_WAVES:
         raise InputError(f"defocused_otf: waves is {waves!r}, wanted at most {_MOST_WAVES:g}")
     share = np.minimum(np.abs(frequencies("defocused_otf", v)), 1)
-    # The phase turns by 8 W v (1 - v) <= 2 W half circles; each wants a few nodes.
-    nodes, weights = np.polynomial.legendre.leggauss(32 + int(8 * abs(amount)))
+    # The phase turns by 4 W v (1 - v) <= W circles; 32 nodes are enough for four of them.
+    turns = 4 * abs(amount) * float(np.max(share * (1 - share), initial=0))
+    nodes, weights = np.polynomial.legendre.leggauss(32)
+    pieces = 1 + int(turns / 4)
     low = np.arcsin(share)
-    half = (np.pi / 2 - low) / 2
+    half = (np.pi / 2 - low) / (2 * pieces)
     total = np.zeros(share.shape)
-    for node, weight in zip(nodes, weights, strict=True):
-        t = low + half * (1 + node)
-        total += weight * np.cos(8 * np.pi * amount * share * (np.sin(t) - share)) * np.cos(t) ** 2
+    for piece in range(pieces):
+        for node, weight in zip(nodes, weights, strict=True):
+            t = low + half * (2 * piece + 1 + node)
+            phase = 8 * np.pi * amount * share * (np.sin(t) - share)
+            total += weight * np.cos(phase) * np.cos(t) ** 2
     return np.asarray(4 / np.pi * half * total)
 
 

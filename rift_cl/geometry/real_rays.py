@@ -16,8 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 from rift_cl.errors import InputError
 from rift_cl.geometry.gaussian_lens import GaussianLens
 from rift_cl.geometry.lens_prescription import LensPrescription, Surface
+from rift_cl.geometry.optics import positive_or_infinite
 
 Floats = NDArray[np.float64]
+# How close to the middle of the stop a chief ray comes, as a share of its radius.
+_CENTRED = 1e-9
 
 
 class Rays(NamedTuple):
@@ -105,13 +108,13 @@ def pupil_rays(
     Raises:
         InputError: the distance is not positive.
     """
-    if not distance > 0:
+    away = positive_or_infinite(distance)
+    if not away > 0:
         raise InputError(f"distance is {distance!r}, wanted a positive length in front of the lens")
     across = np.asarray(pupil, np.float64).reshape(-1, 2) * gaussian.pupil_diameter / 2
     position = np.concatenate([across, np.full((len(across), 1), gaussian.entrance_pupil)], 1)
     go = np.tile([0.0, -slope, 1.0], (len(across), 1))
-    if distance != math.inf:
-        go[:, :2] += across / distance
+    go[:, :2] += across / away
     return Rays(position, go / np.linalg.norm(go, axis=1, keepdims=True))
 
 
@@ -148,6 +151,11 @@ def chief_ray(
             break
         low, high = high, high - off_high * (high - low) / (off_high - off_low)
         off_low, found = off_high, tried
-        if abs(off_high) < 1e-12 * gaussian.stop_radius:
+        if abs(off_low) < 1e-12 * gaussian.stop_radius:
             break
+    if not abs(off_low) < _CENTRED * gaussian.stop_radius:
+        raise InputError(
+            f"lens {lens.name!r}: no ray that comes in at the slope {slope:g} was found to go "
+            "through the middle of the stop; the field is too wide for this lens"
+        )
     return found

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         read_view,
     )
     from rift_cl.io.image import read_image, write_png
+    from rift_cl.io.lens_file import open_lens
     from rift_cl.io.output import atomic_path, make_folder, write_json, write_text
     from rift_cl.io.photographs import PosedPhotographs, demand_photographs, pose_photographs
     from rift_cl.io.scan import open_scan
@@ -40,6 +41,7 @@ _HOMES = {
     "holds_bare_photographs": "capture",
     "make_folder": "output",
     "open_capture": "capture",
+    "open_lens": "lens_file",
     "open_scan": "scan",
     "open_volume": "volume",
     "pose_photographs": "photographs",
@@ -65,6 +67,7 @@ __all__ = [
     "holds_bare_photographs",
     "make_folder",
     "open_capture",
+    "open_lens",
     "open_scan",
     "open_volume",
     "pose_photographs",

@@ -17,6 +17,7 @@ target's middle.
 from __future__ import annotations
 
 import dataclasses
+import reprlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -63,6 +64,9 @@ def read_cameras(path: Path) -> tuple[CameraChoice, ...]:
         PathEscapeError: a lens lies outside the file's folder.
     """
     top = read_json_object(path)
+    if "cameras" in top and len(top.values) > 1:
+        other = sorted(set(top.values) - {"cameras"})[0]
+        raise FileFormatError(f"{path}: {other!r} stands beside 'cameras', which has all of them")
     entries = list(top.objects("cameras")) if "cameras" in top else [top]
     if not entries:
         raise FileFormatError(f"{path}: 'cameras' is empty, wanted one or more")
@@ -86,7 +90,7 @@ def _choice(entry: Fields, path: Path) -> CameraChoice:
         known = ", ".join(sorted(_KNOWN))
         raise FileFormatError(f"{entry.where}: {unknown[0]!r} is no field of a camera; {known} are")
     name = entry.text("name") or path.stem
-    lens = entry.text("lens")
+    lens = _lens_file(entry, path)
     values: dict[str, Any] = {} if lens is not None else {
         "focal_length": _wanted(entry, "focal_length"),
         "f_number": _wanted(entry, "f_number"),
@@ -97,31 +101,35 @@ def _choice(entry: Fields, path: Path) -> CameraChoice:
     values["wavelength"] = None if wavelength is None else wavelength * _NANO
     given = {key: value for key, value in values.items() if value is not None}
     cost = entry.number("cost")
+    pixel, size = _wanted(entry, "pixel_um") * _MICRON, _size(entry)
     with located(entry.where):
-        pixel, size = _wanted(entry, "pixel_um") * _MICRON, _size(entry)
         if lens is None:
             kind = CameraType(name=name, pixel=pixel, size=size, **given)
         else:
-            kind = _behind(entry, CaptureFolder(path.parent), lens, name, pixel, size, given)
+            kind = _behind(lens, name, pixel, size, given)
         if cost is not None and cost < 0:
             raise InputError(f"'cost' is {cost:g}, wanted 0 or more")
     return CameraChoice(kind, 1.0 if cost is None else cost, _ranges(entry))
 
 
-def _behind(
-    entry: Fields,
-    folder: CaptureFolder,
-    lens: str,
-    name: str,
-    pixel: float,
-    size: tuple[int, int],
-    given: dict[str, Any],
-) -> CameraType:
-    """A sensor behind the lens that the file names."""
+def _lens_file(entry: Fields, path: Path) -> Path | None:
+    """The file of the lens that an entry names, in the same folder."""
+    lens = entry.text("lens")
+    if lens is None:
+        return None
     both = [word for word in _OF_LENS if word in entry]
     if both:
-        raise FileFormatError(f"{both[0]!r} comes with a 'lens', which has its own: leave one out")
-    found = gaussian_lens(open_lens(folder.file(entry.where, lens)))
+        raise FileFormatError(
+            f"{entry.where}: {both[0]!r} comes with a 'lens', which has its own: leave one out"
+        )
+    return CaptureFolder(path.parent.resolve()).file(entry.where, lens)
+
+
+def _behind(
+    lens: Path, name: str, pixel: float, size: tuple[int, int], given: dict[str, Any]
+) -> CameraType:
+    """A sensor behind the lens of a file."""
+    found = gaussian_lens(open_lens(lens))
     made = found.camera_type(pixel, size, name=name, exposure=given.get("exposure", 1.0))
     return dataclasses.replace(made, wavelength=given.get("wavelength", made.wavelength))
 
@@ -130,7 +138,9 @@ def _size(entry: Fields) -> tuple[int, int]:
     """(height, width) of what the file says as width and height."""
     given = entry.values.get("size")
     if not (isinstance(given, list) and len(given) == 2 and all(type(n) is int for n in given)):
-        raise FileFormatError(f"'size' is {given!r}, wanted width and height in pixels")
+        raise FileFormatError(
+            f"{entry.where}: 'size' is {reprlib.repr(given)}, wanted width and height in pixels"
+        )
     return given[1], given[0]
 
 

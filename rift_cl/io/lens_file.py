@@ -182,7 +182,10 @@ def _numbers(fields: Fields, name: str) -> tuple[float, ...]:
             f"{fields.where}: {name!r} is {reprlib.repr(values)}, wanted a list of numbers"
         )
     each = Fields(fields.where, {f"{name}[{i}]": value for i, value in enumerate(values)})
-    return tuple(each.number(f"{name}[{i}]") or 0.0 for i in range(len(values)))
+    numbers = [each.number(place) for place in each.values]
+    if None in numbers:
+        raise FileFormatError(f"{fields.where}: {name}[{numbers.index(None)}] is null")
+    return tuple(number for number in numbers if number is not None)
 
 
 def _check_names(fields: Fields, known: set[str]) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from rift_cl.errors import InputError
 from rift_cl.geometry.camera import Camera
 
 
@@ -25,7 +26,16 @@ def transforms_of(
         names: of their pictures, relative to the file.
         fields: more of what is known of each camera; readers leave names alone that they do not
             know.
+
+    Raises:
+        InputError: a camera is no pinhole, which such a file has no words for.
     """
+    for camera, name in zip(cameras, names, strict=True):
+        if camera.model != "pinhole":
+            raise InputError(
+                f"the camera of {name!r} is of the model {camera.model!r}, wanted a pinhole: a "
+                "transforms.json has no words for others"
+            )
     more = fields or [{}] * len(cameras)
     frames = [_frame(*entry) for entry in zip(cameras, names, more, strict=True)]
     return {"camera_model": "PINHOLE", "frames": frames}

@@ -174,8 +174,9 @@ def _glass(line: Line) -> Glass:
 
 
 def _prescription(lens: _Lens, path: Path) -> LensPrescription:
-    between = lens.surfaces[1:-1]
-    last = lens.surfaces[-1]
+    first, *between, last = lens.surfaces
+    if first.glass is not None:
+        raise InputError(f"{first.where}: the object lies in glass; only lenses in air are read")
     # Nothing follows the image; a file that was cut off ends in some other surface.
     if last.thickness != 0 or last.glass is not None:
         raise FileFormatError(
@@ -187,7 +188,8 @@ def _prescription(lens: _Lens, path: Path) -> LensPrescription:
         raise FileFormatError(f"{len(stops)} surfaces of the lens are marked STOP, wanted one")
     opening, opening_is = _opening(lens, between[stops[0]])
     # Files list 24 wavelengths, of which the first so many are meant.
-    slots = [slot for slot in sorted(lens.wavelengths) if slot <= (lens.count or len(between) + 24)]
+    meant = lens.count or math.inf
+    slots = [slot for slot in sorted(lens.wavelengths) if slot <= meant]
     if lens.primary not in slots:
         raise FileFormatError(f"the primary wavelength is number {lens.primary}, of {slots}")
     return LensPrescription(

@@ -34,6 +34,9 @@ Floats = NDArray[np.float64]
 _FAR = 30.0
 # Arguments below which quotients by them are taken from their series.
 _SMALL = 1e-4
+# Least share of a frequency's square across the line of sight: rounding leaves that much, and
+# gradients are divided by it.
+_ACROSS = 1e-14
 
 
 class LooksLike(Protocol):
@@ -203,7 +206,8 @@ def _near(looks: LooksLike, point: int, frequencies: ArrayLike, diameter: float)
     products = normals @ k.T
     view, place = np.nonzero(steepness * products**2 < _FAR)
     u = products[view, place]
-    k_perp = np.sqrt(np.maximum((k**2).sum(1)[place] - u**2, 0))
+    square = (k**2).sum(1)[place]
+    k_perp = np.sqrt(np.maximum(square - u**2, _ACROSS * square))
     optics = (looks.pixel, looks.cutoff, looks.blur)
     transfer = optical_transfer(k_perp, *(values[view, point] for values in optics))
     window, weight = np.exp(-steepness * u**2), looks.weight[view, point]

@@ -1,1 +1,39 @@
-"""Where to look from: what frequencies of a target views sample, and what views to take."""
+"""Where to look from: what frequencies of a target views sample, and what views to take.
+
+``coverage`` and ``merit`` are in modules of these names, and in ``rift_cl`` itself.
+"""
+
+from rift_cl.sampling.baselines import Baseline
+from rift_cl.sampling.constraints import Budget, Constraints, Ranges
+from rift_cl.sampling.keep_out import Box, Cone, KeepOut, Sphere
+from rift_cl.sampling.looks import Looks
+from rift_cl.sampling.paths import Free, Ring, Spline, TiltedRings
+from rift_cl.sampling.pilot import Pilot
+from rift_cl.sampling.planner import next_views, plan
+from rift_cl.sampling.prior import PowerLaw, Spectrum
+from rift_cl.sampling.target import Target
+from rift_cl.sampling.view_plan import Knee, Plan
+
+__all__ = [
+    "Baseline",
+    "Box",
+    "Budget",
+    "Cone",
+    "Constraints",
+    "Free",
+    "KeepOut",
+    "Knee",
+    "Looks",
+    "Pilot",
+    "Plan",
+    "PowerLaw",
+    "Ranges",
+    "Ring",
+    "Spectrum",
+    "Sphere",
+    "Spline",
+    "Target",
+    "TiltedRings",
+    "next_views",
+    "plan",
+]

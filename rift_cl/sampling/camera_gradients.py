@@ -80,7 +80,9 @@ def _by_position(
         return np.zeros(3)
     direction = seen.direction[view]
     if camera.model == "pinhole":
-        distance = seen.pixel[view] * camera.intrinsics[0] / (direction @ -camera.view[2, :3])
+        ahead = direction @ -camera.view[2, :3]
+        # Points beside and behind are not seen, so that nothing hangs on how far off they are.
+        distance = seen.pixel[view] * camera.intrinsics[0] / np.where(ahead > 0, ahead, 1)
         farther = np.broadcast_to(-camera.view[2, :3], direction.shape)
     else:
         distance, farther = seen.pixel[view] * camera.intrinsics[0], direction

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.errors import InputError
+from rift_cl.geometry.numbers import one_number
 from rift_cl.sampling.coverage import coverage
 from rift_cl.sampling.coverage_work import Views
 from rift_cl.sampling.target import Target
@@ -36,6 +37,7 @@ def coverage_cube(
         InputError: a number is not finite or out of its range, or ``count`` below 2.
     """
     along = cube_axis(target.highest, count)
+    count = len(along)
     half = along[: -(-count // 2)]
     z, y, x = np.meshgrid(half, along, along, indexing="ij")
     k = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
@@ -50,8 +52,8 @@ def cube_axis(band: float, count: int) -> NDArray[np.float64]:
     """The frequencies along an edge of a cube: ``count`` from -band to band.
 
     Raises:
-        InputError: ``count`` is below 2.
+        InputError: ``count`` is no whole number, or below 2.
     """
-    if not count >= 2:
+    if not one_number(count) >= 2 or count != int(count):
         raise InputError(f"count is {count!r}, wanted 2 or more frequencies along an edge")
-    return np.linspace(-band, band, count)
+    return np.linspace(-band, band, int(count))

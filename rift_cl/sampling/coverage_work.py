@@ -23,6 +23,7 @@ Floats = NDArray[np.float64]
 Views = Sequence[Camera] | Looks | Parallel
 # Numbers of a view and of a block's box.
 ROW, BOX = 8, 6
+_LARGEST = float(np.finfo(np.float32).max)
 # Cycles per diameter beyond which float32 does not tell a slab from its neighbour.
 _MOST = 1e5
 
@@ -136,6 +137,11 @@ def _rows(looks: Looks, diameter: float) -> NDArray[np.float32]:
     rows[..., :3] = looks.direction.transpose(1, 0, 2)
     lengths = (looks.pixel / diameter, 1 / (looks.cutoff * diameter), looks.blur / diameter)
     for place, values in enumerate((looks.weight, *lengths), start=3):
+        if values.max() > _LARGEST:
+            raise InputError(
+                f"a weight, a pixel or a blur over the diameter, or the diameter's inverse over a "
+                f"cut-off, is {values.max():g}: too large for float32; check the units"
+            )
         rows[..., place] = values.T
     return rows
 

@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.errors import InputError
+
 Floats = NDArray[np.float64]
 # Exponent of the mean over directions: 1 would be the Wiener error, infinity the worst one alone.
 _SHARPNESS = 8
@@ -28,6 +30,19 @@ class Scored(NamedTuple):
 
     value: float
     gradient: Floats
+
+
+def scored(kind: str, coverage: Floats, power: Floats, snr: float, k: Floats) -> Scored:
+    """The score of a kind, ``wiener``, ``logdet`` or ``worst``; arguments are those of ``worst``.
+
+    Raises:
+        InputError: the kind is another.
+    """
+    if kind == "worst":
+        return worst(coverage, power, snr, k)
+    if kind not in ("wiener", "logdet"):
+        raise InputError(f"merit: kind is {kind!r}, wanted wiener, logdet or worst")
+    return (wiener if kind == "wiener" else logdet)(coverage, power, snr)
 
 
 def wiener(coverage: Floats, power: Floats, snr: float) -> Scored:

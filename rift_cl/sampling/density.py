@@ -13,6 +13,7 @@ density falls as 1 / |k|, and what falls so is levelled by a ramp. K views have 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,10 +23,10 @@ from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry.numbers import one_number, real_numbers
 from rift_cl.sampling.coverage import coverage
 from rift_cl.sampling.coverage_work import Views
+from rift_cl.sampling.prior import directions_for
 from rift_cl.sampling.target import Target
 
 Floats = NDArray[np.float64]
-_GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 def window_width(diameter: float) -> float:
@@ -53,13 +54,16 @@ def density(
 
 
 def sphere_density(views: float, k: ArrayLike) -> Floats:
-    """K / (2 |k|) at frequencies (..., 3): directions that fill the sphere."""
-    return np.asarray(views / (2 * np.linalg.norm(_vectors(k), axis=-1)))
+    """K / (2 |k|) at frequencies (..., 3): directions that fill the sphere; inf at zero."""
+    return _law(views, 2 * np.linalg.norm(_vectors(k), axis=-1))
 
 
 def ring_density(views: float, k: ArrayLike) -> Floats:
-    """K / (pi sqrt(kx^2 + ky^2)) at frequencies (..., 3): a ring about z, or angles of a plane."""
-    return np.asarray(views / (np.pi * np.linalg.norm(_vectors(k)[..., :2], axis=-1)))
+    """K / (pi sqrt(kx^2 + ky^2)) at frequencies (..., 3): a ring about z, or angles of a plane.
+
+    It is infinite along the axis.
+    """
+    return _law(views, np.pi * np.linalg.norm(_vectors(k)[..., :2], axis=-1))
 
 
 def mean_density(
@@ -85,11 +89,16 @@ def mean_density(
         (n,).
 
     Raises:
-        InputError: a radius is not positive; and what ``coverage`` raises.
+        InputError: a radius is not positive and finite, or samples no number of them; and what
+            ``coverage`` raises.
     """
     lengths = real_numbers(radii)
-    if lengths is None or lengths.ndim != 1 or not (lengths > 0).all():
+    if lengths is None or lengths.ndim != 1 or not len(lengths):
         raise InputError(f"radii is {radii!r}, wanted positive frequencies (n,)")
+    if not ((lengths > 0) & np.isfinite(lengths)).all():
+        raise InputError(f"radii is {radii!r}, wanted positive finite frequencies")
+    if not one_number(samples) >= 1 or samples != int(samples):
+        raise InputError(f"samples is {samples!r}, wanted a whole number of frequencies, 1 or more")
     units = half_circle(samples) if target.is_flat else half_sphere(samples)
     k = (lengths[:, None, None] * units).reshape(-1, 3)
     found = density(views, target, k, weights=weights, device=device)[0]
@@ -112,17 +121,20 @@ def power_slope(k: ArrayLike, values: ArrayLike) -> float:
 
 
 def half_sphere(count: int) -> Floats:
-    """Unit vectors that fill the half-sphere z > 0 evenly along a golden spiral, (count, 3)."""
-    i = np.arange(count)
-    height, turn = (i + 0.5) / count, 2 * np.pi * _GOLDEN * i
-    across = np.sqrt(1 - height**2)
-    return np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1)
+    """Unit vectors that fill the half-sphere z > 0 evenly, from the pole down, (count, 3)."""
+    return directions_for(3, count)
 
 
 def half_circle(count: int) -> Floats:
     """Unit vectors evenly along the half-circle y > 0, z = 0, (count, 3)."""
-    turn = (np.arange(count) + 0.5) * np.pi / count
-    return np.stack([np.cos(turn), np.sin(turn), np.zeros(count)], axis=1)
+    return directions_for(2, count)
+
+
+def _law(views: Any, across: Any) -> Floats:
+    if not one_number(views) > 0:
+        raise InputError(f"views is {views!r}, wanted a positive number")
+    with np.errstate(divide="ignore"):
+        return np.asarray(one_number(views) / across)
 
 
 def _vectors(k: ArrayLike) -> Floats:

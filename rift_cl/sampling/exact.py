@@ -45,7 +45,8 @@ def exact(looks: LooksLike, target: Target, samples: int | None = None) -> float
 
     Raises:
         ResourceLimitError: that makes over 8192 samples.
-        InputError: a view of a flat target looks along another direction than one in its plane.
+        InputError: a view of a flat target looks along another direction than one in its plane, or
+            there is so much more signal than noise that rounding hides what stays.
     """
     axes = 2 if target.is_flat else 3
     if axes == 2 and np.abs(looks.direction[..., 2]).max() > _IN_THE_PLANE:
@@ -71,7 +72,13 @@ def _left(root: Floats, information: Floats) -> float:
     from scipy.linalg import cho_factor, cho_solve
 
     whole = np.eye(len(root)) + root.T @ information @ root
-    return float((root.T * cho_solve(cho_factor(whole), root.T)).sum())
+    try:
+        return float((root.T * cho_solve(cho_factor(whole), root.T)).sum())
+    except np.linalg.LinAlgError as error:
+        raise InputError(
+            "exact: the target's signal to noise is so high that rounding hides what stays unknown;"
+            " take a lower snr"
+        ) from error
 
 
 def _covariance(target: Target, count: int, axes: int) -> Floats:

@@ -3,12 +3,14 @@
 Each camera ends at a point of the target where the first of three ends:
 
 - pixel: half a cycle a pixel, 1 / (2 a), beyond which detail is folded back;
-- diffraction and depth of field: where either passes a tenth of the contrast alone;
+- diffraction and depth of field: where either passes a tenth of the contrast alone; defocus of less
+  than 0.54 wavelengths does so nowhere;
 
-and a little earlier where both weaken the same detail: where their product with the pixel's own
-passes a tenth. A set of views tells a direction of frequency up to where the best of its cameras
-ends whose slice, 1 / D thick, holds that frequency: a slice at an angle to it holds it up to
-1 / (2 D sin(angle)). What nine tenths of all directions reach is the detail of the set.
+and earlier where they weaken the same detail: where their product with the pixel's own passes a
+tenth. There the cause is the one that passes least. A set of views tells a direction of frequency
+up to where the best of its cameras ends whose slice, 1 / D thick, holds that frequency: a slice at
+an angle to it holds it up to 1 / (2 D sin(angle)). What nine tenths of all directions reach is the
+detail of the set.
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ CAUSES = ("pixel", "diffraction", "depth of field", "number of views")
 UNSEEN = "field of view"
 # The contrast at which detail ends, and where diffraction and a disc of defocus pass it: in
 # cut-offs, and in cycles per diameter of the disc.
-_CONTRAST, _DIFFRACTION, _DEFOCUS = 0.1, 0.8054, 1.0885
+_CONTRAST, _DIFFRACTION, _DEFOCUS = 0.1, 0.80538, 1.08854
 # Steps in which the end is looked for, and the share of directions that a set must tell.
 _STEPS, _MOST = 256, 0.9
 # A direction that lies in a slice to rounding.
@@ -46,6 +48,7 @@ class Limits:
         diffraction: (V, P) by diffraction.
         focus: (V, P) by depth of field.
         camera: (V, P) by all three together.
+        first: (V, P) which of ``CAUSES`` ends the camera, -1 where nothing does.
         number: (P,) the set's, if its cameras were perfect.
         reached: (P,) the set's as it is; 0 where no camera sees the point.
         cause: (P,) what ends it, one of ``CAUSES``, or ``UNSEEN``.
@@ -55,6 +58,7 @@ class Limits:
     diffraction: Floats
     focus: Floats
     camera: Floats
+    first: NDArray[np.intp]
     number: Floats
     reached: Floats
     cause: tuple[str, ...]
@@ -66,11 +70,11 @@ class Limits:
             return np.asarray(1 / self.reached)
 
     def camera_cause(self, point: int = 0) -> tuple[str, ...]:
-        """(V,) what ends each camera's detail at a point; empty text where it sees nothing."""
-        three = np.stack([self.pixel, self.diffraction, self.focus])[:, :, point]
-        first = np.argmin(three, axis=0)
-        blind = self.camera[:, point] == 0
-        return tuple("" if b else CAUSES[f] for b, f in zip(blind, first, strict=True))
+        """(V,) what ends each camera's detail at a point; empty text where nothing does.
+
+        So it is for a camera that passes any detail, and for one that does not see the point.
+        """
+        return tuple(CAUSES[f] if f >= 0 else "" for f in self.first[:, point])
 
     @property
     def sentence(self) -> str:
@@ -106,28 +110,49 @@ def limits(views: Views, target: Target, *, weights: ArrayLike | None = None) ->
     if not seen.any():
         looks.require_seen()
     with np.errstate(divide="ignore"):
-        parts = [0.5 / looks.pixel, _DIFFRACTION * looks.cutoff, _DEFOCUS / looks.blur]
+        parts = [0.5 / looks.pixel, _DIFFRACTION * looks.cutoff, _focus(looks)]
     pixel, diffraction, focus = (np.where(seen, part, 0) for part in parts)
     camera = np.where(seen, _end(looks, np.min(parts, axis=0)), 0)
+    first = np.where(seen & np.isfinite(camera), _first(looks, camera, parts[0]), -1)
     told = [
         [_told(looks, target, p, ends[:, p]) for p in range(looks.points)]
         for ends in (np.where(seen, np.inf, 0), camera)
     ]
     number, reached = np.array(told)
-    ends = (pixel, diffraction, focus, camera)
     cause = tuple(
-        _cause(number[p], *(end[seen[:, p], p] for end in ends)) for p in range(looks.points)
+        _cause(number[p], camera[seen[:, p], p], first[seen[:, p], p]) for p in range(looks.points)
     )
-    return Limits(pixel, diffraction, focus, camera, number, reached, cause)
+    return Limits(pixel, diffraction, focus, camera, first, number, reached, cause)
 
 
-def _cause(number: float, pixel: Floats, diffraction: Floats, focus: Floats, camera: Floats) -> str:
-    """What ends a set's detail at a point, by the ends of the cameras that see it."""
+def _focus(looks: Looks) -> Floats:
+    """Where the disc of defocus alone passes a tenth: the least k of blur k (1 - k / cutoff)."""
+    plain = _DEFOCUS / looks.blur
+    with np.errstate(invalid="ignore"):
+        share = 4 * plain / looks.cutoff
+    # No real root where the disc never passes so little, and none without blur.
+    root = np.sqrt(1 - np.where(share <= 1, share, 1))
+    return np.where(share <= 1, 2 * plain / (1 + root), np.inf)
+
+
+def _first(looks: Looks, camera: Floats, pixel: Floats) -> NDArray[np.intp]:
+    """(V, P) what passes least where each camera ends; pixels where that is half their cycle."""
+    k = np.where(np.isfinite(camera), camera, 0)
+    square = optical_transfer(k, looks.pixel, np.inf, 0).value
+    light = optical_transfer(k, 0, looks.cutoff, 0).value
+    both = optical_transfer(k, 0, looks.cutoff, looks.blur).value
+    disc = both / np.where(light > 0, light, 1)
+    first = np.argmin([square, light, disc], axis=0)
+    return np.where(camera >= pixel * (1 - 1e-9), 0, first)
+
+
+def _cause(number: float, camera: Floats, first: NDArray[np.intp]) -> str:
+    """What ends a set's detail at a point, by the cameras that see it."""
     if not len(camera):
         return UNSEEN
     if number <= np.median(camera):
         return CAUSES[3]
-    return CAUSES[int(np.argmin([np.median(end) for end in (pixel, diffraction, focus)]))]
+    return CAUSES[int(np.argmax(np.bincount(first[first >= 0])))]
 
 
 def _end(looks: Looks, first: Floats) -> Floats:

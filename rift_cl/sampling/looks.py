@@ -7,8 +7,8 @@ posed cameras, a tomographic scan, or bare directions.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import NamedTuple
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -50,7 +50,10 @@ class Looks:
         if len(shape) != 2 or 0 in shape:
             raise ShapeError(f"Looks: weight has shape {shape}, wanted (views, points), none empty")
         for entry in fields(self):
-            values = np.asarray(getattr(self, entry.name), np.float64)
+            given = getattr(self, entry.name)
+            values = real_numbers(given)
+            if values is None:
+                raise InputError(f"Looks: {entry.name} is {given!r}, wanted real numbers")
             wanted = (*shape, 3) if entry.name == "direction" else shape
             if values.shape != wanted:
                 raise ShapeError(f"Looks: {entry.name} has shape {values.shape}, wanted {wanted}")
@@ -88,8 +91,7 @@ class Looks:
             more = f" and {len(unseen) - 1} more" if len(unseen) > 1 else ""
             raise InputError(
                 f"point {unseen[0]}{more} of the target's {self.points} lie outside every picture "
-                f"of {self.views} views: check the target's centre and unit of length, or aim the "
-                "cameras at it"
+                f"of {self.views} views: check its centre and unit of length, or aim at it"
             )
 
     @classmethod
@@ -105,17 +107,23 @@ class Looks:
 
         Raises:
             ShapeError: there is no camera or no point, or an array has another shape.
-            InputError: a number is not finite, or a weight negative.
+            InputError: what is given are no cameras, a number is not finite, or a weight negative.
         """
-        if not len(cameras):
-            raise ShapeError("cameras is empty, wanted at least one view")
         x = _points(points)
-        light = _weights(weights, len(cameras))
-        sights = [_sight(camera, x) for camera in cameras]
-        direction, seen, pixel, cutoff, blur = (
-            np.stack(parts) for parts in zip(*sights, strict=True)
-        )
-        return cls(direction, seen * light[:, None], pixel, cutoff, blur)
+        sights = [_sight(camera, x) for camera in _cameras(cameras)]
+        looks = cls(*(np.stack(parts) for parts in zip(*sights, strict=True)))
+        return looks.weighted(weights)
+
+    def weighted(self, weights: ArrayLike | None) -> Looks:
+        """The same with so many times the light in each view (V,); None leaves it as it is.
+
+        Raises:
+            ShapeError: there is another number of weights.
+            InputError: one is not finite, or negative.
+        """
+        if weights is None:
+            return self
+        return replace(self, weight=self.weight * _weights(weights, self.views)[:, None])
 
     @classmethod
     def of_scan(
@@ -216,9 +224,15 @@ def _points(points: ArrayLike) -> Floats:
     return x
 
 
-def _weights(weights: ArrayLike | None, count: int) -> Floats:
-    if weights is None:
-        return np.ones(count)
+def _cameras(cameras: Any) -> list[Camera]:
+    if not isinstance(cameras, Sequence) or not all(isinstance(c, Camera) for c in cameras):
+        raise InputError(f"views: wanted cameras in a sequence, this is a {type(cameras).__name__}")
+    if not cameras:
+        raise ShapeError("cameras is empty, wanted at least one view")
+    return list(cameras)
+
+
+def _weights(weights: ArrayLike, count: int) -> Floats:
     light = _finite("weights", weights)
     if light.shape != (count,):
         raise ShapeError(f"weights has shape {light.shape}, wanted ({count},), one per view")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.geometry import Camera
-from rift_cl.geometry.numbers import one_number, real_numbers
+from rift_cl.geometry.numbers import real_numbers
 from rift_cl.reference import coverage as twin
 from rift_cl.sampling import criteria
 from rift_cl.sampling.camera_gradients import CameraGradients, camera_gradients
@@ -77,13 +76,13 @@ def merit(
 
     Raises:
         ShapeError: there is no camera, or weights do not fit.
-        InputError: the kind is unknown or does not go with the target's mode, or the prior makes
-            no sense.
+        InputError: what is given are no cameras, the kind is unknown or does not go with the
+            target's mode, or the prior makes no sense.
     """
     if kind not in get_args(MeritKind):
         raise InputError(f"merit: kind is {kind!r}, wanted one of {', '.join(get_args(MeritKind))}")
     seen = Looks.of(cameras, target.points)
-    looks = _weighted(seen, weights)
+    looks = seen.weighted(weights)
     if kind == "kriging" or kind == "exact":  # noqa: PLR1714 - what is narrowed by its type
         if target.mode == "surface":
             raise InputError(f"merit: a surface has no {kind}; take wiener, logdet or worst")
@@ -93,17 +92,6 @@ def merit(
     else:
         value, by_looks = _volume(looks, target, kind, device)
     return Merit(value, camera_gradients(cameras, seen, by_looks))
-
-
-def _weighted(seen: Looks, weights: ArrayLike | None) -> Looks:
-    if weights is None:
-        return seen
-    light = real_numbers(weights)
-    if light is None or light.shape != (seen.views,):
-        raise ShapeError(f"weights has shape {np.shape(weights)}, wanted ({seen.views},)")
-    if not (np.isfinite(light).all() and light.min() >= 0):
-        raise InputError("weights holds a negative number, NaN or infinity, wanted zero or more")
-    return replace(seen, weight=seen.weight * light[:, None])
 
 
 def _volume(
@@ -131,20 +119,12 @@ def merit_of_coverage(kind: CoverageMerit, coverage: Any, target: Target) -> Sco
         The value, lower is better, and its derivative by the coverage (P, K).
 
     Raises:
-        InputError: the kind is unknown, the prior or the signal-to-noise ratio makes no sense, or
-            coverage is negative or does not fit.
+        InputError: the kind is unknown, the prior makes no sense, or coverage is negative or does
+            not fit.
     """
-    if kind not in get_args(CoverageMerit):
-        wanted = ", ".join(get_args(CoverageMerit))
-        raise InputError(f"merit_of_coverage: kind is {kind!r}, wanted one of {wanted}")
-    k = np.asarray(target.k, np.float64)
-    known = _coverage(coverage, len(k))
-    if not 0 < one_number(target.snr) < np.inf:
-        raise InputError(f"target: snr is {target.snr!r}, wanted a number above 0")
-    power = checked_power(target.prior, k, target.diameter)
-    if kind == "worst":
-        return criteria.worst(known, power, target.snr, k)
-    return (criteria.wiener if kind == "wiener" else criteria.logdet)(known, power, target.snr)
+    known = _coverage(coverage, len(target.k))
+    power = checked_power(target.prior, target.k, target.diameter)
+    return criteria.scored(kind, known, power, target.snr, target.k)
 
 
 def _coverage(values: Any, frequencies: int) -> Floats:

@@ -113,8 +113,9 @@ def seen_directions(views: Views, target: Target, point: int) -> Floats:
         InputError: there is no such point, or it lies outside every picture.
     """
     looks = looks_at(views, target)
-    if not 0 <= point < looks.points:
-        raise InputError(f"point is {point!r}, the target has {looks.points}")
+    if point not in range(looks.points):
+        raise InputError(f"point is {point!r}, the target has {looks.points}, from 0 on")
+    point = int(point)
     looks.require_seen(point)
     directions: Floats = looks.direction[looks.weight[:, point] > 0, point]
     return directions

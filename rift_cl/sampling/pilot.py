@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.geometry.numbers import one_number, real_numbers
-from rift_cl.sampling.prior import directions_for
+from rift_cl.sampling.prior import directions_for, require_flat
 
 Floats = NDArray[np.float64]
 _FLAT, _SOLID, _SMALLEST = 2, 3, 8
@@ -50,6 +50,7 @@ class Pilot:
     slope: float
     cells: Floats
     angular: Floats
+    axes: int
 
     def __init__(
         self, reconstruction: ArrayLike, spacing: float, noise: float | None = None
@@ -75,10 +76,16 @@ class Pilot:
         object.__setattr__(self, "slope", float(np.clip(slope, 0, _STEEPEST)))
         object.__setattr__(self, "cells", cells)
         object.__setattr__(self, "angular", angular)
+        object.__setattr__(self, "axes", values.ndim)
 
     def power(self, k: Any, diameter: float) -> Floats:
-        """Power at frequencies (K, 3): the profile along frequency times that over directions."""
+        """Power at frequencies (K, 3): the profile along frequency times that over directions.
+
+        Raises:
+            InputError: the reconstruction was flat, and ``k`` is not.
+        """
         frequencies = np.asarray(k, np.float64)
+        require_flat("Pilot: reconstruction", self.axes, frequencies)
         radius = np.maximum(np.linalg.norm(frequencies, axis=1), 1 / diameter)
         along = self._radial(radius) / self._radial(np.array([1 / diameter]))
         length = np.linalg.norm(frequencies, axis=1, keepdims=True)

@@ -35,7 +35,7 @@ Floats = NDArray[np.float64]
 Method = Literal["greedy", "greedy+mma"]
 _MOST_VIEWS = 100_000
 # Frequencies that hold a target's power, below which a plan is not to be trusted.
-_FEW = 10
+_FEW = 6
 
 
 def plan(
@@ -53,7 +53,8 @@ def plan(
 
     All views look at the target's centre, upright about ``constraints.up``. Free views are chosen
     one after another among some 500 directions with each camera type, then all are moved together
-    (method of moving asymptotes, analytic gradient). Views on a path share one type and setting.
+    (method of moving asymptotes, analytic gradient). Where noise limits, a view may be taken twice.
+    Views on a path share one type and setting.
 
     Args:
         target: what is looked at.

@@ -42,7 +42,8 @@ class Prior(Protocol):
 class PowerLaw:
     """Power that falls as ``|k| ** -alpha``, and is level below one cycle per diameter.
 
-    Natural pictures have 2 in their plane; so have surfaces of solids with sharp edges, cut.
+    In their plane natural pictures have about 2 and plain shapes with sharp edges 3; in space thin
+    shells have 2 and solids with sharp surfaces 4 (Porod's law).
 
     Args:
         alpha: the exponent, zero or more.
@@ -125,8 +126,7 @@ class Spectrum:
         from scipy.ndimage import map_coordinates
 
         axes = self.array.ndim
-        if axes == _FLAT and np.abs(k[..., 2]).max(initial=0) > 1e-9 * np.abs(k).max(initial=0):
-            raise InputError("Spectrum: array is (y, x), and the target is not flat; give it in 3D")
+        require_flat("Spectrum: array", axes, k)
         middle = np.array(self.array.shape)[:, None] // 2
         steps = k[:, axes - 1 :: -1].T / self.spacing
         both = [
@@ -134,6 +134,16 @@ class Spectrum:
             for sign in (1, -1)
         ]
         return np.asarray(both[0] + both[1]) / 2
+
+
+def require_flat(what: str, axes: int, k: Floats) -> None:
+    """Refuse frequencies out of the plane for what is known in the plane alone.
+
+    Raises:
+        InputError: there are two axes, and a frequency has kz.
+    """
+    if axes == _FLAT and np.abs(k[..., 2]).max(initial=0) > 1e-9 * np.abs(k).max(initial=0):
+        raise InputError(f"{what} is (y, x), and the target is not flat; give it in 3D")
 
 
 def directions_for(axes: int, count: int = _DIRECTIONS) -> Floats:

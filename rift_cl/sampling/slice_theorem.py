@@ -77,13 +77,16 @@ def slice_comparison(
     Raises:
         ShapeError: the values are not the grid's, or the direction is neither a number nor a
             vector.
-        InputError: a number is not finite, the band out of its range, or the direction zero.
+        InputError: a number is not finite, the band out of its range, the direction zero, or so
+            are all values.
     """
     samples = real_numbers(values)
     if samples is None or samples.shape != grid.shape:
         raise ShapeError(f"values has shape {np.shape(values)}, the grid has {grid.shape}")
     if not np.isfinite(samples).all():
         raise NonFiniteError("values holds NaN or infinity")
+    if not samples.any():
+        raise InputError("values is zero everywhere: there is no spectrum to compare")
     if not 0 < one_number(band) <= 0.5:
         raise InputError(f"band is {band!r}, wanted cycles per sample, above 0 and up to 0.5")
     highest = band / max(grid.spacing)

@@ -52,8 +52,9 @@ class Crowther:
     @property
     def sentence(self) -> str:
         """The finding for a reader."""
+        told = "1 view tells" if self.views == 1 else f"{self.views} views tell"
         return (
-            f"{self.views} views tell {_MOST:.0%} of all directions up to {self.frequency:.3g} "
+            f"{told} {_MOST:.0%} of all directions up to {self.frequency:.3g} "
             f"cycles per unit (a resolution of {1 / self.frequency:.3g}); for "
             f"{self.wanted:.3g} along one circle it takes {self.needed}."
         )

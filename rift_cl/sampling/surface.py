@@ -24,7 +24,6 @@ from rift_cl.reference.coverage import (
     optical_transfer,
 )
 from rift_cl.sampling import criteria
-from rift_cl.sampling.criteria import Scored
 from rift_cl.sampling.prior import checked_power
 
 if TYPE_CHECKING:
@@ -72,7 +71,7 @@ def surface_merit(
         The value, lower is better, and its derivative by the looks.
 
     Raises:
-        InputError: the target has no normals, or the degree is not 0 to 8.
+        InputError: the target has no normals, the kind is unknown, or the degree is not 0 to 8.
     """
     if target.normals is None:
         raise InputError("surface_merit: the target has no normals, wanted one for each point")
@@ -106,11 +105,7 @@ def _texture(
     power = checked_power(target.prior, plane, target.diameter)
     seen = [_seen(looks, p, normal, plane) for p, normal in enumerate(normals)]
     coverage = np.stack([_sum(looks, p, one) for p, one in enumerate(seen)])
-    scored: Scored = (
-        criteria.worst(coverage, power, target.snr, plane)
-        if kind == "worst"
-        else (criteria.wiener if kind == "wiener" else criteria.logdet)(coverage, power, target.snr)
-    )
+    scored = criteria.scored(kind, coverage, power, target.snr, plane)
     parts = [_gradient(looks, p, normals[p], one, scored.gradient[p]) for p, one in enumerate(seen)]
     return scored.value, LooksGradient(
         *(np.stack(values, axis=1) for values in zip(*parts, strict=True))

@@ -39,15 +39,18 @@ class Target:
         normals: (P, 3) of the surface at the points, for the mode ``surface``.
         mode: ``volume`` for what is seen through, ``surface`` for what is opaque.
         prior: the power that is expected at each frequency.
-        snr: signal to noise at one cycle per diameter of one view; at k it is ``snr`` times the
-            prior's power.
+        snr: signal to noise, in power, at one cycle per diameter of one view; at k it is ``snr``
+            times the prior's power. With the default and a power law of 2 one view alone tells
+            little beyond 5 cycles per diameter. N pixels across a target of contrast c, with noise
+            s in each, have about (N c / s)^2 / 40 by that law, most photographs far over 1000.
         band: the highest frequency that is wanted; 16 / diameter by default.
         frequencies: (K, 3) the frequencies to count with; by default ``k`` is a set that fills the
             half-ball of the band evenly (coverage at -k is that at k).
 
     Raises:
         ShapeError: an array has the wrong shape.
-        InputError: a length is not positive, a number not finite, or the mode unknown.
+        InputError: a length is not positive, a number not finite, the mode unknown, or the prior
+            none.
     """
 
     center: Floats
@@ -76,6 +79,11 @@ class Target:
         if self.frequencies is not None:
             k = _array("frequencies", self.frequencies, (None, 3))
             object.__setattr__(self, "frequencies", k)
+        if not callable(getattr(self.prior, "power", None)):
+            raise InputError(
+                f"Target: prior is {self.prior!r}, wanted PowerLaw, Spectrum, Pilot or another "
+                "object with a method power(k, diameter)"
+            )
         self._check_mode()
 
     def _check_mode(self) -> None:
@@ -99,12 +107,18 @@ class Target:
             diameter: its size.
             center: (2,) or (3,) its middle.
             **settings: the other arguments of ``Target``.
+
+        Raises:
+            ShapeError: an array has the wrong shape.
+            InputError: a frequency lies outside the plane, or what ``Target`` refuses.
         """
         middle = np.zeros(3)
         given = _array("center", center, (3,) if np.size(center) == 3 else (2,))
         middle[: len(given)] = given
         target = cls(middle, diameter, **settings)
         if target.frequencies is not None:
+            if not target.is_flat:
+                raise InputError("Target.flat: frequencies reach out of the plane, wanted kz = 0")
             return target
         k = half_disc(target.highest)
         return cls(middle, diameter, **{**settings, "frequencies": k})

@@ -80,7 +80,8 @@ def tuy(cameras: Sequence[Camera], target: Target, *, tolerance: float | None = 
     if not near > 0:
         raise InputError(f"tolerance is {tolerance!r}, wanted a positive length")
     # A flat path is blind along its own normal, which no even set of directions hits.
-    own = np.linalg.svd(places - places.mean(0))[2]
+    spread = places - places.mean(0)
+    own = np.linalg.eigh(spread.T @ spread)[1].T
     normals = np.concatenate([half_sphere(_NORMALS), own])
     offsets = np.linspace(-0.5, 0.5, _OFFSETS) * target.diameter
     distances = np.empty((len(normals), _OFFSETS))

@@ -37,6 +37,7 @@ def test_the_cutoff_is_that_of_incoherent_light() -> None:
         ((1, 0), "focus"),
         ((1, -2), "focus"),
         ((1, math.nan), "focus"),
+        ((1, np.array([1.0, 2.0])), "focus"),
         ((1, 1, -1e-6), "wavelength"),
         ((1, 1, math.nan), "wavelength"),
     ],
@@ -55,3 +56,13 @@ def test_a_camera_carries_its_aperture() -> None:
         Camera((8, 8), K, np.eye(4), "ortho", Aperture(0.1, 2.0))
     with pytest.raises(InputError, match="aperture"):
         Camera((8, 8), K, np.eye(4), aperture=0.1)  # type: ignore[arg-type]
+
+
+def test_numbers_of_any_kind_are_the_same_opening() -> None:
+    given = Aperture(np.float32(0.5), np.array(2.0), np.int64(0))  # type: ignore[arg-type]
+    assert given == Aperture(0.5, 2.0) and hash(given) == hash(Aperture(0.5, 2.0))
+    assert {type(n) for n in (given.radius, given.focus, given.wavelength)} == {float}
+
+
+def test_at_the_lens_itself_everything_passes() -> None:
+    assert Aperture(2.0, 270.0, 550e-6).cutoff(0.0) == math.inf

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry.camera_reduction import Reduction, reduce_camera
+from rift_cl.geometry.gaussian_lens import gaussian_lens
 from rift_cl.geometry.lens_prescription import LensPrescription
+from rift_cl.geometry.real_rays import Rays, trace
 from rift_cl.io.lens_file import open_lens
 from rift_cl.sample.stock_lenses import STOCK_LENSES, stock_lens
 
@@ -91,3 +94,29 @@ def test_a_plane_before_the_focus_a_target_at_the_lens_and_too_wide_a_stop_are_r
         reduce_camera(_stopped_down(lens, 60.0), 270.0, PIXEL, SIZE)
     with pytest.raises(ShapeError, match="size"):
         reduce_camera(lens, 270.0, PIXEL, (0, 4))
+
+
+@pytest.mark.parametrize("name", STOCK_LENSES)
+def test_the_colours_see_one_point_that_stands_still(name: str) -> None:
+    """Against real rays close to the axis, from the same point in every colour."""
+    lens = open_lens(stock_lens(name))
+    gaussian = gaussian_lens(lens)
+    distance, places = 2.2 * gaussian.focal_length, []
+    for wavelength in lens.wavelengths:
+        go = np.array([[0, 1e-4 / distance, 1.0]])
+        start = np.array([[0, 0, gaussian.entrance_pupil - distance]])
+        last = trace(lens, Rays(start, go / np.linalg.norm(go)), wavelength)[-1]
+        slope = last.direction[0, 1] / last.direction[0, 2]
+        places.append(last.position[0, 2] - last.position[0, 1] / slope)
+    found = _losses(reduce_camera(lens, distance, PIXEL, (100, 100), 1.0))
+    apart = max(places) - min(places)
+    assert found["focus between the colours"] == pytest.approx(apart, rel=1e-6)
+
+
+def test_a_plane_that_equal_pupils_would_never_see_sharp_is_infinitely_far_off() -> None:
+    lens = open_lens(stock_lens("double_gauss"))
+    gaussian = gaussian_lens(lens)
+    assert gaussian.pupil_magnification > 1.1
+    for share in (1.0, 0.95):
+        found = _losses(reduce_camera(lens, share * gaussian.focal_length, PIXEL, (100, 100), 1.0))
+        assert found["magnification, were the pupils taken as equal"] == math.inf

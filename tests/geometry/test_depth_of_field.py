@@ -20,7 +20,8 @@ from rift_cl.geometry.depth_of_field import (
     sharp_range,
     worst_depth_cutoff,
 )
-from rift_cl.geometry.optics import defocus_mtf, diffraction_mtf
+from rift_cl.geometry.optics import defocus_mtf, diffraction_mtf, incoherent_cutoff
+from rift_cl.geometry.pupil import defocused_otf
 
 GREEN = 550e-6
 
@@ -109,6 +110,7 @@ def test_lengths_are_positive(bad: float) -> None:
     for call in (
         lambda: sharp_range(bad, 100, 1, 100),
         lambda: sharp_range(1, bad, 1, 100),
+        lambda: sharp_range(1, np.array([1.0, 2.0]), 1, 100),  # type: ignore[arg-type]
         lambda: hyperfocal(1, bad, 100),
         lambda: diffraction_depth(1, bad, GREEN),
         lambda: finite_depth_optimum(bad, 270, GREEN),
@@ -124,3 +126,14 @@ def test_a_target_does_not_reach_to_the_lens_and_levels_lie_between_nothing_and_
         finite_depth_optimum(600, 270, GREEN)
     with pytest.raises(InputError, match="level"):
         worst_depth_cutoff(4, 270, 60, GREEN, level=1.0)
+
+
+@pytest.mark.parametrize("waves", [0.05, 0.6, 3.0, 200.0, 9000.0])
+@pytest.mark.parametrize("level", [0.02, 0.1, 0.7])
+def test_the_cutoff_is_where_the_exact_otf_crosses_the_level(waves: float, level: float) -> None:
+    """Also where the first zero lies a thousand times before the cut-off."""
+    depth = waves * 16 * GREEN * 270**2 / 4.0**2
+    cutoff = incoherent_cutoff(4.0, 270, GREEN)
+    share = worst_depth_cutoff(4.0, 270, depth, GREEN, level) / cutoff
+    assert defocused_otf(share, waves) == pytest.approx(level, rel=1e-3)
+    assert (defocused_otf(np.linspace(0, share, 200)[:-1], waves) > level).all()

@@ -190,6 +190,7 @@ def test_a_lens_that_is_no_cameras_is_refused(lens: LensPrescription, word: str)
         ((10.0, 1e9), "thickness"),
         ((10.0, 0.0, Glass("g", "constant", (1.5,))), "thickness"),
         ((10.0, 1.0, None, math.nan), "conic"),
+        ((10.0, 1.0, "N-BK7"), "glass"),
         ((10.0, 1.0, None, 0.0, -2.0), "semi_diameter"),
     ],
 )
@@ -206,6 +207,9 @@ def test_surfaces_that_cannot_be_are_refused(surface: tuple[object, ...], word: 
         ({"surfaces": (Surface(9.0, 1.0),) * 1001}, "1001 surfaces"),
         ({"stop": 2}, "stop"),
         ({"stop": -1}, "stop"),
+        ({"stop": 0.5}, "stop"),
+        ({"stop": "0"}, "stop"),
+        ({"primary": 0.5}, "primary"),
         ({"opening": 0.0}, "opening"),
         ({"opening": math.nan}, "opening"),
         ({"opening_is": "wide"}, "opening_is"),

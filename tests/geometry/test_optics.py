@@ -182,6 +182,8 @@ def test_hostile_values_are_refused_in_words() -> None:
         defocus_mtf(1.0, math.nan)
     with pytest.raises(InputError, match="cutoff"):
         system_mtf(1.0, cutoff=0)
+    with pytest.raises(InputError, match="cutoff"):
+        defocus_mtf(1.0, 1.0, np.array([1.0, 2.0]))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="waves"):
         defocused_otf(0.5, 1e6)
     with pytest.raises(InputError, match="obstruction"):
@@ -194,3 +196,12 @@ def test_hostile_values_are_refused_in_words() -> None:
         polychromatic_mtf(1.0, 1, 1, [])
     with pytest.raises(InputError, match="weights"):
         polychromatic_mtf(1.0, 1, 1, [1e-3, 2e-3], [1, -1])
+
+
+def test_strong_defocus_is_the_blur_disc_of_geometry() -> None:
+    """As far as the quadrature is allowed to go, where it has many turns of the phase."""
+    for waves in (300.0, 1e4):
+        v = np.linspace(0, 6, 25) / (8 * np.pi * waves)
+        disc = defocus_mtf(v, 8 * waves, 1.0)
+        np.testing.assert_allclose(np.abs(defocused_otf(v, waves)), disc, atol=0.01)
+    assert abs(defocused_otf(0.5, 1e4)) < 1e-4

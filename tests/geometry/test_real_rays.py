@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rift_cl.errors import InputError
+from rift_cl.geometry import real_rays
 from rift_cl.geometry.gaussian_lens import gaussian_lens
 from rift_cl.geometry.glass import Glass
 from rift_cl.geometry.lens_prescription import LensPrescription, Surface
@@ -101,5 +102,20 @@ def test_rays_that_miss_or_cannot_leave_name_the_surface() -> None:
     steep = LensPrescription("steep", (Surface(math.inf, 10.0, GLASS), Surface(-5.0, 0.0)), 0, 9.0)
     with pytest.raises(InputError, match="cannot leave surface 2 of 2"):
         trace(steep, pupil_rays(gaussian_lens(steep), [[0, 1]]))
-    with pytest.raises(InputError, match="distance"):
-        pupil_rays(gaussian_lens(steep), [[0, 1]], distance=0.0)
+    for bad in (0.0, math.nan, "far"):
+        with pytest.raises(InputError, match="distance"):
+            pupil_rays(gaussian_lens(steep), [[0, 1]], distance=bad)  # type: ignore[arg-type]
+
+
+def test_a_chief_ray_that_is_not_found_is_no_ray(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Secant steps that end somewhere else must not pass for the middle of the stop."""
+    lens = open_lens(stock_lens("cooke_triplet"))
+
+    def never_there(lens: LensPrescription, rays: real_rays.Rays) -> list[real_rays.Rays]:
+        place, straight = rays.position.copy(), np.array([[0.0, 0.0, 1.0]])
+        place[:, 1] = 1 + place[:, 1] ** 2
+        return [real_rays.Rays(place, straight) for _ in lens.surfaces]
+
+    monkeypatch.setattr(real_rays, "trace", never_there)
+    with pytest.raises(InputError, match="middle of the stop"):
+        chief_ray(lens, gaussian_lens(lens), 0.15)

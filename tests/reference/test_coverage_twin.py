@@ -101,3 +101,14 @@ def test_gradients_stay_finite_along_the_line_of_sight_and_at_zero():
     k = np.array([[0, 0, 0.3], [0, 0, 0], [1e-12, 0, 0.2]])
     gradient = coverage_grad(looks, k, 1.0, np.ones((1, 3)))
     assert all(np.isfinite(part).all() for part in gradient)
+
+
+def test_rounding_along_the_line_of_sight_does_not_blow_up():
+    """A frequency along the line of sight but for rounding: its length across it rounds to none."""
+    random = np.random.default_rng(0)
+    for _ in range(200):
+        n = random.normal(size=3)
+        n /= np.linalg.norm(n)
+        looks = Looks(n[None, None], *np.array([1.0, 0.1, 5.0, 0.2]).reshape(4, 1, 1))
+        k = random.uniform(0.05, 0.5, (20, 1)) * n * (1 + 1e-16 * random.integers(-2, 3, (20, 3)))
+        assert np.abs(coverage_grad(looks, k, 1.0, np.ones((1, 20))).direction).max() < 1e-6

@@ -161,6 +161,11 @@ def test_bad_views_and_gradients_are_refused(looks, target):
         coverage(looks, Target((0, 0, 0), 1.0))
     with pytest.raises(InputError, match="weights are for cameras"):
         coverage(looks, target, weights=[1.0])
+    with pytest.raises(InputError, match="too large for float32"):
+        coverage(ring_of_cameras(1), Target((0, 0, 0), 1.0), weights=[1e39])
+    for count in (1, 2.5, "five"):
+        with pytest.raises(InputError, match="count is"):
+            coverage_cube(looks, target, count)
     with pytest.raises(ShapeError, match="grad has shape"):
         coverage_grad(looks, target, np.zeros((1, 3)))
     with pytest.raises(InputError, match="NaN"):

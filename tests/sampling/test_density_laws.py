@@ -69,9 +69,20 @@ def test_a_weight_counts_as_so_many_views(device):
     np.testing.assert_allclose(found[1], 3 * found[0], rtol=1e-6)
 
 
+def test_the_laws_are_infinite_where_all_slices_meet():
+    np.testing.assert_array_equal(sphere_density(4, [[0, 0, 0], [1, 0, 0]]), [np.inf, 2])
+    np.testing.assert_allclose(ring_density(4, [[0, 0, 9], [1, 0, 9]]), [np.inf, 4 / np.pi])
+
+
 def test_bad_arguments_are_refused():
-    with pytest.raises(InputError, match="radii"):
-        mean_density(Looks.along([[1, 0, 0]]), SPACE, [0.0, 1.0])
+    for radii in ([0.0, 1.0], [], [np.inf], [np.nan], "wide"):
+        with pytest.raises(InputError, match="radii"):
+            mean_density(Looks.along([[1, 0, 0]]), SPACE, radii)
+    for samples in (0, 2.5, "many"):
+        with pytest.raises(InputError, match="samples"):
+            mean_density(Looks.along([[1, 0, 0]]), SPACE, [1.0], samples=samples)
+    with pytest.raises(InputError, match="views is 'few'"):
+        ring_density("few", [1, 0, 0])
     with pytest.raises(ShapeError, match="two or more"):
         power_slope([1.0], [1.0])
     with pytest.raises(InputError, match="positive"):

@@ -8,6 +8,7 @@ from looks_of_all_kinds import ring_of_cameras
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Aperture
+from rift_cl.geometry.pupil import defocused_otf
 from rift_cl.reference.coverage import optical_transfer
 from rift_cl.sampling.density import half_sphere
 from rift_cl.sampling.limits import limits
@@ -47,7 +48,7 @@ def test_a_small_opening_is_limited_by_diffraction():
     found = limits(ring_of_cameras(60, aperture=aperture), SMALL)
     assert found.cause == ("diffraction",)
     # 2 R / (wavelength z) is 2 cycles per unit.
-    assert found.diffraction[0, 0] == pytest.approx(2 * 0.8054)
+    assert found.diffraction[0, 0] == pytest.approx(2 * 0.80538)
     assert found.camera[0, 0] < found.diffraction[0, 0]
 
 
@@ -57,6 +58,36 @@ def test_a_wide_opening_is_limited_by_depth_of_field_away_from_its_focus():
     found = limits(ring_of_cameras(60, aperture=aperture), target)
     assert found.cause[0] == "pixel" and found.cause[2] == "depth of field"
     assert found.focus[0, 0] > 1e9
+
+
+def lens(cutoff, blur, pixel=0.0):
+    one = np.ones((1, 1))
+    return Looks(np.array([[[0, 0, 1.0]]]), one, pixel * one, cutoff * one, blur * one)
+
+
+@pytest.mark.parametrize("waves", [0.6, 1.0, 2.0, 6.0])
+def test_the_disc_ends_where_it_passes_a_tenth_with_diffraction_taken_off(waves):
+    """A blur disc of 8 W / cutoff is a defocus of W wavelengths at the pupil's edge."""
+    found = limits(lens(3.0, 8 * waves / 3.0), SMALL).focus[0, 0]
+    both, light = (optical_transfer(found, 0, 3.0, blur).value for blur in (8 * waves / 3.0, 0))
+    assert both / light == pytest.approx(0.1, abs=1e-4)
+
+
+@pytest.mark.parametrize("waves", [0.1, 0.3, 0.7, 1.0, 3.0])
+def test_detail_ends_where_that_of_a_real_pupil_does(waves):
+    found = limits(lens(3.0, 8 * waves / 3.0), SMALL)
+    v = np.linspace(0, 1, 2001)
+    first = v[np.argmax(defocused_otf(v, waves) < 0.1)]
+    assert found.camera[0, 0] == pytest.approx(3.0 * first, rel=0.04)
+    # Little defocus alone takes no detail; between, where both weaken it, the stronger is named.
+    assert np.isinf(found.focus[0, 0]) == (waves < 0.54)
+    assert found.camera_cause() == ("diffraction" if waves < 0.5 else "depth of field",)
+
+
+def test_defocus_that_halves_detail_is_named_though_alone_it_would_not_end_it():
+    found = limits(lens(3.0, 8 * 0.53 / 3.0), SMALL)
+    assert np.isinf(found.focus[0, 0]) and found.camera[0, 0] < 0.6 * found.diffraction[0, 0]
+    assert found.camera_cause() == ("depth of field",) and found.cause == ("depth of field",)
 
 
 def test_few_views_of_a_large_target_limit_it():
@@ -72,6 +103,7 @@ def test_one_camera_and_bare_directions_work():
     assert one.reached[0] == pytest.approx(0.5 / 0.9, rel=0.01)
     bare = limits(Looks.along(half_sphere(100)), Target((0, 0, 0), 1.0))
     assert bare.cause == ("number of views",) and np.isinf(bare.camera).all()
+    assert set(bare.camera_cause()) == {""}
     assert "any detail" in bare.sentence
 
 

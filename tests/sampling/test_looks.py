@@ -61,6 +61,8 @@ def test_an_aperture_blurs_away_from_its_focus():
 def test_weights_multiply_what_is_seen():
     looks = Looks.of([one(), one()], [[0, 0, 0], [0, 100, 0]], weights=[2, 3])
     assert looks.weight.tolist() == [[2, 0], [3, 0]]
+    assert looks.weighted([0.5, 2]).weight.tolist() == [[1, 0], [6, 0]]
+    assert looks.weighted(None) is looks
     assert (looks.views, looks.points) == (2, 2)
 
 
@@ -86,6 +88,9 @@ def test_a_target_that_nobody_sees_is_named():
     ("make", "wanted"),
     [
         (lambda: Looks.of([], [[0, 0, 0]]), "cameras is empty"),
+        (lambda: Looks.of(one(), [[0, 0, 0]]), "cameras in a sequence, this is a Camera"),
+        (lambda: Looks.of([one(), 2], [[0, 0, 0]]), "cameras in a sequence, this is a list"),
+        (lambda: Looks.of((c for c in [one()]), [[0, 0, 0]]), "this is a generator"),
         (lambda: Looks.of([one()], np.empty((0, 3))), "points has shape"),
         (lambda: Looks.of([one()], [[0, np.nan, 0]]), "NaN"),
         (lambda: Looks.of([one()], "here"), "real numbers"),
@@ -112,5 +117,7 @@ def test_numbers_out_of_their_range_are_refused(name, value):
     given[name][...] = value
     with pytest.raises(InputError, match=name):
         Looks(**given)
+    with pytest.raises(InputError, match=f"{name} is .*much.*, wanted real numbers"):
+        Looks(**{**vars(looks), name: [["much"]]})
     with pytest.raises(ShapeError, match="wanted"):
         Looks(**{**vars(looks), name: getattr(looks, name)[..., None]})

@@ -6,7 +6,8 @@ from scattered_cameras import cameras, changed
 from scipy.spatial.transform import Rotation
 from scipy.stats import spearmanr
 
-from rift_cl.geometry import Parallel
+from rift_cl.geometry import Camera, Parallel
+from rift_cl.geometry.pose import look_at
 from rift_cl.reference.coverage import coverage
 from rift_cl.sampling import merit as merit_file
 from rift_cl.sampling.exact import exact
@@ -207,6 +208,17 @@ def test_a_target_that_no_camera_sees_is_all_unknown():
     assert not found.gradient.position.any()
     assert merit(cameras(4), target, "kriging").value == pytest.approx(1)
     assert merit(cameras(4), target, "exact").value == pytest.approx(1)
+
+
+@pytest.mark.parametrize("model", ["pinhole", "fisheye"])
+def test_points_beside_and_behind_a_camera_change_nothing(model):
+    K = [[64, 0, 32], [0, 64, 32], [0, 0, 1]]
+    camera = Camera((64, 64), K, look_at((0, 0, -10), (0, 0, 0), (0, -1, 0)), model)
+    front = merit([camera], Target((0, 0, 0), 1.0)).gradient
+    beside = [[0, 0, 0], [1, 0, -10], [0, 100, -20], [0, 0, -30]]
+    found = merit([camera], Target((0, 0, 0), 1.0, points=beside)).gradient
+    np.testing.assert_allclose(4 * found.position, front.position, rtol=1e-9)
+    np.testing.assert_allclose(4 * found.focal, front.focal, rtol=1e-9)
 
 
 def test_what_correlated_views_tell_twice_is_counted_once(target):

@@ -76,6 +76,11 @@ def test_another_object_is_not_the_same():
     assert mixed.error > 5e-3
 
 
+def test_an_object_of_nothing_is_refused():
+    with pytest.raises(InputError, match="zero everywhere"):
+        slice_comparison(np.zeros(FLAT.shape), FLAT, 0.3)
+
+
 def test_bad_arguments_are_refused():
     image = np.ones(FLAT.shape)
     with pytest.raises(ShapeError, match="the grid has"):

@@ -78,7 +78,7 @@ def test_more_views_reach_further_and_a_cluster_does_not():
         crowther(Looks.along(half_sphere(count)), SPACE).frequency for count in (10, 40, 160)
     ]
     assert reached[0] < reached[1] < reached[2]
-    cluster = half_sphere(4000)[-160:]
+    cluster = half_sphere(4000)[:160]
     assert crowther(Looks.along(cluster), SPACE).frequency < reached[0]
 
 
@@ -95,10 +95,18 @@ def test_one_ring_fails_tuy_and_two_meet_it():
     assert not tuy(two, Target((0, 0, 0), 18.0)).satisfied
 
 
+def test_a_flat_path_is_blind_along_its_own_normal_however_it_lies():
+    turned = ring_of_cameras(40, axis=1) + ring_of_cameras(40, distance=11.0, axis=1)
+    found = tuy(turned, Target((0, 0, 0), 4.0))
+    assert abs(found.normal[1]) == pytest.approx(1, abs=1e-9)
+    assert found.distance == pytest.approx(2, abs=1e-6)
+
+
 def test_one_camera_works():
     found = sufficiency(ring_of_cameras(1), SPACE)
     assert found.tuy is not None and found.tuy.unmet > 0.9
     assert found.crowther.views == 1 and found.orlov.missing > 0.9
+    assert "1 view tells" in found.sentence
     assert found.sentence.count(".") >= 3
 
 
@@ -119,8 +127,9 @@ def test_bad_arguments_are_refused():
     looks = Looks.along([[0, 0, 1]])
     with pytest.raises(InputError, match="frequency is"):
         orlov(looks, SPACE, frequency=-1)
-    with pytest.raises(InputError, match="point is 3"):
-        orlov(looks, SPACE, point=3)
+    for point in (3, -1, 0.5, "middle"):
+        with pytest.raises(InputError, match=f"point is '?{point}"):
+            orlov(looks, SPACE, point=point)
     with pytest.raises(InputError, match="wanted positive"):
         crowther_views(1.0, 0.0)
     with pytest.raises(InputError, match="wanted positive"):

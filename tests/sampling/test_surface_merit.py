@@ -133,5 +133,7 @@ def test_what_a_surface_has_not_is_refused():
         merit(cameras(2), target, "exact")
     with pytest.raises(InputError, match="degree is 9"):
         merit(cameras(2), target, degree=9)
+    with pytest.raises(InputError, match="kind is 'best', wanted wiener"):
+        surface_merit(looking([[0, 0, 1]]), patch(), "best")
     with pytest.raises(InputError, match="no normals"):
         surface_merit(looking([[0, 0, 1]]), Target((0, 0, 0), 1.0))

@@ -62,6 +62,8 @@ def test_normals_of_a_surface_become_unit_vectors():
         ({"points": [0, 0, 0]}, "points has shape"),
         ({"frequencies": np.empty((0, 3))}, "frequencies has shape"),
         ({"frequencies": "many"}, "frequencies is 'many'"),
+        ({"prior": "steep"}, "prior is 'steep', wanted PowerLaw"),
+        ({"prior": 2.0}, "prior is 2.0"),
         ({"mode": "solid"}, "mode is 'solid'"),
         ({"mode": "surface"}, "wanted normals"),
         ({"normals": [[0, 0, 0]]}, r"normals\[0\] is zero"),
@@ -71,6 +73,11 @@ def test_normals_of_a_surface_become_unit_vectors():
 def test_bad_targets_are_refused(changes, wanted):
     with pytest.raises(InputError, match=wanted):
         Target(**{"center": (0, 0, 0), "diameter": 1.0, **changes})
+
+
+def test_a_flat_target_has_no_frequencies_out_of_its_plane():
+    with pytest.raises(InputError, match="out of the plane"):
+        Target.flat(1.0, frequencies=[[0, 1, 0], [1, 0, 0.5]])
 
 
 def test_a_bad_middle_of_a_flat_target_is_refused():

@@ -79,6 +79,20 @@ def test_blur_is_the_discs_variance_at_every_depth(device):
         assert blurred[5] / blurred[2] == pytest.approx(sharp[5] / sharp[2], rel=1e-5)
 
 
+@pytest.mark.parametrize("radius", [0.2, 0.5, 0.8, 1.4])
+def test_what_is_drawn_lacks_the_light_below_the_threshold(device, radius):
+    """All of it but (1/255) / weight: alphas below 1/255 do not count."""
+    lights = []
+    for aperture in (None, Aperture(radius, 4.0)):
+        values, camera = before(8.0, aperture)
+        weight = projected_on(device, values, Kind(), camera)["screen"][0, 5]
+        splats = upload(device, values | {"colors": np.ones((1, 1), np.float32)}, Kind())
+        image = device.get(Renderer(device=device).forward(splats, camera).image)
+        lights.append((image.sum(), 1 - 1 / 255 / weight if weight else 0.0))
+    (sharp, all_but), (blurred, left) = lights
+    assert blurred / sharp == pytest.approx(left / all_but, abs=0.02)
+
+
 def test_what_is_in_focus_is_what_a_pinhole_draws(device):
     values, camera = before(4.0, Aperture(0.3, 4.0))
     lens = projected_on(device, values, Kind(), camera)

@@ -30,7 +30,7 @@ def support(tool, monkeypatch):
         "SETS": ((3, 1080.0), (12, 270.0), (24, 270.0)),
         "_FINE": 1,
         "_AZIMUTHS": 2,
-        "_DISTANCES": (150.0, 1080.0, 5),
+        "_DISTANCES": (150.0, 1080.0, 7),
     }.items():
         monkeypatch.setattr(figure, name, value)
     return figure

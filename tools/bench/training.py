@@ -15,7 +15,7 @@ from bench.costs import Cost
 from bench.row_filters import ROW_COSTS
 from bench.transform_work import transform_bytes, transform_flops
 from rift_cl.operators.spectrum import padded_length
-from rift_cl.train.band_limit import camera_table
+from rift_cl.train.band_limit import Detail, camera_table
 from rift_cl.train.exposures import Exposures
 from rift_cl.train.homogenisation import Homogenisation
 from rift_cl.train.homogenised_loss import HomogenisedLoss
@@ -52,7 +52,7 @@ def training_operations(case: SplatCase) -> dict[str, Callable[[], Any]]:
     statistics = ScreenStatistics(device, case.count)
     homogenised = HomogenisedLoss(device, Homogenisation(0.5), ssim_weight=0.2, kind="l1")
     cameras = device.array(camera_table([case.camera] * _VIEWS))
-    limited = Parameters.of(device, raw)
+    limited, detail = Parameters.of(device, raw), Detail(2.0, 1000.0)
     exposures = Exposures(device, 1)
 
     def expose() -> None:
@@ -65,6 +65,9 @@ def training_operations(case: SplatCase) -> dict[str, Callable[[], Any]]:
         "statistics": lambda: statistics.add(case.frame, case.gradients),
         "homogenised loss": lambda: homogenised(case.frame.image, target),
         "band limit": lambda: limited.limit_band(cameras, near=0.01, unseen=1.0),
+        "band limit by coverage": lambda: limited.limit_band(
+            cameras, near=0.01, unseen=1.0, detail=detail
+        ),
         "exposure": expose,
     }
 

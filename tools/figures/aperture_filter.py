@@ -1,9 +1,9 @@
 """What a thin lens is worth where photographs were taken through one, and what it filters.
 
-The paper's Section 2 ends with the aperture as a "natural filter" in front of the sensor, and its
-Figure 8 draws the camera as it is. This bears out two claims: defocus of fitted splats explains
-pictures through an aperture far better than a pinhole does; and an aperture only takes away, by
-the transfer of its blur disc, while the difference of two apertures is a band-pass.
+The paper's section on its camera model has the aperture as a "natural filter" in front of the
+sensor, and its Figure 8 draws the camera as it is. This bears out two claims: defocus of fitted
+splats explains pictures through an aperture far better than a pinhole does; and an aperture only
+takes away, by the transfer of its blur disc, while the difference of two apertures is a band-pass.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from rift_cl.metrics import disc, psnr
 from rift_cl.sampling.constraints import Constraints
 from rift_cl.sampling.pilot import Pilot
 from rift_cl.sampling.planner import next_views, plan
-from rift_cl.sampling.target import Target
+from rift_cl.sampling.target import Target, half_disc
 
 METHODS = ("CGLS", "MAP")
 # Views of the first look, from which the rest are planned.
@@ -75,16 +75,27 @@ def _piloted(objects: Objects, views: int, phase: float, seed: int, device: Devi
     looks = _images(objects, np.tile(first, (len(objects.truth), 1)), seed, device)["CGLS"]
     for image in looks:
         prior = Pilot(image, 1.0)
+        band = _audible(prior, target)
         known = Target.flat(
             target.diameter,
             prior=prior,
             snr=target.snr,
-            band=target.band,
-            frequencies=target.frequencies,
+            band=band,
+            frequencies=half_disc(band, len(target.k)),
         )
         rest = next_views([_camera(a) for a in first], known, views - len(first), _PLANE)
         found.append(np.concatenate([first, scan_angles(rest.directions)]))
     return np.array(found)
+
+
+def _audible(prior: Pilot, target: Target) -> float:
+    """The frequency up to which a prior's power, mean over directions, is above the noise's."""
+    radii = np.linspace(1 / target.diameter, target.highest, 60)
+    angles = np.arange(60) * np.pi / 60
+    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(60)], axis=1)
+    power = [prior.power(radius * ring, target.diameter).mean() for radius in radii]
+    heard = np.flatnonzero(target.snr * np.array(power) >= 1)
+    return float(radii[heard.max(initial=0)])
 
 
 def _camera(angle: float) -> Camera:

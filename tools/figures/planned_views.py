@@ -139,7 +139,7 @@ def _show_volume(page: Page, case: dict[str, Any]) -> None:
         )
         page.figure(
             figure_png(figure),
-            caption="The planned directions of the sector: most on its rim.",
+            caption="The planned directions of the sector: most on its rim, some taken twice.",
             alt="Cameras round a ball, from above and from the side",
         )
 
