@@ -29,6 +29,7 @@ from rift_cl.errors import FileFormatError, InputError, ResourceLimitError
 from rift_cl.geometry.glass import Glass, glass
 from rift_cl.geometry.lens_prescription import MOST_SURFACES, LensPrescription, Surface
 from rift_cl.io.json_fields import Fields, read_json_object
+from rift_cl.io.view import located
 from rift_cl.io.zemax_lens import read_zemax_lens
 
 MILLIMETRES = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
@@ -67,6 +68,33 @@ def open_lens(path: str | Path) -> LensPrescription:
 def _lens(fields: Fields, path: Path) -> LensPrescription:
     _check_names(fields, _LENS)
     scale = _scale(fields)
+    surfaces, stop = _surfaces(fields, scale, path)
+    opening, opening_is = _opening(fields, scale)
+    wavelengths = _numbers(fields, "wavelengths_um") or (_DEFAULT_UM,)
+    primary = fields.number("primary") or 0.0
+    if not (primary.is_integer() and 0 <= primary < len(wavelengths)):
+        raise FileFormatError(
+            f"{path}: 'primary' is {primary:g}, wanted which of {len(wavelengths)} wavelengths, "
+            "from 0"
+        )
+    weights, name = _numbers(fields, "weights"), fields.text("name") or path.stem
+    source = fields.text("source") or ""
+    with located(str(path)):
+        return LensPrescription(
+            name=name,
+            surfaces=surfaces,
+            stop=stop,
+            opening=opening,
+            opening_is=opening_is,
+            wavelengths=tuple(w * 1e-3 for w in wavelengths),
+            weights=weights,
+            primary=int(primary),
+            source=source,
+        )
+
+
+def _surfaces(fields: Fields, scale: float, path: Path) -> tuple[tuple[Surface, ...], int]:
+    """The surfaces, and which of them carries the stop."""
     surfaces, stops = [], []
     listed = fields.values.get("surfaces")
     if isinstance(listed, list) and len(listed) > MOST_SURFACES:
@@ -82,28 +110,7 @@ def _lens(fields: Fields, path: Path) -> LensPrescription:
         raise FileFormatError(
             f'{path}: {len(stops)} surfaces have "stop": true, wanted exactly one'
         )
-    opening, opening_is = _opening(fields, scale)
-    wavelengths = _numbers(fields, "wavelengths_um") or (_DEFAULT_UM,)
-    primary = fields.number("primary") or 0.0
-    if not (primary.is_integer() and 0 <= primary < len(wavelengths)):
-        raise FileFormatError(
-            f"{path}: 'primary' is {primary:g}, wanted which of {len(wavelengths)} wavelengths, "
-            "from 0"
-        )
-    try:
-        return LensPrescription(
-            name=fields.text("name") or path.stem,
-            surfaces=tuple(surfaces),
-            stop=stops[0],
-            opening=opening,
-            opening_is=opening_is,
-            wavelengths=tuple(w * 1e-3 for w in wavelengths),
-            weights=_numbers(fields, "weights"),
-            primary=int(primary),
-            source=fields.text("source") or "",
-        )
-    except InputError as error:
-        raise type(error)(f"{path}: {error}") from error
+    return tuple(surfaces), stops[0]
 
 
 def _scale(fields: Fields) -> float:
@@ -119,30 +126,26 @@ def _surface(fields: Fields, scale: float) -> Surface:
     if thickness is None:
         raise FileFormatError(f"{fields.where}: has no 'thickness', wanted a length")
     radius, semi = fields.number("radius"), fields.number("semi_diameter")
-    medium = _glass(fields)
-    try:
+    medium, conic = _glass(fields), fields.number("conic") or 0.0
+    with located(fields.where):
         return Surface(
             radius=math.inf if radius is None else radius * scale,
             thickness=thickness * scale,
             glass=medium,
-            conic=fields.number("conic") or 0.0,
+            conic=conic,
             semi_diameter=None if semi is None else semi * scale,
         )
-    except InputError as error:
-        raise InputError(f"{fields.where}: {error}") from error
 
 
 def _glass(fields: Fields) -> Glass | None:
     value = fields.values.get("glass")
     if value is None:
         return None
-    try:
+    with located(fields.where):
         if isinstance(value, str):
             return glass(value)
         if isinstance(value, Mapping):
-            return _made_glass(Fields(f"{fields.where}: glass", value))
-    except InputError as error:
-        raise type(error)(f"{fields.where}: {error}") from error
+            return _made_glass(Fields("glass", value))
     raise FileFormatError(
         f"{fields.where}: 'glass' is {reprlib.repr(value)}, wanted a name or an object"
     )

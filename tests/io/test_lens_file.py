@@ -209,6 +209,8 @@ def test_what_a_zemax_file_may_not_say_is_named(
         ({"surfaces": [{"thickness": 1, "glass": 1.5, "stop": True}]}, "'glass'"),
         ({"surfaces": [{"thickness": 1, "glass": {"n": 1.5}, "stop": True}]}, "nd and vd"),
         ({"surfaces": [{"thickness": 1, "glass": {"index": -1}, "stop": True}]}, "index"),
+        ({"surfaces": [{"thickness": 1, "glass": {"index": "n"}, "stop": True}]}, "glass: 'index'"),
+        ({"surfaces": [{"thickness": 1, "conic": "flat", "stop": True}]}, "'conic'"),
         ({"surfaces": [{"thickness": 1, "glass": {"sellmeier": [1]}, "stop": True}]}, "numbers"),
         ({"surfaces": [{"thickness": 1, "glass": "F2", "stop": True}]}, "into glass"),
         ({"surfaces": [{"thickness": 1}]}, "0 surfaces have"),
@@ -232,8 +234,9 @@ def test_what_a_zemax_file_may_not_say_is_named(
 def test_what_a_json_file_may_not_say_is_named(
     save: Callable[..., Path], changes: dict[str, Any], word: str
 ) -> None:
-    with pytest.raises(InputError, match=rf"lens\.json.*{word}"):
+    with pytest.raises(InputError, match=rf"lens\.json.*{word}") as caught:
         open_lens(_changed(save, **changes))
+    assert str(caught.value).count("lens.json") == 1
 
 
 def test_huge_counts_and_files_are_refused_before_they_are_read(
