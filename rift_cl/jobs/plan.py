@@ -18,13 +18,13 @@ from rift_cl.jobs.run_folder import RunFolder
 from rift_cl.jobs.sampled import Sampled, place_of
 from rift_cl.jobs.views_table import csv_text, view_row
 from rift_cl.progress import Report
+from rift_cl.sampling.candidates import most_candidates
+from rift_cl.sampling.frequency_sets import for_planning
 from rift_cl.sampling.planner import plan
 from rift_cl.sampling.site import Site
 from rift_cl.sampling.view_plan import Plan
 
 _STEPS = 4
-# As many as the planner chooses among, where not very many views are wanted.
-_CANDIDATES = 2400
 
 
 class Planning:
@@ -77,8 +77,9 @@ class Planning:
         }  # fmt: skip
 
     def _memory(self) -> int:
-        target = self.given.target
-        return 8 * max(_CANDIDATES, 2 * self.settings.views) * len(target.points) * len(target.k)
+        count = most_candidates(self.settings.views)
+        target = for_planning(self.given.target, count)
+        return 8 * count * len(target.points) * len(target.k)
 
     def run(self) -> Iterator[Report]:
         """Do it: the plan, what it is worth, the pictures, the files."""
@@ -93,17 +94,17 @@ class Planning:
             seed=settings.seed,
             kind=settings.merit,
         )
-        yield Report(1, _STEPS, "steps", {"merit": found.merit})
+        yield Report(1, _STEPS, "steps", {"merit": found.elsewhere})
         self.verdict = found.verdict()
         knee = found.knee()
-        yield Report(2, _STEPS, "steps", {"merit": found.merit})
+        yield Report(2, _STEPS, "steps", {"merit": found.elsewhere})
         sampled = self._sampled(found)
         self.metrics = self._figures(found)
         page = plan_page(given, found, knee, sampled, self.metrics, self.device)
-        yield Report(3, _STEPS, "steps", {"merit": found.merit})
+        yield Report(3, _STEPS, "steps", {"merit": found.elsewhere})
         self._write(found)
         self.folder.finish(settings, self.metrics, page, self.device)
-        yield Report(_STEPS, _STEPS, "steps", {"merit": found.merit})
+        yield Report(_STEPS, _STEPS, "steps", {"merit": found.elsewhere})
 
     def _sampled(self, found: Plan) -> Sampled:
         """All views, those that were there already first."""
@@ -123,12 +124,12 @@ class Planning:
             "views": len(found),
             "wanted": self.settings.views,
             "taken_before": len(found.fixed),
-            "merit": found.merit,
-            "bound": found.bound,
+            "merit": found.elsewhere,
+            "planned_with": {"merit": found.merit, "bound": found.bound},
             "kind": self.settings.merit,
             "mode": self.settings.mode,
             "cost": found.cost,
-            "baselines": {name: entry.merit for name, entry in found.baselines.items()},
+            "baselines": {name: entry.elsewhere for name, entry in found.baselines.items()},
             "verdict": self.verdict,
             "knee": knee.views,
             "merits": knee.merits,

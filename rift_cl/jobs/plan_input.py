@@ -11,6 +11,7 @@ import numpy as np
 from rift_cl.errors import InputError
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.io.camera_file import CameraChoice, read_cameras, with_lens
+from rift_cl.io.capture import holds_capture
 from rift_cl.io.lens_file import open_lens
 from rift_cl.io.volume import read_volume
 from rift_cl.jobs.analyze_input import open_sampled
@@ -71,15 +72,14 @@ def plan_input(settings: PlanSettings) -> PlanInput:
 
 
 def _have(settings: PlanSettings, path: Path) -> Sampled:
+    if not holds_capture(path):
+        raise InputError(f"--have {path} is no capture, wanted photographs and their cameras")
     asked = AnalyzeSettings(
         source=path, center=_in_units(settings), diameter=_over(settings.diameter, settings.unit),
         unit=settings.unit,
     )  # fmt: skip
     asked.check()
-    have = open_sampled(asked)
-    if have.is_flat:
-        raise InputError(f"--have {path} is a scan, wanted a capture with cameras")
-    return have
+    return open_sampled(asked)
 
 
 def _in_units(settings: PlanSettings) -> tuple[float, float, float] | None:

@@ -40,10 +40,12 @@ def plan_page(
 ) -> Page:
     """The report of a finished plan."""
     more = f" besides {len(found.fixed)} taken" if found.fixed else ""
-    page = Page(f"Plan of {len(found)} views{more}", metrics["verdict"])
+    noun = "view" if len(found) == 1 else "views"
+    page = Page(f"Plan of {len(found)} {noun}{more}", metrics["verdict"])
     page.section("What planning is worth")
     page.table(*worth_table(metrics), caption=caption_of(metrics))
     page.paragraph(metrics["verdict"])
+    page.paragraph(bound_words(metrics))
     _assumed(page, given)
     _cameras(page, given, found, sampled)
     _gains(page, found, knee, merit_name(metrics))
@@ -60,15 +62,16 @@ def merit_name(metrics: Mapping[str, Any]) -> str:
 
 
 def worth_table(metrics: Mapping[str, Any]) -> tuple[tuple[str, ...], list[tuple[Any, ...]]]:
-    """Columns and rows: the merit of the plan, of what people do without one, and the bound."""
+    """Columns and rows: the merit of the plan, and of what people do without one."""
     own, kind = metrics["merit"], metrics["kind"]
-    columns = ("views", merit_name(metrics), "against the plan")
+    columns = (
+        "views",
+        merit_name(metrics),
+        "more when planned" if kind == "logdet" else "less when planned",
+    )
     rows: list[tuple[Any, ...]] = [("planned", _shown(own, kind), "")]
     for name, value in metrics["baselines"].items():
-        rows.append((_NAMES.get(name, name), _shown(value, kind), _against(value, own, kind)))
-    # A surface's bound may be too weak to say anything.
-    if kind == "logdet" or metrics["bound"] > 0:
-        rows.append(("no choice among the candidates is below", _shown(metrics["bound"], kind), ""))
+        rows.append((_NAMES.get(name, name), _shown(value, kind), _against(value, own)))
     return columns, rows
 
 
@@ -76,8 +79,9 @@ def caption_of(metrics: Mapping[str, Any]) -> str:
     """What the table of worth compares."""
     views, wanted = metrics["views"], metrics["wanted"]
     paid = f" (the budget ends before the {wanted} that were wanted)" if views < wanted else ""
+    noun = "view" if views == 1 else "views"
     return (
-        f"{views} views each{paid}, under the same constraints, with the cameras and settings "
+        f"{views} {noun} each{paid}, under the same constraints, with the cameras and settings "
         "that do best. Lower is better."
     )
 
@@ -86,10 +90,22 @@ def _shown(value: float, kind: str) -> str:
     return f"{value:.4g}" if kind == "logdet" else f"{100 * value:.3g}%"
 
 
-def _against(value: float, own: float, kind: str) -> str:
-    if kind == "logdet":
-        return f"{value - own:+.3g} bits"
-    return f"{value / own - 1:+.1%}" if own > 0 else ""
+def bound_words(metrics: Mapping[str, Any]) -> str:
+    """How much a better choice could bring at the most."""
+    kind, own = metrics["kind"], metrics["planned_with"]
+    # A surface's bound may be too weak to say anything.
+    if kind != "logdet" and own["bound"] <= 0:
+        return "How much better another choice could be is not known."
+    return (
+        f"At the frequencies that it was planned with, the plan comes to "
+        f"{_shown(own['merit'], kind)}; no choice of as many views among the candidates and these "
+        f"gets below {_shown(own['bound'], kind)} there."
+    )
+
+
+def _against(value: float, own: float) -> str:
+    """By which share the plan is below a value, as ``Plan.gain`` has it."""
+    return f"{(value - own) / max(abs(value), 1e-300):.1%}"
 
 
 def _assumed(page: Page, given: PlanInput) -> None:

@@ -98,6 +98,16 @@ class PlanSettings:
         for name, least, most in (("elevation", -90, 90), ("azimuth", -720, 720),
                                   ("distance", 0, math.inf)):  # fmt: skip
             self._check_range(name, least, most)
+        first, last = self.azimuth
+        if last - first > 360:
+            raise InputError(
+                f"--azimuth is {first:g} {last:g}, more than the full circle of 360 degrees"
+            )
+        if self.path == "tilted-rings" and last - first < 360:
+            raise InputError(
+                f"--path tilted-rings goes all the way round, but --azimuth is {first:g} {last:g}: "
+                "take another path, or the full circle"
+            )
         if self.seed < 0:
             raise InputError(f"--seed is {self.seed}, wanted 0 or more")
         if self.unit != 1 and self.have is None:

@@ -88,17 +88,17 @@ def _best_lens(objective: Objective, views: int) -> _Lens | None:
             lens = _Lens(kind, row, count)
             stations = _even(site, lens, 0) if count else None
             if stations is not None:
-                found.append((objective.value(stations), lens))
+                found.append((objective.rough.value(stations), lens))
     return min(found, key=lambda entry: entry[0])[1] if found else None
 
 
 def _best(objective: Objective, options: list[tuple[str, Stations]]) -> Baseline | None:
     if not options:
         return None
-    merits = [objective.value(stations) for _, stations in options]
+    merits = [objective.rough.value(stations) for _, stations in options]
     described, stations = options[int(np.argmin(merits))]
-    cameras, elsewhere = stations.cameras(objective.site), objective.elsewhere.value(stations)
-    return Baseline(described, cameras, stations, min(merits), elsewhere)
+    values = (one.value(stations) for one in (objective, objective.elsewhere))
+    return Baseline(described, stations.cameras(objective.site), stations, *values)
 
 
 def _stations(lens: _Lens, angles: Floats) -> Stations:

@@ -69,6 +69,11 @@ def candidates(objective: Objective, views: int, seed: int) -> Stations:
     return found.take(np.arange(0, len(found), max(1, len(found) // (2 * wanted * per_direction))))
 
 
+def most_candidates(views: int) -> int:
+    """How many candidates there may be for so many views of one camera type."""
+    return max(_CANDIDATES, 2 * views)
+
+
 def spread(site: Site, count: int, seed: int) -> Floats:
     """Azimuth and elevation (count, 2) of directions spread evenly over what is allowed."""
     (first, last), (low, high) = site.constraints.azimuth, site.constraints.elevation

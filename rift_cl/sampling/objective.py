@@ -17,16 +17,16 @@ from numpy.typing import NDArray
 from rift_cl.reference.coverage import LooksGradient, coverage, coverage_grad
 from rift_cl.sampling import criteria
 from rift_cl.sampling.criteria import Scored
+from rift_cl.sampling.frequency_sets import for_judging
 from rift_cl.sampling.looks import Looks
 from rift_cl.sampling.merit import CoverageMerit
 from rift_cl.sampling.prior import checked_power
 from rift_cl.sampling.site import DISTANCE, ELEVATION, EXPOSURE, F_NUMBER, FOCAL, FOCUS, Site
 from rift_cl.sampling.stations import Stations
 from rift_cl.sampling.surface import surface_merit
-from rift_cl.sampling.target import half_ball, half_disc
+from rift_cl.sampling.target import Target
 
 Floats = NDArray[np.float64]
-_FINER = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +37,13 @@ class Objective:
         site: where views are planned.
         kind: of the merit.
         fixed: how views that are there already see the target's points; None if there are none.
+        asked: the target, where the site has it at more frequencies; None if it has not.
     """
 
     site: Site
     kind: CoverageMerit = "wiener"
     fixed: Looks | None = None
+    asked: Target | None = None
 
     @cached_property
     def base(self) -> Floats:
@@ -52,24 +54,19 @@ class Objective:
         return coverage(self.fixed, target.k, target.diameter)
 
     @cached_property
-    def elsewhere(self) -> Objective:
-        """The same at four times as many frequencies, to judge what was optimised with fewer.
+    def rough(self) -> Objective:
+        """The same at the frequencies of the target that is asked about, to compare many views."""
+        return self if self.asked is None else self._at(self.asked)
 
-        Views can be fitted to a set of frequencies that lie farther apart than the slabs that they
-        sample. Frequencies that the target came with stay, and so do those of a surface.
-        """
+    @cached_property
+    def elsewhere(self) -> Objective:
+        """The same at frequencies that nothing was optimised with, to judge what was."""
         target = self.site.target
-        flat = half_disc(target.highest)
-        if target.mode == "surface":
-            return self
-        if target.frequencies is None:
-            k = half_ball(target.highest, _FINER * len(target.k))
-        elif np.array_equal(target.frequencies, flat):
-            k = half_disc(target.highest, _FINER * len(flat))
-        else:
-            return self
-        site = replace(self.site, target=replace(target, frequencies=k))
-        return replace(self, site=site)
+        judged = for_judging(target if self.asked is None else self.asked, target)
+        return self if judged is target else self._at(judged)
+
+    def _at(self, target: Target) -> Objective:
+        return replace(self, site=replace(self.site, target=target), asked=None)
 
     @cached_property
     def power(self) -> Floats:

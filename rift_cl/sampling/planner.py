@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal, get_args
 
 import numpy as np
@@ -13,9 +13,11 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.numbers import one_number
-from rift_cl.sampling.candidates import candidates
+from rift_cl.sampling.baselines import Baseline, baselines
+from rift_cl.sampling.candidates import candidates, most_candidates
 from rift_cl.sampling.constraints import Constraints
 from rift_cl.sampling.free_layout import FreeLayout
+from rift_cl.sampling.frequency_sets import for_planning
 from rift_cl.sampling.greedy import Limits, bound, choose
 from rift_cl.sampling.looks import Looks
 from rift_cl.sampling.merit import CoverageMerit
@@ -29,6 +31,7 @@ from rift_cl.sampling.site import Site, default_types
 from rift_cl.sampling.spending import prices, require_paid, total
 from rift_cl.sampling.stations import Stations, turned
 from rift_cl.sampling.target import Target
+from rift_cl.sampling.twins import parted
 from rift_cl.sampling.view_plan import Plan
 
 Floats = NDArray[np.float64]
@@ -36,6 +39,8 @@ Method = Literal["greedy", "greedy+mma"]
 _MOST_VIEWS = 100_000
 # Frequencies that hold a target's power, below which a plan is not to be trusted.
 _FEW = 6
+# By which part the merit may grow so that no two views stand at one place: 0.02 dB.
+_PARTING = 5e-3
 
 
 def plan(
@@ -52,9 +57,10 @@ def plan(
     """Choose where to look from.
 
     All views look at the target's centre, upright about ``constraints.up``. Free views are chosen
-    one after another among some 500 directions with each camera type, then all are moved together
-    (method of moving asymptotes, analytic gradient). Where noise limits, a view may be taken twice.
-    Views on a path share one type and setting.
+    one after another among some 500 directions with each camera type; from there, or from the best
+    simple arrangement where that is better, all are moved together (method of moving asymptotes,
+    analytic gradient). Views on a path share one type and setting. A target that names no
+    frequencies is planned at four times as many as it has by itself.
 
     Args:
         target: what is looked at.
@@ -76,15 +82,20 @@ def plan(
         if value not in get_args(known):
             raise InputError(f"plan: {name} is {value!r}, wanted one of {get_args(known)}")
     limits = Constraints() if constraints is None else constraints
-    site = Site(target, limits, tuple(cameras) or default_types(target))
+    fine = for_planning(target, most_candidates(int(views)))
+    site = Site(fine, limits, tuple(cameras) or default_types(target))
     require_paid(site)
-    _warn_of_few_frequencies(target)
+    _warn_of_few_frequencies(fine)
     taken, weights = _taken(fixed, site)
     seen = Looks.of(taken, target.points, weights) if taken else None
-    objective = Objective(site, kind, seen)
-    found, least = _chosen(objective, int(views), method, seed)
+    objective = Objective(site, kind, seen, target)
+    simple = baselines(objective, int(views), seed)
+    found, least = _chosen(objective, int(views), method, seed, simple)
     stations = Stations(found.kind, turned(found.table, site))
-    return Plan(objective, stations, objective.value(stations), least, taken, weights, seed)
+    if len(stations) < views:
+        simple = baselines(objective, len(stations), seed)
+    merit = objective.value(stations)
+    return Plan(objective, stations, merit, min(least, merit), taken, weights, simple)
 
 
 def next_views(
@@ -138,7 +149,9 @@ def _warn_of_few_frequencies(target: Target) -> None:
         )
 
 
-def _chosen(objective: Objective, views: int, method: Method, seed: int) -> tuple[Stations, float]:
+def _chosen(
+    objective: Objective, views: int, method: Method, seed: int, simple: Mapping[str, Baseline]
+) -> tuple[Stations, float]:
     """The views, and a bound of their merit."""
     site = objective.site
     offered = candidates(objective, views, seed)
@@ -147,13 +160,29 @@ def _chosen(objective: Objective, views: int, method: Method, seed: int) -> tupl
         choice = choose(pool, Limits(views, prices(site, offered), total(site)))
         found = offered.take(choice.order)
         if method == "greedy+mma":
-            found = polish(objective, FreeLayout(site, found))
+            found = _moved(objective, found, simple)
     else:
         found = best_path(objective, views, moved=method == "greedy+mma")
     whole = Stations.joined([offered, found])
     limits = Limits(views, prices(site, whole), total(site))
     places = list(range(len(offered), len(whole)))
     return found, bound(pool.with_views(found), limits, places)
+
+
+def _moved(objective: Objective, chosen: Stations, simple: Mapping[str, Baseline]) -> Stations:
+    """What was chosen, or the best simple arrangement, whichever is better, polished."""
+    starts = [chosen, *(baseline.stations for baseline in simple.values())]
+    best = min(starts, key=objective.value)
+    site, spacing = objective.site, FreeLayout(objective.site, best).trust
+    moved = polish(objective, FreeLayout(site, parted(site, best, spacing)))
+    best = min((best, moved), key=objective.value)
+    # In a corner of what is allowed views may meet again: a little apart they are worth as much.
+    value = objective.value(best)
+    for share in (1, 0.25, 0.05):
+        apart = parted(site, best, share * spacing)
+        if objective.value(apart) <= value + _PARTING * abs(value):
+            return apart
+    return best
 
 
 def _taken(fixed: Sequence[Camera] | Plan, site: Site) -> tuple[tuple[Camera, ...], Floats]:

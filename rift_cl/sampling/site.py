@@ -28,6 +28,8 @@ _NEAREST = 1.02
 # Distances beyond this many diameters are not looked for.
 _FARTHEST = 1e6
 _HALVINGS = 80
+# Diameters within these can be squared and divided by at any such distance.
+_LARGEST = 1e50
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +55,11 @@ class Site:
         for index, kind in enumerate(self.types):
             if not isinstance(kind, CameraType):
                 raise InputError(f"cameras[{index}] is {kind!r}, wanted a CameraType")
+        if not 1 / _LARGEST < self.target.diameter < _LARGEST:
+            raise InputError(
+                f"Target: diameter is {self.target.diameter:g}, wanted a length between "
+                f"{1 / _LARGEST:g} and {_LARGEST:g}: take another unit"
+            )
         names = [kind.name for kind in self.types]
         if len(set(names)) < len(names):
             raise InputError(f"cameras have the names {names}: give each type a name of its own")

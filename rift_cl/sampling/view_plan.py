@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.numbers import one_number
-from rift_cl.sampling.baselines import Baseline, baselines
+from rift_cl.sampling.baselines import Baseline
 from rift_cl.sampling.greedy import Choice, Limits, choose
 from rift_cl.sampling.objective import Objective
 from rift_cl.sampling.paths import Free
@@ -25,8 +26,9 @@ from rift_cl.sampling.spending import cost
 from rift_cl.sampling.stations import Stations
 
 Floats = NDArray[np.float64]
-# Merits this close, as a share, are called equal: in mean squared error that is 0.3 dB.
-_SAME = 0.07
+# Gains below the first, as a share, are called none, and below the second little: in mean squared
+# error those are 0.09 and 0.3 dB.
+_NONE, _LITTLE = 0.02, 0.07
 
 
 class Knee(NamedTuple):
@@ -49,6 +51,10 @@ class Knee(NamedTuple):
 class Plan:
     """Views that a planner chose.
 
+    ``merit``, ``bound`` and each baseline's ``merit`` are at the frequencies that were planned with
+    (``objective.site.target``); ``elsewhere``, the knee and the verdict at others, so that none of
+    what is compared was favoured. They are the same where the target came with frequencies.
+
     Args:
         objective: what was to be small, and where.
         stations: the views.
@@ -56,7 +62,8 @@ class Plan:
         bound: no choice of as many views among the planner's candidates and these gets below it.
         fixed: the views that were there already.
         fixed_weights: (V,) relative photons of each of those.
-        seed: of the candidates.
+        baselines: what is done without a plan, at the same cost under the same constraints, by
+            name.
     """
 
     objective: Objective
@@ -65,11 +72,22 @@ class Plan:
     bound: float
     fixed: tuple[Camera, ...]
     fixed_weights: Floats
-    seed: int
+    baselines: Mapping[str, Baseline]
 
     def __len__(self) -> int:
         """How many new views there are."""
         return len(self.stations)
+
+    def __repr__(self) -> str:
+        """One line: how many views, what they are worth, with which cameras."""
+        counts = np.bincount(self.stations.kind, minlength=len(self.objective.site.types))
+        kinds = ", ".join(
+            f"{n} x {kind.name!r}"
+            for n, kind in zip(counts.tolist(), self.objective.site.types, strict=True)
+            if n
+        )
+        more = f" besides {len(self.fixed)}" if self.fixed else ""
+        return f"Plan({len(self)} views{more}, merit {self.merit:.4g}, cameras: {kinds})"
 
     @cached_property
     def cameras(self) -> tuple[Camera, ...]:
@@ -152,31 +170,34 @@ class Plan:
     @cached_property
     def _ordered(self) -> Choice:
         limits = Limits(len(self), np.zeros(len(self)), math.inf)
-        return choose(pool_of(self.objective, self.stations), limits, again=False)
+        return choose(pool_of(self.objective.elsewhere, self.stations), limits, again=False)
 
     @cached_property
     def elsewhere(self) -> float:
-        """The merit at more frequencies than the plan was made with, so that none was favoured."""
+        """The merit at frequencies that the plan was not made with, so that none was favoured."""
         return self.objective.elsewhere.value(self.stations)
 
-    @cached_property
-    def baselines(self) -> dict[str, Baseline]:
-        """What is done without a plan, at the same cost under the same constraints, by name."""
-        return baselines(self.objective, len(self), self.seed)
+    def gain(self, merit: float) -> float:
+        """The share by which the plan lies below another ``elsewhere``; negative if above."""
+        return (merit - self.elsewhere) / max(abs(merit), 1e-300)
 
     def verdict(self) -> str:
         """In words, what planning was worth against the best of the baselines."""
         if not self.baselines:
             return "Nothing to compare with: no simple arrangement keeps to the constraints."
         best = min(self.baselines.values(), key=lambda baseline: baseline.elsewhere)
-        gain = (best.elsewhere - self.elsewhere) / max(abs(best.elsewhere), 1e-300)
-        where = f"{self._target_in_words()} target, {self._cameras_in_words()} cameras"
-        if gain <= _SAME:
-            apart = f"{abs(gain):.1%} apart" if gain > -_SAME else f"{-gain:.0%} better"
-            return f"Planning gains nothing ({where}): {best.described} is as good ({apart})."
+        gain, where = self.gain(best.elsewhere), f"{self._target_in_words()} target, "
+        where += f"{self._cameras_in_words()} cameras"
+        if gain < _NONE:
+            worth = "is as good" if gain > -_NONE else "is better"
+            apart = f"{abs(gain):.1%} apart"
+            return f"Planning gains nothing ({where}): {best.described} {worth} ({apart})."
+        start = "Planning pays" if gain >= _LITTLE else "Planning gains little"
         more = "more bits" if self.objective.kind == "logdet" else "less stays unknown"
+        if self.objective.kind == "worst":
+            more += " in the worst direction"
         return (
-            f"Planning pays ({where}): {gain:.0%} {more} than with the best simple arrangement, "
+            f"{start} ({where}): {gain:.1%} {more} than with the best simple arrangement, "
             f"{best.described}."
         )
 

@@ -92,7 +92,8 @@ def test_its_lens_is_in_the_file_and_in_the_table_for_the_tripod(planned):
 def test_the_report_compares_and_says_what_planning_is_worth(planned, capsys):
     found, page = metrics_of(planned), (planned / "report.html").read_text()
     assert set(found["baselines"]) <= {"ring", "arc", "fibonacci", "random"}
-    assert 0 < found["bound"] <= found["merit"] < 1 and len(found["merits"]) == 9
+    own = found["planned_with"]
+    assert 0 < own["bound"] <= own["merit"] < 1 and len(found["merits"]) == 9
     assert found["merits"][-1] == pytest.approx(found["merit"], rel=1e-6)
     assert found["merit"] <= min(found["baselines"].values()) * 1.02
     assert found["verdict"] in page and page.count("<img") >= 4
@@ -188,6 +189,10 @@ def test_cameras_ways_places_and_a_pilot_become_what_the_planner_takes(tmp_path,
         (("--elevation", 0, 100), "--elevation is 0 100"),
         (("--azimuth", "nan", 5), "--azimuth is nan"),
         (("--distance", 0.001, 20), "distance ends at 20"),
+        (("--diameter", 1e300), "diameter is 1e+300"),
+        (("--diameter", 1e-300), "diameter is 1e-300"),
+        (("--azimuth", -720, 720), "--azimuth is -720 720, more than the full circle"),
+        (("--path", "tilted-rings", "--azimuth", 0, 90), "--azimuth is 0 90"),
         (("--distance", -5, 20), "--distance is -5"),
         (("--cover", 0), "--cover is 0"),
         (("--budget", 0), "--budget is 0"),
@@ -201,6 +206,7 @@ def test_cameras_ways_places_and_a_pilot_become_what_the_planner_takes(tmp_path,
         (("--lens", "broken.zmx"), "broken.zmx"),
         (("--camera", "nowhere.json"), "nowhere.json"),
         (("--have", "nowhere"), "nowhere"),
+        (("--have", "broken.zmx"), "broken.zmx is no capture"),
         (("--pilot", "nowhere"), "nowhere"),
         (("--path", "tilted-rings", "--rings", 0), "count is 0"),
     ],

@@ -17,9 +17,9 @@ from rift_cl.sampling.site import Site, default_types
 from rift_cl.sampling.stations import Stations
 from rift_cl.sampling.target import Target, half_ball
 
-VOLUME = Target((0, 0, 0), 10.0, frequencies=half_ball(0.5, 120))
+VOLUME = Target((0, 0, 0), 10.0, snr=30.0, frequencies=half_ball(0.5, 120))
 NORMALS = directions_for(3, 7)
-SURFACE = Target((0, 0, 0), 10.0, 5 * NORMALS, NORMALS, "surface", band=0.5)
+SURFACE = Target((0, 0, 0), 10.0, 5 * NORMALS, NORMALS, "surface", snr=30.0, band=0.5)
 
 
 def pool(target=VOLUME, kind="wiener", count=9, fixed=False):

@@ -17,7 +17,7 @@ from rift_cl.sampling.polish import permitted
 from rift_cl.sampling.site import Site, default_types
 from rift_cl.sampling.target import Target, half_ball
 
-TARGET = Target((0, 0, 0), 10.0, frequencies=half_ball(0.6, 200))
+TARGET = Target((0, 0, 0), 10.0, snr=30.0, frequencies=half_ball(0.6, 200))
 SECTOR = {"elevation": (0.1, 1.0), "azimuth": (-1.0, 1.0)}
 PATHS = {
     "ring": Constraints(path=Ring()),

@@ -1,0 +1,58 @@
+"""Which frequencies a planner counts with, and at which others its plan is judged.
+
+Views can be fitted to a set of frequencies that lie farther apart than the slabs that they sample.
+Hence a plan is made with more than a target has by itself, and judged at others. Frequencies that
+the target came with stay, and so do those of a surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rift_cl.sampling.target import Target, half_ball, half_disc
+
+# How many more than a target has by itself to plan with, and to judge with.
+_FINER, _JUDGED = 4, 5
+# Bytes that candidates' coverage may take for the sake of more frequencies.
+_MEMORY = 250e6
+
+
+def for_planning(target: Target, candidates: int) -> Target:
+    """The target at up to four times as many frequencies, as far as memory allows.
+
+    Args:
+        target: that is asked about.
+        candidates: how many views the planner may hold ready.
+    """
+    taken = 8 * candidates * len(target.points) * len(target.k)
+    factor = min(_FINER, int(_MEMORY / taken))
+    if factor <= 1 or not _open(target):
+        return target
+    spread = half_disc if target.is_flat else half_ball
+    return replace(target, frequencies=spread(target.highest, factor * len(target.k)))
+
+
+def for_judging(target: Target, planned: Target) -> Target:
+    """The target at frequencies of which none was planned with.
+
+    Args:
+        target: that is asked about.
+        planned: the same as ``for_planning`` made it.
+    """
+    if not _open(target):
+        return planned
+    count = _JUDGED * len(target.k)
+    if target.is_flat:
+        return replace(target, frequencies=half_disc(target.highest, count))
+    # Points of the half ball continue those before them.
+    k = half_ball(target.highest, len(planned.k) + count)[len(planned.k) :]
+    return replace(target, frequencies=k)
+
+
+def _open(target: Target) -> bool:
+    """Whether the choice of frequencies is ours."""
+    if target.mode == "surface":
+        return False
+    return target.frequencies is None or np.array_equal(target.k, half_disc(target.highest))

@@ -1,0 +1,78 @@
+"""Twins are parted by a little, the same way each time, and only where there is room."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rift_cl.sampling.constraints import Constraints
+from rift_cl.sampling.keep_out import Cone, KeepOut
+from rift_cl.sampling.polish import permitted
+from rift_cl.sampling.site import AZIMUTH, DISTANCE, ELEVATION, Site, default_types
+from rift_cl.sampling.stations import Stations
+from rift_cl.sampling.target import Target, half_ball
+from rift_cl.sampling.twins import parted
+
+TARGET = Target((0, 0, 0), 10.0, frequencies=half_ball(0.5, 50))
+SPACING = 0.4
+
+
+def views(site, *angles):
+    table = np.repeat(site.limits[0, :, 0][None], len(angles), axis=0)
+    table[:, [AZIMUTH, ELEVATION]] = angles
+    return Stations(np.zeros(len(angles), int), table)
+
+
+def site_of(**limits):
+    return Site(TARGET, Constraints(**limits), default_types(TARGET))
+
+
+def lines_apart(site, stations):
+    outward = stations.frames(site)[:, 0]
+    cosines = np.abs(outward @ outward.T)[np.triu_indices(len(stations), 1)]
+    return np.arccos(np.clip(cosines, -1, 1)).min()
+
+
+@pytest.mark.parametrize(
+    "angles",
+    [
+        [(0.3, 0.2), (0.3, 0.2)],
+        [(0.3, 0.2), (1.0, 0.5), (0.3, 0.2), (0.3, 0.2), (1.0, 0.5)],
+        # Opposite each other, and at the pole under two names.
+        [(0.3, 0.2), (0.3 - math.pi, -0.2)],
+        [(0.3, math.pi / 2), (2.0, math.pi / 2)],
+    ],
+)
+def test_twins_are_parted_by_a_little_and_always_alike(angles):
+    site = site_of()
+    given = views(site, *angles)
+    found = parted(site, given, SPACING)
+    assert lines_apart(site, given) < 1e-6
+    assert lines_apart(site, found) > 0.005 * SPACING
+    moved = (found.frames(site)[:, 0] * given.frames(site)[:, 0]).sum(1)
+    assert math.acos(moved.min()) < 0.1 * SPACING
+    np.testing.assert_array_equal(found.table[0], given.table[0])
+    np.testing.assert_array_equal(found.table, parted(site, given, SPACING).table)
+    assert permitted(site, found)
+
+
+def test_what_is_apart_stays_as_it_is():
+    site = site_of()
+    given = views(site, (0.3, 0.2), (0.3, 0.25), (2.0, -0.4))
+    assert parted(site, given, SPACING) is given
+
+
+def test_twins_keep_to_limits_and_out_of_keep_outs():
+    limits = {"elevation": (0.1, 0.9), "azimuth": (-1, 1)}
+    site = site_of(**limits, keepouts=(KeepOut(Cone((0, 0, 0), (1, 0, 0), 0.3)),))
+    for corner in [(-1, 0.1), (1, 0.9), (-1, 0.9), (0.0, 0.3000001)]:
+        found = parted(site, views(site, corner, corner, corner), SPACING)
+        assert permitted(site, found)
+        assert lines_apart(site, found) > 1e-4
+
+
+def test_twins_with_no_room_stay():
+    site = site_of(elevation=(0.2, 0.2), azimuth=(0.5, 0.5))
+    given = views(site, (0.5, 0.2), (0.5, 0.2))
+    np.testing.assert_array_equal(parted(site, given, SPACING).table, given.table)
+    assert given.table[0, DISTANCE] > 0
