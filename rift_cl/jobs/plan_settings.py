@@ -65,7 +65,7 @@ class PlanSettings:
     """Whether the target is seen through, or opaque: then a sphere's surface stands for it."""
     budget: float | None = None
     """Most that all views may cost; a view costs 1, or what the camera's file says."""
-    snr: float = 30.0
+    snr: float = 1000.0
     """Signal to noise of one view at one cycle per diameter."""
     band: float | None = None
     """Highest frequency that is wanted, in cycles per millimetre; 16 per diameter when not

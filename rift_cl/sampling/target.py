@@ -40,9 +40,10 @@ class Target:
         mode: ``volume`` for what is seen through, ``surface`` for what is opaque.
         prior: the power that is expected at each frequency.
         snr: signal to noise, in power, at one cycle per diameter of one view; at k it is ``snr``
-            times the prior's power. With the default and a power law of 2 one view alone tells
-            little beyond 5 cycles per diameter. N pixels across a target of contrast c, with noise
-            s in each, have about (N c / s)^2 / 40 by that law, most photographs far over 1000.
+            times the prior's power. With the default and a power law of 2 one view alone has 4
+            left at the end of the band. N pixels across a target of contrast c, with noise s in
+            each, have about (N c / s)^2 / 40 by that law, most photographs far more; beyond the
+            default the merit counts the tails of its smooth slabs as known.
         band: the highest frequency that is wanted; 16 / diameter by default.
         frequencies: (K, 3) the frequencies to count with; by default ``k`` is a set that fills the
             half-ball of the band evenly (coverage at -k is that at k).
@@ -59,7 +60,7 @@ class Target:
     normals: Floats | None = None
     mode: TargetMode = "volume"
     prior: Prior = field(default_factory=lambda: PowerLaw(2.0))
-    snr: float = 30.0
+    snr: float = 1000.0
     band: float | None = None
     frequencies: Floats | None = None
 

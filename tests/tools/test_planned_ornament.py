@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from rift_cl.errors import OutputError
 from rift_cl.html_page import Page
 
 
@@ -91,3 +92,25 @@ def test_without_the_renderer_it_says_what_to_install(figure, plan, rows, monkey
     figure.show(page, last)
     assert "rift-cl[render]" in page.html()
     figure.show(Page("nothing"), {"rows": [], "missing": None})
+
+
+def test_pictures_that_are_there_are_taken_if_they_are_of_these_views(figure, plan, monkeypatch):
+    drawn = []
+
+    class Tracer:
+        name = "none"
+
+        def __init__(self, *given, **more):
+            drawn.append(more["samples"])
+
+        def picture(self, shot, number):
+            return np.full((*shot.size, 3), 0.5, np.float32)
+
+    monkeypatch.setattr(figure, "Tracer", Tracer)
+    monkeypatch.setattr(figure, "choose_variant", lambda asked: ("none", "for a test"))
+    folder = figure._rendered(plan, figure.CAP)
+    assert len(list((folder / "images").glob("*.png"))) == 8
+    assert figure._rendered(plan, figure.CAP) == folder and drawn == [16]
+    monkeypatch.setattr(figure, "_GOLDEN_ANGLE", 77.0)
+    with pytest.raises(OutputError, match="differ in frames"):
+        figure._rendered(plan, figure.CAP)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from figures.plan import EPS2D, Plan
-from ornament.cameras import TARGET, around, off_path, ring, shots_at, transforms
+from ornament.cameras import TARGET, Shot, around, off_path, ring, shots_at, transforms
 from ornament.capture_folder import render_capture
 from ornament.tracer import BACKGROUND, Tracer, choose_variant
 from rift_cl import Device
@@ -117,8 +117,7 @@ def show(page: Page, result: dict[str, Any]) -> None:
     )
     if result["missing"]:
         page.paragraph(result["missing"])
-    rows = result["rows"]
-    if not rows:
+    if not (rows := result["rows"]):
         return
     cells = [
         (SETS[row["set"]], row["views"], *(row[s] for s in _SCORES), *row["merits"].values())
@@ -136,9 +135,8 @@ def show(page: Page, result: dict[str, Any]) -> None:
         forward = np.array(TARGET) - places
         forward /= np.linalg.norm(forward, axis=1, keepdims=True)
         groups[SETS[row["set"]]] = Stands(places, forward)
-    words = "Where the views stand."
     drawn = camera_plot(groups, center=TARGET, diameter=_DIAMETER, up=(0, 0, 1), unit="radii")
-    page.figure(figure_png(drawn), caption=words, alt=words)
+    page.figure(figure_png(drawn), caption="Where the views stand.", alt="Places of cameras")
 
 
 def poses_of(name: str, size: Size, seed: int = 0) -> list[Floats]:
@@ -198,9 +196,9 @@ def _row(plan: Plan, name: str) -> dict[str, Any]:
 def _rendered(plan: Plan, name: str) -> Path:
     """The capture of a set of views."""
     folder, size = _folder(plan) / "renders" / name, Size.of(plan)
-    if (folder / "transforms.json").exists():
-        return folder
     shots = shots_at(poses_of(name, size, plan.seeds[0]), size.image, _FIELD)
+    if _is_there(folder / "transforms.json", shots):
+        return folder
     variant, reason = choose_variant("auto")
     print(f"{len(shots)} pictures of {name} by {variant}: {reason}", file=sys.stderr)
     tracer = Tracer(variant, seed=_SCENE, samples=size.samples)
@@ -214,6 +212,15 @@ def _rendered(plan: Plan, name: str) -> Path:
     reports = render_capture(folder, record, lambda k: tracer.picture(shots[k], k))
     show_progress(reports, quiet=False)
     return folder
+
+
+def _is_there(file: Path, shots: Sequence[Shot]) -> bool:
+    """Whether all pictures were rendered; those of other poses are refused later, by name."""
+    if not file.exists():
+        return False
+    top = json.loads(file.read_text(encoding="utf-8"))
+    poses = np.array([frame["transform_matrix"] for frame in top["frames"]])
+    return poses.shape == (len(shots), 4, 4) and np.allclose(poses, [s.pose for s in shots])
 
 
 def _fitted(plan: Plan, name: str, capture: Path) -> dict[str, dict[str, float]]:
