@@ -20,7 +20,7 @@ from rift_cl.plot import (
 )
 from rift_cl.plot.camera_plot import axis_names, upright_frame
 from rift_cl.plot.direction_map import flattened, unflattened
-from rift_cl.sampling.constraints import Constraints
+from rift_cl.sampling.planning.constraints import Constraints
 
 UP = (0.0, 0.0, 1.0)
 

@@ -71,7 +71,6 @@ FITTED: tuple[ModuleType, ...] = (
     figure_11,
     figure_12,
     spectral_bias,
-    planned_ornament,
     aperture_filter,
 )
 

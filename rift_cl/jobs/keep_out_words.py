@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from rift_cl.errors import InputError
-from rift_cl.sampling.keep_out import Box, Cone, KeepOut, Sphere
+from rift_cl.sampling.planning.keep_out import Box, Cone, KeepOut, Sphere
 
 _BODY = "body-"
 _FORMS = {

@@ -18,11 +18,11 @@ from rift_cl.jobs.run_folder import RunFolder
 from rift_cl.jobs.sampled import Sampled, place_of
 from rift_cl.jobs.views_table import csv_text, view_row
 from rift_cl.progress import Report
-from rift_cl.sampling.candidates import most_candidates
-from rift_cl.sampling.frequency_sets import for_planning
-from rift_cl.sampling.planner import plan
-from rift_cl.sampling.site import Site
-from rift_cl.sampling.view_plan import Plan
+from rift_cl.sampling.planning.candidates import most_candidates
+from rift_cl.sampling.planning.frequency_sets import for_planning
+from rift_cl.sampling.planning.planner import plan
+from rift_cl.sampling.planning.site import Site
+from rift_cl.sampling.planning.view_plan import Plan
 
 _STEPS = 4
 

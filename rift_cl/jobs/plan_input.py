@@ -19,10 +19,10 @@ from rift_cl.jobs.analyze_settings import AnalyzeSettings
 from rift_cl.jobs.keep_out_words import keep_out_of
 from rift_cl.jobs.plan_settings import PlanSettings
 from rift_cl.jobs.sampled import Floats, Sampled
-from rift_cl.sampling.constraints import Budget, Constraints, Ranges
-from rift_cl.sampling.paths import Free, Ring, Spline, TiltedRings
-from rift_cl.sampling.paths import Path as Way
 from rift_cl.sampling.pilot import Pilot
+from rift_cl.sampling.planning.constraints import Budget, Constraints, Ranges
+from rift_cl.sampling.planning.paths import Free, Ring, Spline, TiltedRings
+from rift_cl.sampling.planning.paths import Path as Way
 from rift_cl.sampling.prior import PowerLaw, Prior, directions_for
 from rift_cl.sampling.target import Target
 

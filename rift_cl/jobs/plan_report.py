@@ -14,7 +14,7 @@ from rift_cl.jobs.coverage_pictures import add_coverage, camera_figure, directio
 from rift_cl.jobs.plan_input import PlanInput
 from rift_cl.jobs.sampled import Sampled, points_of
 from rift_cl.plot import curves, figure_png
-from rift_cl.sampling.view_plan import Knee, Plan
+from rift_cl.sampling.planning.view_plan import Knee, Plan
 
 # What a merit is, for people.
 _MERITS = {

@@ -10,8 +10,8 @@ from rift_cl.geometry import Camera
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.jobs.sampled import Floats, Sampled
 from rift_cl.jobs.views_table import angles_of
-from rift_cl.sampling.constraints import Constraints
-from rift_cl.sampling.planner import next_views
+from rift_cl.sampling.planning.constraints import Constraints
+from rift_cl.sampling.planning.planner import next_views
 
 # As high as people get a camera above a target, in degrees.
 _HIGH = 75.0

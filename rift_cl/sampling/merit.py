@@ -50,7 +50,6 @@ def merit(
     kind: MeritKind = "wiener",
     *,
     weights: ArrayLike | None = None,
-    degree: int = 3,
     device: Device | None = None,
 ) -> Merit:
     """Score what cameras will know of a target.
@@ -68,7 +67,6 @@ def merit(
         target: what is looked at.
         kind: of the score; see above.
         weights: (V,) relative photons of the views; 1 each by default.
-        degree: of the spherical harmonics of a surface's brightness; for ``surface`` alone.
         device: where the coverage of a large problem is counted and passed back, in float32, so
             that value and gradient hold to 1e-3: one whose views times points times frequencies
             are over 260,000, some seven times faster than on the host even where the device is
@@ -88,7 +86,7 @@ def merit(
             raise InputError(f"merit: a surface has no {kind}; take wiener, logdet or worst")
         return Merit((kriging if kind == "kriging" else exact)(looks, target), None)
     if target.mode == "surface":
-        value, by_looks = surface_merit(looks, target, kind, degree)
+        value, by_looks = surface_merit(looks, target, kind)
     else:
         value, by_looks = _volume(looks, target, kind, device)
     return Merit(value, camera_gradients(cameras, seen, by_looks))

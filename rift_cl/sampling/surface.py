@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 # Frequencies of a tangent plane.
 _TEXTURE = 150
-_MOST_DEGREE = 8
 
 
 class _Seen(NamedTuple):
@@ -51,7 +50,7 @@ class _Seen(NamedTuple):
 
 
 def surface_merit(
-    looks: LooksLike, target: Target, kind: str = "wiener", degree: int = 3
+    looks: LooksLike, target: Target, kind: str = "wiener"
 ) -> tuple[float, LooksGradient]:
     """Texture error and angular error of a surface, added; each from 0 to 1.
 
@@ -65,20 +64,17 @@ def surface_merit(
         looks: V views of the target's points.
         target: of mode ``surface``; the prior is taken in the tangent planes' own axes.
         kind: ``wiener``, ``logdet`` or ``worst``, the last for the texture alone.
-        degree: of the harmonics; 0 for brightness that does not depend on the direction.
 
     Returns:
         The value, lower is better, and its derivative by the looks.
 
     Raises:
-        InputError: the target has no normals, the kind is unknown, or the degree is not 0 to 8.
+        InputError: the target has no normals, or the kind is unknown.
     """
     if target.normals is None:
         raise InputError("surface_merit: the target has no normals, wanted one for each point")
-    if degree not in range(_MOST_DEGREE + 1):
-        raise InputError(f"surface_merit: degree is {degree!r}, wanted 0 to {_MOST_DEGREE}")
     texture, gradient = _texture(looks, target, target.normals, kind)
-    angular, by_direction, by_weight = _angular(looks, target, target.normals, kind, degree)
+    angular, by_direction, by_weight = _angular(looks, target, target.normals, kind)
     whole = gradient._replace(
         direction=gradient.direction + by_direction, weight=gradient.weight + by_weight
     )
@@ -152,7 +148,7 @@ def _tangential(vectors: Floats, direction: Floats) -> Floats:
 
 
 def _angular(
-    looks: LooksLike, target: Target, normals: Floats, kind: str, degree: int
+    looks: LooksLike, target: Target, normals: Floats, kind: str
 ) -> tuple[float, Floats, Floats]:
     """Mean over points, and its derivatives by direction (V, P, 3) and weight (V, P).
 
@@ -160,6 +156,7 @@ def _angular(
     eigenvalues; and the products of harmonics there are sums of Legendre polynomials of the angle
     between two views, by the addition theorem.
     """
+    degree = target.degree
     count = (degree + 1) ** 2
     series = 2 * np.arange(degree + 1) + 1.0
     slopes = legendre.legder(series)

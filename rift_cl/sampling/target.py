@@ -22,6 +22,7 @@ TargetMode = Literal["volume", "surface"]
 # Frequencies of a set that nobody gave, in space and in the plane; its band in cycles per diameter.
 _IN_SPACE, _IN_PLANE = 1500, 600
 _BAND = 16.0
+_MOST_DEGREE = 8
 # The plastic ratio and the golden one: steps by their powers fill a square and a line evenly
 # (Roberts 2018; in two dimensions the plastic ratio solves x^3 = x + 1, in three x^4 = x + 1).
 _STEPS_3D = 1.2207440846057596 ** -np.arange(1.0, 4.0)
@@ -45,6 +46,9 @@ class Target:
             each, have about (N c / s)^2 / 40 by that law, most photographs far more; beyond the
             default the merit counts the tails of its smooth slabs as known.
         band: the highest frequency that is wanted; 16 / diameter by default.
+        degree: of the spherical harmonics of a surface's brightness, for the mode ``surface``, 0
+            to 8; 0 for what looks the same from all sides. Views fix no more than (degree + 1)^2
+            of one point, so that many views want a high one.
         frequencies: (K, 3) the frequencies to count with; by default ``k`` is a set that fills the
             half-ball of the band evenly (coverage at -k is that at k).
 
@@ -63,6 +67,7 @@ class Target:
     snr: float = 1000.0
     band: float | None = None
     frequencies: Floats | None = None
+    degree: int = 3
 
     def __post_init__(self) -> None:
         """Check the arguments and bring them into their normal form."""
@@ -88,6 +93,8 @@ class Target:
         self._check_mode()
 
     def _check_mode(self) -> None:
+        if self.degree not in range(_MOST_DEGREE + 1):
+            raise InputError(f"Target: degree is {self.degree!r}, wanted 0 to {_MOST_DEGREE}")
         if self.mode not in ("volume", "surface"):
             raise InputError(f"Target: mode is {self.mode!r}, wanted volume or surface")
         if self.normals is None:

@@ -7,9 +7,9 @@ import pytest
 
 from rift_cl.errors import InputError
 from rift_cl.geometry.camera_type import CameraType
-from rift_cl.sampling.constraints import Budget, Constraints, Ranges
-from rift_cl.sampling.paths import Spline, TiltedRings
-from rift_cl.sampling.site import DISTANCE, FOCAL, Site, default_types
+from rift_cl.sampling.planning.constraints import Budget, Constraints, Ranges
+from rift_cl.sampling.planning.paths import Spline, TiltedRings
+from rift_cl.sampling.planning.site import DISTANCE, FOCAL, Site, default_types
 from rift_cl.sampling.target import Target
 
 TARGET = Target((1, 2, 3), 10.0)

@@ -6,15 +6,15 @@ import math
 import numpy as np
 import pytest
 
-from rift_cl.sampling.candidates import candidates, spread
-from rift_cl.sampling.constraints import Constraints
-from rift_cl.sampling.greedy import Limits, bound, choose
 from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.objective import Objective
-from rift_cl.sampling.pool import pool_of
+from rift_cl.sampling.planning.candidates import candidates, spread
+from rift_cl.sampling.planning.constraints import Constraints
+from rift_cl.sampling.planning.greedy import Limits, bound, choose
+from rift_cl.sampling.planning.objective import Objective
+from rift_cl.sampling.planning.pool import pool_of
+from rift_cl.sampling.planning.site import Site, default_types
+from rift_cl.sampling.planning.stations import Stations
 from rift_cl.sampling.prior import directions_for
-from rift_cl.sampling.site import Site, default_types
-from rift_cl.sampling.stations import Stations
 from rift_cl.sampling.target import Target, half_ball
 
 VOLUME = Target((0, 0, 0), 10.0, snr=30.0, frequencies=half_ball(0.5, 120))

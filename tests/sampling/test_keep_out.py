@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rift_cl.errors import InputError
-from rift_cl.sampling.keep_out import Box, Cone, KeepOut, Sphere
+from rift_cl.sampling.planning.keep_out import Box, Cone, KeepOut, Sphere
 
 SHAPES = {
     "sphere": Sphere((1, 2, 3), 2.0),

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from rift_cl.errors import InputError
-from rift_cl.sampling.constraints import Constraints
-from rift_cl.sampling.curves import curves_of
-from rift_cl.sampling.keep_out import Cone, KeepOut, Sphere
-from rift_cl.sampling.objective import Objective
-from rift_cl.sampling.path_layout import PathLayout
-from rift_cl.sampling.paths import Free, Ring, Spline, TiltedRings
-from rift_cl.sampling.planner import plan
-from rift_cl.sampling.polish import permitted
-from rift_cl.sampling.site import Site, default_types
+from rift_cl.sampling.planning.constraints import Constraints
+from rift_cl.sampling.planning.curves import curves_of
+from rift_cl.sampling.planning.keep_out import Cone, KeepOut, Sphere
+from rift_cl.sampling.planning.objective import Objective
+from rift_cl.sampling.planning.path_layout import PathLayout
+from rift_cl.sampling.planning.paths import Free, Ring, Spline, TiltedRings
+from rift_cl.sampling.planning.planner import plan
+from rift_cl.sampling.planning.polish import permitted
+from rift_cl.sampling.planning.site import Site, default_types
 from rift_cl.sampling.target import Target, half_ball
 
 TARGET = Target((0, 0, 0), 10.0, snr=30.0, frequencies=half_ball(0.6, 200))

@@ -8,11 +8,11 @@ import pytest
 
 from rift_cl.errors import InputError
 from rift_cl.geometry.camera_type import CameraType
-from rift_cl.sampling.constraints import Budget, Constraints, Ranges
-from rift_cl.sampling.keep_out import Box, Cone, KeepOut, Sphere
 from rift_cl.sampling.merit import merit
-from rift_cl.sampling.planner import next_views, plan
-from rift_cl.sampling.polish import permitted
+from rift_cl.sampling.planning.constraints import Budget, Constraints, Ranges
+from rift_cl.sampling.planning.keep_out import Box, Cone, KeepOut, Sphere
+from rift_cl.sampling.planning.planner import next_views, plan
+from rift_cl.sampling.planning.polish import permitted
 from rift_cl.sampling.prior import PowerLaw, Spectrum
 from rift_cl.sampling.target import Target, half_ball, half_disc
 

@@ -59,14 +59,14 @@ def test_light_adds_up_and_more_views_never_make_it_worse():
 @pytest.mark.parametrize("kind", ["wiener", "logdet"])
 def test_sheen_is_that_of_the_matrix_of_harmonics(kind):
     views = np.random.default_rng(1).normal((0, 0, 2), size=(7, 3))
-    looks, target, degree = looking(views), patch(snr=20.0), 2
-    both, _ = surface_merit(looks, target, kind, degree)
+    looks, degree = looking(views), 2
+    both, _ = surface_merit(looks, patch(snr=20.0, degree=degree), kind)
     # Of degree 0 the brightness is one number, whose error is known by itself.
     units = looks.direction[:, 0]
     light = units[:, 2]
     basis = spherical_harmonics(units, degree) * np.sqrt(4 * np.pi)
     gram = np.eye(9) + 20 * (basis * light[:, None]).T @ basis
-    plain, _ = surface_merit(looks, target, kind, 0)
+    plain, _ = surface_merit(looks, patch(snr=20.0, degree=0), kind)
     if kind == "wiener":
         wanted = np.trace(np.linalg.inv(gram)) / 9 - 1 / (1 + 20 * light.sum())
     else:
@@ -77,8 +77,8 @@ def test_sheen_is_that_of_the_matrix_of_harmonics(kind):
 def test_sheen_wants_views_from_several_sides():
     close = [tilted(0.05 * n, n) for n in range(16)]
     spread = [tilted(1.2 * np.sqrt((n + 0.5) / 16), 2.4 * n) for n in range(16)]
-    sheen = [surface_merit(looking(v), patch(), degree=3)[0] for v in (close, spread)]
-    matt = [surface_merit(looking(v), patch(), degree=0)[0] for v in (close, spread)]
+    sheen = [surface_merit(looking(v), patch(degree=3))[0] for v in (close, spread)]
+    matt = [surface_merit(looking(v), patch(degree=0))[0] for v in (close, spread)]
     assert sheen[1] < sheen[0]
     assert matt[1] > matt[0]
 
@@ -98,10 +98,10 @@ def test_turning_target_and_views_together_changes_nothing():
 
 @pytest.mark.parametrize("kind", ["wiener", "logdet", "worst"])
 def test_gradients_are_those_of_finite_differences(kind):
-    target = Target((0, 0, 0), 1.0, POINTS, NORMALS, "surface")
+    target = Target((0, 0, 0), 1.0, POINTS, NORMALS, "surface", degree=2)
     views, random = cameras(6), np.random.default_rng(5)
     ways = random.normal(size=(6, 3))
-    found = merit(views, target, kind, degree=2).gradient
+    found = merit(views, target, kind).gradient
 
     def slope(step, **way):
         ends = [
@@ -112,7 +112,6 @@ def test_gradients_are_those_of_finite_differences(kind):
                 ],
                 target,
                 kind,
-                degree=2,
             ).value
             for sign in (1, -1)
         ]
@@ -123,7 +122,7 @@ def test_gradients_are_those_of_finite_differences(kind):
     assert slope(1e-3, focal=one) == pytest.approx(found.focal @ one, rel=1e-5)
     assert slope(1e-6, radius=one) == pytest.approx(found.radius @ one, rel=1e-5)
     assert slope(1e-4, focus=one) == pytest.approx(found.focus @ one, rel=1e-5)
-    ends = [merit(views, target, kind, degree=2, weights=1 + h * one).value for h in (1e-5, -1e-5)]
+    ends = [merit(views, target, kind, weights=1 + h * one).value for h in (1e-5, -1e-5)]
     assert (ends[0] - ends[1]) / 2e-5 == pytest.approx(found.weight @ one, rel=1e-5)
 
 
@@ -132,7 +131,7 @@ def test_what_a_surface_has_not_is_refused():
     with pytest.raises(InputError, match="surface has no exact"):
         merit(cameras(2), target, "exact")
     with pytest.raises(InputError, match="degree is 9"):
-        merit(cameras(2), target, degree=9)
+        patch(degree=9)
     with pytest.raises(InputError, match="kind is 'best', wanted wiener"):
         surface_merit(looking([[0, 0, 1]]), patch(), "best")
     with pytest.raises(InputError, match="no normals"):

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from figures.planned_sector import directions
 from rift_cl.geometry.camera_type import CameraType
-from rift_cl.sampling.constraints import Constraints, Ranges
-from rift_cl.sampling.planner import plan
+from rift_cl.sampling.planning.constraints import Constraints, Ranges
+from rift_cl.sampling.planning.planner import plan
 from rift_cl.sampling.prior import PowerLaw
 from rift_cl.sampling.target import Target
 

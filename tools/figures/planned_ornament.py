@@ -31,9 +31,9 @@ from rift_cl.jobs.fit import Fit
 from rift_cl.jobs.fit_settings import FitSettings
 from rift_cl.plot import Stands, camera_plot, figure_png
 from rift_cl.progress_bar import show_progress
-from rift_cl.sampling.constraints import Constraints
 from rift_cl.sampling.merit import merit
-from rift_cl.sampling.planner import plan as plan_views
+from rift_cl.sampling.planning.constraints import Constraints
+from rift_cl.sampling.planning.planner import plan as plan_views
 from rift_cl.sampling.target import Target
 
 NAME = "planned_ornament"
@@ -175,7 +175,7 @@ def targets() -> dict[str, Target]:
     ball = np.stack([side * np.cos(turn), side * np.sin(turn), height], axis=1)
     return {
         VOLUME: Target(TARGET, _DIAMETER),
-        SURFACE: Target(TARGET, _DIAMETER, points=ball, normals=ball, mode="surface"),
+        SURFACE: Target(TARGET, _DIAMETER, points=ball, normals=ball, mode="surface", degree=8),
     }
 
 

@@ -11,6 +11,7 @@ known, which flatters every score: a fit has to find it as well.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -202,8 +203,8 @@ class Sphere:
         volume = Target((0, 0, 0), 2.0, prior=target.prior, snr=target.snr, band=target.band)
         nearest = np.clip((spiral(2000) @ places.T).max(1), -1, 1)
         return {
-            "surface": merit(cameras, target, degree=self.degree).value,
-            "texture": merit(cameras, target, degree=0).value,
+            "surface": merit(cameras, replace(target, degree=self.degree)).value,
+            "texture": merit(cameras, replace(target, degree=0)).value,
             "volume": merit(cameras, volume).value,
             "gap": float(np.arccos(nearest.min())),
         }

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.sampling.pool import Pool
+from rift_cl.sampling.planning.pool import Pool
 
 Floats = NDArray[np.float64]
 # Steps towards the best mixture; each tightens the bound.

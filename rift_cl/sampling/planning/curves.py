@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.sampling.constraints import Constraints
-from rift_cl.sampling.paths import Ring, Spline, TiltedRings
+from rift_cl.sampling.planning.constraints import Constraints
+from rift_cl.sampling.planning.paths import Ring, Spline, TiltedRings
 
 Floats = NDArray[np.float64]
 _QUARTER = math.pi / 2

@@ -13,12 +13,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.sampling.candidates import allowed
-from rift_cl.sampling.keep_out import KeepOut
-from rift_cl.sampling.objective import Objective
-from rift_cl.sampling.site import AZIMUTH, COLUMNS, DISTANCE, ELEVATION, EXPOSURE, Site
-from rift_cl.sampling.spending import cost, total
-from rift_cl.sampling.stations import Stations
+from rift_cl.sampling.planning.candidates import allowed
+from rift_cl.sampling.planning.keep_out import KeepOut
+from rift_cl.sampling.planning.objective import Objective
+from rift_cl.sampling.planning.site import AZIMUTH, COLUMNS, DISTANCE, ELEVATION, EXPOSURE, Site
+from rift_cl.sampling.planning.spending import cost, total
+from rift_cl.sampling.planning.stations import Stations
 
 Floats = NDArray[np.float64]
 # Evaluations of the merit, and the relative fall below which no more is looked for.

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.sampling.curves import Curve
-from rift_cl.sampling.site import (
+from rift_cl.sampling.planning.curves import Curve
+from rift_cl.sampling.planning.site import (
     AZIMUTH,
     COLUMNS,
     DISTANCE,
@@ -22,7 +22,7 @@ from rift_cl.sampling.site import (
     FOCUS,
     Site,
 )
-from rift_cl.sampling.stations import Stations
+from rift_cl.sampling.planning.stations import Stations
 
 Floats = NDArray[np.float64]
 # Step of the differences with which a path's shape is derived; the merit's own derivative is exact.

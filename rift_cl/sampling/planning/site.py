@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.geometry.camera_type import CameraType
-from rift_cl.sampling.constraints import Constraints, Ranges
+from rift_cl.sampling.planning.constraints import Constraints, Ranges
 from rift_cl.sampling.target import Target
 
 Floats = NDArray[np.float64]

@@ -11,9 +11,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.sampling.candidates import allowed
-from rift_cl.sampling.site import AZIMUTH, ELEVATION, Site
-from rift_cl.sampling.stations import Stations
+from rift_cl.sampling.planning.candidates import allowed
+from rift_cl.sampling.planning.site import AZIMUTH, ELEVATION, Site
+from rift_cl.sampling.planning.stations import Stations
 
 Floats = NDArray[np.float64]
 # How far twins are moved at first, in spacings of evenly spread views, and in which ways: towards

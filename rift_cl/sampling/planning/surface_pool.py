@@ -15,15 +15,13 @@ from numpy.typing import NDArray
 
 from rift_cl.sampling import criteria
 from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.objective import Objective, joined, some
+from rift_cl.sampling.planning.objective import Objective, joined, some
+from rift_cl.sampling.planning.stations import Stations
 from rift_cl.sampling.prior import checked_power
-from rift_cl.sampling.stations import Stations
 from rift_cl.sampling.surface import texture_coverage
 from rift_cl.sampling.target import half_disc
 
 Floats = NDArray[np.float64]
-# Of the spherical harmonics, as ``surface_merit`` has it.
-_DEGREE = 3
 
 
 class SurfacePool:
@@ -41,7 +39,7 @@ class SurfacePool:
         self._texture = _texture(looks, objective) if texture is None else texture
         self._plane = half_disc(target.highest, self._texture.shape[2])
         self._power = checked_power(target.prior, self._plane, target.diameter)
-        # (C, P, 16), so that their products with themselves are a view's angular information.
+        # (C, P, waves), so that their products with themselves are a view's angular information.
         self._waves = self._harmonics(looks)
         fixed = objective.fixed
         self._base = 0 * self._texture[0] if fixed is None else texture_coverage(fixed, target)
@@ -111,7 +109,7 @@ class SurfacePool:
         return self._per_wave(np.trace(self._inverse, axis1=1, axis2=2))
 
     def _turned(self, index: int) -> tuple[Floats, Floats]:
-        """(P, 16) the inverse times a candidate's waves, and (P,) 1 + waves inverse waves."""
+        """(P, waves) the inverse times a candidate's waves, and (P,) 1 + waves inverse waves."""
         waves = self._waves[index]
         turned = np.einsum("pij,pj->pi", self._inverse, waves)
         return turned, 1 + (turned * waves).sum(1)
@@ -134,14 +132,14 @@ class SurfacePool:
         return np.asarray(np.linalg.slogdet(information)[1] / math.log(2))
 
     def _harmonics(self, looks: Looks) -> Floats:
-        """(V, P, 16) real spherical harmonics, mean square 1, times the root of snr and light."""
+        """(V, P, waves) spherical harmonics, mean square 1, times the root of snr and light."""
         from scipy.special import lpmv
 
         target = self._objective.site.target
         normals = np.zeros((looks.points, 3)) if target.normals is None else target.normals
         x, y, z = np.moveaxis(looks.direction, 2, 0)
         turn, waves = np.arctan2(y, x), []
-        for degree, order in ((n, m) for n in range(_DEGREE + 1) for m in range(n + 1)):
+        for degree, order in ((n, m) for n in range(target.degree + 1) for m in range(n + 1)):
             scale = (
                 (2 * degree + 1) * math.factorial(degree - order) / math.factorial(degree + order)
             )

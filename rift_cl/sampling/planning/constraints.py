@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number, real_numbers
-from rift_cl.sampling.keep_out import KeepOut
-from rift_cl.sampling.paths import Free, Path, Ring, Spline, TiltedRings
+from rift_cl.sampling.planning.keep_out import KeepOut
+from rift_cl.sampling.planning.paths import Free, Path, Ring, Spline, TiltedRings
 
 Pair = tuple[float, float]
 _QUARTER = math.pi / 2

@@ -17,12 +17,20 @@ from numpy.typing import NDArray
 from rift_cl.reference.coverage import LooksGradient, coverage, coverage_grad
 from rift_cl.sampling import criteria
 from rift_cl.sampling.criteria import Scored
-from rift_cl.sampling.frequency_sets import for_judging
 from rift_cl.sampling.looks import Looks
 from rift_cl.sampling.merit import CoverageMerit
+from rift_cl.sampling.planning.frequency_sets import for_judging
+from rift_cl.sampling.planning.site import (
+    DISTANCE,
+    ELEVATION,
+    EXPOSURE,
+    F_NUMBER,
+    FOCAL,
+    FOCUS,
+    Site,
+)
+from rift_cl.sampling.planning.stations import Stations
 from rift_cl.sampling.prior import checked_power
-from rift_cl.sampling.site import DISTANCE, ELEVATION, EXPOSURE, F_NUMBER, FOCAL, FOCUS, Site
-from rift_cl.sampling.stations import Stations
 from rift_cl.sampling.surface import surface_merit
 from rift_cl.sampling.target import Target
 

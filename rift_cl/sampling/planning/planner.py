@@ -13,26 +13,26 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.numbers import one_number
-from rift_cl.sampling.baselines import Baseline, baselines
-from rift_cl.sampling.candidates import candidates, most_candidates
-from rift_cl.sampling.constraints import Constraints
-from rift_cl.sampling.free_layout import FreeLayout
-from rift_cl.sampling.frequency_sets import for_planning
-from rift_cl.sampling.greedy import Limits, bound, choose
 from rift_cl.sampling.looks import Looks
 from rift_cl.sampling.merit import CoverageMerit
-from rift_cl.sampling.objective import Objective
-from rift_cl.sampling.path_search import best_path
-from rift_cl.sampling.paths import Free
-from rift_cl.sampling.polish import polish
-from rift_cl.sampling.pool import pool_of
+from rift_cl.sampling.planning.baselines import Baseline, baselines
+from rift_cl.sampling.planning.candidates import candidates, most_candidates
+from rift_cl.sampling.planning.constraints import Constraints
+from rift_cl.sampling.planning.free_layout import FreeLayout
+from rift_cl.sampling.planning.frequency_sets import for_planning
+from rift_cl.sampling.planning.greedy import Limits, bound, choose
+from rift_cl.sampling.planning.objective import Objective
+from rift_cl.sampling.planning.path_search import best_path
+from rift_cl.sampling.planning.paths import Free
+from rift_cl.sampling.planning.polish import polish
+from rift_cl.sampling.planning.pool import pool_of
+from rift_cl.sampling.planning.site import Site, default_types
+from rift_cl.sampling.planning.spending import prices, require_paid, total
+from rift_cl.sampling.planning.stations import Stations, turned
+from rift_cl.sampling.planning.twins import parted
+from rift_cl.sampling.planning.view_plan import Plan
 from rift_cl.sampling.prior import checked_power
-from rift_cl.sampling.site import Site, default_types
-from rift_cl.sampling.spending import prices, require_paid, total
-from rift_cl.sampling.stations import Stations, turned
 from rift_cl.sampling.target import Target
-from rift_cl.sampling.twins import parted
-from rift_cl.sampling.view_plan import Plan
 
 Floats = NDArray[np.float64]
 Method = Literal["greedy", "greedy+mma"]

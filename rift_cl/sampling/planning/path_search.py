@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.sampling.candidates import settings_of
-from rift_cl.sampling.curves import Curve, curves_of
-from rift_cl.sampling.objective import Objective
-from rift_cl.sampling.path_layout import PathLayout
-from rift_cl.sampling.polish import permitted, polish
-from rift_cl.sampling.site import (
+from rift_cl.sampling.planning.candidates import settings_of
+from rift_cl.sampling.planning.curves import Curve, curves_of
+from rift_cl.sampling.planning.objective import Objective
+from rift_cl.sampling.planning.path_layout import PathLayout
+from rift_cl.sampling.planning.polish import permitted, polish
+from rift_cl.sampling.planning.site import (
     DISTANCE,
     EXPOSURE,
     F_NUMBER,
@@ -21,8 +21,8 @@ from rift_cl.sampling.site import (
     FOCUS,
     Site,
 )
-from rift_cl.sampling.spending import paid
-from rift_cl.sampling.stations import Stations
+from rift_cl.sampling.planning.spending import paid
+from rift_cl.sampling.planning.stations import Stations
 
 Floats = NDArray[np.float64]
 # Paths that are moved after the best start of each; settings that are tried with each start.

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.sampling.objective import Objective
-from rift_cl.sampling.site import (
+from rift_cl.sampling.planning.objective import Objective
+from rift_cl.sampling.planning.site import (
     AZIMUTH,
     COLUMNS,
     DISTANCE,
@@ -24,8 +24,8 @@ from rift_cl.sampling.site import (
     FOCUS,
     Site,
 )
-from rift_cl.sampling.spending import affordable
-from rift_cl.sampling.stations import Stations
+from rift_cl.sampling.planning.spending import affordable
+from rift_cl.sampling.planning.stations import Stations
 
 Floats = NDArray[np.float64]
 # Directions, at least and for each view; and candidates of all types and settings.

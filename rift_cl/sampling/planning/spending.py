@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.sampling.site import EXPOSURE, Site
-from rift_cl.sampling.stations import Stations
+from rift_cl.sampling.planning.site import EXPOSURE, Site
+from rift_cl.sampling.planning.stations import Stations
 
 # Sums are compared with the budget up to this part of it.
 _ROUNDING = 1e-9

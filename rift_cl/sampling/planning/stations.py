@@ -13,7 +13,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.pose import look_at
-from rift_cl.sampling.site import AZIMUTH, COLUMNS, DISTANCE, ELEVATION, FOCUS, Site
+from rift_cl.sampling.planning.site import AZIMUTH, COLUMNS, DISTANCE, ELEVATION, FOCUS, Site
 
 Floats = NDArray[np.float64]
 # How far beside the target's centre a camera that is read back may look, as part of the distance.
