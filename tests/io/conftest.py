@@ -12,6 +12,10 @@ import capture_files as made
 import pytest
 from photograph_files import NAMES
 
+from rift_cl.geometry.lens_prescription import LensPrescription
+from rift_cl.io.lens_file import open_lens
+from rift_cl.sample.stock_lenses import stock_lens
+
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
@@ -45,3 +49,20 @@ def seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], dict[s
     path = tmp_path / "seen.json"
     monkeypatch.setenv("FAKE_PYCOLMAP_SEEN", str(path))
     return lambda: json.loads(path.read_text())
+
+
+@pytest.fixture
+def triplet() -> LensPrescription:
+    """The stock Cooke triplet."""
+    return open_lens(stock_lens("cooke_triplet"))
+
+
+@pytest.fixture
+def save(tmp_path: Path) -> Callable[..., Path]:
+    """Writes a text as a file, by default as a Zemax lens."""
+
+    def _save(text: str, name: str = "lens.zmx", encoding: str = "utf-8") -> Path:
+        (tmp_path / name).write_bytes(text.encode(encoding))
+        return tmp_path / name
+
+    return _save

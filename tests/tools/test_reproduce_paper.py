@@ -222,8 +222,7 @@ def test_colour_pictures_come_back_to_half_a_code(part):
 
 
 def test_noise_is_the_same_each_time_and_in_the_colours_alone(part, tmp_path):
-    choice, plan = part("view_choice"), part("plan")
-    source = plan.sample_ornament().ring
+    choice, source = part("view_choice"), part("plan").sample_ornament().ring
     folders = [
         choice.write_capture(source, [3, 5], tmp_path / name, noise=noise)
         for name, noise in (("a", 0.1), ("b", 0.1), ("c", 0.0))
@@ -240,12 +239,11 @@ def test_noise_is_the_same_each_time_and_in_the_colours_alone(part, tmp_path):
 
 
 def test_noise_has_scores_of_its_own(part, tmp_path, monkeypatch):
-    """Noisy fits stand beside the others, under the same seeds."""
     bias = part("spectral_bias")
     monkeypatch.setattr(bias, "_spectra", lambda *_: {"moments": []})
     monkeypatch.setattr(bias, "_scores", lambda _, *case: dict(zip(bias._OF, case, strict=True)))
     plan = part("plan").Plan(False, tmp_path, None, None, (4,), 2, 3, (0, 1), (0.0, 0.2))
-    *_, result = bias.compute(plan, None, {})
+    result = list(bias.compute(plan, None, {}))[-1]
     found = [tuple(run[key] for key in bias._OF) for run in result["scores"]]
     assert found == [
         (4, noise, ramp, seed) for noise in (0.0, 0.2) for ramp in (0.0, 0.5) for seed in (0, 1)

@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 
 from rift_cl.reference.coverage import LooksGradient, coverage, coverage_grad
 from rift_cl.sampling import criteria
-from rift_cl.sampling.criteria import Scored
 from rift_cl.sampling.looks import Looks
 from rift_cl.sampling.merit import CoverageMerit
 from rift_cl.sampling.planning.frequency_sets import for_judging
-from rift_cl.sampling.planning.site import (
+from rift_cl.sampling.planning.site import (  # fmt: skip
     DISTANCE,
     ELEVATION,
     EXPOSURE,
@@ -82,7 +81,7 @@ class Objective:
         target = self.site.target
         return checked_power(target.prior, target.k, target.diameter)
 
-    def scored(self, added: Floats) -> Scored:
+    def scored(self, added: Floats) -> criteria.Scored:
         """A volume's merit with so much coverage (P, K) added to what is there; its derivative.
 
         That of ``merit_of_coverage``, with the prior asked but once.
