@@ -37,7 +37,7 @@ class Kind:
     model: str = "pinhole"
     covars: bool = False
     settings: SplatSettings = field(default_factory=SplatSettings)
-    aperture: Aperture | None = None
+    aperture: Aperture | None = field(default=None, kw_only=True)
 
     @property
     def camera(self):
@@ -60,7 +60,9 @@ KINDS = {
     "lens": Kind(aperture=LENS),
     "lens antialiased": Kind(settings=SplatSettings(antialiased=True), aperture=LENS),
     "lens covariances": Kind(covars=True, aperture=LENS),
-    "lens antialiased covariances": Kind("pinhole", True, SplatSettings(antialiased=True), LENS),
+    "lens antialiased covariances": Kind(
+        "pinhole", True, SplatSettings(antialiased=True), aperture=LENS
+    ),
 }
 
 
