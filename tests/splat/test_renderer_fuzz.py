@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from projection_scenes import Kind, random_splats, shaped, turned
+from projection_scenes import LENS, Kind, random_splats, shaped, turned
 
 import rift_cl as rift
 from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
@@ -37,6 +37,7 @@ WAYS = {  # model, covariances, settings, coefficients of harmonics, colours, de
     "sh": Way("pinhole", False, SplatSettings(tile=8), 4, 0),
     "all channels": Way("pinhole", True, SplatSettings(absgrad=True), 4, 2, "expected"),
     "antialiased": Way("pinhole", False, SplatSettings(antialiased=True), 0, 5, "accumulated"),
+    "lens": Way("pinhole", False, SplatSettings(), 1, 2, "expected", aperture=LENS),
     "ortho": Way("ortho", True, SplatSettings(absgrad=True, tile=8), 0, 3, "accumulated"),
     "fisheye": Way("fisheye", False, SplatSettings(tile=32), 1, 1, "expected"),
     "fisheye antialiased": Way("fisheye", True, SplatSettings(antialiased=True, absgrad=True), 9),
@@ -70,12 +71,12 @@ class Scene:
     odd: tuple[tuple[int, str, int, float], ...] = ()
     changes: dict[str, float] = field(default_factory=dict)
 
-    def camera(self, model):
+    def camera(self, model, aperture=None):
         focal = {"pinhole": 45.0, "ortho": 9.0, "fisheye": 30.0}[model]
         view = np.eye(4)
         view[:3, :3], view[:3, 3] = turned(self.seed), [0.1, -0.2, 0.3]
         K = [[focal, 0, self.size[1] / 2], [0, 1.1 * focal, self.size[0] / 2 - 0.2], [0, 0, 1]]
-        return rift.Camera(self.size, K, view, model)
+        return rift.Camera(self.size, K, view, model, aperture)
 
     def values(self, chosen):
         """Host arrays, hostile numbers included."""
@@ -118,7 +119,7 @@ def run(device, chosen, scene, values):
     """A frame and its gradient: host arrays of both, and how many were culled."""
     renderer = Renderer(replace(chosen.settings, **scene.changes), device=device)
     splats, background = Splats.upload(device, **values), device.array(chosen.background)
-    camera = scene.camera(chosen.model)
+    camera = scene.camera(chosen.model, chosen.aperture)
     frame = renderer.forward(splats, camera, background=background, depth=chosen.depth)
     random = np.random.default_rng(scene.seed)
     coming = [device.array(random.normal(size=a.shape)) for a in (frame.image, frame.transmittance)]

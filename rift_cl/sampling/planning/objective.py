@@ -19,7 +19,7 @@ from rift_cl.sampling import criteria
 from rift_cl.sampling.looks import Looks
 from rift_cl.sampling.merit import CoverageMerit
 from rift_cl.sampling.planning.frequency_sets import for_judging
-from rift_cl.sampling.planning.site import (  # fmt: skip
+from rift_cl.sampling.planning.site import (
     DISTANCE,
     ELEVATION,
     EXPOSURE,
@@ -87,10 +87,7 @@ class Objective:
         That of ``merit_of_coverage``, with the prior asked but once.
         """
         known, target = self.base + added, self.site.target
-        if self.kind == "worst":
-            return criteria.worst(known, self.power, target.snr, target.k)
-        score = criteria.wiener if self.kind == "wiener" else criteria.logdet
-        return score(known, self.power, target.snr)
+        return criteria.scored(self.kind, known, self.power, target.snr, target.k)
 
     def looks(self, stations: Stations) -> Looks:
         """How the stations see the target's points."""

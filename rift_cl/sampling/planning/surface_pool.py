@@ -98,10 +98,7 @@ class SurfacePool:
 
     def _scored(self, coverage: Floats) -> criteria.Scored:
         kind = self._objective.kind
-        if kind == "worst":
-            return criteria.worst(coverage, self._power, self._snr, self._plane)
-        score = criteria.wiener if kind == "wiener" else criteria.logdet
-        return score(coverage, self._power, self._snr)
+        return criteria.scored(kind, coverage, self._power, self._snr, self._plane)
 
     def _angular(self) -> float:
         if self._objective.kind == "logdet":
