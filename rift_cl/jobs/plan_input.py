@@ -109,6 +109,11 @@ def _target(settings: PlanSettings, have: Sampled | None, notes: list[str]) -> T
         normals = np.concatenate([ways, -ways])
         points = center + diameter / 2 * normals
         notes.append("A sphere stands for the target's surface; nothing of it is in the way.")
+    else:
+        notes.append(
+            "The target is taken to be seen through, so that opposite views tell the same and one "
+            "side may go unseen; an opaque one wants --mode surface."
+        )
     return Target(
         center=center,
         diameter=diameter,

@@ -176,6 +176,7 @@ def test_cameras_ways_places_and_a_pilot_become_what_the_planner_takes(tmp_path,
     assert [k.hides for k in given.constraints.keepouts] == [True, False, False]
     assert given.constraints.budget.cost("mine", 1) == 3
     assert given.target.mode == "surface" and len(given.target.normals) > 8
+    assert not any("seen through" in note for note in given.notes)
     assert any("pilot" in note for note in given.notes)
 
 
