@@ -13,7 +13,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.polynomial import legendre
 
 from rift_cl.errors import InputError
 from rift_cl.reference.coverage import (
@@ -25,6 +24,7 @@ from rift_cl.reference.coverage import (
 )
 from rift_cl.sampling import criteria
 from rift_cl.sampling.prior import checked_power
+from rift_cl.sampling.sheen import sheen_error
 
 if TYPE_CHECKING:
     from rift_cl.sampling.target import Target
@@ -52,13 +52,10 @@ class _Seen(NamedTuple):
 def surface_merit(
     looks: LooksLike, target: Target, kind: str = "wiener"
 ) -> tuple[float, LooksGradient]:
-    """Texture error and angular error of a surface, added; each from 0 to 1.
+    """Errors of a surface's texture and of its sheen, added; each from 0 to 1.
 
-    The texture's coverage is ``sum w cos MTF^2``, scored by ``criteria``. The angular error is the
-    share that stays unknown of brightness as spherical harmonics to a degree with equal variances:
-    ``tr (1 + snr G)^-1 / (degree + 1)^2``, where G sums ``w cos Y Y'`` over the views of a point
-    (scaled so that its mean trace per view is (degree + 1)^2); with ``logdet`` it is minus its
-    bits per coefficient.
+    The texture's coverage is ``sum w cos MTF^2``, scored by ``criteria``; what is unknown of the
+    sheen says ``rift_cl.sampling.sheen``.
 
     Args:
         looks: V views of the target's points.
@@ -74,11 +71,11 @@ def surface_merit(
     if target.normals is None:
         raise InputError("surface_merit: the target has no normals, wanted one for each point")
     texture, gradient = _texture(looks, target, target.normals, kind)
-    angular, by_direction, by_weight = _angular(looks, target, target.normals, kind)
+    sheen, by_direction, by_weight = sheen_error(looks, target, target.normals, kind)
     whole = gradient._replace(
         direction=gradient.direction + by_direction, weight=gradient.weight + by_weight
     )
-    return texture + angular, whole
+    return texture + sheen, whole
 
 
 def texture_coverage(looks: LooksLike, target: Target) -> Floats:
@@ -145,38 +142,3 @@ def _gradient(
 
 def _tangential(vectors: Floats, direction: Floats) -> Floats:
     return np.asarray(vectors - (vectors * direction).sum(1, keepdims=True) * direction)
-
-
-def _angular(
-    looks: LooksLike, target: Target, normals: Floats, kind: str
-) -> tuple[float, Floats, Floats]:
-    """Mean over points, and its derivatives by direction (V, P, 3) and weight (V, P).
-
-    ``tr (1 + snr B B')^-1`` and ``det`` are those of ``1 + snr B' B``, V x V, but for the unit
-    eigenvalues; and the products of harmonics there are sums of Legendre polynomials of the angle
-    between two views, by the addition theorem.
-    """
-    degree = target.degree
-    count = (degree + 1) ** 2
-    series = 2 * np.arange(degree + 1) + 1.0
-    slopes = legendre.legder(series)
-    v = looks.direction.transpose(1, 0, 2)
-    cosine = np.einsum("pvd,pd->pv", v, normals)
-    light = looks.weight.T * np.maximum(cosine, 0)
-    between = v @ v.transpose(0, 2, 1)
-    kernel = legendre.legval(between, series)
-    inverse = np.linalg.inv(np.eye(v.shape[1]) + target.snr * light[:, :, None] * kernel)
-    if kind == "logdet":
-        value = np.linalg.slogdet(inverse)[1].mean() / (count * np.log(2))
-        outer, scale = inverse, -target.snr / (count * np.log(2) * len(v))
-    else:
-        traces = np.trace(inverse, axis1=1, axis2=2)
-        value = (count - v.shape[1] + traces.mean()) / count
-        outer, scale = inverse @ inverse, -target.snr / (count * len(v))
-    by_light = scale * np.einsum("pvw,pwv->pv", kernel, outer)
-    by_kernel = scale * outer.transpose(0, 2, 1) * light[:, :, None]
-    by_between = (by_kernel + by_kernel.transpose(0, 2, 1)) * legendre.legval(between, slopes)
-    by_cosine = by_light * looks.weight.T * (cosine > 0)
-    by_direction = by_between @ v + by_cosine[..., None] * normals[:, None]
-    across = by_direction - (by_direction * v).sum(2, keepdims=True) * v
-    return float(value), across.transpose(1, 0, 2), (by_light * np.maximum(cosine, 0)).T

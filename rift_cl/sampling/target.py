@@ -22,7 +22,7 @@ TargetMode = Literal["volume", "surface"]
 # Frequencies of a set that nobody gave, in space and in the plane; its band in cycles per diameter.
 _IN_SPACE, _IN_PLANE = 1500, 600
 _BAND = 16.0
-_MOST_DEGREE = 8
+_MOST_DEGREE = 32
 # The plastic ratio and the golden one: steps by their powers fill a square and a line evenly
 # (Roberts 2018; in two dimensions the plastic ratio solves x^3 = x + 1, in three x^4 = x + 1).
 _STEPS_3D = 1.2207440846057596 ** -np.arange(1.0, 4.0)
@@ -47,8 +47,11 @@ class Target:
             default the merit counts the tails of its smooth slabs as known.
         band: the highest frequency that is wanted; 16 / diameter by default.
         degree: of the spherical harmonics of a surface's brightness, for the mode ``surface``, 0
-            to 8; 0 for what looks the same from all sides. Views fix no more than (degree + 1)^2
-            of one point, so that many views want a high one.
+            to 32; 0 for what looks the same from all sides. Views that lie closer than half a turn
+            by the degree tell the same.
+        seen_from: (D, 3) directions, from the target, that a surface will be looked at from: what
+            is unknown of its sheen counts there alone. All directions alike when not given; a
+            planner takes those in which its cameras may stand.
         frequencies: (K, 3) the frequencies to count with; by default ``k`` is a set that fills the
             half-ball of the band evenly (coverage at -k is that at k).
 
@@ -67,7 +70,8 @@ class Target:
     snr: float = 1000.0
     band: float | None = None
     frequencies: Floats | None = None
-    degree: int = 3
+    degree: int = 24
+    seen_from: Floats | None = None
 
     def __post_init__(self) -> None:
         """Check the arguments and bring them into their normal form."""
@@ -93,6 +97,9 @@ class Target:
         self._check_mode()
 
     def _check_mode(self) -> None:
+        if self.seen_from is not None:
+            toward = _array("seen_from", self.seen_from, (None, 3))
+            object.__setattr__(self, "seen_from", _units("seen_from", toward))
         if self.degree not in range(_MOST_DEGREE + 1):
             raise InputError(f"Target: degree is {self.degree!r}, wanted 0 to {_MOST_DEGREE}")
         if self.mode not in ("volume", "surface"):
@@ -102,10 +109,7 @@ class Target:
                 raise InputError("Target: mode is surface, wanted normals (P, 3) of its points")
             return
         normals = _array("normals", self.normals, (len(self.points), 3))
-        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        if not lengths.all():
-            raise InputError(f"Target: normals[{int(np.argmin(lengths))}] is zero")
-        object.__setattr__(self, "normals", normals / lengths)
+        object.__setattr__(self, "normals", _units("normals", normals))
 
     @classmethod
     def flat(cls, diameter: float, center: ArrayLike = (0, 0, 0), **settings: Any) -> Target:
@@ -162,6 +166,13 @@ def half_disc(band: float, count: int = _IN_PLANE) -> Floats:
     radius, turn = np.sqrt((i + 0.5) / count), np.mod((i + 1) * _GOLDEN, 1)
     unit = [np.cos(np.pi * turn), np.sin(np.pi * turn), np.zeros(count)]
     return np.asarray(band * radius * np.stack(unit)).T.copy()
+
+
+def _units(name: str, vectors: Floats) -> Floats:
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    if not lengths.all():
+        raise InputError(f"Target: {name}[{int(np.argmin(lengths))}] is zero")
+    return np.asarray(vectors / lengths)
 
 
 def _array(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Floats:

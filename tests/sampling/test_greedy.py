@@ -114,7 +114,7 @@ def test_a_candidate_is_chosen_once_where_that_is_asked():
 def test_directions_are_spread_evenly_over_what_is_allowed():
     limits = Constraints(elevation=(0.2, 1.2), azimuth=(-1, 2))
     site = Site(VOLUME, limits, default_types(VOLUME))
-    angles = spread(site, 900, 3)
+    angles = spread(site.constraints, 900, 3)
     heights = np.sin(angles[:, 1])
     cells, _, _ = np.histogram2d(
         angles[:, 0], heights, (6, 5), range=((-1, 2), (np.sin(0.2), np.sin(1.2)))
@@ -127,7 +127,7 @@ def test_directions_are_spread_evenly_over_what_is_allowed():
 def test_no_two_directions_in_the_plane_lie_opposite_each_other():
     site = Site(VOLUME, Constraints(elevation=(0, 0)), default_types(VOLUME))
     for count in (480, 481):
-        lines = np.sort(spread(site, count, 0)[:, 0] % math.pi)
+        lines = np.sort(spread(site.constraints, count, 0)[:, 0] % math.pi)
         gaps = np.diff(lines, append=lines[0] + math.pi)
         assert gaps.min() > 0.9 * math.pi / count - 1e-3
         assert len(Stations(np.zeros(count, int), np.zeros((count, 7)))) == count

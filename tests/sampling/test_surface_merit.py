@@ -9,6 +9,8 @@ from rift_cl.errors import InputError
 from rift_cl.reference.splat_projection import spherical_harmonics
 from rift_cl.sampling.looks import Looks
 from rift_cl.sampling.merit import merit
+from rift_cl.sampling.prior import directions_for
+from rift_cl.sampling.sheen import variances
 from rift_cl.sampling.surface import surface_merit, texture_coverage
 from rift_cl.sampling.target import Target
 
@@ -64,14 +66,20 @@ def test_sheen_is_that_of_the_matrix_of_harmonics(kind):
     # Of degree 0 the brightness is one number, whose error is known by itself.
     units = looks.direction[:, 0]
     light = units[:, 2]
-    basis = spherical_harmonics(units, degree) * np.sqrt(4 * np.pi)
+    scale = np.sqrt(np.repeat(variances(degree), [1, 3, 5]))
+    basis = spherical_harmonics(units, degree) * np.sqrt(4 * np.pi) * scale
     gram = np.eye(9) + 20 * (basis * light[:, None]).T @ basis
     plain, _ = surface_merit(looks, patch(snr=20.0, degree=0), kind)
     if kind == "wiener":
-        wanted = np.trace(np.linalg.inv(gram)) / 9 - 1 / (1 + 20 * light.sum())
+        toward = directions_for(3, 4000)
+        waves = spherical_harmonics(toward, degree) * np.sqrt(4 * np.pi) * scale
+        variance = ((waves @ np.linalg.inv(gram)) * waves).sum(1)
+        shown = np.maximum(toward[:, 2], 0)
+        wanted = shown @ variance / shown.sum() - 1 / (1 + 20 * light.sum())
     else:
         wanted = (-np.linalg.slogdet(gram)[1] / 9 + np.log1p(20 * light.sum())) / np.log(2)
-    assert both - plain == pytest.approx(wanted)
+    # Evenly spread directions stand for the mean over all of them.
+    assert both - plain == pytest.approx(wanted, rel=2e-3)
 
 
 def test_sheen_wants_views_from_several_sides():
@@ -96,9 +104,10 @@ def test_turning_target_and_views_together_changes_nothing():
     assert merit(there, turned).value == pytest.approx(merit(views, target).value, rel=0.01)
 
 
+@pytest.mark.parametrize("seen_from", [None, [[1, 0.2, 0.4], [0, 1, 0.5], [0.3, -0.2, -1]]])
 @pytest.mark.parametrize("kind", ["wiener", "logdet", "worst"])
-def test_gradients_are_those_of_finite_differences(kind):
-    target = Target((0, 0, 0), 1.0, POINTS, NORMALS, "surface", degree=2)
+def test_gradients_are_those_of_finite_differences(kind, seen_from):
+    target = Target((0, 0, 0), 1.0, POINTS, NORMALS, "surface", degree=2, seen_from=seen_from)
     views, random = cameras(6), np.random.default_rng(5)
     ways = random.normal(size=(6, 3))
     found = merit(views, target, kind).gradient
@@ -130,8 +139,8 @@ def test_what_a_surface_has_not_is_refused():
     target = Target((0, 0, 0), 1.0, POINTS, NORMALS, "surface")
     with pytest.raises(InputError, match="surface has no exact"):
         merit(cameras(2), target, "exact")
-    with pytest.raises(InputError, match="degree is 9"):
-        patch(degree=9)
+    with pytest.raises(InputError, match="degree is 33"):
+        patch(degree=33)
     with pytest.raises(InputError, match="kind is 'best', wanted wiener"):
         surface_merit(looking([[0, 0, 1]]), patch(), "best")
     with pytest.raises(InputError, match="no normals"):

@@ -175,7 +175,7 @@ def targets() -> dict[str, Target]:
     ball = np.stack([side * np.cos(turn), side * np.sin(turn), height], axis=1)
     return {
         VOLUME: Target(TARGET, _DIAMETER),
-        SURFACE: Target(TARGET, _DIAMETER, points=ball, normals=ball, mode="surface", degree=8),
+        SURFACE: Target(TARGET, _DIAMETER, points=ball, normals=ball, mode="surface"),
     }
 
 

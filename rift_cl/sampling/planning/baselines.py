@@ -156,7 +156,7 @@ def _even(site: Site, lens: _Lens, seed: int) -> Stations | None:
     """As many views as wanted of those of a Fibonacci lattice that are allowed."""
     laid = lens.views
     for _ in range(_ROUNDS):
-        stations = _stations(lens, spread(site, laid, seed))
+        stations = _stations(lens, spread(site.constraints, laid, seed))
         clear = np.flatnonzero(allowed(site, stations))
         if len(clear) >= lens.views:
             chosen = np.linspace(0, len(clear) - 1, lens.views).round().astype(int)

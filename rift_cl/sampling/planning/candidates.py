@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
+from rift_cl.sampling.planning.constraints import Constraints
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.site import (
     AZIMUTH,
@@ -26,6 +28,7 @@ from rift_cl.sampling.planning.site import (
 )
 from rift_cl.sampling.planning.spending import affordable
 from rift_cl.sampling.planning.stations import Stations
+from rift_cl.sampling.target import Target
 
 Floats = NDArray[np.float64]
 # Directions, at least and for each view; and candidates of all types and settings.
@@ -35,6 +38,8 @@ _SETTINGS, _TRIAL = 8, 12
 _GOLDEN = (math.sqrt(5) - 1) / 2
 # How often more directions are laid where keep-outs leave few.
 _ROUNDS = 5
+# Directions that a surface will be looked at from, as far as it is not told.
+_LOOKED_FROM = 200
 
 
 def candidates(objective: Objective, views: int, seed: int) -> Stations:
@@ -55,7 +60,7 @@ def candidates(objective: Objective, views: int, seed: int) -> Stations:
     wanted = max(min(least, _CANDIDATES // per_direction), 2 * views)
     laid = wanted
     for attempt in itertools.count():
-        angles = spread(site, laid, seed)
+        angles = spread(site.constraints, laid, seed)
         parts = [_at(angles, kind, rows) for kind, rows in enumerate(settings)]
         stations = Stations.joined(parts)
         open_places = allowed(site, stations)
@@ -74,9 +79,9 @@ def most_candidates(views: int) -> int:
     return max(_CANDIDATES, 2 * views)
 
 
-def spread(site: Site, count: int, seed: int) -> Floats:
+def spread(constraints: Constraints, count: int, seed: int) -> Floats:
     """Azimuth and elevation (count, 2) of directions spread evenly over what is allowed."""
-    (first, last), (low, high) = site.constraints.azimuth, site.constraints.elevation
+    (first, last), (low, high) = constraints.azimuth, constraints.elevation
     shift = float(np.random.default_rng(seed).uniform())
     i = np.arange(count)
     if high - low < 1e-9:
@@ -89,6 +94,17 @@ def spread(site: Site, count: int, seed: int) -> Floats:
     height = math.sin(low) + (i + 0.5) / count * (math.sin(high) - math.sin(low))
     elevation = np.clip(np.arcsin(np.clip(height, -1, 1)), low, high)
     return np.column_stack([first + turn * (last - first), elevation])
+
+
+def looked_at(target: Target, constraints: Constraints) -> Target:
+    """A surface that says from where it will be looked at: if it does not, where cameras may stand.
+
+    Whoever places no camera above a target does not care about what it looks like from there.
+    """
+    if target.mode == "volume" or target.seen_from is not None:
+        return target
+    frames = constraints.frames(spread(constraints, _LOOKED_FROM, 0))
+    return replace(target, seen_from=frames[:, 0])
 
 
 def allowed(site: Site, stations: Stations) -> NDArray[np.bool_]:
@@ -143,7 +159,7 @@ def _best(objective: Objective, kind: int, rows: Floats) -> Floats:
     """Those settings that serve best when every view has them."""
     if len(rows) <= _SETTINGS:
         return rows
-    angles = spread(objective.site, _TRIAL, 0)
+    angles = spread(objective.site.constraints, _TRIAL, 0)
     values = [objective.value(_at(angles, kind, row[None])) for row in rows]
     return rows[np.sort(np.argsort(values, kind="stable")[:_SETTINGS])]
 

@@ -202,6 +202,16 @@ class Constraints:
         start /= np.linalg.norm(start)
         return np.stack([start, np.cross(up, start), up])
 
+    def frames(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(V, 3, 3) rows: unit vectors outwards, along growing azimuth, and upright.
+
+        Args:
+            angles: (V, 2) azimuths and elevations.
+        """
+        (ca, ce), (sa, se) = np.cos(angles).T, np.sin(angles).T
+        local = [[ce * ca, ce * sa, se], [-sa, ca, 0 * ca], [-se * ca, -se * sa, ce]]
+        return np.moveaxis(np.array(local), 2, 0) @ self.axes
+
 
 def _pair(name: str, values: Any) -> Pair:
     numbers = real_numbers(values)

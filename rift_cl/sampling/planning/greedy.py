@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from rift_cl.sampling.planning.pool import Pool
 
 Floats = NDArray[np.float64]
-# Steps towards the best mixture; each tightens the bound.
-_MIXING = 25
 # Sums of costs are compared with the budget up to this part of it; free views cost so little.
 _ROUNDING, _FREE = 1e-9, 1e-12
 
@@ -114,7 +112,7 @@ def bound(pool: Pool, limits: Limits, chosen: list[int]) -> float:
     """
     mixture = np.bincount(chosen, minlength=len(pool)).astype(np.float64)
     best = -np.inf
-    for step in range(_MIXING):
+    for step in range(pool.mixing):
         merit, falls = pool.mixed(mixture)
         least = limits.views * float(falls.max())
         if np.isfinite(limits.total):

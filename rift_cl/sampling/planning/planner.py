@@ -16,7 +16,7 @@ from rift_cl.geometry.numbers import one_number
 from rift_cl.sampling.looks import Looks
 from rift_cl.sampling.merit import CoverageMerit
 from rift_cl.sampling.planning.baselines import Baseline, baselines
-from rift_cl.sampling.planning.candidates import candidates, most_candidates
+from rift_cl.sampling.planning.candidates import candidates, looked_at, most_candidates
 from rift_cl.sampling.planning.constraints import Constraints
 from rift_cl.sampling.planning.free_layout import FreeLayout
 from rift_cl.sampling.planning.frequency_sets import for_planning
@@ -60,7 +60,8 @@ def plan(
     one after another among some 500 directions with each camera type; from there, or from the best
     simple arrangement where that is better, all are moved together (method of moving asymptotes,
     analytic gradient). Views on a path share one type and setting. A target that names no
-    frequencies is planned at four times as many as it has by itself.
+    frequencies is planned at four times as many as it has by itself; a surface that does not say
+    from where it will be looked at, for directions in which its cameras may stand.
 
     Args:
         target: what is looked at.
@@ -82,6 +83,7 @@ def plan(
         if value not in get_args(known):
             raise InputError(f"plan: {name} is {value!r}, wanted one of {get_args(known)}")
     limits = Constraints() if constraints is None else constraints
+    target = looked_at(target, limits)
     fine = for_planning(target, most_candidates(int(views)))
     site = Site(fine, limits, tuple(cameras) or default_types(target))
     require_paid(site)

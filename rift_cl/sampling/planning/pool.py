@@ -15,6 +15,7 @@ from rift_cl.sampling.planning.stations import Stations
 from rift_cl.sampling.planning.surface_pool import SurfacePool
 
 Floats = NDArray[np.float64]
+_MIXING = 25
 
 
 class Pool(Protocol):
@@ -23,6 +24,10 @@ class Pool(Protocol):
     @property
     def start(self) -> float:
         """The merit before the first is chosen."""
+
+    @property
+    def mixing(self) -> int:
+        """Steps towards the best mixture that are worth their time; each tightens a bound."""
 
     def __len__(self) -> int:
         """C."""
@@ -70,6 +75,7 @@ class _VolumePool:
 
     def __init__(self, objective: Objective, each: Floats) -> None:
         self._objective, self._each = objective, each
+        self.mixing = _MIXING
         # A view knows a slab alone, so that most of its coverage is zero.
         self._flat = csr_array(each.reshape(len(each), -1))
         self._known = np.zeros(each.shape[1:])

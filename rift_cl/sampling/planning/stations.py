@@ -51,11 +51,7 @@ class Stations:
 
     def frames(self, site: Site) -> Floats:
         """(V, 3, 3) rows: unit vectors outwards, along growing azimuth, and upright."""
-        azimuth, elevation = self.table[:, AZIMUTH], self.table[:, ELEVATION]
-        (ca, sa), (ce, se) = ((np.cos(angle), np.sin(angle)) for angle in (azimuth, elevation))
-        zero = np.zeros_like(ca)
-        local = [[ce * ca, ce * sa, se], [-sa, ca, zero], [-se * ca, -se * sa, ce]]
-        return np.moveaxis(np.array(local), 2, 0) @ site.constraints.axes
+        return site.constraints.frames(self.table[:, [AZIMUTH, ELEVATION]])
 
     def places(self, site: Site) -> Floats:
         """(V, 3) where the cameras stand."""

@@ -1,14 +1,14 @@
 """Candidates for a surface: what views know of its texture and its sheen, added up view by view.
 
 ``surface_merit`` scores a set of views; a greedy choice asks for thousands of sets that differ by
-one. Here every candidate's part is kept: the coverage of the texture's frequencies, and its
-spherical harmonics at every point, with which one more view changes the inverse of the angular
-information by a matrix of rank one (Sherman and Morrison 1950).
+one. Here every candidate's part is kept: the coverage of the texture's frequencies, and how its
+brightness at every point hangs together with that in all directions which are wanted. One more
+view changes those covariances by a matrix of rank one.
 """
 
 from __future__ import annotations
 
-import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,31 @@ from rift_cl.sampling.looks import Looks
 from rift_cl.sampling.planning.objective import Objective, joined, some
 from rift_cl.sampling.planning.stations import Stations
 from rift_cl.sampling.prior import checked_power
+from rift_cl.sampling.sheen import covariance, light_of, shown, wanted_of
 from rift_cl.sampling.surface import texture_coverage
 from rift_cl.sampling.target import half_disc
 
 Floats = NDArray[np.float64]
+# Steps towards the best mixture of all candidates, and for how many of them that is not too long.
+_MIXING, _FEW = 4, 600
+
+
+class _Sheen(NamedTuple):
+    """Brightness of P points given what is chosen: S views, candidates and others, D directions.
+
+    Args:
+        toward: (P, S, D) covariances of views and wanted directions.
+        variance: (P, S) of the views.
+        left: (P, D) of the wanted directions.
+        rows: (P, S) each, whose products were taken from the views' own covariances.
+        bits: (P,) of information.
+    """
+
+    toward: Floats
+    variance: Floats
+    left: Floats
+    rows: tuple[Floats, ...]
+    bits: Floats
 
 
 class SurfacePool:
@@ -34,19 +55,28 @@ class SurfacePool:
     """
 
     def __init__(self, objective: Objective, looks: Looks, texture: Floats | None = None) -> None:
-        target = objective.site.target
-        self._objective, self._looks, self._snr = objective, looks, target.snr
+        target, fixed = objective.site.target, objective.fixed
+        self._objective, self._looks, self._target = objective, looks, target
         self._texture = _texture(looks, objective) if texture is None else texture
         self._plane = half_disc(target.highest, self._texture.shape[2])
         self._power = checked_power(target.prior, self._plane, target.diameter)
-        # (C, P, waves), so that their products with themselves are a view's angular information.
-        self._waves = self._harmonics(looks)
-        fixed = objective.fixed
         self._base = 0 * self._texture[0] if fixed is None else texture_coverage(fixed, target)
-        before = self._waves[:0] if fixed is None else self._harmonics(fixed)
-        self._given = np.eye(self._waves.shape[2]) + np.einsum("vpi,vpj->pij", before, before)
+        # Views that are there already stand behind the candidates.
+        views = looks if fixed is None else joined([looks, fixed])
+        self._views = views.direction.transpose(1, 0, 2)
+        normals = np.zeros((views.points, 3)) if target.normals is None else target.normals
+        self._light = target.snr * light_of(views, normals)
+        self._share = shown(target, normals).T / len(wanted_of(target))
+        self._given = self._before()
+        for index in range(len(self), views.views):
+            self._given = self._with(self._given, index)
         self.clear()
-        self.start = self._scored(self._base).value + self._angular()
+        self.start = self._scored(self._base).value + self._error(self._sheen)
+
+    @property
+    def mixing(self) -> int:
+        """Steps towards the best mixture that are worth their time."""
+        return _MIXING if len(self) <= _FEW else 1
 
     def __len__(self) -> int:
         """C."""
@@ -54,28 +84,27 @@ class SurfacePool:
 
     def clear(self) -> None:
         """Choose none."""
-        self._known = self._base
-        self._inverse, self._bits = np.linalg.inv(self._given), self._bits_of(self._given)
+        self._known, self._sheen = self._base, self._given
 
     def merit_with(self, index: int) -> float:
         """The merit of what is chosen, and one more."""
-        turned, more = self._turned(index)
         texture = self._scored(self._known + self._texture[index]).value
+        light, sheen = self._light[:, index], self._sheen
+        more = 1 + light * sheen.variance[:, index]
         if self._objective.kind == "logdet":
-            return texture + self._angular() - self._per_wave(np.log2(more))
-        return texture + self._angular() - self._per_wave((turned**2).sum(1) / more)
+            return texture + self._error(sheen) - self._per_wave(np.log2(more))
+        lost = (self._share * sheen.toward[:, index] ** 2).sum(1) * light / more
+        return texture + self._error(sheen) - float(lost.mean())
 
     def add(self, index: int) -> None:
         """Choose one more."""
-        turned, more = self._turned(index)
         self._known = self._known + self._texture[index]
-        product = turned[:, :, None] * turned[:, None]
-        self._inverse = self._inverse - product / more[:, None, None]
-        self._bits = self._bits + np.log2(more)
+        self._sheen = self._with(self._sheen, index)
 
     def ceilings(self) -> Floats:
         """(C,) by how much one more of each lowers the merit at the most."""
-        return self._falls(self._scored(self._known).gradient, self._inverse)
+        slope = self._scored(self._known).gradient
+        return self._falls(slope, self._sheen.toward, self._sheen.variance)
 
     def with_views(self, stations: Stations) -> SurfacePool:
         """A pool with some more candidates, and none chosen."""
@@ -86,67 +115,71 @@ class SurfacePool:
     def mixed(self, amounts: Floats) -> tuple[float, Floats]:
         """The merit of so much of each candidate (C,), and how fast it falls with each."""
         scored = self._scored(self._base + np.tensordot(amounts, self._texture, 1))
-        weighted = self._waves * np.sqrt(amounts)[:, None, None]
-        points = weighted.transpose(1, 2, 0)
-        information = self._given + points @ points.transpose(0, 2, 1)
-        inverse = np.linalg.inv(information)
-        if self._objective.kind == "logdet":
-            angular = -self._per_wave(self._bits_of(information))
-        else:
-            angular = self._per_wave(np.trace(inverse, axis1=1, axis2=2))
-        return scored.value + angular, self._falls(scored.gradient, inverse)
+        some_of_each = np.concatenate([amounts, np.ones(self._light.shape[1] - len(amounts))])
+        used = np.flatnonzero(some_of_each)
+        light, before = self._light[:, used] * some_of_each[used], self._before()
+        between = covariance(self._views, self._views[:, used], self._target.degree)
+        gram = np.eye(len(used)) + light[:, :, None] * between[:, used]
+        of_used = [before.toward[:, used], between.transpose(0, 2, 1)]
+        solved = np.linalg.solve(gram, light[:, :, None] * np.concatenate(of_used, axis=2))
+        wanted = before.toward.shape[2]
+        toward = before.toward - between @ solved[:, :, :wanted]
+        variance = before.variance - (between * solved[:, :, wanted:].transpose(0, 2, 1)).sum(2)
+        left = before.left - (before.toward[:, used] * solved[:, :, :wanted]).sum(1)
+        bits = np.linalg.slogdet(gram)[1] / np.log(2)
+        sheen = _Sheen(toward, variance, left, (), bits)
+        return scored.value + self._error(sheen), self._falls(scored.gradient, toward, variance)
+
+    def _before(self) -> _Sheen:
+        """With no view at all."""
+        wanted, degree = wanted_of(self._target), self._target.degree
+        toward = covariance(self._views, wanted[None], degree)
+        variance, left = np.ones(toward.shape[:2]), np.ones((len(toward), len(wanted)))
+        return _Sheen(toward, variance, left, (), np.zeros(len(toward)))
+
+    def _with(self, sheen: _Sheen, index: int) -> _Sheen:
+        """With one view more, by Schur's complement."""
+        one = self._views[:, index, None]
+        across = covariance(self._views, one, self._target.degree)[:, :, 0]
+        for row in sheen.rows:
+            across = across - row * row[:, index, None]
+        light = self._light[:, index]
+        more = 1 + light * sheen.variance[:, index]
+        root = np.sqrt(light / more)[:, None]
+        row, column = root * across, root * sheen.toward[:, index]
+        return _Sheen(
+            sheen.toward - row[:, :, None] * column[:, None],
+            sheen.variance - row**2,
+            sheen.left - column**2,
+            (*sheen.rows, row),
+            sheen.bits + np.log2(more),
+        )
 
     def _scored(self, coverage: Floats) -> criteria.Scored:
         kind = self._objective.kind
-        return criteria.scored(kind, coverage, self._power, self._snr, self._plane)
+        return criteria.scored(kind, coverage, self._power, self._target.snr, self._plane)
 
-    def _angular(self) -> float:
+    def _error(self, sheen: _Sheen) -> float:
         if self._objective.kind == "logdet":
-            return -self._per_wave(self._bits)
-        return self._per_wave(np.trace(self._inverse, axis1=1, axis2=2))
+            return -self._per_wave(sheen.bits)
+        return float((self._share * sheen.left).sum(1).mean())
 
-    def _turned(self, index: int) -> tuple[Floats, Floats]:
-        """(P, waves) the inverse times a candidate's waves, and (P,) 1 + waves inverse waves."""
-        waves = self._waves[index]
-        turned = np.einsum("pij,pj->pi", self._inverse, waves)
-        return turned, 1 + (turned * waves).sum(1)
-
-    def _falls(self, slope: Floats, inverse: Floats) -> Floats:
+    def _falls(self, slope: Floats, toward: Floats, variance: Floats) -> Floats:
+        count = len(self)
         texture = -np.tensordot(self._texture, slope, 2)
-        turned = np.matmul(self._waves.transpose(1, 0, 2), inverse)
         if self._objective.kind == "logdet":
-            products = (turned * self._waves.transpose(1, 0, 2)).sum(2) / math.log(2)
-        else:
-            products = (turned**2).sum(2)
-        return np.asarray(texture + products.sum(0) / (len(products) * inverse.shape[1]))
+            bits = self._light[:, :count] * variance[:, :count] / np.log(2)
+            return np.asarray(texture + bits.mean(0) / self._waves)
+        lost = np.einsum("psd,pd->ps", toward[:, :count] ** 2, self._share)
+        return np.asarray(texture + (self._light[:, :count] * lost).mean(0))
 
-    def _per_wave(self, values: Floats) -> float:
-        """Mean over points of a sum over harmonics, for each of those."""
-        return float(values.mean() / self._waves.shape[2])
+    @property
+    def _waves(self) -> int:
+        return (self._target.degree + 1) ** 2
 
-    @staticmethod
-    def _bits_of(information: Floats) -> Floats:
-        return np.asarray(np.linalg.slogdet(information)[1] / math.log(2))
-
-    def _harmonics(self, looks: Looks) -> Floats:
-        """(V, P, waves) spherical harmonics, mean square 1, times the root of snr and light."""
-        from scipy.special import lpmv
-
-        target = self._objective.site.target
-        normals = np.zeros((looks.points, 3)) if target.normals is None else target.normals
-        x, y, z = np.moveaxis(looks.direction, 2, 0)
-        turn, waves = np.arctan2(y, x), []
-        for degree, order in ((n, m) for n in range(target.degree + 1) for m in range(n + 1)):
-            scale = (
-                (2 * degree + 1) * math.factorial(degree - order) / math.factorial(degree + order)
-            )
-            height = math.sqrt(scale * (2 if order else 1)) * lpmv(order, degree, z)
-            waves.append(height * np.cos(order * turn))
-            if order:
-                waves.append(height * np.sin(order * turn))
-        cosine = np.maximum(np.einsum("vpd,pd->vp", looks.direction, normals), 0)
-        light = target.snr * looks.weight * cosine
-        return np.asarray(np.stack(waves, axis=2) * np.sqrt(light)[:, :, None])
+    def _per_wave(self, bits: Floats) -> float:
+        """Mean over points, for each harmonic."""
+        return float(bits.mean() / self._waves)
 
 
 def _texture(looks: Looks, objective: Objective) -> Floats:
