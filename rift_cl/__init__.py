@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from rift_cl import metrics, phantom
+    from rift_cl import basis, metrics, phantom
     from rift_cl.cl import Device, default_device, devices, open_device
     from rift_cl.errors import RiftError
     from rift_cl.geometry import Aperture, Camera, CameraType, FanBeam, Grid, Parallel
@@ -77,7 +77,7 @@ _HOMES = {
     "sirt": "reconstruct",
     "tv": "reconstruct",
 }
-_MODULES = ("metrics", "phantom")
+_MODULES = ("basis", "metrics", "phantom")
 
 __all__ = [
     "Aperture",
@@ -103,6 +103,7 @@ __all__ = [
     "Splats",
     "Target",
     "backproject",
+    "basis",
     "cgls",
     "coverage",
     "default_device",

@@ -27,6 +27,10 @@ class DTypeError(InputError, TypeError):
     """An array has a type that has no meaning here."""
 
 
+class BasisSpanError(InputError):
+    """A function of one basis was wanted in another that does not hold it."""
+
+
 class NonFiniteError(InputError):
     """An array holds NaN or infinity."""
 

@@ -1,0 +1,44 @@
+"""Functions that splats are made of: Gaussians times polynomials, and colours by direction.
+
+Over space (``Basis``): Gaussian, Hermite, Laguerre, SquaredHermite. Over directions
+(``AngularBasis``): harmonics and lobes.
+"""
+
+from rift_cl.basis.angular import (
+    ANGULAR_KINDS,
+    AngularBasis,
+    AnisotropicSphericalGaussians,
+    HGLobe,
+    LGLobe,
+    SphericalGaussians,
+    SphericalHarmonics,
+    angular_basis,
+)
+from rift_cl.basis.footprint import Footprint, footprint
+from rift_cl.basis.gaussian import Gaussian
+from rift_cl.basis.hermite import Hermite
+from rift_cl.basis.laguerre import Laguerre
+from rift_cl.basis.protocol import Basis, Evaluation
+from rift_cl.basis.registry import BASES, basis_named
+from rift_cl.basis.squared_hermite import SquaredHermite
+
+__all__ = [
+    "ANGULAR_KINDS",
+    "BASES",
+    "AngularBasis",
+    "AnisotropicSphericalGaussians",
+    "Basis",
+    "Evaluation",
+    "Footprint",
+    "Gaussian",
+    "HGLobe",
+    "Hermite",
+    "LGLobe",
+    "Laguerre",
+    "SphericalGaussians",
+    "SphericalHarmonics",
+    "SquaredHermite",
+    "angular_basis",
+    "basis_named",
+    "footprint",
+]
