@@ -1,8 +1,10 @@
 /* From what is trained to what is drawn.
  *
  *     scale = exp(log_scale),    opacity = sigmoid(logit), or exp(logit) with DENSITY,
+ *                                or -ln(1 - sigmoid(logit)) = ln(1 + exp(logit)) with AMPLITUDE,
  *
- * both held inside what float32 can hold and a rasterizer can use. With BAND no splat is finer than
+ * which is the optical depth that leaves alpha = sigmoid(logit) at the peak of a plain Gaussian; all
+ * held inside what float32 can hold and a rasterizer can use. With BAND no splat is finer than
  * the cameras could see (the 3D filter of Mip-Splatting, Yu et al. 2024): it is blurred by a Gaussian
  * of standard deviation b, and fades as it spreads,
  *

@@ -6,7 +6,12 @@
  *     dL/dlogit = slope (f dL/do' + opacity_penalty / N),
  *
  * where slope is o (1 - o), or o for densities: the penalties are those of the loss
- * opacity_penalty mean(o) + scale_penalty mean(s) (3DGS as MCMC, Kheradmand et al. 2024). In place:
+ * opacity_penalty mean(o) + scale_penalty mean(s) (3DGS as MCMC, Kheradmand et al. 2024). Where o is
+ * an optical depth it has no bound, and the penalty is of what it hides, p = sigmoid(logit):
+ *
+ *     dL/dlogit = p f dL/do' + p (1 - p) opacity_penalty / N.
+ *
+ * In place:
  * gradients come in by what is drawn and go out by what is trained. Index space: splats. */
 
 #include "include/portable.h"
@@ -30,6 +35,11 @@ KERNEL void splat_activate_grad(
 #endif
     by_scales[3 * i + k] = by;
   }
+#if AMPLITUDE
+  const float hidden = 1 / (1 + exp(-logits[i]));
+  by_opacities[i] = hidden * (a.faded * by_opacity + (1 - hidden) * each_opacity);
+#else
   const float slope = DENSITY ? a.opacity : a.opacity * (1 - a.opacity);
   by_opacities[i] = slope * (a.faded * by_opacity + each_opacity);
+#endif
 }

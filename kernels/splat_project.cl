@@ -12,6 +12,7 @@
  * at the latest; line integrals, which no display rounds, and SMOOTH cut-offs end at EXTENT always.
  * What ends there is the share (1/255) / weight of a splat's light: next to nothing in focus, but
  * all of it where an aperture spreads a small splat over so many pixels that no weight is left.
+ * MODAL splats, which have Hermite modes or another activation, end where hermite_extent.h says.
  *
  * Splats that are not drawn get zeros and the reason in `culled`, the first of: not finite or
  * degenerate in what was given (2), out of depth (1), too large to tell (2), too faint (3),
@@ -31,6 +32,10 @@
 #endif
 /* Standard deviations; splat.h stops adding line integrals there as well. */
 #define EXTENT (XRAY ? 4.0f : 3.33f)
+/* Whether splats have Hermite modes or another activation. */
+#ifndef MODAL
+#define MODAL 0
+#endif
 /* Extents are held at this, so that rounded up they fit an int with room to add. */
 #define MOST_PIXELS 1e9f
 #define FAINTEST (1.0f / 255.0f)
@@ -54,16 +59,38 @@ static float natural_log(float x) {
   return e * 0.69314718f + 2 * s * series;
 }
 
+#if MODAL
+#include "include/hermite_project.h"
+#include "include/hermite_edge.h"
+#include "include/hermite_extent.h"
+#define MODE_PARAMETERS , __global const float *restrict shape_modes, __global const float *restrict color_modes
+#define NORMS_PARAMETER , const ModeNorms *norms
+#define NORMS , &norms
+#define NORMS_AGAIN , norms
+#else
+#define MODE_PARAMETERS
+#define NORMS_PARAMETER
+#define NORMS
+#define NORMS_AGAIN
+#endif
+
 /* Extent of a splat on the screen and in tiles; gives VISIBLE, or why it is not drawn. */
 static int bound(
-    const Gaussian *g, float weight, float radius_clip, int width, int height, float *extents, int *box)
+    const Gaussian *g, float weight, float radius_clip, int width, int height, float *extents, int *box
+    NORMS_PARAMETER)
 {
+#if MODAL
+  if (!(weight >= LEAST_NORMAL)) return TOO_FAINT;
+  const float extent = modal_extent(norms, weight);
+  if (extent < 0) return TOO_FAINT;
+#else
   float extent = EXTENT;
   if (!(weight >= (XRAY ? LEAST_NORMAL : FAINTEST))) return TOO_FAINT;
   if (!XRAY && !SMOOTH) {
     const float at_threshold = sqrt(2 * natural_log(larger(weight / FAINTEST, 1)));
     extent = at_threshold < EXTENT ? at_threshold : EXTENT;
   }
+#endif
   const float reach_x = extent * sqrt(dot3(g->v0, g->v0) + g->eps);
   const float reach_y = extent * sqrt(dot3(g->v1, g->v1) + g->eps);
   extents[0] = reach_x < MOST_PIXELS ? reach_x : MOST_PIXELS;
@@ -84,7 +111,7 @@ static int bound(
 /* The screen's row of a splat, its rectangles, and why it is not drawn. */
 static int project(
     const Gaussian *g, float opacity, float radius_clip, int width, int height,
-    float *row, int *box)
+    float *row, int *box NORMS_PARAMETER)
 {
   row[0] = g->screen.u;
   row[1] = g->screen.v;
@@ -93,14 +120,17 @@ static int project(
   row[4] = (dot3(g->v0, g->v0) + g->eps) * g->inverse;
   row[5] = opacity * g->factor;
   if (not_finite(row[2]) | not_finite(row[3]) | not_finite(row[4]) | not_finite(row[5])) return DEGENERATE;
-  return bound(g, row[5], radius_clip, width, height, row + 6, box);
+#if MODAL
+  if (!modes_are_finite(norms) || !whitening_is_finite(g)) return DEGENERATE;
+#endif
+  return bound(g, row[5], radius_clip, width, height, row + 6, box NORMS_AGAIN);
 }
 
 KERNEL void splat_project(
     __global const float *restrict means, SHAPES, __global const float *restrict opacities,
     __global float *restrict screen, __global float *restrict depths, __global int *restrict boxes,
     __global uchar *restrict culled, CAMERA_PARAMETERS,
-    float near_plane, float far_plane, float radius_clip, float eps2d, int count)
+    float near_plane, float far_plane, float radius_clip, float eps2d, int count MODE_PARAMETERS)
 {
   const long i = get_global_id(0);
   if (i >= count) return;
@@ -110,7 +140,10 @@ KERNEL void splat_project(
   const float opacity = opacities[i];
   int code = not_finite(opacity) ? DEGENERATE
       : see_gaussian(&g, CAMERA, means, SHAPE, i, near_plane, far_plane, eps2d);
-  if (code == VISIBLE) code = project(&g, opacity, radius_clip, width, height, row, box);
+#if MODAL
+  const ModeNorms norms = norms_of(shape_modes, color_modes, i);
+#endif
+  if (code == VISIBLE) code = project(&g, opacity, radius_clip, width, height, row, box NORMS);
   const int drawn = code == VISIBLE;
   for (int k = 0; k < 8; k++) screen[8 * i + k] = drawn ? row[k] : 0;
   for (int k = 0; k < 4; k++) boxes[4 * i + k] = drawn ? box[k] : 0;

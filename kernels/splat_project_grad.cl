@@ -11,6 +11,9 @@
  * and back through V = J W F to everything that J, W and F are made of. With COVARIANCES dL/dH is
  * needed for H = V V^T: -Q S2 Q / 2 + what the factor adds, and then M^T dL/dH M.
  *
+ * With VIEW_PARTS what flows into V besides comes as view_parts[i], dL/dV's rows: the modes of
+ * hermite_project_grad.cl hang on V at a fixed screen covariance as well.
+ *
  * With DEPTH the last feature is the splat's depth. With CAMERA_GRADIENT each splat leaves its
  * part of dL/d(view, rows of 4), dL/d(fx, fy, cx, cy) in camera_parts, and with DEFOCUS as well of
  * dL/d(radius, focus) in aperture_parts. Nothing flows through extents and culls; splats that are
@@ -38,6 +41,9 @@
 #ifndef FIRST_MOMENTS
 #define FIRST_MOMENTS 1
 #endif
+#ifndef VIEW_PARTS
+#define VIEW_PARTS 0
+#endif
 #define RECORD (6 + CHANNELS + 2 * ABSGRAD)
 
 #if COVARIANCES
@@ -52,6 +58,12 @@
 #define APERTURE_GRADIENTS , __global float *restrict aperture_parts
 #else
 #define APERTURE_GRADIENTS
+#endif
+
+#if VIEW_PARTS
+#define VIEW_PARAMETER , __global const float *restrict view_parts
+#else
+#define VIEW_PARAMETER
 #endif
 
 static void clear(__global float *p, int length) {
@@ -182,7 +194,8 @@ KERNEL void splat_project_grad(
     float near_plane, float far_plane, float eps2d, int count,
     __global float *restrict grad_means, SHAPE_GRADIENTS, __global float *restrict grad_opacities,
     __global float *restrict grad_features, __global float *restrict grad_means2d,
-    __global float *restrict grad_means2d_abs, __global float *restrict camera_parts APERTURE_GRADIENTS)
+    __global float *restrict grad_means2d_abs, __global float *restrict camera_parts APERTURE_GRADIENTS
+    VIEW_PARAMETER)
 {
   const long i = get_global_id(0);
   if (i >= count) return;
@@ -205,7 +218,15 @@ KERNEL void splat_project_grad(
   const Camera camera = CAMERA;
   Gaussian g;
   see_gaussian(&g, camera, means, SHAPE, i, near_plane, far_plane, eps2d);
+#if VIEW_PARTS
+  ViewGradient view = dilate_grad(&g, s);
+  view.v0 += load3(view_parts, 2 * i);
+  view.v1 += load3(view_parts, 2 * i + 1);
+  view.m0 = apply3(g.root, view.v0);
+  view.m1 = apply3(g.root, view.v1);
+#else
   const ViewGradient view = dilate_grad(&g, s);
+#endif
   const float2 first = (float2)(s[1], s[2]), uv = FIRST_MOMENTS ? apply_conic(&g, first) : first;
   const CameraGradient point = screen_grad(&g, camera, &view, uv, DEPTH ? s[6 + CHANNELS - 1] : 0);
   grad_opacities[i] = -s[0] / opacities[i];

@@ -4,6 +4,9 @@
 #ifndef DENSITY
 #define DENSITY 0
 #endif
+#ifndef AMPLITUDE
+#define AMPLITUDE 0
+#endif
 #ifndef BAND
 #define BAND 0
 #endif
@@ -14,7 +17,13 @@
 
 static float held_exp(float x) { return exp(x < LEAST_LOG ? LEAST_LOG : x > MOST_LOG ? MOST_LOG : x); }
 
-/* Scales as trained and as drawn, the opacity as trained, and what the limit leaves of it. */
+#if AMPLITUDE
+/* ln(1 + exp(x)), the optical depth that hides sigmoid(x) of what is behind it. */
+static float softplus(float x) { return fmax(x, 0.0f) + log1p(exp(-fabs(x))); }
+#endif
+
+/* Scales as trained and as drawn, the opacity as trained (or the density, or the optical depth), and
+ * what the limit leaves of it. */
 typedef struct {
   float trained[3], drawn[3], opacity, faded;
 } Activation;
@@ -31,6 +40,10 @@ static Activation activated(
     a.faded *= a.trained[k] / a.drawn[k];
 #endif
   }
+#if AMPLITUDE
+  a.opacity = softplus(logits[i]);
+#else
   a.opacity = DENSITY ? held_exp(logits[i]) : 1 / (1 + exp(-logits[i]));
+#endif
   return a;
 }

@@ -38,14 +38,18 @@ def activate(
     *,
     band: Floats | float = 0.0,
     density: bool = False,
+    amplitude: bool = False,
 ) -> tuple[Floats, Floats]:
-    """Scales and opacities, or densities; ``band`` blurs splats as Mip-Splatting's 3D filter does.
+    """Scales and opacities, or densities, or optical depths.
 
-    The gradient of this is the gradient kernel's oracle, by finite differences.
+    ``band`` blurs splats as Mip-Splatting's 3D filter does. The gradient of this is the gradient
+    kernel's oracle, by finite differences.
     """
     trained = np.exp(np.clip(log_scales, -30, 30))
     scales = np.sqrt(trained**2 + np.broadcast_to(band, logits.shape)[:, None] ** 2)
     opacities = np.exp(np.clip(logits, -30, 30)) if density else 1 / (1 + np.exp(-logits))
+    if amplitude:
+        opacities = np.logaddexp(0, logits)
     return scales, opacities * np.prod(trained / scales, axis=1)
 
 

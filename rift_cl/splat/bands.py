@@ -8,7 +8,7 @@ records are summed in the order of the tiles whatever the band, so that every bi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.errors import ResourceLimitError
+from rift_cl.splat.hermite import is_modal, moment_count, table_width
 from rift_cl.splat.projection import MOMENTS
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
@@ -39,6 +40,8 @@ class FrameMemory:
         channels: of the image.
         gradient: whether its gradient is wanted as well.
         absgrad: whether that has the magnitudes.
+        table: floats of a splat's modes on the screen; 0 for plain splats.
+        moments: floats of a (splat, tile) pair's record where there are modes; 0 for plain ones.
     """
 
     splats: int
@@ -47,6 +50,8 @@ class FrameMemory:
     channels: int
     gradient: bool = False
     absgrad: bool = False
+    table: int = 0
+    moments: int = 0
 
     @classmethod
     def of(
@@ -60,20 +65,26 @@ class FrameMemory:
         floats = sum(array.size for array in vars(splats).values() if array is not None)
         parameters = -(-floats // max(len(splats), 1))
         pixels = size[0] * size[1]
-        return cls(len(splats), parameters, pixels, channels, absgrad=settings.absgrad)
+        plain = cls(len(splats), parameters, pixels, channels, absgrad=settings.absgrad)
+        if not is_modal(splats, settings):
+            return plain
+        return replace(plain, table=table_width(splats), moments=moment_count(splats, channels))
 
     @property
     def record(self) -> int:
         """Floats of a (splat, tile) pair's record."""
-        return MOMENTS + self.channels + 2 * self.absgrad
+        return self.moments or MOMENTS + self.channels + 2 * self.absgrad
 
     @property
     def fixed(self) -> int:
         """Bytes that are taken however the image is cut: parameters, screen, image."""
-        splat = 4 * self.parameters + _PROJECTED + 4 * self.channels
+        splat = 4 * (self.parameters + self.table) + _PROJECTED + 4 * self.channels
         pixel = 4 * self.channels + 8
         if self.gradient:
             splat += 4 * (self.parameters + self.record + self.channels + 4) + _CAMERA
+            if self.moments:
+                # What the moments of modes become before they are gradients.
+                splat += 4 * (MOMENTS + self.channels + 6)
             # The gradients that come in, those of expected depth, the background's parts.
             pixel += 12 * self.channels + 16
         # Sums over columns leave their first level, a part of what they add up.

@@ -17,6 +17,7 @@ from rift_cl.cl.device import Device
 from rift_cl.splat.bands import FrameMemory, plan_bands
 from rift_cl.splat.projected import Projected
 from rift_cl.splat.raster import Raster, ScreenSplats, raster_grad, rasterize, sum_slots
+from rift_cl.splat.screen_modes import ScreenModes
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.tile_lists import TileLists, count_tiles, list_tiles, tile_lists
 from rift_cl.splat.tiles import Tiles
@@ -35,6 +36,7 @@ class Drawing:
         memory: what it takes.
         lists: the tile lists; None where they did not fit and the image was drawn in bands.
         raster: the image, and what the raster left for its gradient.
+        modes: the splats' polynomials on the screen; None for plain splats.
     """
 
     projected: Projected
@@ -45,6 +47,7 @@ class Drawing:
     memory: FrameMemory
     lists: TileLists | None
     raster: Raster
+    modes: ScreenModes | None = None
 
     @property
     def tiles(self) -> Tiles:
@@ -54,7 +57,7 @@ class Drawing:
     @property
     def screen(self) -> ScreenSplats:
         """The splats as the raster takes them."""
-        return ScreenSplats(self.projected.screen, self.features)
+        return ScreenSplats(self.projected.screen, self.features, self.modes)
 
 
 def draw(
@@ -66,6 +69,7 @@ def draw(
     settings: SplatSettings,
     memory: FrameMemory,
     background: Any = None,
+    modes: ScreenModes | None = None,
 ) -> Drawing:
     """Draw splats, at once if they fit the budget.
 
@@ -77,31 +81,36 @@ def draw(
         settings: how to draw.
         memory: what a frame takes.
         background: (D,); black if not given.
+        modes: the splats' polynomials on the screen, if they have any.
 
     Raises:
         ResourceLimitError: not even one row of tiles fits the budget.
     """
     tiles, sort = Tiles.of(size, settings.tile), settings.mode == "light"
-    screen = ScreenSplats(projected.screen, features)
+    screen = ScreenSplats(projected.screen, features, modes)
     counts = count_tiles(device, projected.boxes, projected.depths, tiles)
     lists, raster = None, None
     if _fits(memory, counts.n_entries, tiles, device.budget):
         lists = list_tiles(device, counts, sort=sort)
         raster = rasterize(device, screen, lists, size, settings=settings, background=background)
-        return Drawing(projected, features, size, settings, background, memory, lists, raster)
+        return Drawing(
+            projected, features, size, settings, background, memory, lists, raster, modes
+        )
     del counts
     for band in _bands(device, projected, tiles, memory, sort=sort):
         raster = rasterize(
             device, screen, band, size, settings=settings, background=background, into=raster
         )
     assert raster is not None
-    return Drawing(projected, features, size, settings, background, memory, None, raster)
+    return Drawing(projected, features, size, settings, background, memory, None, raster, modes)
 
 
 def draw_grad(
     device: Device, drawing: Drawing, grad_image: Any, grad_transmittance: Any = None
 ) -> Any:
-    """Each splat's sums over its tiles of what the raster's gradient leaves: (N, 6 + D [+ 2]).
+    """Each splat's sums over its tiles of what the raster's gradient leaves.
+
+    (N, 6 + D [+ 2]), or with modes (N, P): see ``raster_grad``.
 
     Args:
         device: where the arrays are.

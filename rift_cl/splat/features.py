@@ -1,8 +1,12 @@
-"""What splats show: their colours from spherical harmonics, features of any number, depth.
+"""What splats show: their colours by the viewing direction, features of any number, depth.
 
-All of it stands in one table of features, (N, D), in this order: three colours of the harmonics,
-the splats' own ``colors``, depth; each where it is asked for. ``kernels/splat_shade.cl`` says what
-a colour is.
+All of it stands in one table of features, (N, D), in this order: three shaded colours, the
+splats' own ``colors``, depth; each where it is asked for. ``kernels/splat_shade.cl`` says what a
+colour of spherical harmonics is, ``kernels/lobe_shade.cl`` what one of lobes is.
+
+``angular`` names the functions: ``sh`` with ``sh`` (N, K, 3) alone, or one of the lobes of
+``rift_cl.basis.angular`` with ``sh`` (N, L, 3) as their linear coefficients and ``lobes`` (N, G)
+as their geometry.
 """
 
 from __future__ import annotations
@@ -12,12 +16,17 @@ from typing import Any
 
 import numpy as np
 
+from rift_cl.basis.angular import ANGULAR_KINDS, angular_basis
 from rift_cl.cl.arithmetic import copy_columns
 from rift_cl.cl.device import Device
+from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Camera
 from rift_cl.splat.projected import Projected, SplatGradients
 from rift_cl.splat.splats import Splats
+
+# The numbers that kernels/include/lobe.h knows the kinds of lobes by.
+_LOBES = {"hg": 0, "lg": 1, "sg": 2, "asg": 3}
 
 
 @dataclass(frozen=True)
@@ -25,7 +34,7 @@ class Channels:
     """How many channels of each kind there are.
 
     Args:
-        shaded: 3 where colours come from spherical harmonics, otherwise 0.
+        shaded: 3 where colours depend on the viewing direction, otherwise 0.
         own: of the splats' ``colors``.
         depth: 1 where depth is drawn, otherwise 0.
 
@@ -62,14 +71,21 @@ class Channels:
 
 
 def gather_features(
-    device: Device, splats: Splats, camera: Camera, projected: Projected, channels: Channels
+    device: Device,
+    splats: Splats,
+    camera: Camera,
+    projected: Projected,
+    channels: Channels,
+    *,
+    angular: str = "sh",
 ) -> Any:
-    """The table of features, (N, D), as seen from the camera."""
+    """The table of features, (N, D), as seen from the camera; see ``shade`` for the errors."""
     if channels.total == channels.own:
         return splats.colors
     features = device.empty((len(splats), channels.total))
     if channels.shaded:
-        shade(device, splats.means, splats.sh, camera, projected.culled, into=features)
+        given = (splats.means, splats.sh, camera, projected.culled)
+        shade(device, *given, into=features, lobes=splats.lobes, angular=angular)
     if channels.own:
         copy_columns(device, splats.colors, 0, features, channels.shaded, channels.own)
     if channels.depth:
@@ -87,34 +103,45 @@ def own_columns(device: Device, table: Any, channels: Channels) -> Any:
 
 
 def shade(
-    device: Device, means: Any, sh: Any, camera: Camera, culled: Any, *, into: Any = None
+    device: Device,
+    means: Any,
+    sh: Any,
+    camera: Camera,
+    culled: Any,
+    *,
+    into: Any = None,
+    lobes: Any = None,
+    angular: str = "sh",
 ) -> Any:
-    """Colours of splats with spherical harmonics, as seen from the camera's centre.
+    """Colours of splats as seen from the camera's centre.
 
     Args:
         device: where the arrays are.
         means: (N, 3) positions.
-        sh: (N, K, 3) coefficients.
+        sh: (N, K, 3) coefficients of spherical harmonics, or the linear ones of the lobes.
         camera: the view.
         culled: (N,) why a splat is not drawn; those that are not are black.
         into: a table of features whose first three columns are written; a new one if not given.
+        lobes: (N, G) geometry of the lobes; None for spherical harmonics.
+        angular: what the colours are made of.
 
     Returns:
         The table, (N, 3) if it is new.
 
     Raises:
-        InputError: the splats have no spherical harmonics.
+        InputError: the splats have no coefficients, or no such functions are known.
+        ShapeError: the coefficients and the lobes do not fit the functions.
     """
-    _check_harmonics(sh)
+    shading = _Shading.of(means, sh, lobes, angular)
     count = means.shape[0]
     features = device.empty((count, 3)) if into is None else into
     center = np.array([*camera.center, 0], np.float32)
     device.launch(
-        "splat_shade",
+        shading.kernel,
         (count,),
-        *(means, sh, culled, features, center, count),
-        COEFFICIENTS=sh.shape[1],
+        *(means, *shading.parameters, culled, features, center, count),
         STRIDE=features.shape[1],
+        **shading.sizes,
     )
     return features
 
@@ -127,6 +154,9 @@ def shade_grad(
     *,
     features: Any,
     gradients: SplatGradients,
+    lobes: Any = None,
+    angular: str = "sh",
+    grad_lobes: Any = None,
 ) -> Any:
     """The gradient of ``shade``.
 
@@ -138,36 +168,81 @@ def shade_grad(
         features: the table it wrote to.
         gradients: the first three of its features are what comes in; what flows through the
             viewing direction is added to its means and camera.
+        lobes: as given to ``shade``.
+        angular: as given to ``shade``.
+        grad_lobes: (N, G) array that the gradient by the lobes is written to; it is left out if
+            not given.
 
     Returns:
         (N, K, 3) gradient by the coefficients.
 
     Raises:
-        InputError: the splats have no spherical harmonics.
-        ShapeError: the gradient and the features have not the same channels, three or more.
+        InputError: the splats have no coefficients, or no such functions are known.
+        ShapeError: the gradient and the features have not the same channels, three or more, or
+            the coefficients, the lobes and their gradient do not fit.
     """
-    _check_harmonics(sh)
+    shading = _Shading.of(means, sh, lobes, angular)
     count = means.shape[0]
     if gradients.features.shape != features.shape or features.shape[1] < 3:
         raise ShapeError(
             f"shade_grad: gradients.features has shape {gradients.features.shape}, wanted that of "
             f"features, {features.shape}, with 3 channels or more"
         )
-    grad_sh = device.empty(sh.shape)
+    found = [device.empty(array.shape) for array in shading.parameters]
+    if grad_lobes is not None and lobes is not None:
+        found[1] = as_device_array(device, grad_lobes, lobes.shape, name="shade_grad: grad_lobes")
     inverse = np.linalg.inv(camera.view[:3, :3]).T
     rows = np.column_stack([inverse, camera.center]).astype(np.float32, order="C")
     device.launch(
-        "splat_shade_grad",
+        f"{shading.kernel}_grad",
         (count,),
-        *(means, sh, features, gradients.features, *rows, count),
-        *(grad_sh, gradients.means, gradients.camera),
-        COEFFICIENTS=sh.shape[1],
+        *(means, *shading.parameters, features, gradients.features, *rows, count),
+        *(*found, gradients.means, gradients.camera),
         STRIDE=features.shape[1],
         CAMERA_GRADIENT=gradients.camera is not None,
+        **shading.sizes,
     )
-    return grad_sh
+    return found[0]
 
 
-def _check_harmonics(sh: Any) -> None:
-    if sh is None:
-        raise InputError("shade: these splats have no spherical harmonics; draw their colors")
+@dataclass(frozen=True, eq=False)
+class _Shading:
+    """The kernel that knows the functions, the arrays it reads, and the sizes it is built for."""
+
+    kernel: str
+    parameters: tuple[Any, ...]
+    sizes: dict[str, int]
+
+    @classmethod
+    def of(cls, means: Any, sh: Any, lobes: Any, angular: str) -> _Shading:
+        """See that coefficients and lobes fit the functions, and choose.
+
+        Raises:
+            InputError: there are none, or the functions are unknown.
+            ShapeError: they do not fit.
+        """
+        if angular not in ANGULAR_KINDS:
+            wanted = ", ".join(ANGULAR_KINDS)
+            raise InputError(f"shade: angular is {angular!r}, wanted one of {wanted}")
+        if sh is None:
+            raise InputError("shade: these splats have no spherical harmonics; draw their colors")
+        if angular == "sh":
+            if lobes is not None:
+                raise InputError(
+                    "shade: these splats have lobes, which angular='sh' would leave out: say which "
+                    f"lobes they are, one of {', '.join(_LOBES)}"
+                )
+            return cls("splat_shade", (sh,), {"COEFFICIENTS": sh.shape[1]})
+        if lobes is None:
+            raise InputError(
+                f"shade: angular is {angular!r}, but these splats have no lobes: give lobes, or "
+                "draw them with angular='sh'"
+            )
+        wanted_shape = (means.shape[0], angular_basis(angular, sh.shape[1]).n_geometry)
+        if lobes.shape != wanted_shape:
+            raise ShapeError(
+                f"shade: lobes has shape {lobes.shape}, wanted {wanted_shape} for {sh.shape[1]} "
+                f"functions of {angular!r}"
+            )
+        sizes = {"LOBES": _LOBES[angular], "FUNCTIONS": sh.shape[1]}
+        return cls("lobe_shade", (sh, lobes), sizes)

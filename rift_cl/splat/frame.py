@@ -71,6 +71,9 @@ class FrameGradients:
         aperture: (2,): by the aperture's radius and focus; None if the camera's is not asked
             for, or has none.
         background: by the background as it was given; None where there was none.
+        shape_modes: (N, K - 1) by the modes of the densities; None where there are none.
+        color_modes: (N, K - 1, C) by those of the colours; None where there are none.
+        lobes: (N, G) by the geometry of the lobes; None where there are none.
     """
 
     splats: SplatGradients
@@ -79,3 +82,6 @@ class FrameGradients:
     camera: Any
     aperture: Any
     background: Any
+    shape_modes: Any = None
+    color_modes: Any = None
+    lobes: Any = None

@@ -47,12 +47,14 @@ def project(device: Device, splats: Splats, camera: Camera, settings: SplatSetti
     device.launch(
         "splat_project",
         (count,),
-        *(splats.means, *_shapes(splats), splats.opacities),
+        *(splats.means, *shape_arguments(splats), splats.opacities),
         *(projected.screen, projected.depths, projected.boxes, projected.culled),
-        *_camera_arguments(camera),
+        *camera_arguments(camera),
         *(float(settings.near), float(settings.far), float(settings.radius_clip)),
         *(float(settings.eps2d), count),
-        **_macros(splats, camera, settings),
+        *((splats.shape_modes, splats.color_modes) if is_modal(splats, settings) else ()),
+        **projection_macros(splats, camera, settings),
+        **mode_macros(splats, settings),
         TILE=settings.tile,
         SMOOTH=settings.smooth_cutoff,
     )
@@ -70,6 +72,7 @@ def project_grad(
     with_camera: bool = True,
     depth_channel: bool = False,
     first_moments: bool = True,
+    view_parts: Any = None,
 ) -> SplatGradients:
     """The gradient of ``project``.
 
@@ -85,6 +88,8 @@ def project_grad(
         depth_channel: the last of the D channels is the splats' depth.
         first_moments: numbers 1 and 2 are the first moments of dL/dsigma; otherwise they are the
             gradient by the position on the screen.
+        view_parts: (N, 6) what flows into the screen's square root besides, from
+            ``project_modes_grad``; nothing if not given.
 
     Raises:
         ShapeError: the sums do not fit.
@@ -102,17 +107,19 @@ def project_grad(
     device.launch(
         "splat_project_grad",
         (len(splats),),
-        *(splats.means, *_shapes(splats), splats.opacities, projected.culled, sums),
-        *_camera_arguments(camera),
+        *(splats.means, *shape_arguments(splats), splats.opacities, projected.culled, sums),
+        *camera_arguments(camera),
         *(float(settings.near), float(settings.far), float(settings.eps2d), len(splats)),
         *(out.means, *((out.quats, out.scales) if splats.covars is None else (out.covars,))),
         *(out.opacities, out.features, out.means2d, out.means2d_abs, out.camera),
         *(() if camera.aperture is None else (out.aperture,)),
-        **_macros(splats, camera, settings),
+        *(() if view_parts is None else (view_parts,)),
+        **projection_macros(splats, camera, settings),
         CHANNELS=channels,
         ABSGRAD=settings.absgrad,
         DEPTH=depth_channel,
         FIRST_MOMENTS=first_moments,
+        VIEW_PARTS=view_parts is not None,
         CAMERA_GRADIENT=with_camera,
     )
     return out
@@ -135,7 +142,27 @@ def _check(device: Device, splats: Splats, camera: Camera, settings: SplatSettin
         )
 
 
-def _macros(splats: Splats, camera: Camera, settings: SplatSettings) -> dict[str, int]:
+def is_modal(splats: Splats, settings: SplatSettings) -> bool:
+    """Whether splats have Hermite modes or another activation, and so kernels of their own."""
+    modes = splats.shape_modes is not None or splats.color_modes is not None
+    return modes or settings.activation != "clamp"
+
+
+def mode_macros(splats: Splats, settings: SplatSettings) -> dict[str, int]:
+    """What ``hermite_project.h`` and ``hermite_extent.h`` are told; nothing for plain splats."""
+    if not is_modal(splats, settings):
+        return {}
+    return {
+        "MODAL": 1,
+        "SHAPE_ORDER": splats.shape_order,
+        "COLOR_ORDER": splats.color_order,
+        "COLOR_CHANNELS": 0 if splats.color_modes is None else splats.color_modes.shape[2],
+        "SQUARE": settings.activation == "square",
+    }
+
+
+def projection_macros(splats: Splats, camera: Camera, settings: SplatSettings) -> dict[str, int]:
+    """What ``gaussian.h`` and ``camera.h`` are told."""
     return {
         "MODEL": _MODELS[camera.model],
         "XRAY": settings.mode == "xray",
@@ -145,11 +172,12 @@ def _macros(splats: Splats, camera: Camera, settings: SplatSettings) -> dict[str
     }
 
 
-def _shapes(splats: Splats) -> tuple[Any, ...]:
+def shape_arguments(splats: Splats) -> tuple[Any, ...]:
+    """What ``gaussian.h`` wants: a splat's shape."""
     return (splats.quats, splats.scales) if splats.covars is None else (splats.covars,)
 
 
-def _camera_arguments(camera: Camera) -> tuple[Any, ...]:
+def camera_arguments(camera: Camera) -> tuple[Any, ...]:
     """What ``camera.h`` wants: by value, so that no copy waits for the queue."""
     rows: NDArray[np.float32] = camera.view[:3].astype(np.float32, order="C")
     pinhole = (*rows, np.array(camera.intrinsics, np.float32), camera.width, camera.height)

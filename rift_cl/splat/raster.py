@@ -1,7 +1,8 @@
 """Splats on the screen to pixels, and the gradient back: the drivers of the raster kernels.
 
 ``kernels/splat_raster_cpu.cl`` says what is computed, ``kernels/splat_raster_grad_cpu.cl`` how it
-is differentiated. Features of more than 32 channels are drawn 32 at a time.
+is differentiated; ``kernels/hermite_raster_cpu.cl`` and its gradient do both for splats with
+Hermite modes. Features of more than 32 channels are drawn 32 at a time, without modes alone.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.splat.projection import MOMENTS
+from rift_cl.splat.screen_modes import ScreenModes
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.tile_lists import TileLists
 from rift_cl.splat.tiles import Tiles
@@ -31,10 +33,12 @@ class ScreenSplats:
     Args:
         screen: (N, 8): mean x, mean y, conic a, b, c, weight, extent x, extent y.
         features: (N, D), the channels that are drawn.
+        modes: the polynomials of splats that have some; None for Gaussians.
     """
 
     screen: Any
     features: Any
+    modes: ScreenModes | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +78,9 @@ def rasterize(
         into: a raster whose rows are drawn; a new one if not given.
 
     Raises:
-        InputError: the tile size is none that the kernels are made for.
-        ShapeError: features or background do not fit.
+        InputError: the tile size is none that the kernels are made for, or splats with modes
+            have more than 32 channels.
+        ShapeError: features, modes or background do not fit.
     """
     _check(splats, lists, size, settings)
     height, width = size
@@ -88,14 +93,11 @@ def rasterize(
     )
     for first, count in _channel_runs(channels):
         device.launch(
-            _kernel(device, "splat_raster"),
+            _kernel(device, splats, "raster"),
             _work(device, lists, settings, per_pixel=True),
             *(raster.image, raster.transmittance, raster.last),
-            *(splats.screen, splats.features, background),
-            *(lists.entries, lists.starts, height, width),
-            *(lists.tiles.across, lists.tiles.first_row),
-            *(settings.alpha_cap, channels, first),
-            **_macros(settings, count),
+            *_drawn(splats, background, lists, size, settings, first),
+            **_macros(splats, settings, count),
         )
     return raster
 
@@ -124,7 +126,11 @@ def raster_grad(
         background: as given to ``rasterize``.
 
     Returns:
-        (M, 6 + D [+ 2]) device array, slot by slot: see ``kernels/include/splat_slots.h``.
+        (M, 6 + D [+ 2]) device array, slot by slot: see ``kernels/include/splat_slots.h``; for
+        splats with modes (M, P), see ``kernels/include/hermite_slots.h``.
+
+    Raises:
+        InputError: magnitudes of gradients are asked for splats with modes.
     """
     height, width, channels = raster.image.shape
     as_device_array(device, grad_image, raster.image.shape, name="grad_image")
@@ -133,26 +139,25 @@ def raster_grad(
     as_device_array(device, grad_transmittance, (height, width), name="grad_transmittance")
     background = _background(device, background, channels)
     record = MOMENTS + channels + 2 * settings.absgrad
+    if splats.modes is not None:
+        record = splats.modes.record_length(channels, settings)
     slots = device.empty((lists.n_entries, record))
     nothing = device.zeros((height, width)) if channels > _CHANNELS else grad_transmittance
     for first, count in _channel_runs(channels):
         device.launch(
-            _kernel(device, "splat_raster_grad"),
+            _kernel(device, splats, "raster_grad"),
             _work(device, lists, settings, per_pixel=False),
             *(slots, grad_image, nothing if first else grad_transmittance),
             *(raster.transmittance, raster.last),
-            *(splats.screen, splats.features, background),
-            *(lists.entries, lists.starts, height, width),
-            *(lists.tiles.across, lists.tiles.first_row),
-            *(settings.alpha_cap, channels, first),
-            **_macros(settings, count),
+            *_drawn(splats, background, lists, (height, width), settings, first),
+            **_macros(splats, settings, count),
             ABSGRAD=int(settings.absgrad),
         )
     return slots
 
 
 def sum_slots(device: Device, lists: TileLists, records: Any, *, onto: Any = None) -> Any:
-    """Sum each splat's records over its tiles: (N, 6 + D [+ 2]).
+    """Sum each splat's records over its tiles: (N, 6 + D [+ 2]), or (N, P) with modes.
 
     Args:
         device: where the arrays are.
@@ -187,6 +192,8 @@ def _check(
         raise ShapeError(
             f"features have shape {splats.features.shape}, wanted ({len(splats.screen)}, channels)"
         )
+    if splats.modes is not None:
+        splats.modes.check_fit(*splats.features.shape)
 
 
 def _background(device: Device, background: Any, channels: int) -> Any:
@@ -200,8 +207,9 @@ def _channel_runs(channels: int) -> Iterator[tuple[int, int]]:
         yield first, min(_CHANNELS, channels - first)
 
 
-def _kernel(device: Device, name: str) -> str:
-    return f"{name}_{'cpu' if device.traits.is_cpu else 'gpu'}"
+def _kernel(device: Device, splats: ScreenSplats, name: str) -> str:
+    basis = "splat" if splats.modes is None else "hermite"
+    return f"{basis}_{name}_{'cpu' if device.traits.is_cpu else 'gpu'}"
 
 
 def _work(
@@ -214,10 +222,28 @@ def _work(
     return (tiles * (settings.tile**2 if per_pixel else device.traits.macros["GROUP"]),)
 
 
-def _macros(settings: SplatSettings, channels: int) -> dict[str, int]:
-    return {
+def _drawn(
+    splats: ScreenSplats,
+    background: Any,
+    lists: TileLists,
+    size: tuple[int, int],
+    settings: SplatSettings,
+    first: int,
+) -> tuple[Any, ...]:
+    """The arguments that compositing and its gradient share."""
+    modes = () if splats.modes is None else (splats.modes.table,)
+    return (
+        *(splats.screen, *modes, splats.features, background, lists.entries, lists.starts),
+        *(*size, lists.tiles.across, lists.tiles.first_row, settings.alpha_cap),
+        *(() if modes else (splats.features.shape[1], first)),
+    )
+
+
+def _macros(splats: ScreenSplats, settings: SplatSettings, channels: int) -> dict[str, int]:
+    macros = {
         "TILE": settings.tile,
         "CHANNELS": channels,
         "ADDITIVE": int(settings.mode == "xray"),
         "SMOOTH": int(settings.smooth_cutoff),
     }
+    return macros | (splats.modes.macros(settings) if splats.modes else {})

@@ -22,7 +22,14 @@ from rift_cl.splat.depth import expected_depth, expected_depth_grad
 from rift_cl.splat.drawing import draw, draw_grad
 from rift_cl.splat.features import Channels, gather_features, own_columns, shade_grad
 from rift_cl.splat.frame import Frame, FrameGradients
-from rift_cl.splat.projected import CULL_REASONS
+from rift_cl.splat.hermite import (
+    ModeGradients,
+    check_modal,
+    is_modal,
+    project_modes,
+    project_modes_grad,
+)
+from rift_cl.splat.projected import CULL_REASONS, SplatGradients
 from rift_cl.splat.projection import project, project_grad
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
@@ -78,23 +85,28 @@ class Renderer:
                 sum of weights times depths, or ``expected``, that divided by alpha.
 
         Raises:
-            InputError: there is nothing to draw, or no depth or no lens in this mode.
-            ShapeError: the background does not fit.
+            InputError: there is nothing to draw, no depth or no lens in this mode, or splats
+                with modes have more than 32 channels or shall have magnitudes of gradients.
+            ShapeError: the background or the lobes do not fit.
             ResourceLimitError: not even one row of tiles fits the memory budget.
         """
         device, settings = self.device, self.settings
+        check_modal(splats, settings)
         channels = self._channels(splats, depth)
         behind = self._behind(background, channels)
         memory = FrameMemory.of(splats, camera.size, channels.total, settings)
         check_fixed(memory, device.budget)
         projected = project(device, splats, camera, settings)
-        features = gather_features(device, splats, camera, projected, channels)
+        given = (device, splats, camera)
+        features = gather_features(*given, projected, channels, angular=settings.angular)
+        modal = is_modal(splats, settings)
         drawing = draw(
             device,
             *(projected, features, camera.size),
             settings=settings,
             memory=memory,
             background=behind,
+            modes=project_modes(*given, settings, projected) if modal else None,
         )
         if depth == "expected":
             expected_depth(device, drawing.raster)
@@ -128,19 +140,19 @@ class Renderer:
             grad_image, grad_transmittance = expected_depth_grad(
                 device, frame.raster, grad_image, grad_transmittance
             )
+        sums = draw_grad(device, frame.drawing, grad_image, grad_transmittance)
+        modes = self._modes_grad(frame, sums)
         gradients = project_grad(
             device,
             *(splats, camera, self.settings),
             projected=frame.projected,
-            sums=draw_grad(device, frame.drawing, grad_image, grad_transmittance),
+            sums=modes.sums if modes else sums,
             with_camera=with_camera,
             depth_channel=frame.depth is not None,
+            first_moments=modes is None,
+            view_parts=modes.view_parts if modes else None,
         )
-        sh = None
-        if splats.sh is not None:
-            features = frame.drawing.features
-            given = (splats.means, splats.sh, camera)
-            sh = shade_grad(device, *given, features=features, gradients=gradients)
+        sh, lobes = self._shade_grad(frame, gradients)
         return FrameGradients(
             splats=gradients,
             colors=own_columns(device, gradients.features, frame.channels),
@@ -150,6 +162,9 @@ class Renderer:
             if gradients.aperture is None
             else sum_columns(device, gradients.aperture),
             background=self._background_grad(frame, grad_image) if with_background else None,
+            shape_modes=modes.shape_modes if modes else None,
+            color_modes=modes.color_modes if modes else None,
+            lobes=lobes,
         )
 
     def culled(self, frame: Frame) -> dict[str, int]:
@@ -158,6 +173,37 @@ class Renderer:
         return {
             reason: int(count) for reason, count in zip(CULL_REASONS, codes, strict=True) if count
         }
+
+    def _modes_grad(self, frame: Frame, moments: Any) -> ModeGradients | None:
+        """What the raster's moments mean; None for plain splats, whose sums say it themselves."""
+        modes = frame.drawing.modes
+        if modes is None:
+            return None
+        return project_modes_grad(
+            self.device,
+            *(frame.splats, frame.camera, self.settings),
+            projected=frame.projected,
+            modes=modes,
+            moments=moments,
+            channels=frame.channels.total,
+        )
+
+    def _shade_grad(self, frame: Frame, gradients: SplatGradients) -> tuple[Any, Any]:
+        """By the coefficients of shaded colours and by their lobes; None where there are none."""
+        splats, device = frame.splats, self.device
+        if splats.sh is None:
+            return None, None
+        lobes = None if splats.lobes is None else device.empty(splats.lobes.shape)
+        sh = shade_grad(
+            device,
+            *(splats.means, splats.sh, frame.camera),
+            features=frame.drawing.features,
+            gradients=gradients,
+            lobes=splats.lobes,
+            angular=self.settings.angular,
+            grad_lobes=lobes,
+        )
+        return sh, lobes
 
     def _channels(self, splats: Splats, depth: DepthKind | None) -> Channels:
         check_depth(depth, self.settings)

@@ -9,6 +9,8 @@ from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
 
 SplatMode = Literal["light", "xray"]
+Activation = Literal["clamp", "exp", "square"]
+Angular = Literal["sh", "hg", "lg", "sg", "asg"]
 # Devices count in float32.
 _LARGEST = 3.4028234e38
 
@@ -31,9 +33,16 @@ class SplatSettings:
         absgrad: sum magnitudes of screen-position gradients as well, for densification.
         smooth_cutoff: replace thresholds by smooth ones, so that finite differences hold; for
             tests alone.
+        activation: how a splat's density E = weight * Q * Gaussian, Q the polynomial of its
+            modes, becomes an alpha in light mode: ``clamp`` max(E, 0), ``exp``
+            1 - exp(-max(E, 0)), ``square`` 1 - exp(-weight Q^2 Gaussian). With the last two
+            opacities are optical depths at the peak, any number >= 0.
+        angular: what colours vary with the viewing direction in: spherical harmonics, or
+            ``hg``, ``lg`` (Hermite- and Laguerre-Gaussian lobes), ``sg``, ``asg`` (isotropic and
+            anisotropic spherical Gaussians), which want ``Splats.lobes``.
 
     Raises:
-        InputError: a number is out of its range, or the mode is unknown.
+        InputError: a number is out of its range, or a choice is unknown.
     """
 
     near: float = 0.01
@@ -46,6 +55,8 @@ class SplatSettings:
     mode: SplatMode = "light"
     absgrad: bool = False
     smooth_cutoff: bool = False
+    activation: Activation = "clamp"
+    angular: Angular = "sh"
 
     def __post_init__(self) -> None:
         """Check every number's range."""
@@ -68,11 +79,23 @@ class SplatSettings:
             raise InputError(f"SplatSettings: tile is {self.tile!r}, wanted a whole number >= 1")
         if not 0 < one_number(self.alpha_cap) < 1:
             raise InputError(f"SplatSettings: alpha_cap is {self.alpha_cap!r}, wanted 0 < cap < 1")
-        if self.mode not in get_args(SplatMode):
-            wanted = " or ".join(get_args(SplatMode))
-            raise InputError(f"SplatSettings: mode is {self.mode!r}, wanted {wanted}")
+        for name, choices in (
+            ("mode", SplatMode),
+            ("activation", Activation),
+            ("angular", Angular),
+        ):
+            if getattr(self, name) not in get_args(choices):
+                wanted = " or ".join(get_args(choices))
+                raise InputError(
+                    f"SplatSettings: {name} is {getattr(self, name)!r}, wanted {wanted}"
+                )
         if self.antialiased and self.mode == "xray":
             raise InputError(
                 "SplatSettings: antialiased has no meaning in xray mode, where dilation keeps a "
                 "splat's mass: leave it off"
+            )
+        if self.activation != "clamp" and self.mode == "xray":
+            raise InputError(
+                f"SplatSettings: activation {self.activation} has no meaning in xray mode, which "
+                "adds densities as they are: leave it at clamp"
             )

@@ -1,7 +1,10 @@
 """The parameters of splats, on a device: Gaussians in space with opacity and colour.
 
 Values are what the rasterizer works with, after a trainer's activations: scales are lengths, not
-their logarithms, opacities are not logits.
+their logarithms, opacities are not logits. A splat may have Hermite modes, of its shape and of
+its colour: with x' its own coordinates, R^T (x - mean) / scale, the density is
+opacity * (1 + sum of shape_modes He~(x')) exp(-|x'|^2 / 2), and each channel of the colour is a
+feature plus the sum of color_modes He~(x').
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_plain, as_real_array, upload
 from rift_cl.errors import DTypeError, InputError, ShapeError
+from rift_cl.splat.orders import count_of, order_of
 
 # Numbers of spherical harmonics of degree 0 to 4.
 _COEFFICIENTS = (1, 4, 9, 16, 25)
@@ -35,11 +39,19 @@ class Splats:
         sh: (N, K, 3) coefficients of spherical harmonics, K = 1, 4, 9, 16 or 25, or None.
         covars: (N, 6) upper triangles xx, xy, xz, yy, yz, zz of covariance matrices, in place
             of ``quats`` and ``scales``.
+        shape_modes: (N, K - 1) coefficients of the density's modes of order 1 and more, in
+            graded order (see ``rift_cl.splat.hermite``), K = 4, 10, 20, 35.. for the orders to 1,
+            2, 3, 4..; None for Gaussians.
+        color_modes: (N, K - 1, C) coefficients of the colours' modes, C = all channels but
+            depth; None for splats of one colour.
+        lobes: (N, G) geometry of the splats' angular lobes, in place of spherical harmonics (see
+            ``SplatSettings.angular``); ``sh`` are then their (N, L, 3) linear coefficients, L >= 1.
 
     Raises:
         ShapeError: an array does not fit the others.
         DTypeError: an array is not float32.
-        InputError: a splat's shape is given twice or not at all.
+        InputError: a splat's shape is given twice or not at all, covariances have modes, lobes
+            have no coefficients, or a number of modes belongs to no order.
     """
 
     means: Any
@@ -49,22 +61,36 @@ class Splats:
     colors: Any = None
     sh: Any = None
     covars: Any = None
+    shape_modes: Any = None
+    color_modes: Any = None
+    lobes: Any = None
 
     def __post_init__(self) -> None:
         """Check that the arrays fit each other."""
         given = [self.quats is not None, self.scales is not None, self.covars is not None]
         if given not in ([True, True, False], [False, False, True]):
             raise InputError("Splats: give either quats and scales, or covars alone")
-        for name in ("means", "quats", "scales", "opacities", "colors", "sh", "covars"):
-            array = getattr(self, name)
+        for name, array in vars(self).items():
             if array is not None:
-                _check_shape(name, array.shape, self.means.shape[0] if self.means.shape else 0)
+                count = self.means.shape[0] if self.means.shape else 0
+                _check_shape(name, array.shape, count, lobed=self.lobes is not None)
                 if array.dtype != np.float32:
                     raise DTypeError(f"Splats: {name} has type {array.dtype}, wanted float32")
+        _check_modes(self)
 
     def __len__(self) -> int:
         """Number of splats."""
         return int(self.means.shape[0])
+
+    @property
+    def shape_order(self) -> int:
+        """Highest order of the density's modes; 0 for Gaussians."""
+        return 0 if self.shape_modes is None else order_of(self.shape_modes.shape[1] + 1)
+
+    @property
+    def color_order(self) -> int:
+        """Highest order of the colours' modes; 0 for splats of one colour."""
+        return 0 if self.color_modes is None else order_of(self.color_modes.shape[1] + 1)
 
     @classmethod
     def upload(
@@ -78,6 +104,9 @@ class Splats:
         colors: Any = None,
         sh: Any = None,
         covars: Any = None,
+        shape_modes: Any = None,
+        color_modes: Any = None,
+        lobes: Any = None,
     ) -> Splats:
         """Copy splats to a device; see the class for the arguments.
 
@@ -87,11 +116,12 @@ class Splats:
         Raises:
             ShapeError: an array does not fit the others.
             DTypeError: an array does not hold real numbers.
-            InputError: a covariance is not symmetric, or a splat's shape is given twice or not
-                at all.
+            InputError: a covariance is not symmetric, a splat's shape is given twice or not at
+                all, covariances have modes, or a number of modes belongs to no order.
         """
         hosts = {"means": means, "quats": quats, "scales": scales, "opacities": opacities}
-        hosts |= {"colors": colors, "sh": sh, "covars": covars}
+        hosts |= {"colors": colors, "sh": sh, "covars": covars, "lobes": lobes}
+        hosts |= {"shape_modes": shape_modes, "color_modes": color_modes}
         ready: dict[str, Any] = dict.fromkeys(hosts)
         for name, values in hosts.items():
             if values is not None:
@@ -108,15 +138,43 @@ def _sent(device: Device, host: NDArray[np.float32] | None) -> Any:
     return None if host is None else upload(device, host)
 
 
-def _check_shape(name: str, shape: tuple[int, ...], count: int) -> None:
+def _check_modes(splats: Splats) -> None:
+    given = [name for name in ("shape_modes", "color_modes") if getattr(splats, name) is not None]
+    if given and splats.covars is not None:
+        raise InputError(
+            f"Splats: {given[0]} want quats and scales: a covariance has no axes of its own for "
+            "modes to lie along"
+        )
+    for name in given:
+        try:
+            order_of(getattr(splats, name).shape[1] + 1)
+        except InputError as error:
+            raise InputError(f"Splats: {name}: {error} (the first, 1, is not stored)") from error
+    if splats.lobes is not None and splats.sh is None:
+        raise InputError("Splats: lobes want sh, the linear coefficients of their functions")
+    if splats.color_modes is not None:
+        channels = 0 if splats.colors is None else splats.colors.shape[1]
+        channels += 0 if splats.sh is None else 3
+        if splats.color_modes.shape[2] != channels:
+            raise ShapeError(
+                f"Splats: color_modes has shape {tuple(splats.color_modes.shape)}, its last "
+                f"length wants to be {channels}, the channels of sh and colors together"
+            )
+
+
+def _check_shape(name: str, shape: tuple[int, ...], count: int, *, lobed: bool) -> None:
     fits = {
         "means": shape == (count, 3),
         "quats": shape == (count, 4),
         "scales": shape == (count, 3),
         "opacities": shape == (count,),
         "colors": len(shape) == 2 and shape[0] == count and shape[1] >= 1,
-        "sh": shape in [(count, k, 3) for k in _COEFFICIENTS],
+        "sh": shape in [(count, k, 3) for k in _COEFFICIENTS]
+        or (lobed and len(shape) == 3 and shape[::2] == (count, 3) and shape[1] >= 1),
         "covars": shape == (count, 6),
+        "shape_modes": len(shape) == 2 and shape[0] == count,
+        "color_modes": len(shape) == 3 and shape[0] == count,
+        "lobes": len(shape) == 2 and shape[0] == count and shape[1] >= 1,
     }
     wanted = {
         "means": "(N, 3)",
@@ -124,8 +182,13 @@ def _check_shape(name: str, shape: tuple[int, ...], count: int) -> None:
         "scales": f"({count}, 3)",
         "opacities": f"({count},)",
         "colors": f"({count}, D)",
-        "sh": f"({count}, K, 3) with K = 1, 4, 9, 16 or 25",
+        "sh": f"({count}, K, 3) with "
+        + ("K >= 1" if lobed else "K = 1, 4, 9, 16 or 25 (any K >= 1 with lobes)"),
         "covars": f"({count}, 6) or ({count}, 3, 3)",
+        "shape_modes": f"({count}, K - 1) with K = {count_of(1)}, {count_of(2)}, {count_of(3)}..",
+        "color_modes": f"({count}, K - 1, C) with K = {count_of(1)}, {count_of(2)}, "
+        f"{count_of(3)}..",
+        "lobes": f"({count}, G) with G >= 1",
     }
     if not fits[name]:
         raise ShapeError(f"Splats: {name} has shape {tuple(shape)}, wanted {wanted[name]}")

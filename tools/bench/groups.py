@@ -15,17 +15,17 @@ from bench.case import Case
 from bench.costs import Cost
 from bench.coverages import COVERAGE_COSTS, coverage_tasks
 from bench.fast_projections import FAST_COSTS, fast_tasks
+from bench.modes import MODE_COSTS, mode_tasks
 from bench.operations import Task
 from bench.projections import COSTS, footprint_tasks
 from bench.row_filters import filter_tasks
 from bench.solver_steps import step_tasks
-from bench.splats import SPLAT_COSTS
 from bench.splines import SPLINE_COSTS, spline_tasks
 from bench.vectors import VOLUME_COSTS, vector_tasks
 
 # Every kernel's cost, or one of them where it depends on the task.
 KNOWN: Mapping[str, Cost] = {
-    **SPLAT_COSTS,
+    **MODE_COSTS,
     **FAST_COSTS,
     **VOLUME_COSTS,
     **SPLINE_COSTS,
@@ -64,4 +64,5 @@ def groups(device: rift.Device, case: Case) -> list[Group]:
         Group(f"splines, {case.name}", partial(spline_tasks, *at)),
         Group(f"the fast projector, {case.name}", partial(fast_tasks, *at)),
         Group("coverage", partial(coverage_tasks, device, views, quarter)),
+        Group("splats with modes", partial(mode_tasks, device, 16 * n, n // 2)),
     ]

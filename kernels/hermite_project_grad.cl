@@ -1,0 +1,191 @@
+/* Gradient of hermite_project and, with splat_project_grad, of all that modes hang on.
+ *
+ * The raster leaves sums over pixels: moments[i] = (H_m for |m| <= SHAPE_ORDER + 2, V_0c for all
+ * CHANNELS, V_mc for 1 <= |m| <= COLOR_ORDER and the COLOR_CHANNELS), m graded,
+ *
+ *     H_m = sum of h He~_m(u'),  V_mc = sum of w v_c He~_m(u'),  v = dL/d image,  w = alpha T,
+ *     h = dL/dE weight g, with SQUARE dL/dE weight g Q,
+ *
+ * for E = weight Q g or weight Q^2 g, Q = sum of s_m He~_m (s_0 = 1), and colours that are a
+ * feature plus the sum of t_m He~_m. So
+ *
+ *     dL/ds_m = H_m (SQUARE: 2 H_m),    dL/dt_mc = V_mc,    weight dL/dweight = sum of s_m H_m.
+ *
+ * In u' an order is raised by the Gaussian's slope and lowered by the polynomial's,
+ *
+ *     d(He~_m g)/du_a = -sqrt(m_a + 1) He~_{m+e_a} g,      dHe~_m/du_a = sqrt(m_a) He~_{m-e_a},
+ *     d(Q^2 g)/du_a = g Q (dQ/du_a - sum of s_m sqrt(m_a + 1) He~_{m+e_a}),
+ *
+ * so that P_a, the sum of dL/du'_a, is linear in the moments, and so is R_ab, that of dL/du'_a u'_b,
+ * by u_b He~_k = sqrt(k_b + 1) He~_{k+e_b} + sqrt(k_b) He~_{k-e_b}. From u' = L^-1 (pixel - mean),
+ * dL/dmean = -L^-T P. The modes hang on A = L^-1 V: with G = dL/dA,
+ *
+ *     dL/dL = -lower part of L^-T X,  X = R + G A^T,      dL/dV at fixed L = L^-T G (view_parts).
+ *
+ * Cholesky's factor of Sigma = L L^T passes this on (Murray 2016, arXiv 1602.07527) as dL/dSigma =
+ * -L^-T Y L^-1 / 2, Y the symmetric matrix with the lower part of X. That is what second moments
+ * S2 = L Y L^T of a Gaussian give, and in their place they go to splat_project_grad, with dL/d(u, v)
+ * for first ones: sums[i] = (-weight dL/dweight, dL/du, dL/dv, S2 xx, xy, yy, V_0c).
+ *
+ * Through one order, c2 = Gamma(A) c, with c2_m sqrt(m!) = T2 contracted N times (hermite_project.h):
+ * dT2_m/dA_ai = m_a T2' where T2' has N - 1 indices contracted and i left, and dL/dc runs through the
+ * contractions backwards. Splats that are not drawn get zeros. Index space: splats. */
+
+#include "include/portable.h"
+#include "include/small_matrix.h"
+#include "include/camera.h"
+#include "include/aperture.h"
+#include "include/gaussian.h"
+#include "include/hermite_project.h"
+#include "include/hermite_project_grad.h"
+
+#ifndef CHANNELS
+#define CHANNELS 3
+#endif
+#ifndef SQUARE
+#define SQUARE 0
+#endif
+
+#define SHAPE_MOMENTS MODES2(SHAPE_ORDER + 2)
+#define MOMENTS (SHAPE_MOMENTS + CHANNELS + SCREEN_COLOR_MODES * COLOR_CHANNELS)
+#define PLACE2(order, j) ((order) * ((order) + 1) / 2 + (j))
+
+__constant float ROOTS[] = {
+    0, 1, 1.41421356f, 1.73205081f, 2, 2.23606798f, 2.44948974f, 2.64575131f, 2.82842712f, 3, 3.16227766f};
+
+/* The moment of u_b He~_m, m = (order - j, j). */
+static float moment_times(const float *moments, int order, int j, int b) {
+  const int m = b ? j : order - j;
+  float sum = ROOTS[m + 1] * moments[PLACE2(order + 1, j + b)];
+  if (m > 0) sum += ROOTS[m] * moments[PLACE2(order - 1, j - b)];
+  return sum;
+}
+
+/* What comes of a term `factor` He~_m in dL/du_a, m = (order - j, j). */
+static void add_slope(ScreenSums *sums, const float *moments, int order, int j, int a, float factor) {
+  sums->first[a] += factor * moments[PLACE2(order, j)];
+  const float by_x = factor * moment_times(moments, order, j, 0);
+  if (a == 0) {
+    sums->xx += by_x;
+  } else {
+    sums->yx += by_x;
+    sums->yy += factor * moment_times(moments, order, j, 1);
+  }
+}
+
+/* The shape's part of P and R; gives weight dL/dweight. */
+static float shape_slopes(ScreenSums *sums, const float *moments, __global const float *modes) {
+  float by_weight = 0;
+  for (int order = 0; order <= SHAPE_ORDER; order++)
+    for (int j = 0; j <= order; j++) {
+      const float s = order == 0 ? 1 : modes[PLACE2(order, j) - 1];
+      by_weight += s * moments[PLACE2(order, j)];
+      for (int a = 0; a < 2; a++) {
+        const int m = a ? j : order - j;
+        add_slope(sums, moments, order + 1, j + a, a, -s * ROOTS[m + 1]);
+        if (SQUARE && m > 0) add_slope(sums, moments, order - 1, j - a, a, s * ROOTS[m]);
+      }
+    }
+  return by_weight;
+}
+
+/* A channel's part of P and R. */
+static void color_slopes(ScreenSums *sums, const float *moments, __global const float *modes, int channel) {
+  for (int order = 1; order <= COLOR_ORDER; order++)
+    for (int j = 0; j <= order; j++) {
+      const float t = modes[(PLACE2(order, j) - 1) * COLOR_CHANNELS + channel];
+      if (order > j) add_slope(sums, moments, order - 1, j, 0, t * ROOTS[order - j]);
+      if (j > 0) add_slope(sums, moments, order - 1, j - 1, 1, t * ROOTS[j]);
+    }
+}
+
+/* The shape's part of everything; gives weight dL/dweight. */
+static float shape_grad(
+    const Whitening *w, ScreenSums *sums, __global const float *moments,
+    __global const float *modes, __global const float *screen_modes, __global float *out)
+{
+  float h[SHAPE_MOMENTS];
+  for (int m = 0; m < SHAPE_MOMENTS; m++) h[m] = moments[m];
+  for (int order = 1; order <= SHAPE_ORDER; order++) {
+    const int first = MODES3(order - 1) - 1;
+    order_grad(w, sums, modes + first, order, 1, h + MODES2(order - 1), SQUARE ? 2 : 1, out + first);
+  }
+  return shape_slopes(sums, h, screen_modes);
+}
+
+/* A channel's part of everything. */
+static void color_grad(
+    const Whitening *w, ScreenSums *sums, __global const float *moments, int channel,
+    __global const float *modes, __global const float *screen_modes, __global float *out)
+{
+  float v[MODES2(COLOR_ORDER)];
+  v[0] = moments[channel];
+  for (int m = 1; m < MODES2(COLOR_ORDER); m++)
+    v[m] = moments[CHANNELS + (m - 1) * COLOR_CHANNELS + channel];
+  for (int order = 1; order <= COLOR_ORDER; order++) {
+    const int first = (MODES3(order - 1) - 1) * COLOR_CHANNELS + channel;
+    order_grad(w, sums, modes + first, order, COLOR_CHANNELS, v + MODES2(order - 1), 1, out + first);
+  }
+  color_slopes(sums, v, screen_modes, channel);
+}
+
+/* From P, R and G to the sums of splat_project_grad and the view's part. */
+static void leave_sums(
+    const Gaussian *g, const Whitening *w, const ScreenSums *sums, float by_weight,
+    __global float *out, __global float *view_part)
+{
+  const float xx = sums->xx + dot3(sums->a0, w->a0);
+  const float yx = sums->yx + dot3(sums->a1, w->a0);
+  const float yy = sums->yy + dot3(sums->a1, w->a1);
+  /* L from what it is made of: its inverse would be a quotient of quotients. */
+  const float l00 = 1 / w->i00, l11 = 1 / w->i11, l10 = dot3(g->v0, g->v1) * w->i00;
+  const float left = l10 * xx + l11 * yx;
+  out[0] = -by_weight;
+  out[1] = -(w->i00 * sums->first[0] + w->i10 * sums->first[1]);
+  out[2] = -w->i11 * sums->first[1];
+  out[3] = l00 * l00 * xx;
+  out[4] = l00 * left;
+  out[5] = l10 * left + l11 * (l10 * yx + l11 * yy);
+  store3(view_part, 0, w->i00 * sums->a0 + w->i10 * sums->a1);
+  store3(view_part, 1, w->i11 * sums->a1);
+}
+
+static void clear(__global float *p, int length) {
+  for (int k = 0; k < length; k++) p[k] = 0;
+}
+
+KERNEL void hermite_project_grad(
+    __global const float *restrict means, SHAPES, __global const float *restrict shape_modes,
+    __global const float *restrict color_modes, __global const uchar *restrict culled,
+    __global const float *restrict screen_modes, __global const float *restrict moments,
+    CAMERA_PARAMETERS, float near_plane, float far_plane, float eps2d, int count,
+    __global float *restrict sums, __global float *restrict view_parts,
+    __global float *restrict grad_shape_modes, __global float *restrict grad_color_modes)
+{
+  const long i = get_global_id(0);
+  if (i >= count) return;
+  const long shape = i * SHAPE_MODES, color = i * COLOR_MODES * COLOR_CHANNELS;
+  sums += i * (6 + CHANNELS);
+  if (culled[i] != VISIBLE) {
+    clear(sums, 6 + CHANNELS);
+    clear(view_parts + 6 * i, 6);
+    clear(grad_shape_modes + shape, SHAPE_MODES);
+    clear(grad_color_modes + color, COLOR_MODES * COLOR_CHANNELS);
+    return;
+  }
+  moments += i * MOMENTS;
+  screen_modes += i * TABLE_LENGTH + WHITENING;
+  Gaussian g;
+  see_gaussian(&g, CAMERA, means, SHAPE, i, near_plane, far_plane, eps2d);
+  const Whitening w = whiten(&g);
+  ScreenSums screen = {{0, 0}, 0, 0, 0, (float3)(0), (float3)(0)};
+  const float by_weight = shape_grad(
+      &w, &screen, moments, shape_modes + shape, screen_modes, grad_shape_modes + shape);
+  moments += SHAPE_MOMENTS;
+  for (int c = 0; COLOR_ORDER > 0 && c < COLOR_CHANNELS; c++)
+    color_grad(
+        &w, &screen, moments, c, color_modes + color, screen_modes + SCREEN_SHAPE_MODES,
+        grad_color_modes + color);
+  leave_sums(&g, &w, &screen, by_weight, sums, view_parts + 6 * i);
+  for (int c = 0; c < CHANNELS; c++) sums[6 + c] = moments[c];
+}

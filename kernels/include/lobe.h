@@ -1,0 +1,28 @@
+/* The functions of lobes: a constant, and after it those of the kind that LOBES says.
+ *
+ * FUNCTIONS counts all of them; GEOMETRY is how many numbers a splat's lobes have. A geometry with
+ * a number that is not finite, or with a quaternion or an axis of no direction, has no functions.
+ * Needs portable.h and small_matrix.h. */
+
+#define HG 0
+#define LG 1
+#define SG 2
+#define ASG 3
+
+#ifndef LOBES
+#define LOBES HG
+#endif
+#ifndef FUNCTIONS
+#define FUNCTIONS 8
+#endif
+#define MODES (FUNCTIONS - 1)
+/* The harmonic of degree 0. */
+#define CONSTANT 0.28209479177387814f
+
+#include "include/lobe_frame.h"
+#if LOBES == HG || LOBES == LG
+#include "include/lobe_modes.h"
+#include "include/lobe_chart.h"
+#else
+#include "include/lobe_gaussians.h"
+#endif
