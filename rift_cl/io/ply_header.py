@@ -50,12 +50,14 @@ class PlyHeader:
         count: number of records.
         properties: NumPy's types without byte order, by name, as they follow each other.
         offset: bytes before the body.
+        comments: without the word that begins them.
     """
 
     order: str
     count: int
     properties: dict[str, str]
     offset: int
+    comments: tuple[str, ...] = ()
 
     @property
     def record(self) -> np.dtype[np.void]:
@@ -98,7 +100,8 @@ def read_header(path: Path, file: BufferedReader) -> PlyHeader:
         raise FileFormatError(f"{path}: has no PLY header; the file is damaged or something else")
     lines = start[first.end() : end].decode("latin-1").split(newline.decode())
     order, count, properties = _parse(path, lines)
-    return PlyHeader(order, count, properties, end + len(last))
+    comments = tuple(line[8:].strip() for line in lines if line.startswith("comment "))
+    return PlyHeader(order, count, properties, end + len(last), comments)
 
 
 def _parse(path: Path, lines: Iterable[str]) -> tuple[str, int, dict[str, str]]:

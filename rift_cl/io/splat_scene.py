@@ -22,10 +22,17 @@ from rift_cl.cl.memory import as_host_array, as_real_array, check_finite
 from rift_cl.errors import FileFormatError, InputError, OutputError, ShapeError
 from rift_cl.io.boundary import reading
 from rift_cl.io.output import atomic_path, check_space
-from rift_cl.io.splat_activations import log_scales_of, logits_of, opacities_of, scales_of
+from rift_cl.io.splat_activations import (
+    demand_range,
+    drawn_strengths,
+    kept_strengths,
+    log_scales_of,
+    scales_of,
+)
+from rift_cl.io.splat_basis import SceneBasis
 from rift_cl.io.splat_file import encode_splat, read_splat
 from rift_cl.io.splat_ply import COEFFICIENTS, encode_ply, read_ply, scene_shapes
-from rift_cl.splat.settings import SplatMode
+from rift_cl.splat.settings import Activation, Angular, SplatMode
 from rift_cl.splat.splats import Splats
 
 _ENCODERS = {".ply": encode_ply, ".splat": encode_splat}
@@ -41,12 +48,19 @@ class SplatScene:
         log_scales: (N, 3) logarithms of the standard deviations along the rotated axes.
         quats: (N, 4) rotations as quaternions (w, x, y, z) of any length.
         logit_opacities: (N,) logits of the opacities.
-        sh: (N, K, 3) coefficients of spherical harmonics, K = 1, 4, 9, 16 or 25.
+        sh: (N, K, 3) coefficients of spherical harmonics, K = 1, 4, 9, 16 or 25; of lobes, where
+            there are some, any K up to 36.
+        shape_modes: (N, K - 1) Hermite modes of the shape, or None; see ``rift_cl.splat.splats``.
+        color_modes: (N, K - 1, 3) those of the colour, or None.
+        lobes: (N, G) geometry of the lobes that colours vary in, or None.
+        activation: that densities are drawn with; see ``SplatSettings``.
+        angular: what colours vary in; see ``SplatSettings``.
 
     Raises:
         ShapeError: an array does not fit the others.
         DTypeError: an array does not hold real numbers.
         NonFiniteError: an array holds NaN or infinity.
+        InputError: a choice is unknown, or not for scenes of this mode.
     """
 
     means: NDArray[np.float32]
@@ -54,6 +68,11 @@ class SplatScene:
     quats: NDArray[np.float32]
     logit_opacities: NDArray[np.float32]
     sh: NDArray[np.float32]
+    shape_modes: NDArray[np.float32] | None = None
+    color_modes: NDArray[np.float32] | None = None
+    lobes: NDArray[np.float32] | None = None
+    activation: Activation = "clamp"
+    angular: Angular = "sh"
     mode: ClassVar[SplatMode] = "light"
 
     def __post_init__(self) -> None:
@@ -61,13 +80,19 @@ class SplatScene:
         means, sh = (
             as_real_array(getattr(self, n), name=f"SplatScene: {n}") for n in ("means", "sh")
         )
-        count = means.shape[0] if means.ndim else 0
-        if sh.ndim != 3 or sh.shape[1] not in COEFFICIENTS:
+        count, basis = means.shape[0] if means.ndim else 0, SceneBasis.of(self)
+        lobed = self.angular != "sh"
+        if sh.ndim != 3 or not (lobed or sh.shape[1] in COEFFICIENTS):
+            words = "K of the lobes" if lobed else "K = 1, 4, 9, 16 or 25"
             raise ShapeError(
-                f"SplatScene: sh has shape {sh.shape}, wanted ({count}, K, 3) with K = 1, 4, 9, "
-                "16 or 25"
+                f"SplatScene: sh has shape {sh.shape}, wanted ({count}, K, 3) with {words}"
             )
-        for name, shape in scene_shapes(count, sh.shape[1]).items():
+        if lobed != (self.lobes is not None):
+            raise ShapeError(
+                f"SplatScene: angular is {self.angular!r} {'without' if lobed else 'with'} lobes, "
+                "wanted both, or harmonics ('sh') and none"
+            )
+        for name, shape in scene_shapes(count, sh.shape[1], basis).items():
             array = as_host_array(
                 getattr(self, name), shape, name=f"SplatScene: {name}", wants="the scene"
             )
@@ -79,8 +104,14 @@ class SplatScene:
 
     @property
     def degree(self) -> int:
-        """Degree of the spherical harmonics, 0 to 4."""
-        return COEFFICIENTS.index(self.sh.shape[1])
+        """Degree of the spherical harmonics, 0 to 4; 0 where lobes are in their place."""
+        return 0 if self.lobes is not None else COEFFICIENTS.index(self.sh.shape[1])
+
+    @property
+    def numbers(self) -> int:
+        """Numbers that a splat has."""
+        basis = SceneBasis.of(self)
+        return 11 + 3 * self.sh.shape[1] + sum(np.prod(s[1:]) for s in basis.shapes(1).values())
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, budget: int | None = None) -> SplatScene:
@@ -105,10 +136,11 @@ class SplatScene:
         """
         path = Path(path)
         with reading(path, "the scene"):
-            kind, arrays = _read(path, budget=budget)
+            mode, basis, arrays = _read(path, budget=budget)
             for name, array in arrays.items():
                 check_finite(array, name=f"{path}: {name}")
-        return kind(**arrays)
+        kind: type[SplatScene] = XrayScene if mode == "xray" else SplatScene
+        return kind(**arrays, activation=basis.activation, angular=basis.angular)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file that appears complete or not at all.
@@ -118,8 +150,8 @@ class SplatScene:
                 rounded opacities, rotations and colours, and without the higher harmonics.
 
         Raises:
-            InputError: the ending is another, or an empty scene, or one of X-rays, is to become a
-                .splat file.
+            InputError: the ending is another, or a .splat file cannot hold the scene: one that is
+                empty, or of X-rays, or has modes, lobes or an activation.
             OutputError: the file cannot be written.
         """
         path = Path(path)
@@ -127,6 +159,9 @@ class SplatScene:
             raise InputError(f"{path}: splats are written as .ply or .splat: end the name so")
         if self.mode == "xray" and path.suffix.lower() == ".splat":
             raise InputError(f"{path}: a .splat file holds opacities, not densities: save a .ply")
+        basis = SceneBasis.of(self)
+        if path.suffix.lower() == ".splat" and not basis.plain:
+            raise InputError(f"{path}: a .splat file holds no {basis.words}: save a .ply")
         size, blocks = _ENCODERS[path.suffix.lower()](self)
         check_space(path, size)
         with atomic_path(path) as part:
@@ -143,16 +178,32 @@ class SplatScene:
             means=self.means,
             quats=self.quats,
             scales=scales_of(self.log_scales),
-            opacities=self._opacities(),
+            opacities=drawn_strengths(self.logit_opacities, self.mode, self.activation),
             sh=self.sh,
+            shape_modes=self.shape_modes,
+            color_modes=self.color_modes,
+            lobes=self.lobes,
         )
 
     @classmethod
-    def of(cls, splats: Splats, device: Device) -> SplatScene:
+    def of(
+        cls,
+        splats: Splats,
+        device: Device,
+        *,
+        activation: Activation = "clamp",
+        angular: Angular = "sh",
+    ) -> SplatScene:
         """Copy splats back from a device.
 
         A scale of 0 and opacities of 0 and 1, whose logarithms and logits are not finite, become
         the float32 numbers nearest to them.
+
+        Args:
+            splats: with rotations, scales and coefficients of colours.
+            device: where they are.
+            activation: that they are drawn with.
+            angular: what their colours vary in.
 
         Raises:
             InputError: the splats have covariances, own colours or no harmonics, or a scale or
@@ -161,21 +212,19 @@ class SplatScene:
         """
         if splats.quats is None or splats.sh is None or splats.colors is not None:
             raise InputError("SplatScene: wants splats with quats, scales and sh, and no colors")
-        scales, opacities = device.get(splats.scales), device.get(splats.opacities)
-        _demand_range("scales", scales, np.inf)
-        _demand_range("opacities", opacities, 1 if cls.mode == "light" else np.inf)
-        inverse = logits_of if cls.mode == "light" else log_scales_of
+        scales = device.get(splats.scales)
+        demand_range("scales", scales, np.inf)
+        more = {name: getattr(splats, name) for name in ("shape_modes", "color_modes", "lobes")}
         return cls(
             means=device.get(splats.means),
             log_scales=log_scales_of(scales),
             quats=device.get(splats.quats),
-            logit_opacities=inverse(opacities),
+            logit_opacities=kept_strengths(device.get(splats.opacities), cls.mode, activation),
             sh=device.get(splats.sh),
+            **{name: None if array is None else device.get(array) for name, array in more.items()},
+            activation=activation,
+            angular=angular,
         )
-
-    def _opacities(self) -> NDArray[np.float32]:
-        """What is drawn: opacities, or densities in xray mode."""
-        return opacities_of(self.logit_opacities)
 
 
 class XrayScene(SplatScene):
@@ -187,30 +236,17 @@ class XrayScene(SplatScene):
 
     mode: ClassVar[SplatMode] = "xray"
 
-    def _opacities(self) -> NDArray[np.float32]:
-        return scales_of(self.logit_opacities)
-
 
 def _read(
     path: Path, *, budget: int | None
-) -> tuple[type[SplatScene], dict[str, NDArray[np.float32]]]:
+) -> tuple[SplatMode, SceneBasis, dict[str, NDArray[np.float32]]]:
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: is not a file")
     with path.open("rb") as file:
         start = file.read(4)
         file.seek(0)
         if start in _PLY_STARTS:
-            mode, arrays = read_ply(path, file, budget=budget)
-            return XrayScene if mode == "xray" else SplatScene, arrays
+            return read_ply(path, file, budget=budget)
         if path.suffix.lower() == ".splat":
-            return SplatScene, read_splat(path, file, budget=budget)
+            return "light", SceneBasis(), read_splat(path, file, budget=budget)
     raise FileFormatError(f"{path}: is no PLY file, and no .splat file by its name")
-
-
-def _demand_range(name: str, values: NDArray[np.float32], most: float) -> None:
-    outside = np.count_nonzero((values < 0) | (values > most))
-    if outside:
-        raise InputError(
-            f"SplatScene: {name} hold {outside} values outside 0 to {most:g}, whose "
-            f"{'logits' if name == 'opacities' else 'logarithms'} do not exist"
-        )

@@ -74,12 +74,12 @@ class Fit(FitRun):
         if self.capture is None:
             return {
                 "capture": f"{settings.capture}, bare photographs: their poses are found first",
-                "splats": f"at most {settings.splats}, harmonics of degree {settings.sh_degree}",
+                "splats": self._splats,
                 "device": self.device.name,
             }
         cameras = [camera_at(view, settings.downscale) for view in self.seen]
         largest = max(camera.height * camera.width for camera in cameras)
-        parameters = 11 + 3 * (settings.sh_degree + 1) ** 2
+        parameters = self.training.numbers
         memory = FrameMemory(settings.splats, parameters, largest, 3, gradient=True)
         # Besides what a frame takes there are Adam's two moments of every parameter.
         need = memory.fixed + 8 * parameters * settings.splats
@@ -88,10 +88,18 @@ class Fit(FitRun):
             "trained on": f"{len(self.seen)} photographs",
             "held out": f"{len(self.unseen)} photographs",
             "largest photograph": f"{largest} pixels",
-            "splats": f"at most {settings.splats}, harmonics of degree {settings.sh_degree}",
+            "splats": self._splats,
             "device memory": f"{need / 2**20:.0f} MiB and the tile lists",
             "device": self.device.name,
         }
+
+    @property
+    def _splats(self) -> str:
+        """How many splats, and what they are."""
+        settings, words = self.settings, [f"at most {self.settings.splats}"]
+        if settings.angular == "sh":
+            words.append(f"harmonics of degree {settings.sh_degree}")
+        return ", ".join([*words, *filter(None, [settings.basis_words()])])
 
     def run(self) -> Iterator[Report]:
         """Do it; a report now and then.
@@ -114,7 +122,10 @@ class Fit(FitRun):
         trainer = self._trainer(capture, pictures)
         yield from self._trained(trainer, pictures)
         splats = trainer.parameters.drawn
-        SplatScene.of(splats, self.device).save(settings.out / "scene.ply")
+        drawn = trainer.renderer.settings
+        SplatScene.of(splats, self.device, activation=drawn.activation, angular=drawn.angular).save(
+            settings.out / "scene.ply"
+        )
         for name, views in self._scored().items():
             self.scores[name] = []
             unseen = self._pictures(views, pictures)
@@ -126,6 +137,7 @@ class Fit(FitRun):
             "splats": len(splats),
             "loss": self.losses[-1][1],
             "background": pictures.behind.tolist(),
+            **settings.basis_facts(),
             **score_record(self.scores),
         }
         page = fit_page(capture.path.name, self.scores, self.losses, self.metrics)

@@ -44,7 +44,8 @@ def fit_page(
     metrics: Mapping[str, Any],
 ) -> Page:
     """The report of a finished fit."""
-    page = Page(f"Splats fitted to {name}", f"{metrics['splats']} splats")
+    basis = f", {metrics['basis']}" if "basis" in metrics else ""
+    page = Page(f"Splats fitted to {name}", f"{metrics['splats']} splats{basis}")
     show_fit(page, groups, losses, metrics)
     return page
 

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from tyro.conf import Positional
 
 from rift_cl.errors import InputError
+from rift_cl.jobs.basis_options import BasisOptions
 from rift_cl.jobs.xray_options import XRAY_ONLY, XrayOptions
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.homogenisation import Homogenisation, WeightKind
@@ -27,7 +28,7 @@ _FREE = (
 
 
 @dataclass(frozen=True)
-class FitSettings(XrayOptions):
+class FitSettings(XrayOptions, BasisOptions):
     """Fit splats to posed photographs, or to the projections of an X-ray scan.
 
     Example: rift fit capture/transforms.json --out fit --steps 3000 --splats 20000
@@ -105,6 +106,12 @@ class FitSettings(XrayOptions):
             InputError: an option makes no sense, or not in this mode.
         """
         self.demand_mode()
+        self.check_basis()
+        if self.angular != "sh" and self.sh_degree != type(self).sh_degree:
+            raise InputError(
+                f"--sh-degree is about harmonics, in whose place --angular {self.angular} puts "
+                "lobes: say --modes, or leave it out"
+            )
         least = {"downscale": 1, "hold_out": 0, "views": 0, "checkpoint_every": 0}
         for name, bound in least.items():
             if getattr(self, name) < bound:
@@ -152,6 +159,7 @@ class FitSettings(XrayOptions):
                 exponent=self.exponent,
                 weight=self.homogenise_by,
                 band_limit=self.band_limit,
+                basis=self.basis_settings(colored=False),
             )
         return TrainSettings(
             steps=self.steps,
@@ -162,6 +170,8 @@ class FitSettings(XrayOptions):
             sh_degree=self.sh_degree,
             homogenisation=Homogenisation(self.exponent, weight=self.homogenise_by),
             band_limit=self.band_limit,
+            basis=self.basis_settings(),
+            angular=self.angular_settings(),
             rates=Rates(
                 poses=_POSE_RATE if self.refine_poses else 0.0,
                 exposures=_EXPOSURE_RATE if self.refine_exposures else 0.0,
@@ -180,8 +190,9 @@ class FitSettings(XrayOptions):
             del values["homogenise_by"]
         if self.band_limit != "coverage":
             values["band_limit"] = self.band_limit == "pixels"
-        if not self.pinhole:
-            del values["pinhole"]
+        for name in ("pinhole", *(field.name for field in dataclasses.fields(BasisOptions))):
+            if values[name] == getattr(type(self), name):
+                del values[name]
         if self.mode == "light":
             # So that fits from before there were other modes still go on.
             values = {k: v for k, v in values.items() if k not in ("mode", *XRAY_ONLY)}

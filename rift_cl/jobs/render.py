@@ -92,7 +92,7 @@ class Render:
         bounds, scene = self.bounds, self.scene.splats
         largest = max((camera.size for camera in self.cameras), key=lambda size: size[0] * size[1])
         channels = 3 + self.settings.depth
-        parameters = 11 + scene.sh.shape[1] * 3
+        parameters = scene.numbers
         memory = FrameMemory(len(scene), parameters, largest[0] * largest[1], channels)
         orbit = f"orbit at {np.linalg.norm(self.cameras[0].center - bounds.center):.4g}"
         return {

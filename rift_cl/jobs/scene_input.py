@@ -2,12 +2,12 @@
 
 How wide splats are drawn (eps2d) is part of what was fitted: drawn otherwise, the same splats look
 softer or harder. So is the light that their colours are in, and what was behind them. A file of
-splats says none of it, the folder of a fit does.
+splats says none of it, the folder of a fit does. Modes, lobes and activation are in the file.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated
@@ -76,7 +76,8 @@ class OpenedScene:
         if len(self.splats) == 0:
             raise InputError(f"{path}: holds no splats, there is nothing to draw")
         eps2d = self._fitted("eps2d") if settings.eps2d is None else settings.eps2d
-        self.drawing = SplatSettings() if eps2d is None else SplatSettings(eps2d=eps2d)
+        drawing = SplatSettings(activation=self.splats.activation, angular=self.splats.angular)
+        self.drawing = drawing if eps2d is None else replace(drawing, eps2d=eps2d)
         self.light: Light = self._light()
         self.background: NDArray[np.float32] = self._background(settings)
 

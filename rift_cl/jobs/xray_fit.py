@@ -22,6 +22,7 @@ from rift_cl.jobs.xray_report import xray_page
 from rift_cl.jobs.xray_scores import backprojected, drawn, relative_error, score_projections
 from rift_cl.progress import Report
 from rift_cl.splat.splats import Splats
+from rift_cl.splat.voxels import voxelise
 from rift_cl.train.homogenisation import noise_of
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.xray_start import density_splats
@@ -58,12 +59,13 @@ class XrayFit(FitRun):
         """What would be done, by name."""
         scan, rows = self.input.scan, self.input.rows
         bins, settings = scan.shape[2], self.settings
+        words = settings.basis_words(colored=False)
         return {
             "scan": f"{scan.path} ({scan.source}, {scan.kind})",
             "trained on": f"{len(self.seen)} projections",
             "held out": f"{len(self.unseen)} projections",
             "rows": f"{rows[0]} to {rows[1] - 1}, {bins} bins each",
-            "splats": f"{settings.splats}",
+            "splats": ", ".join(filter(None, [str(settings.splats), words])),
             "output": f"scene.ply and {VOLUME_NAMES[settings.format]}, "
             f"{(rows[1] - rows[0], bins, bins)} (z, y, x)",
             "host memory": f"{self.input.need / 2**20:.0f} MiB",
@@ -99,6 +101,7 @@ class XrayFit(FitRun):
             "center": whole.center,
             "scale": whole.scale,
             "start_error": first,
+            **self.settings.basis_facts(colored=False),
             **score_record(self.scores),
         }
         self._leave(splats, volume, whole)
@@ -136,12 +139,12 @@ class XrayFit(FitRun):
         settings, source, pitch = self.settings, self.input, self.input.pitch
         density = whole.scale / pitch
         scene = XrayScene.of(splats, self.device)
-        XrayScene(
+        # Modes are shares of the peak, in units of the splats' axes: no unit changes them.
+        dataclasses.replace(
+            scene,
             means=scene.means * np.float32(pitch),
             log_scales=scene.log_scales + np.float32(log(pitch)),
-            quats=scene.quats,
             logit_opacities=scene.logit_opacities + np.float32(log(density)),
-            sh=scene.sh,
         ).save(settings.out / "scene.ply")
         slices = density * self._voxels(splats, whole)
         path, spacing = settings.out / VOLUME_NAMES[settings.format], (pitch,) * 3
@@ -155,6 +158,10 @@ class XrayFit(FitRun):
         self.folder.finish(settings, self.metrics, page, self.device)
 
     def _voxels(self, splats: Splats, whole: Projections) -> Floats:
+        """The splats on the grid; plain ones to the last bits of fits from before modes."""
+        if splats.shape_modes is not None:
+            volume = voxelise(self.device, splats, whole.grid, dilation=self.drawing.eps2d)
+            return np.asarray(self.device.get(volume))
         names = ("means", "quats", "scales", "opacities")
         means, quats, scales, peaks = (
             self.device.get(getattr(splats, name)).astype(float) for name in names

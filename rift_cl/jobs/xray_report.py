@@ -37,7 +37,8 @@ def xray_page(
         losses: by step.
         metrics: the figures of the fit.
     """
-    page = Page(f"Splats fitted to {name}", f"{metrics['splats']} splats, X-rays")
+    basis = f", {metrics['basis']}" if "basis" in metrics else ""
+    page = Page(f"Splats fitted to {name}", f"{metrics['splats']} splats, X-rays{basis}")
     if metrics["scores"]:
         page.table(COLUMNS, score_rows(metrics), caption=SCORING)
     page.section("Slices")

@@ -14,7 +14,7 @@ noisy, or out of focus.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from numpy.typing import NDArray
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Camera
 from rift_cl.train.start import field_diameter, focus_of
+
+if TYPE_CHECKING:
+    from rift_cl.train.parameters import Parameters
 
 # Pictures whose contrast is measured.
 _FEW = 8
@@ -105,3 +108,23 @@ def unseen_length(cameras: Sequence[Camera]) -> float:
     depths = [abs(camera.view[2, :3] @ middle + camera.view[2, 3]) for camera in cameras]
     focal = [max(camera.intrinsics[:2]) for camera in cameras]
     return float(np.sqrt(0.2) * np.median(np.divide(depths, focal)))
+
+
+class BandLimiter:
+    """Sets the limit of a run's splats, from its cameras and pictures.
+
+    Args:
+        device: where the splats are.
+        pictures: of the fit.
+        noise: standard deviation of their noise, where coverage sets the limit; None for pixels
+            alone.
+    """
+
+    def __init__(self, device: Device, pictures: Targets, *, noise: float | None) -> None:
+        self._detail = None if noise is None else Detail.of(device, pictures, noise)
+        self._cameras = device.array(camera_table(pictures.cameras))
+        self._unseen = unseen_length(pictures.cameras)
+
+    def limit(self, parameters: Parameters, *, near: float) -> None:
+        """Set it anew; cameras do not see what is nearer than ``near``."""
+        parameters.limit_band(self._cameras, near=near, unseen=self._unseen, detail=self._detail)

@@ -25,6 +25,7 @@ from rift_cl.operators.spectrum import Response
 from rift_cl.sampling.coverage import coverage
 from rift_cl.sampling.looks import Looks
 from rift_cl.sampling.target import Target
+from rift_cl.train.homogenisation import Homogenisation
 from rift_cl.train.start import field_diameter, focus_of
 
 Floats = NDArray[np.float64]
@@ -36,6 +37,15 @@ _ANGLES, _RADII, _LARGEST = 64, 24, np.sqrt(0.5)
 _LINES = 256
 # The least coverage: a square pixel passes more at any frequency, an aperture may pass nothing.
 _LEAST = 0.1
+
+
+def weight_of(
+    chosen: Homogenisation, cameras: Sequence[Camera], device: Device
+) -> CoverageWeight | None:
+    """The weights of a fit that wants them; None for the ramp, or for none."""
+    if chosen.weight == "ramp" or not chosen.exponent:
+        return None
+    return CoverageWeight(cameras, device)
 
 
 class CoverageWeight:

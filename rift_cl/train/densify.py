@@ -3,7 +3,8 @@
 The densification of 3D Gaussian Splatting (Kerbl et al. 2023) as gsplat 1.5 does it. Of the splats
 whose mean gradient on the screen is large, a small one leaves a copy of itself in its place, and a
 large one gives way to two that are drawn from its own Gaussian, with scales 1.6 times smaller.
-Faint splats go, and later those that have become too large.
+Faint splats go, and later those that have become too large. Copies and halves keep the modes and
+lobes of the splat that they come from, in coordinates of their own.
 
 It happens seldom, on the host, in NumPy; what is random comes from (seed, step) alone.
 """
@@ -16,7 +17,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.train.parameters import GROUPS, Parameters
+from rift_cl.train.parameters import Parameters
 from rift_cl.train.quaternions import rotated
 from rift_cl.train.settings import Densification
 
@@ -80,12 +81,12 @@ def densify(
     if settings.revised_opacity:
         doubled = np.concatenate([fates.cloned, fates.split])
         raw["logits"][doubled] = _shared_logits(raw["logits"][doubled])
-    after = {name: raw[name][order] for name in GROUPS}
+    after = {name: array[order] for name, array in raw.items()}
     halves = order.size - 2 * fates.split.size
     after["means"][halves:] += _samples(raw, fates.split, random)
     after["log_scales"][halves:] -= np.float32(log(_SPLIT_SHRINK))
     for group in (first, second):
-        for name in GROUPS:
+        for name in raw:
             group[name] = group[name][order]
             group[name][fates.kept.size :] = 0
     return parameters.replaced(after, first, second)
@@ -136,8 +137,8 @@ def _fates(
 def _usable(raw: Raw) -> Chosen:
     """Splats that can be drawn: finite, with a quaternion that is a rotation."""
     usable = np.asarray(raw["quats"].any(axis=1))
-    for name in GROUPS:
-        usable &= np.isfinite(raw[name]).reshape(len(usable), -1).all(axis=1)
+    for array in raw.values():
+        usable &= np.isfinite(array).reshape(len(usable), -1).all(axis=1)
     return usable
 
 

@@ -1,8 +1,8 @@
 """What is trained: splats before their activations, on the device, with Adam's moments.
 
 Scales are trained as logarithms, opacities as logits and densities as logarithms; what the
-rasterizer draws, ``drawn``, is made from them after every step. One owner, the trainer, changes
-these arrays in place.
+rasterizer draws, ``drawn``, is made from them after every step. Hermite modes and lobes, where
+splats have some, are trained as they are. One owner, the trainer, changes these arrays in place.
 """
 
 from __future__ import annotations
@@ -14,34 +14,38 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.cl.arithmetic import copy_columns
+from rift_cl.cl.arithmetic import axpby, copy_columns
 from rift_cl.cl.device import Device
+from rift_cl.cl.elementwise import multiply
 from rift_cl.splat.frame import FrameGradients
 from rift_cl.splat.splats import Splats
 from rift_cl.train.band_limit import Detail
+from rift_cl.train.device_adam import DeviceAdam
 
+# What all splats have, and what some have as well.
 GROUPS = ("means", "quats", "log_scales", "logits", "sh")
-_BETA1, _BETA2, _EPSILON = 0.9, 0.999, 1e-15
-# Parameters that one work-item of a CPU goes through; kernels/adam.cl has the same.
-_CPU_RUN = 4096
+MORE = ("shape_modes", "color_modes", "lobes")
 
 Arrays = Mapping[str, NDArray[np.float32]]
 
 
 @dataclass
 class Parameters:
-    """N splats in training; every mapping has an array for each of ``GROUPS``.
+    """N splats in training; every mapping has an array for each of ``groups``.
 
     Args:
         device: where they are.
-        raw: what is trained: (N, 3), (N, 4), (N, 3), (N,), (N, K, 3).
+        raw: what is trained: (N, 3), (N, 4), (N, 3), (N,), (N, K, 3), and any of ``MORE``:
+            (N, modes), (N, modes, 3), (N, G).
         first: Adam's means of gradients.
         second: Adam's means of their squares.
-        drawn: what the rasterizer draws; shares positions, quaternions and harmonics with ``raw``.
+        drawn: what the rasterizer draws; shares all but scales and opacities with ``raw``.
         step: steps of Adam that were taken.
         density: whether ``logits`` are logarithms of densities, for X-rays.
+        amplitude: whether optical depths are drawn, those that hide sigmoid(logit).
         band: (N,) lengths below which splats have no detail, or None; see ``limit_band``.
-        shares: of the rates along a period of parameters, on the device.
+        free: by group, 1 where a mode is trained and 0 where it is held as it is; device arrays of
+            the group's shape. Groups without one are trained whole.
     """
 
     device: Device
@@ -51,8 +55,13 @@ class Parameters:
     drawn: Splats
     step: int = 0
     density: bool = False
+    amplitude: bool = False
     band: Any = None
-    shares: dict[tuple[int, float], Any] = field(default_factory=dict)
+    free: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Make what takes the steps."""
+        self._adam = DeviceAdam(self.device)
 
     @classmethod
     def of(
@@ -64,10 +73,12 @@ class Parameters:
         second: Arrays | None = None,
         step: int = 0,
         density: bool = False,
+        amplitude: bool = False,
         band: NDArray[np.float32] | None = None,
     ) -> Parameters:
         """Send host arrays to a device; moments are zero if not given."""
-        sent = {name: device.array(raw[name]) for name in GROUPS}
+        names = [*GROUPS, *(name for name in MORE if name in raw)]
+        sent = {name: device.array(raw[name]) for name in names}
         parameters = cls(
             device,
             sent,
@@ -76,6 +87,7 @@ class Parameters:
             _undrawn(device, sent),
             step,
             density,
+            amplitude,
             None if band is None else device.array(band),
         )
         parameters.activate()
@@ -85,17 +97,28 @@ class Parameters:
         """Number of splats."""
         return int(self.raw["means"].shape[0])
 
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """The names of what is trained: ``GROUPS``, and those of ``MORE`` that there are."""
+        return tuple(self.raw)
+
     def host(self) -> tuple[dict[str, NDArray[np.float32]], ...]:
         """The raw values and both moments, on the host."""
         return tuple(
-            {name: self.device.get(group[name]) for name in GROUPS}
+            {name: self.device.get(group[name]) for name in self.groups}
             for group in (self.raw, self.first, self.second)
         )
 
     def replaced(self, raw: Arrays, first: Arrays, second: Arrays) -> Parameters:
         """Other splats in the place of these, at the same step; their band is still to be set."""
         return Parameters.of(
-            self.device, raw, first=first, second=second, step=self.step, density=self.density
+            self.device,
+            raw,
+            first=first,
+            second=second,
+            step=self.step,
+            density=self.density,
+            amplitude=self.amplitude,
         )
 
     def update(
@@ -106,6 +129,7 @@ class Parameters:
         sh_rest: float,
         opacity_penalty: float,
         scale_penalty: float,
+        ridge: float = 0.0,
     ) -> None:
         """One step of Adam.
 
@@ -115,6 +139,7 @@ class Parameters:
             sh_rest: rate of the other harmonics, as a share of that.
             opacity_penalty: weight of the mean opacity in the loss.
             scale_penalty: weight of the mean scale in the loss.
+            ridge: weight in the loss of the mean over splats of their shape modes' squares.
         """
         count, found = len(self), gradients.splats
         self.device.launch(
@@ -125,9 +150,17 @@ class Parameters:
             **self._kind(),
         )
         by = (found.means, found.quats, found.scales, found.opacities, gradients.sh)
+        more = (name for name in MORE if name in self.raw)
+        given = dict(zip(GROUPS, by, strict=True)) | {n: getattr(gradients, n) for n in more}
         self.step += 1
-        for name, gradient in zip(GROUPS, by, strict=True):
-            self._adam(name, gradient, rates[name], sh_rest if name == "sh" else 1.0)
+        for name, gradient in given.items():
+            if name == "shape_modes" and ridge:
+                axpby(self.device, 2 * ridge / count, self.raw[name], 1.0, gradient)
+            if name in self.free:
+                multiply(self.device, self.free[name], gradient)
+            rest = sh_rest if name == "sh" else 1.0
+            moments = self.raw[name], self.first[name], self.second[name]
+            self._adam.step(*moments, gradient, rate=rates[name], rest=rest, step=self.step)
         self.activate()
 
     def activate(self) -> None:
@@ -142,7 +175,8 @@ class Parameters:
         return self.raw["log_scales"], logits, logits if self.band is None else self.band
 
     def _kind(self) -> dict[str, bool]:
-        return {"DENSITY": self.density, "BAND": self.band is not None}
+        kind = {"DENSITY": self.density, "BAND": self.band is not None}
+        return kind | ({"AMPLITUDE": True} if self.amplitude else {})
 
     def limit_band(
         self, cameras: Any, *, near: float, unseen: float, detail: Detail | None = None
@@ -165,30 +199,6 @@ class Parameters:
             device.launch("splat_band_coverage", (runs,), *given, *detail, views, count)
         self.activate()
 
-    def _adam(self, name: str, gradient: Any, rate: float, rest: float) -> None:
-        device, size = self.device, self.raw[name].size
-        period = 3 * self.raw["sh"].shape[1] if name == "sh" else 1
-        run = _CPU_RUN if device.traits.is_cpu else 1
-        device.launch(
-            "adam",
-            (-(-size // run),),
-            *(self.raw[name], self.first[name], self.second[name], gradient),
-            *(self._shares(period, rest), period, float(rate), _BETA1, _BETA2),
-            *(1 / (1 - _BETA1**self.step), 1 / (1 - _BETA2**self.step), _EPSILON),
-            np.uint64(size),
-            RUN=run,
-        )
-
-    def _shares(self, period: int, rest: float) -> Any:
-        """Shares of the rate along a period, one for the first three; sent to the device once."""
-        if (period, rest) not in self.shares:
-            shares = np.where(np.arange(period) < 3, 1.0, rest)
-            # Two periods and a run more, so that shares can be read from any place on.
-            length = 2 * period + self.device.traits.macros["LANES"]
-            table = np.resize(shares, length).astype(np.float32)
-            self.shares[period, rest] = self.device.array(table)
-        return self.shares[period, rest]
-
     def shake(self, amount: float, seed: int) -> None:
         """Move faint splats at random; ``kernels/splat_noise.cl`` says how."""
         drawn, count = self.drawn, len(self)
@@ -201,24 +211,40 @@ class Parameters:
 
     def add_degree(self) -> None:
         """Let the next degree of harmonics join, with coefficients of zero."""
-        count, had = len(self), self.raw["sh"].shape[1]
-        wanted = (int(np.sqrt(had)) + 1) ** 2
+        self.widen("sh", (int(np.sqrt(self.raw["sh"].shape[1])) + 1) ** 2)
+
+    def widen(self, name: str, count: int) -> None:
+        """Let more coefficients of a group join, with zeros; a group that is not there begins.
+
+        Args:
+            name: ``sh``, ``shape_modes`` or ``color_modes``.
+            count: coefficients that there are then, of each channel.
+        """
+        rows, tail = len(self), () if name == "shape_modes" else (3,)
         for group in (self.raw, self.first, self.second):
-            wider = self.device.zeros((count, wanted, 3))
-            copy_columns(self.device, group["sh"], 0, wider, 0, 3 * had)
-            group["sh"] = wider
+            wider = self.device.zeros((rows, count, *tail))
+            if name in group:
+                had = group[name].size // max(rows, 1)
+                copy_columns(self.device, group[name], 0, wider, 0, had)
+            group[name] = wider
+        self.free.pop(name, None)
+        self.redraw()
+
+    def redraw(self) -> None:
+        """Make what is drawn anew, after arrays of ``raw`` were put in the place of others."""
         self.drawn = _undrawn(self.device, self.raw)
         self.activate()
 
 
 def _moments(device: Device, sent: Mapping[str, Any], given: Arrays | None) -> dict[str, Any]:
     if given is None:
-        return {name: device.zeros(sent[name].shape) for name in GROUPS}
-    return {name: device.array(given[name]) for name in GROUPS}
+        return {name: device.zeros(array.shape) for name, array in sent.items()}
+    return {name: device.array(given[name]) for name in sent}
 
 
 def _undrawn(device: Device, raw: Mapping[str, Any]) -> Splats:
     """Splats whose scales and opacities are still to be made."""
     count = raw["means"].shape[0]
     scales, opacities = device.empty((count, 3)), device.empty((count,))
-    return Splats(raw["means"], raw["quats"], scales, opacities, sh=raw["sh"])
+    more = {name: raw[name] for name in MORE if name in raw}
+    return Splats(raw["means"], raw["quats"], scales, opacities, sh=raw["sh"], **more)

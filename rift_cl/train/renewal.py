@@ -8,11 +8,18 @@ one before:
     o' = 1 - (1 - o)^(1/k),    s' = s o / sum over i = 1..k, j = 0..i-1 of
                                          binomial(i-1, j) (-1)^j o'^(j+1) / sqrt(j+1).
 
+Where densities are drawn as optical depths (``SplatSettings.activation``) depths add up: each of
+the k gets one k-th, which is the same o', and keeps its scale, whatever its modes. That is exact.
+
 Densities of X-rays add up, nothing hides anything: there a faint splat takes over one half of a
 splat that the projections pull at. Mass m, mean and covariance of the two together stay what they
 were, by shifts along the longest axis,
 
     m' = m / 2,    mean' = mean +- a s e,    s' = s sqrt(1 - a^2)  along e.
+
+Hermite modes are derivatives of the Gaussian in units of its axes, and both halves keep the same
+derivatives: a mode of order n along e is divided by (1 - a^2)^(n/2). So moments of the two together
+are those of the splat before up to the third, as without modes; higher ones are not.
 
 It happens seldom, on the host, in NumPy; what is random comes from (seed, step) alone.
 """
@@ -24,8 +31,10 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.basis.indices import graded
 from rift_cl.errors import InputError
-from rift_cl.train.parameters import GROUPS, Parameters
+from rift_cl.splat.orders import order_of
+from rift_cl.train.parameters import Parameters
 from rift_cl.train.quaternions import rotated
 from rift_cl.train.settings import Renewal
 
@@ -69,10 +78,10 @@ def renew(
     chance = opacities[alive] / opacities[alive].sum()
     chosen = alive[random.choice(alive.size, faded.size + added, p=chance)]
     shared = np.bincount(chosen, minlength=len(parameters))
-    _share(raw, opacities, shared)
+    _share(raw, opacities, shared, depths=parameters.amplitude)
     places = np.concatenate([faded, np.arange(len(parameters), len(parameters) + added)])
     touched = np.concatenate([places, np.flatnonzero(shared)])
-    for name in GROUPS:
+    for name in parameters.groups:
         raw[name] = _extended(raw[name], added)
         raw[name][places] = raw[name][chosen]
         for moments in (first, second):
@@ -111,7 +120,7 @@ def renew_densities(
     if places.size == 0:
         return parameters
     hosts = random.choice(len(parameters), places.size, replace=False, p=chance / chance.sum())
-    for name in GROUPS:
+    for name in parameters.groups:
         raw[name][places] = raw[name][hosts]
         for moments in (first, second):
             moments[name][places] = moments[name][hosts] = 0
@@ -134,20 +143,29 @@ def _halve(
         raw["log_scales"][halves, longest] += shrink
         # Half of the mass, in a volume that has shrunk.
         raw["logits"][halves] -= np.float32(np.log(2)) + shrink
+        if "shape_modes" in raw:
+            modes = raw["shape_modes"]
+            powers = graded(order_of(modes.shape[1] + 1), 3)[1:, longest].T
+            modes[halves] *= np.exp(-shrink * powers).astype(np.float32)
 
 
 def _share(
-    raw: dict[str, NDArray[np.float32]], opacities: Floats, shared: NDArray[np.int64]
+    raw: dict[str, NDArray[np.float32]],
+    opacities: Floats,
+    shared: NDArray[np.int64],
+    *,
+    depths: bool,
 ) -> None:
     """Make splats share their place with as many others as fell on it."""
     hosts = np.flatnonzero(shared)
     count = np.minimum(shared[hosts] + 1, _MOST_IN_PLACE)
     opacity = opacities[hosts]
     each = 1 - (1 - opacity) ** (1 / count)
-    scale = opacity / np.array([_overlap(o, k) for o, k in zip(each, count, strict=True)])
+    if not depths:
+        scale = opacity / np.array([_overlap(o, k) for o, k in zip(each, count, strict=True)])
+        raw["log_scales"][hosts] += np.log(scale)[:, None]
     each = np.clip(each, _OPACITY_EDGE, 1 - _OPACITY_EDGE)
     raw["logits"][hosts] = np.log(each / (1 - each))
-    raw["log_scales"][hosts] += np.log(scale)[:, None]
 
 
 def _overlap(opacity: float, count: int) -> float:

@@ -41,6 +41,9 @@ class Schedule:
             "log_scales": fade * rates.log_scales,
             "logits": fade * rates.logits,
             "sh": fade * rates.sh,
+            "shape_modes": fade * rates.shape_modes,
+            "color_modes": fade * rates.color_modes,
+            "lobes": fade * rates.lobes,
             "poses": fade * rates.poses * falling,
             "exposures": fade * rates.exposures * falling,
         }

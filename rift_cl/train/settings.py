@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from rift_cl.errors import InputError
-from rift_cl.geometry.numbers import one_number
+from rift_cl.splat.orders import count_of
+from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.homogenisation import Homogenisation
+from rift_cl.train.ranges import check_choice, check_number, check_whole
 
 LossKind = Literal["l1", "l2"]
 StrategyName = Literal["mcmc", "default"]
 BandLimit = Literal["pixels", "coverage"]
 _DEGREES = (0, 1, 2, 3, 4)
-# Devices count in float32.
-_LARGEST = 3.4028234e38
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,9 @@ class Rates:
         poses: of the cameras' turns, in radians, and shifts, in extents of the scene; falls as
             that of positions does. At 0 the cameras stay where they are.
         exposures: of each photograph's gains and offsets; falls likewise. At 0 there are none.
+        shape_modes: of the Hermite modes of splats' shapes.
+        color_modes: of those of their colours.
+        lobes: of the geometry of lobes: quaternions or axes, and logarithms of widths.
 
     Raises:
         InputError: a number is out of its range.
@@ -46,13 +49,16 @@ class Rates:
     sh_rest: float = 0.2
     poses: float = 0.0
     exposures: float = 0.0
+    shape_modes: float = 5e-3
+    color_modes: float = 2.5e-3
+    lobes: float = 1e-2
 
     def __post_init__(self) -> None:
         """Check every number's range: a rate of 0 holds a group still."""
         for item in fields(self):
             if item.name != "means_last":
-                _check_number(self, item.name)
-        _check_number(self, "means_last", most=1, above=True)
+                check_number(self, item.name)
+        check_number(self, "means_last", most=1, above=True)
 
 
 @dataclass(frozen=True)
@@ -87,12 +93,12 @@ class Renewal:
 
     def __post_init__(self) -> None:
         """Check every number's range."""
-        _check_whole(self, "every", 1)
-        _check_whole(self, "first", 0)
+        check_whole(self, "every", 1)
+        check_whole(self, "first", 0)
         for name in ("last", "full", "faint"):
-            _check_number(self, name, most=1)
+            check_number(self, name, most=1)
         for name in ("growth", "noise", "opacity_penalty", "scale_penalty"):
-            _check_number(self, name)
+            check_number(self, name)
 
 
 @dataclass(frozen=True)
@@ -142,15 +148,15 @@ class Densification:
     def __post_init__(self) -> None:
         """Check every number's range."""
         for name in ("every", "reset_least"):
-            _check_whole(self, name, 1)
+            check_whole(self, name, 1)
         for name in ("first", "last", "reset"):
-            _check_number(self, name, most=1)
+            check_number(self, name, most=1)
         for name in ("gradient", "large_on_screen"):
             if getattr(self, name) is not None:
-                _check_number(self, name, above=True)
+                check_number(self, name, above=True)
         for name in ("small", "large"):
-            _check_number(self, name, above=True)
-        _check_number(self, "faint", most=0.25, above=True)
+            check_number(self, name, above=True)
+        check_number(self, "faint", most=0.25, above=True)
         if self.small > self.large:
             raise InputError(
                 f"Densification: small is {self.small!r} and large is {self.large!r}, wanted "
@@ -185,6 +191,9 @@ class TrainSettings:
             penalties, ``default`` densifies as 3DGS did at first, with neither.
         renewal: of splats that have faded, with ``mcmc``.
         densification: with ``default``.
+        basis: Hermite modes of the splats' shapes and colours, and how densities become opacities.
+        angular: what colours vary in with the direction they are seen from; anything but ``sh``
+            takes the place of the harmonics, all but the constant one.
 
     Raises:
         InputError: a number is out of its range.
@@ -205,42 +214,33 @@ class TrainSettings:
     strategy: StrategyName = "mcmc"
     renewal: Renewal = field(default_factory=Renewal)
     densification: Densification = field(default_factory=Densification)
+    basis: BasisSettings = field(default_factory=BasisSettings)
+    angular: AngularSettings = field(default_factory=AngularSettings)
 
     def __post_init__(self) -> None:
         """Check every number's range."""
         for name, least in (("steps", 1), ("splats", 1), ("sh_every", 1), ("seed", 0)):
-            _check_whole(self, name, least)
+            check_whole(self, name, least)
         if self.sh_degree not in _DEGREES:
             raise InputError(f"TrainSettings: sh_degree is {self.sh_degree!r}, wanted 0 to 4")
         for name in ("ssim_weight", "finish"):
-            _check_number(self, name, most=1)
+            check_number(self, name, most=1)
         if self.noise is not None:
-            _check_number(self, "noise")
-        if self.loss not in get_args(LossKind):
-            raise InputError(f"TrainSettings: loss is {self.loss!r}, wanted l1 or l2")
+            check_number(self, "noise")
+        check_choice(self, "loss", get_args(LossKind))
         if self.band_limit is not None and self.band_limit not in get_args(BandLimit):
             wanted = "None, " + " or ".join(get_args(BandLimit))
             raise InputError(f"TrainSettings: band_limit is {self.band_limit!r}, wanted {wanted}")
-        if self.strategy not in get_args(StrategyName):
-            wanted = " or ".join(get_args(StrategyName))
-            raise InputError(f"TrainSettings: strategy is {self.strategy!r}, wanted {wanted}")
+        check_choice(self, "strategy", get_args(StrategyName))
+        if self.densification.absgrad and not self.basis.plain:
+            raise InputError(
+                "TrainSettings: densification.absgrad wants magnitudes of screen gradients, which "
+                "splats with modes or an activation do not have: leave it off"
+            )
 
-
-def _check_whole(settings: Any, name: str, least: int) -> None:
-    given = getattr(settings, name)
-    value = one_number(given)
-    if not (value >= least and value.is_integer()):
-        kind = type(settings).__name__
-        raise InputError(f"{kind}: {name} is {given!r}, wanted a whole number >= {least}")
-
-
-def _check_number(settings: Any, name: str, *, most: float = _LARGEST, above: bool = False) -> None:
-    """Check that a number lies from 0 to ``most``; ``above`` leaves 0 itself out."""
-    given = getattr(settings, name)
-    value = one_number(given)
-    if not 0 <= value <= most or (above and value == 0):
-        kind = type(settings).__name__
-        wanted = "a number > 0" if above else "a number >= 0"
-        if most < _LARGEST:
-            wanted = f"a number above 0, at most {most}" if above else f"0 to {most}"
-        raise InputError(f"{kind}: {name} is {given!r}, wanted {wanted}")
+    @property
+    def numbers(self) -> int:
+        """Parameters that a splat has in the end."""
+        basis, colors = self.basis, 3 * (self.sh_degree + 1) ** 2
+        modes = count_of(basis.order) - 1 + 3 * (count_of(basis.color_order) - 1)
+        return 11 + modes + (self.angular.numbers or colors)

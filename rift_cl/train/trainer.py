@@ -24,12 +24,14 @@ from rift_cl.geometry import Camera
 from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
-from rift_cl.train.band_limit import Detail, camera_table, unseen_length
-from rift_cl.train.coverage_weight import CoverageWeight
+from rift_cl.train.band_limit import BandLimiter
+from rift_cl.train.coverage_weight import weight_of
 from rift_cl.train.exposures import Exposures
 from rift_cl.train.homogenised_loss import HomogenisedLoss
+from rift_cl.train.joining import Joining
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.poses import Poses
+from rift_cl.train.run_state import flattened, grouped
 from rift_cl.train.schedule import Schedule
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start import scene_extent
@@ -66,7 +68,8 @@ class Trainer:
         pictures: what is fitted.
         parameters: the splats to begin with.
         settings: of the fit.
-        drawing: of the rasterizer.
+        drawing: of the rasterizer; its activation is that of the settings.
+        flat: whether all splats lie in one slice.
     """
 
     def __init__(
@@ -75,6 +78,8 @@ class Trainer:
         parameters: Parameters,
         settings: TrainSettings,
         drawing: SplatSettings | None = None,
+        *,
+        flat: bool = False,
     ) -> None:
         self.pictures = pictures
         self.parameters = parameters
@@ -87,6 +92,8 @@ class Trainer:
         )
         drawing = self.strategy.drawing(drawing or SplatSettings())
         self.renderer = Renderer(drawing, device=self.device)
+        self.joining = Joining(settings, pictures.cameras, flat=flat)
+        self._join()
         self.poses = Poses(pictures.cameras, extent) if settings.rates.poses else None
         self.exposures = Exposures(self.device, views) if settings.rates.exposures else None
         self.loss = HomogenisedLoss(
@@ -95,9 +102,13 @@ class Trainer:
             ssim_weight=settings.ssim_weight,
             kind=settings.loss,
             noise=settings.noise or 0.0,
-            coverage=self._coverage(),
+            coverage=weight_of(settings.homogenisation, pictures.cameras, self.device),
         )
-        self._band = self._band_of_cameras() if settings.band_limit else None
+        self._band = None
+        if settings.band_limit:
+            by_coverage = settings.band_limit == "coverage"
+            noise = (settings.noise or 0.0) if by_coverage else None
+            self._band = BandLimiter(self.device, pictures, noise=noise)
         if self._band is not None and parameters.band is None:
             self._limit_band()
 
@@ -138,10 +149,13 @@ class Trainer:
             by_view = self.device.get(gradients.camera)[:12].reshape(3, 4).astype(float)
             self.poses.update(number, by_view, rates["poses"])
         penalties = self.strategy.before_step(step)
-        parameters.update(gradients, rates, sh_rest=settings.rates.sh_rest, **penalties)
-        self._add_degree()
+        more = {"sh_rest": settings.rates.sh_rest, "ridge": settings.basis.ridge}
+        parameters.update(gradients, rates, **more, **penalties)
+        self._join()
         self.parameters = self.strategy.after_step(parameters, frame, gradients, rates["means"])
         renewed = self.parameters is not parameters
+        if renewed:
+            self.joining.hold(self.parameters)
         if self._band is not None and (renewed or self.parameters.step % _BAND_EVERY == 0):
             self._limit_band()
         return value
@@ -166,10 +180,7 @@ class Trainer:
         for name, refined in (("poses", self.poses), ("exposures", self.exposures)):
             if refined is not None:
                 groups[name] = refined.state()
-        state = {
-            f"{group}.{key}": array for group in groups for key, array in groups[group].items()
-        }
-        return {"step": np.array(parameters.step), **state}
+        return {"step": np.array(parameters.step), **flattened(groups)}
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a state of a run with the same settings and pictures.
@@ -177,7 +188,7 @@ class Trainer:
         Raises:
             CheckpointError: it is of another run.
         """
-        groups = _grouped(state)
+        groups = grouped(state)
         try:
             self.parameters = Parameters.of(
                 self.device,
@@ -186,8 +197,11 @@ class Trainer:
                 second=groups["second"],
                 step=int(state["step"]),
                 density=self.parameters.density,
+                amplitude=self.parameters.amplitude,
                 band=groups.get("band", {}).get("lengths"),
             )
+            self.joining.hold(self.parameters)
+            self._fit_drawing()
             self.strategy.restore(groups.get("strategy", {}))
             self.loss.restore(groups["loss"])
             for name, refined in (("poses", self.poses), ("exposures", self.exposures)):
@@ -208,41 +222,23 @@ class Trainer:
             return value, by_exposed
         return value, exposures.pulled_back(image, by_exposed, number, rate)
 
-    def _add_degree(self) -> None:
-        settings, parameters = self.settings, self.parameters
-        degree = int(np.sqrt(parameters.raw["sh"].shape[1])) - 1
-        if parameters.step % settings.sh_every == 0 and degree < settings.sh_degree:
-            parameters.add_degree()
+    def _join(self) -> None:
+        """Let join what is due, and draw it."""
+        self.joining.after_step(self.parameters)
+        self._fit_drawing()
 
-    def _coverage(self) -> CoverageWeight | None:
-        chosen = self.settings.homogenisation
-        if chosen.weight == "ramp" or not chosen.exponent:
-            return None
-        return CoverageWeight(self.pictures.cameras, self.device)
-
-    def _band_of_cameras(self) -> tuple[Any, float, Detail | None]:
-        pictures, settings = self.pictures, self.settings
-        detail = None
-        if settings.band_limit == "coverage":
-            detail = Detail.of(self.device, pictures, settings.noise or 0.0)
-        cameras = pictures.cameras
-        return self.device.array(camera_table(cameras)), unseen_length(cameras), detail
+    def _fit_drawing(self) -> None:
+        """Draw the splats as what they are by now."""
+        drawing = self.joining.drawing(self.parameters, self.renderer.settings)
+        if drawing != self.renderer.settings:
+            self.renderer = Renderer(drawing, device=self.device)
 
     def _limit_band(self) -> None:
         if self._band is not None:
-            near, (cameras, unseen, detail) = self.renderer.settings.near, self._band
-            self.parameters.limit_band(cameras, near=near, unseen=unseen, detail=detail)
+            self._band.limit(self.parameters, near=self.renderer.settings.near)
 
     def view_at(self, step: int) -> int:
         """The picture that is looked at in a step: all of them once, in a new order every time."""
         count = len(self.pictures.cameras)
         order = np.random.default_rng((self.settings.seed, step // count, 0x0DE)).permutation(count)
         return int(order[step % count])
-
-
-def _grouped(state: Mapping[str, NDArray[Any]]) -> dict[str, dict[str, NDArray[Any]]]:
-    groups: dict[str, dict[str, NDArray[Any]]] = {}
-    for name, array in state.items():
-        group, _, key = name.partition(".")
-        groups.setdefault(group, {})[key] = array
-    return groups

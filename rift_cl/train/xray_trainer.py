@@ -3,7 +3,7 @@
 Line integrals need no colour: it is one, has no rate, and the loss looks at the first channel. A
 scan of one detector row says nothing about what is across it. Gradients there are no more than
 rounding, which Adam would blow up to whole steps, so that after each step the splats are put back
-into their slice.
+into their slice; modes of their shapes that vary across it stay at zero.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from rift_cl.cl.arithmetic import copy_columns
 from rift_cl.splat.settings import SplatSettings
+from rift_cl.train.basis_settings import BasisSettings
 from rift_cl.train.homogenisation import Homogenisation, WeightKind
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.settings import BandLimit, Rates, Renewal, TrainSettings
@@ -33,6 +34,7 @@ def xray_settings(
     exponent: float,
     weight: WeightKind = "ramp",
     band_limit: BandLimit | None = None,
+    basis: BasisSettings | None = None,
 ) -> TrainSettings:
     """The settings of a fit to projections.
 
@@ -44,6 +46,7 @@ def xray_settings(
             or of the inverse coverage.
         weight: which of the two.
         band_limit: as in ``TrainSettings``.
+        basis: the modes of the splats' densities.
     """
     return TrainSettings(
         steps=steps,
@@ -56,6 +59,7 @@ def xray_settings(
         band_limit=band_limit,
         rates=RATES,
         renewal=RENEWAL,
+        basis=basis or BasisSettings(),
     )
 
 
@@ -79,7 +83,7 @@ class XrayTrainer(Trainer):
         *,
         flat: bool,
     ) -> None:
-        super().__init__(pictures, parameters, settings, drawing)
+        super().__init__(pictures, parameters, settings, drawing, flat=flat)
         count = len(parameters)
         self._zero = self.device.zeros((count, 2)) if flat else None
         thin = np.full((count, 1), np.log(FLAT), np.float32)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from splat_files import KINDS, valid
+from splat_files import ARRAYS, KINDS, valid
 
 import rift_cl as rift
 from rift_cl.errors import FileFormatError, RiftError
@@ -54,7 +54,7 @@ def outcome(path: Path) -> rift.SplatScene | RiftError:
     except RiftError as error:
         assert str(error).startswith(f"{path}: "), error
         return error
-    assert all(np.isfinite(array).all() for array in vars(scene).values())
+    assert all(np.isfinite(getattr(scene, name)).all() for name in ARRAYS)
     assert scene.means.shape == (len(scene), 3) and scene.degree in range(5)
     return scene
 
