@@ -1,0 +1,208 @@
+"""The comparison of bases: small studies, verdicts that follow from figures, reports from JSON."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rift_cl import open_device
+
+TOOL = Path(__file__).parents[2] / "tools" / "compare_bases.py"
+STUDIES = (
+    "angular_dense",
+    "angular_fixed",
+    "angular_views",
+    "images",
+    "slices",
+    "volumes",
+    "radiance",
+)
+
+
+def run(*arguments):
+    command = [sys.executable, str(TOOL), *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False)
+
+
+def test_a_study_is_computed_kept_and_drawn_again(tmp_path):
+    first = run("--tiny", "--only", "angular_fixed", "volumes", "--seeds", 4, "--out", tmp_path)
+    assert first.returncode == 0, first.stderr
+    assert "against SH" in first.stdout
+    assert "HG 1" in first.stdout
+    file = tmp_path / "volumes.json"
+    record = json.loads(file.read_text())
+    assert record["environment"]["device"]
+    assert {r["basis"] for r in record["result"]["runs"]} == {"Gaussian", "HG 1"}
+    # What is kept is taken as it is; what was lost is computed again.
+    record["result"]["runs"][0]["pairs"] = 77.0
+    file.write_text(json.dumps(record))
+    (tmp_path / "angular_fixed.json").write_text("damaged")
+    again = run("--tiny", "--only", "angular_fixed", "volumes", "--seeds", 4, "--out", tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert json.loads(file.read_text())["result"]["runs"][0]["pairs"] == 77.0
+    page = (tmp_path / "report.html").read_text()
+    assert page.count("<h2>") == 2
+    assert "## PSNR in dB" in (tmp_path / "bases.md").read_text()
+    assert (tmp_path / "volumes_time_60.png").read_bytes().startswith(b"\x89PNG")
+    (tmp_path / "report.html").unlink()
+    assert run("--report-only", "--out", tmp_path).returncode == 0
+    assert (tmp_path / "report.html").read_text() == page
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (("--only", "nonsense"), "nonsense"),
+        (("--quick", "--full"), "--quick"),
+        (("--seeds", 1, 1), "--seeds"),
+        (("--seeds", -1), "--seeds"),
+    ],
+)
+def test_bad_arguments(tmp_path, arguments, word):
+    result = run(*arguments, "--out", tmp_path / "out")
+    assert result.returncode == 3
+    assert word in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_every_study_yields_its_runs_and_shows_them(tool, tmp_path, name):
+    plan = tool("bases.plan").Plan("tiny", tmp_path, (0,))
+    study, device = tool(f"bases.{name}"), open_device()
+    results = list(study.compute(plan, device, {"runs": []}))
+    result = json.loads(json.dumps(results[-1]))
+    assert len(result["runs"]) == result["total"] > 1
+    assert all(len(row) == len(t.columns) for t in study.tables(result) for row in t.rows)
+    assert study.pictures(result)
+    assert study.verdicts(result)
+    # What is there is not computed again.
+    kept = list(study.compute(plan, device, result))[-1]
+    assert kept["runs"] == result["runs"]
+
+
+@pytest.fixture
+def statistics(tool):
+    return tool("bases.statistics")
+
+
+@pytest.mark.parametrize(
+    ("gains", "word"),
+    [
+        ((1.0, 1.1, 0.9), "wins"),
+        ((-1.0, -1.1, -0.9), "loses"),
+        ((1.0, -1.1, 0.2), "shows no clear difference"),
+        ((0.5,), "is ahead"),
+        ((-0.5,), "is behind"),
+        ((0.0,), "is even"),
+    ],
+)
+def test_a_verdict_follows_from_the_figures(statistics, gains, word):
+    found = statistics.Difference.of(gains)
+    assert found.word == word
+    said = statistics.sentence("one", "other", found, "dB", "here")
+    assert f"one {word} against other" in said
+    assert f"{np.mean(gains):+.3g} dB" in said
+
+
+def test_pairs_share_everything_but_the_basis(statistics):
+    runs = [
+        {"basis": b, "seed": s, "rms": value}
+        for b, s, value in [("a", 0, 1.0), ("a", 1, 3.0), ("b", 0, 2.0), ("b", 1, 3.5), ("b", 2, 9)]
+    ]
+    given = {"what": "rms", "keys": ("seed",)}
+    worse = statistics.paired(runs, "a", "b", **given, lower_is_better=True)
+    assert (worse.mean, worse.pairs, worse.better) == (0.75, 2, 2)
+    assert statistics.paired(runs, "a", "c", **given) is None
+    assert "not run" in statistics.sentence("a", "c", None, "dB", "here")
+
+
+def test_equal_time_reads_between_the_scores(tool):
+    history = [{"wall": 1.0, "psnr": 20.0}, {"wall": 3.0, "psnr": 24.0}]
+    at_time = tool("bases.additive_fit").at_time
+    assert at_time(history, 2.0, "wall", "psnr") == pytest.approx(22.0)
+    assert at_time(history, 9.0, "wall", "psnr") == 24.0
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_pictures_are_linear_and_have_an_adjoint(tool, order, dim):
+    sets, additive = tool("bases.mode_sets"), tool("bases.additive")
+    modes = sets.in_plane(order) if dim == 2 else sets.in_space(order)
+    random, count = np.random.default_rng(order), 4
+    means = random.uniform(-4, 4, (count, 3)) * (1, 1, dim - 2)
+    turns = np.array([[1.0, 0, 0, 0.4]]) + (dim - 2) * 0.3 * random.normal(size=(count, 4))
+    scales = np.log(random.uniform(1.5, 2.5, (count, 3)))
+    geometry = additive.Geometry.of_flat(np.concatenate([means, turns, scales], axis=1))
+    cameras = additive.turned_cameras(12, 14, np.array([0.2, 1.4]))
+    cameras = [additive.upright_camera(12, 14)] if dim == 2 else cameras
+    renderer = additive.additive_renderer(open_device(), tile=8, eps2d=0.1)
+    c, other = random.normal(size=(2, count, modes.count, 2))
+    placed = additive.Placed(renderer, cameras, modes, geometry, c)
+    seen = placed.render(c)
+    np.testing.assert_allclose(placed.pictures(), seen, atol=1e-5)
+    both = placed.render(c + 2 * other)
+    np.testing.assert_allclose(both, seen + 2 * placed.render(other), atol=1e-4)
+    pictures = random.normal(size=seen.shape)
+    assert np.vdot(seen, pictures) == pytest.approx(np.vdot(c, placed.adjoint(pictures)), rel=1e-4)
+
+
+def test_the_density_in_space_has_the_pictures_as_its_line_integrals(tool):
+    sets, additive = tool("bases.mode_sets"), tool("bases.additive")
+    modes, n = sets.in_space(2), 20
+    flat = np.array([[1.0, -2, 0.5, 0.8, 0.2, -0.3, 0.4, *np.log([1.6, 2.0, 2.4])]])
+    geometry = additive.Geometry.of_flat(flat)
+    c = np.random.default_rng(3).normal(size=(1, modes.count, 1))
+    renderer = additive.additive_renderer(open_device(), tile=8, eps2d=0.0)
+    camera = additive.turned_cameras(n, n, np.zeros(1))
+    picture = additive.Placed(renderer, camera, modes, geometry, c).pictures()[0, ..., 0]
+    line = np.arange(n) - (n - 1) / 2
+    z, y, x = np.meshgrid(line, line, line, indexing="ij")
+    points = np.stack([x, y, z], axis=-1).reshape(-1, 3)
+    volume = tool("bases.densities").density(geometry, modes, c, points).reshape(n, n, n)
+    np.testing.assert_allclose(volume.sum(axis=1), picture, atol=2e-3 * np.abs(picture).max())
+
+
+def test_modes_made_even_span_the_same_and_are_orthonormal(tool):
+    sets = tool("bases.mode_sets")
+    modes = sets.in_space(2)
+    gram = sets.seen_gram(2, sets.directions(40))
+    even = modes.even(gram)
+    np.testing.assert_allclose(even.matrix.T @ gram @ even.matrix, np.eye(10), atol=1e-10)
+    assert np.linalg.matrix_rank(np.concatenate([modes.matrix, even.matrix], axis=1)) == 10
+
+
+def test_budgets_of_colours_are_as_large_as_those_of_harmonics(tool):
+    families = tool("bases.lobe_families")
+    for degree, numbers in ((1, 12), (2, 27), (3, 48)):
+        found = families.budget(degree)
+        assert all(numbers - 5 <= family.parameters <= numbers for family in found)
+        assert len({tuple(f.columns) for f in found if f.kind == "lg"}) == 2
+    # Row by row: Gaussian, ring of one zero, then the two of one turn.
+    assert families.laguerre_columns(4) == [0, 5, 1, 2]
+
+
+def test_the_shortened_jacobian_gives_the_whole_gradient(tool):
+    fits, lobes = tool("bases.lobe_fits"), tool("bases.lobes")
+    sphere = lobes.Hemisphere.gauss(8)
+    truth = lobes.lobe_values("ggx 0.35", sphere.directions, 0)
+    for family in tool("bases.lobe_families").budget(2)[1:]:
+        problem = fits._Projected(family, sphere.directions, truth, sphere.weights, 1e-6)
+        x = family.starts(1, np.array([-0.5, 0.1, 0.8]), np.random.default_rng(0))[0]
+
+        def loss(numbers, problem=problem):
+            return 0.5 * np.square(problem.residual(numbers)).sum()
+
+        steps = 1e-6 * np.eye(x.size)
+        wanted = np.array([(loss(x + s) - loss(x - s)) / 2e-6 for s in steps])
+        found = problem.jacobian(x).T @ problem.residual(x)
+        np.testing.assert_allclose(found, wanted, atol=1e-6 * np.abs(wanted).max())
+
+
+def test_a_hemispheres_weights_integrate_polynomials(tool):
+    sphere = tool("bases.lobes").Hemisphere.gauss(6)
+    assert sphere.weights.sum() == pytest.approx(2 * np.pi)
+    assert (sphere.weights * sphere.directions[:, 2] ** 2).sum() == pytest.approx(2 * np.pi / 3)
+    assert (sphere.weights * sphere.directions[:, 0] ** 2).sum() == pytest.approx(2 * np.pi / 3)

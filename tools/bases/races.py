@@ -1,0 +1,132 @@
+"""What races of additive splats show: tables, plots and verdicts, from their records alone.
+
+Equal parameters: every basis after so many steps. Equal wall time: every basis at the moment at
+which the Gaussians had taken so many. The clock of a fit runs while that fit steps; fits take turns
+step by step, so that whatever else the machine does slows all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from bases.additive_fit import at_time
+from bases.statistics import Difference, distinct, sentence, spread, values
+from bench.table import Table
+from rift_cl.plot import curves
+
+BASELINE = "Gaussian"
+
+
+def _moments(result: dict[str, Any]) -> dict[str, int]:
+    last = int(result["runs"][0]["history"][-1]["step"])
+    return {"short": result["short"], "converged": last}
+
+
+def _comparable(result: dict[str, Any]) -> list[dict[str, Any]]:
+    """Every run with its scores at both moments, by steps, by wall clock and by processor time."""
+    runs, found = result["runs"], []
+    mates = {_key(run): run for run in runs if run["basis"] == BASELINE}
+    for run in runs:
+        mate = mates[_key(run)]["history"]
+        row = {k: v for k, v in run.items() if k != "history"}
+        for name, step in _moments(result).items():
+            reached = next(mark for mark in mate if mark["step"] == step)
+            own = next(mark for mark in run["history"] if mark["step"] == step)
+            row[f"{name} steps"] = own["psnr"]
+            for clock in ("wall", "cpu"):
+                row[f"{name} {clock}"] = at_time(run["history"], reached[clock], clock, "psnr")
+        found.append(row)
+    return found
+
+
+def _key(run: dict[str, Any]) -> tuple[Any, ...]:
+    return tuple(run.get(k) for k in ("seed", "target", "budget", "views"))
+
+
+def _cases(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    keys = [k for k in ("target", "views", "budget") if k in runs[0]]
+    combos = dict.fromkeys(tuple(run[k] for k in keys) for run in runs)
+    return [dict(zip(keys, combo, strict=True)) for combo in combos]
+
+
+def _words(case: dict[str, Any]) -> str:
+    return ", ".join(f"{v} {k}" if k in ("views", "budget") else str(v) for k, v in case.items())
+
+
+def race_tables(result: dict[str, Any]) -> Iterator[Table]:
+    """PSNR at equal parameters and equal time, then what it cost."""
+    runs = _comparable(result)
+    bases = distinct(runs, "basis")
+    notes = {
+        "steps": "Equal parameters and equal steps.",
+        "wall": "Equal parameters, at the wall clock of the Gaussians' last of these steps.",
+        "cpu": "Equal parameters, at the processor time of the Gaussians' last of these steps.",
+    }
+    for name, step in _moments(result).items():
+        for clock, note in notes.items():
+            rows = [
+                [_words(case), *(spread(values(runs, f"{name} {clock}", basis=b, **case))
+                                 for b in bases)]
+                for case in _cases(runs)
+            ]  # fmt: skip
+            how = "steps" if clock == "steps" else f"steps of the Gaussians by {clock} time"
+            yield Table(f"PSNR in dB after {step} {how} ({name})", ["case", *bases], rows, [note])
+    rows = [
+        [b, str(distinct([r for r in runs if r["basis"] == b], "per_splat")[0]),
+         *(spread(values(runs, what, basis=b), ".3g") for what in ("wall_ms", "cpu_ms", "pairs"))]
+        for b in bases
+    ]  # fmt: skip
+    heads = ["basis", "parameters a splat", "ms a step", "processor ms a step", "boxes a pixel"]
+    yield Table("What a step costs, over all cases", heads, rows)
+
+
+def race_pictures(result: dict[str, Any]) -> dict[str, tuple[Any, str]]:
+    """PSNR against time for every budget, and against parameters."""
+    found = {}
+    budgets = distinct(result["runs"], "budget")
+    for budget in budgets:
+        mine = [run for run in result["runs"] if run["budget"] == budget]
+        series = {
+            b: _mean_curve([r for r in mine if r["basis"] == b]) for b in distinct(mine, "basis")
+        }
+        figure = curves(series, xlabel="seconds", ylabel="mean PSNR, dB", log_x=True)
+        found[f"time_{budget}"] = (figure, f"Mean PSNR against wall time, {budget} parameters")
+    runs = _comparable(result)
+    for name in _moments(result):
+        series = {
+            b: (
+                budgets,
+                [np.mean(values(runs, f"{name} steps", basis=b, budget=n)) for n in budgets],
+            )
+            for b in distinct(runs, "basis")
+        }
+        figure = curves(series, xlabel="parameters", ylabel="mean PSNR, dB")
+        found[f"parameters_{name}"] = (figure, f"Mean PSNR against parameters, {name}")
+    return found
+
+
+def _mean_curve(runs: list[dict[str, Any]]) -> tuple[list[float], list[float]]:
+    marks = range(len(runs[0]["history"]))
+    of = lambda what: [float(np.mean([r["history"][k][what] for r in runs])) for k in marks]  # noqa: E731
+    return of("wall"), of("psnr")
+
+
+def race_verdicts(result: dict[str, Any]) -> list[str]:
+    """Every basis against Gaussians: by steps and by time, short and converged."""
+    runs, said = _comparable(result), []
+    for name, step in _moments(result).items():
+        for clock, words in (("steps", "equal steps"), ("wall", "equal wall time")):
+            for basis in distinct(runs, "basis"):
+                if basis != BASELINE:
+                    gain = _gain(runs, basis, f"{name} {clock}")
+                    where = f"equal parameters and {words} ({step} steps, {name})"
+                    said.append(sentence(basis, BASELINE, gain, "dB", where))
+    return said
+
+
+def _gain(runs: list[dict[str, Any]], basis: str, what: str) -> Difference:
+    mates = {_key(run): run[what] for run in runs if run["basis"] == BASELINE}
+    return Difference.of([run[what] - mates[_key(run)] for run in runs if run["basis"] == basis])
