@@ -63,7 +63,8 @@ KERNEL void hermite_raster_cpu(
     for (int n = 0; n < CHANNELS; n++) state[p][1 + n] = 0;
   }
   for (int entry = start; entry < stop; entry++) {
-    const int splat = entries[entry].x, next_splat = entries[entry + AHEAD < stop ? entry + AHEAD : entry].x;
+    const int splat = entries[entry].x;
+    const int next_splat = entries[entry + AHEAD < stop ? entry + AHEAD : entry].x;
     PREFETCH(screen + 8 * next_splat);
     PREFETCH(modes + (long)next_splat * ROW);
     PREFETCH(features + (long)next_splat * CHANNELS);
@@ -87,7 +88,8 @@ KERNEL void hermite_raster_cpu(
       lanes he[ORDER + 1], q[SHAPE_ORDER + 1], column[VARIED + 1][COLOR_ORDER + 1];
       hermite_values(he, absolute(far) < REACH ? far : 0, ORDER);
       polynomial_of_column(q, shape, he, SHAPE_ORDER);
-      UNROLL for (int n = 0; n < VARIED; n++) polynomial_of_column(column[n], color[n], he, COLOR_ORDER);
+      UNROLL for (int n = 0; n < VARIED; n++)
+        polynomial_of_column(column[n], color[n], he, COLOR_ORDER);
       lanes dy = (s.top + 0.5f) - s.y;
       lanes_int turned = 0;
       for (int row = s.top; row < s.bottom; row++) {
@@ -96,7 +98,8 @@ KERNEL void hermite_raster_cpu(
         const lanes_int within = power >= LEAST_POWER;
         const lanes v = within ? place : 0, shaped = polynomial_at(q, v, SHAPE_ORDER);
         const lanes g = power_of_two(power);
-        const lanes raw = density_that_counts(SQUARED ? shaped * shaped * (s.weight * g) : shaped * g, within);
+        const lanes density = SQUARED ? shaped * shaped * (s.weight * g) : shaped * g;
+        const lanes raw = density_that_counts(density, within);
         dy = dy + 1.0f;
 #if ADDITIVE
         const lanes w = raw;
@@ -108,13 +111,16 @@ KERNEL void hermite_raster_cpu(
 #else
         const lanes t = here[0], share = alpha * t, rest = t - share;
         const lanes_int goes_on = rest > OPAQUE;
-        const lanes w = goes_on ? share : 0, after = goes_on ? rest : AS_LANES(AS_INT(t) | SIGN_BIT);
+        const lanes w = goes_on ? share : 0;
+        const lanes after = goes_on ? rest : AS_LANES(AS_INT(t) | SIGN_BIT);
         turned |= AS_INT(t) ^ AS_INT(after);
         here[0] = after;
 #endif
 #endif
-        UNROLL for (int n = 0; n < CHANNELS; n++)
-          here[1 + n] = here[1 + n] + w * (n < VARIED ? polynomial_at(column[n], v, COLOR_ORDER) : feature[n]);
+        UNROLL for (int n = 0; n < CHANNELS; n++) {
+          const lanes seen = n < VARIED ? polynomial_at(column[n], v, COLOR_ORDER) : feature[n];
+          here[1 + n] = here[1 + n] + w * seen;
+        }
       }
       if (!any_negative(turned)) continue;
       for (int p = strip * TILE + s.top; p < strip * TILE + s.bottom; p++)

@@ -20,7 +20,8 @@ KERNEL void hermite_raster_gpu(
 {
   const int item = (int)get_global_id(0);
   const int tile = item / (TILE * TILE), within = item % (TILE * TILE);
-  const int x = tile % tiles_x * TILE + within % TILE, y = (tile / tiles_x + first_tile_row) * TILE + within / TILE;
+  const int x = tile % tiles_x * TILE + within % TILE;
+  const int y = (tile / tiles_x + first_tile_row) * TILE + within / TILE;
   if (x >= width || y >= height) return;
   const float most = cap_that_counts(cap);
   float left = 1, color[CHANNELS];
@@ -39,7 +40,8 @@ KERNEL void hermite_raster_gpu(
     hermite_values(he1, u1, ORDER);
     hermite_values(he2, u2, ORDER);
     const float shaped = polynomial_of_modes(1, mode + 3, 1, he1, he2, SHAPE_ORDER);
-    float w = density_that_counts((SQUARED ? shaped * shaped : shaped) * (s[5] * power_of_two(power)), 1);
+    const float g = s[5] * power_of_two(power);
+    float w = density_that_counts((SQUARED ? shaped * shaped : shaped) * g, 1);
 #if !ADDITIVE
     const float hidden = hidden_by(w), alpha = hidden < most ? hidden : most;
     if (!SMOOTH && !(alpha > 0)) continue;
@@ -51,8 +53,7 @@ KERNEL void hermite_raster_gpu(
     left -= w;
 #endif
     UNROLL for (int n = 0; n < CHANNELS; n++)
-      color[n] += w * (n < VARIED ? polynomial_of_modes(feature[n], mode + COLOR_MODES + n, COLORED, he1, he2, COLOR_ORDER)
-                                  : feature[n]);
+      color[n] += w * color_at(feature[n], mode, n, he1, he2);
   }
   const long pixel = (long)y * width + x;
   transmittance[pixel] = left;

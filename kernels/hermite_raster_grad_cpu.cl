@@ -63,7 +63,8 @@ KERNEL void hermite_raster_grad_cpu(
   for (int entry = deepest; entry < starts[tile + 1]; entry++)
     for (int n = 0; n < RECORD; n++) slots[(long)entries[entry].y * RECORD + n] = 0;
   for (int entry = deepest - 1; entry >= start; entry--) {
-    const int splat = entries[entry].x, next_splat = entries[entry - AHEAD > start ? entry - AHEAD : entry].x;
+    const int splat = entries[entry].x;
+    const int next_splat = entries[entry - AHEAD > start ? entry - AHEAD : entry].x;
     PREFETCH(screen + 8 * next_splat);
     PREFETCH(modes + (long)next_splat * ROW);
     PREFETCH(features + (long)next_splat * CHANNELS);
@@ -86,7 +87,8 @@ KERNEL void hermite_raster_grad_cpu(
       lanes he[MOMENT_ORDER + 1], q[SHAPE_ORDER + 1], column[VARIED + 1][COLOR_ORDER + 1];
       hermite_values(he, absolute(far) < REACH ? far : 0, MOMENT_ORDER);
       polynomial_of_column(q, shape, he, SHAPE_ORDER);
-      UNROLL for (int n = 0; n < VARIED; n++) polynomial_of_column(column[n], color[n], he, COLOR_ORDER);
+      UNROLL for (int n = 0; n < VARIED; n++)
+        polynomial_of_column(column[n], color[n], he, COLOR_ORDER);
       lanes dy = (s.top + 0.5f) - s.y;
       /* Sums over rows of h v^k, and of w v_c v^k. */
       lanes of_shape[SHAPE_ORDER + 3], of_color[CHANNELS][COLOR_ORDER + 1];
@@ -100,11 +102,14 @@ KERNEL void hermite_raster_grad_cpu(
         const lanes_int within = power >= LEAST_POWER;
         const lanes v = within ? place : 0, shaped = polynomial_at(q, v, SHAPE_ORDER);
         lanes g = power_of_two(power);
-        lanes raw = density_that_counts(SQUARED ? shaped * shaped * (s.weight * g) : shaped * g, within);
+        const lanes density = SQUARED ? shaped * shaped * (s.weight * g) : shaped * g;
+        lanes raw = density_that_counts(density, within);
         dy = dy + 1.0f;
         lanes cv = 0;
-        UNROLL for (int n = 0; n < CHANNELS; n++)
-          cv = cv + (n < VARIED ? polynomial_at(column[n], v, COLOR_ORDER) : feature[n]) * here[2 + n];
+        UNROLL for (int n = 0; n < CHANNELS; n++) {
+          const lanes seen = n < VARIED ? polynomial_at(column[n], v, COLOR_ORDER) : feature[n];
+          cv = cv + seen * here[2 + n];
+        }
 #if ADDITIVE
         const lanes w = raw, h = within ? g * cv : 0;
 #else
@@ -121,7 +126,8 @@ KERNEL void hermite_raster_grad_cpu(
 #endif
         lanes powers[MOMENT_ORDER + 1];
         powers[1] = v;
-        UNROLL for (int k = 2; k <= MOMENT_ORDER; k++) powers[k] = powers[k / 2] * powers[k - k / 2];
+        UNROLL for (int k = 2; k <= MOMENT_ORDER; k++)
+          powers[k] = powers[k / 2] * powers[k - k / 2];
         of_shape[0] = of_shape[0] + h;
         UNROLL for (int k = 1; k < SHAPE_ORDER + 3; k++) of_shape[k] = of_shape[k] + h * powers[k];
         UNROLL for (int n = 0; n < CHANNELS; n++) {

@@ -78,8 +78,7 @@ KERNEL void hermite_raster_grad_gpu(
         const float raw = density_that_counts((SQUARED ? shaped * shaped : shaped) * g, 1);
         float cv = 0;
         UNROLL_IF_FEW for (int n = 0; n < CHANNELS; n++)
-          cv += v[p][n] * (n < VARIED ? polynomial_of_modes(feature[n], mode + COLOR_MODES + n, COLORED, he1, he2, COLOR_ORDER)
-                                      : feature[n]);
+          cv += v[p][n] * color_at(feature[n], mode, n, he1, he2);
 #if ADDITIVE
         const float w = raw, h = g * cv;
 #else
@@ -99,7 +98,8 @@ KERNEL void hermite_raster_grad_gpu(
           const float wv = w * v[p][n];
           UNROLL for (int j = 0; j <= COLOR_ORDER; j++)
             UNROLL for (int i = 0; i <= COLOR_ORDER; i++)
-              if (i + j <= (n < VARIED ? COLOR_ORDER : 0)) sums[COLOR_MOMENT(i, j, n)] += wv * he2[j] * he1[i];
+              if (i + j <= (n < VARIED ? COLOR_ORDER : 0))
+                sums[COLOR_MOMENT(i, j, n)] += wv * he2[j] * he1[i];
         }
       }
     }

@@ -8,7 +8,7 @@
  *     u_2 = dz / U_22,     u_1 = (dy - U_12 u_2) / U_11,     u_0 = (dx - U_01 u_1 - U_02 u_2) / U_00.
  *
  * Horner's rule puts u_2 into P once for a slice of a brick, u_1 once for a row of it, and leaves
- * ORDER products for a voxel. Orders 0 are Gaussians, of the same kernel.
+ * ORDER products for a voxel. What cancels between powers up to order 8 the Gaussian makes small.
  *
  * The grid is cut into bricks. `entries` list the splats whose boxes touch a brick, as places in
  * `chosen`, brick after brick (rows of bricks along x from first_row on, all of one layer), always
@@ -88,7 +88,8 @@ static void to_line(float *line, const float *slice, float u) {
   }
 }
 
-/* The whole numbers from 0 to most - 1 within `half` of a middle: the first, and one past the last. */
+/* Of the whole numbers 0 to most - 1 the first that is not below `low`, and one past the last that is
+ * not above `high`; none where these are no numbers. */
 static int first_within(float low, int most) {
   const int whole = (int)low;
   return !(low > 0) ? 0 : low >= most ? most : whole < low ? whole + 1 : whole;
@@ -123,10 +124,10 @@ KERNEL void hermite_voxelise(
     int nz, int ny, int nx, int bricks_x, int first_row, int layer, int bricks)
 {
   const int brick = (int)(get_global_id(0) / ITEMS), item = (int)(get_global_id(0) % ITEMS);
-  if (brick >= bricks) return;
   const int x0 = brick % bricks_x * BRICK_X + item % ITEMS_X * (BLOCK_X * LANES);
   const int y0 = (brick / bricks_x + first_row) * BRICK_Y + item / ITEMS_X % ITEMS_Y * BLOCK_Y;
   const int z0 = layer * BRICK_Z + item / (ITEMS_X * ITEMS_Y) * BLOCK_Z;
+  if (brick >= bricks || x0 >= nx || y0 >= ny || z0 >= nz) return;
   const int slices = least(BLOCK_Z, nz - z0), lines = least(BLOCK_Y, ny - y0);
   lanes sums[BLOCK_Z * BLOCK_Y * BLOCK_X];
   for (int k = 0; k < BLOCK_Z * BLOCK_Y * BLOCK_X; k++) sums[k] = 0;

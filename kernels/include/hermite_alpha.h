@@ -48,7 +48,8 @@ static lanes hidden_by(lanes density) {
   x = x > -126.0f ? x : -126.0f;
   const lanes_int whole = TO_INT(x);
   const lanes f = x - TO_FLOAT(whole), scale = AS_LANES((whole + 127) << 23);
-  const lanes rate = (((0.0010016494f * f + 0.009340084f) * f + 0.055405777f) * f + 0.24021408f) * f + 0.69314694f;
+  const lanes high = (0.0010016494f * f + 0.009340084f) * f + 0.055405777f;
+  const lanes rate = (high * f + 0.24021408f) * f + 0.69314694f;
   return (1.0f - scale) - scale * (f * rate);
 #endif
 }

@@ -2,11 +2,12 @@
  * it round: u1 = i00 dx, u2 = i10 dx + i11 dy, with dx, dy = pixel centre - mean.
  *
  *     Q(u') = 1 + sum of s_ij He~_i(u1) He~_j(u2),  1 <= i + j <= SHAPE_ORDER,
- *     color_c(u') = feature_c + sum of t_ijc He~_i(u1) He~_j(u2),  1 <= i + j <= COLOR_ORDER, c < COLORED,
+ *     color_c(u') = feature_c + sum of t_ijc He~_i(u1) He~_j(u2),  1 <= i + j <= COLOR_ORDER,
+ *                   for channels c < COLORED,
  *     He~_n = He_n / sqrt(n!):   He~_0 = 1,   sqrt(n + 1) He~_{n+1} = x He~_n - sqrt(n) He~_{n-1}.
  *
- * A row of `modes` has ROW numbers: i00, i10, i11, then s_ij, then t_ijc, each mode with its COLORED
- * channels. Modes stand in graded order, MODE(i, j), and the constant one is left out.
+ * A row of `modes` has ROW numbers: i00, i10, i11, then s_ij, then t_ijc, each mode with its
+ * COLORED channels. Modes stand in graded order, MODE(i, j), and the constant one is left out.
  *
  * Along a column of pixels u1 stays what it is, so there a polynomial is one in u2 alone, whose
  * coefficients are worked out once. They are those of powers, which cost one multiply-add each:
@@ -112,7 +113,8 @@ static lanes polynomial_at(const lanes *column, lanes v, int order) {
 
 /* The polynomial from its modes, given He~_i(u1) and He~_j(u2). */
 static lanes polynomial_of_modes(
-    float zeroth, __global const float *others, int stride, const lanes *he1, const lanes *he2, int order)
+    float zeroth, __global const float *others, int stride, const lanes *he1, const lanes *he2,
+    int order)
 {
   lanes value = zeroth;
   UNROLL for (int j = 0; j <= ORDER; j++) {
@@ -123,4 +125,12 @@ static lanes polynomial_of_modes(
     value = value + sum * he2[j];
   }
   return value;
+}
+
+/* Channel n of a colour, given He~_i(u1) and He~_j(u2). */
+static lanes color_at(
+    float feature, __global const float *mode, int n, const lanes *he1, const lanes *he2)
+{
+  if (n >= VARIED) return feature;
+  return polynomial_of_modes(feature, mode + COLOR_MODES + n, COLORED, he1, he2, COLOR_ORDER);
 }

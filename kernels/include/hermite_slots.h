@@ -1,4 +1,4 @@
-/* The record that a (splat, tile) pair with Hermite modes leaves for the gradient of its projection.
+/* The record that a (splat, tile) pair with Hermite modes leaves for its projection's gradient.
  *
  *     H_ij = sum over pixels of h He~_i(u1) He~_j(u2),   i + j <= SHAPE_ORDER + 2,
  *            h = dL/dE weight g,  with SQUARED dL/dE weight g Q; zero where E is clamped;
@@ -10,7 +10,7 @@
  * u_a He~_m = sqrt(m_a + 1) He~_{m + e_a} + sqrt(m_a) He~_{m - e_a}:
  *
  *     dL/ds_m = H_m,   weight dL/dweight = sum of s_m H_m (s_00 = 1),   dL/dt_mc = V_mc,
- *     sum of dL/du_a u_b^k from H of order SHAPE_ORDER + 1 + k and V of order COLOR_ORDER - 1 + k. */
+ *     sum of dL/du_a u_b^k from H to order SHAPE_ORDER + 1 + k, V to COLOR_ORDER - 1 + k. */
 
 #define SHAPE_MOMENTS MODES(SHAPE_ORDER + 2)
 #define RECORD (SHAPE_MOMENTS + CHANNELS + (MODES(COLOR_ORDER) - 1) * COLORED)

@@ -27,6 +27,11 @@ static int mode_place(int a, int b, int c) {
   return modes_below(a + b + c) + (b + c) * (b + c + 1) / 2 + c;
 }
 
+/* The place of the mode that is of order n along one dimension, and p and q along the others. */
+static int place_along(int dimension, int n, int p, int q) {
+  return dimension == 0 ? mode_place(n, p, q) : dimension == 1 ? mode_place(p, n, q) : mode_place(p, q, n);
+}
+
 /* Multiply a homogeneous polynomial of this degree by a linear form, in place. */
 static void times_form(float *p, int degree, float3 form) {
   for (int j = degree + 1; j >= 0; j--) {
@@ -79,8 +84,8 @@ static void to_powers(float *modes, int dimension) {
         for (int k = 0; j + 2 * k <= ORDER - p - q; k++) {
           const int n = j + 2 * k;
           if (k > 0) factor *= -0.5f * (n * (n - 1)) / k;
-          sum += factor * modes[dimension == 0 ? mode_place(n, p, q) : dimension == 1 ? mode_place(p, n, q) : mode_place(p, q, n)];
+          sum += factor * modes[place_along(dimension, n, p, q)];
         }
-        modes[dimension == 0 ? mode_place(j, p, q) : dimension == 1 ? mode_place(p, j, q) : mode_place(p, q, j)] = sum;
+        modes[place_along(dimension, j, p, q)] = sum;
       }
 }

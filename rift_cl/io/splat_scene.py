@@ -107,12 +107,6 @@ class SplatScene:
         """Degree of the spherical harmonics, 0 to 4; 0 where lobes are in their place."""
         return 0 if self.lobes is not None else COEFFICIENTS.index(self.sh.shape[1])
 
-    @property
-    def numbers(self) -> int:
-        """Numbers that a splat has."""
-        basis = SceneBasis.of(self)
-        return 11 + 3 * self.sh.shape[1] + sum(np.prod(s[1:]) for s in basis.shapes(1).values())
-
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, budget: int | None = None) -> SplatScene:
         """Read a .ply file of 3D Gaussian splatting, whatever its name is, or a .splat file.

@@ -16,7 +16,7 @@ from rift_cl.jobs.xray_options import XRAY_ONLY, XrayOptions
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.homogenisation import Homogenisation, WeightKind
 from rift_cl.train.settings import BandLimit, Densification, Rates, TrainSettings
-from rift_cl.train.xray_trainer import xray_settings
+from rift_cl.train.xray_trainer import RIDGE, xray_settings
 
 # Rates of poses and exposures where they are refined.
 _POSE_RATE, _EXPOSURE_RATE = 1e-3, 1e-2
@@ -159,7 +159,7 @@ class FitSettings(XrayOptions, BasisOptions):
                 exponent=self.exponent,
                 weight=self.homogenise_by,
                 band_limit=self.band_limit,
-                basis=self.basis_settings(colored=False),
+                basis=dataclasses.replace(self.basis_settings(colored=False), ridge=RIDGE),
             )
         return TrainSettings(
             steps=self.steps,

@@ -142,8 +142,8 @@ def look_through(
 ) -> Iterator[Seen]:
     """Every splat of a tile in turn, front to back."""
     rules = how.rules
-    y = np.arange(here[0].start, here[0].stop)[:, None] + 0.5
-    x = np.arange(here[1].start, here[1].stop) + 0.5
+    y = np.arange(here[0].start, here[0].stop, dtype=np.float64)[:, None] + 0.5
+    x = np.arange(here[1].start, here[1].stop, dtype=np.float64) + 0.5
     left = np.ones((y.shape[0], x.size))
     finished = np.zeros(left.shape, bool)
     for splat in order:

@@ -14,7 +14,7 @@ from math import factorial, prod, sqrt
 
 import numpy as np
 from numpy.polynomial import hermite_e
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
@@ -31,7 +31,7 @@ def voxelise(
     grid: Grid,
     *,
     shape_modes: Floats | None = None,
-    dilation: ArrayLike = 0.0,
+    dilation: float | Floats = 0.0,
     reach: float = np.inf,
 ) -> Floats:
     """The sum of N splats at the samples of a grid.
@@ -82,8 +82,8 @@ def edge(order: int) -> float:
 def graded_tensors(modes: Floats) -> Iterator[Floats]:
     """The modes behind the constant, order by order, as tensors with an index for each derivative.
 
-    Mode (a, b, c) is the a-th derivative by x, the b-th by y, the c-th by z. It stands at one of its
-    places, (0,) * a + (1,) * b + (2,) * c, which in graded order follow each other as numbers do.
+    Mode (a, b, c) is the a-th derivative by x, the b-th by y, the c-th by z. It stands at one of
+    its places, (0,) * a + (1,) * b + (2,) * c, which in graded order come as numbers do.
     """
     order, first = 1, 0
     while first < len(modes):
@@ -99,14 +99,15 @@ def graded_tensors(modes: Floats) -> Iterator[Floats]:
 def _polynomial(modes: Floats, to_unit: Floats, u: Floats) -> Floats:
     """1 + sum of modes, which belong to x', at places u = A x' of a dilated splat."""
     total = np.ones(u.shape[:-1])
-    for tensor in graded_tensors(modes):
+    for given in graded_tensors(modes):
+        tensor = given
         # Derivatives by x' as derivatives by u: d/dx'_i = sum over a of A_ai d/du_a.
-        for slot in range(tensor.ndim):
+        for slot in range(given.ndim):
             tensor = np.moveaxis(np.tensordot(to_unit, tensor, axes=(1, slot)), 0, slot)
         alike: dict[tuple[int, ...], float] = {}
-        for place, coefficient in np.ndenumerate(tensor):
+        for place, share in np.ndenumerate(tensor):
             orders = tuple(place.count(axis) for axis in range(3))
-            alike[orders] = alike.get(orders, 0.0) + coefficient
+            alike[orders] = alike.get(orders, 0.0) + float(share)
         for orders, coefficient in alike.items():
             total += coefficient * _hermite(orders, u)
     return total

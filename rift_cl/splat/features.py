@@ -16,17 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from rift_cl.basis.angular import ANGULAR_KINDS, angular_basis
 from rift_cl.cl.arithmetic import copy_columns
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Camera
 from rift_cl.splat.projected import Projected, SplatGradients
+from rift_cl.splat.shading import Shading
 from rift_cl.splat.splats import Splats
-
-# The numbers that kernels/include/lobe.h knows the kinds of lobes by.
-_LOBES = {"hg": 0, "lg": 1, "sg": 2, "asg": 3}
 
 
 @dataclass(frozen=True)
@@ -132,7 +129,7 @@ def shade(
         InputError: the splats have no coefficients, or no such functions are known.
         ShapeError: the coefficients and the lobes do not fit the functions.
     """
-    shading = _Shading.of(means, sh, lobes, angular)
+    shading = Shading.of(means, sh, lobes, angular)
     count = means.shape[0]
     features = device.empty((count, 3)) if into is None else into
     center = np.array([*camera.center, 0], np.float32)
@@ -181,13 +178,9 @@ def shade_grad(
         ShapeError: the gradient and the features have not the same channels, three or more, or
             the coefficients, the lobes and their gradient do not fit.
     """
-    shading = _Shading.of(means, sh, lobes, angular)
+    shading = Shading.of(means, sh, lobes, angular)
     count = means.shape[0]
-    if gradients.features.shape != features.shape or features.shape[1] < 3:
-        raise ShapeError(
-            f"shade_grad: gradients.features has shape {gradients.features.shape}, wanted that of "
-            f"features, {features.shape}, with 3 channels or more"
-        )
+    _check_incoming(gradients.features, features)
     found = [device.empty(array.shape) for array in shading.parameters]
     if grad_lobes is not None and lobes is not None:
         found[1] = as_device_array(device, grad_lobes, lobes.shape, name="shade_grad: grad_lobes")
@@ -205,44 +198,9 @@ def shade_grad(
     return found[0]
 
 
-@dataclass(frozen=True, eq=False)
-class _Shading:
-    """The kernel that knows the functions, the arrays it reads, and the sizes it is built for."""
-
-    kernel: str
-    parameters: tuple[Any, ...]
-    sizes: dict[str, int]
-
-    @classmethod
-    def of(cls, means: Any, sh: Any, lobes: Any, angular: str) -> _Shading:
-        """See that coefficients and lobes fit the functions, and choose.
-
-        Raises:
-            InputError: there are none, or the functions are unknown.
-            ShapeError: they do not fit.
-        """
-        if angular not in ANGULAR_KINDS:
-            wanted = ", ".join(ANGULAR_KINDS)
-            raise InputError(f"shade: angular is {angular!r}, wanted one of {wanted}")
-        if sh is None:
-            raise InputError("shade: these splats have no spherical harmonics; draw their colors")
-        if angular == "sh":
-            if lobes is not None:
-                raise InputError(
-                    "shade: these splats have lobes, which angular='sh' would leave out: say which "
-                    f"lobes they are, one of {', '.join(_LOBES)}"
-                )
-            return cls("splat_shade", (sh,), {"COEFFICIENTS": sh.shape[1]})
-        if lobes is None:
-            raise InputError(
-                f"shade: angular is {angular!r}, but these splats have no lobes: give lobes, or "
-                "draw them with angular='sh'"
-            )
-        wanted_shape = (means.shape[0], angular_basis(angular, sh.shape[1]).n_geometry)
-        if lobes.shape != wanted_shape:
-            raise ShapeError(
-                f"shade: lobes has shape {lobes.shape}, wanted {wanted_shape} for {sh.shape[1]} "
-                f"functions of {angular!r}"
-            )
-        sizes = {"LOBES": _LOBES[angular], "FUNCTIONS": sh.shape[1]}
-        return cls("lobe_shade", (sh, lobes), sizes)
+def _check_incoming(incoming: Any, features: Any) -> None:
+    if incoming.shape != features.shape or features.shape[1] < 3:
+        raise ShapeError(
+            f"shade_grad: gradients.features has shape {incoming.shape}, wanted that of "
+            f"features, {features.shape}, with 3 channels or more"
+        )

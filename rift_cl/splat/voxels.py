@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -143,7 +144,8 @@ class _Work:
         if chosen.size == 0:
             return
         boxes = np.concatenate([self.low[chosen, :2], self.high[chosen, :2]], axis=1)
-        tiles = Tiles(*(int(-(-n // b)) for n, b in zip(_counts(self.grid), _BRICK)))
+        across, rows, _ = -(-_counts(self.grid) // _BRICK)
+        tiles = Tiles(int(across), int(rows))
         memory = _LayerMemory(chosen.size, 1, 0, 0, shared=shared)
         listing = device.array(chosen, np.int32), device.array(boxes), device.zeros(chosen.size)
         for band in plan_bands(boxes, tiles, memory, device.budget):
@@ -233,9 +235,9 @@ def _check(device: Device, splats: Splats, grid: Grid) -> None:
 
 def _fixed_bytes(splats: Splats, grid: Grid) -> int:
     """What is taken whatever the number of bands: parameters, rows, boxes, volume."""
-    floats = sum(array.size for array in vars(splats).values() if array is not None)
+    floats = sum(int(array.size) for array in vars(splats).values() if array is not None)
     row = _SHAPE_NUMBERS + count_of(splats.shape_order)
-    return 4 * (floats + len(splats) * (row + 9) + int(np.prod(grid.shape, dtype=float)))
+    return 4 * (floats + len(splats) * (row + 9) + prod(grid.shape))
 
 
 def _check_room(splats: Splats, grid: Grid, need: int, budget: int) -> None:

@@ -46,7 +46,7 @@ class BasisSettings:
     order: int = 0
     color_order: int = 0
     activation: Activation = "clamp"
-    first: float = 0.15
+    first: float = 0.1
     every: float = 0.1
     ridge: float = 1e-3
     least: float = 0.0

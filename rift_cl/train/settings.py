@@ -35,6 +35,7 @@ class Rates:
         shape_modes: of the Hermite modes of splats' shapes.
         color_modes: of those of their colours.
         lobes: of the geometry of lobes: quaternions or axes, and logarithms of widths.
+        lobes_rest: of the lobes' coefficients, as a share of ``sh``.
 
     Raises:
         InputError: a number is out of its range.
@@ -49,9 +50,10 @@ class Rates:
     sh_rest: float = 0.2
     poses: float = 0.0
     exposures: float = 0.0
-    shape_modes: float = 5e-3
-    color_modes: float = 2.5e-3
+    shape_modes: float = 1e-2
+    color_modes: float = 1e-2
     lobes: float = 1e-2
+    lobes_rest: float = 1.0
 
     def __post_init__(self) -> None:
         """Check every number's range: a rate of 0 holds a group still."""

@@ -149,8 +149,10 @@ class Trainer:
             by_view = self.device.get(gradients.camera)[:12].reshape(3, 4).astype(float)
             self.poses.update(number, by_view, rates["poses"])
         penalties = self.strategy.before_step(step)
-        more = {"sh_rest": settings.rates.sh_rest, "ridge": settings.basis.ridge}
-        parameters.update(gradients, rates, **more, **penalties)
+        lobed = "lobes" in parameters.raw
+        rest = settings.rates.lobes_rest if lobed else settings.rates.sh_rest
+        ridge = settings.basis.ridge
+        parameters.update(gradients, rates, sh_rest=rest, ridge=ridge, **penalties)
         self._join()
         self.parameters = self.strategy.after_step(parameters, frame, gradients, rates["means"])
         renewed = self.parameters is not parameters

@@ -24,6 +24,8 @@ from rift_cl.train.xray_start import FLAT
 # The start is near already, so that positions may move fast and need not slow down by much.
 RATES = Rates(means=6e-4, means_last=0.1, quats=2e-2, log_scales=2e-2, logits=4e-2, sh=0.0)
 RENEWAL = Renewal(first=100, every=100, last=0.7, faint=0.02)
+# Of modes, in a loss of squares that is far smaller than that of photographs.
+RIDGE = 1e-5
 
 
 def xray_settings(

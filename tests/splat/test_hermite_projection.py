@@ -62,8 +62,10 @@ def test_extents_are_those_of_the_bound(device, shape, activation, strength):
     assert drawn.sum() > 80
     assert (mine[drawn] >= wanted[drawn] - 2e-3).all(), "no bound"
     assert (mine[drawn] <= 6.001).all()
-    # A few steps come close to where the bound ends; nearer its top they stop earlier.
-    assert np.median(mine[drawn] / wanted[drawn]) < 1.03
+    # A few steps come close to where the bound ends; those that hardly reach it stop earlier.
+    seen_at_all = drawn & (wanted > 0)
+    assert np.median(mine[seen_at_all] / wanted[seen_at_all]) < 1.04
+    assert (drawn & (wanted == 0)).sum() < 20
     assert not wanted[found["culled"] == 3].any(), "left out although it could be seen"
 
 

@@ -2,6 +2,8 @@
 
 import dataclasses
 import itertools
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from hermite_scenes import draw, draw_twin, hermite_scene, whitening
 from scenes import random_scene
 
 from rift_cl.errors import InputError, ShapeError
+from rift_cl.reference.hermite_raster import EDGES, hermite_modes
 from rift_cl.splat.raster import rasterize
 from rift_cl.splat.screen_modes import ScreenModes
 from rift_cl.splat.settings import SplatSettings
@@ -26,7 +29,13 @@ KINDS = {
     "low cap": SplatSettings(alpha_cap=0.5, activation="square"),
     "no cap counts": SplatSettings(alpha_cap=0.003),
 }
-ORDERS = [("clamp", (1, 0)), ("clamp", (0, 1)), ("clamp", (3, 4)), ("xray", (3, 4))]
+ORDERS = [
+    ("clamp", (1, 0)),
+    ("clamp", (0, 1)),
+    ("clamp", (3, 4)),
+    ("xray", (1, 0)),
+    ("xray", (3, 4)),
+]
 # What most tests draw, so that few kernels are built.
 USUAL = (2, 1)
 
@@ -111,6 +120,18 @@ def test_the_order_of_splats_changes_no_integral(device):
     images = [device.get(draw(device, scene, KINDS["xray"])[2].image) for scene in (given, turned)]
     assert not np.array_equal(*images)
     np.testing.assert_allclose(*images, atol=1e-5 * np.abs(images[0]).max())
+
+
+def test_integrals_end_where_their_order_falls_below_the_gaussians_end():
+    """The kernels' table and the twin's are one, and say what they are said to."""
+    header = Path(__file__).parents[2] / "kernels" / "include" / "hermite_edge.h"
+    listed = re.findall(r"(\d\.\d+)f", header.read_text().split("#define")[1])
+    assert tuple(map(float, listed)) == EDGES
+    for order, edge in enumerate(EDGES):
+        x = np.linspace(edge - 0.01, edge + 5, 5011)
+        mode = np.abs(hermite_modes(x, 0 * x, order)[order * (order + 1) // 2])
+        beyond = mode * np.exp(-(x**2) / 2) > np.exp(-8)
+        assert beyond[:8].all() and not beyond[12:].any()
 
 
 @pytest.mark.parametrize("kind", ["clamp", "exp", "square", "xray"])

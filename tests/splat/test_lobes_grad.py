@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from lobe_scenes import CAMERA, CASES, Lobes, error, facing, random_lobes, seen, seen_grad
-from projection_scenes import random_splats
 
 from rift_cl.basis.angular import SphericalHarmonics
 from rift_cl.reference.lobes import shade_lobes, shade_lobes_grad
-from rift_cl.splat.renderer import Renderer
-from rift_cl.splat.settings import SplatSettings
-from rift_cl.splat.splats import Splats
 
 NAMES = ("linear", "lobes", "means", "view")
 
@@ -112,24 +106,3 @@ class Moved:
     def __init__(self, view):
         self.view = view
         self.center = -np.linalg.inv(view[:3, :3]) @ view[:3, 3]
-
-
-def test_lobes_learn_through_the_whole_renderer(device):
-    """A step against the gradient makes a picture's loss smaller by what the gradient says."""
-    given = facing(bright(random_lobes("lg", 9, 60)), aside=0.3)
-    given.lobes[:, 4:] = -0.7
-    values = random_splats(60, wide=0.8) | {"sh": given.linear, "lobes": given.lobes}
-    renderer = Renderer(SplatSettings(angular="lg"), device=device)
-    splats = Splats.upload(device, **values)
-    frame = renderer.forward(splats, CAMERA)
-    ones = np.ones(frame.image.shape, np.float32)
-    by_lobes = renderer.backward(frame, device.array(ones)).lobes
-    along = device.get(by_lobes)
-    assert along.shape == (60, 5) and np.abs(along).max() > 0
-    step = 0.02 / np.abs(along).max()
-    totals = []
-    for sign in (1, -1):
-        moved = replace(splats, lobes=device.array(given.lobes + sign * step * along))
-        totals.append(device.get(renderer.forward(moved, CAMERA).image).sum(dtype=float))
-    slope = (totals[0] - totals[1]) / (2 * step)
-    assert slope == pytest.approx((along.astype(float) ** 2).sum(), rel=2e-3)

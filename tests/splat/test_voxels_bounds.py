@@ -25,9 +25,7 @@ def test_a_small_budget_gives_the_same_bits_in_more_bands(device, monkeypatch):
     values, bands = random_splats(600, order=1, scales=(0.03, 0.12)), []
     whole = drawn(device, values, GRID)
     need = 4 * (GRID.shape[0] * GRID.shape[1] * GRID.shape[2] + 600 * (14 + 16 + 9))
-    small = rift.Device(
-        device._handle, device.selector, traits=device.traits, memory=need + 100_000
-    )
+    small = rift.Device(device._handle, device.selector, traits=device.traits, memory=need + 60_000)
     launch = small.launch
 
     def counted(kernel, *arguments, **macros):
@@ -36,8 +34,8 @@ def test_a_small_budget_gives_the_same_bits_in_more_bands(device, monkeypatch):
 
     monkeypatch.setattr(small, "launch", counted)
     assert np.array_equal(drawn(small, values, GRID), whole)
-    # Three layers of bricks in all; each is cut.
-    assert bands.count("hermite_voxelise") >= 5
+    # Three layers of bricks in all; the fullest is cut.
+    assert bands.count("hermite_voxelise") > 3
 
 
 def test_what_fits_no_budget_is_told(device):
@@ -94,17 +92,17 @@ def test_covariances_draw_what_quaternions_and_scales_do(device):
     exact = {name: array.astype(float) for name, array in values.items()}
     whole = expected(values, GRID, 0.002)
     given = {"covars": covariances(exact["quats"], exact["scales"])}
-    splats = Splats.upload(
-        device, means=values["means"], opacities=values["opacities"], **given
-    )
+    splats = Splats.upload(device, means=values["means"], opacities=values["opacities"], **given)
     found = device.get(voxelise(device, splats, GRID, dilation=0.002))
     assert np.median(np.abs(found - whole)) < 1e-6 * np.abs(whole).max()
     assert np.abs(found - whole).max() < 1e-3 * np.abs(whole).max()
 
 
-@pytest.mark.parametrize("dilation", [-1, (1, 2), (0, 0, -1e-9), np.nan, np.inf, "wide", None, 1e38])
+@pytest.mark.parametrize(
+    "dilation", [-1, (1, 2), (0, 0, -1e-9), np.nan, np.inf, "wide", None, 1e38]
+)
 def test_dilations_that_are_none_are_refused(device, dilation):
-    with pytest.raises(InputError, match="voxelise: dilation is .*, wanted"):
+    with pytest.raises(InputError, match=r"voxelise: dilation is .*, wanted"):
         drawn(device, random_splats(3), GRID, dilation)
 
 

@@ -18,7 +18,6 @@ STUDIES = (
     "images",
     "slices",
     "volumes",
-    "radiance",
 )
 
 
@@ -81,6 +80,44 @@ def test_every_study_yields_its_runs_and_shows_them(tool, tmp_path, name):
     # What is there is not computed again.
     kept = list(study.compute(plan, device, result))[-1]
     assert kept["runs"] == result["runs"]
+
+
+def test_kinds_of_radiance_splats_share_a_budget_and_get_the_gaussians_time(
+    tool, tmp_path, monkeypatch
+):
+    radiance = tool("bases.radiance")
+    speeds = {"Gaussian, SH 1": 0.1, "HG 1, SH 1": 0.2}
+    asked_for = []
+
+    def fitted(asked, lengths, seed, device):
+        asked_for.append(dict(lengths))
+        return [
+            {"basis": kind, "seed": seed, "taken": steps, "splats": 9, "per_splat": 30,
+             "wall": speeds[kind] * steps, "wall_ms": 1.0, "cpu_ms": 1.0, "ssim": 0.5,
+             "psnr": 20.0 - 3 * (kind[0] == "H")}
+            for kind, steps in lengths.items()
+        ]  # fmt: skip
+
+    monkeypatch.setattr(radiance, "_fitted", fitted)
+    monkeypatch.setattr(radiance, "_LEAST_STEPS", 8)
+    plan = tool("bases.plan").Plan("tiny", tmp_path, (0, 1, 2))
+    monkeypatch.setattr(radiance, "settings", lambda _: {"steps": [40], "kinds": list(speeds)})
+    result = list(radiance.compute(plan, None, {"runs": []}))[-1]
+    assert len(result["runs"]) == result["total"] == 12
+    # After the warm-up: the same steps, then half as many for what takes twice the time.
+    assert asked_for[1:3] == [dict.fromkeys(speeds, 40), {"HG 1, SH 1": 20}]
+    assert all("HG 1, SH 1 loses" in said for said in radiance.verdicts(result))
+    assert len(list(radiance.tables(result))) == 2
+    assert radiance.pictures(result)
+
+
+def test_every_kind_of_radiance_splats_is_one_that_a_fit_takes(tool, tmp_path):
+    radiance = tool("bases.radiance")
+    asked = {"downscale": 4, "parameters": 2000}
+    for kind in radiance.KINDS:
+        found = radiance._settings(asked, kind, 30, 0, tmp_path, None)
+        found.check()
+        assert 1900 < found.splats * found.training().numbers <= 2000
 
 
 @pytest.fixture

@@ -27,8 +27,8 @@ RATES = (0.08, 0.03, 0.04)
 # After so many steps rates have fallen to a half; as one over one plus their share.
 HALF_LIFE = 120.0
 RIDGE = 1e-5
-# Conjugate gradients of the first step, and of each later one.
-FIRST_SOLVE, LATER_SOLVE = 12, 4
+# How many times the conjugate gradients of a later step the first one takes.
+FIRST = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,11 +68,13 @@ class AdditiveFit:
         task: what is fitted.
         modes: of the basis.
         splats: how many.
+        solve: conjugate gradients of each step; the first one takes three times as many.
     """
 
     task: Task
     modes: ModeSet
     splats: int
+    solve: int = 4
     steps: int = 0
     wall: float = 0.0
     cpu: float = 0.0
@@ -101,7 +103,7 @@ class AdditiveFit:
         """Solve, then move; the clocks of this fit run."""
         wall, cpu = time.perf_counter(), time.process_time()
         first = self.steps == 0
-        self._residual, gradient = self._passes(FIRST_SOLVE if first else LATER_SOLVE)
+        self._residual, gradient = self._passes(FIRST * self.solve if first else self.solve)
         self.steps += 1
         slower = 1 / (1 + self.steps / HALF_LIFE)
         moved = self._numbers - self._adam.step(0, gradient, slower * self._rates)
@@ -174,6 +176,7 @@ def record(fit: AdditiveFit, **keys: Any) -> dict[str, Any]:
     return {
         "basis": fit.modes.name,
         **keys,
+        "solve": fit.solve,
         "splats": fit.splats,
         "parameters": fit.splats * fit.modes.parameters(channels),
         "per_splat": fit.modes.parameters(channels),

@@ -31,8 +31,8 @@ _RIDGE = 1e-9
 
 def settings(plan: Plan) -> dict[str, Any]:
     """What decides the result."""
-    lobes = plan.of(tiny=("phong 16",), quick=tuple(LOBES)[1::2], full=tuple(LOBES))
-    rings, starts = plan.of(tiny=(8, 1), quick=(16, 2), full=(48, 6))
+    lobes = plan.of(tiny=("phong 16",), quick=tuple(LOBES)[1::3], full=tuple(LOBES))
+    rings, starts = plan.of(tiny=(8, 1), quick=(12, 2), full=(48, 6))
     return {**plan.settings(), "lobes": list(lobes), "rings": rings, "starts": starts}
 
 

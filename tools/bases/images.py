@@ -38,6 +38,7 @@ def settings(plan: Plan) -> dict[str, Any]:
         ),
         "pixels": plan.of(tiny=16, quick=48, full=64),
         "budgets": plan.of(tiny=[120], quick=[600], full=[400, 800, 1600]),
+        "solves": plan.of(tiny=[2], quick=[4], full=[4, 12]),
         "marks": plan.of(tiny=[2], quick=[5, 10, 20, 40, 60], full=MARKS),
         "short": plan.of(tiny=2, quick=20, full=100),
     }
@@ -64,14 +65,18 @@ def compute(plan: Plan, device: Device, kept: dict[str, Any]) -> Iterator[dict[s
     ]
     done = {(run["seed"], run["target"], run["budget"]) for run in kept["runs"]}
     result = {
-        "total": len(wanted) * len(sets),
+        "total": len(wanted) * len(sets) * len(asked["solves"]),
         "short": asked["short"],
         "runs": list(kept["runs"]),
     }
     for seed, picture, budget in wanted:
         if (seed, picture, budget) not in done:
             task = _task(device, picture, asked["pixels"], seed)
-            fits = [AdditiveFit(task, modes, modes.splats(budget, 3)) for modes in sets]
+            fits = [
+                AdditiveFit(task, modes, modes.splats(budget, 3), solve)
+                for modes in sets
+                for solve in asked["solves"]
+            ]
             race(fits, asked["marks"])
             keys = {"seed": seed, "target": picture, "budget": budget}
             result["runs"] += [record(fit, **keys) for fit in fits]

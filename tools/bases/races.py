@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from bases.additive_fit import at_time
-from bases.statistics import Difference, distinct, sentence, spread, values
+from bases.statistics import Difference, chosen, distinct, sentence, spread, values
 from bench.table import Table
 from rift_cl.plot import curves
 
@@ -43,17 +43,18 @@ def _comparable(result: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _key(run: dict[str, Any]) -> tuple[Any, ...]:
-    return tuple(run.get(k) for k in ("seed", "target", "budget", "views"))
+    return tuple(run.get(k) for k in ("seed", "target", "budget", "views", "solve"))
 
 
 def _cases(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    keys = [k for k in ("target", "views", "budget") if k in runs[0]]
+    keys = [k for k in ("target", "views", "budget", "solve") if k in runs[0]]
     combos = dict.fromkeys(tuple(run[k] for k in keys) for run in runs)
     return [dict(zip(keys, combo, strict=True)) for combo in combos]
 
 
 def _words(case: dict[str, Any]) -> str:
-    return ", ".join(f"{v} {k}" if k in ("views", "budget") else str(v) for k, v in case.items())
+    units = {"views": "views", "budget": "parameters", "solve": "conjugate gradients"}
+    return ", ".join(f"{v} {units[k]}" if k in units else str(v) for k, v in case.items())
 
 
 def race_tables(result: dict[str, Any]) -> Iterator[Table]:
@@ -89,34 +90,41 @@ def race_pictures(result: dict[str, Any]) -> dict[str, tuple[Any, str]]:
     budgets = distinct(result["runs"], "budget")
     for budget in budgets:
         mine = [run for run in result["runs"] if run["budget"] == budget]
-        series = {
-            b: _mean_curve([r for r in mine if r["basis"] == b]) for b in distinct(mine, "basis")
-        }
-        figure = curves(series, xlabel="seconds", ylabel="mean PSNR, dB", log_x=True)
+        figure = curves(_by_time(mine), xlabel="seconds", ylabel="mean PSNR, dB", log_x=True)
         found[f"time_{budget}"] = (figure, f"Mean PSNR against wall time, {budget} parameters")
-    runs = _comparable(result)
+    solve = max(distinct(result["runs"], "solve"))
+    runs = [run for run in _comparable(result) if run["solve"] == solve]
     for name in _moments(result):
-        series = {
-            b: (
-                budgets,
-                [np.mean(values(runs, f"{name} steps", basis=b, budget=n)) for n in budgets],
-            )
-            for b in distinct(runs, "basis")
-        }
+        series = {}
+        for basis in distinct(runs, "basis"):
+            means = [np.mean(values(runs, f"{name} steps", basis=basis, budget=n)) for n in budgets]
+            series[basis] = budgets, means
         figure = curves(series, xlabel="parameters", ylabel="mean PSNR, dB")
         found[f"parameters_{name}"] = (figure, f"Mean PSNR against parameters, {name}")
     return found
 
 
-def _mean_curve(runs: list[dict[str, Any]]) -> tuple[list[float], list[float]]:
-    marks = range(len(runs[0]["history"]))
-    of = lambda what: [float(np.mean([r["history"][k][what] for r in runs])) for k in marks]  # noqa: E731
-    return of("wall"), of("psnr")
+def _by_time(runs: list[dict[str, Any]]) -> dict[str, tuple[list[float], list[float]]]:
+    """Mean curves of every basis and length of solves."""
+    several, found = len(distinct(runs, "solve")) > 1, {}
+    for basis in distinct(runs, "basis"):
+        for solve in distinct(runs, "solve"):
+            marks = [run["history"] for run in chosen(runs, basis=basis, solve=solve)]
+            wall, psnr = (
+                [float(np.mean([mark[what] for mark in at])) for at in zip(*marks, strict=True)]
+                for what in ("wall", "psnr")
+            )
+            found[f"{basis}, {solve} CG" if several else basis] = (wall, psnr)
+    return found
 
 
 def race_verdicts(result: dict[str, Any]) -> list[str]:
-    """Every basis against Gaussians: by steps and by time, short and converged."""
-    runs, said = _comparable(result), []
+    """Every basis against Gaussians: by steps and by time, short and converged.
+
+    With the longest solves, where there is a choice: pairs should be independent.
+    """
+    solve, said = max(distinct(result["runs"], "solve")), []
+    runs = chosen(_comparable(result), solve=solve)
     for name, step in _moments(result).items():
         for clock, words in (("steps", "equal steps"), ("wall", "equal wall time")):
             for basis in distinct(runs, "basis"):
@@ -124,6 +132,35 @@ def race_verdicts(result: dict[str, Any]) -> list[str]:
                     gain = _gain(runs, basis, f"{name} {clock}")
                     where = f"equal parameters and {words} ({step} steps, {name})"
                     said.append(sentence(basis, BASELINE, gain, "dB", where))
+    return [*said, *_best_verdicts(result)]
+
+
+def _best_verdicts(result: dict[str, Any]) -> list[str]:
+    """Every basis with the length of solves that suits it, where there was a choice.
+
+    The time is that of the Gaussians' last step with the shortest solves; whatever a fit with
+    longer ones had by then counts, of either basis.
+    """
+    runs, said = result["runs"], []
+    solves = distinct(runs, "solve")
+    if len(solves) < 2:
+        return said
+    for name, step in _moments(result).items():
+        best: dict[str, dict[tuple[Any, ...], float]] = {}
+        ends = {
+            _key(run)[:-1]: next(m["wall"] for m in run["history"] if m["step"] == step)
+            for run in runs
+            if run["basis"] == BASELINE and run["solve"] == min(solves)
+        }
+        for run in runs:
+            case, found = _key(run)[:-1], best.setdefault(run["basis"], {})
+            reached = at_time(run["history"], ends[case], "wall", "psnr")
+            found[case] = max(reached, found.get(case, -np.inf))
+        for basis, found in best.items():
+            if basis != BASELINE:
+                gain = Difference.of([v - best[BASELINE][case] for case, v in found.items()])
+                where = f"equal parameters and wall time, each with its better solver ({name})"
+                said.append(sentence(basis, BASELINE, gain, "dB", where))
     return said
 
 

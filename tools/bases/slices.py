@@ -41,6 +41,7 @@ def settings(plan: Plan) -> dict[str, Any]:
         "noise": plan.of(tiny={}, quick={}, full={"20": 0.01}),
         "budgets": plan.of(tiny=[60], quick=[300], full=[300, 600, 1200]),
         "orders": plan.of(tiny=[0, 1], quick=[0, 1, 2], full=[0, 1, 2, 3, 4]),
+        "solves": plan.of(tiny=[2], quick=[4], full=[4, 12]),
         "marks": plan.of(tiny=[2], quick=[5, 10, 20, 30, 45, 60], full=MARKS),
         "short": plan.of(tiny=2, quick=30, full=60),
     }
@@ -79,7 +80,7 @@ def compute(plan: Plan, device: Device, kept: dict[str, Any]) -> Iterator[dict[s
     sets = [in_plane(order) for order in asked["orders"]]
     wanted = [(views, budget) for budget in asked["budgets"] for views in asked["views"]]
     done = {(run["views"], run["budget"]) for run in kept["runs"]}
-    each = len(sets) * len(asked["images"]) * len(plan.seeds)
+    each = len(sets) * len(asked["solves"]) * len(asked["images"]) * len(plan.seeds)
     result = {
         "total": len(wanted) * each,
         "short": asked["short"],
@@ -91,8 +92,9 @@ def compute(plan: Plan, device: Device, kept: dict[str, Any]) -> Iterator[dict[s
             stack = stacked(device, asked["images"], plan.seeds, asked["pixels"], views, noise)
             task = stack_task(device, stack)
             fits = [
-                AdditiveFit(task, modes, len(stack.names) * modes.splats(budget, 1))
+                AdditiveFit(task, modes, len(stack.names) * modes.splats(budget, 1), solve)
                 for modes in sets
+                for solve in asked["solves"]
             ]
             race(fits, asked["marks"])
             for fit in fits:

@@ -27,7 +27,7 @@ def spread(values: Sequence[float], form: str = ".2f") -> str:
     return f"{np.mean(values):{form}} ± {np.std(values, ddof=1):{form}}"
 
 
-def chosen(runs: Iterable[Run], **wanted: Any) -> list[Run]:
+def chosen(runs: Iterable[Any], **wanted: Any) -> list[Any]:
     """The runs that have these values."""
     return [run for run in runs if all(run.get(key) == value for key, value in wanted.items())]
 

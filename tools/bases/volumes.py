@@ -39,6 +39,7 @@ def settings(plan: Plan) -> dict[str, Any]:
         "views": plan.of(tiny=[3], quick=[24], full=[6, 24]),
         "budgets": plan.of(tiny=[60], quick=[400], full=[400, 800]),
         "orders": plan.of(tiny=[0, 1], quick=[0, 1, 2], full=[0, 1, 2, 3]),
+        "solves": plan.of(tiny=[2], quick=[4], full=[4, 12]),
         "marks": plan.of(tiny=[2], quick=[5, 10, 20, 30, 45, 60, 90, 120], full=MARKS),
         "short": plan.of(tiny=2, quick=30, full=60),
     }
@@ -59,14 +60,18 @@ def compute(plan: Plan, device: Device, kept: dict[str, Any]) -> Iterator[dict[s
     ]
     done = {(run["seed"], run["views"], run["budget"]) for run in kept["runs"]}
     result = {
-        "total": len(wanted) * len(sets),
+        "total": len(wanted) * len(sets) * len(asked["solves"]),
         "short": asked["short"],
         "runs": list(kept["runs"]),
     }
     for seed, views, budget in wanted:
         if (seed, views, budget) not in done:
             task = ellipsoid_task(device, asked["samples"], views, seed)
-            fits = [AdditiveFit(task, modes, modes.splats(budget, 1)) for modes in sets]
+            fits = [
+                AdditiveFit(task, modes, modes.splats(budget, 1), solve)
+                for modes in sets
+                for solve in asked["solves"]
+            ]
             race(fits, asked["marks"])
             keys = {"seed": seed, "target": "ellipsoids", "views": views, "budget": budget}
             result["runs"] += [record(fit, **keys) for fit in fits]
