@@ -23,6 +23,8 @@
 #define MOST_RADIUS 6.0f
 #define STEADY_RADIUS 1.64f
 #define EXTENT_STEPS 4
+/* Steps shorter than this, in standard deviations, are the last. */
+#define CLOSE 0.05f
 
 /* 2-norms of each order of the shape, index 0 unused; what all colours' modes are together. */
 typedef struct {
@@ -55,18 +57,24 @@ static int modes_are_finite(const ModeNorms *norms) {
   return !not_finite(norms->color_square);
 }
 
-/* P(r). K_n is the sum over even k of He~_{n-k}(r)^2 He~_k(0)^2, He~_k(0)^2 = C(k, k/2) / 2^k. */
+/* sqrt(n), 1 / sqrt(n), and He~_2k(0)^2 = C(2k, k) / 4^k. */
+__constant float ROOT_OF[] = {
+    0, 1, 1.41421356f, 1.73205081f, 2, 2.23606798f, 2.44948974f, 2.64575131f, 2.82842712f};
+__constant float INVERSE_ROOT_OF[] = {
+    0, 1, 0.70710678f, 0.57735027f, 0.5f, 0.44721360f, 0.40824829f, 0.37796447f, 0.35355339f};
+__constant float MIDDLE_SQUARE[] = {1, 0.5f, 0.375f, 0.3125f, 0.2734375f};
+
+/* P(r), with K_n the sum over even k of He~_{n-k}(r)^2 He~_k(0)^2. */
 static float polynomial_bound(const ModeNorms *norms, float r) {
-  const float at_zero[] = {1, 0.5f, 0.375f, 0.3125f, 0.2734375f};
   float squares[SHAPE_ORDER + 1], before = 0, here = 1, sum = 1;
   squares[0] = 1;
-  for (int n = 1; n <= SHAPE_ORDER; n++) {
-    const float next = (r * here - sqrt((float)(n - 1)) * before) / sqrt((float)n);
+  UNROLL for (int n = 1; n <= SHAPE_ORDER; n++) {
+    const float next = (r * here - ROOT_OF[n - 1] * before) * INVERSE_ROOT_OF[n];
     float kernel_sum = 0;
     before = here;
     here = next;
     squares[n] = next * next;
-    for (int k = 0; k <= n; k += 2) kernel_sum += squares[n - k] * at_zero[k / 2];
+    UNROLL for (int k = 0; k <= n; k += 2) kernel_sum += squares[n - k] * MIDDLE_SQUARE[k / 2];
     sum += norms->shape[n] * sqrt(kernel_sum);
   }
   return SQUARE ? sum * sum : sum;
@@ -84,8 +92,9 @@ static float modal_extent(const ModeNorms *norms, float weight) {
     if (not_finite(over)) return MOST_RADIUS;
     if (!(over >= 1)) return -1;
     const float next = sqrt(2 * natural_log(over));
+    const float fallen = r - next;
     r = next < r ? next : r;
-    if (SHAPE_ORDER == 0) break;
+    if (SHAPE_ORDER == 0 || fallen < CLOSE) break;
   }
   return r;
 }

@@ -44,13 +44,18 @@ def _expand(name: str, seen: set[str]) -> list[str]:
         raise KernelBuildError(
             f"kernel source {name} is missing from {kernel_folder()}: reinstall rift-cl"
         ) from error
-    lines = [f'#line 1 "{name}"']
+    lines, moved = [f'#line 1 "{name}"'], False
     for number, line in enumerate(text.splitlines(), start=1):
-        match = _INCLUDE.match(line)
+        match, onward = _INCLUDE.match(line), f'#line {number + 1} "{name}"'
         if match is None:
             lines.append(line)
+            # Where a condition left an include out, it left out the directive behind it as well.
+            if moved and line.startswith("#endif"):
+                lines.append(onward)
+                moved = False
         elif match[1] not in seen:
-            lines += [*_expand(match[1], seen), f'#line {number + 1} "{name}"']
+            lines += [*_expand(match[1], seen), onward]
+            moved = True
         else:
             lines.append("")
     return lines
