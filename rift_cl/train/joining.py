@@ -18,10 +18,8 @@ from rift_cl.geometry import Camera
 from rift_cl.splat.orders import count_of, order_of
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.lobe_start import lobe_axes
-from rift_cl.train.parameters import Parameters
+from rift_cl.train.parameters import MODES, Parameters
 from rift_cl.train.settings import TrainSettings
-
-_MODES = ("shape_modes", "color_modes")
 
 
 class Joining:
@@ -69,7 +67,7 @@ class Joining:
         if not (self._flat or settled):
             return
         rows = self._with_modes(parameters) if settled else np.ones(len(parameters), bool)
-        for name in (name for name in _MODES if name in parameters.raw):
+        for name in (name for name in MODES if name in parameters.raw):
             shape = parameters.raw[name].shape
             free = np.broadcast_to(rows.reshape(-1, *[1] * (len(shape) - 1)), shape)
             if self._flat:
@@ -86,7 +84,7 @@ class Joining:
     def _add_orders(self, parameters: Parameters) -> None:
         basis, joined = self.settings.basis, False
         reached = basis.order_at(parameters.step, self.settings.steps)
-        for name, highest in zip(_MODES, (basis.order, basis.color_order), strict=True):
+        for name, highest in zip(MODES, (basis.order, basis.color_order), strict=True):
             wanted = count_of(min(reached, highest)) - 1
             had = parameters.raw[name].shape[1] if name in parameters.raw else 0
             if wanted > had:
@@ -109,7 +107,7 @@ class Joining:
     def _settle(self, parameters: Parameters) -> None:
         """Make Gaussians of the splats whose modes do the least."""
         kept = self._with_modes(parameters, self.settings.basis.least)
-        for name in (name for name in _MODES if name in parameters.raw):
+        for name in (name for name in MODES if name in parameters.raw):
             for group in (parameters.raw, parameters.first, parameters.second):
                 array = parameters.device.get(group[name])
                 array[~kept] = 0
@@ -120,7 +118,7 @@ class Joining:
     def _with_modes(self, parameters: Parameters, least: float = 0.0) -> NDArray[np.bool_]:
         """(N,) splats whose modes have a larger norm."""
         square = np.zeros(len(parameters))
-        for name in (name for name in _MODES if name in parameters.raw):
+        for name in (name for name in MODES if name in parameters.raw):
             modes = parameters.device.get(parameters.raw[name]).astype(float)
             square += np.square(modes).reshape(len(square), -1).sum(axis=1)
         return np.asarray(square > least**2)

@@ -24,7 +24,8 @@ from rift_cl.train.device_adam import DeviceAdam
 
 # What all splats have, and what some have as well.
 GROUPS = ("means", "quats", "log_scales", "logits", "sh")
-MORE = ("shape_modes", "color_modes", "lobes")
+MODES = ("shape_modes", "color_modes")
+MORE = (*MODES, "lobes")
 
 Arrays = Mapping[str, NDArray[np.float32]]
 
@@ -139,7 +140,7 @@ class Parameters:
             sh_rest: rate of the other harmonics, as a share of that.
             opacity_penalty: weight of the mean opacity in the loss.
             scale_penalty: weight of the mean scale in the loss.
-            ridge: weight in the loss of the mean over splats of their shape modes' squares.
+            ridge: weight in the loss of the mean over splats of their modes' squares.
         """
         count, found = len(self), gradients.splats
         self.device.launch(
@@ -154,7 +155,7 @@ class Parameters:
         given = dict(zip(GROUPS, by, strict=True)) | {n: getattr(gradients, n) for n in more}
         self.step += 1
         for name, gradient in given.items():
-            if name == "shape_modes" and ridge:
+            if name in MODES and ridge:
                 axpby(self.device, 2 * ridge / count, self.raw[name], 1.0, gradient)
             if name in self.free:
                 multiply(self.device, self.free[name], gradient)
