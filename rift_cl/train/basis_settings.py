@@ -31,9 +31,9 @@ class BasisSettings:
         activation: how densities become opacities; see ``SplatSettings``.
         first: share of the steps after which order 1 joins, with zeros.
         every: share of the steps between an order and the next.
-        ridge: weight in the loss of the mean over splats of their shape modes' squares. Modes of
-            orders 1 and 2 of a shape do nearly what a shift and another covariance do, and
-            without it wander where nothing holds them.
+        ridge: weight in the loss of the mean over splats of their modes' squares. Modes of orders
+            1 and 2 of a shape do nearly what a shift and another covariance do, and polynomials
+            of colours have no bound: without it they wander where nothing holds them.
         least: an experiment: splats whose modes, all together, have a smaller norm than this at
             ``settle`` are Gaussians from then on; 0 for none.
         settle: share of the steps at which that is decided.

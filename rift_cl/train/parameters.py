@@ -45,8 +45,7 @@ class Parameters:
         density: whether ``logits`` are logarithms of densities, for X-rays.
         amplitude: whether optical depths are drawn, those that hide sigmoid(logit).
         band: (N,) lengths below which splats have no detail, or None; see ``limit_band``.
-        free: by group, 1 where a mode is trained and 0 where it is held as it is; device arrays of
-            the group's shape. Groups without one are trained whole.
+        free: by group, of its shape, 1 where a mode is trained and 0 where it stays as it is.
     """
 
     device: Device
@@ -151,17 +150,17 @@ class Parameters:
             **self._kind(),
         )
         by = (found.means, found.quats, found.scales, found.opacities, gradients.sh)
-        more = (name for name in MORE if name in self.raw)
-        given = dict(zip(GROUPS, by, strict=True)) | {n: getattr(gradients, n) for n in more}
+        more = {name: getattr(gradients, name) for name in MORE if name in self.raw}
+        given = dict(zip(GROUPS, by, strict=True)) | more
         self.step += 1
         for name, gradient in given.items():
             if name in MODES and ridge:
                 axpby(self.device, 2 * ridge / count, self.raw[name], 1.0, gradient)
             if name in self.free:
                 multiply(self.device, self.free[name], gradient)
-            rest = sh_rest if name == "sh" else 1.0
-            moments = self.raw[name], self.first[name], self.second[name]
-            self._adam.step(*moments, gradient, rate=rates[name], rest=rest, step=self.step)
+            rest, rate = sh_rest if name == "sh" else 1.0, rates[name]
+            moved = self.raw[name], self.first[name], self.second[name]
+            self._adam.step(*moved, gradient, rate=rate, rest=rest, step=self.step)
         self.activate()
 
     def activate(self) -> None:

@@ -9,7 +9,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
 
 # Devices count in float32.
-LARGEST = 3.4028234e38
+_LARGEST = 3.4028234e38
 
 
 def check_whole(settings: Any, name: str, least: int, most: int | None = None) -> None:
@@ -25,7 +25,7 @@ def check_whole(settings: Any, name: str, least: int, most: int | None = None) -
         raise InputError(f"{type(settings).__name__}: {name} is {given!r}, wanted {wanted}")
 
 
-def check_number(settings: Any, name: str, *, most: float = LARGEST, above: bool = False) -> None:
+def check_number(settings: Any, name: str, *, most: float = _LARGEST, above: bool = False) -> None:
     """Check that a field is a number from 0 to ``most``; ``above`` leaves 0 itself out.
 
     Raises:
@@ -36,7 +36,7 @@ def check_number(settings: Any, name: str, *, most: float = LARGEST, above: bool
     if not 0 <= value <= most or (above and value == 0):
         kind = type(settings).__name__
         wanted = "a number > 0" if above else "a number >= 0"
-        if most < LARGEST:
+        if most < _LARGEST:
             wanted = f"a number above 0, at most {most}" if above else f"0 to {most}"
         raise InputError(f"{kind}: {name} is {given!r}, wanted {wanted}")
 

@@ -31,7 +31,7 @@ class Schedule:
         """Adam's rates at a step, by group."""
         rates, settings = self.settings.rates, self.settings
         way = min(step / max(self.finish, 1), 1.0)
-        falling, settling, fade = rates.means_last**way, rates.modes_last**way, 1.0
+        falling, fade = rates.means_last**way, 1.0
         if step >= self.finish:
             into = (step - self.finish) / max(settings.steps - self.finish, 1)
             fade = _LAST_SHARE**into
@@ -41,8 +41,8 @@ class Schedule:
             "log_scales": fade * rates.log_scales,
             "logits": fade * rates.logits,
             "sh": fade * rates.sh,
-            "shape_modes": fade * rates.shape_modes * settling,
-            "color_modes": fade * rates.color_modes * settling,
+            "shape_modes": fade * rates.shape_modes,
+            "color_modes": fade * rates.color_modes,
             "lobes": fade * rates.lobes,
             "poses": fade * rates.poses * falling,
             "exposures": fade * rates.exposures * falling,

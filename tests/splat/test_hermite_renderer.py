@@ -103,20 +103,20 @@ def test_line_integrals_are_those_of_quadrature(device, eps2d):
     found = image(device, values, model="ortho", **settings)[..., 0]
     view = camera("ortho")
     random = np.random.default_rng(4)
-    pixels = np.stack([random.integers(8, 56, 30), random.integers(6, 42, 30)], axis=1)
-    at, share = np.polynomial.hermite_e.hermegauss(14)
+    bright = np.argwhere(np.abs(found) > 0.1 * np.abs(found).max())
+    pixels = np.concatenate([random.choice(bright, 15), random.integers(6, 42, (5, 2))])[:, ::-1]
+    at, share = np.polynomial.hermite_e.hermegauss(10 if eps2d else 1)
     offsets = np.sqrt(eps2d) * np.stack(np.meshgrid(at, at), -1).reshape(-1, 2)
     shares = np.outer(share, share).ravel() / share.sum() ** 2
     right = [shares @ integrals(values, view, pixel + 0.5 + offsets) for pixel in pixels]
     mine = found[pixels[:, 1], pixels[:, 0]]
     assert np.abs(mine - right).max() < 1e-4 * np.abs(found).max()
-    assert np.abs(right).max() > 0.2 * np.abs(found).max(), "some rays go through the middle"
 
 
 def integrals(values, view, places):
     """Line integrals along the camera's axis through (P, 2) places on the screen."""
     fx, fy, cx, cy = view.intrinsics
-    depths = np.linspace(2, 6, 801)
+    depths = np.linspace(2, 6, 301)
     across = (places - (cx, cy)) / (fx, fy)
     points = np.empty((len(places), depths.size, 3))
     points[..., :2], points[..., 2] = across[:, None], depths
