@@ -52,7 +52,9 @@ def test_counted_work_is_that_of_the_arrays(tool):
     device, case = rift.default_device(), tool("bench.case").Case(32, 24)
     tasks = tool("bench.projections").projection_tasks(device, case)
     for group in tool("bench.groups").groups(device, case):
-        tasks += group.tasks()
+        # Work on splats is counted in pairs of a splat and a tile, which no array's size tells.
+        if not group.name.startswith("splats"):
+            tasks += group.tasks()
     checked = set()
     for task in tasks:
         for kernel, launches in launched(device, task.run).items():
