@@ -163,45 +163,6 @@ def test_equal_time_reads_between_the_scores(tool):
     assert at_time(history, 9.0, "wall", "psnr") == 24.0
 
 
-@pytest.mark.parametrize("order", [0, 1, 2])
-@pytest.mark.parametrize("dim", [2, 3])
-def test_pictures_are_linear_and_have_an_adjoint(tool, order, dim):
-    sets, additive = tool("bases.mode_sets"), tool("bases.additive")
-    modes = sets.in_plane(order) if dim == 2 else sets.in_space(order)
-    random, count = np.random.default_rng(order), 4
-    means = random.uniform(-4, 4, (count, 3)) * (1, 1, dim - 2)
-    turns = np.array([[1.0, 0, 0, 0.4]]) + (dim - 2) * 0.3 * random.normal(size=(count, 4))
-    scales = np.log(random.uniform(1.5, 2.5, (count, 3)))
-    geometry = additive.Geometry.of_flat(np.concatenate([means, turns, scales], axis=1))
-    cameras = additive.turned_cameras(12, 14, np.array([0.2, 1.4]))
-    cameras = [additive.upright_camera(12, 14)] if dim == 2 else cameras
-    renderer = additive.additive_renderer(open_device(), tile=8, eps2d=0.1)
-    c, other = random.normal(size=(2, count, modes.count, 2))
-    placed = additive.Placed(renderer, cameras, modes, geometry, c)
-    seen = placed.render(c)
-    np.testing.assert_allclose(placed.pictures(), seen, atol=1e-5)
-    both = placed.render(c + 2 * other)
-    np.testing.assert_allclose(both, seen + 2 * placed.render(other), atol=1e-4)
-    pictures = random.normal(size=seen.shape)
-    assert np.vdot(seen, pictures) == pytest.approx(np.vdot(c, placed.adjoint(pictures)), rel=1e-4)
-
-
-def test_the_density_in_space_has_the_pictures_as_its_line_integrals(tool):
-    sets, additive = tool("bases.mode_sets"), tool("bases.additive")
-    modes, n = sets.in_space(2), 20
-    flat = np.array([[1.0, -2, 0.5, 0.8, 0.2, -0.3, 0.4, *np.log([1.6, 2.0, 2.4])]])
-    geometry = additive.Geometry.of_flat(flat)
-    c = np.random.default_rng(3).normal(size=(1, modes.count, 1))
-    renderer = additive.additive_renderer(open_device(), tile=8, eps2d=0.0)
-    camera = additive.turned_cameras(n, n, np.zeros(1))
-    picture = additive.Placed(renderer, camera, modes, geometry, c).pictures()[0, ..., 0]
-    line = np.arange(n) - (n - 1) / 2
-    z, y, x = np.meshgrid(line, line, line, indexing="ij")
-    points = np.stack([x, y, z], axis=-1).reshape(-1, 3)
-    volume = tool("bases.densities").density(geometry, modes, c, points).reshape(n, n, n)
-    np.testing.assert_allclose(volume.sum(axis=1), picture, atol=2e-3 * np.abs(picture).max())
-
-
 def test_modes_made_even_span_the_same_and_are_orthonormal(tool):
     sets = tool("bases.mode_sets")
     modes = sets.in_space(2)

@@ -2,8 +2,8 @@
 
 Every splat has density one; what it shows is a colour with Hermite modes (``Splats.color_modes``),
 so that pictures are linear in the coefficients of all modes, the constant one included, and no
-coefficient is divided by another. While only coefficients change, the splats' places on the screen
-and their tile lists are kept.
+coefficient is divided by another. All that depends on the geometry alone is worked out once: where
+splats are on the screen, their tile lists, and the matrices by which modes go there.
 """
 
 from __future__ import annotations
@@ -16,19 +16,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bases.mode_sets import ModeSet
+from bases.mosaic import Mosaic
 from rift_cl.cl import Device
-from rift_cl.cl.arithmetic import axpby
+from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
-from rift_cl.splat.drawing import draw_grad
-from rift_cl.splat.frame import Frame
 from rift_cl.splat.hermite import project_modes, project_modes_grad
-from rift_cl.splat.projection import MOMENTS
-from rift_cl.splat.raster import rasterize
+from rift_cl.splat.projected import SplatGradients
+from rift_cl.splat.projection import MOMENTS, project, project_grad
+from rift_cl.splat.raster import Raster, ScreenSplats, raster_grad, rasterize, sum_slots
 from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.screen_modes import ScreenModes
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
+from rift_cl.splat.tile_lists import tile_lists
+from rift_cl.splat.tiles import Tiles
 
 Floats = NDArray[np.float64]
+# The rows of L^-1 come before the modes in a table.
+_WHITENING = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,14 +62,14 @@ class Geometry:
 
 
 class Placed:
-    """Splats of one geometry, seen by all cameras.
+    """Splats of one geometry, seen by all cameras at once (``bases.mosaic``).
 
     Args:
         renderer: in xray mode.
-        cameras: of one size.
+        cameras: orthographic, of one size.
         modes: of the splats.
         geometry: of the splats.
-        coefficients: (N, K, C) to begin with.
+        channels: of the pictures.
     """
 
     def __init__(
@@ -73,111 +78,152 @@ class Placed:
         cameras: Sequence[Camera],
         modes: ModeSet,
         geometry: Geometry,
-        coefficients: Floats,
+        channels: int,
     ) -> None:
         self.renderer, self.device, self.modes = renderer, renderer.device, modes
-        count = len(geometry.means)
-        self._shapes = {
-            "means": geometry.means,
-            "quats": geometry.quats,
-            "scales": np.exp(geometry.log_scales),
-            "opacities": np.ones(count),
-        }
-        splats = Splats.upload(self.device, **self._shapes, **self._colors(coefficients))
-        self.frames = [renderer.forward(splats, camera) for camera in cameras]
-        self._scales = self._shapes["scales"]
+        self._mosaic = Mosaic(cameras, renderer.settings.tile)
+        self._camera, self._views = self._mosaic.camera, len(cameras)
+        self._count, self._channels = len(geometry.means), channels
+        self._scales = np.exp(geometry.log_scales)
+        self._splats = self._everywhere(geometry)
+        given = (self.device, self._splats, self._camera, renderer.settings)
+        projected = project(*given)
+        boxes = self.device.array(self._mosaic.cut_boxes(self.device.get(projected.boxes)))
+        self._projected = replace(projected, boxes=boxes)
+        tiles = Tiles.of(self._camera.size, renderer.settings.tile)
+        self._lists = tile_lists(self.device, boxes, projected.depths, tiles, sort=False)
+        self._whitening, self._to_screen = self._mode_maps(given)
+        self._raster: Raster | None = None
 
-    def _colors(self, coefficients: Floats) -> dict[str, NDArray[np.float32]]:
-        full = np.einsum("mk,nkc->nmc", self.modes.matrix, coefficients).astype(np.float32)
-        colors = {"colors": np.ascontiguousarray(full[:, 0])}
-        return colors | ({"color_modes": np.ascontiguousarray(full[:, 1:])} if self.modal else {})
+    def _everywhere(self, geometry: Geometry) -> Splats:
+        """The splats as all views see them, one beside the other, with modes of order one each.
+
+        Their colours' modes are the unit vectors, one a channel: what becomes of those on the
+        screen is the matrix by which any others go there.
+        """
+        means, quats = self._mosaic.placed(geometry.means, geometry.quats)
+        rows, modes = len(means), len(self.modes.matrix) - 1
+        given = {
+            "means": means,
+            "quats": quats,
+            "scales": np.tile(self._scales, (self._views, 1)),
+            "opacities": np.ones(rows),
+        }
+        given["colors"] = np.zeros((rows, max(modes, 1)))
+        if modes:
+            given["color_modes"] = np.broadcast_to(np.eye(modes), (rows, modes, modes))
+        return Splats.upload(self.device, **given)
+
+    def _mode_maps(self, given: Any) -> tuple[NDArray[np.float32], Floats]:
+        """Whitenings (V N, 3), and (N, V M, K) what own coefficients become on the screen."""
+        views, count, matrix = self._views, self._count, self.modes.matrix
+        constant = np.broadcast_to(matrix[:1], (views, count, 1, matrix.shape[1]))
+        if not self.modal:
+            flat = np.zeros((0, 3), np.float32)
+            return flat, np.ascontiguousarray(constant[:, :, 0].transpose(1, 0, 2))
+        table = self.device.get(project_modes(*given, self._projected).table)
+        modes = len(matrix) - 1
+        units = table[:, _WHITENING:].reshape(views, count, -1, modes).astype(np.float64)
+        maps = np.concatenate([constant, units @ matrix[1:]], axis=2).transpose(1, 0, 2, 3)
+        return table[:, :_WHITENING], maps.reshape(count, -1, matrix.shape[1])
 
     @property
     def modal(self) -> bool:
         """Whether there are modes beside the constant."""
-        return self.modes.order > 0
-
-    def pictures(self) -> Floats:
-        """Of the coefficients that it began with, (V, height, width, C)."""
-        return np.stack([self.device.get(f.image) for f in self.frames]).astype(np.float64)
+        return len(self.modes.matrix) > 1
 
     def render(self, coefficients: Floats) -> Floats:
         """Pictures (V, height, width, C) of coefficients (N, K, C)."""
-        drawn = [
-            rasterize(
-                self.device,
-                frame.drawing.screen,
-                frame.drawing.lists,
-                frame.camera.size,
-                settings=self.renderer.settings,
-            ).image
-            for frame in self._recoloured(coefficients)
-        ]
-        return np.stack([self.device.get(image) for image in drawn]).astype(np.float64)
+        self._raster = rasterize(
+            self.device,
+            self._screen(coefficients),
+            self._lists,
+            self._camera.size,
+            settings=self.renderer.settings,
+        )
+        return self._mosaic.cut(self.device.get(self._raster.image))
 
     def adjoint(self, pictures: Floats) -> Floats:
         """The transpose of ``render``: (V, height, width, C) to (N, K, C)."""
-        total: list[Any] = []
-        for frame, picture in zip(self.frames, pictures, strict=True):
-            parts = self._linear_grad(frame, self._sent(picture))
-            for before, part in zip(total, parts, strict=False):
-                axpby(self.device, 1.0, part, 1.0, before)
-            total = total or parts
-        sums, *rest = (np.asarray(self.device.get(part), np.float64) for part in total)
-        full = np.concatenate([sums[:, None, MOMENTS:], *rest], axis=1)
-        return np.asarray(np.einsum("mk,nmc->nkc", self.modes.matrix, full))
-
-    def _linear_grad(self, frame: Frame, grad_image: Any) -> list[Any]:
-        sums = draw_grad(self.device, frame.drawing, grad_image)
-        if not self.modal:
-            return [sums]
-        found = project_modes_grad(
-            self.device,
-            *(frame.splats, frame.camera, self.renderer.settings),
-            projected=frame.projected,
-            modes=frame.drawing.modes,
-            moments=sums,
-            channels=frame.channels.total,
-        )
-        return [found.sums, found.color_modes]
+        zero = np.zeros((self._count, self.modes.count, self._channels))
+        sums = self._sums(self._screen(zero), pictures)
+        # Moments of the shape, which is a Gaussian, come first.
+        own = np.asarray(self.device.get(sums), np.float64)[:, MOMENTS:]
+        by_view = own.reshape(self._views, self._count, -1, self._channels).transpose(1, 0, 2, 3)
+        flat = by_view.reshape(self._count, -1, self._channels)
+        return np.asarray(self._to_screen.transpose(0, 2, 1) @ flat)
 
     def geometry_gradient(self, coefficients: Floats, grad_pictures: Floats) -> Floats:
         """dL/d geometry as ``Geometry.flat`` has it, at these coefficients."""
-        total: list[Any] = []
-        for frame, picture in zip(self._recoloured(coefficients), grad_pictures, strict=True):
-            found = self.renderer.backward(frame, self._sent(picture)).splats
-            parts = [found.means, found.quats, found.scales]
-            for before, part in zip(total, parts, strict=False):
-                axpby(self.device, 1.0, part, 1.0, before)
-            total = total or parts
-        means, quats, scales = (np.asarray(self.device.get(part), np.float64) for part in total)
-        return np.concatenate([means, quats, scales * self._scales], axis=1)
+        screen, splats = self._screen(coefficients), self._coloured(coefficients)
+        given = (self.device, splats, self._camera, self.renderer.settings)
+        sums, parts = self._sums(screen, grad_pictures), None
+        if screen.modes is not None:
+            found = project_modes_grad(
+                *given,
+                projected=self._projected,
+                modes=screen.modes,
+                moments=sums,
+                channels=self._channels,
+            )
+            sums, parts = found.sums, found.view_parts
+        gradients = project_grad(
+            *given,
+            projected=self._projected,
+            sums=sums,
+            with_camera=False,
+            first_moments=parts is None,
+            view_parts=parts,
+        )
+        return self._pulled_back(gradients)
 
-    def _recoloured(self, coefficients: Floats) -> list[Frame]:
-        device = self.device
-        sent = {k: device.array(v) for k, v in self._colors(coefficients).items()}
-        splats = replace(self.frames[0].splats, **sent)
-        return [self._recoloured_frame(frame, splats) for frame in self.frames]
+    def _pulled_back(self, gradients: SplatGradients) -> Floats:
+        """Of splats in all views, to those that they are."""
+        wanted = (gradients.means, gradients.quats, gradients.scales)
+        means, quats, scales = (np.asarray(self.device.get(g), np.float64) for g in wanted)
+        by_means, by_quats = self._mosaic.gathered(means, quats)
+        by_scales = scales.reshape(self._views, self._count, 3).sum(axis=0)
+        return np.concatenate([by_means, by_quats, by_scales * self._scales], axis=1)
 
-    def _recoloured_frame(self, frame: Frame, splats: Splats) -> Frame:
-        modes = None
-        if self.modal:
-            given = (self.device, splats, frame.camera, self.renderer.settings)
-            modes = project_modes(*given, frame.projected)
-        drawing = replace(frame.drawing, features=splats.colors, modes=modes)
-        return replace(frame, splats=splats, drawing=drawing)
+    def _screen(self, coefficients: Floats) -> ScreenSplats:
+        """The splats on the screen with what these coefficients show there."""
+        seen = (self._to_screen @ coefficients).astype(np.float32)
+        seen = seen.reshape(self._count, self._views, -1, self._channels).transpose(1, 0, 2, 3)
+        features = self.device.array(
+            np.ascontiguousarray(seen[:, :, 0]).reshape(-1, self._channels)
+        )
+        if not self.modal:
+            return ScreenSplats(self._projected.screen, features)
+        rest = seen[:, :, 1:].reshape(self._views * self._count, -1)
+        table = self.device.array(np.concatenate([self._whitening, rest], axis=1))
+        modes = ScreenModes(table, 0, self.modes.order, self._channels)
+        return ScreenSplats(self._projected.screen, features, modes)
 
-    def _sent(self, picture: Floats) -> Any:
-        return self.device.array(np.ascontiguousarray(picture, np.float32))
+    def _coloured(self, coefficients: Floats) -> Splats:
+        """The splats in all views with these coefficients, in space."""
+        full = np.einsum("mk,nkc->nmc", self.modes.matrix, coefficients).astype(np.float32)
+        full = np.tile(full, (self._views, 1, 1))
+        colors = self.device.array(np.ascontiguousarray(full[:, 0]))
+        modes = self.device.array(np.ascontiguousarray(full[:, 1:])) if self.modal else None
+        return replace(self._splats, colors=colors, color_modes=modes)
+
+    def _sums(self, screen: ScreenSplats, pictures: Floats) -> Any:
+        """What the raster's gradient leaves of every splat in every view."""
+        if self._raster is None:
+            raise InputError("Placed: ask for pictures before their gradient")
+        sent = self.device.array(self._mosaic.joined(pictures))
+        records = raster_grad(
+            self.device,
+            *(screen, self._lists, self._raster, sent),
+            settings=self.renderer.settings,
+        )
+        return sum_slots(self.device, self._lists, records)
 
     def pairs_per_pixel(self) -> float:
         """How many splats' boxes a pixel lies in, on average over the views."""
-        found = []
-        for frame in self.frames:
-            extents = np.asarray(self.device.get(frame.projected.screen), np.float64)[:, 6:8]
-            pixels = frame.camera.height * frame.camera.width
-            found.append(4 * extents.prod(axis=1).sum() / pixels)
-        return float(np.mean(found))
+        extents = np.asarray(self.device.get(self._projected.screen), np.float64)[:, 6:8]
+        height, width = self._mosaic.cameras[0].size
+        return float(4 * extents.prod(axis=1).sum() / (self._views * height * width))
 
 
 def additive_renderer(device: Device, *, tile: int, eps2d: float) -> Renderer:

@@ -116,7 +116,8 @@ class AdditiveFit:
 
     def _passes(self, iterations: int) -> tuple[Floats, Floats]:
         task = self.task
-        placed = Placed(task.renderer, task.cameras, self._solved, self.geometry, self._c)
+        channels = task.targets.shape[-1]
+        placed = Placed(task.renderer, task.cameras, self._solved, self.geometry, channels)
         if not self._ridge:
             self._ridge = RIDGE * mean_curvature(placed.render, self._c.shape)
         found = solve(
