@@ -43,17 +43,19 @@ def _comparable(result: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _key(run: dict[str, Any]) -> tuple[Any, ...]:
-    return tuple(run.get(k) for k in ("seed", "target", "budget", "views", "solve"))
+    keys = ("seed", "target", "samples", "budget", "views", "solve")
+    return tuple(run.get(k) for k in keys)
 
 
 def _cases(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    keys = [k for k in ("target", "views", "budget", "solve") if k in runs[0]]
+    keys = [k for k in ("target", "samples", "views", "budget", "solve") if k in runs[0]]
     combos = dict.fromkeys(tuple(run[k] for k in keys) for run in runs)
     return [dict(zip(keys, combo, strict=True)) for combo in combos]
 
 
 def _words(case: dict[str, Any]) -> str:
-    units = {"views": "views", "budget": "parameters", "solve": "conjugate gradients"}
+    units = {"samples": "samples an edge", "views": "views", "budget": "parameters"}
+    units["solve"] = "conjugate gradients"
     return ", ".join(f"{v} {units[k]}" if k in units else str(v) for k, v in case.items())
 
 

@@ -41,7 +41,7 @@ def settings(plan: Plan) -> dict[str, Any]:
         "noise": plan.of(tiny={}, quick={}, full={"20": 0.01}),
         "budgets": plan.of(tiny=[60], quick=[300], full=[300, 600, 1200]),
         "orders": plan.of(tiny=[0, 1], quick=[0, 1, 2], full=[0, 1, 2, 3, 4]),
-        "solves": plan.of(tiny=[2], quick=[4], full=[4, 12]),
+        "solves": plan.of(tiny=[2], quick=[4, 12], full=[4, 12]),
         "marks": plan.of(tiny=[2], quick=[5, 10, 20, 30, 45, 60], full=MARKS),
         "short": plan.of(tiny=2, quick=30, full=60),
     }

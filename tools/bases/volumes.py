@@ -35,46 +35,41 @@ def settings(plan: Plan) -> dict[str, Any]:
     """What decides the result."""
     return {
         **plan.settings(),
-        "samples": plan.of(tiny=12, quick=24, full=24),
-        "views": plan.of(tiny=[3], quick=[24], full=[6, 24]),
-        "budgets": plan.of(tiny=[60], quick=[400], full=[400, 800]),
+        "cases": plan.of(tiny=[[12, 3, 60]], quick=[[24, 24, 400]], full=CASES),
         "orders": plan.of(tiny=[0, 1], quick=[0, 1, 2], full=[0, 1, 2, 3]),
-        "solves": plan.of(tiny=[2], quick=[4], full=[4, 12]),
+        "solves": plan.of(tiny=[2], quick=[4, 12], full=[4, 12]),
         "marks": plan.of(tiny=[2], quick=[5, 10, 20, 30, 45, 60, 90, 120], full=MARKS),
         "short": plan.of(tiny=2, quick=30, full=60),
     }
 
 
+# Samples along an edge, views, parameters.
+CASES = [[24, 6, 400], [24, 24, 400], [24, 24, 800], [40, 40, 2000]]
 MARKS = [5, 10, 20, 30, 45, 60, 90, 120, 180, 240]
 
 
 def compute(plan: Plan, device: Device, kept: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """Every budget, number of views and seed, the bases in turns."""
+    """Every case and seed, the bases in turns."""
     asked = settings(plan)
     sets = [in_space(order) for order in asked["orders"]]
-    wanted = [
-        (seed, views, budget)
-        for budget in asked["budgets"]
-        for views in asked["views"]
-        for seed in plan.seeds
-    ]
-    done = {(run["seed"], run["views"], run["budget"]) for run in kept["runs"]}
+    wanted = [(seed, *case) for case in asked["cases"] for seed in plan.seeds]
+    done = {(run["seed"], run["samples"], run["views"], run["budget"]) for run in kept["runs"]}
     result = {
         "total": len(wanted) * len(sets) * len(asked["solves"]),
         "short": asked["short"],
         "runs": list(kept["runs"]),
     }
-    for seed, views, budget in wanted:
-        if (seed, views, budget) not in done:
-            task = ellipsoid_task(device, asked["samples"], views, seed)
+    for seed, samples, views, budget in wanted:
+        if (seed, samples, views, budget) not in done:
+            task = ellipsoid_task(device, samples, views, seed)
             fits = [
                 AdditiveFit(task, modes, modes.splats(budget, 1), solve)
                 for modes in sets
                 for solve in asked["solves"]
             ]
             race(fits, asked["marks"])
-            keys = {"seed": seed, "target": "ellipsoids", "views": views, "budget": budget}
-            result["runs"] += [record(fit, **keys) for fit in fits]
+            case = {"samples": samples, "views": views, "budget": budget}
+            result["runs"] += [record(fit, seed=seed, target="ellipsoids", **case) for fit in fits]
         yield result
 
 
