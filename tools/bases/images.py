@@ -38,7 +38,7 @@ def settings(plan: Plan) -> dict[str, Any]:
         ),
         "pixels": plan.of(tiny=16, quick=48, full=64),
         "budgets": plan.of(tiny=[120], quick=[600], full=[400, 800, 1600]),
-        "solves": plan.of(tiny=[2], quick=[4], full=[4, 12]),
+        "solves": plan.of(tiny=[2], quick=[4, 12], full=[4, 12]),
         "marks": plan.of(tiny=[2], quick=[5, 10, 20, 40, 60], full=MARKS),
         "short": plan.of(tiny=2, quick=20, full=100),
     }
