@@ -29,16 +29,16 @@ def tool(monkeypatch):
 
 def problem(tool, order, dim):
     """A renderer, cameras, modes, and four splats with coefficients of two channels."""
-    sets, additive = tool("bases.mode_sets"), tool("bases.additive")
+    sets, additive, views = (tool(f"bases.{n}") for n in ("mode_sets", "additive", "views"))
     modes = sets.in_plane(order) if dim == 2 else sets.in_space(order)
     random, count = np.random.default_rng(order), 4
     means = random.uniform(-9, 9, (count, 3)) * (1, 1, dim - 2)
     turns = np.array([[1.0, 0, 0, 0.4]]) + (dim - 2) * 0.3 * random.normal(size=(count, 4))
     scales = np.log(random.uniform(1.5, 2.5, (count, 3)))
     geometry = additive.Geometry.of_flat(np.concatenate([means, turns, scales], axis=1))
-    cameras = additive.turned_cameras(*SIZE, np.array([0.2, 1.4, 2.9, 4.0, 5.5]))
-    cameras = [additive.upright_camera(*SIZE)] if dim == 2 else cameras
-    renderer = additive.additive_renderer(open_device(), tile=8, eps2d=0.1)
+    cameras = views.turned_cameras(*SIZE, np.array([0.2, 1.4, 2.9, 4.0, 5.5]))
+    cameras = [views.upright_camera(*SIZE)] if dim == 2 else cameras
+    renderer = views.additive_renderer(open_device(), tile=8, eps2d=0.1)
     return renderer, cameras, modes, geometry, random.normal(size=(2, count, modes.count, 2))
 
 
@@ -118,7 +118,7 @@ def test_no_splat_is_seen_in_the_next_cell(tool):
 
 
 def test_views_that_have_no_common_mosaic_are_refused(tool):
-    mosaic, camera = tool("bases.mosaic"), tool("bases.additive").upright_camera(8, 8)
+    mosaic, camera = tool("bases.mosaic"), tool("bases.views").upright_camera(8, 8)
     wider = Camera((8, 8), [[2, 0, 4], [0, 2, 4], [0, 0, 1]], np.eye(4), "ortho")
     with pytest.raises(InputError, match="one matrix K"):
         mosaic.Mosaic([camera, wider], 8)
@@ -147,16 +147,35 @@ def test_turns_by_matrix_and_by_quaternion_are_the_same(tool):
 
 
 def test_the_density_in_space_has_the_pictures_as_its_line_integrals(tool):
-    sets, additive = tool("bases.mode_sets"), tool("bases.additive")
+    sets, additive, views = (tool(f"bases.{n}") for n in ("mode_sets", "additive", "views"))
     modes, n = sets.in_space(2), 20
     flat = np.array([[1.0, -2, 0.5, 0.8, 0.2, -0.3, 0.4, *np.log([1.6, 2.0, 2.4])]])
     geometry = additive.Geometry.of_flat(flat)
     c = np.random.default_rng(3).normal(size=(1, modes.count, 1))
-    renderer = additive.additive_renderer(open_device(), tile=8, eps2d=0.0)
-    camera = additive.turned_cameras(n, n, np.zeros(1))
+    renderer = views.additive_renderer(open_device(), tile=8, eps2d=0.0)
+    camera = views.turned_cameras(n, n, np.zeros(1))
     picture = additive.Placed(renderer, camera, modes, geometry, 1).render(c)[0, ..., 0]
     line = np.arange(n) - (n - 1) / 2
     z, y, x = np.meshgrid(line, line, line, indexing="ij")
     points = np.stack([x, y, z], axis=-1).reshape(-1, 3)
     volume = tool("bases.densities").density(geometry, modes, c, points).reshape(n, n, n)
     np.testing.assert_allclose(volume.sum(axis=1), picture, atol=2e-3 * np.abs(picture).max())
+
+
+@pytest.mark.parametrize("stack", [1, 2])
+def test_exact_coefficients_are_those_that_drew_the_pictures(tool, stack):
+    renderer, cameras, modes, geometry, _ = problem(tool, 1, 3)
+    flat = geometry.flat()
+    if stack == 2:
+        # Two splats in each half of the picture's rows, so far apart that they do not meet.
+        flat[:, :3] = [[-5, 3, -3], [5, -3, -3], [-4, -4, 3], [5, 2, 3]]
+        flat[:, 3:7] = [1, 0, 0, 0]
+        flat[:, 7:] = np.log([1.5, 1.5, 0.4])
+    placed = tool("bases.additive").Placed(
+        renderer, cameras, modes, tool("bases.additive").Geometry.of_flat(flat), 2
+    )
+    c = np.random.default_rng(2).normal(size=(4, modes.count, 2))
+    columns = np.concatenate(list(placed.columns(stack)), axis=-1)
+    assert columns.shape == (stack, 5 * SIZE[0] * SIZE[1] // stack, 4 // stack * modes.count)
+    found = tool("bases.exact").solved(placed, placed.render(c), 1e-9, stack)
+    np.testing.assert_allclose(found, c, atol=2e-3)

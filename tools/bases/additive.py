@@ -8,7 +8,7 @@ splats are on the screen, their tile lists, and the matrices by which modes go t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from bases.mode_sets import ModeSet
 from bases.mosaic import Mosaic
-from rift_cl.cl import Device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.splat.hermite import project_modes, project_modes_grad
@@ -26,7 +25,6 @@ from rift_cl.splat.projection import MOMENTS, project, project_grad
 from rift_cl.splat.raster import Raster, ScreenSplats, raster_grad, rasterize, sum_slots
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.screen_modes import ScreenModes
-from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 from rift_cl.splat.tile_lists import tile_lists
 from rift_cl.splat.tiles import Tiles
@@ -34,6 +32,8 @@ from rift_cl.splat.tiles import Tiles
 Floats = NDArray[np.float64]
 # The rows of L^-1 come before the modes in a table.
 _WHITENING = 3
+# Channels of a picture, and so columns that are drawn at once.
+_AT_ONCE = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,14 +134,29 @@ class Placed:
 
     def render(self, coefficients: Floats) -> Floats:
         """Pictures (V, height, width, C) of coefficients (N, K, C)."""
-        self._raster = rasterize(
-            self.device,
-            self._screen(coefficients),
-            self._lists,
-            self._camera.size,
-            settings=self.renderer.settings,
-        )
+        self._raster = self._drawn(coefficients)
         return self._mosaic.cut(self.device.get(self._raster.image))
+
+    def columns(self, stack: int) -> Iterator[NDArray[np.float32]]:
+        """What each coefficient shows alone, some at a time: (stack, rows, some).
+
+        Args:
+            stack: into how many parts of as many rows, and of as many splats one after the other,
+                pictures fall that have nothing to do with each other; each has its own columns.
+
+        Yields:
+            Columns of the matrix from a part's coefficients (N / stack * K) to its pixels, of all
+            views; the last ones may be fewer.
+        """
+        unknowns = self._count // stack * self.modes.count
+        for first in range(0, unknowns, _AT_ONCE):
+            some = min(_AT_ONCE, unknowns - first)
+            units = np.zeros((stack, unknowns, _AT_ONCE))
+            units[:, first + np.arange(some), np.arange(some)] = 1
+            image = self._drawn(units.reshape(self._count, self.modes.count, -1)).image
+            seen = self._mosaic.cut(self.device.get(image))[..., :some]
+            parts = seen.reshape(self._views, stack, -1, some).swapaxes(0, 1)
+            yield parts.reshape(stack, -1, some).astype(np.float32)
 
     def adjoint(self, pictures: Floats) -> Floats:
         """The transpose of ``render``: (V, height, width, C) to (N, K, C)."""
@@ -185,18 +200,22 @@ class Placed:
         by_scales = scales.reshape(self._views, self._count, 3).sum(axis=0)
         return np.concatenate([by_means, by_quats, by_scales * self._scales], axis=1)
 
+    def _drawn(self, coefficients: Floats) -> Raster:
+        screen, size = self._screen(coefficients), self._camera.size
+        settings = self.renderer.settings
+        return rasterize(self.device, screen, self._lists, size, settings=settings)
+
     def _screen(self, coefficients: Floats) -> ScreenSplats:
         """The splats on the screen with what these coefficients show there."""
+        channels = coefficients.shape[-1]
         seen = (self._to_screen @ coefficients).astype(np.float32)
-        seen = seen.reshape(self._count, self._views, -1, self._channels).transpose(1, 0, 2, 3)
-        features = self.device.array(
-            np.ascontiguousarray(seen[:, :, 0]).reshape(-1, self._channels)
-        )
+        seen = seen.reshape(self._count, self._views, -1, channels).transpose(1, 0, 2, 3)
+        features = self.device.array(np.ascontiguousarray(seen[:, :, 0]).reshape(-1, channels))
         if not self.modal:
             return ScreenSplats(self._projected.screen, features)
         rest = seen[:, :, 1:].reshape(self._views * self._count, -1)
         table = self.device.array(np.concatenate([self._whitening, rest], axis=1))
-        modes = ScreenModes(table, 0, self.modes.order, self._channels)
+        modes = ScreenModes(table, 0, self.modes.order, channels)
         return ScreenSplats(self._projected.screen, features, modes)
 
     def _coloured(self, coefficients: Floats) -> Splats:
@@ -224,27 +243,3 @@ class Placed:
         extents = np.asarray(self.device.get(self._projected.screen), np.float64)[:, 6:8]
         height, width = self._mosaic.cameras[0].size
         return float(4 * extents.prod(axis=1).sum() / (self._views * height * width))
-
-
-def additive_renderer(device: Device, *, tile: int, eps2d: float) -> Renderer:
-    """A renderer that adds splats, in front of the camera or behind it."""
-    settings = SplatSettings(mode="xray", near=-1e6, eps2d=eps2d, tile=tile)
-    return Renderer(settings, device=device)
-
-
-def upright_camera(height: int, width: int) -> Camera:
-    """A camera that sees the plane z = 0 pixel by pixel, x to the right and y downwards."""
-    K = [[1, 0, width / 2], [0, 1, height / 2], [0, 0, 1]]
-    return Camera((height, width), K, np.eye(4), "ortho")
-
-
-def turned_cameras(height: int, width: int, angles: Floats) -> list[Camera]:
-    """Cameras of a parallel scan: x along (cos, sin, 0) of each angle, y along z."""
-    K = [[1, 0, width / 2], [0, 1, height / 2], [0, 0, 1]]
-    views = []
-    for angle in angles:
-        c, s = np.cos(angle), np.sin(angle)
-        view = np.eye(4)
-        view[:3, :3] = [[c, s, 0], [0, 0, 1], [s, -c, 0]]
-        views.append(Camera((height, width), K, view, "ortho"))
-    return views

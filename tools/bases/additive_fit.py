@@ -1,9 +1,10 @@
 """A fit of additive splats: geometry by Adam, all coefficients by ridge least squares inside it.
 
 Each step places the splats, solves for the coefficients by a few conjugate gradients from the last
-ones (``rift_cl.train.variable_projection``), and moves means, rotations and scales along the
-gradient at those coefficients. Bases differ in nothing but their modes and the number of splats
-that a budget buys: they start from the first of the same places, at a size that fills the gaps.
+ones (``rift_cl.train.variable_projection``) or exactly (``bases.exact``), and moves means,
+rotations and scales along the gradient at those coefficients. Bases differ in nothing but their
+modes and the number of splats that a budget buys: they start from the first of the same places, at
+a size that fills the gaps.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from bases.additive import Floats, Geometry, Placed
+from bases.exact import solved
 from bases.mode_sets import ModeSet, seen_gram
 from rift_cl.geometry import Camera
 from rift_cl.splat.renderer import Renderer
@@ -29,6 +31,8 @@ HALF_LIFE = 120.0
 RIDGE = 1e-5
 # How many times the conjugate gradients of a later step the first one takes.
 FIRST = 3
+# In place of a number of conjugate gradients.
+EXACT = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +50,7 @@ class Task:
         score: PSNR in dB of a geometry, its coefficients and the residual.
         screens: projections of a round splat by which modes are made orthonormal.
         power: of a splat's volume that the squared norm of its pictures goes by.
+        stack: slices that have nothing to do with each other, a row of the pictures each.
     """
 
     renderer: Renderer
@@ -58,6 +63,7 @@ class Task:
     score: Callable[[Geometry, ModeSet, Floats, Floats], dict[str, float]]
     screens: Sequence[Floats]
     power: float
+    stack: int = 1
 
 
 @dataclass(eq=False)
@@ -68,7 +74,8 @@ class AdditiveFit:
         task: what is fitted.
         modes: of the basis.
         splats: how many.
-        solve: conjugate gradients of each step; the first one takes three times as many.
+        solve: conjugate gradients of each step; the first one takes three times as many. ``EXACT``
+            solves the normal equations.
     """
 
     task: Task
@@ -120,6 +127,16 @@ class AdditiveFit:
         placed = Placed(task.renderer, task.cameras, self._solved, self.geometry, channels)
         if not self._ridge:
             self._ridge = RIDGE * mean_curvature(placed.render, self._c.shape)
+        residual = self._solve(placed, iterations)
+        self.pairs = placed.pairs_per_pixel()
+        return residual, placed.geometry_gradient(self._c, -residual)
+
+    def _solve(self, placed: Placed, iterations: int) -> Floats:
+        """Put better coefficients in the place of these; their residual."""
+        task = self.task
+        if self.solve == EXACT:
+            self._c = solved(placed, task.targets, self._ridge, task.stack)
+            return task.targets - placed.render(self._c)
         found = solve(
             placed.render,
             placed.adjoint,
@@ -130,8 +147,7 @@ class AdditiveFit:
             diagonal=self._diagonal(),
         )
         self._c = found.coefficients
-        self.pairs = placed.pairs_per_pixel()
-        return found.residual, placed.geometry_gradient(self._c, -found.residual)
+        return found.residual
 
     def _diagonal(self) -> Floats:
         """How strongly coefficients show, by the size of their splats."""

@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from bases.additive import Geometry, additive_renderer, upright_camera
-from bases.additive_fit import AdditiveFit, Floats, Task, psnr, race, record
+from bases.additive import Geometry
+from bases.additive_fit import EXACT, AdditiveFit, Floats, Task, psnr, race, record
 from bases.mode_sets import ModeSet, in_plane, laguerre_rows
 from bases.plan import Plan
 from bases.races import race_pictures, race_tables, race_verdicts
 from bases.starts import flat_start
+from bases.views import additive_renderer, upright_camera
 from rift_cl import Device
 
 NAME = "images"
@@ -38,7 +39,7 @@ def settings(plan: Plan) -> dict[str, Any]:
         ),
         "pixels": plan.of(tiny=16, quick=48, full=64),
         "budgets": plan.of(tiny=[120], quick=[600], full=[400, 800, 1600]),
-        "solves": plan.of(tiny=[2], quick=[4, 12], full=[4, 12]),
+        "solves": plan.of(tiny=[2, EXACT], quick=[4, EXACT], full=[4, 12, EXACT]),
         "marks": plan.of(tiny=[2], quick=[5, 10, 20, 40, 60], full=MARKS),
         "short": plan.of(tiny=2, quick=20, full=100),
     }

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from bases.additive_fit import at_time
+from bases.additive_fit import EXACT, at_time
 from bases.statistics import Difference, chosen, distinct, sentence, spread, values
 from bench.table import Table
 from rift_cl.plot import curves
@@ -55,8 +55,18 @@ def _cases(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def _words(case: dict[str, Any]) -> str:
     units = {"samples": "samples an edge", "views": "views", "budget": "parameters"}
-    units["solve"] = "conjugate gradients"
-    return ", ".join(f"{v} {units[k]}" if k in units else str(v) for k, v in case.items())
+    told = {k: f"{v} {units[k]}" if k in units else str(v) for k, v in case.items()}
+    return ", ".join((told | {"solve": _solver(case["solve"])}).values())
+
+
+def _solver(solve: int) -> str:
+    return "exact solves" if solve == EXACT else f"{solve} conjugate gradients"
+
+
+def _exactest(runs: list[dict[str, Any]]) -> int:
+    """The solver that comes closest to the best coefficients."""
+    solves = distinct(runs, "solve")
+    return EXACT if EXACT in solves else max(solves)
 
 
 def race_tables(result: dict[str, Any]) -> Iterator[Table]:
@@ -94,8 +104,7 @@ def race_pictures(result: dict[str, Any]) -> dict[str, tuple[Any, str]]:
         mine = [run for run in result["runs"] if run["budget"] == budget]
         figure = curves(_by_time(mine), xlabel="seconds", ylabel="mean PSNR, dB", log_x=True)
         found[f"time_{budget}"] = (figure, f"Mean PSNR against wall time, {budget} parameters")
-    solve = max(distinct(result["runs"], "solve"))
-    runs = [run for run in _comparable(result) if run["solve"] == solve]
+    runs = chosen(_comparable(result), solve=_exactest(result["runs"]))
     for name in _moments(result):
         series = {}
         for basis in distinct(runs, "basis"):
@@ -116,44 +125,42 @@ def _by_time(runs: list[dict[str, Any]]) -> dict[str, tuple[list[float], list[fl
                 [float(np.mean([mark[what] for mark in at])) for at in zip(*marks, strict=True)]
                 for what in ("wall", "psnr")
             )
-            found[f"{basis}, {solve} CG" if several else basis] = (wall, psnr)
+            found[f"{basis}, {_solver(solve)}" if several else basis] = (wall, psnr)
     return found
 
 
 def race_verdicts(result: dict[str, Any]) -> list[str]:
     """Every basis against Gaussians: by steps and by time, short and converged.
 
-    With the longest solves, where there is a choice: pairs should be independent.
+    With the most exact solves, where there is a choice: pairs should be independent.
     """
-    solve, said = max(distinct(result["runs"], "solve")), []
+    solve, said = _exactest(result["runs"]), []
     runs = chosen(_comparable(result), solve=solve)
     for name, step in _moments(result).items():
         for clock, words in (("steps", "equal steps"), ("wall", "equal wall time")):
             for basis in distinct(runs, "basis"):
                 if basis != BASELINE:
                     gain = _gain(runs, basis, f"{name} {clock}")
-                    where = f"equal parameters and {words} ({step} steps, {name})"
+                    where = f"{_solver(solve)}, equal parameters and {words} ({step} steps, {name})"
                     said.append(sentence(basis, BASELINE, gain, "dB", where))
     return [*said, *_best_verdicts(result)]
 
 
 def _best_verdicts(result: dict[str, Any]) -> list[str]:
-    """Every basis with the length of solves that suits it, where there was a choice.
+    """Every basis with the solver that suits it, where there was a choice.
 
-    The time is that of the Gaussians' last step with the shortest solves; whatever a fit with
-    longer ones had by then counts, of either basis.
+    The time is that of the Gaussians' last step with the solver that took longest; the best that a
+    fit of either basis had by then counts.
     """
     runs, said = result["runs"], []
-    solves = distinct(runs, "solve")
-    if len(solves) < 2:
+    if len(distinct(runs, "solve")) < 2:
         return said
     for name, step in _moments(result).items():
         best: dict[str, dict[tuple[Any, ...], float]] = {}
-        ends = {
-            _key(run)[:-1]: next(m["wall"] for m in run["history"] if m["step"] == step)
-            for run in runs
-            if run["basis"] == BASELINE and run["solve"] == min(solves)
-        }
+        ends: dict[tuple[Any, ...], float] = {}
+        for run in chosen(runs, basis=BASELINE):
+            end = next(m["wall"] for m in run["history"] if m["step"] == step)
+            ends[_key(run)[:-1]] = max(end, ends.get(_key(run)[:-1], 0.0))
         for run in runs:
             case, found = _key(run)[:-1], best.setdefault(run["basis"], {})
             reached = at_time(run["history"], ends[case], "wall", "psnr")

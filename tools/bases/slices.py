@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from bases.additive import Geometry, additive_renderer, turned_cameras
-from bases.additive_fit import AdditiveFit, Floats, Task, psnr, race, record
+from bases.additive import Geometry
+from bases.additive_fit import EXACT, AdditiveFit, Floats, Task, psnr, race, record
 from bases.densities import density
 from bases.mode_sets import ModeSet, in_plane
 from bases.plan import Plan
 from bases.races import race_pictures, race_tables, race_verdicts
 from bases.starts import slice_start
+from bases.views import additive_renderer, turned_cameras
 from rift_cl import Device, Grid, Parallel, Projector
 from rift_cl.phantom import shepp_logan, shepp_logan_sinogram
 
@@ -41,7 +42,7 @@ def settings(plan: Plan) -> dict[str, Any]:
         "noise": plan.of(tiny={}, quick={}, full={"20": 0.01}),
         "budgets": plan.of(tiny=[60], quick=[300], full=[300, 600, 1200]),
         "orders": plan.of(tiny=[0, 1], quick=[0, 1, 2], full=[0, 1, 2, 3, 4]),
-        "solves": plan.of(tiny=[2], quick=[4, 12], full=[4, 12]),
+        "solves": plan.of(tiny=[2, EXACT], quick=[4, EXACT], full=[4, 12, EXACT]),
         "marks": plan.of(tiny=[2], quick=[5, 10, 20, 30, 45, 60], full=MARKS),
         "short": plan.of(tiny=2, quick=30, full=60),
     }
@@ -192,6 +193,7 @@ def stack_task(device: Device, stack: Stack) -> Task:
         score,
         [np.array([[np.cos(a), np.sin(a), 0.0]]) for a in stack.angles],
         1.5,
+        slices,
     )
 
 
