@@ -16,6 +16,7 @@ from rift_cl.jobs.xray_options import XRAY_ONLY, XrayOptions
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.homogenisation import Homogenisation, WeightKind
 from rift_cl.train.settings import BandLimit, Densification, Rates, TrainSettings
+from rift_cl.train.solve_settings import SolveSettings
 from rift_cl.train.xray_trainer import RIDGE, xray_settings
 
 # Rates of poses and exposures where they are refined.
@@ -112,7 +113,7 @@ class FitSettings(XrayOptions, BasisOptions):
                 f"--sh-degree is about harmonics, in whose place --angular {self.angular} puts "
                 "lobes: say --modes, or leave it out"
             )
-        least = {"downscale": 1, "hold_out": 0, "views": 0, "checkpoint_every": 0}
+        least = {"downscale": 1, "hold_out": 0, "views": 0, "checkpoint_every": 0, "solve": 0}
         for name, bound in least.items():
             if getattr(self, name) < bound:
                 option = name.replace("_", "-")
@@ -160,6 +161,7 @@ class FitSettings(XrayOptions, BasisOptions):
                 weight=self.homogenise_by,
                 band_limit=self.band_limit,
                 basis=dataclasses.replace(self.basis_settings(colored=False), ridge=RIDGE),
+                solve=SolveSettings(self.solve),
             )
         return TrainSettings(
             steps=self.steps,
@@ -190,7 +192,8 @@ class FitSettings(XrayOptions, BasisOptions):
             del values["homogenise_by"]
         if self.band_limit != "coverage":
             values["band_limit"] = self.band_limit == "pixels"
-        for name in ("pinhole", *(field.name for field in dataclasses.fields(BasisOptions))):
+        later = ("pinhole", "solve", *(field.name for field in dataclasses.fields(BasisOptions)))
+        for name in later:
             if values[name] == getattr(type(self), name):
                 del values[name]
         if self.mode == "light":

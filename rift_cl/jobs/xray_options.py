@@ -47,6 +47,9 @@ class XrayOptions:
     """X-rays: the slices as a folder of TIFF files, a Zarr store, or one HDF5 file."""
     memory: str | None = None
     """X-rays: most memory to use, such as 512M or 4G."""
+    solve: int = 0
+    """X-rays: steps between two solves of all densities, and their modes, by least squares, such as
+    100; between them only places and shapes move. 0 for none."""
 
     def demand_mode(self) -> None:
         """Refuse what has no meaning in this mode.

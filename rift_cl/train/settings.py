@@ -10,11 +10,11 @@ from rift_cl.splat.orders import count_of
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.homogenisation import Homogenisation
 from rift_cl.train.ranges import check_choice, check_number, check_whole
+from rift_cl.train.solve_settings import SolveSettings
 
 LossKind = Literal["l1", "l2"]
 StrategyName = Literal["mcmc", "default"]
 BandLimit = Literal["pixels", "coverage"]
-_DEGREES = (0, 1, 2, 3, 4)
 
 
 @dataclass(frozen=True)
@@ -197,6 +197,7 @@ class TrainSettings:
         basis: Hermite modes of the splats' shapes and colours, and how densities become opacities.
         angular: what colours vary in with the direction they are seen from; anything but ``sh``
             takes the place of the harmonics, all but the constant one.
+        solve: what is linear is solved for now and then; X-rays alone.
 
     Raises:
         InputError: a number is out of its range.
@@ -219,13 +220,13 @@ class TrainSettings:
     densification: Densification = field(default_factory=Densification)
     basis: BasisSettings = field(default_factory=BasisSettings)
     angular: AngularSettings = field(default_factory=AngularSettings)
+    solve: SolveSettings = field(default_factory=SolveSettings)
 
     def __post_init__(self) -> None:
         """Check every number's range."""
         for name, least in (("steps", 1), ("splats", 1), ("sh_every", 1), ("seed", 0)):
             check_whole(self, name, least)
-        if self.sh_degree not in _DEGREES:
-            raise InputError(f"TrainSettings: sh_degree is {self.sh_degree!r}, wanted 0 to 4")
+        check_whole(self, "sh_degree", 0, 4)
         for name in ("ssim_weight", "finish"):
             check_number(self, name, most=1)
         if self.noise is not None:

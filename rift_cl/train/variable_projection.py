@@ -23,6 +23,9 @@ Floats = NDArray[np.float64]
 Linear = Callable[[Floats], Floats]
 # Squared norms below this share of the first one are rounding.
 _EXHAUSTED = 1e-30
+# No step raises the loss by more than this share of it, unless gradients are no more than the
+# rounding of what is rendered: steps go astray from there on, and ever faster.
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +36,13 @@ class Solution:
         coefficients: of any shape that ``render`` takes.
         residual: targets minus what the coefficients render, of the targets' shape.
         steps: conjugate gradients that were taken.
+        loss_before: what is minimised, of the coefficients that it began with.
     """
 
     coefficients: Floats
     residual: Floats
     steps: int
+    loss_before: float
 
 
 def solve(
@@ -49,6 +54,7 @@ def solve(
     iterations: int,
     start: Floats | None = None,
     diagonal: Floats | None = None,
+    free: NDArray[np.bool_] | None = None,
 ) -> Solution:
     """Minimise ``|render(c) - targets|^2 + ridge |c|^2`` by conjugate gradients (CGLS).
 
@@ -63,34 +69,40 @@ def solve(
         start: coefficients to begin from; zero if not given.
         diagonal: about the squared norm of each coefficient's pictures, of the coefficients'
             shape, all positive: steps then count in coefficients of equal effect.
+        free: of the coefficients' shape, which of them are solved for; the others stay at what
+            they are in ``start``. All are if not given.
 
     Raises:
         InputError: ``ridge`` or ``iterations`` is out of its range, or ``diagonal`` not positive.
-        ShapeError: ``start``, ``diagonal`` or what ``render`` returns does not fit.
+        ShapeError: ``start``, ``diagonal``, ``free`` or what ``render`` returns does not fit.
         NonFiniteError: the targets, or what is rendered, hold NaN or infinity.
     """
     _check(ridge, iterations, diagonal)
     targets = np.asarray(targets, np.float64)
     c, r, gradient = _begin(render, adjoint, targets, ridge, start)
-    scale = np.ones_like(c) if diagonal is None else np.asarray(diagonal, np.float64)
-    if scale.shape != c.shape:
-        raise ShapeError(f"solve: diagonal has shape {scale.shape}, wanted {c.shape}")
-    direction = gradient / scale
+    moves = _moves(c.shape, diagonal, free)
+    direction = moves * gradient
     slope = first = float(np.vdot(gradient, direction))
+    loss = _loss(r, c, ridge)
+    found = Solution(c, r, 0, loss)
     for step in range(iterations):
         if not slope > _EXHAUSTED * first:
-            return Solution(c, r, step)
+            break
         seen = _rendered(render, direction, targets)
-        curvature = float(np.vdot(seen, seen) + ridge * np.vdot(direction, direction))
+        curvature = _loss(seen, direction, ridge)
         if not curvature > 0:
-            return Solution(c, r, step)
+            break
         c = c + slope / curvature * direction
         r = r - slope / curvature * seen
+        before, loss = loss, _loss(r, c, ridge)
+        if loss > before * (1 + _ROUNDING):
+            break
+        found = Solution(c, r, step + 1, found.loss_before)
         if step + 1 < iterations:
             gradient = adjoint(r) - ridge * c
-            before, slope = slope, float(np.vdot(gradient, gradient / scale))
-            direction = gradient / scale + slope / before * direction
-    return Solution(c, r, iterations)
+            last, slope = slope, float(np.vdot(gradient, moves * gradient))
+            direction = moves * gradient + slope / last * direction
+    return found
 
 
 def mean_curvature(render: Linear, shape: tuple[int, ...], *, seed: int = 0) -> float:
@@ -116,6 +128,23 @@ def _check(ridge: float, iterations: int, diagonal: Floats | None) -> None:
         raise InputError(f"solve: iterations is {iterations!r}, wanted a whole number >= 1")
     if diagonal is not None and not (np.isfinite(diagonal).all() and np.all(diagonal > 0)):
         raise InputError("solve: diagonal holds numbers that are not positive and finite")
+
+
+def _moves(
+    shape: tuple[int, ...], diagonal: Floats | None, free: NDArray[np.bool_] | None
+) -> Floats:
+    """How far each coefficient goes along the gradient; those that are held go nowhere."""
+    moves = np.ones(shape)
+    for name, given in (("diagonal", diagonal), ("free", free)):
+        if given is not None and given.shape != shape:
+            raise ShapeError(f"solve: {name} has shape {given.shape}, wanted {shape}")
+    if diagonal is not None:
+        moves /= diagonal
+    return moves if free is None else moves * free
+
+
+def _loss(r: Floats, c: Floats, ridge: float) -> float:
+    return float(np.vdot(r, r) + ridge * np.vdot(c, c))
 
 
 def _begin(

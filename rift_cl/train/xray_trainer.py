@@ -8,6 +8,7 @@ into their slice; modes of their shapes that vary across it stay at zero.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,11 @@ import numpy as np
 from rift_cl.cl.arithmetic import copy_columns
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.basis_settings import BasisSettings
+from rift_cl.train.density_solve import solve_densities
 from rift_cl.train.homogenisation import Homogenisation, WeightKind
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.settings import BandLimit, Rates, Renewal, TrainSettings
+from rift_cl.train.solve_settings import SolveSettings
 from rift_cl.train.trainer import Pictures, Trainer
 from rift_cl.train.xray_start import FLAT
 
@@ -37,6 +40,7 @@ def xray_settings(
     weight: WeightKind = "ramp",
     band_limit: BandLimit | None = None,
     basis: BasisSettings | None = None,
+    solve: SolveSettings | None = None,
 ) -> TrainSettings:
     """The settings of a fit to projections.
 
@@ -49,7 +53,11 @@ def xray_settings(
         weight: which of the two.
         band_limit: as in ``TrainSettings``.
         basis: the modes of the splats' densities.
+        solve: how often densities and modes are solved for. Between solves they then stay as they
+            are, which serves better than moving them by Adam as well.
     """
+    solve = solve or SolveSettings()
+    rates = replace(RATES, logits=0.0, shape_modes=0.0) if solve.every else RATES
     return TrainSettings(
         steps=steps,
         seed=seed,
@@ -59,9 +67,10 @@ def xray_settings(
         ssim_weight=0.0,
         homogenisation=Homogenisation(exponent, along_rows=True, weight=weight),
         band_limit=band_limit,
-        rates=RATES,
+        rates=rates,
         renewal=RENEWAL,
         basis=basis or BasisSettings(),
+        solve=solve,
     )
 
 
@@ -93,6 +102,8 @@ class XrayTrainer(Trainer):
 
     def step(self) -> Any:
         """One projection; the loss as a (1,) device array."""
+        if self.settings.solve.due(self.parameters.step):
+            self._solve()
         value = super().step()
         if self._zero is not None:
             raw = self.parameters.raw
@@ -100,4 +111,13 @@ class XrayTrainer(Trainer):
             copy_columns(self.device, self._zero, 0, raw["quats"], 1, 2)
             copy_columns(self.device, self._thin, 0, raw["log_scales"], 2, 1)
             self.parameters.activate()
+        if self.settings.solve.every and self.parameters.step == self.settings.steps:
+            self._solve()
         return value
+
+    def _solve(self) -> None:
+        """Give the splats the densities and modes that serve best where they are."""
+        settings = self.settings
+        solve_densities(
+            *(self.parameters, self.renderer, self.pictures, settings.solve), seed=settings.seed
+        )

@@ -157,3 +157,39 @@ def test_pictures_of_another_shape_and_no_numbers_are_refused(problem):
         solve(render, adjoint, targets * np.nan, ridge=0.0, iterations=2)
     with pytest.raises(ShapeError, match="start has shape"):
         solve(render, adjoint, targets, ridge=0.0, iterations=2, start=np.zeros(15))
+
+
+def test_more_steps_than_float32_can_use_do_no_harm():
+    """Gradients end as rounding, by which conjugate gradients would go astray ever faster."""
+    random = np.random.default_rng(4)
+    dense = random.normal(size=(48, 6)).astype(np.float32)
+    true = random.normal(size=(6, 1))
+    targets = (dense.astype(float) @ true.ravel()).reshape(PICTURES)
+
+    def render(c):
+        return (dense @ c.ravel().astype(np.float32)).reshape(PICTURES)
+
+    def adjoint(pictures):
+        return (dense.T @ pictures.ravel().astype(np.float32)).reshape(6, 1).astype(float)
+
+    for iterations in (8, 40, 400):
+        found = solve(render, adjoint, targets, ridge=1e-6, iterations=iterations)
+        np.testing.assert_allclose(found.coefficients, true, atol=1e-5)
+        assert found.steps <= iterations
+
+
+def test_what_is_held_stays_and_the_rest_is_solved_around_it(problem):
+    dense, targets = problem
+    random = np.random.default_rng(5)
+    free, start = random.random(SHAPE) < 0.6, random.normal(size=SHAPE)
+    found = solve(*maps(dense), targets, ridge=2.0, iterations=60, start=start, free=free)
+    assert np.array_equal(found.coefficients[~free], start[~free])
+    fixed = dense @ np.where(free, 0, start).ravel()
+    some = dense[:, free.ravel()]
+    normal = some.T @ some + 2.0 * np.eye(some.shape[1])
+    wanted = np.linalg.solve(normal, some.T @ (targets.ravel() - fixed))
+    np.testing.assert_allclose(found.coefficients[free], wanted, atol=1e-8 * np.abs(wanted).max())
+    loss = np.square(targets.ravel() - dense @ start.ravel()).sum() + 2.0 * np.square(start).sum()
+    assert found.loss_before == pytest.approx(loss)
+    with pytest.raises(ShapeError, match="free has shape"):
+        solve(*maps(dense), targets, ridge=0, iterations=1, free=free[:2])
