@@ -16,33 +16,10 @@
 #include "include/portable.h"
 #include "include/exponential.h"
 #include "include/splat.h"
+#include "include/tile_pixels.h"
 #include "include/hermite_edge.h"
 #include "include/hermite_modes.h"
 #include "include/hermite_alpha.h"
-
-#define STRIPS (TILE / LANES)
-#define PIXELS (STRIPS * TILE)
-/* Splats between two looks at whether the tile is finished. */
-#define PATIENCE 16
-/* Splats are asked for so many entries before they are needed: they lie anywhere in memory. */
-#define AHEAD 8
-#define SIGN_BIT ((int)0x80000000)
-
-static int any_negative(lanes_int v) {
-#if LANES == 8
-  const int4 four = v.lo | v.hi;
-  const int2 two = four.lo | four.hi;
-  return (two.x | two.y) < 0;
-#else
-  return v < 0;
-#endif
-}
-
-static int all_negative(const lanes (*state)[1 + CHANNELS]) {
-  lanes_int sign = AS_INT(state[0][0]);
-  for (int p = 1; p < PIXELS; p++) sign &= AS_INT(state[p][0]);
-  return !any_negative(~sign);
-}
 
 KERNEL void hermite_raster_cpu(
     __global float *restrict image, __global float *restrict transmittance,
@@ -57,11 +34,7 @@ KERNEL void hermite_raster_cpu(
   const float most = cap_that_counts(cap);
   lanes state[PIXELS][1 + CHANNELS];
   lanes_int end[PIXELS];
-  for (int p = 0; p < PIXELS; p++) {
-    state[p][0] = 1;
-    end[p] = stop;
-    for (int n = 0; n < CHANNELS; n++) state[p][1 + n] = 0;
-  }
+  clear_pixels(state, end, stop);
   for (int entry = start; entry < stop; entry++) {
     const int splat = entries[entry].x;
     const int next_splat = entries[entry + AHEAD < stop ? entry + AHEAD : entry].x;
@@ -122,21 +95,9 @@ KERNEL void hermite_raster_cpu(
           here[1 + n] = here[1 + n] + w * seen;
         }
       }
-      if (!any_negative(turned)) continue;
-      for (int p = strip * TILE + s.top; p < strip * TILE + s.bottom; p++)
-        end[p] = state[p][0] < 0 && end[p] == stop ? entry : end[p];
+      if (any_negative(turned)) note_finished(state, end, strip, s, stop, entry);
     }
   }
-  for (int p = 0; p < PIXELS; p++) {
-    const int y = y0 + p % TILE, x = x0 + p / TILE * LANES;
-    for (int lane = 0; lane < LANES && x + lane < width && y < height; lane++) {
-      const long pixel = (long)y * width + x + lane;
-      const float t = ((const float *)&state[p][0])[lane], rest = t < 0 ? -t : t;
-      transmittance[pixel] = rest;
-      last[pixel] = ((const int *)&end[p])[lane] - start;
-      for (int n = 0; n < CHANNELS; n++)
-        image[pixel * CHANNELS + n] =
-            ((const float *)&state[p][1 + n])[lane] + (ADDITIVE ? 0 : rest * background[n]);
-    }
-  }
+  write_pixels(
+      state, end, start, x0, y0, height, width, CHANNELS, 0, background, image, transmittance, last);
 }

@@ -12,11 +12,8 @@
 
 #include "include/portable.h"
 #include "include/small_matrix.h"
+#include "include/seen_color.h"
 #include "include/lobe.h"
-
-#ifndef STRIDE
-#define STRIDE 3
-#endif
 
 KERNEL void lobe_shade(
     __global const float *restrict means, __global const float *restrict linear,
@@ -27,15 +24,13 @@ KERNEL void lobe_shade(
   if (i >= count) return;
   float3 color = (float3)(0, 0, 0);
   if (!culled[i]) {
-    const float3 away = load3(means, i) - center.xyz;
-    const float square = dot3(away, away);
-    const float3 d = square > 0 ? away / sqrt(square) : (float3)(0, 0, 1);
+    const float3 d = direction_of(load3(means, i) - center.xyz);
     float basis[FUNCTIONS];
     basis[0] = CONSTANT;
     if (lobe_functions(lobes + i * GEOMETRY, d, basis + 1)) {
       color = (float3)(0.5f, 0.5f, 0.5f);
       for (int k = 0; k < FUNCTIONS; k++) color += basis[k] * load3(linear, i * FUNCTIONS + k);
-      color = not_finite3(color) ? (float3)(0, 0, 0) : color > 0 ? color : (float3)(0, 0, 0);
+      color = color_of(color);
     }
   }
   store3(features + i * STRIDE, 0, color);

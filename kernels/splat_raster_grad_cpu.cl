@@ -18,13 +18,9 @@
 #include "include/portable.h"
 #include "include/exponential.h"
 #include "include/splat.h"
+#include "include/tile_pixels.h"
 #include "include/splat_slots.h"
 #include "include/transpose.h"
-
-#define STRIPS (TILE / LANES)
-#define PIXELS (STRIPS * TILE)
-/* Splats are asked for so many entries before they are needed: they lie anywhere in memory. */
-#define AHEAD 8
 
 KERNEL void splat_raster_grad_cpu(
     __global float *restrict slots, __global const float *restrict grad_image,
@@ -40,25 +36,9 @@ KERNEL void splat_raster_grad_cpu(
   /* Of each pixel: T on the way back, q, and v. */
   lanes state[PIXELS][2 + CHANNELS];
   lanes_int end[PIXELS];
-  int deepest = start;
-  for (int p = 0; p < PIXELS; p++) {
-    const int y = y0 + p % TILE, x = x0 + p / TILE * LANES;
-    for (int lane = 0; lane < LANES; lane++) {
-      const int inside = x + lane < width && y < height;
-      const long pixel = inside ? (long)y * width + x + lane : 0;
-      float q = inside ? grad_transmittance[pixel] : 0;
-      for (int n = 0; n < CHANNELS; n++) {
-        const float g = inside ? grad_image[pixel * stride + first + n] : 0;
-        ((float *)&state[p][2 + n])[lane] = g;
-        q += g * background[first + n];
-      }
-      const int stop = inside ? last[pixel] + start : 0;
-      ((float *)&state[p][0])[lane] = inside ? transmittance[pixel] : 1;
-      ((float *)&state[p][1])[lane] = q;
-      ((int *)&end[p])[lane] = stop;
-      deepest = stop > deepest ? stop : deepest;
-    }
-  }
+  const int deepest = read_pixels(
+      state, end, start, x0, y0, height, width, stride, first, background, grad_image,
+      grad_transmittance, transmittance, last);
   for (int entry = deepest; entry < starts[tile + 1]; entry++)
     for (int n = 0; n < RECORD; n++)
       if (first == 0 || !SHARED(n)) slots[(long)entries[entry].y * RECORD_LENGTH + PLACE(n)] = 0;

@@ -8,11 +8,8 @@
 
 #include "include/portable.h"
 #include "include/small_matrix.h"
+#include "include/seen_color.h"
 #include "include/sh.h"
-
-#ifndef STRIDE
-#define STRIDE 3
-#endif
 
 KERNEL void splat_shade(
     __global const float *restrict means, __global const float *restrict sh,
@@ -22,13 +19,11 @@ KERNEL void splat_shade(
   if (i >= count) return;
   float3 color = (float3)(0, 0, 0);
   if (!culled[i]) {
-    const float3 away = load3(means, i) - center.xyz;
-    const float square = dot3(away, away);
     float basis[COEFFICIENTS];
-    sh_basis(square > 0 ? away / sqrt(square) : (float3)(0, 0, 1), basis);
+    sh_basis(direction_of(load3(means, i) - center.xyz), basis);
     color = (float3)(0.5f, 0.5f, 0.5f);
     for (int k = 0; k < COEFFICIENTS; k++) color += basis[k] * load3(sh, i * COEFFICIENTS + k);
-    color = not_finite3(color) ? (float3)(0, 0, 0) : color > 0 ? color : (float3)(0, 0, 0);
+    color = color_of(color);
   }
   store3(features + i * STRIDE, 0, color);
 }

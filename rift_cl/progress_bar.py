@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Iterable
@@ -14,6 +15,26 @@ from rift_cl.progress import Report
 
 # Plain lines come no closer together than this, in seconds, except the last.
 _PAUSE = 5.0
+
+
+class _Pace:
+    """Steps per second since the first report of steps of a kind.
+
+    What was done before that report may be an earlier run's, and took no time of this one.
+    """
+
+    def __init__(self) -> None:
+        self._what, self._done = "", 0
+        self._first, self._begin = 0, 0.0
+
+    def after(self, report: Report) -> float:
+        """The rate after this report; 0 while there is none to tell."""
+        now = time.monotonic()
+        if report.what != self._what or report.done < self._done:
+            self._what, self._first, self._begin = report.what, report.done, now
+        self._done = report.done
+        elapsed = now - self._begin
+        return (report.done - self._first) / elapsed if elapsed > 0 else 0.0
 
 
 def show_progress(reports: Iterable[Report], *, quiet: bool) -> None:
@@ -35,31 +56,29 @@ def _draw_bar(reports: Iterable[Report]) -> None:
         TimeRemainingColumn(),
     )
     with Progress(*columns, console=Console(stderr=True)) as progress:
-        task = progress.add_task("", rate="")
-        begin = time.monotonic()
+        task, pace = progress.add_task("", rate=""), _Pace()
         for report in reports:
-            rate = _rate(report, time.monotonic() - begin)
+            rate = pace.after(report)
             progress.update(
                 task,
                 completed=report.done,
                 total=report.total,
                 description=f"{report.what}{_figures(report)}",
-                rate=rate,
+                rate=f"{rate:.3g} {report.what}/s" if rate else "",
             )
 
 
 def _print_lines(reports: Iterable[Report]) -> None:
-    begin, last = time.monotonic(), -_PAUSE
+    pace, last = _Pace(), -math.inf
     for report in reports:
-        elapsed = time.monotonic() - begin
-        if elapsed - last < _PAUSE and report.done < report.total:
+        rate, now = pace.after(report), time.monotonic()
+        if now - last < _PAUSE and report.done < report.total:
             continue
-        last = elapsed
-        left = elapsed / report.done * (report.total - report.done) if report.done else None
-        parts = [f"{report.done}/{report.total} {report.what}", _rate(report, elapsed)]
-        parts += [f"{left:.0f} s left"] if left else []
-        line = ", ".join(part for part in parts if part) + _figures(report)
-        print_line(line)
+        last, left = now, report.total - report.done
+        parts = [f"{report.done}/{report.total} {report.what}"]
+        parts += [f"{rate:.3g} {report.what}/s"] if rate else []
+        parts += [f"{left / rate:.0f} s left"] if rate and left else []
+        print_line(", ".join(parts) + _figures(report))
 
 
 def print_line(line: str) -> None:
@@ -67,10 +86,6 @@ def print_line(line: str) -> None:
     if sys.stderr is not None:
         with suppress(OSError, ValueError):
             print(line, file=sys.stderr, flush=True)
-
-
-def _rate(report: Report, elapsed: float) -> str:
-    return f"{report.done / elapsed:.3g} {report.what}/s" if report.done and elapsed > 0 else ""
 
 
 def _figures(report: Report) -> str:

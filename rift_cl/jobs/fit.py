@@ -31,6 +31,7 @@ from rift_cl.jobs.fit_settings import FitSettings
 from rift_cl.jobs.fit_start import first_splats
 from rift_cl.progress import Report
 from rift_cl.splat.bands import FrameMemory
+from rift_cl.splat.orders import ModeOrders
 from rift_cl.train.homogenisation import noise_of
 from rift_cl.train.trainer import Trainer
 
@@ -79,19 +80,26 @@ class Fit(FitRun):
             }
         cameras = [camera_at(view, settings.downscale) for view in self.seen]
         largest = max(camera.height * camera.width for camera in cameras)
-        parameters = self.training.numbers
-        memory = FrameMemory(settings.splats, parameters, largest, 3, gradient=True)
-        # Besides what a frame takes there are Adam's two moments of every parameter.
-        need = memory.fixed + 8 * parameters * settings.splats
         return {
             "capture": str(self.capture.path),
             "trained on": f"{len(self.seen)} photographs",
             "held out": f"{len(self.unseen)} photographs",
             "largest photograph": f"{largest} pixels",
             "splats": self._splats,
-            "device memory": f"{need / 2**20:.0f} MiB and the tile lists",
+            "device memory": f"{self._need(largest) / 2**20:.0f} MiB and the tile lists",
             "device": self.device.name,
         }
+
+    def _need(self, pixels: int) -> int:
+        """Bytes that a step takes on the device, but for its tile lists and their records."""
+        count, parameters, basis = self.settings.splats, self.training.numbers, self.training.basis
+        channels = 3 if basis.color_order else 0
+        modes = None if basis.plain else ModeOrders(basis.order, basis.color_order, channels)
+        frame = FrameMemory(
+            count, parameters, pixels, 3, gradient=True, absgrad=self.drawing.absgrad, modes=modes
+        )
+        # Besides what a frame takes there are Adam's two moments of every parameter.
+        return frame.fixed + 8 * parameters * count
 
     @property
     def _splats(self) -> str:

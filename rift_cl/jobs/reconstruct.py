@@ -100,7 +100,8 @@ class Reconstruction:
             StoppedError: it was broken off, and what was done is kept.
         """
         self._begin = time.perf_counter()
-        yield Report(0, self._total, self._what)
+        if not self.settings.resume:
+            yield Report(0, self._total, self._what)
         self._settle()
         self.folder.make()
         try:
@@ -168,6 +169,9 @@ class Reconstruction:
         if not self._gone_on and self._looks_first:
             yield from self._look()
         done = self._kept.done
+        if self._gone_on:
+            # Where it goes on, so that nobody takes what was done before for this run's pace.
+            yield Report(done * self.settings.most_steps, self._total, self._what)
         for slab in self.inversion.slabs(self._kept.missing()):
             self._kept.save(slab.start, (yield from self._slab(slab, done)))
             done += slab.stop - slab.start

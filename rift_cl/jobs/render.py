@@ -92,9 +92,7 @@ class Render:
         bounds, scene = self.bounds, self.scene.splats
         largest = max((camera.size for camera in self.cameras), key=lambda size: size[0] * size[1])
         channels = 3 + self.settings.depth
-        arrays = [array for array in vars(scene).values() if isinstance(array, np.ndarray)]
-        parameters = sum(array[0].size for array in arrays)
-        memory = FrameMemory(len(scene), parameters, largest[0] * largest[1], channels)
+        memory = FrameMemory.of(scene, largest, channels, self.scene.drawing)
         orbit = f"orbit at {np.linalg.norm(self.cameras[0].center - bounds.center):.4g}"
         return {
             "scene": f"{self.scene.name}, {len(scene)} splats",

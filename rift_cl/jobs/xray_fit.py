@@ -78,7 +78,8 @@ class XrayFit(FitRun):
         Raises:
             StoppedError: ``stop`` was called; a checkpoint was kept.
         """
-        yield Report(0, self.settings.steps, "steps")
+        if not self.settings.resume:
+            yield Report(0, self.settings.steps, "steps")
         whole = self.input.read()
         self.folder.make()
         seen = whole.of(self.seen)

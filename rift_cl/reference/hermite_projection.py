@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rift_cl.basis.indices import order_of, order_slices
 from rift_cl.basis.projection import gamma
 from rift_cl.geometry import Camera
-from rift_cl.reference.splat_projection import _map
+from rift_cl.reference.splat_projection import screen_map
 
 Floats = NDArray[np.float64]
 _FAINTEST, _FARTHEST = 1 / 255, 6.0
@@ -71,7 +71,7 @@ def project_modes(
         color_modes: (N, K3(T) - 1, C); none for splats of one colour.
     """
     points = means @ camera.view[:3, :3].T + camera.view[:3, 3]
-    _, jacobians, _ = _map(camera, points)
+    _, jacobians, _ = screen_map(camera, points)
     lower = np.linalg.cholesky(covars)
     maps = np.linalg.solve(lower, jacobians @ camera.view[:3, :3] @ roots)
     shape = np.zeros((len(means), 0)) if shape_modes is None else shape_modes

@@ -81,7 +81,7 @@ def project_splats(
     """Project Gaussians of (N, 3) means, (N, 3, 3) covariances and (N,) opacities."""
     points = means @ camera.view[:3, :3].T + camera.view[:3, 3]
     with np.errstate(all="ignore"):
-        centers, jacobians, rays = _map(camera, points)
+        centers, jacobians, rays = screen_map(camera, points)
         to_screen = jacobians @ camera.view[:3, :3]
         plain = to_screen @ covars @ to_screen.transpose(0, 2, 1)
         sharp = plain + eps2d * np.eye(2)
@@ -140,7 +140,7 @@ def _reach(weights: Floats, mode: str) -> Floats:
     return np.asarray(np.minimum(_EXTENT, at_threshold))
 
 
-def _map(camera: Camera, points: Floats) -> tuple[Floats, Floats, Floats]:
+def screen_map(camera: Camera, points: Floats) -> tuple[Floats, Floats, Floats]:
     """Pixel positions, 2 x 3 Jacobians, and the unit rays along which those see nothing."""
     fx, fy, cx, cy = camera.intrinsics
     x, y, z = points.T

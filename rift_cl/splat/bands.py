@@ -8,7 +8,7 @@ records are summed in the order of the tiles whatever the band, so that every bi
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.errors import ResourceLimitError
-from rift_cl.splat.hermite import is_modal, moment_count, table_width
-from rift_cl.splat.projection import MOMENTS
+from rift_cl.splat.orders import Modal, ModeOrders
+from rift_cl.splat.projection import MOMENTS, is_modal
 from rift_cl.splat.settings import SplatSettings
-from rift_cl.splat.splats import Splats
 from rift_cl.splat.tile_lists import tile_lists_bytes
 from rift_cl.splat.tiles import Tiles
 
@@ -40,8 +39,8 @@ class FrameMemory:
         channels: of the image.
         gradient: whether its gradient is wanted as well.
         absgrad: whether that has the magnitudes.
-        table: floats of a splat's modes on the screen; 0 for plain splats.
-        moments: floats of a (splat, tile) pair's record where there are modes; 0 for plain ones.
+        modes: orders of the modes, all 0 where another activation alone asks for their kernels;
+            None for plain splats.
     """
 
     splats: int
@@ -50,39 +49,43 @@ class FrameMemory:
     channels: int
     gradient: bool = False
     absgrad: bool = False
-    table: int = 0
-    moments: int = 0
+    modes: ModeOrders | None = None
 
     @classmethod
     def of(
         cls,
-        splats: Splats,
+        splats: Modal,
         size: tuple[int, int],
         channels: int,
         settings: SplatSettings,
     ) -> FrameMemory:
-        """What a frame of these splats takes, without its gradient."""
-        floats = sum(array.size for array in vars(splats).values() if array is not None)
+        """What a frame of these splats takes, without its gradient.
+
+        The splats may be on a device, or a scene on the host that is yet to be uploaded.
+        """
+        floats = sum(getattr(array, "size", 0) for array in vars(splats).values())
         parameters = -(-floats // max(len(splats), 1))
         pixels = size[0] * size[1]
-        plain = cls(len(splats), parameters, pixels, channels, absgrad=settings.absgrad)
-        if not is_modal(splats, settings):
-            return plain
-        return replace(plain, table=table_width(splats), moments=moment_count(splats, channels))
+        modes = ModeOrders.of(splats) if is_modal(splats, settings) else None
+        absgrad = settings.absgrad
+        return cls(len(splats), parameters, pixels, channels, absgrad=absgrad, modes=modes)
 
     @property
     def record(self) -> int:
         """Floats of a (splat, tile) pair's record."""
-        return self.moments or MOMENTS + self.channels + 2 * self.absgrad
+        if self.modes is not None:
+            return self.modes.record_length(self.channels)
+        return MOMENTS + self.channels + 2 * self.absgrad
 
     @property
     def fixed(self) -> int:
         """Bytes that are taken however the image is cut: parameters, screen, image."""
-        splat = 4 * (self.parameters + self.table) + _PROJECTED + 4 * self.channels
+        table = 0 if self.modes is None else self.modes.row_length
+        splat = 4 * (self.parameters + table) + _PROJECTED + 4 * self.channels
         pixel = 4 * self.channels + 8
         if self.gradient:
             splat += 4 * (self.parameters + self.record + self.channels + 4) + _CAMERA
-            if self.moments:
+            if self.modes is not None:
                 # What the moments of modes become before they are gradients.
                 splat += 4 * (MOMENTS + self.channels + 6)
             # The gradients that come in, those of expected depth, the background's parts.

@@ -50,6 +50,9 @@ class SplatSums:
     opacities: Any
     colors: Any
     sh: Any
+    shape_modes: Any
+    color_modes: Any
+    lobes: Any
 
 
 def draw_views(
@@ -121,7 +124,8 @@ def views_grad(
 def _shared(found: FrameGradients) -> SplatSums:
     splats = found.splats
     shape = (splats.quats, splats.scales, splats.covars)
-    return SplatSums(splats.means, *shape, splats.opacities, found.colors, found.sh)
+    colors, modes = (found.colors, found.sh), (found.shape_modes, found.color_modes)
+    return SplatSums(splats.means, *shape, splats.opacities, *colors, *modes, found.lobes)
 
 
 def _add(device: Device, total: SplatSums | None, more: SplatSums) -> SplatSums:

@@ -14,12 +14,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from rift_cl.basis.indices import n_coeff
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
-from rift_cl.splat.orders import HIGHEST, count_of, order_of
+from rift_cl.splat.orders import HIGHEST, ModeOrders, count_of, order_of
 from rift_cl.splat.projected import Projected
 from rift_cl.splat.projection import (
     MOMENTS,
@@ -32,9 +31,6 @@ from rift_cl.splat.projection import (
 from rift_cl.splat.screen_modes import ScreenModes
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
-
-# The rows of L^-1 come before the modes.
-_WHITENING = 3
 
 __all__ = [
     "HIGHEST",
@@ -162,14 +158,9 @@ def project_modes_grad(
 
 def table_width(splats: Splats) -> int:
     """Floats of a splat's row in the table of its modes on the screen."""
-    return _WHITENING + n_coeff(splats.shape_order, 2) - 1 + _color_numbers(splats)
+    return ModeOrders.of(splats).row_length
 
 
 def moment_count(splats: Splats, channels: int) -> int:
     """Floats that the raster's gradient leaves of a splat drawn in so many channels."""
-    return n_coeff(splats.shape_order + 2, 2) + channels + _color_numbers(splats)
-
-
-def _color_numbers(splats: Splats) -> int:
-    channels = 0 if splats.color_modes is None else splats.color_modes.shape[2]
-    return (n_coeff(splats.color_order, 2) - 1) * channels
+    return ModeOrders.of(splats).record_length(channels)

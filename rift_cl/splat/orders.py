@@ -2,15 +2,92 @@
 
 Arrays of coefficients say by their length what order they are of; a length that is none, or one
 that the kernels are not made for, is refused here, by one sentence for all who read such arrays.
+Here as well: how many numbers the kernels keep of splats with modes of some orders.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any, Protocol
+
 from rift_cl.basis.indices import n_coeff
+from rift_cl.basis.numbers import whole
 from rift_cl.errors import InputError
 
 # What the kernels are made for, and tested to.
 HIGHEST = 8
+# The rows of L^-1 come before the modes: i00, i10, i11.
+_WHITENING = 3
+
+
+class Modal(Protocol):
+    """Splats that may have modes: on a device, or as a scene on the host."""
+
+    @property
+    def shape_modes(self) -> Any:
+        """(N, K - 1), or None."""
+
+    @property
+    def color_modes(self) -> Any:
+        """(N, K - 1, C), or None."""
+
+    def __len__(self) -> int:
+        """Number of splats."""
+
+
+@dataclass(frozen=True)
+class ModeOrders:
+    """What modes splats have, and what the kernels keep of them.
+
+    Args:
+        shape: highest order of the polynomials of opacity or density.
+        color: the same of the colours' polynomials.
+        channels: how many channels have polynomials.
+    """
+
+    shape: int = 0
+    color: int = 0
+    channels: int = 0
+
+    @classmethod
+    def of(cls, splats: Modal) -> ModeOrders:
+        """The orders of these splats' modes.
+
+        Raises:
+            InputError: a number of modes belongs to no order.
+        """
+        shape, color = splats.shape_modes, splats.color_modes
+        return cls(
+            0 if shape is None else order_of(shape.shape[1] + 1),
+            0 if color is None else order_of(color.shape[1] + 1),
+            0 if color is None else color.shape[2],
+        )
+
+    @property
+    def row_length(self) -> int:
+        """Numbers of a splat on the screen: see ``ScreenModes.table``."""
+        return _WHITENING + n_coeff(self.shape, 2) - 1 + self._color_numbers
+
+    def record_length(self, channels: int) -> int:
+        """Numbers of a gradient's record, of an image with so many channels.
+
+        ``kernels/include/hermite_slots.h`` says what they are; a gradient by the place has moments
+        of two orders more than the polynomial.
+        """
+        return n_coeff(self.shape + 2, 2) + channels + self._color_numbers
+
+    @property
+    def _color_numbers(self) -> int:
+        return (n_coeff(self.color, 2) - 1) * self.channels
+
+
+def check_order(order: int, name: str = "order") -> int:
+    """Read an order.
+
+    Raises:
+        InputError: it is out of range.
+    """
+    return whole(order, name, 0, HIGHEST)
 
 
 def count_of(order: int, dim: int = 3) -> int:
@@ -23,9 +100,7 @@ def count_of(order: int, dim: int = 3) -> int:
     Raises:
         InputError: the order is out of range.
     """
-    if order not in range(HIGHEST + 1):
-        raise InputError(f"order is {order!r}, wanted a whole number from 0 to {HIGHEST}")
-    return n_coeff(order, dim)
+    return n_coeff(check_order(order), dim)
 
 
 def order_of(count: int, dim: int = 3) -> int:

@@ -16,6 +16,7 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Aperture, Camera
+from rift_cl.splat.orders import Modal, ModeOrders
 from rift_cl.splat.projected import Projected, SplatGradients
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
@@ -142,7 +143,7 @@ def _check(device: Device, splats: Splats, camera: Camera, settings: SplatSettin
         )
 
 
-def is_modal(splats: Splats, settings: SplatSettings) -> bool:
+def is_modal(splats: Modal, settings: SplatSettings) -> bool:
     """Whether splats have Hermite modes or another activation, and so kernels of their own."""
     modes = splats.shape_modes is not None or splats.color_modes is not None
     return modes or settings.activation != "clamp"
@@ -152,11 +153,12 @@ def mode_macros(splats: Splats, settings: SplatSettings) -> dict[str, int]:
     """What ``hermite_project.h`` and ``hermite_extent.h`` are told; nothing for plain splats."""
     if not is_modal(splats, settings):
         return {}
+    orders = ModeOrders.of(splats)
     return {
         "MODAL": 1,
-        "SHAPE_ORDER": splats.shape_order,
-        "COLOR_ORDER": splats.color_order,
-        "COLOR_CHANNELS": 0 if splats.color_modes is None else splats.color_modes.shape[2],
+        "SHAPE_ORDER": orders.shape,
+        "COLOR_ORDER": orders.color,
+        "COLOR_CHANNELS": orders.channels,
         "SQUARE": settings.activation == "square",
     }
 

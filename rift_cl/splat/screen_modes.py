@@ -11,11 +11,9 @@ from typing import Any
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry.numbers import one_number
-from rift_cl.splat.orders import HIGHEST
+from rift_cl.splat.orders import ModeOrders, check_order
 from rift_cl.splat.settings import Activation, SplatSettings
 
-# The rows of L^-1 come before the modes: i00, i10, i11.
-_WHITENING = 3
 # The most channels that the kernels are made for.
 _CHANNELS = 32
 _ACTIVATIONS: dict[Activation, int] = {"clamp": 0, "exp": 1, "square": 2}
@@ -47,7 +45,7 @@ class ScreenModes:
     def __post_init__(self) -> None:
         """Check the orders against the table."""
         for name in ("shape_order", "color_order"):
-            _check_order(name, getattr(self, name))
+            check_order(getattr(self, name), f"ScreenModes: {name}")
         if not (one_number(self.channels) >= 0 and float(self.channels).is_integer()):
             raise InputError(f"ScreenModes: channels is {self.channels!r}, wanted 0 or more")
         shape = tuple(self.table.shape)
@@ -61,7 +59,7 @@ class ScreenModes:
     @property
     def width(self) -> int:
         """Numbers in a row of the table."""
-        return _WHITENING + _modes(self.shape_order) - 1 + self._color_numbers
+        return self._orders.row_length
 
     def record_length(self, features: int, settings: SplatSettings) -> int:
         """Numbers that the gradient has for each splat: ``kernels/include/hermite_slots.h``.
@@ -78,7 +76,7 @@ class ScreenModes:
                 "SplatSettings: absgrad is for Gaussians alone, these splats have modes: leave it "
                 "off"
             )
-        return _modes(self.shape_order + 2) + features + self._color_numbers
+        return self._orders.record_length(features)
 
     def check_fit(self, count: int, features: int) -> None:
         """Check that the modes belong to ``count`` splats with ``features`` channels.
@@ -111,18 +109,5 @@ class ScreenModes:
         }
 
     @property
-    def _color_numbers(self) -> int:
-        return (_modes(self.color_order) - 1) * self.channels
-
-
-def _modes(order: int) -> int:
-    """Modes of the plane up to an order, which in a gradient may be beyond the highest."""
-    return (order + 1) * (order + 2) // 2
-
-
-def _check_order(name: str, order: int) -> None:
-    value = one_number(order)
-    if not (value.is_integer() and 0 <= value <= HIGHEST):
-        raise InputError(
-            f"ScreenModes: {name} is {order!r}, the kernels are made for orders 0 to {HIGHEST}"
-        )
+    def _orders(self) -> ModeOrders:
+        return ModeOrders(self.shape_order, self.color_order, int(self.channels))

@@ -81,6 +81,16 @@ def test_a_failure_of_a_run_that_went_on_loses_nothing(scan, tmp_path, monkeypat
     assert contents(tmp_path / "out") == before
 
 
+def test_a_run_that_goes_on_begins_to_count_where_it_stands(scan, tmp_path, monkeypatch):
+    """So that its pace is its own: the first report is what the rate is counted from."""
+    out = tmp_path / "out"
+    cut_off(monkeypatch, ("reconstruct", scan.counts, "--center", 45, "--out", out), 2)
+    settings = ReconstructSettings(scan.counts, out=out, center=45.0, resume=True)
+    assert [report.done for report in Reconstruction(settings).run()] == [2, 3]
+    again = ReconstructSettings(scan.counts, out=tmp_path / "new", center=45.0, resume=True)
+    assert [report.done for report in Reconstruction(again).run()][-1] == 3
+
+
 def tiff_scan(folder):
     """Eight projections of three rows in a folder, and two flats among them."""
     frames = 100 + made.frames(8).astype("u2")[:, :3]

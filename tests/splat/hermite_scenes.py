@@ -3,7 +3,7 @@
 import dataclasses
 
 import numpy as np
-from scenes import FARTHEST, _lists, random_scene
+from scenes import FARTHEST, lists_of, random_scene
 
 from rift_cl.reference.hermite_moments import hermite_moments
 from rift_cl.reference.hermite_raster import (
@@ -63,7 +63,7 @@ def reaching(scene, farthest):
     screen = scene.screen.copy()
     screen[:, 6:] *= farthest / FARTHEST
     edge = next(edge for edge in (8, 16, 32) if Tiles.of(scene.size, edge) == scene.tiles)
-    slots, entries, starts, _ = _lists(screen, scene.depths, scene.tiles, edge)
+    slots, entries, starts, _ = lists_of(screen, scene.depths, scene.tiles, edge)
     return dataclasses.replace(scene, screen=screen, slots=slots, entries=entries, starts=starts)
 
 

@@ -49,11 +49,12 @@ def random_scene(count, size, *, seed=0, channels=3, scale=4.0, tile=16, weights
     screen[:, 6:] = FARTHEST * np.sqrt(np.stack([xx, yy], axis=1))
     features = random.uniform(0, 1, (count, channels)).astype(np.float32)
     return ScreenScene(
-        screen, depths, features, *_lists(screen, depths, Tiles.of(size, tile), tile), size
+        screen, depths, features, *lists_of(screen, depths, Tiles.of(size, tile), tile), size
     )
 
 
-def _lists(screen, depths, tiles, edge):
+def lists_of(screen, depths, tiles, edge):
+    """Slots, entries and starts of the tile lists, and the tiles."""
     most = (tiles.across, tiles.rows)
     low = np.clip(np.floor((screen[:, :2] - screen[:, 6:]) / edge), 0, most).astype(int)
     high = np.clip(np.ceil((screen[:, :2] + screen[:, 6:]) / edge), 0, most).astype(int)
