@@ -22,11 +22,14 @@ from rift_cl.jobs.fit_pictures import Light
 from rift_cl.jobs.fit_settings import FitSettings
 from rift_cl.jobs.scan_input import ScanInput, check_center, chosen_rows, read_attenuation
 from rift_cl.reconstruct import find_center
+from rift_cl.train.solve_settings import SolveSettings
 
 # Line integrals are measured by the value that this share of them stays below.
 _STRONG = 0.999
 # Volumes of float64 that start, slices and scores take together, and stacks of projections.
 _VOLUMES, _STACKS = 5, 5
+# Stacks of float64 of the views that densities are solved for.
+_SOLVED = 6
 
 Floats = NDArray[np.float32]
 
@@ -53,6 +56,7 @@ class XrayInput:
         self.rows = chosen_rows(settings.rows, self.scan)
         check_center(settings.center, self.scan)
         self.center = settings.center
+        self._solved = SolveSettings().views if settings.solve else 0
         self.pitch = (self.scan.pitch or 1.0) if settings.pitch is None else settings.pitch
         self.unit = settings.unit or self.scan.unit or ("bin" if self.pitch == 1.0 else "")
         # Made now, so that a bad pitch is told before any work.
@@ -64,6 +68,7 @@ class XrayInput:
         """Bytes of host memory that a fit takes."""
         views, _, bins = self.scan.shape
         each = 8 * _VOLUMES * bins * bins + 4 * _STACKS * views * bins
+        each += 8 * _SOLVED * min(self._solved, views) * bins
         return each * (self.rows[1] - self.rows[0])
 
     def read(self) -> Projections:

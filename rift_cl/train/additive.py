@@ -5,9 +5,8 @@ A density with modes is a density of one that shows a colour with Hermite modes
 them. While only coefficients change, the splats' places on the screen and their tile lists stay, so
 that a least-squares solver draws many pictures of one geometry for little.
 
-It goes view by view, on the device, within its memory budget: what is kept grows with splats plus
-pixels of a view, not with their modes. (``tools/bases`` draws all views at once, which is faster for
-few splats and tiny pictures, and takes the splats times views times modes.)
+It goes view by view, on the device and within its memory budget. (``tools/bases`` draws all views
+at once, which is faster for tiny pictures, and keeps matrices of all splats' modes in all views.)
 """
 
 from __future__ import annotations

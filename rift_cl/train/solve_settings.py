@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rift_cl.errors import InputError
 from rift_cl.train.ranges import check_number, check_whole
 
 
@@ -38,6 +39,18 @@ class SolveSettings:
         for name in ("views", "iterations"):
             check_whole(self, name, 1)
         check_number(self, "ridge")
+
+    def demand_densities(self, density: bool) -> None:
+        """Refuse to solve for splats that hide one another.
+
+        Raises:
+            InputError: there shall be solves, and the splats have opacities.
+        """
+        if self.every and not density:
+            raise InputError(
+                f"TrainSettings: solve.every is {self.every}, which is for the densities of X-rays "
+                "alone: leave it 0 for splats with opacities"
+            )
 
     def due(self, step: int) -> bool:
         """Whether to solve before a step."""

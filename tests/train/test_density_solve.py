@@ -20,6 +20,7 @@ from rift_cl.train.parameters import Parameters
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.solve_settings import SolveSettings
 from rift_cl.train.start import start_splats
+from rift_cl.train.trainer import Trainer
 from rift_cl.train.xray_trainer import XrayTrainer, xray_settings
 
 SIZE, COUNT = 20, 6
@@ -206,6 +207,15 @@ def test_bad_settings_are_refused_by_name(given, words):
         SolveSettings(**given)
 
 
+def test_splats_that_hide_one_another_are_not_solved_for(device):
+    pictures = pictures_of(device, scene(0))
+    settings = replace(TrainSettings(steps=5), solve=SolveSettings(2))
+    with pytest.raises(
+        InputError, match=r"solve\.every is 2, which is for the densities of X-rays"
+    ):
+        Trainer(pictures, Parameters.of(device, scene(0)), settings)
+
+
 def trainer_of(device, pictures, *, rows, every=5):
     random = np.random.default_rng(2)
     means = random.uniform(-8, 8, (30, 3)) * (1, 1, rows > 1)
@@ -249,8 +259,9 @@ def test_a_fit_goes_on_from_any_state_to_the_same_bits(device, rows):
         run_to(again, STEPS)
         for one, other in zip(whole.parameters.host(), again.parameters.host(), strict=True):
             assert all(one[name].tobytes() == other[name].tobytes() for name in one)
-    modes = whole.parameters.host()[0]["shape_modes"]
-    across = graded(2, 3)[1:, 2] > 0
+    raw = whole.parameters.host()[0]
+    assert all(np.isfinite(array).all() for array in raw.values())
+    modes, across = raw["shape_modes"], graded(2, 3)[1:, 2] > 0
     assert modes[:, ~across].any() and modes[:, across].any() == (rows > 1)
 
 
