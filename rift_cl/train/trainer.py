@@ -84,6 +84,7 @@ class Trainer:
         self.pictures = pictures
         self.parameters = parameters
         self.settings = settings
+        settings.solve.demand_densities(parameters.density)
         self.device: Device = parameters.device
         self.schedule = Schedule(settings, scene_extent(pictures.cameras))
         extent, views = self.schedule.extent, len(pictures.cameras)
@@ -217,8 +218,9 @@ class Trainer:
         pictures, exposures = self.pictures, self.exposures
         target, weights = pictures.target(number), pictures.weights(number)
         exposed = image if exposures is None else exposures.applied(image, number)
-        value, by_exposed = self.loss(exposed, target, weights=weights, view=number)
-        if (self.parameters.step + 1) % REPORT_EVERY == 0:
+        step = self.parameters.step
+        value, by_exposed = self.loss(exposed, target, weights=weights, view=number, step=step)
+        if (step + 1) % REPORT_EVERY == 0:
             self.loss.watch(exposed, target, weights=weights)
         if exposures is None:
             return value, by_exposed

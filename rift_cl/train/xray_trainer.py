@@ -37,6 +37,7 @@ def xray_settings(
     seed: int,
     splats: int,
     exponent: float,
+    until: int = 0,
     weight: WeightKind = "ramp",
     band_limit: BandLimit | None = None,
     basis: BasisSettings | None = None,
@@ -50,6 +51,7 @@ def xray_settings(
         splats: how many there are.
         exponent: of the ramp along the detector's rows, since orbits are dense along nothing else,
             or of the inverse coverage.
+        until: step at which it has fallen to zero; 0 lets it stay.
         weight: which of the two.
         band_limit: as in ``TrainSettings``.
         basis: the modes of the splats' densities.
@@ -65,7 +67,7 @@ def xray_settings(
         sh_degree=0,
         loss="l2",
         ssim_weight=0.0,
-        homogenisation=Homogenisation(exponent, along_rows=True, weight=weight),
+        homogenisation=Homogenisation(exponent, along_rows=True, weight=weight, until=until),
         band_limit=band_limit,
         rates=rates,
         renewal=RENEWAL,
