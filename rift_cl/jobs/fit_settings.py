@@ -119,20 +119,26 @@ class FitSettings(XrayOptions, BasisOptions):
                 "lobes: say --modes, or leave it out"
             )
         least = {"downscale": 1, "hold_out": 0, "views": 0, "checkpoint_every": 0, "solve": 0}
-        least |= {} if self.homogenise_until is None else {"homogenise_until": 0}
         for name, bound in least.items():
             if getattr(self, name) < bound:
                 option = name.replace("_", "-")
                 raise InputError(f"--{option} is {getattr(self, name)}, wanted {bound} or more")
         if not (self.first_splats is None or 0 < self.first_splats <= 1):
             raise InputError(f"--first-splats is {self.first_splats}, wanted above 0, at most 1")
-        if self.homogenise_by == "coverage" and not self.exponent:
-            raise InputError(
-                "--homogenise-by coverage weighs nothing while the exponent is 0: add --homogenise "
-                "0.5, say, or leave it out"
-            )
+        self._check_ramp()
         if self.resume and self.overwrite:
             raise InputError("--resume goes on with what --overwrite throws away: give one of them")
+
+    def _check_ramp(self) -> None:
+        if self.homogenise_until is not None and self.homogenise_until < 0:
+            raise InputError(f"--homogenise-until is {self.homogenise_until}, wanted 0 or more")
+        idle = "--homogenise-by coverage" if self.homogenise_by == "coverage" else ""
+        idle = "--homogenise-until" if self.homogenise_until else idle
+        if idle and not self.exponent:
+            raise InputError(
+                f"{idle} weighs nothing while the exponent is 0: add --homogenise 0.5, say, or "
+                "leave it out"
+            )
 
     @property
     def exponent(self) -> float:

@@ -131,3 +131,5 @@ def test_a_ramp_that_stays_is_what_fits_had_before_it_could_fade():
     assert settings(*given, homogenise=0.5, homogenise_until=9).training().homogenisation.until == 9
     with pytest.raises(InputError, match="--homogenise-until"):
         settings(*given, homogenise_until=-1).check()
+    with pytest.raises(InputError, match="--homogenise-until weighs nothing"):
+        settings(*given, homogenise=0.0, homogenise_until=50).check()
