@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TextColumn
 
 from rift_cl.progress import Report
 
@@ -52,19 +52,17 @@ def _draw_bar(reports: Iterable[Report]) -> None:
     columns = (
         BarColumn(),
         TextColumn("{task.completed}/{task.total} {task.description}"),
-        TextColumn("{task.fields[rate]}"),
-        TimeRemainingColumn(),
+        TextColumn("{task.fields[pace]}"),
     )
     with Progress(*columns, console=Console(stderr=True)) as progress:
-        task, pace = progress.add_task("", rate=""), _Pace()
+        task, pace = progress.add_task("", pace=""), _Pace()
         for report in reports:
-            rate = pace.after(report)
             progress.update(
                 task,
                 completed=report.done,
                 total=report.total,
                 description=f"{report.what}{_figures(report)}",
-                rate=f"{rate:.3g} {report.what}/s" if rate else "",
+                pace=", ".join(_told(report, pace.after(report))),
             )
 
 
@@ -74,11 +72,16 @@ def _print_lines(reports: Iterable[Report]) -> None:
         rate, now = pace.after(report), time.monotonic()
         if now - last < _PAUSE and report.done < report.total:
             continue
-        last, left = now, report.total - report.done
-        parts = [f"{report.done}/{report.total} {report.what}"]
-        parts += [f"{rate:.3g} {report.what}/s"] if rate else []
-        parts += [f"{left / rate:.0f} s left"] if rate and left else []
+        last = now
+        parts = [f"{report.done}/{report.total} {report.what}", *_told(report, rate)]
         print_line(", ".join(parts) + _figures(report))
+
+
+def _told(report: Report, rate: float) -> list[str]:
+    """The rate and the time left, where there is a rate."""
+    left = report.total - report.done
+    told = [f"{rate:.3g} {report.what}/s"] if rate else []
+    return told + ([f"{left / rate:.0f} s left"] if rate and left else [])
 
 
 def print_line(line: str) -> None:

@@ -92,7 +92,7 @@ def test_a_terminal_shows_the_same_rate(clock, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")
     steps = [(60, 2050, 3000, "steps"), (10, 2100, 3000, "steps")]
     printed = "\n".join(shown(clock, capsys, *steps))
-    assert "2100/3000 steps" in printed and " 5 steps/s" in printed
+    assert "2100/3000 steps" in printed and " 5 steps/s, 180 s left" in printed
 
 
 def test_who_is_quiet_prints_nothing(clock, capsys):

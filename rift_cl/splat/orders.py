@@ -17,7 +17,7 @@ from rift_cl.errors import InputError
 # What the kernels are made for, and tested to.
 HIGHEST = 8
 # The rows of L^-1 come before the modes: i00, i10, i11.
-_WHITENING = 3
+WHITENING = 3
 
 
 class Modal(Protocol):
@@ -66,7 +66,7 @@ class ModeOrders:
     @property
     def row_length(self) -> int:
         """Numbers of a splat on the screen: see ``ScreenModes.table``."""
-        return _WHITENING + n_coeff(self.shape, 2) - 1 + self._color_numbers
+        return WHITENING + n_coeff(self.shape, 2) - 1 + self._color_numbers
 
     def record_length(self, channels: int) -> int:
         """Numbers of a gradient's record, of an image with so many channels.

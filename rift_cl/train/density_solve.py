@@ -52,7 +52,7 @@ class DensityProblem:
     Args:
         operator: coefficients to pictures.
         targets: (V, height, width, 1) what they are to be.
-        weights: (V, height, width, 1) how much each pixel counts.
+        roots: (V, height, width, 1) square roots of how much each pixel counts; 1 where all do.
         free: (N, K, 1) whether a coefficient is solved for.
         ridge: weight of the squared coefficients.
         least: density, above 0.
@@ -60,46 +60,49 @@ class DensityProblem:
 
     operator: Additive
     targets: Floats
-    weights: Floats
+    roots: Floats | float
     free: NDArray[np.bool_]
     ridge: float
     least: float
 
     def loss(self, c: Floats) -> float:
         """What is to be small: weighted squares of the residual, and the ridge."""
-        error = self._render(c) - np.sqrt(self.weights) * self.targets
+        error = self._render(c) - self.roots * self.targets
         return float(np.vdot(error, error) + self.ridge * np.vdot(c, c))
 
     def solved(self, start: Floats, iterations: int) -> Floats:
         """Coefficients of no larger loss than these, which keep to the least density."""
-        first = self._solve(start, self.free, iterations)
+        energies = self.operator.energies()
+        energies = np.maximum(energies, max(_HARDLY_SEEN * energies.mean(), _TINY))
+        diagonal = np.broadcast_to(energies[:, None, None], start.shape)
+        first = self._solve(start, self.free, diagonal, iterations)
         c = self._held(first.coefficients)
         if c is first.coefficients:
             return c
         free = self.free & (c[:, :1] > self.least)
-        c = self._held(self._solve(c, free, iterations).coefficients)
+        c = self._held(self._solve(c, free, diagonal, iterations).coefficients)
         for _ in range(_TRIES):
             if self.loss(c) <= first.loss_before:
                 return c
             c = (start + c) / 2
         return start
 
-    def _solve(self, start: Floats, free: NDArray[np.bool_], iterations: int) -> Solution:
-        energies = self.operator.energies()
-        energies = np.maximum(energies, max(_HARDLY_SEEN * energies.mean(), _TINY))
+    def _solve(
+        self, start: Floats, free: NDArray[np.bool_], diagonal: Floats, iterations: int
+    ) -> Solution:
         return solve(
             self._render,
-            lambda pictures: self.operator.adjoint(np.sqrt(self.weights) * pictures),
-            np.sqrt(self.weights) * self.targets,
+            lambda pictures: self.operator.adjoint(self.roots * pictures),
+            self.roots * self.targets,
             ridge=self.ridge,
             iterations=iterations,
             start=start,
-            diagonal=np.broadcast_to(energies[:, None, None], start.shape),
+            diagonal=diagonal,
             free=free,
         )
 
     def _render(self, c: Floats) -> Floats:
-        return np.sqrt(self.weights) * self.operator.render(c)
+        return np.asarray(self.roots * self.operator.render(c))
 
     def _held(self, c: Floats) -> Floats:
         """No density below the least, and no modes there; ``c`` itself if all are above."""
@@ -145,7 +148,7 @@ def solve_densities(
     problem = DensityProblem(
         operator,
         targets,
-        _weights(parameters, pictures, numbers, targets.shape),
+        _roots(parameters, pictures, numbers, targets.shape),
         free,
         ridge=settings.ridge * mean_curvature(operator.render, operator.shape),
         least=max(_LEAST * float(start[:, 0].mean()), _TINY),
@@ -158,14 +161,16 @@ def _views(count: int, most: int, seed: tuple[int, ...]) -> NDArray[np.int64]:
     return np.sort(np.random.default_rng(seed).permutation(count)[:most])
 
 
-def _weights(
+def _roots(
     parameters: Parameters, pictures: Views, numbers: NDArray[np.int64], shape: tuple[int, ...]
-) -> Floats:
+) -> Floats | float:
+    weights = [pictures.weights(number) for number in numbers]
+    if all(each is None for each in weights):
+        return 1.0
     found = np.ones(shape)
-    for row, number in zip(found, numbers, strict=True):
-        weights = pictures.weights(number)
-        if weights is not None:
-            row[...] = parameters.device.get(weights)[..., None]
+    for row, each in zip(found, weights, strict=True):
+        if each is not None:
+            row[...] = np.sqrt(parameters.device.get(each).astype(float))[..., None]
     return found
 
 

@@ -10,6 +10,8 @@ from rift_cl.geometry.numbers import one_number
 
 # Devices count in float32.
 _LARGEST = 3.4028234e38
+# What is counted here fits a long of any device.
+_MOST = 2**62
 
 
 def check_whole(settings: Any, name: str, least: int, most: int | None = None) -> None:
@@ -20,8 +22,12 @@ def check_whole(settings: Any, name: str, least: int, most: int | None = None) -
     """
     given = getattr(settings, name)
     value = one_number(given)
-    wanted = f"a whole number >= {least}" if most is None else f"{least} to {most}"
-    if not (value >= least and value.is_integer()) or (most is not None and value > most):
+    wanted = f"{least} to {most}"
+    if most is None:
+        most, wanted = _MOST, f"a whole number >= {least}"
+        if value > most or (isinstance(given, int) and given > most):
+            wanted = f"a whole number up to {most}"
+    if not (least <= value <= most and value.is_integer()):
         raise InputError(f"{type(settings).__name__}: {name} is {given!r}, wanted {wanted}")
 
 

@@ -40,13 +40,13 @@ class SolveSettings:
             check_whole(self, name, 1)
         check_number(self, "ridge")
 
-    def demand_densities(self, density: bool) -> None:
-        """Refuse to solve for splats that hide one another.
+    def demand_heed(self, solves: bool) -> None:
+        """Refuse solves to a trainer that does none, as that of splats that hide one another.
 
         Raises:
-            InputError: there shall be solves, and the splats have opacities.
+            InputError: there shall be solves.
         """
-        if self.every and not density:
+        if self.every and not solves:
             raise InputError(
                 f"TrainSettings: solve.every is {self.every}, which is for the densities of X-rays "
                 "alone: leave it 0 for splats with opacities"

@@ -72,6 +72,8 @@ class Trainer:
         flat: whether all splats lie in one slice.
     """
 
+    solves = False  # Whether steps heed ``settings.solve``.
+
     def __init__(
         self,
         pictures: Pictures,
@@ -84,7 +86,7 @@ class Trainer:
         self.pictures = pictures
         self.parameters = parameters
         self.settings = settings
-        settings.solve.demand_densities(parameters.density)
+        settings.solve.demand_heed(self.solves)
         self.device: Device = parameters.device
         self.schedule = Schedule(settings, scene_extent(pictures.cameras))
         extent, views = self.schedule.extent, len(pictures.cameras)

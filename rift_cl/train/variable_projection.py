@@ -11,7 +11,7 @@ last geometry's solution was, so that a few conjugate gradients a step are enoug
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,12 +92,11 @@ def solve(
         curvature = _loss(seen, direction, ridge)
         if not curvature > 0:
             break
-        c = c + slope / curvature * direction
-        r = r - slope / curvature * seen
+        c, r = c + slope / curvature * direction, r - slope / curvature * seen
         before, loss = loss, _loss(r, c, ridge)
         if loss > before * (1 + _ROUNDING):
             break
-        found = Solution(c, r, step + 1, found.loss_before)
+        found = replace(found, coefficients=c, residual=r, steps=step + 1)
         if step + 1 < iterations:
             gradient = adjoint(r) - ridge * c
             last, slope = slope, float(np.vdot(gradient, moves * gradient))

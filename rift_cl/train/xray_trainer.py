@@ -87,6 +87,8 @@ class XrayTrainer(Trainer):
         flat: whether there is but one detector row.
     """
 
+    solves = True
+
     def __init__(
         self,
         pictures: Pictures,
@@ -123,3 +125,5 @@ class XrayTrainer(Trainer):
         solve_densities(
             *(self.parameters, self.renderer, self.pictures, settings.solve), seed=settings.seed
         )
+        # What is held follows from the modes, which are others now.
+        self.joining.hold(self.parameters)

@@ -179,3 +179,19 @@ def test_exact_coefficients_are_those_that_drew_the_pictures(tool, stack):
     assert columns.shape == (stack, 5 * SIZE[0] * SIZE[1] // stack, 4 // stack * modes.count)
     found = tool("bases.exact").solved(placed, placed.render(c), 1e-9, stack)
     np.testing.assert_allclose(found, c, atol=2e-3)
+
+
+def test_a_case_without_exact_solves_is_judged_by_the_best_there_are(tool):
+    """Large budgets have conjugate gradients alone; they are drawn and count all the same."""
+    races, runs = tool("bases.races"), []
+    for samples, solve in ((24, 4), (24, 0), (40, 4), (40, 12)):
+        for basis, better in (("Gaussian", 0), ("HG 1", 1 if solve in (0, 12) else 9)):
+            history = [{"step": s, "wall": s, "cpu": s, "psnr": 20.0 + s + better} for s in (2, 4)]
+            run = {"basis": basis, "seed": 0, "samples": samples, "budget": 10 * samples}
+            run |= {"solve": solve, "views": 3, "target": "balls", "history": history}
+            runs.append(run | {"per_splat": 3, "wall_ms": 1.0, "cpu_ms": 1.0, "pairs": 1.0})
+    result = {"short": 2, "runs": runs}
+    said = races.race_verdicts(result)
+    assert "+1 dB" in said[0] and "most exact solves" in said[0] and "2 of 2" in said[0]
+    assert set(races.race_pictures(result)) >= {"time_240", "time_400", "parameters_short"}
+    assert len(list(races.race_tables(result))) == 7

@@ -22,6 +22,7 @@ from bases.mosaic import Mosaic
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.splat.hermite import project_modes, project_modes_grad
+from rift_cl.splat.orders import WHITENING
 from rift_cl.splat.projected import SplatGradients
 from rift_cl.splat.projection import MOMENTS, project, project_grad
 from rift_cl.splat.raster import Raster, ScreenSplats, raster_grad, rasterize, sum_slots
@@ -32,8 +33,6 @@ from rift_cl.splat.tile_lists import tile_lists
 from rift_cl.splat.tiles import Tiles
 
 Floats = NDArray[np.float64]
-# The rows of L^-1 come before the modes in a table.
-_WHITENING = 3
 # Channels of a picture, and so columns that are drawn at once.
 _AT_ONCE = 32
 
@@ -125,9 +124,9 @@ class Placed:
             return flat, np.ascontiguousarray(constant[:, :, 0].transpose(1, 0, 2))
         table = self.device.get(project_modes(*given, self._projected).table)
         modes = len(matrix) - 1
-        units = table[:, _WHITENING:].reshape(views, count, -1, modes).astype(np.float64)
+        units = table[:, WHITENING:].reshape(views, count, -1, modes).astype(np.float64)
         maps = np.concatenate([constant, units @ matrix[1:]], axis=2).transpose(1, 0, 2, 3)
-        return table[:, :_WHITENING], maps.reshape(count, -1, matrix.shape[1])
+        return table[:, :WHITENING], maps.reshape(count, -1, matrix.shape[1])
 
     @property
     def modal(self) -> bool:

@@ -98,8 +98,9 @@ class AdditiveFit:
         self._c = np.zeros((self.splats, self.modes.count, self.task.targets.shape[-1]))
         self._ridge = 0.0
         self.pairs = 0.0
-        # Kernels are compiled before a clock runs.
-        self._residual, _ = self._passes(2)
+        # Kernels are compiled before a clock runs; what they find is forgotten.
+        self._residual, _ = self._passes(1)
+        self._c[...] = 0
 
     @property
     def geometry(self) -> Geometry:

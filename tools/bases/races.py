@@ -63,10 +63,13 @@ def _solver(solve: int) -> str:
     return "exact solves" if solve == EXACT else f"{solve} conjugate gradients"
 
 
-def _exactest(runs: list[dict[str, Any]]) -> int:
-    """The solver that comes closest to the best coefficients."""
-    solves = distinct(runs, "solve")
-    return EXACT if EXACT in solves else max(solves)
+def _most_exact(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Of every case, the runs with the solver that comes closest to the best coefficients."""
+    solvers: dict[tuple[Any, ...], set[int]] = {}
+    for run in runs:
+        solvers.setdefault(_key(run)[:-1], set()).add(run["solve"])
+    best = {case: EXACT if EXACT in found else max(found) for case, found in solvers.items()}
+    return [run for run in runs if run["solve"] == best[_key(run)[:-1]]]
 
 
 def race_tables(result: dict[str, Any]) -> Iterator[Table]:
@@ -104,7 +107,7 @@ def race_pictures(result: dict[str, Any]) -> dict[str, tuple[Any, str]]:
         mine = [run for run in result["runs"] if run["budget"] == budget]
         figure = curves(_by_time(mine), xlabel="seconds", ylabel="mean PSNR, dB", log_x=True)
         found[f"time_{budget}"] = (figure, f"Mean PSNR against wall time, {budget} parameters")
-    runs = chosen(_comparable(result), solve=_exactest(result["runs"]))
+    runs = _most_exact(_comparable(result))
     for name in _moments(result):
         series = {}
         for basis in distinct(runs, "basis"):
@@ -134,14 +137,15 @@ def race_verdicts(result: dict[str, Any]) -> list[str]:
 
     With the most exact solves, where there is a choice: pairs should be independent.
     """
-    solve, said = _exactest(result["runs"]), []
-    runs = chosen(_comparable(result), solve=solve)
+    runs, said = _most_exact(_comparable(result)), []
+    several = len(distinct(result["runs"], "solve")) > 1
+    how = "most exact solves, equal parameters" if several else "equal parameters"
     for name, step in _moments(result).items():
         for clock, words in (("steps", "equal steps"), ("wall", "equal wall time")):
             for basis in distinct(runs, "basis"):
                 if basis != BASELINE:
                     gain = _gain(runs, basis, f"{name} {clock}")
-                    where = f"{_solver(solve)}, equal parameters and {words} ({step} steps, {name})"
+                    where = f"{how} and {words} ({step} steps, {name})"
                     said.append(sentence(basis, BASELINE, gain, "dB", where))
     return [*said, *_best_verdicts(result)]
 
@@ -168,7 +172,7 @@ def _best_verdicts(result: dict[str, Any]) -> list[str]:
         for basis, found in best.items():
             if basis != BASELINE:
                 gain = Difference.of([v - best[BASELINE][case] for case, v in found.items()])
-                where = f"equal parameters and wall time, each with its better solver ({name})"
+                where = f"equal parameters and wall time, each with its best solver ({name})"
                 said.append(sentence(basis, BASELINE, gain, "dB", where))
     return said
 

@@ -1,0 +1,108 @@
+"""A fit that solves for its densities: what moves when, and that it goes on to the same bits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from density_scenes import DRAWING, SIZE, pictures_of, scene
+
+from rift_cl.basis.indices import graded
+from rift_cl.train.basis_settings import BasisSettings
+from rift_cl.train.parameters import Parameters
+from rift_cl.train.settings import TrainSettings
+from rift_cl.train.solve_settings import SolveSettings
+from rift_cl.train.start import start_splats
+from rift_cl.train.xray_trainer import XrayTrainer, xray_settings
+
+STEPS = 24
+
+
+def trainer_of(device, pictures, *, rows, every=5, **more):
+    random = np.random.default_rng(2)
+    means = random.uniform(-8, 8, (30, 3)) * (1, 1, rows > 1)
+    raw = start_splats(means, np.ones((30, 3)), seed=1)
+    raw["logits"] -= 2
+    settings = xray_settings(
+        steps=STEPS,
+        seed=4,
+        splats=30,
+        exponent=0.0,
+        basis=BasisSettings("hermite", 2, first=0.2, every=0.2, **more),
+        solve=SolveSettings(every, views=4),
+    )
+    # Renewed between solves and just before one.
+    renewal = replace(settings.renewal, first=4, every=6, faint=0.5)
+    return XrayTrainer(
+        pictures,
+        Parameters.of(device, raw, density=True),
+        replace(settings, renewal=renewal),
+        DRAWING,
+        flat=rows == 1,
+    )
+
+
+def run_to(trainer, step):
+    while trainer.parameters.step < step:
+        trainer.step()
+
+
+@pytest.mark.parametrize(
+    ("rows", "more"), [(1, {}), (SIZE, {}), (SIZE, {"least": 1e-6, "settle": 0.4})]
+)
+def test_a_fit_goes_on_from_any_state_to_the_same_bits(device, rows, more):
+    pictures = pictures_of(device, scene(0, flat=rows == 1), rows=rows)
+    whole, states = trainer_of(device, pictures, rows=rows, **more), []
+    for step in (0, 5, 8, 17):
+        run_to(whole, step)
+        states.append(whole.state())
+    run_to(whole, STEPS)
+    for state in states:
+        again = trainer_of(device, pictures, rows=rows, **more)
+        again.restore(state)
+        run_to(again, STEPS)
+        for one, other in zip(whole.parameters.host(), again.parameters.host(), strict=True):
+            assert all(one[name].tobytes() == other[name].tobytes() for name in one)
+    raw = whole.parameters.host()[0]
+    assert all(np.isfinite(array).all() for array in raw.values())
+    modes, across = raw["shape_modes"], graded(2, 3)[1:, 2] > 0
+    assert modes[:, ~across].any() and modes[:, across].any() == (rows > 1)
+
+
+def test_between_solves_densities_stay_and_the_last_one_ends_the_fit(device):
+    pictures = pictures_of(device, scene(0))
+    trainer = trainer_of(device, pictures, rows=SIZE, every=10)
+    trainer.settings = replace(
+        trainer.settings, renewal=replace(trainer.settings.renewal, first=STEPS)
+    )
+    trainer.strategy.settings = trainer.settings
+
+    def densities():
+        return trainer.parameters.host()[0]["logits"].copy()
+
+    found = {0: densities()}
+    for step in range(1, STEPS + 1):
+        trainer.step()
+        found[step] = densities()
+    changed = [step for step in range(1, STEPS + 1) if (found[step] != found[step - 1]).any()]
+    # Before the steps 0, 10, 20 and after the last.
+    assert changed == [1, 11, 21, STEPS]
+
+
+def test_solves_serve_short_fits(device):
+    pictures, losses = pictures_of(device, scene(1), views=9), []
+    for every in (0, 6):
+        trainer = trainer_of(device, pictures, rows=SIZE, every=every)
+        run_to(trainer, STEPS)
+        images = [trainer.renderer.forward(trainer.parameters.drawn, k) for k in pictures.cameras]
+        drawn = np.stack([device.get(frame.image)[..., 0] for frame in images])
+        losses.append(np.square(drawn - pictures.projections.values).mean())
+    assert losses[1] < 0.5 * losses[0]
+
+
+def test_settings_say_what_moves():
+    assert xray_settings(steps=9, seed=0, splats=1, exponent=0.0).rates.logits > 0
+    solving = xray_settings(steps=9, seed=0, splats=1, exponent=0.0, solve=SolveSettings(3))
+    assert solving.rates.logits == solving.rates.shape_modes == 0 < solving.rates.means
+    assert TrainSettings().solve == SolveSettings(0)
