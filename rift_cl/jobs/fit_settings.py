@@ -19,8 +19,6 @@ from rift_cl.train.settings import BandLimit, Densification, Rates, TrainSetting
 from rift_cl.train.solve_settings import SolveSettings
 from rift_cl.train.xray_trainer import RIDGE, xray_settings
 
-# Steps after which the usual exponent is none.
-_UNTIL = 6000
 # Rates of poses and exposures where they are refined.
 _POSE_RATE, _EXPOSURE_RATE = 1e-3, 1e-2
 # What may differ between a run and the one that goes on with it: it changes no bit of the result.
@@ -66,9 +64,6 @@ class FitSettings(XrayOptions, BasisOptions):
     """Exponent of the ramp that weighs the residual's frequencies, so that fine detail is pulled
     at as strongly as coarse; 0 for none. 0.5 if not given, and 0 for X-rays, where it is the
     frequencies along the detector's rows."""
-    homogenise_until: int | None = None
-    """Step at which that exponent has fallen to 0, in a straight line; 0 lets it stay. 6000 where
-    --homogenise is not given either: what the ramp gains, it gains early."""
     homogenise_by: WeightKind = "ramp"
     """What that exponent is of: the ramp, as for views that lie evenly, or one over how often all
     views together cover a frequency (coverage)."""
@@ -125,37 +120,24 @@ class FitSettings(XrayOptions, BasisOptions):
                 raise InputError(f"--{option} is {getattr(self, name)}, wanted {bound} or more")
         if not (self.first_splats is None or 0 < self.first_splats <= 1):
             raise InputError(f"--first-splats is {self.first_splats}, wanted above 0, at most 1")
-        self._check_ramp()
+        if self.homogenise_by == "coverage" and not self.exponent:
+            raise InputError(
+                "--homogenise-by coverage weighs nothing while the exponent is 0: add --homogenise "
+                "0.5, say, or leave it out"
+            )
         if self.resume and self.overwrite:
             raise InputError("--resume goes on with what --overwrite throws away: give one of them")
 
-    def _check_ramp(self) -> None:
-        if self.homogenise_until is not None and self.homogenise_until < 0:
-            raise InputError(f"--homogenise-until is {self.homogenise_until}, wanted 0 or more")
-        idle = "--homogenise-by coverage" if self.homogenise_by == "coverage" else ""
-        idle = "--homogenise-until" if self.homogenise_until else idle
-        if idle and not self.exponent:
-            raise InputError(
-                f"{idle} weighs nothing while the exponent is 0: add --homogenise 0.5, say, or "
-                "leave it out"
-            )
-
     @property
     def exponent(self) -> float:
-        """Of the ramp, as it was measured to serve: short fits gain by it.
+        """Of the ramp, as it was measured to serve: docs/homogenisation.md.
 
-        X-ray fits gained nothing by it at length, and lost where there was noise.
+        Short fits of photographs gain by it, and long ones away from the views; those of X-rays
+        gained nothing at length, and lost where there was noise.
         """
         if self.homogenise is not None:
             return self.homogenise
         return 0.5 if self.mode == "light" else 0.0
-
-    @property
-    def until(self) -> int:
-        """Step at which the exponent is 0, so that long fits end as if there had been none."""
-        if self.homogenise_until is not None:
-            return self.homogenise_until
-        return _UNTIL if self.homogenise is None and self.exponent else 0
 
     @property
     def asks_for_noise(self) -> bool:
@@ -177,7 +159,6 @@ class FitSettings(XrayOptions, BasisOptions):
                 seed=self.seed,
                 splats=self.splats,
                 exponent=self.exponent,
-                until=self.until,
                 weight=self.homogenise_by,
                 band_limit=self.band_limit,
                 basis=dataclasses.replace(self.basis_settings(colored=False), ridge=RIDGE),
@@ -190,9 +171,7 @@ class FitSettings(XrayOptions, BasisOptions):
             strategy=self.strategy,
             densification=Densification(absgrad=self.absgrad),
             sh_degree=self.sh_degree,
-            homogenisation=Homogenisation(
-                self.exponent, weight=self.homogenise_by, until=self.until
-            ),
+            homogenisation=Homogenisation(self.exponent, weight=self.homogenise_by),
             band_limit=self.band_limit,
             basis=self.basis_settings(),
             angular=self.angular_settings(),
@@ -212,9 +191,6 @@ class FitSettings(XrayOptions, BasisOptions):
         # So that fits from before there was a choice still go on.
         if self.homogenise_by == "ramp":
             del values["homogenise_by"]
-        values["homogenise_until"] = self.until
-        if not self.until:
-            del values["homogenise_until"]
         if self.band_limit != "coverage":
             values["band_limit"] = self.band_limit == "pixels"
         later = ("pinhole", "solve", *(field.name for field in dataclasses.fields(BasisOptions)))

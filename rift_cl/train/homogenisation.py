@@ -17,9 +17,6 @@ Either amplifies noise as well, and once only noise is left of the residual a fl
 best there is. So the exponent falls with the share of the residual that is noise,
 
     p = exponent (1 - noise^2 / mean square residual),    not below zero.
-
-What the ramp gains it gains early, when much is still to be found; a fit that has long settled ends
-better with the plain loss. So the exponent may also fall with the steps, in a straight line.
 """
 
 from __future__ import annotations
@@ -35,7 +32,6 @@ from scipy.special import ndtri
 
 from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
-from rift_cl.train.ranges import check_whole
 
 Floats = NDArray[np.float64]
 WeightKind = Literal["ramp", "coverage"]
@@ -56,21 +52,18 @@ class Homogenisation:
         noise_aware: let the exponent fall as the residual comes down to the pictures' noise.
         along_rows: take the ramp's frequency along x alone, as for projections of an orbit.
         weight: what the exponent is of: ``ramp``, or ``coverage``, one over what was counted.
-        until: step at which the exponent has fallen to zero, from the first on; 0 lets it stay.
 
     Raises:
-        InputError: a number is out of its range, or the weight unknown.
+        InputError: the exponent is out of its range, or the weight unknown.
     """
 
     exponent: float = 0.0
     noise_aware: bool = True
     along_rows: bool = False
     weight: WeightKind = "ramp"
-    until: int = 0
 
     def __post_init__(self) -> None:
-        """Check the numbers and the weight's name."""
-        check_whole(self, "until", 0)
+        """Check the exponent and the weight's name."""
         if not 0 <= one_number(self.exponent) <= _STEEPEST:
             raise InputError(
                 f"Homogenisation: exponent is {self.exponent!r}, wanted 0 to {_STEEPEST:g}"
@@ -84,12 +77,11 @@ class Homogenisation:
         square = (kx**2 if self.along_rows else ky**2 + kx**2) + 1 / longest**2
         return np.asarray(square ** (exponent / 2))
 
-    def exponent_at(self, mean_square: float, noise: float, step: int = 0) -> float:
+    def exponent_at(self, mean_square: float, noise: float) -> float:
         """The exponent for a mean square residual and a standard deviation of the noise."""
-        most = self.exponent * (max(0.0, 1 - step / self.until) if self.until else 1.0)
         if not self.noise_aware or noise == 0:
-            return most
-        return most * max(0.0, 1 - noise**2 / mean_square)
+            return self.exponent
+        return self.exponent * max(0.0, 1 - noise**2 / mean_square)
 
 
 def noise_of(images: Sequence[NDArray[np.float32]]) -> float:

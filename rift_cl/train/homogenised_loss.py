@@ -71,23 +71,22 @@ class HomogenisedLoss:
         self._filters: dict[tuple[tuple[int, ...], int], SpectralFilter] = {}
         self._filtered = 0.0
 
-    def exponent(self, step: int = 0) -> float:
-        """The exponent that holds at a step."""
+    @property
+    def exponent(self) -> float:
+        """The exponent that holds now."""
         most = self.settings.exponent
-        if not most:
-            return 0.0
-        share = self.settings.exponent_at(self.mean_square, self.noise, step) / most
+        share = self.settings.exponent_at(self.mean_square, self.noise) / most if most else 0.0
         return round(share * _PARTS) / _PARTS * most
 
     def __call__(
-        self, image: Any, target: Any, *, weights: Any = None, view: int = 0, step: int = 0
+        self, image: Any, target: Any, *, weights: Any = None, view: int = 0
     ) -> tuple[Any, Any]:
         """The loss, (1,), and its weighted gradient, as ``ImageLoss`` gives them.
 
         The ramp spreads a residual; what comes to lie on pixels that do not count is left out.
         ``view`` is the picture's number, which coverage hangs on.
         """
-        exponent = self.exponent(step)
+        exponent = self.exponent
         if exponent == 0:
             return self._plain(self.device, image, target, weights=weights)
         value, gradient = self._pixels(self.device, image, target, weights=weights)

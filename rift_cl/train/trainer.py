@@ -220,9 +220,8 @@ class Trainer:
         pictures, exposures = self.pictures, self.exposures
         target, weights = pictures.target(number), pictures.weights(number)
         exposed = image if exposures is None else exposures.applied(image, number)
-        step = self.parameters.step
-        value, by_exposed = self.loss(exposed, target, weights=weights, view=number, step=step)
-        if (step + 1) % REPORT_EVERY == 0:
+        value, by_exposed = self.loss(exposed, target, weights=weights, view=number)
+        if (self.parameters.step + 1) % REPORT_EVERY == 0:
             self.loss.watch(exposed, target, weights=weights)
         if exposures is None:
             return value, by_exposed

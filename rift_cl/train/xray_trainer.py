@@ -37,7 +37,6 @@ def xray_settings(
     seed: int,
     splats: int,
     exponent: float,
-    until: int = 0,
     weight: WeightKind = "ramp",
     band_limit: BandLimit | None = None,
     basis: BasisSettings | None = None,
@@ -51,7 +50,6 @@ def xray_settings(
         splats: how many there are.
         exponent: of the ramp along the detector's rows, since orbits are dense along nothing else,
             or of the inverse coverage.
-        until: step at which it has fallen to zero; 0 lets it stay.
         weight: which of the two.
         band_limit: as in ``TrainSettings``.
         basis: the modes of the splats' densities.
@@ -67,7 +65,7 @@ def xray_settings(
         sh_degree=0,
         loss="l2",
         ssim_weight=0.0,
-        homogenisation=Homogenisation(exponent, along_rows=True, weight=weight, until=until),
+        homogenisation=Homogenisation(exponent, along_rows=True, weight=weight),
         band_limit=band_limit,
         rates=rates,
         renewal=RENEWAL,

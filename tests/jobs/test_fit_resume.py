@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rift_cl.cli import main
-from rift_cl.errors import InputError, StoppedError
+from rift_cl.errors import StoppedError
 from rift_cl.jobs.fit import Fit
 from rift_cl.jobs.fit_settings import FitSettings
 
@@ -118,18 +118,3 @@ def test_fits_from_before_there_was_a_choice_go_on():
         assert found["band_limit"] == before and "homogenise_by" not in found
     found = settings(Path("capture"), Path("out"), homogenise_by="coverage").decisive()
     assert found["homogenise_by"] == "coverage"
-
-
-def test_a_ramp_that_stays_is_what_fits_had_before_it_could_fade():
-    """Their checkpoints do not say until when; one that fades is another fit."""
-    given = Path("capture"), Path("out")
-    assert settings(*given, homogenise=None).until == 6000
-    assert settings(*given, homogenise=None).decisive()["homogenise_until"] == 6000
-    for more in ({"homogenise": 0.5}, {"homogenise": None, "homogenise_until": 0}):
-        assert "homogenise_until" not in settings(*given, **more).decisive()
-    assert settings(*given, homogenise=0.0).until == 0
-    assert settings(*given, homogenise=0.5, homogenise_until=9).training().homogenisation.until == 9
-    with pytest.raises(InputError, match="--homogenise-until"):
-        settings(*given, homogenise_until=-1).check()
-    with pytest.raises(InputError, match="--homogenise-until weighs nothing"):
-        settings(*given, homogenise=0.0, homogenise_until=50).check()

@@ -93,31 +93,9 @@ def test_the_residual_is_watched_and_kept(device):
     assert loss.mean_square == pytest.approx(0.8 * square, rel=1e-5)
     other = loss_of(device, 0.5)
     other.restore(loss.state())
-    assert (other.mean_square, other.noise, other.exponent()) == (
-        loss.mean_square, 0.01, loss.exponent(),
+    assert (other.mean_square, other.noise, other.exponent) == (
+        loss.mean_square, 0.01, loss.exponent,
     )  # fmt: skip
-
-
-def test_the_exponent_falls_with_the_steps_and_the_loss_is_the_plain_one_then(device):
-    settings = Homogenisation(0.8, until=100)
-    found = [settings.exponent_at(1.0, 0.0, step) for step in (0, 25, 100, 900)]
-    assert found == pytest.approx([0.8, 0.6, 0.0, 0.0])
-    # Noise takes its share of what is left.
-    assert settings.exponent_at(0.02, 0.1, 50) == pytest.approx(0.2)
-    _, sent = pictures(device)
-    loss = HomogenisedLoss(device, settings, ssim_weight=0.2, kind="l1")
-    constant = [loss_of(device, p, ssim_weight=0.2, kind="l1") for p in (0.0, 0.8, 0.4)]
-    gradient, *held = (device.get(other(*sent)[1]) for other in constant)
-    np.testing.assert_array_equal(device.get(loss(*sent, step=100)[1]), gradient)
-    for step, wanted in zip((0, 50), held, strict=True):
-        np.testing.assert_allclose(device.get(loss(*sent, step=step)[1]), wanted, atol=1e-9)
-        assert abs(wanted - gradient).max() > 1e-4
-
-
-@pytest.mark.parametrize("until", [-1, 2.5])
-def test_steps_that_are_none_are_refused(until):
-    with pytest.raises(InputError, match="until"):
-        Homogenisation(0.5, until=until)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01, 0.05])
