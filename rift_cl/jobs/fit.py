@@ -164,7 +164,9 @@ class Fit(FitRun):
         return open_capture(found.model, images=settings.capture)
 
     def _trainer(self, capture: Capture, pictures: CapturePictures) -> Trainer:
-        settings, training = self.settings, self.training
+        settings, exponent = self.settings, self.settings.exponent_for(len(pictures.views))
+        ramp = dataclasses.replace(self.training.homogenisation, exponent=exponent)
+        training = dataclasses.replace(self.training, homogenisation=ramp)
         first = first_splats(
             self.device,
             *(capture, pictures),

@@ -19,6 +19,8 @@ from rift_cl.train.settings import BandLimit, Densification, Rates, TrainSetting
 from rift_cl.train.solve_settings import SolveSettings
 from rift_cl.train.xray_trainer import RIDGE, xray_settings
 
+# Photographs from which on the ramp serves: with 8 it lost, with 49 it gained.
+_ENOUGH = 24
 # Rates of poses and exposures where they are refined.
 _POSE_RATE, _EXPOSURE_RATE = 1e-3, 1e-2
 # What may differ between a run and the one that goes on with it: it changes no bit of the result.
@@ -62,8 +64,8 @@ class FitSettings(XrayOptions, BasisOptions):
     pictures, 0.05 to 0.1 suits cameras that all keep one distance."""
     homogenise: float | None = None
     """Exponent of the ramp that weighs the residual's frequencies, so that fine detail is pulled
-    at as strongly as coarse; 0 for none. 0.5 if not given, and 0 for X-rays, where it is the
-    frequencies along the detector's rows."""
+    at as strongly as coarse; 0 for none. If not given 0.5, but 0 for fewer than 24 photographs, and
+    for X-rays, where it is the frequencies along the detector's rows."""
     homogenise_by: WeightKind = "ramp"
     """What that exponent is of: the ramp, as for views that lie evenly, or one over how often all
     views together cover a frequency (coverage)."""
@@ -138,6 +140,11 @@ class FitSettings(XrayOptions, BasisOptions):
         if self.homogenise is not None:
             return self.homogenise
         return 0.5 if self.mode == "light" else 0.0
+
+    def exponent_for(self, views: int) -> float:
+        """The exponent for so many photographs; what was asked for holds for any number."""
+        asked = self.homogenise is not None or self.homogenise_by == "coverage"
+        return self.exponent if asked or views >= _ENOUGH else 0.0
 
     @property
     def asks_for_noise(self) -> bool:

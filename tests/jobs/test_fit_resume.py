@@ -118,3 +118,15 @@ def test_fits_from_before_there_was_a_choice_go_on():
         assert found["band_limit"] == before and "homogenise_by" not in found
     found = settings(Path("capture"), Path("out"), homogenise_by="coverage").decisive()
     assert found["homogenise_by"] == "coverage"
+
+
+def test_few_photographs_are_fitted_without_the_ramp_unless_it_is_asked_for(capture, tmp_path):
+    found = {}
+    for name, homogenise in (("none", None), ("zero", 0.0), ("half", 0.5)):
+        given = settings(capture, tmp_path / name, steps=20, homogenise=homogenise)
+        list(Fit(given).run())
+        found[name] = digest(tmp_path / name)
+    assert found["none"] == found["zero"] != found["half"]
+    assert [settings(capture, tmp_path).exponent_for(views) for views in (23, 24)] == [0.0, 0.5]
+    for more in ({"homogenise": 0.3}, {"homogenise_by": "coverage"}):
+        assert settings(capture, tmp_path, **more).exponent_for(8) > 0
