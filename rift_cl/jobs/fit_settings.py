@@ -19,8 +19,8 @@ from rift_cl.train.settings import BandLimit, Densification, Rates, TrainSetting
 from rift_cl.train.solve_settings import SolveSettings
 from rift_cl.train.xray_trainer import RIDGE, xray_settings
 
-# Photographs from which on the ramp serves: with 8 it lost, with 49 it gained.
-_ENOUGH = 24
+# Photographs from which on the ramp serves: with 36 and fewer it lost, with 49 and more it gained.
+_ENOUGH = 40
 # Rates of poses and exposures where they are refined.
 _POSE_RATE, _EXPOSURE_RATE = 1e-3, 1e-2
 # What may differ between a run and the one that goes on with it: it changes no bit of the result.
@@ -64,7 +64,7 @@ class FitSettings(XrayOptions, BasisOptions):
     pictures, 0.05 to 0.1 suits cameras that all keep one distance."""
     homogenise: float | None = None
     """Exponent of the ramp that weighs the residual's frequencies, so that fine detail is pulled
-    at as strongly as coarse; 0 for none. If not given 0.5, but 0 for fewer than 24 photographs, and
+    at as strongly as coarse; 0 for none. If not given 0.5, but 0 for fewer than 40 photographs, and
     for X-rays, where it is the frequencies along the detector's rows."""
     homogenise_by: WeightKind = "ramp"
     """What that exponent is of: the ramp, as for views that lie evenly, or one over how often all

@@ -127,6 +127,6 @@ def test_few_photographs_are_fitted_without_the_ramp_unless_it_is_asked_for(capt
         list(Fit(given).run())
         found[name] = digest(tmp_path / name)
     assert found["none"] == found["zero"] != found["half"]
-    assert [settings(capture, tmp_path).exponent_for(views) for views in (23, 24)] == [0.0, 0.5]
+    assert [settings(capture, tmp_path).exponent_for(views) for views in (39, 40)] == [0.0, 0.5]
     for more in ({"homogenise": 0.3}, {"homogenise_by": "coverage"}):
         assert settings(capture, tmp_path, **more).exponent_for(8) > 0
