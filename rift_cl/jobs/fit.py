@@ -174,7 +174,7 @@ class Fit(FitRun):
             guessed=settings.first_count,
             seed=settings.seed,
         )
-        if settings.asks_for_noise:
+        if settings.asks_for_noise(exponent):
             count = len(pictures.views)
             few = evenly(count, _NOISE_VIEWS)
             noise = noise_of([pictures.image(number)[..., :3] for number in few])

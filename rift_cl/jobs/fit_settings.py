@@ -146,10 +146,9 @@ class FitSettings(XrayOptions, BasisOptions):
         asked = self.homogenise is not None or self.homogenise_by == "coverage"
         return self.exponent if asked or views >= _ENOUGH else 0.0
 
-    @property
-    def asks_for_noise(self) -> bool:
-        """Whether the pictures' noise must be known."""
-        return self.exponent > 0 or self.band_limit == "coverage"
+    def asks_for_noise(self, exponent: float) -> bool:
+        """Whether the pictures' noise must be known, where this is the ramp's exponent."""
+        return exponent > 0 or self.band_limit == "coverage"
 
     @property
     def first_count(self) -> int:

@@ -122,7 +122,8 @@ class XrayFit(FitRun):
             size=_SIZE,
         )
         first = Parameters.of(self.device, raw, density=True)
-        if settings.asks_for_noise and min(len(self.seen), seen.values.shape[2]) >= _FEW:
+        asked = settings.asks_for_noise(settings.exponent)
+        if asked and min(len(self.seen), seen.values.shape[2]) >= _FEW:
             few = evenly(rows, _FEW)
             noise = noise_of([seen.values[:, row, :, None] for row in few])
             training = dataclasses.replace(training, noise=noise)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_density_solve import SIZE, cameras_of, scene
+from density_scenes import SIZE, cameras_of, scene
 
 import rift_cl as rift
 from rift_cl.splat.orders import count_of
