@@ -49,7 +49,7 @@ def _commands() -> dict[str, Callable[..., Callable[[], int]]]:
     from rift_cl.jobs.evaluate import EvalSettings
     from rift_cl.jobs.fit_settings import FitSettings
     from rift_cl.jobs.plan_settings import PlanSettings
-    from rift_cl.jobs.reconstruct_settings import ReconstructSettings
+    from rift_cl.jobs.reconstruct.settings import ReconstructSettings
     from rift_cl.jobs.render_settings import RenderSettings
     from rift_cl.jobs.view import ViewSettings
 
@@ -92,7 +92,7 @@ def _demo(settings: Any, output: Output) -> None:
 
 
 def _reconstruct(settings: Any, output: Output) -> None:
-    from rift_cl.jobs.reconstruct import Reconstruction
+    from rift_cl.jobs.reconstruct.job import Reconstruction
 
     job = Reconstruction(settings)
     if not output.quiet:

@@ -7,8 +7,8 @@ import pytest
 
 from rift_cl.cli import main
 from rift_cl.io import read_volume
-from rift_cl.jobs.reconstruct import Reconstruction
-from rift_cl.jobs.reconstruct_settings import ReconstructSettings
+from rift_cl.jobs.reconstruct.job import Reconstruction
+from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 
 NAMES = {"tiff": "slices", "zarr": "volume.zarr", "h5": "volume.h5"}
 

@@ -13,10 +13,11 @@ import rift_cl as rift
 from rift_cl.cli import main
 from rift_cl.geometry.fan import FanBeam
 from rift_cl.io import read_volume
-from rift_cl.jobs import reconstruct_report, scan_input
-from rift_cl.jobs.reconstruct import Reconstruction
-from rift_cl.jobs.reconstruct_settings import ReconstructSettings
-from rift_cl.jobs.reconstruct_slabs import SlabFolder
+from rift_cl.jobs import scan_input
+from rift_cl.jobs.reconstruct import report as reconstruct_report
+from rift_cl.jobs.reconstruct.job import Reconstruction
+from rift_cl.jobs.reconstruct.kept_slabs import SlabFolder
+from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 from rift_cl.jobs.scan_input import ScanInput
 
 INPUT, INTERRUPTED, OUTPUT = 3, 130, 5
@@ -43,7 +44,7 @@ def cut_off(monkeypatch, arguments, slabs=1):
 
     with monkeypatch.context() as patch:
         patch.setattr(SlabFolder, "save", counted)
-        patch.setattr("rift_cl.jobs.reconstruct_method._SLAB", 1)
+        patch.setattr("rift_cl.jobs.reconstruct.inversion._SLAB", 1)
         assert run(*arguments) == INTERRUPTED
 
 
@@ -208,7 +209,7 @@ def test_a_foreign_file_among_the_slices_stops_before_the_work(scan, tmp_path, m
     assert run(*arguments) == 0
     (tmp_path / "out/slices/thesis.tex").write_text("years of work")
     before = contents(tmp_path / "out")
-    monkeypatch.setattr("rift_cl.jobs.reconstruct_input.SliceInput.read", None)
+    monkeypatch.setattr("rift_cl.jobs.reconstruct.slice_input.SliceInput.read", None)
     assert run(*arguments, "--overwrite", "--format", format) == OUTPUT
     assert contents(tmp_path / "out") == before
 

@@ -11,8 +11,8 @@ from rift_cl.cli import main
 from rift_cl.geometry.fan import FanBeam
 from rift_cl.io import read_volume
 from rift_cl.jobs import scan_input
-from rift_cl.jobs.reconstruct import Reconstruction
-from rift_cl.jobs.reconstruct_settings import ReconstructSettings
+from rift_cl.jobs.reconstruct.job import Reconstruction
+from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 
 SIZE, VIEWS = 64, 90
 HALF, FULL = np.arange(VIEWS) * np.pi / VIEWS, np.arange(2 * VIEWS) * np.pi / VIEWS

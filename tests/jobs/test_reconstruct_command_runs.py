@@ -8,9 +8,9 @@ import pytest
 
 from rift_cl.cli import main
 from rift_cl.io import read_volume
-from rift_cl.jobs.reconstruct import Reconstruction
-from rift_cl.jobs.reconstruct_settings import ReconstructSettings
-from rift_cl.jobs.reconstruct_slabs import SlabFolder
+from rift_cl.jobs.reconstruct.job import Reconstruction
+from rift_cl.jobs.reconstruct.kept_slabs import SlabFolder
+from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 
 INPUT, INTERRUPTED, OUTPUT = 3, 130, 5
 
@@ -33,8 +33,8 @@ def interrupted_after(patch, slabs):
         save(self, start, slices)
 
     patch.setattr(SlabFolder, "save", counted)
-    patch.setattr("rift_cl.jobs.reconstruct_method._SLAB", 1)
-    patch.setattr("rift_cl.jobs.reconstruct_method._ITERATIVE_SLAB", 1)
+    patch.setattr("rift_cl.jobs.reconstruct.inversion._SLAB", 1)
+    patch.setattr("rift_cl.jobs.reconstruct.inversion._ITERATIVE_SLAB", 1)
 
 
 @pytest.mark.parametrize("options", [(), STEPS, (*STEPS, "--rows", 1, 3)])
@@ -142,7 +142,7 @@ def test_a_run_cut_off_in_its_report_can_be_repeated(scan, tmp_path, monkeypatch
 
     arguments = ("reconstruct", scan.counts, "--center", 45, "--out", tmp_path / "out")
     with monkeypatch.context() as patch:
-        patch.setattr("rift_cl.jobs.reconstruct.reconstruction_page", interrupt)
+        patch.setattr("rift_cl.jobs.reconstruct.job.reconstruction_page", interrupt)
         assert run(*arguments) == INTERRUPTED
     assert run(*arguments) == OUTPUT
     assert run(*arguments, "--overwrite") == 0

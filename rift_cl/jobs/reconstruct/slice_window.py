@@ -8,8 +8,8 @@ import numpy as np
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Grid
-from rift_cl.jobs.reconstruct_input import SliceInput
-from rift_cl.jobs.reconstruct_settings import ReconstructSettings
+from rift_cl.jobs.reconstruct.settings import ReconstructSettings
+from rift_cl.jobs.reconstruct.slice_input import SliceInput
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Parallel
-from rift_cl.jobs.reconstruct_notes import notes_of
-from rift_cl.jobs.reconstruct_settings import ReconstructSettings
+from rift_cl.jobs.reconstruct.notes import notes_of
+from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 from rift_cl.jobs.scan_input import (
     check_center,
     chosen_rows,

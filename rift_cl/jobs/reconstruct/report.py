@@ -15,11 +15,11 @@ from rift_cl.cl.budget import format_bytes
 from rift_cl.html_page import Page
 from rift_cl.io.output import atomic_path
 from rift_cl.jobs.few import evenly
-from rift_cl.jobs.reconstruct_volume import volume_path
+from rift_cl.jobs.reconstruct.volume import volume_path
 from rift_cl.plot import curves, figure_png, image_grid
 
 if TYPE_CHECKING:
-    from rift_cl.jobs.reconstruct import Reconstruction
+    from rift_cl.jobs.reconstruct.job import Reconstruction
 
 _PANELS = 6
 # Values that a histogram tells apart.

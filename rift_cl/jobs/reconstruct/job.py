@@ -17,18 +17,18 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.errors import StoppedError
-from rift_cl.jobs.reconstruct_input import SliceInput
-from rift_cl.jobs.reconstruct_method import Inversion
-from rift_cl.jobs.reconstruct_report import (
+from rift_cl.jobs.reconstruct.inversion import Inversion
+from rift_cl.jobs.reconstruct.kept_slabs import SlabFolder, run_folder
+from rift_cl.jobs.reconstruct.report import (
     PREVIEW_PICTURE,
     Preview,
     planned,
     reconstruction_page,
     write_preview,
 )
-from rift_cl.jobs.reconstruct_settings import ReconstructSettings
-from rift_cl.jobs.reconstruct_slabs import SlabFolder, run_folder
-from rift_cl.jobs.reconstruct_volume import demand_place, open_slices, volume_path
+from rift_cl.jobs.reconstruct.settings import ReconstructSettings
+from rift_cl.jobs.reconstruct.slice_input import SliceInput
+from rift_cl.jobs.reconstruct.volume import demand_place, open_slices, volume_path
 from rift_cl.jobs.scan_input import VOLUME_NAMES
 from rift_cl.progress import Report
 

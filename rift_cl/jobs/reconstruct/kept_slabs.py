@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import CheckpointError, OutputError
 from rift_cl.io.output import atomic_path, check_space, make_folder, write_json, writing
-from rift_cl.jobs.reconstruct_report import PREVIEW_PICTURE
-from rift_cl.jobs.reconstruct_settings import ReconstructSettings
+from rift_cl.jobs.reconstruct.report import PREVIEW_PICTURE
+from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 from rift_cl.jobs.run_folder import RunFolder
 
 Floats = NDArray[np.float32]

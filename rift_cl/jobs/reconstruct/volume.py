@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Literal
 
 from rift_cl.io.volume import VolumeWriter, open_volume
-from rift_cl.jobs.reconstruct_input import SliceInput
-from rift_cl.jobs.reconstruct_settings import ReconstructSettings
-from rift_cl.jobs.reconstruct_window import Window
+from rift_cl.jobs.reconstruct.settings import ReconstructSettings
+from rift_cl.jobs.reconstruct.slice_input import SliceInput
+from rift_cl.jobs.reconstruct.slice_window import Window
 from rift_cl.jobs.scan_input import VOLUME_NAMES
 
 Format = Literal["tiff", "zarr", "h5"]

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
-from rift_cl.jobs.reconstruct_input import SliceInput
-from rift_cl.jobs.reconstruct_settings import ReconstructSettings
-from rift_cl.jobs.reconstruct_window import Window
+from rift_cl.jobs.reconstruct.settings import ReconstructSettings
+from rift_cl.jobs.reconstruct.slice_input import SliceInput
+from rift_cl.jobs.reconstruct.slice_window import Window
 from rift_cl.operators import FastProjector, ParallelProjector, Projector
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp

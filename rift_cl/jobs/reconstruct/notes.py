@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from rift_cl.jobs.reconstruct_input import SliceInput
+    from rift_cl.jobs.reconstruct.slice_input import SliceInput
 
 # A gap between directions that is worth a word, in mean steps and in radians.
 _GAP_STEPS, _GAP = 2.0, np.deg2rad(5)
