@@ -9,6 +9,7 @@ from rift_cl.reconstruct.flatfield import Attenuation, attenuation
 from rift_cl.reconstruct.offset_axis import find_offset_center, widened
 from rift_cl.reconstruct.padding import extended
 from rift_cl.reconstruct.pdhg import Pdhg
+from rift_cl.reconstruct.poisson_weights import RayWeights, poisson_weights
 from rift_cl.reconstruct.rings import remove_rings
 from rift_cl.reconstruct.seen_rays import SeenRays
 from rift_cl.reconstruct.simultaneous_iteration import Sirt, sirt
@@ -21,6 +22,7 @@ __all__ = [
     "FilteredBackprojection",
     "Fista",
     "Pdhg",
+    "RayWeights",
     "SeenRays",
     "Sirt",
     "attenuation",
@@ -30,6 +32,7 @@ __all__ = [
     "fbp",
     "find_center",
     "find_offset_center",
+    "poisson_weights",
     "rebin_fan",
     "remove_rings",
     "sirt",

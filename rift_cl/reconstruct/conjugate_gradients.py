@@ -52,8 +52,9 @@ class Cgls(Solver):
         start: Any = None,
         precondition: Precondition = None,
         noise: float | None = None,
+        weights: Any = None,
     ) -> None:
-        data = DataTerm(A, y, precondition, noise, self.arrays)
+        data = DataTerm(A, y, precondition, noise, self.arrays, weights)
         super().__init__(data, noise)
         image, residual, direction = data.start(start), data.data(), data.image()
         data.residual(image, residual)
@@ -101,6 +102,7 @@ def cgls(
     start: Any = None,
     precondition: Precondition = None,
     noise: float | None = None,
+    weights: Any = None,
     out: Any = None,
 ) -> Any:
     """Least squares by conjugate gradients.
@@ -117,6 +119,10 @@ def cgls(
             operator on ``A.range``: several times fewer steps, see ``residual_weight``.
         noise: standard deviation of the noise of a sample of y. The run ends once the residual is
             down to it, and a ramp spares frequencies in which there is little else.
+        weights: how much each sample counts, of the shape of y: its relative inverse variance
+            (``poisson_weights``), 0 where nothing was measured; y may be anything there. ``noise``
+            and the reported residual are then those of a sample of weight 1, and
+            ``|F^(1/2) W^(1/2) (A x - y)|`` is what becomes small.
         out: where to put the result.
 
     Returns:
@@ -125,5 +131,5 @@ def cgls(
     Raises:
         InputError: an argument does not fit, or holds NaN or infinity.
     """
-    solver = Cgls(A, y, start=start, precondition=precondition, noise=noise)
+    solver = Cgls(A, y, start=start, precondition=precondition, noise=noise, weights=weights)
     return solve(solver, steps, like=y, out=out)

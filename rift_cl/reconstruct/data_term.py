@@ -2,8 +2,9 @@
 
     |F^(1/2) (A x - y)|^2 / 2,    gradient A' F (A x - y),
 
-F the weight of the residual, or the identity. Everything is on the device; what comes back to the
-host are scalars.
+F the weight of the residual, or the identity. Rays with weights of their own make A and y
+``W^(1/2) A`` and ``W^(1/2) y`` beforehand (see ``weighted_rays``). Everything is on the device;
+what comes back to the host are scalars.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.reconstruct.residual_weight import Precondition, residual_weight
+from rift_cl.reconstruct.weighted_rays import WeightedRays, masked_data
 
 # Rounds of the search for the largest eigenvalue, what is added to its answer, which comes from
 # below, and the share of it that is rounding.
@@ -37,9 +39,11 @@ class DataTerm:
         precondition: see ``residual_weight``.
         noise: standard deviation of the noise of a sample of y, if known.
         arrays: of the shape of x and of the shape of y that the method keeps on the device.
+        weights: of the samples of y, their relative inverse variances; None: all alike.
 
     Raises:
-        InputError: A is no operator, or y, ``precondition`` or ``noise`` cannot be used.
+        InputError: A is no operator, or y, ``precondition``, ``noise`` or ``weights`` cannot be
+            used.
         ResourceLimitError: they do not fit the device's budget.
     """
 
@@ -50,6 +54,7 @@ class DataTerm:
         precondition: Precondition,
         noise: float | None,
         arrays: tuple[int, int] = (1, 2),
+        weights: Any = None,
     ) -> None:
         if not isinstance(A, LinearOperator):
             raise InputError(
@@ -61,11 +66,24 @@ class DataTerm:
         images, sinograms = (math.prod(shape) for shape in (A.domain, A.range))
         each = self.dtype.itemsize * (arrays[0] * images + arrays[1] * sinograms)
         plan_chunks(1, each, A.scratch, self.device.budget, what="solver")
+        self.samples = max(math.prod(A.range), 1)
+        """Samples of y that count."""
         self.y = self.data()
-        copy(self.device, self.on_device(y, A.range, name="y"), self.y)
-        self.weight = residual_weight(A, self.y, precondition, noise)
+        if weights is None:
+            copy(self.device, self.on_device(y, A.range, name="y"), self.y)
+        else:
+            self._weigh_rays(y, weights)
+        self.weight = residual_weight(self.A, self.y, precondition, noise)
         self.unit_gain = self.weight is None or isinstance(precondition, str)
         """Whether F keeps the size of white noise; not known of an operator of the caller's."""
+
+    def _weigh_rays(self, y: Any, weights: Any) -> None:
+        """Make A and y those of the weighted problem."""
+        weighted = WeightedRays(self.A, weights)
+        given = y if is_device_array(y) else masked_data(y, weighted.weights)
+        copy(self.device, self.on_device(given, self.A.range, name="y"), self.y)
+        weighted.weigh(self.y)
+        self.A, self.samples = weighted, weighted.measured
 
     def on_device(self, x: Any, shape: tuple[int, ...], *, name: str) -> Any:
         """An array that a caller gave, checked, on the device.
@@ -117,7 +135,9 @@ class DataTerm:
         self.A.T(weighted, out=out)
 
     def rms(self, r: Any) -> float:
-        """The root mean square of a residual, in the unit of y; comparable to the noise.
+        """The root mean square of a residual over the samples that count, in the unit of y.
+
+        It is comparable to the noise; with weights, to that of a sample of weight 1.
 
         Raises:
             NonFiniteError: the residual is not finite any more.
@@ -127,11 +147,11 @@ class DataTerm:
             raise NonFiniteError(
                 f"the residual has left the range of {self.dtype}: scale y to values near 1"
             )
-        return length / math.sqrt(max(r.size, 1))
+        return length / math.sqrt(self.samples)
 
     def weighted_rms(self, r: Any, weighted: Any) -> float:
         """The root mean square of F^(1/2) r, for a residual r and F r."""
-        return math.sqrt(max(dot(self.device, r, weighted), 0.0) / max(r.size, 1))
+        return math.sqrt(max(dot(self.device, r, weighted), 0.0) / self.samples)
 
     def norm_squared(self) -> float:
         """The largest eigenvalue of A' F A, from a little above; 0 if there is none.

@@ -67,10 +67,17 @@ class Fista(VariationSolver):
         nonnegative: bool = False,
         precondition: Precondition = None,
         noise: float | None = None,
+        weights: Any = None,
         inner: int = 5,
     ) -> None:
         super().__init__(
-            A, y, weight, nonnegative=nonnegative, precondition=precondition, noise=noise
+            A,
+            y,
+            weight,
+            nonnegative=nonnegative,
+            precondition=precondition,
+            noise=noise,
+            weights=weights,
         )
         self._inner = check_steps(inner, name="inner") if weight > 0 else 0
         if weight > 0 and self._inner == 0:

@@ -56,9 +56,16 @@ class Pdhg(VariationSolver):
         nonnegative: bool = False,
         precondition: Precondition = None,
         noise: float | None = None,
+        weights: Any = None,
     ) -> None:
         super().__init__(
-            A, y, weight, nonnegative=nonnegative, precondition=precondition, noise=noise
+            A,
+            y,
+            weight,
+            nonnegative=nonnegative,
+            precondition=precondition,
+            noise=noise,
+            weights=weights,
         )
         data = self.data
         largest = data.norm_squared() or 1.0

@@ -6,6 +6,10 @@ R one over the sums of A's rows and C one over the sums of its columns (Gilbert 
 Benson, IEEE Trans. Med. Imaging 27, 2008). It minimises ``|R^(1/2) (A x - y)|``, converges for any
 relaxation below 2, and can keep the image from negative values.
 
+Weights W of the rays take the place of R: C is then one over ``A' W A 1``, which bounds the
+curvature of ``|W^(1/2) (A x - y)|^2`` pixel by pixel (Erdogan and Fessler, Phys. Med. Biol. 44,
+1999). W = R is the case without weights.
+
 With a weight F of the residual that takes the place of the sums,
 
     x <- x + relaxation / L * A' F (y - A x),
@@ -69,15 +73,18 @@ class Sirt(Solver):
         relaxation: float = 1.0,
         precondition: Precondition = None,
         noise: float | None = None,
+        weights: Any = None,
     ) -> None:
         if not 0 < one_number(relaxation) < 2:
             raise InputError(f"relaxation is {relaxation!r}, wanted a number between 0 and 2")
-        data = DataTerm(A, y, precondition, noise, self.arrays)
+        data = DataTerm(A, y, precondition, noise, self.arrays, weights)
         super().__init__(data, noise)
         self._nonnegative = nonnegative
         self._rays, self._pixels, self._length = None, None, float(relaxation)
-        if data.weight is None:
+        if data.weight is None and weights is None:
             self._rays, self._pixels = _inverse_sums(A), _inverse_sums(A.T)
+        elif data.weight is None:
+            self._pixels = _inverse_sums(data.A.T @ data.A)
         else:
             largest = data.norm_squared()
             self._length = relaxation / largest if largest > 0 else 0.0
@@ -108,10 +115,12 @@ class Sirt(Solver):
     def _advance(self) -> None:
         now, data, device = self._now, self.data, self.data.device
         spread, change = self._spare
+        pull = now.residual if now.weighted is None else now.weighted
         if self._rays is not None:
             copy(device, now.residual, spread)
             multiply(device, self._rays, spread)
-        data.gradient(spread if now.weighted is None else now.weighted, change)
+            pull = spread
+        data.gradient(pull, change)
         if self._pixels is not None:
             multiply(device, self._pixels, change)
         axpby(device, -self._length, change, 1.0, now.image)
@@ -148,6 +157,7 @@ def sirt(
     relaxation: float = 1.0,
     precondition: Precondition = None,
     noise: float | None = None,
+    weights: Any = None,
     out: Any = None,
 ) -> Any:
     """Simultaneous iterative reconstruction.
@@ -164,6 +174,10 @@ def sirt(
         noise: standard deviation of the noise of a sample of y. The run ends once the residual is
             down to it (with a ramp also once the weighted residual is well below it), and a ramp
             spares frequencies in which there is little else.
+        weights: how much each sample counts, of the shape of y: its relative inverse variance
+            (``poisson_weights``), 0 where nothing was measured; y may be anything there. ``noise``
+            and the reported residual are then those of a sample of weight 1, and
+            ``|F^(1/2) W^(1/2) (A x - y)|`` is what becomes small.
         out: where to put the result.
 
     Returns:
@@ -180,5 +194,6 @@ def sirt(
         relaxation=relaxation,
         precondition=precondition,
         noise=noise,
+        weights=weights,
     )
     return solve(solver, steps, like=y, out=out)

@@ -25,6 +25,7 @@ def tv(
     nonnegative: bool = False,
     precondition: Precondition = None,
     noise: float | None = None,
+    weights: Any = None,
     out: Any = None,
 ) -> Any:
     """Least squares with isotropic total variation.
@@ -49,6 +50,10 @@ def tv(
         noise: standard deviation of the noise of a sample of y. The run ends once the residual is
             down to it, before the minimum if the weight is small, and a ramp spares frequencies in
             which there is little else.
+        weights: how much each sample counts, of the shape of y: its relative inverse variance
+            (``poisson_weights``), 0 where nothing was measured; y may be anything there. ``noise``
+            and the reported residual are then those of a sample of weight 1, and
+            ``|F^(1/2) W^(1/2) (A x - y)|`` is what becomes small.
         out: where to put the result.
 
     Returns:
@@ -67,5 +72,6 @@ def tv(
         nonnegative=nonnegative,
         precondition=precondition,
         noise=noise,
+        weights=weights,
     )
     return solve(solver, steps, like=y, out=out)

@@ -54,10 +54,11 @@ class VariationSolver(Solver):
         nonnegative: bool = False,
         precondition: Precondition = None,
         noise: float | None = None,
+        weights: Any = None,
     ) -> None:
         if not one_number(weight) >= 0:
             raise InputError(f"weight is {weight!r}, wanted a number, 0 or more")
-        data = DataTerm(A, y, precondition, noise, self.arrays)
+        data = DataTerm(A, y, precondition, noise, self.arrays, weights)
         super().__init__(data, noise)
         self._weight, self._nonnegative = float(weight), bool(nonnegative)
         spacing = (1.0,) * len(A.domain) if A.grid is None else A.grid.spacing

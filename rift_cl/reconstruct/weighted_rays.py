@@ -1,0 +1,93 @@
+"""A projector whose rays count by their weights: ``W^(1/2) A``.
+
+Weighted least squares, ``sum of w (A x - y)^2``, are plain least squares on ``W^(1/2) A`` and
+``W^(1/2) y``. Every solver thus takes weights without a line of its own: with w the inverse of a
+ray's variance the noise of the weighted data is white, so that the residual, the noise it is
+compared with and the spectrum a ramp looks at mean what they mean without weights.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.elementwise import copy, multiply
+from rift_cl.cl.memory import as_real_array, download, is_device_array
+from rift_cl.errors import InputError, NonFiniteError, ShapeError
+from rift_cl.operators.linear import LinearOperator
+
+
+class WeightedRays(LinearOperator):
+    """An operator whose samples are multiplied by the roots of their weights.
+
+    Args:
+        A: the operator.
+        weights: of the samples, of shape ``A.range``, 0 or more; 0 where nothing was measured.
+
+    Raises:
+        ShapeError: there is not one weight for each sample.
+        InputError: a weight is negative, NaN or infinite, or all are zero.
+    """
+
+    def __init__(self, A: LinearOperator, weights: Any) -> None:
+        super().__init__(A.domain, A.range, A.device, A.dtype)
+        self.grid, self.scan = A.grid, A.scan
+        found = checked_weights(weights, A)
+        self.inner, self.weights = A, found
+        self.measured = int(np.count_nonzero(found))
+        """Samples that count at all."""
+        self._roots = A.device.array(np.sqrt(found), A.dtype)
+
+    def weigh(self, y: Any) -> None:
+        """Multiply a device array of data by the roots of the weights, in place."""
+        multiply(self.device, self._roots, y)
+
+    @property
+    def scratch(self) -> int:
+        """The operator's, the roots, and the data weighed on the way back."""
+        return self.inner.scratch + 2 * int(self._roots.nbytes)
+
+    def _apply(self, x: Any, out: Any) -> None:
+        self.inner._apply(x, out)
+        self.weigh(out)
+
+    def _apply_adjoint(self, y: Any, out: Any) -> None:
+        weighed = self.device.empty(y.shape, self.dtype)
+        copy(self.device, y, weighed)
+        self.weigh(weighed)
+        self.inner._apply_adjoint(weighed, out)
+
+
+def checked_weights(weights: Any, A: LinearOperator) -> NDArray[np.float64]:
+    """Weights of the samples of A, on the host.
+
+    Raises:
+        ShapeError: there is not one weight for each sample.
+        InputError: a weight is negative, NaN or infinite, or all are zero.
+    """
+    host = download(A.device, weights) if is_device_array(weights) else weights
+    found = as_real_array(host, name="weights").astype(np.float64)
+    if found.shape != A.range:
+        raise ShapeError(f"weights have shape {found.shape}, wanted the data's {A.range}")
+    # A weight too small for the operator's type is none; one too large has no finite root's square.
+    with np.errstate(over="ignore", under="ignore"):
+        found = found.astype(A.dtype).astype(np.float64)
+    if not np.isfinite(found).all():
+        raise NonFiniteError(
+            f"weights hold NaN or infinity, or numbers beyond {A.dtype}: give unmeasured samples 0"
+        )
+    if found.min(initial=0.0) < 0:
+        raise InputError(f"weights hold {found.min():g}, wanted numbers of 0 or more")
+    if not found.any():
+        raise InputError("weights are 0 everywhere: at least one sample must count")
+    return found
+
+
+def masked_data(y: Any, weights: NDArray[np.float64]) -> Any:
+    """Data on the host with 0 where the weight is 0: what lies there was never measured."""
+    array = as_real_array(y, name="y")
+    if array.shape != weights.shape:
+        return y
+    return np.where(weights > 0, array, array.dtype.type(0))
