@@ -14,7 +14,7 @@ from typing import Any
 import tyro
 
 from rift_cl import __version__
-from rift_cl.command import Output, command, exit_status, ran, watch
+from rift_cl.command import Output, command, exit_status, ran, told, watch
 from rift_cl.console_table import print_table
 from rift_cl.interruption import gentle_interrupt
 from rift_cl.progress_bar import print_line
@@ -23,7 +23,7 @@ from rift_cl.progress_bar import print_line
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    return exit_status(lambda: _run(arguments))
+    return exit_status(lambda: told(lambda: _run(arguments)))
 
 
 def _run(arguments: Sequence[str]) -> int:
@@ -31,7 +31,7 @@ def _run(arguments: Sequence[str]) -> int:
         print(f"rift {__version__}")
         return 0
     chosen: Callable[[], int] = tyro.extras.subcommand_cli_from_dict(
-        _commands(),
+        _commands(_earlier(arguments)),
         prog="rift",
         description="Tomography and splatting on any OpenCL device.",
         args=arguments,
@@ -40,7 +40,18 @@ def _run(arguments: Sequence[str]) -> int:
     return chosen()
 
 
-def _commands() -> dict[str, Callable[..., Callable[[], int]]]:
+def _earlier(arguments: Sequence[str]) -> Any:
+    """The settings of the run that ``--config`` names, which options change; else None."""
+    from rift_cl.jobs.reconstruct.settings import ReconstructSettings
+    from rift_cl.jobs.saved_settings import named_config, saved_settings
+
+    if not arguments or arguments[0] != "reconstruct":
+        return None
+    path = named_config(arguments)
+    return None if path is None else saved_settings(path, "reconstruct", ReconstructSettings)
+
+
+def _commands(earlier: Any = None) -> dict[str, Callable[..., Callable[[], int]]]:
     from rift_cl.jobs.analyze_settings import AnalyzeSettings
     from rift_cl.jobs.cache import CacheSettings
     from rift_cl.jobs.center import CenterSettings
@@ -56,7 +67,7 @@ def _commands() -> dict[str, Callable[..., Callable[[], int]]]:
     return {
         "devices": command(_devices, DevicesSettings),
         "demo": command(_demo, DemoSettings),
-        "reconstruct": command(_reconstruct, ReconstructSettings),
+        "reconstruct": command(_reconstruct, ReconstructSettings, earlier),
         "center": command(_center, CenterSettings),
         "fit": command(_fit, FitSettings),
         "eval": command(_eval, EvalSettings),
@@ -99,7 +110,8 @@ def _reconstruct(settings: Any, output: Output) -> None:
         job.announce = print_line
     if not ran(job, settings, output):
         return
-    print_table(("figure", "value"), job.metrics.items())
+    if job.metrics:
+        print_table(("figure", "value"), job.metrics.items())
     print(job.result)
 
 

@@ -52,12 +52,30 @@ def exit_status(run: Callable[[], int]) -> int:
     return status
 
 
-def command(run: Callable[[Any, Output], None], settings: type) -> Callable[..., Callable[[], int]]:
-    """A command for tyro: it takes settings and gives back what is to be run."""
+def told(run: Callable[[], int]) -> int:
+    """Run something; an error of ours becomes one sentence and an exit status."""
+    try:
+        return run()
+    except RiftError as error:
+        return _say(f"rift: {error}", error.exit_status)
+
+
+def command(
+    run: Callable[[Any, Output], None], settings: type, default: Any = None
+) -> Callable[..., Callable[[], int]]:
+    """A command for tyro: it takes settings and gives back what is to be run.
+
+    Args:
+        run: what to do with them.
+        settings: their class.
+        default: settings to begin with, where nothing else is given; the class's own if None.
+    """
 
     def prepared(settings: Any, output: Any = Output()) -> Callable[[], int]:
         return lambda: _guarded(run, settings, output)
 
+    if default is not None:
+        prepared.__defaults__ = (default, Output())
     prepared.__annotations__ = {
         "settings": Annotated[settings, tyro.conf.arg(name="")],
         "output": Annotated[Output, tyro.conf.arg(name="")],

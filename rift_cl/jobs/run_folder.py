@@ -12,6 +12,7 @@ import platform
 import shutil
 from collections.abc import Mapping
 from datetime import datetime, timezone
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -77,13 +78,29 @@ class RunFolder:
                 with writing(entry):
                     shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
 
-    def finish(self, settings: Any, metrics: Mapping[str, Any], page: Page, device: Device) -> None:
-        """Write the report, the metrics and, last, the configuration."""
+    def finish(
+        self,
+        settings: Any,
+        metrics: Mapping[str, Any],
+        page: Page,
+        device: Device,
+        **decided: Any,
+    ) -> None:
+        """Write the report, the metrics and, last, the configuration.
+
+        Args:
+            settings: those that would repeat the run.
+            metrics: its figures.
+            page: the report, to which settings and environment are added.
+            device: where it ran.
+            **decided: what else the configuration is to hold, by name.
+        """
         config = {
             "job": self._job,
             "complete": True,
             "rift_cl": __version__,
             "settings": dataclasses.asdict(settings),
+            **decided,
             "environment": environment(device),
         }
         page.section("Settings")
@@ -102,6 +119,7 @@ def environment(device: Device) -> dict[str, str]:
         "platform": device.platform,
         "driver": device.driver,
         "python": platform.python_version(),
+        **{name: version(name) for name in ("numpy", "scipy", "pyopencl")},
         "system": f"{platform.system()} {platform.machine()}",
         "rift_cl": __version__,
         "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),

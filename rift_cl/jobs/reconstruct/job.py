@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Iterator
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,15 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.errors import StoppedError
+from rift_cl.jobs.reconstruct.decided import decided_settings
 from rift_cl.jobs.reconstruct.inversion import Inversion
-from rift_cl.jobs.reconstruct.kept_slabs import SlabFolder, run_folder
+from rift_cl.jobs.reconstruct.kept_slabs import (
+    SlabFolder,
+    demand_same,
+    finished_run,
+    run_folder,
+)
+from rift_cl.jobs.reconstruct.overlap import Behind, ahead
 from rift_cl.jobs.reconstruct.report import (
     PREVIEW_PICTURE,
     Preview,
@@ -31,6 +39,7 @@ from rift_cl.jobs.reconstruct.slice_input import SliceInput
 from rift_cl.jobs.reconstruct.volume import demand_place, open_slices, volume_path
 from rift_cl.jobs.scan_input import VOLUME_NAMES
 from rift_cl.progress import Report
+from rift_cl.reconstruct import Attenuation
 
 # Slices from which a run by a formula is worth a look before it goes on.
 _PREVIEW_FROM = 8
@@ -61,6 +70,8 @@ class Reconstruction:
         self.announce: Callable[[str], None] = lambda line: None
         # Whether the slabs that are there are this run's, and whether it found them there.
         self._ours, self._gone_on = False, False
+        # Whether this run has left a picture of the middle slice.
+        self._shown = False
         self._begin = time.perf_counter()
 
     @property
@@ -83,6 +94,11 @@ class Reconstruction:
             )
         return f"slices and report.html are in {self.settings.out}"
 
+    @property
+    def decided(self) -> ReconstructSettings:
+        """The settings with all that was decided; of a run whose axis is known."""
+        return decided_settings(self.source, self.inversion)
+
     @cached_property
     def slabs(self) -> list[slice]:
         """Slices that are worked on together, counted from the first row that was asked for."""
@@ -100,6 +116,9 @@ class Reconstruction:
             StoppedError: it was broken off, and what was done is kept.
         """
         self._begin = time.perf_counter()
+        if self._finished_before():
+            self.announce(f"{self.settings.out}: the reconstruction is complete already")
+            return
         if not self.settings.resume:
             yield Report(0, self._total, self._what)
         self._settle()
@@ -147,6 +166,19 @@ class Reconstruction:
         for note in self.source.notes:
             self.announce(note)
 
+    def _finished_before(self) -> bool:
+        """Whether ``--resume`` met a run that had come to its end.
+
+        Raises:
+            CheckpointError: that run would have made other slices.
+        """
+        before = finished_run(self.settings) if self.settings.resume else None
+        if before is None or self._kept.begun:
+            return False
+        now = {**self._facts(), **{name: before.get(name) for name in ("axis", "volume")}}
+        demand_same(self.settings.out, "the finished run", before, now)
+        return True
+
     def _facts(self) -> dict[str, str]:
         """What decides the slices."""
         return {**self.settings.decisive(), **self.source.identity(), "volume": str(self.shape)}
@@ -172,33 +204,50 @@ class Reconstruction:
         if self._gone_on:
             # Where it goes on, so that nobody takes what was done before for this run's pace.
             yield Report(done * self.settings.most_steps, self._total, self._what)
-        for slab in self.inversion.slabs(self._kept.missing()):
-            self._kept.save(slab.start, (yield from self._slab(slab, done)))
-            done += slab.stop - slab.start
-            values = {} if self.source.center is None else {"center": self.source.center}
-            yield Report(done * self.settings.most_steps, self._total, self._what, values)
+        values = {} if self.source.center is None else {"center": self.source.center}
+        slabs = self.inversion.slabs(self._kept.missing())
+        with Behind() as behind, ahead(slabs, self._read) as read:
+            for slab, integrals in read:
+                slices = yield from self._slab(slab, integrals, done)
+                behind.do(self._kept.save, slab.start, slices)
+                done += slab.stop - slab.start
+                yield Report(done * self.settings.most_steps, self._total, self._what, values)
 
     def _look(self) -> Iterator[Report]:
-        """Reconstruct the middle slice, show it, and tell how long the others take."""
+        """Reconstruct the middle slice and show it; alone, tell how long the others would take."""
         middle = self.shape[0] // 2
-        image = yield from self._slab(slice(middle, middle + 1), 0)
-        path = self.settings.out / PREVIEW_PICTURE
-        write_preview(path, image[0], f"slice {self.rows[0] + middle}", self.source.unit)
+        slab = slice(middle, middle + 1)
+        image = yield from self._slab(slab, self._read(slab), 0)
+        path = self._show(image[0])
         if not self.settings.preview:
             self._kept.save(middle, image)
+            self.announce(f"{path} shows the middle slice")
+            yield Report(self.settings.most_steps, self._total, self._what)
+            return
         # Not the time that it took, in which kernels were built.
         seconds = self._seconds_per_slice() * self.shape[0]
         self.metrics["seconds_for_all"] = seconds
-        done = self._total if self.settings.preview else self.settings.most_steps
         self.announce(f"{path} shows the middle slice; all take about {seconds:.3g} s")
-        yield Report(done, self._total, self._what, {"seconds for all": seconds})
+        yield Report(self._total, self._total, self._what, {"seconds for all": seconds})
 
-    def _slab(self, slab: slice, before: int) -> Generator[Report, None, Floats]:
+    def _show(self, image: Floats) -> Path:
+        """Leave the middle slice as a picture."""
+        path = self.settings.out / PREVIEW_PICTURE
+        number = self.rows[0] + self.shape[0] // 2
+        write_preview(path, image, f"slice {number}")
+        self._shown = True
+        return path
+
+    def _read(self, slab: slice) -> Attenuation:
         first = self.rows[0]
-        integrals = self.source.read(first + slab.start, first + slab.stop)
+        return self.source.read(first + slab.start, first + slab.stop)
+
+    def _slab(
+        self, slab: slice, integrals: Attenuation, before: int
+    ) -> Generator[Report, None, Floats]:
         found = {"dead_pixels": integrals.dead, "starved_samples": integrals.starved}
         self.metrics.update({name: self.metrics.get(name, 0) + n for name, n in found.items()})
-        steps = self.inversion.slices(first + slab.start, integrals.projections)
+        steps = self.inversion.slices(self.rows[0] + slab.start, integrals.projections)
         done = before * self.settings.most_steps
         while True:
             try:
@@ -210,7 +259,7 @@ class Reconstruction:
 
     def _finish(self) -> None:
         """Make the volume of the slabs, and the report."""
-        preview = Preview.of(self.shape[0])
+        preview = Preview(self.shape[0])
         with open_slices(self.settings, self.source, self.inversion.window) as volume:
             for start, slab in self._kept.slabs():
                 volume.write(start, slab)
@@ -218,8 +267,8 @@ class Reconstruction:
         # From here on the slices are this run's, and an earlier configuration no longer theirs.
         self.folder.mark()
         self.folder.drop(*set(VOLUME_NAMES.values()) - {volume_path(self.settings).name})
-        if not self._looks_first:
-            self.folder.drop(PREVIEW_PICTURE)
+        if not self._shown:
+            self._show(preview.middle)
         if self.source.center is not None:
             self.metrics = {"center": self.source.center, **self.metrics}
         self.metrics.update(self.inversion.figures())
@@ -228,7 +277,8 @@ class Reconstruction:
         self.metrics.pop("seconds_for_all", None)
         page = reconstruction_page(self, preview)
         record = {**self.metrics, "assumed": self.source.notes}
-        self.folder.finish(self.settings, record, page, self.device)
+        facts = {"asked": self.settings.asked(), "axis": self.source.axis, "run": self._facts()}
+        self.folder.finish(self.decided, record, page, self.device, **facts)
         self._kept.drop()
 
     def _keep_what_is_done(self) -> bool:

@@ -21,6 +21,7 @@ from rift_cl.errors import CheckpointError, OutputError
 from rift_cl.io.output import atomic_path, check_space, make_folder, write_json, writing
 from rift_cl.jobs.reconstruct.report import PREVIEW_PICTURE
 from rift_cl.jobs.reconstruct.settings import ReconstructSettings
+from rift_cl.jobs.reconstruct.volume import volume_path
 from rift_cl.jobs.run_folder import RunFolder
 
 Floats = NDArray[np.float32]
@@ -71,14 +72,7 @@ class SlabFolder:
         Raises:
             CheckpointError: it does not; the sentence names what differs.
         """
-        before = self._recorded()
-        differs = sorted(name for name in {*before, *run} if before.get(name) != run.get(name))
-        if differs:
-            name = differs[0]
-            raise CheckpointError(
-                f"{self.path}: the run that was cut off had {name} {before.get(name)}, this one "
-                f"has {run.get(name)}: repeat its options, or begin anew with --overwrite"
-            )
+        demand_same(self.path, "the run that was cut off", self._recorded(), run)
 
     def _recorded(self) -> dict[str, Any]:
         try:
@@ -142,6 +136,34 @@ class SlabFolder:
         return [entry for entry in found if 0 <= entry[0] < entry[1] <= self.shape[0]]
 
 
+def demand_same(path: Path, what: str, before: Mapping[str, Any], run: Mapping[str, Any]) -> None:
+    """Make sure that two runs make the same slices.
+
+    Raises:
+        CheckpointError: they do not; the sentence names what differs.
+    """
+    differs = sorted(name for name in {*before, *run} if before.get(name) != run.get(name))
+    if differs:
+        name = differs[0]
+        raise CheckpointError(
+            f"{path}: {what} had {name} {before.get(name)}, this one has {run.get(name)}: repeat "
+            "its options, or begin anew with --overwrite"
+        )
+
+
+def finished_run(settings: ReconstructSettings) -> dict[str, Any] | None:
+    """What decided the slices of the finished run in the folder; None where there is none.
+
+    One whose volume is not there in the settings' format does not count.
+    """
+    try:
+        config = json.loads((settings.out / "config.json").read_text(encoding="utf-8"))
+        finished = config["complete"] and volume_path(settings).exists()
+        return dict(config["run"]) if finished else None
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
+
+
 def run_folder(settings: ReconstructSettings, kept: SlabFolder) -> RunFolder:
     """The folder of a run, if it may be used.
 
@@ -156,4 +178,5 @@ def run_folder(settings: ReconstructSettings, kept: SlabFolder) -> RunFolder:
         )
     # A preview alone is there to be followed by the slices.
     alone = out.is_dir() and {p.name for p in out.iterdir()} <= {PREVIEW_PICTURE, "config.json"}
-    return RunFolder(out, "reconstruct", overwrite=settings.overwrite or alone, resume=begun)
+    there = begun or (settings.resume and finished_run(settings) is not None)
+    return RunFolder(out, "reconstruct", overwrite=settings.overwrite or alone, resume=there)

@@ -15,6 +15,7 @@ from rift_cl.cl.budget import format_bytes
 from rift_cl.html_page import Page
 from rift_cl.io.output import atomic_path
 from rift_cl.jobs.few import evenly
+from rift_cl.jobs.reconstruct.decided import in_words
 from rift_cl.jobs.reconstruct.volume import volume_path
 from rift_cl.plot import curves, figure_png, image_grid
 
@@ -34,35 +35,39 @@ class Preview:
     """Collects a few slices and the statistics of all of them as they pass.
 
     Args:
-        wanted: the slices to keep.
-        slices: those seen so far, by their number.
+        count: slices of the volume.
+        slices: those kept so far, by their number: some for the report, and the middle one.
     """
 
-    wanted: frozenset[int]
+    count: int
     slices: dict[int, NDArray[np.float32]] = field(default_factory=dict)
     _lowest: float = np.inf
     _highest: float = -np.inf
     _sum: float = 0.0
-    _count: int = 0
+    _samples: int = 0
 
-    @classmethod
-    def of(cls, count: int) -> Preview:
-        """For a volume of ``count`` slices, kept evenly from the first to the last."""
-        kept = evenly(count, min(count, _PANELS))
-        return cls(frozenset(int(i) for i in kept))
+    @property
+    def panels(self) -> list[int]:
+        """Numbers of the slices that the report shows, evenly from the first to the last."""
+        return evenly(self.count, min(self.count, _PANELS))
+
+    @property
+    def middle(self) -> NDArray[np.float32]:
+        """The middle slice."""
+        return self.slices[self.count // 2]
 
     def take(self, start: int, block: NDArray[np.float32]) -> None:
         """Look at a block of slices, the first of which is number ``start``."""
         self._lowest = min(self._lowest, float(block.min()))
         self._highest = max(self._highest, float(block.max()))
         self._sum += float(block.sum(dtype=np.float64))
-        self._count += block.size
-        for index in self.wanted & set(range(start, start + len(block))):
+        self._samples += block.size
+        for index in {*self.panels, self.count // 2} & set(range(start, start + len(block))):
             self.slices[index] = block[index - start].copy()
 
     def statistics(self) -> dict[str, float]:
         """Least, greatest and mean value of the whole volume."""
-        mean = self._sum / self._count
+        mean = self._sum / self._samples
         return {"minimum": self._lowest, "maximum": self._highest, "mean": mean}
 
 
@@ -82,7 +87,7 @@ def planned(job: Reconstruction, seconds: float) -> dict[str, str]:
     }
 
 
-def write_preview(path: Path, image: NDArray[np.float32], title: str, unit: str) -> None:
+def write_preview(path: Path, image: NDArray[np.float32], title: str) -> None:
     """Write a picture of one slice, for a look before the others are done."""
     figure = image_grid([image], titles=[title], columns=1, window=_window([image]), size=6.0)
     with atomic_path(path) as part:
@@ -92,7 +97,7 @@ def write_preview(path: Path, image: NDArray[np.float32], title: str, unit: str)
 def reconstruction_page(job: Reconstruction, preview: Preview) -> Page:
     """The report of a finished reconstruction."""
     page = Page(f"Reconstruction of {job.source.scan.path.name}", f"{job.shape[0]} slices")
-    kept = sorted(preview.slices)
+    kept = preview.panels
     images = [preview.slices[index] for index in kept]
     titles = [f"slice {job.rows[0] + index}" for index in kept]
     columns = min(3, len(images))
@@ -158,13 +163,19 @@ def _histogram(page: Page, images: list[NDArray[np.float32]], unit: str) -> None
     )
 
 
+def _axis(job: Reconstruction) -> str:
+    axis = job.source.axis
+    return f"bin {axis['center']:.2f}, by {axis['by']}"
+
+
 def _facts(job: Reconstruction) -> dict[str, Any]:
     scan, window = job.source.scan, job.inversion.window
     return {
         "projections": f"{scan.shape} (angle, row, bin)",
         "volume": f"{job.shape} (z, y, x)",
         "file": f"{scan.source}, {scan.kind}",
-        "method": job.settings.method,
+        "method": in_words(job.decided),
+        "axis": _axis(job),
         "spacing": f"{window.pixel:g} {job.source.unit}",
         **job.metrics,
     }

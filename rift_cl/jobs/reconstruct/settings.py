@@ -30,7 +30,7 @@ _STEPS = {"sirt": 100, "cgls": 30, "tv": 200}
 # With frequencies weighed, CGLS is near its best after the first few.
 _PRECONDITIONED_CGLS = 4
 # What may differ between a run and the one that goes on with it: it changes no bit of the result.
-_FREE = ("out", "device", "memory", "format", "overwrite", "resume", "dry_run", "preview")
+_FREE = ("out", "device", "memory", "format", "overwrite", "resume", "dry_run", "preview", "config")
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,9 @@ class ReconstructSettings(ScanInput):
     given."""
     exponent: float | None = None
     """fbp: of the high-pass |f|^exponent; 1, the ramp, if not given."""
-    compensate: Literal["voronoi", "capped-voronoi", "pipe-menon", "exact"] | None = None
-    """fbp: how views count that are unevenly spaced; as evenly spaced ones if not given."""
+    compensate: Literal["uniform", "voronoi", "capped-voronoi", "pipe-menon", "exact"] | None = None
+    """fbp: density compensation for irregular angles; if not given, voronoi where the angles cover
+    180 degrees, else uniform."""
     footprint: Literal["linear", "joseph", "strip"] = "linear"
     """How a pixel is spread over the bins."""
     error: float | None = None
@@ -106,6 +107,9 @@ class ReconstructSettings(ScanInput):
     """Go on with a reconstruction in the same folder that was cut off."""
     dry_run: bool = False
     """Show what would be done, and write nothing."""
+    config: Path | None = None
+    """config.json of an earlier run: its settings are used, with every value that was decided
+    there, where this command line gives no other."""
 
     def check(self) -> None:
         """Check what depends on nothing but the settings.
@@ -162,6 +166,14 @@ class ReconstructSettings(ScanInput):
         if self.exponent is not None:
             raise InputError("--exponent is the high-pass's: add --filter high-pass")
         return Ramp(self.filter or "ram-lak", 1.0 if self.cutoff is None else self.cutoff)
+
+    def asked(self) -> dict[str, Any]:
+        """The settings that differ from the defaults."""
+        return {
+            field.name: getattr(self, field.name)
+            for field in dataclasses.fields(self)
+            if getattr(self, field.name) != field.default
+        }
 
     def decisive(self) -> dict[str, Any]:
         """The settings on which the slices depend, as text."""

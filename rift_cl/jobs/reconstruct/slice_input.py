@@ -7,6 +7,7 @@ rings, fan to parallel, offset axis, continuation beyond the detector.
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +68,8 @@ class SliceInput:
         self.unit = unit if settings.unit is None else settings.unit
         self._pitch = pitch
         self.center = settings.center
+        # The axis as the configuration records it: the bin, and how it was found.
+        self.axis: dict[str, Any] = {}
         self.pad = 0
         # (angle, bin) whether a ray was measured, where some were not.
         self.seen: NDArray[np.bool_] | None = None
@@ -114,6 +117,7 @@ class SliceInput:
         if not self.settled:
             self.center = self._find_center(np.ascontiguousarray(row[:, 0]))
         self.geometry = self._parallel()
+        self.axis = self._axis_record()
         self.offset = self._sees_farther()
         truncated = is_truncated(row)
         wanted = self.settings.pad == "auto" and truncated and not self.offset
@@ -165,6 +169,17 @@ class SliceInput:
 
     def _sees_farther(self) -> bool:
         return self.fan is None and is_offset(self.geometry)
+
+    def _axis_record(self) -> dict[str, Any]:
+        if self.fan is not None:
+            return {
+                "center": self.fan.center,
+                "by": "the file" if self.settings.center is None else "--center",
+            }
+        return {
+            "center": self.center,
+            "by": "search" if self.settings.center is None else "--center",
+        }
 
     def _find_center(self, row: Floats) -> float:
         angles, bins = self.scan.angles, self.scan.shape[2]

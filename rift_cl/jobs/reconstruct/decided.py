@@ -1,0 +1,76 @@
+"""What a reconstruction decided by itself, as the settings that would decide it again.
+
+``config.json`` keeps these, so that a run can be repeated with ``--config`` and read years later:
+nothing in it is left to a default that another version may have, or to a search that may end
+elsewhere.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rift_cl.jobs.reconstruct.settings import ReconstructSettings
+from rift_cl.reconstruct.view_weights import view_weights
+
+if TYPE_CHECKING:
+    from rift_cl.jobs.reconstruct.inversion import Inversion
+    from rift_cl.jobs.reconstruct.slice_input import SliceInput
+
+
+def decided_settings(source: SliceInput, inversion: Inversion) -> ReconstructSettings:
+    """The settings with a value for everything that was left open.
+
+    Args:
+        source: the scan; located.
+        inversion: the method.
+    """
+    settings, scan, window = source.settings, source.scan, inversion.window
+    decided: dict[str, Any] = {
+        "scan": scan.path,
+        "out": settings.out.absolute(),
+        "rings": "on" if source.rings else "off",
+        "pad": "on" if source.pad else "off",
+        "center": source.geometry.center if source.fan is None else source.fan.center,
+        "rows": source.rows,
+        "pitch": source.pitch if source.fan is None else source.fan.pitch,
+        "unit": source.unit,
+        "pixel": window.pixel,
+        "size": window.size,
+        "background": scan.background,
+    }
+    if settings.iterative:
+        decided["steps"] = settings.most_steps
+    if settings.method == "fbp":
+        decided |= _filter(settings)
+        decided["compensate"] = settings.compensate or _weights(source.formula_geometry().angles)
+    return dataclasses.replace(settings, **decided)
+
+
+def _filter(settings: ReconstructSettings) -> dict[str, Any]:
+    if settings.filter == "high-pass":
+        return {"exponent": 1.0 if settings.exponent is None else settings.exponent}
+    cutoff = 1.0 if settings.cutoff is None else settings.cutoff
+    return {"filter": settings.filter or "ram-lak", "cutoff": cutoff}
+
+
+def _weights(angles: np.ndarray[Any, np.dtype[np.float64]]) -> str:
+    """Which of the two that are taken without a word were the views' weights."""
+    uniform = np.array_equal(view_weights(angles), view_weights(angles, "uniform"))
+    return "uniform" if uniform else "voronoi"
+
+
+def in_words(decided: ReconstructSettings) -> str:
+    """The method and its options, for people: ``fbp, ram-lak filter, voronoi weights``."""
+    words: list[str] = [decided.method]
+    if decided.method == "fbp":
+        high_pass = decided.filter == "high-pass"
+        shape = f"exponent {decided.exponent:g}" if high_pass else f"cut-off {decided.cutoff:g}"
+        words += [f"{decided.filter} filter, {shape}", f"{decided.compensate} view weights"]
+    if decided.iterative:
+        words += [f"at most {decided.steps} steps"]
+        words += [f"{decided.precondition} preconditioner"] if decided.precondition else []
+        words += ["non-negative"] if decided.nonnegative else []
+    return ", ".join(words)

@@ -1,0 +1,89 @@
+"""``--config``: a run begins with the settings of an earlier one, as its config.json has them.
+
+The file is read as if its values had been typed: each becomes an option of the command line and
+goes through the same parser, so that a value that cannot be used is refused as it always is.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+import tyro
+from tyro.conf import Positional
+
+from rift_cl.errors import InputError
+
+S = TypeVar("S")
+# Options that say how a command runs, not what comes out: they are not repeated.
+_NOT_REPEATED = ("config", "dry_run", "overwrite", "preview", "resume")
+_MOST_BYTES = 1 << 24
+
+
+def named_config(arguments: Sequence[str]) -> Path | None:
+    """The file that ``--config`` names on a command line, if it does."""
+    for place, argument in enumerate(arguments):
+        if argument.startswith("--config="):
+            return Path(argument.removeprefix("--config="))
+        if argument == "--config" and place + 1 < len(arguments):
+            return Path(arguments[place + 1])
+    return None
+
+
+def saved_settings(path: Path, job: str, settings: type[S]) -> S:
+    """The settings of an earlier run.
+
+    Args:
+        path: its config.json.
+        job: the command that is to be run again, such as "reconstruct".
+        settings: the command's settings.
+
+    Raises:
+        InputError: the file cannot be read, is another command's, or holds a setting that this
+            version does not have or a value that it does not take.
+    """
+    try:
+        if path.stat().st_size > _MOST_BYTES:
+            raise ValueError("it is too large")
+        record = json.loads(path.read_text(encoding="utf-8"))
+        name, values = record["job"], dict(record["settings"])
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise InputError(
+            f"--config {path}: cannot be read as the config.json of an earlier run ({error})"
+        ) from error
+    if name != job:
+        raise InputError(f"--config {path}: is of 'rift {name}', not of 'rift {job}'")
+    known = {field.name for field in dataclasses.fields(settings)}  # type: ignore[arg-type]
+    unknown = sorted(set(values) - known)
+    if unknown:
+        raise InputError(f"--config {path}: 'rift {job}' has no setting {unknown[0]!r}")
+    arguments = _as_arguments(values, settings)
+    try:
+        return tyro.cli(settings, args=arguments, console_outputs=False)
+    except SystemExit as error:
+        raise InputError(
+            f"--config {path}: holds a value that 'rift {job}' does not take; it stands for: "
+            f"rift {job} {' '.join(arguments)}"
+        ) from error
+
+
+def _as_arguments(values: dict[str, Any], settings: type) -> list[str]:
+    """The command line that means these values."""
+    hints = get_type_hints(settings, include_extras=True)
+    positional, options = [], []
+    for name, value in values.items():
+        if value is None or name in _NOT_REPEATED:
+            continue
+        option = "--" + name.replace("_", "-")
+        if Positional in getattr(hints[name], "__metadata__", ()):
+            positional.append(str(value))
+        elif isinstance(value, bool):
+            options.append(option if value else f"--no-{option[2:]}")
+        elif isinstance(value, list):
+            options += [option, *map(str, value)]
+        else:
+            options.append(f"{option}={value}")
+    return [*positional, *options]
