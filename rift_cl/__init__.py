@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from rift_cl.cl import Device, default_device, devices, open_device
     from rift_cl.errors import RiftError
     from rift_cl.geometry import Aperture, Camera, CameraType, FanBeam, Grid, Parallel
-    from rift_cl.io import SplatScene, open_lens
+    from rift_cl.io import SplatScene, open_lens, open_scan
+    from rift_cl.jobs.reconstruct.reconstruct_scan import reconstruct_scan
     from rift_cl.operators import (
         FastProjector,
         HighPass,
@@ -73,7 +74,9 @@ _HOMES = {
     "next_views": "sampling",
     "open_device": "cl",
     "open_lens": "io",
+    "open_scan": "io",
     "plan": "sampling",
+    "reconstruct_scan": "jobs.reconstruct.reconstruct_scan",
     "sirt": "reconstruct",
     "tv": "reconstruct",
 }
@@ -115,8 +118,10 @@ __all__ = [
     "next_views",
     "open_device",
     "open_lens",
+    "open_scan",
     "phantom",
     "plan",
+    "reconstruct_scan",
     "sirt",
     "tv",
 ]

@@ -56,17 +56,33 @@ def saved_settings(path: Path, job: str, settings: type[S]) -> S:
         ) from error
     if name != job:
         raise InputError(f"--config {path}: is of 'rift {name}', not of 'rift {job}'")
+    repeated = {name: value for name, value in values.items() if name not in _NOT_REPEATED}
+    return parsed_settings(repeated, job, settings, where=f"--config {path}: ")
+
+
+def parsed_settings(values: dict[str, Any], job: str, settings: type[S], *, where: str = "") -> S:
+    """Settings of values by their names, which the command line's parser checks.
+
+    Args:
+        values: what is given; the rest has its defaults, and so has what is None.
+        job: the command.
+        settings: its settings.
+        where: what a sentence about a mistake begins with.
+
+    Raises:
+        InputError: there is no such setting, or a value is none that it takes.
+    """
     known = {field.name for field in dataclasses.fields(settings)}  # type: ignore[arg-type]
     unknown = sorted(set(values) - known)
     if unknown:
-        raise InputError(f"--config {path}: 'rift {job}' has no setting {unknown[0]!r}")
+        raise InputError(f"{where}'rift {job}' has no setting {unknown[0]!r}")
     arguments = _as_arguments(values, settings)
     try:
         return tyro.cli(settings, args=arguments, console_outputs=False)
     except SystemExit as error:
         raise InputError(
-            f"--config {path}: holds a value that 'rift {job}' does not take; it stands for: "
-            f"rift {job} {' '.join(arguments)}"
+            f"{where}'rift {job}' does not take all of these values: rift {job} "
+            f"{' '.join(arguments)}"
         ) from error
 
 
@@ -75,14 +91,14 @@ def _as_arguments(values: dict[str, Any], settings: type) -> list[str]:
     hints = get_type_hints(settings, include_extras=True)
     positional, options = [], []
     for name, value in values.items():
-        if value is None or name in _NOT_REPEATED:
+        if value is None:
             continue
         option = "--" + name.replace("_", "-")
         if Positional in getattr(hints[name], "__metadata__", ()):
             positional.append(str(value))
         elif isinstance(value, bool):
             options.append(option if value else f"--no-{option[2:]}")
-        elif isinstance(value, list):
+        elif isinstance(value, (list, tuple)):
             options += [option, *map(str, value)]
         else:
             options.append(f"{option}={value}")

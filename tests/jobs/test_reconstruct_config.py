@@ -81,7 +81,10 @@ def test_a_preview_is_always_left(first):
         ("[]", "cannot be read"),
         ('{"job": "fit", "settings": {}}', "is of 'rift fit'"),
         ('{"job": "reconstruct", "settings": {"colour": 3}}', "no setting 'colour'"),
-        ('{"job": "reconstruct", "settings": {"scan": "x", "filter": "best"}}', "does not take"),
+        (
+            '{"job": "reconstruct", "settings": {"scan": "x", "filter": "best"}}',
+            "does not take all",
+        ),
         ('{"job": "reconstruct", "settings": {"scan": "x", "steps": "many"}}', "does not take"),
     ],
 )
