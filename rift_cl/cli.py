@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from importlib import import_module
 from typing import Any
 
 import tyro
@@ -30,53 +31,38 @@ def _run(arguments: Sequence[str]) -> int:
     if list(arguments) == ["--version"]:
         print(f"rift {__version__}")
         return 0
-    chosen: Callable[[], int] = tyro.extras.subcommand_cli_from_dict(
-        _commands(_earlier(arguments)),
+    config = (tyro.conf.OmitArgPrefixes,)
+    if arguments and arguments[0] in _COMMANDS:
+        name, *rest = arguments
+        chosen: Callable[[], int] = tyro.cli(
+            _command(name, _earlier(name, rest)), prog=f"rift {name}", args=rest, config=config
+        )
+        return chosen()
+    chosen = tyro.extras.subcommand_cli_from_dict(
+        {name: _command(name) for name in _COMMANDS},
         prog="rift",
         description="Tomography and splatting on any OpenCL device.",
         args=arguments,
-        config=(tyro.conf.OmitArgPrefixes,),
+        config=config,
     )
     return chosen()
 
 
-def _earlier(arguments: Sequence[str]) -> Any:
+def _command(name: str, earlier: Any = None) -> Callable[..., Callable[[], int]]:
+    """A command for tyro; of all the commands' modules, only its own is imported."""
+    run, home, settings = _COMMANDS[name]
+    return command(run, getattr(import_module(f"rift_cl.jobs.{home}"), settings), earlier)
+
+
+def _earlier(name: str, arguments: Sequence[str]) -> Any:
     """The settings of the run that ``--config`` names, which options change; else None."""
+    if name != "reconstruct":
+        return None
     from rift_cl.jobs.reconstruct.settings import ReconstructSettings
     from rift_cl.jobs.saved_settings import named_config, saved_settings
 
-    if not arguments or arguments[0] != "reconstruct":
-        return None
     path = named_config(arguments)
-    return None if path is None else saved_settings(path, "reconstruct", ReconstructSettings)
-
-
-def _commands(earlier: Any = None) -> dict[str, Callable[..., Callable[[], int]]]:
-    from rift_cl.jobs.analyze_settings import AnalyzeSettings
-    from rift_cl.jobs.cache import CacheSettings
-    from rift_cl.jobs.center import CenterSettings
-    from rift_cl.jobs.demo import DemoSettings
-    from rift_cl.jobs.devices import DevicesSettings
-    from rift_cl.jobs.evaluate import EvalSettings
-    from rift_cl.jobs.fit_settings import FitSettings
-    from rift_cl.jobs.plan_settings import PlanSettings
-    from rift_cl.jobs.reconstruct.settings import ReconstructSettings
-    from rift_cl.jobs.render_settings import RenderSettings
-    from rift_cl.jobs.view import ViewSettings
-
-    return {
-        "devices": command(_devices, DevicesSettings),
-        "demo": command(_demo, DemoSettings),
-        "reconstruct": command(_reconstruct, ReconstructSettings, earlier),
-        "center": command(_center, CenterSettings),
-        "fit": command(_fit, FitSettings),
-        "eval": command(_eval, EvalSettings),
-        "render": command(_render, RenderSettings),
-        "view": command(_view, ViewSettings),
-        "analyze": command(_analyze, AnalyzeSettings),
-        "plan": command(_plan, PlanSettings),
-        "cache": command(_cache, CacheSettings),
-    }
+    return None if path is None else saved_settings(path, name, ReconstructSettings)
 
 
 def _devices(settings: Any, output: Output) -> None:
@@ -204,6 +190,22 @@ def _cache(settings: Any, output: Output) -> None:
     from rift_cl.jobs.cache import run_cache
 
     print(run_cache(settings))
+
+
+# What runs each command, and where its settings are.
+_COMMANDS: dict[str, tuple[Callable[[Any, Output], None], str, str]] = {
+    "devices": (_devices, "devices", "DevicesSettings"),
+    "demo": (_demo, "demo", "DemoSettings"),
+    "reconstruct": (_reconstruct, "reconstruct.settings", "ReconstructSettings"),
+    "center": (_center, "center", "CenterSettings"),
+    "fit": (_fit, "fit_settings", "FitSettings"),
+    "eval": (_eval, "evaluate", "EvalSettings"),
+    "render": (_render, "render_settings", "RenderSettings"),
+    "view": (_view, "view", "ViewSettings"),
+    "analyze": (_analyze, "analyze_settings", "AnalyzeSettings"),
+    "plan": (_plan, "plan_settings", "PlanSettings"),
+    "cache": (_cache, "cache", "CacheSettings"),
+}
 
 
 if __name__ == "__main__":
