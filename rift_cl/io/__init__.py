@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rift_cl.io.scan import open_scan
     from rift_cl.io.scan_file import ScanFile, ScanRows
     from rift_cl.io.splat_scene import SplatScene
-    from rift_cl.io.volume import VolumeWriter, open_volume, read_volume
+    from rift_cl.io.volumes import VolumeWriter, open_volume, read_volume, suggested_window
 
 _HOMES = {
     "Capture": "capture",
@@ -34,7 +34,7 @@ _HOMES = {
     "ScanRows": "scan_file",
     "SplatScene": "splat_scene",
     "View": "capture",
-    "VolumeWriter": "volume",
+    "VolumeWriter": "volumes",
     "atomic_path": "output",
     "camera_at": "capture",
     "demand_photographs": "photographs",
@@ -43,11 +43,12 @@ _HOMES = {
     "open_capture": "capture",
     "open_lens": "lens_file",
     "open_scan": "scan",
-    "open_volume": "volume",
+    "open_volume": "volumes",
     "pose_photographs": "photographs",
     "read_image": "image",
     "read_view": "capture",
-    "read_volume": "volume",
+    "read_volume": "volumes",
+    "suggested_window": "volumes",
     "write_json": "output",
     "write_png": "image",
     "write_text": "output",
@@ -74,6 +75,7 @@ __all__ = [
     "read_image",
     "read_view",
     "read_volume",
+    "suggested_window",
     "write_json",
     "write_png",
     "write_text",

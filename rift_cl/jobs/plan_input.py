@@ -13,7 +13,7 @@ from rift_cl.geometry.camera_type import CameraType
 from rift_cl.io.camera_file import CameraChoice, read_cameras, with_lens
 from rift_cl.io.capture import holds_capture
 from rift_cl.io.lens_file import open_lens
-from rift_cl.io.volume import read_volume
+from rift_cl.io.volumes import read_volume
 from rift_cl.jobs.analyze_input import open_sampled
 from rift_cl.jobs.analyze_settings import AnalyzeSettings
 from rift_cl.jobs.keep_out_words import keep_out_of

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.io.splat_scene import XrayScene
-from rift_cl.io.volume import open_volume
+from rift_cl.io.volumes import open_volume
 from rift_cl.jobs.few import evenly
 from rift_cl.jobs.fit import split_views
 from rift_cl.jobs.fit_run import FitRun

@@ -33,7 +33,7 @@ def test_places_where_nothing_can_be_written(tmp_path: Path, format: str, place:
 @FORMATS
 def test_the_wrong_kind_of_thing_is_there(tmp_path: Path, format: str) -> None:
     path = tmp_path / "v"
-    if format == "h5":
+    if format in ("h5", "mrc", "tiff-stack"):
         path.mkdir()
     else:
         path.write_text("mine")
@@ -80,6 +80,8 @@ def test_too_little_room(tmp_path: Path, format: str, monkeypatch: pytest.Monkey
         ("zarr", "pathlib.Path.rename"),
         ("h5", "os.fsync"),
         ("h5", "pathlib.Path.replace"),
+        ("mrc", "os.fsync"),
+        ("tiff-stack", "pathlib.Path.replace"),
     ],
 )
 def test_the_last_steps_fail(

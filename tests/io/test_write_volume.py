@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
-import h5py
 import numpy as np
-import OpenImageIO
 import pytest
-import zarr
 from volume_files import FORMATS, SHAPE, VOLUME, left, save
 
 from rift_cl.errors import (
@@ -38,30 +34,6 @@ def test_slabs_in_any_order_and_of_any_layout(tmp_path: Path, format: str) -> No
         writer.write(0, VOLUME[1:2])
         writer.write(0, VOLUME[:1])
     np.testing.assert_array_equal(read_volume(tmp_path / "v"), VOLUME)
-
-
-def test_what_the_files_say(tmp_path: Path) -> None:
-    for format in ("tiff", "zarr", "h5"):
-        spacing = (1.0, 0.5, 0.25)
-        with open_volume(
-            tmp_path / format, SHAPE, format=format, spacing=spacing, unit="mm"
-        ) as writer:
-            writer.write(0, VOLUME)
-    expected = {"axes": ["z", "y", "x"], "spacing": [1.0, 0.5, 0.25], "unit": "mm"}
-    with h5py.File(tmp_path / "h5") as file:
-        attributes = file["volume"].attrs
-        assert attributes["unit"] == "mm"
-        assert list(attributes["axes"]) == expected["axes"]
-        assert list(attributes["spacing"]) == expected["spacing"]
-    array = zarr.open_array(str(tmp_path / "zarr"), mode="r")
-    assert dict(array.attrs) == {**expected, "complete": True}
-    assert array.chunks == (1, 6, 7)
-    source = OpenImageIO.ImageInput.open(str(tmp_path / "tiff" / "slice_00004.tif"))
-    get = source.spec().getattribute
-    assert json.loads(get("ImageDescription")) == expected
-    assert get("ResolutionUnit") == "cm"
-    assert (get("XResolution"), get("YResolution")) == pytest.approx((40, 20))
-    source.close()
 
 
 @FORMATS
@@ -127,6 +99,8 @@ def test_slabs_that_do_not_fit(tmp_path: Path, format: str) -> None:
         {"shape": (0, 6, 7)},
         {"spacing": 0},
         {"spacing": (1, 2)},
+        {"origin": (1, 2)},
+        {"origin": float("nan")},
     ],
 )
 def test_arguments(tmp_path: Path, changed: dict[str, object]) -> None:

@@ -11,7 +11,7 @@ from rift_cl.io import open_volume
 
 SHAPE = (5, 6, 7)
 VOLUME = np.random.default_rng(5).standard_normal(SHAPE).astype(np.float32)
-FORMATS = pytest.mark.parametrize("format", ["tiff", "zarr", "h5"])
+FORMATS = pytest.mark.parametrize("format", ["tiff", "tiff-stack", "zarr", "h5", "mrc"])
 
 
 def save(path: Path, format: str, volume: np.ndarray = VOLUME) -> None:

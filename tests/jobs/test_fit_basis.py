@@ -12,7 +12,7 @@ import rift_cl as rift
 from rift_cl.cli import main
 from rift_cl.errors import StoppedError
 from rift_cl.io.splat_scene import XrayScene
-from rift_cl.io.volume import read_volume
+from rift_cl.io.volumes import read_volume
 from rift_cl.jobs.basis_options import BasisOptions
 from rift_cl.jobs.fit import Fit
 from rift_cl.jobs.fit_settings import FitSettings

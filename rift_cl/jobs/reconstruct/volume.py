@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Literal
 
-from rift_cl.io.volume import VolumeWriter, open_volume
+from rift_cl.io.volumes import VolumeWriter, open_volume
 from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 from rift_cl.jobs.reconstruct.slice_input import SliceInput
 from rift_cl.jobs.reconstruct.slice_window import Window

@@ -1,0 +1,283 @@
+"""A volume as OME-Zarr 0.4: a Zarr group of the volume and coarser copies of it.
+
+Version 0.4 of OME-NGFF (https://ngff.openmicroscopy.org/0.4) on Zarr 2 is what napari, Fiji,
+Neuroglancer and their like have opened for years; Zarr 2.18 and 3 both write it. The headers are
+written here, so that they are the same bytes whichever of the two is installed.
+
+A store says ``complete: false`` until its last copy is on the disk, so that one that was cut off
+is known even when somebody renames it. Zarr takes a chunk that is missing for zeros; in a store
+that says ``complete: true`` every chunk was written, and one that is missing is an error.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numcodecs
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+
+from rift_cl.errors import FileFormatError, PathEscapeError, ShapeError
+from rift_cl.io.boundary import check_claim, check_numeric
+from rift_cl.io.output import staged_folder, writing
+from rift_cl.io.volumes.layout import Floats, SliceStatistics, VolumeLayout
+from rift_cl.io.volumes.plain_samples import WriteSlab
+from rift_cl.io.volumes.pyramid import coarser_shapes, halved
+from rift_cl.io.volumes.sample_window import restored, suggested_window
+
+_CHUNK = (16, 256, 256)
+# Packing of chunks: nearly as fast as none, and every reader of Zarr has it.
+_COMPRESSOR = {"id": "blosc", "cname": "zstd", "clevel": 1, "shuffle": 2, "blocksize": 0}
+# Slices of the coarsest copy from which the range to display is taken.
+_LOOKED_AT = 16
+# Our own entry among the attributes.
+_OURS = "rift_cl"
+_STORE = re.compile(r"\.zgroup(\..*)?|\.zattrs(\..*)?|\d{1,2}")
+_LARGEST_HEADER = 1 << 20
+# Decoders that only unpack bytes. Others, such as "pickle", would run what the file says.
+_CODECS = {"blosc", "bytes", "crc32c", "gzip", "lz4", "zlib", "zstd"}
+
+
+@contextmanager
+def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
+    """Write chunks into a store that gets its name at the end."""
+    statistics = SliceStatistics(layout.shape[0])
+    with staged_folder(path, _strange) as folder:
+        with writing(path):
+            _write_json(folder / ".zgroup", {"zarr_format": 2})
+            _write_json(folder / ".zattrs", {_OURS: {**layout.attributes, "complete": False}})
+            volume = _create(folder / "0", layout.shape, layout)
+
+        def write_slab(start: int, slab: NDArray[Any]) -> None:
+            with writing(path), _one_thread():
+                volume[start : start + len(slab)] = slab
+            statistics.take(start, slab)
+
+        yield write_slab
+        with writing(path):
+            coarsest = _write_copies(folder, layout, volume)
+            shown = _display(layout, statistics.range, coarsest)
+            _write_json(folder / ".zattrs", _attributes(path, layout, shown))
+
+
+def load_volume(path: Path, *, budget: int | None) -> Floats:
+    """Read the finest array of a store, or an array that stands alone."""
+    _check_entries(path)
+    attributes, place = _finest(path)
+    ours = attributes.get(_OURS)
+    if isinstance(ours, dict) and ours.get("complete") is not True:
+        raise FileFormatError(f"{path}: was cut off while it was written; write it again")
+    if not any((place / name).is_file() for name in ("zarr.json", ".zarray")):
+        raise FileFormatError(f"{path}: lacks the array {place.name!r} that it names")
+    _check_codecs(place)
+    array: Any = zarr.open_array(str(place), mode="r")
+    check_numeric(path, "the array", array.dtype)
+    if array.ndim != 3 or 0 in array.shape:
+        raise ShapeError(f"{path}: has shape {array.shape}, wanted (z, y, x)")
+    each = array.dtype.itemsize + (0 if array.dtype == np.float32 else 4)
+    need = math.prod(array.shape) * each + math.prod(array.chunks) * array.dtype.itemsize
+    check_claim(path, "the volume", need, budget)
+    if not isinstance(ours, dict):
+        return np.asarray(array[...], np.float32)
+    _check_chunks(place, array)
+    if "scale_factor" in ours:
+        return restored(array[...], float(ours["scale_factor"]), float(ours["add_offset"]))
+    return np.asarray(array[...], np.float32)
+
+
+def _create(place: Path, shape: tuple[int, ...], layout: VolumeLayout) -> Any:
+    """A new array of a store, of which every chunk will be written, zeros too."""
+    chunks = [min(n, chunk) for n, chunk in zip(shape, _CHUNK, strict=True)]
+    place.mkdir()
+    header = {
+        "zarr_format": 2,
+        "shape": list(shape),
+        "chunks": chunks,
+        "dtype": layout.dtype.str if layout.dtype.itemsize > 1 else "|u1",
+        "order": "C",
+        "dimension_separator": "/",
+        "compressor": _COMPRESSOR,
+        "filters": None,
+        "fill_value": 0,
+    }
+    _write_json(place / ".zarray", header)
+    # The name under which xarray looks for the axes.
+    attributes: dict[str, Any] = {"_ARRAY_DIMENSIONS": ["z", "y", "x"]}
+    if layout.window is not None:
+        attributes |= layout.window.attributes
+    _write_json(place / ".zattrs", attributes)
+    config = getattr(zarr, "config", None)
+    if config is None:
+        return zarr.open_array(str(place), mode="r+", write_empty_chunks=True)
+    with config.set({"array.write_empty_chunks": True}):
+        return zarr.open_array(str(place), mode="r+", zarr_format=2)
+
+
+def _write_copies(folder: Path, layout: VolumeLayout, finest: Any) -> NDArray[Any]:
+    """Write the coarser copies, chunk by chunk, and give the coarsest of all."""
+    finer = finest
+    for level, (shape, factors) in enumerate(coarser_shapes(layout.shape), 1):
+        coarser = _create(folder / str(level), shape, layout)
+        for chunk in _chunks(shape, coarser.chunks):
+            source = tuple(
+                slice(f * part.start, min(f * part.stop, n))
+                for part, f, n in zip(chunk, factors, finer.shape, strict=True)
+            )
+            with _one_thread():
+                coarser[chunk] = halved(np.asarray(finer[source]), factors)
+        finer = coarser
+    return np.asarray(finer[...])
+
+
+def _chunks(shape: tuple[int, ...], chunks: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
+    starts = (range(0, n, chunk) for n, chunk in zip(shape, chunks, strict=True))
+    for corner in product(*starts):
+        yield tuple(
+            slice(at, min(at + chunk, n))
+            for at, chunk, n in zip(corner, chunks, shape, strict=True)
+        )
+
+
+def _attributes(path: Path, layout: VolumeLayout, shown: dict[str, float]) -> dict[str, Any]:
+    unit = {} if layout.unit_name is None else {"unit": layout.unit_name}
+    scale, datasets = list(layout.spacing), []
+    first = list(layout.origin)
+    steps = [(layout.shape, (1, 1, 1)), *coarser_shapes(layout.shape)]
+    for level, (_, factors) in enumerate(steps):
+        # The first sample of a copy stands in the middle of those that it is the mean of.
+        first = [at + (f - 1) / 2 * d for at, f, d in zip(first, factors, scale, strict=True)]
+        scale = [f * d for f, d in zip(factors, scale, strict=True)]
+        transformations = [
+            {"type": "scale", "scale": scale},
+            {"type": "translation", "translation": first},
+        ]
+        datasets.append({"path": str(level), "coordinateTransformations": transformations})
+    image = {
+        "version": "0.4",
+        "name": path.stem,
+        "axes": [{"name": axis, "type": "space", **unit} for axis in "zyx"],
+        "datasets": datasets,
+        "type": "mean",
+        "metadata": {"description": "means of 2 samples along each axis that was longer than 64"},
+    }
+    channel = {"active": True, "color": "FFFFFF", "label": "attenuation", "window": shown}
+    omero = {"channels": [channel], "rdefs": {"model": "greyscale"}} if shown else None
+    return {
+        "multiscales": [image],
+        **({"omero": omero} if omero else {}),
+        _OURS: {**layout.attributes, "complete": True},
+    }
+
+
+def _display(
+    layout: VolumeLayout, range: tuple[float, float], coarsest: NDArray[Any]
+) -> dict[str, float]:
+    """Which samples are shown black and white; nothing where some are not finite."""
+    if layout.window is not None:
+        return {"min": 0, "max": layout.window.levels, "start": 0, "end": layout.window.levels}
+    if not (all(map(math.isfinite, range)) and np.isfinite(coarsest).all()):
+        return {}
+    start, end = suggested_window(coarsest[:: -(-len(coarsest) // _LOOKED_AT)])
+    return {"min": range[0], "max": range[1], "start": start, "end": end}
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Blosc puts blocks down in the order in which its threads end: one thread, one order."""
+    before = numcodecs.blosc.use_threads
+    numcodecs.blosc.use_threads = False
+    try:
+        yield
+    finally:
+        numcodecs.blosc.use_threads = before
+
+
+def _write_json(path: Path, value: dict[str, Any]) -> None:
+    path.write_text(json.dumps(value, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    if path.stat().st_size > _LARGEST_HEADER:
+        raise FileFormatError(f"{path}: is too long for the header of a Zarr store")
+    value = json.loads(path.read_text(encoding="utf-8"))
+    if not isinstance(value, dict):
+        raise FileFormatError(f"{path}: is no header of a Zarr store")
+    return value
+
+
+def _finest(path: Path) -> tuple[dict[str, Any], Path]:
+    """Attributes of a store, and where its finest array is: of Zarr 2 and 3, group or array."""
+    if (path / "zarr.json").is_file():
+        header = _read_json(path / "zarr.json")
+        attributes = header.get("attributes", {})
+        attributes = attributes.get("ome", attributes)
+        group = header.get("node_type") == "group"
+    else:
+        there = (path / ".zattrs").is_file()
+        attributes = _read_json(path / ".zattrs") if there else {}
+        group = (path / ".zgroup").is_file()
+    if not group:
+        return attributes, path
+    if _OURS in attributes and "multiscales" not in attributes:
+        return attributes, path / "0"
+    try:
+        name = str(attributes["multiscales"][0]["datasets"][0]["path"])
+    except (KeyError, IndexError, TypeError) as error:
+        raise FileFormatError(
+            f"{path}: is a Zarr group that names no image; name one of its arrays"
+        ) from error
+    if not (path / name).resolve().is_relative_to(path.resolve()):
+        raise PathEscapeError(f"{path}: {name!r} leads outside the store; copy it in")
+    return attributes, path / name
+
+
+def _check_entries(path: Path) -> None:
+    root = path.resolve()
+    for entry in path.rglob("*"):
+        if entry.is_symlink() and not entry.resolve().is_relative_to(root):
+            raise PathEscapeError(f"{path}: {entry.name!r} leads outside the store; copy it in")
+        if not (entry.is_file() or entry.is_dir()):
+            raise FileFormatError(f"{path}: {entry.name!r} is neither a file nor a folder")
+
+
+def _check_chunks(place: Path, array: Any) -> None:
+    counts = (-(-n // chunk) for n, chunk in zip(array.shape, array.chunks, strict=True))
+    for index in product(*(range(count) for count in counts)):
+        chunk = place.joinpath(*map(str, index))
+        if not chunk.is_file():
+            raise FileFormatError(
+                f"{place.parent}: the chunk {chunk.relative_to(place.parent)} is missing; copy the "
+                "store again, or write it again"
+            )
+
+
+def _check_codecs(path: Path) -> None:
+    for header in (path / "zarr.json", path / ".zarray"):
+        if header.exists():
+            strange = _codecs(header) - _CODECS
+            if strange:
+                raise FileFormatError(
+                    f"{path}: is packed with {sorted(strange)}, wanted some of {sorted(_CODECS)}"
+                )
+
+
+def _codecs(header: Path) -> set[str]:
+    meta = _read_json(header)
+    codecs = [*meta.get("codecs", []), meta.get("compressor"), *(meta.get("filters") or [])]
+    names = (codec.get(key) for codec in codecs if codec for key in ("name", "id"))
+    return {str(name) for name in names if name is not None}
+
+
+def _strange(names: list[str]) -> str | None:
+    strange = next((name for name in names if not _STORE.fullmatch(name)), None)
+    if strange is None and names and ".zgroup" not in names:
+        return names[0]
+    return strange

@@ -1,0 +1,103 @@
+"""A volume as one TIFF file of many pages, as ImageJ saves a stack.
+
+Up to 4 GB it is a classic TIFF, which ImageJ opens by itself. Beyond, it is a BigTIFF, which Fiji
+opens by Bio-Formats. The pages lie one behind the other without a gap, as ImageJ expects.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tifffile
+from numpy.typing import NDArray
+
+from rift_cl.errors import FileFormatError
+from rift_cl.io.boundary import check_claim, check_numeric
+from rift_cl.io.volumes.imagej import calibration, description, resolution
+from rift_cl.io.volumes.layout import Floats, SliceStatistics, VolumeLayout
+from rift_cl.io.volumes.plain_samples import WriteSlab, staged_samples
+from rift_cl.io.volumes.sample_window import restored
+
+# Offsets of a classic TIFF have 32 bits; the pages' directories take their share.
+_CLASSIC = (1 << 32) - (1 << 25)
+_DIRECTORY = 1 << 9
+
+
+@contextmanager
+def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
+    """Write pages into a file that gets its name at the end."""
+    statistics = SliceStatistics(layout.shape[0])
+    header, finish = partial(_write_header, layout), partial(_write_display, layout, statistics)
+    with staged_samples(path, layout, header, finish) as write:
+
+        def write_slab(start: int, slab: NDArray[Any]) -> None:
+            write(start, slab)
+            statistics.take(start, slab)
+
+        yield write_slab
+
+
+def load_volume(path: Path, *, budget: int | None) -> Floats:
+    """Read every page of a stack that ``staged_volume`` wrote."""
+    with tifffile.TiffFile(path) as file:
+        page: Any = file.pages.first
+        notes = file.imagej_metadata or {}
+        slices, place = int(notes.get("slices", 0)), page.dataoffsets[0]
+        plain = page.compression == 1 and len(page.shape) == 2 and page.is_contiguous
+        if not plain or slices < 1:
+            raise FileFormatError(
+                f"{path}: is no stack of plain slices with ImageJ's notes; save it as one in ImageJ"
+            )
+        dtype = np.dtype(page.dtype).newbyteorder(file.byteorder)
+        check_numeric(path, "the stack", dtype)
+        shape = (slices, *page.shape)
+        size = math.prod(shape)
+        if place + size * dtype.itemsize > path.stat().st_size:
+            raise FileFormatError(f"{path}: is shorter than the {slices} slices that it names")
+        check_claim(path, "the volume", size * (4 + dtype.itemsize), budget)
+        step, offset = calibration(notes)
+    samples = np.fromfile(path, dtype, size, offset=place).reshape(shape)
+    if (step, offset) == (1, 0):
+        return np.ascontiguousarray(samples, np.float32)
+    return restored(samples, step, offset)
+
+
+def _write_header(layout: VolumeLayout, part: Path) -> int:
+    count = layout.shape[0]
+    big = layout.size + _DIRECTORY * count > _CLASSIC
+    with tifffile.TiffWriter(part, bigtiff=big) as file:
+        place = file.write(
+            None,
+            shape=layout.shape,
+            dtype=layout.dtype,
+            photometric="minisblack",
+            contiguous=True,
+            metadata=None,
+            software=False,
+            description=description(layout, slices=count, display=_display(layout, (0.0, 0.0))),
+            returnoffset=True,
+            **resolution(layout),
+        )
+    if place is None:
+        raise OSError("tifffile did not place the pages")
+    return int(place[0])
+
+
+def _display(layout: VolumeLayout, range: tuple[float, float]) -> tuple[float, float]:
+    if layout.window is not None:
+        return 0, layout.window.levels
+    return range if all(map(math.isfinite, range)) else (0.0, 0.0)
+
+
+def _write_display(layout: VolumeLayout, statistics: SliceStatistics, part: Path) -> None:
+    """Fill in the range of the samples, which is known at the end."""
+    display = _display(layout, statistics.range)
+    with tifffile.TiffFile(part, mode="r+b") as file:
+        tag: Any = file.pages.first.tags["ImageDescription"]
+        tag.overwrite(description(layout, slices=layout.shape[0], display=display))
