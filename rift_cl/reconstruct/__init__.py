@@ -10,7 +10,7 @@ from rift_cl.reconstruct.offset_axis import find_offset_center, widened
 from rift_cl.reconstruct.padding import extended
 from rift_cl.reconstruct.pdhg import Pdhg
 from rift_cl.reconstruct.poisson_weights import RayWeights, poisson_weights
-from rift_cl.reconstruct.rings import remove_rings
+from rift_cl.reconstruct.preprocess import remove_rings
 from rift_cl.reconstruct.seen_rays import SeenRays
 from rift_cl.reconstruct.simultaneous_iteration import Sirt, sirt
 from rift_cl.reconstruct.tv_reconstruction import tv

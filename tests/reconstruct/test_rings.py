@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
-from rift_cl.errors import ShapeError
-from rift_cl.reconstruct.rings import remove_rings
+from rift_cl.errors import InputError, NonFiniteError, ShapeError
+from rift_cl.reconstruct.preprocess import STRIPE_METHODS, remove_rings
+from rift_cl.reconstruct.preprocess.stripe_detection import fluctuating, offset
+from rift_cl.reference import detector_columns as twin
 
 BINS, VIEWS = 192, 240
 ANGLES = np.arange(VIEWS) * np.pi / VIEWS
@@ -104,7 +106,7 @@ def test_rows_are_mended_one_by_one(clean, noisy):
 
 
 def test_what_is_too_small_to_tell_is_left_alone():
-    for shape in ((5, 64), (64, 8)):
+    for shape in ((5, 64), (64, 8), (0, 64), (64, 0, 64), (1, 1, 1)):
         sinogram = np.random.default_rng(0).random(shape).astype(np.float32)
         np.testing.assert_array_equal(remove_rings(sinogram), sinogram)
 
@@ -112,3 +114,96 @@ def test_what_is_too_small_to_tell_is_left_alone():
 def test_other_axes_are_told():
     with pytest.raises(ShapeError, match="bin"):
         remove_rings(np.zeros(7, np.float32))
+
+
+def by_hand(sinogram, window):
+    """The default method, step by step with the twins."""
+    x = twin.blended(sinogram, fluctuating(twin.roughness(sinogram), 3))
+    ranked, order = twin.ranked(x)
+    level = twin.level(ranked, len(ranked) // 20)
+    ranked = twin.blended(ranked, offset(level, 5))
+    return twin.unranked(twin.median_across(ranked, window), order)
+
+
+@pytest.mark.parametrize("kind", ["full", "varying", "wide", "dead", "fluctuating"])
+def test_it_equals_its_steps_to_the_bit_on_every_device(device, noisy, kind):
+    bad, _ = striped(noisy, kind)
+    np.testing.assert_array_equal(remove_rings(bad, device=device), by_hand(bad, 3))
+    np.testing.assert_array_equal(remove_rings(bad, device=device, window=7), by_hand(bad, 7))
+
+
+# What each method is for. `fitting` blurs the edges of this phantom by as much as its stripes.
+GOOD_AT = [
+    ("sorting", "full"),
+    ("sorting", "varying"),
+    ("filtering", "full"),
+    ("filtering", "varying"),
+    ("large", "wide"),
+    ("dead", "dead"),
+    ("dead", "fluctuating"),
+    ("wavelet-fft", "full"),
+]
+
+
+@pytest.mark.parametrize(("method", "kind"), GOOD_AT)
+def test_a_method_removes_the_stripes_that_it_is_for(noisy, method, kind):
+    if method == "wavelet-fft":
+        pytest.importorskip("pywt")
+    bad, bins = striped(noisy, kind)
+    mended = remove_rings(bad, method=method)
+    before, after = (np.abs(y - noisy)[:, bins].mean() for y in (bad, mended))
+    assert after < 0.3 * before + 0.012 * noisy.max()
+
+
+def test_fitting_removes_low_stripes_of_a_smooth_object():
+    smooth = np.sin(np.linspace(0, np.pi, BINS)) * np.ones((VIEWS, 1))
+    stripes = np.random.default_rng(4).normal(0, 0.02, BINS)
+    bad = (smooth + stripes).astype(np.float32)
+    mended = remove_rings(bad, method="fitting")
+    assert np.std(mended - smooth) < 0.4 * np.std(stripes)
+
+
+@pytest.mark.parametrize("method", STRIPE_METHODS)
+def test_every_method_treats_rows_by_themselves_and_keeps_level_data(clean, noisy, method):
+    if method == "wavelet-fft":
+        pytest.importorskip("pywt")
+    stack = np.stack([clean, striped(noisy, "full")[0], clean * 0 + 0.7], axis=1)
+    mended = remove_rings(stack, method=method)
+    for row in range(3):
+        np.testing.assert_array_equal(mended[:, row], remove_rings(stack[:, row], method=method))
+    np.testing.assert_allclose(mended[:, 2], stack[:, 2], rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"method": "best"}, "method is 'best', wanted one of vo"),
+        ({"size": 5}, "method 'vo' has no option 'size', only window"),
+        ({"window": 4}, "window is 4, wanted an odd number"),
+        ({"window": 129}, "window is 129, wanted an odd number"),
+        ({"window": 127, "method": "sorting"}, "the detector has 64 bins"),
+        ({"large_ratio": 0.5}, "large_ratio is 0.5, wanted a number above 1"),
+        ({"dead_ratio": float("nan")}, "dead_ratio is nan"),
+        ({"method": "fitting", "degree": -1}, "degree is -1"),
+        ({"method": "fitting", "smoothing": 0}, "smoothing is 0"),
+        ({"method": "filtering", "smoothing": float("inf")}, "smoothing is inf"),
+        ({"method": "wavelet-fft", "width": 0}, "width is 0"),
+    ],
+)
+def test_options_that_mean_nothing_are_told_in_a_sentence(options, words):
+    with pytest.raises(InputError, match=words):
+        remove_rings(np.zeros((40, 64), np.float32), **options)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_values_that_are_not_finite_are_told(bad):
+    sinogram = np.zeros((40, 64), np.float32)
+    sinogram[3, 5] = bad
+    with pytest.raises(NonFiniteError, match="projections"):
+        remove_rings(sinogram)
+
+
+def test_a_wavelet_that_is_not_there_is_told():
+    pytest.importorskip("pywt")
+    with pytest.raises(InputError, match="wavelet is 'sine'"):
+        remove_rings(np.zeros((40, 64), np.float32), method="wavelet-fft", wavelet="sine")

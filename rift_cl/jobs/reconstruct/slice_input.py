@@ -31,7 +31,7 @@ from rift_cl.reconstruct.offset_axis import (
     widened,
 )
 from rift_cl.reconstruct.padding import extended, is_truncated
-from rift_cl.reconstruct.rings import remove_rings
+from rift_cl.reconstruct.preprocess import remove_rings
 
 Floats = NDArray[np.float32]
 # Stripes are told from the object where views go round so far: a flat face is a stripe in fewer.
@@ -156,7 +156,9 @@ class SliceInput:
         integrals = read_attenuation(self.scan, start, stop)
         if not self.rings:
             return integrals
-        return dataclasses.replace(integrals, projections=remove_rings(integrals.projections))
+        return dataclasses.replace(
+            integrals, projections=remove_rings(integrals.projections, device=self.device)
+        )
 
     def _parallel(self) -> Parallel:
         if self.fan is not None:
