@@ -58,6 +58,8 @@ def half(tmp_path_factory):
         ("--method", "sirt", "--steps", 40, "--nonnegative"),
         ("--method", "cgls", "--steps", 8, "--footprint", "joseph"),
         ("--method", "cgls", "--steps", 2, "--precondition", "ramp"),
+        ("--method", "cgls", "--steps", 8, "--weights", "counts"),
+        ("--method", "sirt", "--steps", 40, "--weights", "counts", "--nonnegative"),
         ("--method", "tv", "--steps", 150, "--nonnegative"),
     ],
 )

@@ -72,5 +72,6 @@ def in_words(decided: ReconstructSettings) -> str:
     if decided.iterative:
         words += [f"at most {decided.steps} steps"]
         words += [f"{decided.precondition} preconditioner"] if decided.precondition else []
+        words += ["rays weighed by counts"] if decided.weights else []
         words += ["non-negative"] if decided.nonnegative else []
     return ", ".join(words)

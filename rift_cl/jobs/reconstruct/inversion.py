@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Generator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,9 @@ from rift_cl.cl.device import Device
 from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 from rift_cl.jobs.reconstruct.slice_input import SliceInput
 from rift_cl.jobs.reconstruct.slice_window import Window
-from rift_cl.operators import FastProjector, ParallelProjector, Projector
+from rift_cl.operators import FastProjector, LinearOperator, ParallelProjector, Projector
 from rift_cl.progress import Report
-from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp
+from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp, poisson_weights
 from rift_cl.reconstruct.seen_rays import SeenRays
 from rift_cl.reconstruct.solver import Solver
 
@@ -147,20 +148,25 @@ class Inversion:
 
     def _solver(self, sinogram: Floats) -> Solver:
         settings = self.settings
-        whole, seen = self.projector(1), self.source.seen
-        A: ParallelProjector | SeenRays = whole if seen is None else SeenRays(whole, seen)
-        precondition, noise = settings.precondition, settings.noise
+        A, options = self._seen_rays(sinogram)
+        options |= {"precondition": settings.precondition, "noise": settings.noise}
         if settings.method == "cgls":
-            return Cgls(A, sinogram, precondition=precondition, noise=noise)
-        nonnegative = settings.nonnegative
+            return Cgls(A, sinogram, **options)
+        options["nonnegative"] = settings.nonnegative
         if settings.method == "sirt":
-            return Sirt(
-                A, sinogram, nonnegative=nonnegative, precondition=precondition, noise=noise
-            )
+            return Sirt(A, sinogram, **options)
         weight = usual_weight(sinogram) if settings.weight is None else settings.weight
-        return Pdhg(
-            A, sinogram, weight, nonnegative=nonnegative, precondition=precondition, noise=noise
-        )
+        return Pdhg(A, sinogram, weight, **options)
+
+    def _seen_rays(self, sinogram: Floats) -> tuple[LinearOperator, dict[str, Any]]:
+        """The projector of the rays that were measured, and the solver's weights of them."""
+        whole, seen = self.projector(1), self.source.seen
+        if self.settings.weights is None:
+            return (whole if seen is None else SeenRays(whole, seen)), {}
+        weights = poisson_weights(sinogram).weights
+        if seen is not None:
+            weights[~seen] = 0
+        return whole, {"weights": weights}
 
     def _projector(self, slices: int) -> ParallelProjector:
         settings, device = self.settings, self.device

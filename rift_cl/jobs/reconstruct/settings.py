@@ -21,6 +21,7 @@ _ONLY = {
     "compensate": ("fbp",),
     "steps": ITERATIVE,
     "noise": ITERATIVE,
+    "weights": ITERATIVE,
     "precondition": ITERATIVE,
     "weight": ("tv",),
     "nonnegative": ("sirt", "tv"),
@@ -72,6 +73,9 @@ class ReconstructSettings(ScanInput):
     """tv: of the total variation; the greater, the smoother."""
     nonnegative: bool = False
     """sirt, tv: no value below zero."""
+    weights: Literal["counts"] | None = None
+    """sirt, cgls, tv: weigh each ray by the photons that arrived (penalized weighted least
+    squares), so that rays starved by metal draw no streaks; all alike if not given."""
     precondition: Literal["ramp", "capped-voronoi"] | None = None
     """sirt, cgls, tv: weigh the residual's frequencies by a filter, which takes fewer steps."""
     center: float | None = None
