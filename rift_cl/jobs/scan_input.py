@@ -21,9 +21,6 @@ from rift_cl.io.scan_file import ScanFile
 from rift_cl.io.tiff_frames import TiffRows
 from rift_cl.reconstruct.flatfield import Attenuation, attenuation
 
-# How a volume is called in the folder of its run, by format.
-VOLUME_NAMES = {"tiff": "slices", "zarr": "volume.zarr", "h5": "volume.h5"}
-
 
 @dataclass(frozen=True)
 class ScanInput:

@@ -30,7 +30,7 @@ def first(scan, tmp_path_factory):
 def test_every_decision_is_recorded(first):
     config = config_of(first)
     settings = config["settings"]
-    wanted = {"filter": "ram-lak", "cutoff": 1.0, "compensate": "voronoi", "rings": "on"}
+    wanted = {"filter": "ram-lak", "cutoff": 1.0, "compensate": "voronoi", "rings": "vo"}
     assert {name: settings[name] for name in wanted} == wanted
     open_ones = ("center", "rows", "pitch", "unit", "pixel", "size", "background", "pad")
     assert all(settings[name] not in (None, "auto") for name in open_ones)
@@ -100,3 +100,45 @@ def test_a_configuration_that_cannot_be_used_is_told(text, sentence, tmp_path, c
 def test_a_configuration_that_is_not_there_is_told(tmp_path, capsys):
     assert run("reconstruct", "--config", tmp_path / "none.json") == INPUT
     assert "none.json" in capsys.readouterr().err
+
+
+def test_integers_record_the_window_that_was_chosen(first, scan, tmp_path):
+    out = tmp_path / "out"
+    options = ("--dtype", "uint16", "--format", "h5", "--center", 45)
+    assert run("reconstruct", scan.counts, "--out", out, *options) == 0
+    low, high = config_of(out)["settings"]["window"]
+    exact, coarse = read_volume(first / "slices"), read_volume(out / "volume.h5")
+    assert low < exact.min() < exact.max() < high
+    assert "a window chosen from 3 slices" in (out / "report.html").read_text()
+    again = tmp_path / "again"
+    assert run("reconstruct", "--config", out / "config.json", "--out", again) == 0
+    np.testing.assert_array_equal(coarse, read_volume(again / "volume.h5"))
+    assert np.ptp(coarse) == pytest.approx(np.ptp(exact), rel=0.05)
+
+
+def test_what_does_not_fit_the_window_is_counted(scan, tmp_path):
+    out = tmp_path / "out"
+    options = ("--dtype", "uint8", "--window", 0, 0.01, "--center", 45, "--format", "tiff-stack")
+    assert run("reconstruct", scan.counts, "--out", out, *options) == 0
+    metrics = json.loads((out / "metrics.json").read_text())
+    assert metrics["clipped_below"] > 0
+    assert metrics["clipped_above"] > 0
+    volume = read_volume(out / "volume.tif")
+    assert (volume.min(), volume.max()) == (0, pytest.approx(0.01))
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--window", 0, 1), "add --dtype"),
+        (("--dtype", "uint8", "--window", 1, 1), "window"),
+        (("--dtype", "uint8", "--window", 2, 1), "window"),
+        (("--dtype", "uint8", "--window", 0, "nan"), "window"),
+        (("--dtype", "uint8", "--format", "mrc"), "uint16"),
+    ],
+)
+def test_a_window_that_cannot_be_used_is_told(scan, tmp_path, capsys, options, sentence):
+    out = tmp_path / "out"
+    assert run("reconstruct", scan.counts, "--out", out, *options) == INPUT
+    assert sentence in capsys.readouterr().err
+    assert not out.exists()

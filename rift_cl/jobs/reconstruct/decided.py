@@ -20,18 +20,21 @@ if TYPE_CHECKING:
     from rift_cl.jobs.reconstruct.slice_input import SliceInput
 
 
-def decided_settings(source: SliceInput, inversion: Inversion) -> ReconstructSettings:
+def decided_settings(
+    source: SliceInput, inversion: Inversion, values: tuple[float, float] | None
+) -> ReconstructSettings:
     """The settings with a value for everything that was left open.
 
     Args:
         source: the scan; located.
         inversion: the method.
+        values: what the integers of the volume stand for; None for floating samples.
     """
     settings, scan, window = source.settings, source.scan, inversion.window
     decided: dict[str, Any] = {
         "scan": scan.path,
         "out": settings.out.absolute(),
-        "rings": "on" if source.rings else "off",
+        "rings": source.rings or "off",
         "pad": "on" if source.pad else "off",
         "center": source.geometry.center if source.fan is None else source.fan.center,
         "rows": source.rows,
@@ -40,6 +43,7 @@ def decided_settings(source: SliceInput, inversion: Inversion) -> ReconstructSet
         "pixel": window.pixel,
         "size": window.size,
         "background": scan.background,
+        "window": values,
     }
     if settings.iterative:
         decided["steps"] = settings.most_steps

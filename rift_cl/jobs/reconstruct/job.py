@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.errors import StoppedError
+from rift_cl.io.volumes import VOLUME_NAMES, suggested_window
 from rift_cl.jobs.reconstruct.decided import decided_settings
 from rift_cl.jobs.reconstruct.inversion import Inversion
 from rift_cl.jobs.reconstruct.kept_slabs import (
@@ -37,7 +38,6 @@ from rift_cl.jobs.reconstruct.report import (
 from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 from rift_cl.jobs.reconstruct.slice_input import SliceInput
 from rift_cl.jobs.reconstruct.volume import demand_place, open_slices, volume_path
-from rift_cl.jobs.scan_input import VOLUME_NAMES
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Attenuation
 
@@ -70,6 +70,8 @@ class Reconstruction:
         self.announce: Callable[[str], None] = lambda line: None
         # Whether the slabs that are there are this run's, and whether it found them there.
         self._ours, self._gone_on = False, False
+        # What the integers of the volume stand for.
+        self._values: tuple[float, float] | None = None
         # Whether this run has left a picture of the middle slice.
         self._shown = False
         self._begin = time.perf_counter()
@@ -97,7 +99,7 @@ class Reconstruction:
     @property
     def decided(self) -> ReconstructSettings:
         """The settings with all that was decided; of a run whose axis is known."""
-        return decided_settings(self.source, self.inversion)
+        return decided_settings(self.source, self.inversion, self._values)
 
     @cached_property
     def slabs(self) -> list[slice]:
@@ -260,10 +262,15 @@ class Reconstruction:
     def _finish(self) -> None:
         """Make the volume of the slabs, and the report."""
         preview = Preview(self.shape[0])
-        with open_slices(self.settings, self.source, self.inversion.window) as volume:
+        self._values = self._value_window()
+        window = self.inversion.window
+        with open_slices(self.settings, self.source, window, self._values) as volume:
             for start, slab in self._kept.slabs():
                 volume.write(start, slab)
                 preview.take(start, slab)
+        if self._values is not None:
+            below, above = volume.clipped
+            self.metrics |= {"clipped_below": below, "clipped_above": above}
         # From here on the slices are this run's, and an earlier configuration no longer theirs.
         self.folder.mark()
         self.folder.drop(*set(VOLUME_NAMES.values()) - {volume_path(self.settings).name})
@@ -280,6 +287,22 @@ class Reconstruction:
         facts = {"asked": self.settings.asked(), "axis": self.source.axis, "run": self._facts()}
         self.folder.finish(self.decided, record, page, self.device, **facts)
         self._kept.drop()
+
+    def _value_window(self) -> tuple[float, float] | None:
+        """What the integers of the volume stand for, from a few slices where it was not said."""
+        if self.settings.dtype == "float32" or self.settings.window is not None:
+            return self.settings.window
+        wanted = Preview(self.shape[0]).panels
+        slabs = self._kept.slabs(wanted)
+        images = [
+            slab[n - start] for start, slab in slabs for n in wanted if 0 <= n - start < len(slab)
+        ]
+        low, high = suggested_window(images)
+        self.source.notes.append(
+            f"Samples are {self.settings.dtype} from {low:g} to {high:g}, a window chosen from "
+            f"{len(images)} slices (--window)."
+        )
+        return low, high
 
     def _keep_what_is_done(self) -> bool:
         """After a failure: whether slices are kept; else the traces of the run are removed."""

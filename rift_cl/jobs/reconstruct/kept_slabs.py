@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -102,13 +102,18 @@ class SlabFolder:
         with atomic_path(self.path / f"{start:05d}-{stop:05d}.npy") as part, part.open("wb") as out:
             np.save(out, np.ascontiguousarray(slices, np.float32), allow_pickle=False)
 
-    def slabs(self) -> Iterator[tuple[int, Floats]]:
-        """Every slab and the number of its first slice, in order.
+    def slabs(self, numbers: Collection[int] | None = None) -> Iterator[tuple[int, Floats]]:
+        """Slabs and the numbers of their first slices, in order.
+
+        Args:
+            numbers: slices that are wanted; slabs without any of them are left out.
 
         Raises:
             CheckpointError: one is damaged.
         """
         for start, stop, path in self._files():
+            if numbers is not None and not any(start <= number < stop for number in numbers):
+                continue
             try:
                 slab = np.load(path, allow_pickle=False)
             except (OSError, ValueError, EOFError) as error:

@@ -32,7 +32,9 @@ def notes_of(source: SliceInput, *, truncated: bool) -> list[str]:
         notes.append(_offset(source))
     notes += _gap(source.geometry.angles)
     if source.rings:
-        notes.append("Stripes were taken out of the projections (rings).")
+        notes.append(
+            f"Stripes, which make rings, were removed from the projections ({source.rings})."
+        )
     if source.scan.background:
         notes.append(
             f"Air was brought to zero by the outermost {source.scan.background} bins of each end."

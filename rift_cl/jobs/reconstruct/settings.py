@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from rift_cl.errors import InputError
+from rift_cl.io.volumes import SampleWindow
 from rift_cl.jobs.scan_input import ScanInput
 from rift_cl.operators import HighPass, Ramp
 
@@ -31,7 +32,10 @@ _STEPS = {"sirt": 100, "cgls": 30, "tv": 200}
 # With frequencies weighed, CGLS is near its best after the first few.
 _PRECONDITIONED_CGLS = 4
 # What may differ between a run and the one that goes on with it: it changes no bit of the result.
-_FREE = ("out", "device", "memory", "format", "overwrite", "resume", "dry_run", "preview", "config")
+_FREE = (
+    *("out", "device", "memory", "format", "dtype", "window"),
+    *("overwrite", "resume", "dry_run", "preview", "config"),
+)
 
 
 @dataclass(frozen=True)
@@ -95,16 +99,35 @@ class ReconstructSettings(ScanInput):
     roi: tuple[int, int, int, int] | None = None
     """Part of the slice: first column and the one after the last, first line and the one after
     the last."""
-    rings: Switch = "auto"
-    """Take stripes out of the projections, which make rings; auto: where they are counts and the
-    views go round far enough."""
+    rings: Literal[
+        "auto",
+        "off",
+        "on",
+        "vo",
+        "sorting",
+        "filtering",
+        "fitting",
+        "large",
+        "dead",
+        "wavelet-fft",
+    ] = "auto"
+    """Remove the stripes in the sinogram that make rings in the slice: 'vo' (the same as 'on')
+    combines 'dead', 'large' and 'sorting', the filters of Vo, Atwood and Drakopoulos (2018), as are
+    'filtering' and 'fitting'; 'wavelet-fft' is that of Muench et al. (2009). auto: vo, where the
+    file holds counts and the views cover 150 degrees or more."""
     pad: Switch = "auto"
     """Continue an object that is wider than the detector; auto: where the projections do not end
     at zero."""
     preview: bool = False
     """Reconstruct the middle slice alone, as preview.png, and say how long all would take."""
-    format: Literal["tiff", "zarr", "h5"] = "tiff"
-    """A folder of TIFF slices, a Zarr store, or one HDF5 file."""
+    format: Literal["tiff", "tiff-stack", "zarr", "h5", "mrc"] = "tiff"
+    """A folder of TIFF slices, one TIFF file (both with ImageJ's notes), an OME-Zarr store with
+    coarser copies, one HDF5 file, or one MRC file."""
+    dtype: Literal["float32", "uint16", "uint8"] = "float32"
+    """Type of the samples in the volume; integers cover --window."""
+    window: tuple[float, float] | None = None
+    """For integer samples: the attenuation that the least and the greatest integer stand for; from
+    the slices themselves, with a margin, if not given."""
     overwrite: bool = False
     """Replace an earlier reconstruction in the same folder."""
     resume: bool = False
@@ -141,8 +164,20 @@ class ReconstructSettings(ScanInput):
                 raise InputError(f"--{name} is {value:g}, wanted a positive number")
         if self.error is not None and self.footprint != "linear":
             raise InputError(f"--error goes with --footprint linear, not with {self.footprint}")
+        self._check_samples()
         if self.resume and self.overwrite:
             raise InputError("--resume goes on with what --overwrite throws away: give one of them")
+
+    def _check_samples(self) -> None:
+        if self.dtype == "float32":
+            if self.window is not None:
+                raise InputError("--window is for integer samples: add --dtype uint16 or uint8")
+            return
+        if self.window is not None:
+            # Made now, so that its width is checked before any work.
+            SampleWindow(self.dtype, *self.window)
+        if self.format == "mrc" and self.dtype == "uint8":
+            raise InputError("--format mrc has no unsigned 8-bit samples: take --dtype uint16")
 
     @property
     def iterative(self) -> bool:

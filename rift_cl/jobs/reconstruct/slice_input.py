@@ -35,6 +35,7 @@ from rift_cl.reconstruct.preprocess import remove_rings
 
 Floats = NDArray[np.float32]
 # Stripes are told from the object where views go round so far: a flat face is a stripe in fewer.
+_USUAL_RINGS = "vo"
 _RINGS_FROM = np.deg2rad(150)
 # An axis found this far from the detector's middle, as a share of its width, is an offset one.
 _MIDDLE = 0.25
@@ -78,7 +79,7 @@ class SliceInput:
         self.geometry = self._parallel()
         # Whether a full turn's axis is so far off the middle that slices reach beyond the detector.
         self.offset = self._sees_farther()
-        self.rings = self._rings_wanted()
+        self.rings = self._ring_method()
 
     @property
     def pitch(self) -> float:
@@ -154,10 +155,11 @@ class SliceInput:
 
     def _mended(self, start: int, stop: int) -> Attenuation:
         integrals = read_attenuation(self.scan, start, stop)
-        if not self.rings:
+        if self.rings is None:
             return integrals
         return dataclasses.replace(
-            integrals, projections=remove_rings(integrals.projections, device=self.device)
+            integrals,
+            projections=remove_rings(integrals.projections, method=self.rings, device=self.device),
         )
 
     def _parallel(self) -> Parallel:
@@ -191,8 +193,12 @@ class SliceInput:
                 return found
         return find_center(row, angles, device=self.device).center
 
-    def _rings_wanted(self) -> bool:
+    def _ring_method(self) -> str | None:
+        """How stripes are removed; None if they are not."""
+        if self.settings.rings == "off":
+            return None
         if self.settings.rings != "auto":
-            return self.settings.rings == "on"
+            return _USUAL_RINGS if self.settings.rings == "on" else self.settings.rings
         counts = self.scan.kind == "transmission"
-        return counts and bool(np.ptp(self.scan.angles) >= _RINGS_FROM)
+        wide = np.ptp(self.scan.angles) >= _RINGS_FROM
+        return _USUAL_RINGS if counts and wide else None

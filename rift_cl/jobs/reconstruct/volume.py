@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from contextlib import suppress
 from pathlib import Path
-from typing import Literal
 
-from rift_cl.io.volumes import VolumeWriter, open_volume
+from rift_cl.io.volumes import VOLUME_NAMES, VolumeWriter, open_volume
 from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 from rift_cl.jobs.reconstruct.slice_input import SliceInput
 from rift_cl.jobs.reconstruct.slice_window import Window
-from rift_cl.jobs.scan_input import VOLUME_NAMES
-
-Format = Literal["tiff", "zarr", "h5"]
 
 
 class _PlaceFoundError(Exception):
@@ -25,16 +22,29 @@ def volume_path(settings: ReconstructSettings) -> Path:
 
 
 def open_slices(
-    settings: ReconstructSettings, source: SliceInput, window: Window, format: Format | None = None
+    settings: ReconstructSettings,
+    source: SliceInput,
+    window: Window,
+    values: tuple[float, float] | None,
 ) -> VolumeWriter:
-    """Prepare to write the slices of all rows that were asked for, in the settings' format."""
-    format = format or settings.format
+    """Prepare to write the slices of all rows that were asked for, in the settings' format.
+
+    Args:
+        settings: the format and the type of samples.
+        source: the scan.
+        window: where the slices lie.
+        values: what the least and the greatest integer stand for; None for floating samples.
+    """
+    grid = window.grid(1)
     return open_volume(
-        settings.out / VOLUME_NAMES[format],
+        volume_path(settings),
         (source.rows[1] - source.rows[0], *window.shape),
-        format=format,
+        format=settings.format,
         spacing=(source.pitch, window.pixel, window.pixel),
         unit=source.unit,
+        origin=(source.rows[0] * source.pitch, *(grid.coordinates(axis)[0] for axis in (-2, -1))),
+        dtype=settings.dtype,
+        window=values,
     )
 
 
@@ -46,9 +56,8 @@ def demand_place(settings: ReconstructSettings, source: SliceInput, window: Wind
     Raises:
         OutputError: a place holds something else, or cannot be written to.
     """
-    formats: tuple[Format, ...] = ("tiff", "zarr", "h5")
-    for format in formats:
-        there = (settings.out / VOLUME_NAMES[format]).exists()
-        if there or format == settings.format:
-            with suppress(_PlaceFoundError), open_slices(settings, source, window, format):
+    for format, name in VOLUME_NAMES.items():
+        if format == settings.format or (settings.out / name).exists():
+            there = dataclasses.replace(settings, format=format, dtype="float32", window=None)
+            with suppress(_PlaceFoundError), open_slices(there, source, window, None):
                 raise _PlaceFoundError
