@@ -5,8 +5,10 @@
  *
  * Index space: (runs of LANES columns, views of this run, slices). The PHASES entries of a column
  * lie within one step of each other, so they share their bins: a CPU takes phases as lanes, a
- * column at a time, `taps` broadcast loads each, and transposes at the end; a GPU takes its one
- * column phase by phase. Bins outside the detector count as zero. `views` holds, for each view of
+ * column at a time, a broadcast load for each bin, and transposes at the end; a GPU takes its one
+ * column phase by phase. Columns reach one bin more or less; as long as that is cheaper than a
+ * branch that a CPU guesses wrongly, they take the `usual` number, of which the footprints of those
+ * out of reach are zero. Bins outside the detector count as zero. `views` holds, for each view of
  * the table, which view of the scan it is and how many columns it needs; the sinogram has `slices`
  * slices, of which the table takes those from slice0. */
 
@@ -19,7 +21,7 @@ KERNEL void radon_resample(
     __global const real *restrict sinogram, __global real *restrict table,
     __global const long4 *restrict geometry, __global const real8 *restrict footprints,
     __global const int2 *restrict views, int first, int slice0, int slices,
-    int bins, int columns, int taps)
+    int bins, int columns)
 {
   const int k0 = (int)get_global_id(0) * LANES;
   const int number = (int)get_global_id(1), count = (int)get_global_size(1), view = first + number;
@@ -28,15 +30,18 @@ KERNEL void radon_resample(
   const long4 g = geometry[view];
   const real8 shape = footprints[view];
   const long support = (long)(4294967296.0f * shape.SUPPORT);
+  const long spread = g.w - (g.w >> LOG2_PHASES);
+  const long lower = (spread < 0 ? spread : 0) - support, upper = (spread > 0 ? spread : 0) + support;
+  const int usual = WHOLE(upper - lower + (3L << 30));
   __global const real *y = sinogram + ((long)views[view].x * slices + slice0 + slice) * bins;
   lanes entries[PHASES];
   UNROLL for (int n = 0; n < PHASES; n++) {
     const int k = LANES == 1 ? k0 : k0 + n, phase = LANES == 1 ? n : 0;
-    const long tau = g.z + k * g.w, lowest = g.w < 0 ? tau + g.w : tau;
-    const int bin = WHOLE(lowest - support) + 1;
+    const long tau = g.z + k * g.w;
+    const int near = WHOLE(tau + lower) + 1, last = WHOLE(tau + upper) + 1;
+    const int far = near + usual > last ? near + usual : last;
     lanes sum = 0;
-    const int near = bin > 0 ? bin : 0, far = bins - bin < taps ? bins : bin + taps;
-    for (int b = near; b < far; b++)
+    for (int b = near > 0 ? near : 0; b < (far < bins ? far : bins); b++)
       sum = sum + y[b] * footprint(DISTANCES(g, k, phase, b), shape);
     entries[n] = shape.SCALE * sum;
   }

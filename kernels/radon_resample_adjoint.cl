@@ -3,9 +3,9 @@
  *     y[view][slice][b] = scale * sum over k, r of footprint(tau - b) table[slice][view][k][r],
  *     tau = origin + step * (k + r / PHASES).
  *
- * Index space: (bins, views of this run, slices). Each item gathers, for its bin, the `reach`
- * columns whose footprints can touch it; the phases of a column lie together in memory and are taken
- * LANES at a time. No two items write the same bin: no atomics, and one order of summation. */
+ * Index space: (bins, views of this run, slices). Each item gathers, for its bins, the
+ * columns whose footprints can touch them; the phases of a column lie together in memory and are
+ * taken LANES at a time. No two items write the same bin: no atomics, and one order of summation. */
 
 #include "include/portable.h"
 #include "include/phase_table.h"
@@ -21,7 +21,7 @@ KERNEL void radon_resample_adjoint(
     __global real *restrict sinogram, __global const real *restrict table,
     __global const long4 *restrict geometry, __global const real8 *restrict footprints,
     __global const int2 *restrict views, int first, int slice0, int slices,
-    int bins, int columns, int reach)
+    int bins, int columns)
 {
   const int b0 = (int)get_global_id(0) * BINS;
   const int b1 = b0 + BINS < bins ? b0 + BINS : bins;
@@ -30,16 +30,17 @@ KERNEL void radon_resample_adjoint(
   const long4 g = geometry[view];
   const real8 shape = footprints[view];
   const real per_bin = 1.0f / FIXED_TO_REAL(g.w);
-  const real reach_back = (per_bin < 0 ? -per_bin : per_bin) * shape.SUPPORT +
-                          (1.0f - 1.0f / PHASES) + 1e-3f + 1e-6f * columns;
+  const real reach = (per_bin < 0 ? -per_bin : per_bin) * shape.SUPPORT + 1e-3f + 1e-6f * columns;
   __global const real *entries = table + ((long)slice * count + number) * PHASES * columns;
   __global real *y = sinogram + ((long)views[view].x * slices + slice0 + slice) * bins;
   for (int b = b0; b < b1; b++) {
-    /* The first column with a phase in reach, or the one before where rounding hides it. */
+    /* The columns with a phase in reach, or one more where rounding hides it. */
     const real center = ((real)(b - WHOLE(g.z)) - FIXED_TO_REAL(g.z & 0xffffffffL)) * per_bin;
-    const int start = (int)(center - reach_back + (real)columns) - columns + 1;
+    const real from = center - reach - (1.0f - 1.0f / PHASES), to = center + reach;
+    const int start = from < 0 ? 0 : from < used ? (int)from + 1 : used;
+    const int end = to < 0 ? 0 : to < used ? (int)to + 1 : used;
     lanes sum = 0;
-    for (int k = start < 0 ? 0 : start; k < start + reach && k < used; k++)
+    for (int k = start; k < end; k++)
       UNROLL for (int r = 0; r < PHASES; r += LANES)
         sum = sum + footprint(DISTANCES(g, k, r, b), shape) * LOAD(entries + k * PHASES + r);
     y[b] = shape.SCALE * SUM_OF_LANES(sum);

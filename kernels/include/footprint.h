@@ -7,11 +7,12 @@
  * and between pixels (Joseph 1982) where h is the pixel's step over the detector.
  *
  * STRIP 1, the area that a pixel and a bin's strip share. A square's shadow is a trapezoid, two
- * boxes convolved; the bin is a third one. Let L be the longest of the three and c the integral of
- * the trapezoid of the two others, from 0 to 1; then c(d + L/2) - c(d - L/2) is the share times L.
- * With the longest taken out the difference is of the order of one, and has the rounding of one.
- * The trapezoid's outer half-width is s3, its ramps are s4 wide and it is 1 / s6 high; s2 = L/2,
- * s5 = 1 / (2 s4), or any number where s4 is zero. */
+ * boxes convolved; the bin is a third one. Let S <= M <= L be the three widths and c the integral of
+ * the trapezoid of S and M, from 0 to M; then c(d + L/2) - c(d - L/2) is the share times L M. With
+ * the longest taken out the difference is of the order of M, and has its rounding. Both integrals
+ * are taken from their ends: the trapezoid's outer half-width is s3 = (S + M) / 2, its ramps are
+ * s4 = S wide, s5 = 1 / (2 S), or any number where S is zero, s2 = L/2 and s7 = M. Of the first,
+ * what is missing from M is never more than half of a ramp, s6 = (S + M - L) / 2 long or none. */
 
 #ifndef STRIP
 #define STRIP 0
@@ -22,16 +23,11 @@
 static lanes positive(lanes v) { return v > 0 ? v : 0; }
 
 #if STRIP
-/* The trapezoid's area up to `inside` from its outer end, which is not beyond the middle. */
-static lanes area_of_end(lanes inside, real8 f) {
-  const lanes ramp = inside < f.s4 ? inside : f.s4;
-  return (ramp * (ramp * f.s5) + (inside - ramp)) * f.s6;
-}
-
 static lanes footprint(lanes distance, real8 f) {
   const lanes r = absolute(distance), near = f.s2 - r;
-  const lanes end = area_of_end(positive(f.s3 - absolute(near)), f);
-  return (near > 0 ? 1.0f - end : end) - area_of_end(positive(f.s3 - f.s2 - r), f);
+  const lanes inside = positive(f.s3 - absolute(near)), ramp = inside < f.s4 ? inside : f.s4;
+  const lanes end = ramp * (ramp * f.s5) + (inside - ramp), top = positive(f.s6 - r);
+  return (near > 0 ? f.s7 - end : end) - top * (top * f.s5);
 }
 #else
 static lanes footprint(lanes distance, real8 f) {

@@ -20,6 +20,9 @@ class Adjoint(LinearOperator):
         super().__init__(forward.range, forward.domain, forward.device, forward.dtype)
         self._forward = forward
 
+    def __repr__(self) -> str:
+        return f"{self._forward!r}.T"
+
     @property
     def T(self) -> LinearOperator:
         """The operator that this is the adjoint of."""

@@ -15,7 +15,7 @@ from rift_cl.errors import InputError
 
 Floats = NDArray[np.float64]
 
-FOOTPRINTS = ("linear", "joseph", "strip")
+FOOTPRINTS = ("strip", "joseph", "linear")
 _RECORD = 8
 # Where a ramp has no width its inverse is never used, but must be a number.
 _NARROWEST = 1e-30
@@ -64,8 +64,9 @@ def footprint_records(name: str, step: Floats, cross_step: Floats, mass: float) 
 def _strip(step: Floats, cross_step: Floats, mass: float) -> FootprintRecords:
     short, middle, longest = np.sort([step, cross_step, np.ones_like(step)], axis=0)
     inverse = 0.5 / np.maximum(short, _NARROWEST)
-    shape = (longest / 2, (short + middle) / 2, short, inverse, 1 / middle)
-    return _packed((short + middle + longest) / 2, mass / longest, *shape)
+    top = np.maximum(short + middle - longest, 0) / 2
+    shape = (longest / 2, (short + middle) / 2, short, inverse, top, middle)
+    return _packed((short + middle + longest) / 2, mass / (middle * longest), *shape)
 
 
 def _packed(support: Floats, scale: Floats, *shape: Floats) -> FootprintRecords:

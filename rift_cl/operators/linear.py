@@ -63,6 +63,9 @@ class LinearOperator(ABC):
 
     grid: Grid | None = None
     scan: Parallel | None = None
+    # NumPy's arrays leave ``array * A`` to the operator, which refuses it, instead of making an
+    # array of operators.
+    __array_ufunc__ = None
 
     def __init__(
         self, domain: Shape, range: Shape, device: Device, dtype: DTypeLike = np.float32
@@ -71,6 +74,14 @@ class LinearOperator(ABC):
         self.range = range
         self.device = device
         self.dtype = real_type(device, dtype)
+
+    def __repr__(self) -> str:
+        what = self._description()
+        return f"<{type(self).__name__}: {what}, {self.dtype}, device {self.device.selector}>"
+
+    def _description(self) -> str:
+        """What it maps, in a few words."""
+        return f"{self.domain} -> {self.range}"
 
     @cached_property
     def T(self) -> LinearOperator:
@@ -132,14 +143,22 @@ class LinearOperator(ABC):
         return self + (-other) if isinstance(other, LinearOperator) else NotImplemented
 
     def __mul__(self, factor: Any) -> LinearOperator:
-        """The operator x -> factor * A x."""
+        """The operator x -> factor * A x.
+
+        Raises:
+            InputError: the factor is an array, to which the operator was probably meant to be
+                applied.
+        """
         from rift_cl.operators.algebra import Scaled
 
-        return (
-            Scaled(self, float(factor))
-            if isinstance(factor, (int, float, np.integer, np.floating))
-            else NotImplemented
-        )
+        if isinstance(factor, (int, float, np.integer, np.floating)):
+            return Scaled(self, float(factor))
+        if hasattr(factor, "shape") or isinstance(factor, (list, tuple)):
+            raise InputError(
+                "an operator can be multiplied by a number only, and was given an array: to apply "
+                "the operator A to an array x write A(x) or A @ x"
+            )
+        return NotImplemented
 
     __rmul__ = __mul__
 

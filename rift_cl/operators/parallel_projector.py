@@ -11,7 +11,8 @@ from numpy.typing import DTypeLike
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
-from rift_cl.geometry import Grid, Parallel
+from rift_cl.errors import InputError
+from rift_cl.geometry import FanBeam, Grid, Parallel
 from rift_cl.operators.linear import LinearOperator, Piece
 
 
@@ -26,6 +27,9 @@ class ParallelProjector(LinearOperator):
 
     The domain is ``grid.shape``; the range is (angles, bins), or (angles, nz, bins) for a volume.
     Values of the range are in the image's unit times the grid's unit of length.
+
+    Raises:
+        InputError: ``grid`` is no ``Grid``, or ``scan`` no ``Parallel``.
     """
 
     grid: Grid
@@ -38,9 +42,26 @@ class ParallelProjector(LinearOperator):
         device: Device | None = None,
         dtype: DTypeLike = np.float32,
     ) -> None:
+        if not isinstance(grid, Grid):
+            raise InputError(f"grid is {grid!r:.60}, wanted a Grid such as Grid((256, 256))")
+        if isinstance(scan, FanBeam):
+            raise InputError(
+                "scan is a FanBeam, and this projector's rays are parallel: resample its views "
+                "by rift_cl.reconstruct.rebin_fan first"
+            )
+        if not isinstance(scan, Parallel):
+            raise InputError(f"scan is {scan!r:.60}, wanted a Parallel(angles, bins)")
         shape = (len(scan.angles), *grid.shape[:-2], scan.bins)
         super().__init__(grid.shape, shape, device or default_device(), dtype)
         self.grid, self.scan = grid, scan
+
+    def _description(self) -> str:
+        samples = " x ".join(map(str, self.grid.shape))
+        spacing = ", ".join(f"{length:g}" for length in sorted(set(self.grid.spacing)))
+        return (
+            f"{samples} samples {spacing} apart, {len(self.scan.angles)} views of "
+            f"{self.scan.bins} bins {self.scan.pitch:g} apart"
+        )
 
     def _pieces(self, budget: int) -> Iterable[Piece]:
         return self.pieces(budget)

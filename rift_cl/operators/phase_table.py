@@ -39,8 +39,6 @@ class PhaseTable:
         columns: columns of a table, in whole segments.
         rows, width: the image as seen along this axis.
         padded: ``width`` in whole segments.
-        taps: most bins that the phases of one column read.
-        reach: most columns that one bin reads.
     """
 
     views: NDArray[np.int32]
@@ -52,8 +50,6 @@ class PhaseTable:
     rows: int
     width: int
     padded: int
-    taps: int
-    reach: int
 
     @property
     def entries(self) -> int:
@@ -62,7 +58,7 @@ class PhaseTable:
 
 
 def phase_table(
-    grid: Grid, scan: Parallel, footprint: str = "linear", *, along_x: bool, segment: int
+    grid: Grid, scan: Parallel, footprint: str = "strip", *, along_x: bool, segment: int
 ) -> PhaseTable:
     """The table of the views that are walked along x, or of those along y.
 
@@ -92,23 +88,19 @@ def phase_table(
             f"{1 / _WITHIN[0]:g} times as wide as a sample, or as narrow"
         )
     shadows = np.abs(step), np.abs(dy * sine / scan.pitch)
-    spread = footprint_records(footprint, *shadows, dx * dy / scan.pitch)
     padded = -(-width // segment) * segment
     used = ((base + np.maximum(slope, 0) * (rows - 1)) >> 32) + padded + 2
     orders, starts = _rows_by_phase(base, slope, rows)
     return PhaseTable(
         views=np.stack([views, used], axis=1).astype(np.int32),
         geometry=np.stack([base, slope, _fixed(origin), _fixed(step)], axis=1),
-        footprints=spread.records,
+        footprints=footprint_records(footprint, *shadows, dx * dy / scan.pitch).records,
         orders=orders,
         starts=starts,
         columns=-(-int(np.max(used, initial=1)) // segment) * segment,
         rows=rows,
         width=width,
         padded=padded,
-        taps=int(np.ceil(np.max(2 * spread.support + np.abs(step), initial=1.0))),
-        # The footprint's width in columns, a column's own phases, and what rounding may add.
-        reach=int(np.max(2 * spread.support / np.abs(step), initial=0) + 1 - 1 / PHASES + 0.1) + 1,
     )
 
 

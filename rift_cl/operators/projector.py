@@ -35,12 +35,15 @@ class Projector(ParallelProjector):
     Args:
         grid: where the image lives, (ny, nx) or (nz, ny, nx).
         scan: how it is looked at.
-        footprint: what a pixel leaves on the detector. ``linear``: it is spread by linear
-            interpolation between the two bins about its centre; where bins are finer than its
-            shadow the hat widens to that shadow, so that no ray falls between pixels. ``joseph``:
-            rays through the bins' centres interpolate linearly between the pixels of each row or
-            column they cross (Joseph 1982). ``strip``: the area that pixel and bin share, which
-            is right for a detector that counts over whole bins.
+        footprint: what a pixel leaves on the detector. ``strip``: the area that the pixel shares
+            with the strip of rays that a bin collects. Every view then holds the whole mass, and
+            ``fbp(A, A(x))`` of a uniform object is flat. ``joseph``: rays through the bins'
+            centres interpolate linearly between the pixels of each row or column they cross
+            (Joseph 1982); the result is flat to about 1 %. ``linear``: the pixel is spread by
+            linear interpolation over the two bins about its centre (pixel-driven); where bins are
+            finer than its shadow the hat widens to that shadow. Its projections of a uniform
+            object ripple in views near 45 and 135 degrees, and ``fbp(A, A(x))`` varies by
+            several per cent; reconstructions of measured data do not suffer.
         device: where to work; the default device if not given.
         dtype: ``float32``, or ``float64`` where the device has it: for an adjoint that is matched
             to 1e-15 and for solvers that run far. Both types read one geometry, in which a step
@@ -57,7 +60,7 @@ class Projector(ParallelProjector):
         self,
         grid: Grid,
         scan: Parallel,
-        footprint: str = "linear",
+        footprint: str = "strip",
         device: Device | None = None,
         dtype: DTypeLike = np.float32,
     ) -> None:
@@ -79,6 +82,9 @@ class Projector(ParallelProjector):
             for along_x in (True, False)
         )
         return _Walk(self.device, by_rows, self.dtype), _Walk(self.device, by_columns, self.dtype)
+
+    def _description(self) -> str:
+        return f"{super()._description()}, footprint {self.footprint}"
 
     def _apply(self, x: Any, out: Any) -> None:
         for slab in _slabs(x):
@@ -115,7 +121,7 @@ class Projector(ParallelProjector):
             "radon_resample_adjoint",
             (-(-self.scan.bins // bins), count, slab.slices),
             *(out, entries, walk.geometry, walk.footprints, walk.views),
-            *(first, slab.first, slab.total, self.scan.bins, table.columns, table.reach),
+            *(first, slab.first, slab.total, self.scan.bins, table.columns),
             BINS=bins,
             **self._resampling,
         )
@@ -140,7 +146,7 @@ class Projector(ParallelProjector):
                 "radon_resample",
                 (table.columns // self.device.traits.macros["LANES"], count, slab.slices),
                 *(y, entries, walk.geometry, walk.footprints, walk.views),
-                *(first, slab.first, slab.total, self.scan.bins, table.columns, table.taps),
+                *(first, slab.first, slab.total, self.scan.bins, table.columns),
                 **self._resampling,
             )
             self.device.launch(

@@ -36,21 +36,21 @@ from rift_cl.reference.matrix import MatrixProjector
 
 
 def phase_table(
-    grid: Grid, scan: Parallel, footprint: str = "linear", *, phases: int = 8
+    grid: Grid, scan: Parallel, footprint: str = "strip", *, phases: int = 8
 ) -> MatrixProjector:
     """The projector whose matrix is ``phase_table_matrix(grid, scan, footprint)``."""
     return MatrixProjector(phase_table_matrix(grid, scan, footprint, phases=phases), grid, scan)
 
 
 def phase_table_matrix(
-    grid: Grid, scan: Parallel, footprint: str = "linear", *, phases: int = 8
+    grid: Grid, scan: Parallel, footprint: str = "strip", *, phases: int = 8
 ) -> Any:
     """The matrix of the projector, sparse (angles * bins, ny * nx), in the unit of length.
 
     Args:
         grid: the image; of a volume, a slice.
         scan: how it is looked at.
-        footprint: ``linear``, ``joseph`` or ``strip``.
+        footprint: ``strip``, ``joseph`` or ``linear``.
         phases: samples of a view to each step from pixel to pixel.
     """
     plane = grid.slice()

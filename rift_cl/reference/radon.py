@@ -19,18 +19,18 @@ from rift_cl.reference.footprint import footprint_matrix, footprint_of
 from rift_cl.reference.matrix import MatrixProjector
 
 
-def radon(grid: Grid, scan: Parallel, footprint: str = "linear") -> MatrixProjector:
+def radon(grid: Grid, scan: Parallel, footprint: str = "strip") -> MatrixProjector:
     """The projector whose matrix is ``radon_matrix(grid, scan, footprint)``."""
     return MatrixProjector(radon_matrix(grid, scan, footprint), grid, scan)
 
 
-def radon_matrix(grid: Grid, scan: Parallel, footprint: str = "linear") -> Any:
+def radon_matrix(grid: Grid, scan: Parallel, footprint: str = "strip") -> Any:
     """The matrix of the transform, sparse (angles * bins, ny * nx), in the unit of length.
 
     Args:
         grid: the image; of a volume, a slice.
         scan: how it is looked at.
-        footprint: ``linear``, ``joseph`` or ``strip``.
+        footprint: ``strip``, ``joseph`` or ``linear``.
     """
     plane = grid.slice()
     views = [_view(plane, scan, float(angle), footprint) for angle in scan.angles]

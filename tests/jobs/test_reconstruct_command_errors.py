@@ -75,7 +75,7 @@ def test_bad_scans_are_told_and_leave_nothing(scan, tmp_path, capsys, change, wo
         (("--method", "tv", "--weight", "nan"), INPUT, "--weight"),
         (("--pixel", "0"), INPUT, "--pixel"),
         (("--error", "0"), INPUT, "error is 0"),
-        (("--error", "1e-3", "--footprint", "strip"), INPUT, "--footprint linear"),
+        (("--error", "1e-3", "--footprint", "joseph"), INPUT, "--footprint joseph means nothing"),
         (("--size", "0"), INPUT, "--size"),
         (("--roi", "5", "4", "0", "9"), INPUT, "--roi"),
         (("--roi", "0", "97", "0", "9"), INPUT, "0 to 96"),

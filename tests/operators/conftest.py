@@ -90,7 +90,7 @@ class Geometry(NamedTuple):
         return image.astype(np.float32), sinogram.astype(np.float32)
 
 
-def _geometry(name: str, footprint: str = "linear") -> Geometry:
+def _geometry(name: str, footprint: str = "strip") -> Geometry:
     grid, scan = GEOMETRIES[name]
     pair = phase_table(grid, scan, footprint), radon(grid, scan, footprint)
     return Geometry(grid, scan, footprint, *pair)
@@ -98,8 +98,8 @@ def _geometry(name: str, footprint: str = "linear") -> Geometry:
 
 @pytest.fixture(
     scope="session",
-    params=[(name, "linear") for name in GEOMETRIES]
-    + [(name, footprint) for name in FOOTPRINTED for footprint in ("joseph", "strip")],
+    params=[(name, "strip") for name in GEOMETRIES]
+    + [(name, footprint) for name in FOOTPRINTED for footprint in ("joseph", "linear")],
     ids="-".join,
 )
 def geometry(request: pytest.FixtureRequest) -> Geometry:

@@ -160,9 +160,49 @@ def test_empty_scans_are_refused_by_name():
 
 def test_an_unknown_footprint_is_refused(device):
     with pytest.raises(
-        InputError, match="footprint is 'round', wanted 'linear', 'joseph' or 'strip'"
+        InputError, match="footprint is 'round', wanted 'strip', 'joseph' or 'linear'"
     ):
         rift.Projector(GRID, SCAN, "round", device=device)
+
+
+def test_arguments_that_are_no_geometry_are_told_by_name(device):
+    for make in (rift.Projector, rift.FastProjector):
+        with pytest.raises(InputError, match=r"grid is None, wanted a Grid"):
+            make(None, None, device=device)
+        with pytest.raises(InputError, match=r"grid is \(12, 15\), wanted a Grid"):
+            make((12, 15), SCAN, device=device)
+        with pytest.raises(InputError, match=r"scan is array\(.*, wanted a Parallel"):
+            make(GRID, np.arange(3.0), device=device)
+        with pytest.raises(InputError, match=r"scan is a FanBeam.*rebin_fan first"):
+            make(GRID, rift.FanBeam(100, 150, 1, 10), device=device)
+
+
+def test_operators_say_what_they_are(A, F, device):
+    place = f"float32, device {device.selector}>"
+    samples = "12 x 15 samples 1 apart, 8 views of 21 bins 1 apart"
+    assert repr(A) == f"<Projector: {samples}, footprint strip, {place}"
+    assert repr(A.T) == f"{A!r}.T"
+    assert repr(F) == f"<ViewFilter: {F.domain} -> {F.range}, {place}"
+    assert repr(2 * A) == f"<Scaled: {A.domain} -> {A.range}, {place}"
+
+
+def test_a_product_with_an_array_is_refused(A, device):
+    """It would be an array of operators, one for each number."""
+    products = (
+        lambda: A * X,
+        lambda: X * A,
+        lambda: A.T * X,
+        lambda: A * device.array(X),
+        lambda: A * X.tolist(),
+        lambda: np.float64([1, 2]) * A,
+    )
+    for product in products:
+        with pytest.raises(InputError, match=r"write A\(x\) or A @ x"):
+            product()
+    for nonsense in (lambda: A * "2", lambda: X + A, lambda: X @ A, lambda: np.sin(A)):
+        with pytest.raises(TypeError):
+            nonsense()
+    assert np.array_equal(A @ X, A(X))
 
 
 def test_algebra(A, F):

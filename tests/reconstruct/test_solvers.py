@@ -76,7 +76,7 @@ def test_fista_and_pdhg_reach_the_same_minimum(device, weight, nonnegative, prec
     A, _, _, y = problem(device, noise=0.1)
     given = {"nonnegative": nonnegative, "precondition": precondition}
     fista, pdhg = (method(A, y, weight, **given) for method in (Fista, Pdhg))
-    values = [finished(solver, 150)[-1].values["objective"] for solver in (fista, pdhg)]
+    values = [finished(solver, 200)[-1].values["objective"] for solver in (fista, pdhg)]
     assert values[0] == pytest.approx(values[1], rel=1e-3)
     for solver, value in zip((fista, pdhg), values, strict=True):
         image = device.get(solver.image)

@@ -35,10 +35,10 @@ def test_the_error_on_noise_falls_by_phases_to_three_halves():
     """
     grid, scan = Grid((48, 48)), Parallel(np.linspace(0, np.pi, 40, endpoint=False) + 0.01, 72)
     y = np.random.default_rng(1).standard_normal((40, 72))
-    truth = radon(grid, scan).backproject(y)
+    truth = radon(grid, scan, "linear").backproject(y)
     step = np.maximum(abs(np.cos(scan.angles)), abs(np.sin(scan.angles)))
     for phases in (2, 4, 8, 16):
-        value = phase_table(grid, scan, phases=phases).backproject(y)
+        value = phase_table(grid, scan, "linear", phases=phases).backproject(y)
         error = np.linalg.norm(value - truth) / np.linalg.norm(truth)
         assert error == pytest.approx(np.sqrt(np.mean(step**3) / 10 / phases**3), rel=0.1)
 

@@ -119,7 +119,7 @@ def test_a_blob_is_projected_to_its_line_integrals():
     variance = 3.0**2 + 1.5**2 / 6
     expected = 1.3 * 2 * np.pi * 3.0**2 * np.exp(-(t**2) / 2 / variance)
     expected /= np.sqrt(2 * np.pi * variance)
-    np.testing.assert_allclose(radon(grid, scan).project(blob), expected, atol=0.01)
+    np.testing.assert_allclose(radon(grid, scan, "linear").project(blob), expected, atol=0.01)
 
 
 def test_a_volume_is_its_slices():

@@ -33,7 +33,7 @@ class Case:
     n: int
     views: int
     slices: int = 1
-    footprint: str = "linear"
+    footprint: str = "strip"
     dtype: str = "float32"
 
     @classmethod

@@ -62,8 +62,9 @@ class ReconstructSettings(ScanInput):
     compensate: Literal["uniform", "voronoi", "capped-voronoi", "pipe-menon", "exact"] | None = None
     """fbp: density compensation for irregular angles; if not given, voronoi where the angles cover
     180 degrees, else uniform."""
-    footprint: Literal["linear", "joseph", "strip"] = "linear"
-    """How a pixel is spread over the bins."""
+    footprint: Literal["strip", "joseph", "linear"] = "strip"
+    """How a pixel is spread over the bins: by the area they share, or by interpolation between
+    pixels (joseph) or bins (linear)."""
     error: float | None = None
     """Relative error, such as 1e-3, that projections and backprojections may have; if given, they
     go through the Fourier transform, which is several times faster for large slices."""
@@ -162,8 +163,11 @@ class ReconstructSettings(ScanInput):
             value = getattr(self, name)
             if value is not None and not 0 < value < float("inf"):
                 raise InputError(f"--{name} is {value:g}, wanted a positive number")
-        if self.error is not None and self.footprint != "linear":
-            raise InputError(f"--error goes with --footprint linear, not with {self.footprint}")
+        if self.error is not None and self.footprint != usual["footprint"]:
+            raise InputError(
+                f"--footprint {self.footprint} means nothing with --error, which goes through the "
+                "Fourier transform: leave one of them out"
+            )
         self._check_samples()
         if self.resume and self.overwrite:
             raise InputError("--resume goes on with what --overwrite throws away: give one of them")
