@@ -9,33 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.geometry.length_units import length_unit
 from rift_cl.io.volumes.sample_window import SampleWindow
 
 Floats = NDArray[np.float32]
-
-# Units of length: the UDUNITS name and the length in metres.
-_LENGTHS = {
-    "m": ("meter", 1.0),
-    "cm": ("centimeter", 1e-2),
-    "mm": ("millimeter", 1e-3),
-    "um": ("micrometer", 1e-6),
-    "nm": ("nanometer", 1e-9),
-    "pm": ("picometer", 1e-12),
-    "angstrom": ("angstrom", 1e-10),
-    "inch": ("inch", 0.0254),
-}
-_ALIASES = {
-    **{name: unit for unit, (name, _) in _LENGTHS.items()},
-    **{name.replace("meter", "metre"): unit for unit, (name, _) in _LENGTHS.items()},
-    "\u00b5m": "um",  # the micro sign
-    "\u03bcm": "um",  # the Greek letter
-    "micron": "um",
-    "microns": "um",
-    "\u00c5": "angstrom",  # the letter
-    "\u212b": "angstrom",  # the sign
-    "A": "angstrom",
-    "in": "inch",
-}
 
 
 @dataclass(frozen=True)
@@ -86,20 +63,16 @@ class VolumeLayout:
     @property
     def unit_name(self) -> str | None:
         """The unit's name in UDUNITS, such as "millimeter"; None where it is no length."""
-        length = _length(self.unit)
+        length = length_unit(self.unit)
         return None if length is None else length[0]
 
     def lengths(self, metres: float) -> tuple[float, float, float] | None:
         """The spacing in a unit of so many metres; None where the unit is no length."""
-        length = _length(self.unit)
+        length = length_unit(self.unit)
         if length is None:
             return None
         z, y, x = (length[1] * step / metres for step in self.spacing)
         return z, y, x
-
-
-def _length(unit: str) -> tuple[str, float] | None:
-    return _LENGTHS.get(_ALIASES.get(unit.strip(), unit.strip()))
 
 
 class SliceStatistics:

@@ -34,7 +34,7 @@ def decided_settings(
     decided: dict[str, Any] = {
         "scan": scan.path,
         "out": settings.out.absolute(),
-        "rings": source.rings or "off",
+        "rings": source.clean.rings or "off",
         "pad": "on" if source.pad else "off",
         "center": source.geometry.center if source.fan is None else source.fan.center,
         "rows": source.rows,

@@ -31,10 +31,7 @@ def notes_of(source: SliceInput, *, truncated: bool) -> list[str]:
     if source.offset:
         notes.append(_offset(source))
     notes += _gap(source.geometry.angles)
-    if source.rings:
-        notes.append(
-            f"Stripes, which make rings, were removed from the projections ({source.rings})."
-        )
+    notes += source.clean.notes()
     if source.scan.background:
         notes.append(
             f"Air was brought to zero by the outermost {source.scan.background} bins of each end."

@@ -116,6 +116,13 @@ class ReconstructSettings(ScanInput):
     combines 'dead', 'large' and 'sorting', the filters of Vo, Atwood and Drakopoulos (2018), as are
     'filtering' and 'fitting'; 'wavelet-fft' is that of Muench et al. (2009). auto: vo, where the
     file holds counts and the views cover 150 degrees or more."""
+    delta_beta: float | None = None
+    """Phase retrieval after Paganin et al. (2002), for a parallel beam and one material: the ratio
+    delta / beta of its refractive index; with --energy and --propagation."""
+    energy: float | None = None
+    """Phase retrieval: energy of the photons, in keV."""
+    propagation: float | None = None
+    """Phase retrieval: distance from the sample to the detector, in millimetres."""
     pad: Switch = "auto"
     """Continue an object that is wider than the detector; auto: where the projections do not end
     at zero."""

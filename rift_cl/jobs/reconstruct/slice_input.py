@@ -1,7 +1,7 @@
 """From a scan in a file to projections that a method can take: what is mended, and what assumed.
 
-Rows go through these steps, each of which is said in ``notes``: line integrals, background,
-rings, fan to parallel, offset axis, continuation beyond the detector.
+Clean line integrals (``clean_rows``) go through these steps, each of which is said in ``notes``:
+fan to parallel, offset axis, continuation beyond the detector.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Parallel
+from rift_cl.geometry.length_units import length_unit
+from rift_cl.jobs.reconstruct.clean_rows import CleanRows
 from rift_cl.jobs.reconstruct.notes import notes_of
 from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 from rift_cl.jobs.scan_input import (
     check_center,
     chosen_rows,
-    read_attenuation,
     scan_identity,
 )
 from rift_cl.reconstruct import Attenuation, find_center
@@ -31,12 +32,8 @@ from rift_cl.reconstruct.offset_axis import (
     widened,
 )
 from rift_cl.reconstruct.padding import extended, is_truncated
-from rift_cl.reconstruct.preprocess import remove_rings
 
 Floats = NDArray[np.float32]
-# Stripes are told from the object where views go round so far: a flat face is a stripe in fewer.
-_USUAL_RINGS = "vo"
-_RINGS_FROM = np.deg2rad(150)
 # An axis found this far from the detector's middle, as a share of its width, is an offset one.
 _MIDDLE = 0.25
 # The detector is continued by this share of its width on each side.
@@ -79,7 +76,10 @@ class SliceInput:
         self.geometry = self._parallel()
         # Whether a full turn's axis is so far off the middle that slices reach beyond the detector.
         self.offset = self._sees_farther()
-        self.rings = self._ring_method()
+        length = length_unit(self.unit)
+        self.clean = CleanRows(
+            self.scan, settings, None if length is None else pitch * length.metres, device
+        )
 
     @property
     def pitch(self) -> float:
@@ -114,7 +114,7 @@ class SliceInput:
             InputError: the axis cannot be found.
         """
         middle = sum(self.rows) // 2
-        row = self._mended(middle, middle + 1).projections
+        row = self.clean.read(middle, middle + 1).projections
         if not self.settled:
             self.center = self._find_center(np.ascontiguousarray(row[:, 0]))
         self.geometry = self._parallel()
@@ -132,7 +132,7 @@ class SliceInput:
 
     def read(self, start: int, stop: int) -> Attenuation:
         """Parallel projections of some rows of the file, before a formula's weights and margins."""
-        integrals = self._mended(start, stop)
+        integrals = self.clean.read(start, stop)
         if self.fan is None:
             return integrals
         parallel, _ = rebin_fan(
@@ -152,15 +152,6 @@ class SliceInput:
     def formula_geometry(self) -> Parallel:
         """What ``for_formula`` would say of the geometry."""
         return self.for_formula(np.zeros((1, 1, self.geometry.bins), np.float32))[1]
-
-    def _mended(self, start: int, stop: int) -> Attenuation:
-        integrals = read_attenuation(self.scan, start, stop)
-        if self.rings is None:
-            return integrals
-        return dataclasses.replace(
-            integrals,
-            projections=remove_rings(integrals.projections, method=self.rings, device=self.device),
-        )
 
     def _parallel(self) -> Parallel:
         if self.fan is not None:
@@ -192,13 +183,3 @@ class SliceInput:
             if abs(found - (bins - 1) / 2) > _MIDDLE * bins:
                 return found
         return find_center(row, angles, device=self.device).center
-
-    def _ring_method(self) -> str | None:
-        """How stripes are removed; None if they are not."""
-        if self.settings.rings == "off":
-            return None
-        if self.settings.rings != "auto":
-            return _USUAL_RINGS if self.settings.rings == "on" else self.settings.rings
-        counts = self.scan.kind == "transmission"
-        wide = np.ptp(self.scan.angles) >= _RINGS_FROM
-        return _USUAL_RINGS if counts and wide else None

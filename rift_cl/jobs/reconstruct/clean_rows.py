@@ -1,0 +1,124 @@
+"""Rows of a scan as clean line integrals: what a detector gets wrong is put right here.
+
+In this order, each step where it was asked for or is called for: flat-field correction and the
+logarithm, zingers, phase retrieval, stripes. A step that looks at neighbouring rows is given as
+many more as it needs, so that slices do not depend on how the rows were cut into slabs.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.device import Device
+from rift_cl.errors import InputError
+from rift_cl.io.scan_file import ScanFile
+from rift_cl.jobs.reconstruct.settings import ReconstructSettings
+from rift_cl.jobs.scan_input import read_attenuation
+from rift_cl.reconstruct import Attenuation
+from rift_cl.reconstruct.preprocess import Propagation, paganin, remove_rings
+
+Floats = NDArray[np.float32]
+_USUAL_RINGS = "vo"
+# Stripes are told from the object where views go round so far: a flat face is a stripe in fewer.
+_RINGS_FROM = np.deg2rad(150)
+# Options of phase retrieval, all of which it needs.
+_PHASE = ("delta_beta", "energy", "propagation")
+
+
+class CleanRows:
+    """Reads rows of a scan and corrects them.
+
+    Args:
+        scan: the scan.
+        settings: what is to be corrected.
+        pixel: edge of a detector pixel in metres, as phase retrieval needs it; None if unknown.
+        device: where to compute.
+
+    Raises:
+        InputError: an option lacks another, or does not fit the scan.
+    """
+
+    def __init__(
+        self,
+        scan: ScanFile,
+        settings: ReconstructSettings,
+        pixel: float | None,
+        device: Device,
+    ) -> None:
+        self._scan, self._settings, self._device = scan, settings, device
+        self.rings = self._ring_method()
+        self.phase = self._propagation(pixel)
+        self._halo = 0 if self.phase is None else self.phase.halo_rows()
+
+    def read(self, start: int, stop: int) -> Attenuation:
+        """Line integrals of some rows."""
+        first, last = max(0, start - self._halo), min(self._scan.shape[1], stop + self._halo)
+        integrals = read_attenuation(self._scan, first, last)
+        rows = integrals.projections
+        if self.phase is not None:
+            rows = paganin(np.exp(-rows), **_arguments(self.phase))
+        rows = np.ascontiguousarray(rows[:, start - first : stop - first])
+        if self.rings is not None:
+            rows = remove_rings(rows, method=self.rings, device=self._device)
+        return dataclasses.replace(integrals, projections=rows)
+
+    def notes(self) -> list[str]:
+        """What is corrected, a sentence each."""
+        notes = []
+        if self.phase is not None:
+            blur = self.phase.decay_length / self.phase.pixel
+            notes.append(
+                f"Phase was retrieved after Paganin et al. (2002): delta/beta "
+                f"{self.phase.delta_beta:g}, {self.phase.energy:g} keV, "
+                f"{1e3 * self.phase.distance:g} mm, a filter of {blur:.3g} pixels."
+            )
+        if self.rings is not None:
+            notes.append(f"Stripes were removed from the projections, method {self.rings} (rings).")
+        return notes
+
+    def _ring_method(self) -> str | None:
+        """How stripes are removed; None if they are not."""
+        wanted = self._settings.rings
+        if wanted == "off":
+            return None
+        if wanted != "auto":
+            return _USUAL_RINGS if wanted == "on" else wanted
+        wide = np.ptp(self._scan.angles) >= _RINGS_FROM
+        return _USUAL_RINGS if self._scan.kind == "transmission" and wide else None
+
+    def _propagation(self, pixel: float | None) -> Propagation | None:
+        settings = self._settings
+        given = [name for name in _PHASE if getattr(settings, name) is not None]
+        if not given:
+            return None
+        missing = [name.replace("_", "-") for name in _PHASE if name not in given]
+        if missing:
+            raise InputError(
+                f"phase retrieval needs --delta-beta, --energy and --propagation: --{missing[0]} "
+                "is missing"
+            )
+        if self._scan.fan is not None:
+            raise InputError(
+                f"{self._scan.path}: phase retrieval is for parallel rays, these are those of a fan"
+            )
+        if pixel is None:
+            raise InputError(
+                "phase retrieval needs the size of a detector pixel: give --pitch and --unit, such "
+                "as --pitch 0.65 --unit um"
+            )
+        if self._scan.shape[1] < 2:
+            raise InputError(
+                f"{self._scan.path}: phase retrieval needs the rows above and below, the scan has "
+                "a single one"
+            )
+        assert settings.propagation is not None
+        distance = settings.propagation * 1e-3
+        return Propagation(pixel, distance, settings.energy, settings.delta_beta)  # type: ignore[arg-type]
+
+
+def _arguments(phase: Propagation) -> dict[str, Any]:
+    return {field.name: getattr(phase, field.name) for field in dataclasses.fields(phase)}
