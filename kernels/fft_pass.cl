@@ -1,4 +1,5 @@
-/* One pass of a Fourier transform down the columns of planes: Stockham's autosort of radix RADIX.
+/* One pass of a Fourier transform down the columns of planes: Stockham's autosort of radix RADIX,
+ * which is 2, 3, 4, 8 or 9.
  *
  * A transform of length n = RADIX m begins with n/RADIX butterflies, each over the samples that lie
  * m apart, and leaves RADIX transforms of length m. Stockham's form writes what belongs to one of
@@ -17,6 +18,7 @@
  * Index space: (runs of RUN columns, butterflies, fields). */
 
 #include "include/portable.h"
+#include "include/butterfly.h"
 
 #ifndef RADIX
 #define RADIX 4
@@ -27,20 +29,6 @@
 #ifndef RUN
 #define RUN (LANES == 8 ? 4096 : 1)
 #endif
-
-#if DOUBLE
-#define HALF_ROOT3 0.86602540378443865
-#else
-#define HALF_ROOT3 0.86602540f
-#endif
-
-/* Stores the complex product a z. */
-static void store_turned(
-    __global real *restrict re, __global real *restrict im, lanes zr, lanes zi, real ar, real ai)
-{
-  STORE(re, ar * zr - ai * zi);
-  STORE(im, ar * zi + ai * zr);
-}
 
 #if WEIGHTED
 #define READ(p, n) (LOAD(p + (n)) * LOAD(weight + (n)))
@@ -70,28 +58,26 @@ KERNEL void fft_pass(
 #if WEIGHTED
     __global const real *restrict weight = weights + from + c;
 #endif
-    const lanes ar = READ(xr, 0), ai = READ(xi, 0), br = READ(xr, step), bi = READ(xi, step);
+    sample x[RADIX];
+    UNROLL for (int l = 0; l < RADIX; l++) {
+      x[l].r = READ(xr, l * step);
+      x[l].i = READ(xi, l * step);
+    }
 #if RADIX == 2
-    store_turned(yr, yi, ar + br, ai + bi, wr[0], wi[0]);
-    store_turned(yr + leap, yi + leap, ar - br, ai - bi, wr[1], wi[1]);
+    transform2(x, x + 1);
 #elif RADIX == 3
-    const lanes cr = READ(xr, 2 * step), ci = READ(xi, 2 * step);
-    /* a - (b + c) / 2, and sqrt(3)/2 (b - c), which a quarter of a turn adds to it. */
-    const lanes sr = br + cr, si = bi + ci, mr = ar - 0.5f * sr, mi = ai - 0.5f * si;
-    const lanes ur = HALF_ROOT3 * (br - cr), ui = HALF_ROOT3 * (bi - ci);
-    store_turned(yr, yi, ar + sr, ai + si, wr[0], wi[0]);
-    store_turned(yr + leap, yi + leap, mr + ui, mi - ur, wr[1], wi[1]);
-    store_turned(yr + 2 * leap, yi + 2 * leap, mr - ui, mi + ur, wr[2], wi[2]);
+    transform3(x, x + 1, x + 2);
+#elif RADIX == 4
+    transform4(x, x + 1, x + 2, x + 3);
+#elif RADIX == 8
+    transform8(x);
 #else
-    const lanes cr = READ(xr, 2 * step), ci = READ(xi, 2 * step);
-    const lanes dr = READ(xr, 3 * step), di = READ(xi, 3 * step);
-    /* a + c, a - c, b + d, and i (d - b), whose sign tells the second output from the fourth. */
-    const lanes sr = ar + cr, si = ai + ci, mr = ar - cr, mi = ai - ci;
-    const lanes tr = br + dr, ti = bi + di, ur = bi - di, ui = dr - br;
-    store_turned(yr, yi, sr + tr, si + ti, wr[0], wi[0]);
-    store_turned(yr + leap, yi + leap, mr + ur, mi + ui, wr[1], wi[1]);
-    store_turned(yr + 2 * leap, yi + 2 * leap, sr - tr, si - ti, wr[2], wi[2]);
-    store_turned(yr + 3 * leap, yi + 3 * leap, mr - ur, mi - ui, wr[3], wi[3]);
+    transform9(x);
 #endif
+    UNROLL for (int k = 0; k < RADIX; k++) {
+      const sample z = k > 0 ? turned(x[k], wr[k], wi[k]) : x[k];
+      STORE(yr + k * leap, z.r);
+      STORE(yi + k * leap, z.i);
+    }
   }
 }

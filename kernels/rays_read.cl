@@ -22,14 +22,16 @@
 
 KERNEL void rays_read(
     __global const float *restrict grid, __global float *restrict rays,
-    __global const float *restrict table, __global const long2 *restrict steps,
+    __global const float *restrict table, __global const long2 *restrict steps, __global const int *restrict ends,
     int count, int samples, int rows, int columns, int edge)
 {
   const int ray = (int)get_global_id(RAY_AXIS), begin = (int)get_global_id(RUN_AXIS) * RUN;
   const int end = begin + RUN < samples ? begin + RUN : samples;
   const long period_x = (long)edge << 32, period_y = (long)rows << 32;
   __global float *out = rays + (long)ray * samples;
-  for (int l = begin; l < end; l++) {
+  const int kept = end < ends[ray] ? end : ends[ray];
+  for (int l = kept > begin ? kept : begin; l < end; l++) out[l] = out[(long)count * samples + l] = 0;
+  for (int l = begin; l < kept; l++) {
     long px = l * steps[ray].x, py = l * steps[ray].y;
     while (px > period_x) px -= period_x;
     const int mirrored = px > period_x / 2;

@@ -33,8 +33,7 @@ typedef float8 lane_sum __attribute__((aligned(4)));
 KERNEL void rays_spread(
     __global const float *restrict rays, __global float *restrict grid,
     __global const float *restrict table, __global const long2 *restrict steps,
-    __global const float2 *restrict inverses, __global const int4 *restrict visits,
-    __global const int *restrict starts, int count, int samples,
+    __global const float2 *restrict inverses, __global const int *restrict ends, __global const int4 *restrict visits, __global const int *restrict starts, int count, int samples,
     int tiles, int across, int rows, int columns)
 {
   const int tile = (int)get_global_id(0);
@@ -53,12 +52,13 @@ KERNEL void rays_spread(
       const float ay = low_y * inverse.y, by = high_y * inverse.y;
       const float near_y = ay < by ? ay : by, far_y = ay < by ? by : ay;
       float enter = ax > near_y ? ax : near_y, leave = bx < far_y ? bx : far_y;
-      if (enter < (float)-samples) enter = (float)-samples;
-      if (leave > (float)samples) leave = (float)samples;
+      const int kept = ends[ray];
+      if (enter < (float)-kept) enter = (float)-kept;
+      if (leave > (float)kept) leave = (float)kept;
       if (enter > leave) continue;
       int l = (int)enter - 1, last = (int)leave + 1;
-      if (l <= -samples) l = 1 - samples;
-      if (last >= samples) last = samples - 1;
+      if (l <= -kept) l = 1 - kept;
+      if (last >= kept) last = kept - 1;
       const long step_x = steps[ray].x, step_y = steps[ray].y;
       long px = l * step_x - ((long)visit.x << 32), py = l * step_y - ((long)visit.y << 32);
       __global const float *values = rays + (long)ray * samples;

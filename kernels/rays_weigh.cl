@@ -3,8 +3,9 @@
  *
  * With Z the transform of a + i b, a real view has the transform (Z[l] + conj Z[-l]) / 2 and its
  * partner (Z[l] - conj Z[-l]) / 2i, both of period `length`. Rays that point to the left are
- * reflected, which makes them their conjugates: `signs` is -1 for them. Samples 0 .. samples - 1 of
- * a ray are made, which may be more than a period.
+ * reflected, which makes them their conjugates: `signs` is -1 for them. Samples 0 .. ends - 1 of a
+ * ray are made, which may be more than a period, and perhaps some behind them; rows of samples are a
+ * multiple of LANES.
  *
  * Index space: (blocks of LANES columns, runs of RUN samples, parts). */
 
@@ -20,12 +21,15 @@
 KERNEL void rays_weigh(
     __global const float *restrict fields, __global float *restrict rays,
     __global const uint *restrict turns, __global const float *restrict half_shadows,
-    __global const float *restrict signs, int count, int samples, int length, int columns)
+    __global const float *restrict signs, __global const int *restrict ends, int count, int samples, int length, int columns)
 {
   const int c = (int)get_global_id(0) * LANES, part = (int)get_global_id(2);
   if (c >= columns) return;
   const int begin = (int)get_global_id(1) * RUN;
-  const int end = begin + RUN < samples ? begin + RUN : samples, ray0 = part * columns + c;
+  const int ray0 = part * columns + c;
+  int end = 0;
+  for (int k = 0; k < LANES && ray0 + k < count; k++) end = ends[ray0 + k] > end ? ends[ray0 + k] : end;
+  if (begin + RUN < end) end = begin + RUN;
   const lanes_whole turn = LOAD_WHOLE(turns + ray0);
   const lanes half_shadow = LOAD(half_shadows + ray0), sign = LOAD(signs + ray0);
   __global const float *zr = fields + c, *zi = zr + (long)length * columns;

@@ -70,7 +70,7 @@ class ColumnTransform:
             parts.reverse()
         while stride < length:
             left = length // stride
-            radix = next(radix for radix in (4, 3, 2) if left % radix == 0)
+            radix = next(radix for radix in (9, 8, 4, 3, 2) if left % radix == 0)
             weighted = weights is not None and stride == 1
             size = (-(-columns // run), length // radix, fields)
             arrays = (planes, spare, self._turns, weights if weighted else planes)

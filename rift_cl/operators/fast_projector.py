@@ -14,6 +14,8 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from rift_cl.cl.device import Device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
@@ -21,7 +23,7 @@ from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.gridding import LOG2_ROWS, choose
 from rift_cl.operators.padded_spectrum import PaddedSpectrum, in_steps
 from rift_cl.operators.parallel_projector import ParallelProjector
-from rift_cl.operators.ray_geometry import rays
+from rift_cl.operators.ray_geometry import IMAGE, rays
 from rift_cl.operators.ray_tables import RayTables
 
 _MOST_LOBES = 8
@@ -32,8 +34,10 @@ class FastProjector(ParallelProjector):
 
     It approximates the transform with the footprint ``linear`` of ``Projector``, which reads views
     by straight lines from bin to bin. The spectrum of such lines never ends: it is that of the
-    bins, repeated, under sinc^2. Here it ends after so many ``lobes`` of that, by which the two
-    projectors differ on sharp data; smooth data have nothing there.
+    bins, repeated, under sinc^2. Here it ends where the image has no more to show: along
+    either axis at 0.55 cycles per sample of the image, of which 1/2 can be told apart, or at 0.71 as
+    far as that lies below the detector's own Nyquist frequency. What lies beyond would fold back into
+    the image. By that the two projectors differ on sharp data; reconstructions are as good.
 
     Args:
         grid: where the image lives, (ny, nx) or (nz, ny, nx).
@@ -42,9 +46,9 @@ class FastProjector(ParallelProjector):
             over the norm of the result: for data as rough as white noise or smoother, on a detector
             that sees the image. Rougher data (a checkerboard, a lone corner pixel) may differ by a
             little more, and float32 rounds at 1e-6.
-        lobes: of sinc^2 that are kept. 0: nothing beyond the detector's Nyquist frequency. 1: a
-            reconstruction's edges ring no more than with straight lines. 3: the same values as
-            with them, as far as phase tables give those.
+        lobes: ``image``, or how many lobes of sinc^2 are kept in its place, folded or not. 0: nothing
+            beyond the detector's Nyquist frequency; edges ring. 3: the same values as with straight
+            lines, as far as phase tables give those.
         device: where to work; the default device if not given.
 
     Bins of which the hats lie further than eight bins from the image's shadow are taken for zero.
@@ -60,18 +64,20 @@ class FastProjector(ParallelProjector):
         scan: Parallel,
         error: float = 1e-3,
         *,
-        lobes: int = 1,
+        lobes: int | str = IMAGE,
         device: Device | None = None,
     ) -> None:
         if not 0 < one_number(error) <= 0.1:
             raise InputError(f"error is {error!r}, wanted a number from 1e-6 to 0.1")
-        if one_number(lobes) not in range(_MOST_LOBES + 1):
-            raise InputError(f"lobes is {lobes!r}, wanted a whole number from 0 to {_MOST_LOBES}")
+        if lobes != IMAGE and one_number(lobes) not in range(_MOST_LOBES + 1):
+            raise InputError(
+                f"lobes is {lobes!r}, wanted a whole number from 0 to {_MOST_LOBES}, or {IMAGE!r}"
+            )
         super().__init__(grid, scan, device)
-        self.error, self.lobes = float(error), int(lobes)
-        self._rays = found = rays(grid.slice(), scan)
-        self.samples = self.lobes * found.length if self.lobes else found.length // 2
-        spread = len(scan.angles) * self.samples
+        self.error, self.lobes = float(error), IMAGE if lobes == IMAGE else int(lobes)
+        self._rays = found = rays(grid.slice(), scan, lobes)
+        self._samples = in_steps(int(found.ends.max()))
+        spread = int(found.ends.sum())
         self.gridding = choose((grid.shape[-2], grid.shape[-1]), spread, float(error))
         self._columns = in_steps(-(-len(scan.angles) // 2))
         self._spectrum = PaddedSpectrum(
@@ -83,13 +89,20 @@ class FastProjector(ParallelProjector):
         _ = self._tables.nbytes
 
     @property
+    def samples(self) -> tuple[int, ...]:
+        """Samples that are kept of each view's transform, zero frequency included."""
+        kept = np.empty_like(self._rays.ends)
+        kept[self._rays.order] = self._rays.ends
+        return tuple(kept.tolist())
+
+    @property
     def period(self) -> int:
         """Bins after which a view's continuation repeats itself."""
         return self._rays.length
 
     @cached_property
     def _tables(self) -> RayTables:
-        return RayTables(self.device, self._rays, self.gridding, self._columns, self.samples)
+        return RayTables(self.device, self._rays, self.gridding, self._columns)
 
     def _apply(self, x: Any, out: Any) -> None:
         for k in range(x.shape[0] if len(x.shape) == 3 else 1):
@@ -114,10 +127,11 @@ class FastProjector(ParallelProjector):
         size = (*self._blocks(columns, length), 2)
         device.launch("rays_pack", size, views, fields, *arguments, RUN=self._run)
         fields, spare = tables.views(fields, spare)
-        values = device.empty((2, count, self.samples))
-        size = (*self._blocks(columns, self.samples), 2)
-        sizes = (count, self.samples, length, columns)
-        device.launch("rays_weigh", size, fields, values, *tables.factors, *sizes, RUN=self._run)
+        values = device.empty((2, count, self._samples))
+        size = (*self._blocks(columns, self._samples), 2)
+        sizes = (count, self._samples, length, columns)
+        arrays = (fields, values, *tables.factors, tables.ends)
+        device.launch("rays_weigh", size, *arrays, *sizes, RUN=self._run)
         return values
 
     def _views_of(self, values: Any, views: Any, k: int) -> None:
@@ -126,7 +140,7 @@ class FastProjector(ParallelProjector):
         count, length, columns = len(found.order), found.length, self._columns
         fields, spare = self._planes(length, columns)
         blocks = self._blocks(columns, length // 2 + 1)
-        sizes = (count, self.samples, length, columns)
+        sizes = (count, self._samples, length, columns)
         factors = tables.factors
         device.launch("rays_unweigh", blocks, values, fields, *factors, *sizes, RUN=self._run)
         fields, spare = tables.views(fields, spare, inverse=True)
@@ -148,7 +162,7 @@ class FastProjector(ParallelProjector):
         self.device.launch(
             "rays_spread",
             (tiles,),
-            *(values, grid, tables.kernel, tables.steps, tables.inverses),
+            *(values, grid, tables.kernel, tables.steps, tables.inverses, tables.ends),
             *(tables.visits, tables.tiles, *values.shape[1:], tiles),
             *(-(-(edge // 2 + 1) // tables.tile), rows, self._spectrum.across),
             **self._macros,
@@ -159,7 +173,7 @@ class FastProjector(ParallelProjector):
     def _read(self, grid: Any) -> Any:
         """The transpose of ``_spread``."""
         tables, (rows, edge) = self._tables, self.gridding.edges
-        values = self.device.empty((2, len(self._rays.order), self.samples))
+        values = self.device.empty((2, len(self._rays.order), self._samples))
         count, samples = values.shape[1:]
         width = self.gridding.width
         self.device.launch(
@@ -167,7 +181,7 @@ class FastProjector(ParallelProjector):
         )
         cpu = self.device.traits.is_cpu
         run = 64 if cpu else 1
-        arguments = (grid, values, tables.kernel, tables.steps)
+        arguments = (grid, values, tables.kernel, tables.steps, tables.ends)
         sizes = (count, samples, rows, self._spectrum.across, edge)
         runs = -(-samples // run)
         size = (count, runs) if cpu else (runs, count)
@@ -194,7 +208,7 @@ class FastProjector(ParallelProjector):
     def scratch(self) -> int:
         """Bytes needed besides the arrays that go in and come out."""
         found = self._rays
-        values = 2 * len(found.order) * self.samples
+        values = 2 * len(found.order) * self._samples
         fields = 2 * found.length * self._columns
         grid, transform = self._spectrum.entries, self._spectrum.scratch_entries
         most = max(2 * fields + values, values + grid, transform)

@@ -22,7 +22,6 @@ class RayTables:
         rays: of the scan.
         gridding: the kernel.
         columns: that pairs of views are laid out in.
-        samples: of a ray.
     """
 
     def __init__(
@@ -31,12 +30,14 @@ class RayTables:
         rays: Rays,
         gridding: Gridding,
         columns: int,
-        samples: int,
     ) -> None:
         self.tile = _TILE["cpu" if device.traits.is_cpu else "gpu"]
         steps = fixed_steps(rays, gridding.edges)
-        visits, tiles = tile_visits(steps, samples, gridding.edges, gridding.width, self.tile)
+        visits, tiles = tile_visits(
+            steps, rays.ends, gridding.edges, gridding.width, self.tile
+        )
         self.order, self.starts = device.array(rays.order), device.array(rays.starts)
+        self.ends = device.array(rays.ends)
         padding = (0, 2 * columns - len(rays.order))
         factors = (rays.turns, rays.half_shadows, rays.signs)
         self.factors = tuple(device.array(np.pad(factor, padding)) for factor in factors)
@@ -48,6 +49,6 @@ class RayTables:
     @property
     def nbytes(self) -> int:
         """Bytes of the device that these take."""
-        arrays: list[Any] = [self.order, self.starts, *self.factors, self.steps, self.inverses]
+        arrays: list[Any] = [self.order, self.starts, self.ends, *self.factors, self.steps, self.inverses]
         arrays += [self.visits, self.tiles, self.kernel]
         return sum(int(array.nbytes) for array in arrays) + self.views.nbytes

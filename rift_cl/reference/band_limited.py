@@ -12,6 +12,7 @@ Bins further than h + 8 bins from the shadow of the image's circle get nothing.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,17 +23,24 @@ from rift_cl.reference.matrix import MatrixProjector
 _BESIDE = 8
 
 
-def band_limited(grid: Grid, scan: Parallel, *, period: int, samples: int) -> MatrixProjector:
+def band_limited(
+    grid: Grid, scan: Parallel, *, period: int, samples: int | Sequence[int]
+) -> MatrixProjector:
     """The projector that is this matrix.
 
     Args:
         grid: the image; of a volume, every slice.
         scan: how it is looked at.
         period: bins after which a view repeats itself.
-        samples: of the spectrum, ``1 / period`` cycles per bin apart, that are kept.
+        samples: of the spectrum, ``1 / period`` cycles per bin apart, that are kept: of every view,
+            or of each.
     """
     plane = grid.slice()
-    views = [_view(plane, scan, float(angle), period, samples) for angle in scan.angles]
+    kept = np.broadcast_to(samples, len(scan.angles))
+    views = [
+        _view(plane, scan, float(angle), period, int(count))
+        for angle, count in zip(scan.angles, kept, strict=True)
+    ]
     return MatrixProjector(np.concatenate(views), grid, scan)
 
 

@@ -81,7 +81,7 @@ def weight(grid, scan):
     return dx * dy / max(scan.pitch, min(dx, dy))
 
 
-@pytest.mark.parametrize("lobes", [0, 1, 3])
+@pytest.mark.parametrize("lobes", ["image", 0, 1, 3])
 def test_the_named_error_is_met_on_any_geometry(device, scene, lobes):
     grid, scan = scene
     A = FastProjector(grid, scan, 1e-3, lobes=lobes, device=device)
@@ -114,7 +114,7 @@ def test_a_smaller_error_is_a_smaller_error(device):
     assert found[0] > 5 * found[1] > 25 * found[2]
 
 
-@pytest.mark.parametrize("lobes", [0, 1, 3])
+@pytest.mark.parametrize("lobes", ["image", 0, 1, 3])
 def test_the_pair_is_matched(device, scene, lobes):
     grid, scan = scene
     A = FastProjector(grid, scan, 1e-3, lobes=lobes, device=device)
