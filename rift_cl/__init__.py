@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         Projector,
         Ramp,
         Response,
+        cheapest_projector,
         dot_test,
     )
     from rift_cl.reconstruct import backproject, cgls, fbp, sirt, tv
@@ -65,6 +66,7 @@ _HOMES = {
     "Target": "sampling",
     "backproject": "reconstruct",
     "cgls": "reconstruct",
+    "cheapest_projector": "operators",
     "coverage": "sampling.coverage",
     "default_device": "cl",
     "devices": "cl",
@@ -108,6 +110,7 @@ __all__ = [
     "backproject",
     "basis",
     "cgls",
+    "cheapest_projector",
     "coverage",
     "default_device",
     "devices",

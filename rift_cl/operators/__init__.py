@@ -1,6 +1,7 @@
 """Linear operators on device arrays: projector, filters, and their algebra."""
 
 from rift_cl.operators.adjoint_check import dot_test
+from rift_cl.operators.cheapest_projector import cheapest_projector
 from rift_cl.operators.compensation import COMPENSATIONS, Compensation
 from rift_cl.operators.compensation_3d import central_planes, radial_lines
 from rift_cl.operators.fast_projector import FastProjector
@@ -25,6 +26,7 @@ __all__ = [
     "ViewFilter",
     "as_filter",
     "central_planes",
+    "cheapest_projector",
     "dot_test",
     "radial_lines",
 ]

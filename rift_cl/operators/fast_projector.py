@@ -34,10 +34,11 @@ class FastProjector(ParallelProjector):
 
     It approximates the transform with the footprint ``linear`` of ``Projector``, which reads views
     by straight lines from bin to bin. The spectrum of such lines never ends: it is that of the
-    bins, repeated, under sinc^2. Here it ends where the image has no more to show: along
-    either axis at 0.55 cycles per sample of the image, of which 1/2 can be told apart, or at 0.71 as
-    far as that lies below the detector's own Nyquist frequency. What lies beyond would fold back into
-    the image. By that the two projectors differ on sharp data; reconstructions are as good.
+    bins, repeated, under sinc^2. Here it ends where the image has no more to show:
+    along either axis at 0.55 cycles per sample of the image, of which 1/2 can be told apart, or at
+    0.71 as far as that lies below the detector's own Nyquist frequency. What lies beyond would fold
+    back into the image. By that the two projectors differ on sharp data; reconstructions are as
+    good.
 
     Args:
         grid: where the image lives, (ny, nx) or (nz, ny, nx).
@@ -47,8 +48,8 @@ class FastProjector(ParallelProjector):
             that sees the image. Rougher data (a checkerboard, a lone corner pixel) may differ by a
             little more, and float32 rounds at 1e-6.
         lobes: ``image``, or how many lobes of sinc^2 are kept in its place, folded or not. 0: nothing
-            beyond the detector's Nyquist frequency; edges ring. 3: the same values as with straight
-            lines, as far as phase tables give those.
+            beyond the detector's Nyquist frequency; edges ring. 3: the same values as with
+            straight lines, as far as phase tables give those.
         device: where to work; the default device if not given.
 
     Bins of which the hats lie further than eight bins from the image's shadow are taken for zero.

@@ -29,8 +29,8 @@ _FINEST = 64
 # Reciprocals of steps that are next to nothing.
 _LARGEST_INVERSE = 1e9
 _ANGLE_ROUNDING = 1e-9
-# Frequencies up to which rays are kept if no lobes are asked for, in cycles per sample of the image
-# along either axis, of which 1/2 can be told apart. Below the detector's own Nyquist frequency the
+# Frequencies up to which rays are kept if no lobes are asked for, in cycles per sample of the
+# image along either axis, of which 1/2 can be told apart. Below the detector's own Nyquist frequency the
 # data say something about what lies beyond and folds back into a sampled image; above it, only
 # straight lines between bins do, and a margin is left so that nothing ends within the square.
 # Shell and Logan's phantom, 512 x 512, 768 views: with bins half as wide as samples, 0.71 instead of
@@ -67,6 +67,11 @@ class Rays:
     ends: NDArray[np.int32]
 
 
+def too_fine(grid: Grid, scan: Parallel) -> bool:
+    """Whether bins are so much finer than samples that rays are no way to go."""
+    return scan.pitch * _FINEST < min(grid.spacing[-2:])
+
+
 def rays(grid: Grid, scan: Parallel, lobes: int | str = IMAGE) -> Rays:
     """The rays of a scan of one slice.
 
@@ -79,7 +84,7 @@ def rays(grid: Grid, scan: Parallel, lobes: int | str = IMAGE) -> Rays:
         InputError: bins are too fine for this method.
     """
     (dy, dx), pitch = grid.spacing, scan.pitch
-    if pitch * _FINEST < min(dx, dy):
+    if too_fine(grid, scan):
         raise InputError(
             f"pitch is {pitch:g}, samples are {grid.spacing} apart: FastProjector wants bins of at "
             f"least 1/{_FINEST} of a sample; use Projector"
@@ -120,7 +125,8 @@ def _ends(directions: Floats, length: int, lobes: int | str) -> NDArray[np.int32
     cycle = 1 / np.abs(directions).max(axis=1)
     measured = np.minimum(_MEASURED * cycle, length / 2)
     continued = np.minimum(_CONTINUED * cycle, length)
-    return np.ceil(np.maximum(measured, continued)).astype(np.int32)
+    ends: NDArray[np.int32] = np.ceil(np.maximum(measured, continued)).astype(np.int32)
+    return ends
 
 
 def fixed_steps(found: Rays, edges: tuple[int, int]) -> NDArray[np.int64]:

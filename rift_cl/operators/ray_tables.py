@@ -33,9 +33,7 @@ class RayTables:
     ) -> None:
         self.tile = _TILE["cpu" if device.traits.is_cpu else "gpu"]
         steps = fixed_steps(rays, gridding.edges)
-        visits, tiles = tile_visits(
-            steps, rays.ends, gridding.edges, gridding.width, self.tile
-        )
+        visits, tiles = tile_visits(steps, rays.ends, gridding.edges, gridding.width, self.tile)
         self.order, self.starts = device.array(rays.order), device.array(rays.starts)
         self.ends = device.array(rays.ends)
         padding = (0, 2 * columns - len(rays.order))
@@ -49,6 +47,13 @@ class RayTables:
     @property
     def nbytes(self) -> int:
         """Bytes of the device that these take."""
-        arrays: list[Any] = [self.order, self.starts, self.ends, *self.factors, self.steps, self.inverses]
+        arrays: list[Any] = [
+            self.order,
+            self.starts,
+            self.ends,
+            *self.factors,
+            self.steps,
+            self.inverses,
+        ]
         arrays += [self.visits, self.tiles, self.kernel]
         return sum(int(array.nbytes) for array in arrays) + self.views.nbytes

@@ -39,6 +39,10 @@ from rift_cl.reconstruct.solver import Solver, SolverState, solve
 # A ray that crosses less than this share of what the longest does says nothing, and counts as
 # none; the same for a pixel.
 _LEAST = 1e-3
+# Beside an edge, sums of an operator whose band ends (``FastProjector``) ring about their value, by
+# up to 9 % of the step (J. W. Gibbs). Sums below zero by more than this share of the largest are
+# no ringing.
+_RINGING = 0.1
 # The weighted residual's root mean square that ends a run, in units of the noise. On phantoms with
 # sharp and smooth parts it came within 1.3 dB of the best image in seven cases of eight.
 _WELL_BELOW = 0.9
@@ -133,18 +137,24 @@ class Sirt(Solver):
 def _inverse_sums(A: LinearOperator) -> Any:
     """One over the sums of an operator's rows, as a device array; 0 where they are next to 0.
 
+    Where sums ring below zero, none counts for less than that: a ray that grazes the image would
+    get a weight that only ringing has made large.
+
     Raises:
-        InputError: a sum is negative.
+        InputError: a sum is negative, and not by ringing.
     """
     sums = A(A.device.array(np.ones(A.domain), A.dtype))
     host = download(A.device, sums).astype(np.float64)
     largest = host.max(initial=0.0)
-    if host.min(initial=0.0) < -_LEAST * largest or (largest == 0 and host.any()):
+    below = -host.min(initial=0.0)
+    if below > _RINGING * largest:
         raise InputError(
             "A has rows or columns with a negative sum, and SIRT wants weights >= 0: use cgls"
         )
     counts = host > _LEAST * largest
-    return A.device.array(np.where(counts, 1 / np.where(counts, host, 1), 0), A.dtype)
+    return A.device.array(
+        np.where(counts, 1 / np.where(counts, np.maximum(host, below), 1), 0), A.dtype
+    )
 
 
 def sirt(

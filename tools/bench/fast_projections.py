@@ -30,7 +30,7 @@ class FastCase:
         case: the geometry.
         error: what the projector was asked for.
         length: samples of a view's transform.
-        samples: of a ray, from zero on.
+        samples: of a ray, from zero on, on average.
         width: cells that the gridding's kernel reaches along an axis.
         edges: of the padded image along (y, x).
     """
@@ -173,7 +173,8 @@ def fast_tasks(device: rift.Device, n: int, views: int) -> list[Task]:
     A = FastProjector(case.grid, case.scan, _ERROR, device=device)
     A.prepare()
     gridding = A.gridding
-    sizes = FastCase(case, _ERROR, A.period, A.samples, gridding.width, gridding.edges)
+    samples = round(sum(A.samples) / len(A.samples))
+    sizes = FastCase(case, _ERROR, A.period, samples, gridding.width, gridding.edges)
     x, y, costs = device.array(case.image), device.array(case.projections), fast_costs(sizes.width)
     return [
         Task("forward", sizes, lambda: A(x), costs),

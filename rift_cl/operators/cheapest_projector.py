@@ -1,0 +1,107 @@
+"""Which projector costs least for the accuracy that is wanted.
+
+``Projector`` costs something for every pixel of every view, ``FastProjector`` for every sample of a
+view and for the transforms: the one wins where slices are small or views are few, the other from
+some 200 samples along an edge up. Costs are counted, never timed, so that the choice, and with it
+the result, does not depend on what else a machine does.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from rift_cl.cl.device import Device
+from rift_cl.cl.discovery import default_device
+from rift_cl.errors import InputError
+from rift_cl.geometry import Grid, Parallel
+from rift_cl.operators.fast_projector import FastProjector
+from rift_cl.operators.parallel_projector import ParallelProjector
+from rift_cl.operators.projector import Projector
+from rift_cl.operators.ray_geometry import too_fine
+
+# What a formula and what a solver may differ by, in norm. With the first, filtered backprojection
+# of Shepp and Logan's phantom loses 0.01 dB; the residual of a solver goes below it.
+_FORMULA_ERROR, _SOLVER_ERROR = 1e-2, 1e-3
+
+
+class _Costs(NamedTuple):
+    """Nanoseconds of a slice's backprojection, on one core of a CPU or on a whole GPU.
+
+    Args:
+        pixel: of ``Projector``, for a pixel of a view.
+        bin: of ``Projector``, for a bin of a view.
+        sample: of ``FastProjector``, for a sample of a view's transform that is kept.
+        point: of ``FastProjector``, for a number that is transformed.
+        launch: for a kernel's launch.
+    """
+
+    pixel: float
+    bin: float
+    sample: float
+    point: float
+    launch: float
+
+
+# Launches of a backprojection of either kind.
+_DIRECT_LAUNCHES, _FAST_LAUNCHES = 5, 20
+_COSTS = {
+    "cpu": _Costs(pixel=0.13, bin=6.0, sample=22.0, point=8.0, launch=2e4),
+    "gpu": _Costs(pixel=0.004, bin=0.05, sample=0.2, point=0.1, launch=5e3),
+}
+
+
+def cheapest_projector(
+    grid: Grid,
+    scan: Parallel,
+    *,
+    iterative: bool = False,
+    error: float | None = None,
+    footprint: str | None = None,
+    device: Device | None = None,
+) -> ParallelProjector:
+    """The projector of a parallel scan that costs least, by a fixed model of what each costs.
+
+    Args:
+        grid: where the image lives, (ny, nx) or (nz, ny, nx).
+        scan: how it is looked at.
+        iterative: whether a solver will use it, rather than ``fbp`` or ``backproject``.
+        error: what ``FastProjector`` may differ by in norm; 1e-2 if not given, by which filtered
+            backprojection loses less than 0.05 dB, and 1e-3 for solvers.
+        footprint: of ``Projector``; whoever names one wants that projector.
+        device: where to work; the default device if not given.
+
+    Raises:
+        InputError: footprint and error are both given, or one of them cannot be.
+    """
+    if footprint is not None and error is not None:
+        raise InputError(
+            f"footprint is {footprint!r} and error {error!r}: a footprint is Projector's, an error "
+            "FastProjector's; give one of them"
+        )
+    device = device or default_device()
+    if footprint is not None:
+        return Projector(grid, scan, footprint, device=device)
+    wanted = error if error is not None else _SOLVER_ERROR if iterative else _FORMULA_ERROR
+    if too_fine(grid, scan):
+        return Projector(grid, scan, device=device)
+    fast = FastProjector(grid, scan, wanted, device=device)
+    costs = _COSTS["cpu" if device.traits.is_cpu else "gpu"]
+    if _fast_cost(fast, costs) < _direct_cost(grid, scan, costs):
+        return fast
+    return Projector(grid, scan, device=device)
+
+
+def _direct_cost(grid: Grid, scan: Parallel, costs: _Costs) -> float:
+    each = math.prod(grid.shape[-2:]) * costs.pixel + scan.bins * costs.bin
+    return len(scan.angles) * each + _DIRECT_LAUNCHES * costs.launch
+
+
+def _fast_cost(fast: FastProjector, costs: _Costs) -> float:
+    rows, columns = fast.gridding.edges
+    # Views share a complex transform in pairs, and so do rows of the image; of the grid one half is
+    # stored.
+    points = (
+        len(fast.scan.angles) * fast.period + rows * columns + fast.grid.shape[-2] * columns
+    ) / 2
+    return sum(fast.samples) * costs.sample + points * costs.point + _FAST_LAUNCHES * costs.launch
