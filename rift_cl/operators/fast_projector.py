@@ -47,7 +47,7 @@ class FastProjector(ParallelProjector):
             over the norm of the result: for data as rough as white noise or smoother, on a detector
             that sees the image. Rougher data (a checkerboard, a lone corner pixel) may differ by a
             little more, and float32 rounds at 1e-6.
-        lobes: ``image``, or how many lobes of sinc^2 are kept in its place, folded or not. 0: nothing
+        lobes: ``image``, or how many lobes of sinc^2 are kept, folded or not. 0: nothing
             beyond the detector's Nyquist frequency; edges ring. 3: the same values as with
             straight lines, as far as phase tables give those.
         device: where to work; the default device if not given.

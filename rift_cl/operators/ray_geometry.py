@@ -30,11 +30,11 @@ _FINEST = 64
 _LARGEST_INVERSE = 1e9
 _ANGLE_ROUNDING = 1e-9
 # Frequencies up to which rays are kept if no lobes are asked for, in cycles per sample of the
-# image along either axis, of which 1/2 can be told apart. Below the detector's own Nyquist frequency the
-# data say something about what lies beyond and folds back into a sampled image; above it, only
-# straight lines between bins do, and a margin is left so that nothing ends within the square.
-# Shell and Logan's phantom, 512 x 512, 768 views: with bins half as wide as samples, 0.71 instead of
-# 0.55 is worth 1.7 dB; with bins as wide as samples 0.55 loses 0.02 dB, 0.5 loses 0.16.
+# image along either axis, of which 1/2 can be told apart. Below the detector's own Nyquist
+# frequency the data say something about what lies beyond and folds back into a sampled image; above
+# it, only straight lines between bins do, and a margin is left so that nothing ends within the
+# square. Shepp and Logan's phantom, 512 x 512, 768 views: with bins half as wide as samples, 0.71
+# instead of 0.55 is worth 1.7 dB; with bins as wide as samples 0.55 loses 0.02 dB, 0.5 loses 0.16.
 _MEASURED, _CONTINUED = 0.71, 0.55
 # What stands for these in the place of a number of lobes.
 IMAGE = "image"
