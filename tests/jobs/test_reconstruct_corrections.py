@@ -44,7 +44,7 @@ def notes(out):
     return " ".join(json.loads((out / "metrics.json").read_text())["assumed"])
 
 
-PHASE = ("--delta-beta", 200, "--energy", 20, "--propagation", 50, "--pitch", 1, "--unit", "um")
+PHASE = ("--delta-beta", 200, "--energy", 20, "--propagation", 50, "--pitch", 3, "--unit", "um")
 
 
 def test_phase_retrieval_blurs_as_its_formula_says_and_keeps_the_level(tmp_path):
@@ -53,8 +53,8 @@ def test_phase_retrieval_blurs_as_its_formula_says_and_keeps_the_level(tmp_path)
     plain = reconstruct(path, tmp_path / "plain", "--center", 39.5, "--rings", "off")
     phase = reconstruct(path, tmp_path / "phase", "--center", 39.5, "--rings", "off", *PHASE)
     assert "Phase was retrieved after Paganin" in notes(tmp_path / "phase")
-    assert np.abs(np.diff(phase)).max() < 0.8 * np.abs(np.diff(plain)).max()
-    assert phase.sum() == pytest.approx(plain.sum(), rel=0.02)
+    assert 3 * np.abs(np.diff(phase)).max() < 0.8 * np.abs(np.diff(plain)).max()
+    assert 3 * phase.sum() == pytest.approx(plain.sum(), rel=0.01)
 
 
 def test_slabs_do_not_show(tmp_path, monkeypatch):
