@@ -7,6 +7,7 @@ from rift_cl.reconstruct.filtered_backprojection import FilteredBackprojection, 
 from rift_cl.reconstruct.fista import Fista
 from rift_cl.reconstruct.flatfield import Attenuation, attenuation
 from rift_cl.reconstruct.offset_axis import find_offset_center, widened
+from rift_cl.reconstruct.ordered_subsets import OrderedSubsets
 from rift_cl.reconstruct.padding import extended
 from rift_cl.reconstruct.pdhg import Pdhg
 from rift_cl.reconstruct.poisson_weights import RayWeights, poisson_weights
@@ -21,6 +22,7 @@ __all__ = [
     "Cgls",
     "FilteredBackprojection",
     "Fista",
+    "OrderedSubsets",
     "Pdhg",
     "RayWeights",
     "SeenRays",

@@ -80,6 +80,8 @@ class DataTerm:
     def _weigh_rays(self, y: Any, weights: Any) -> None:
         """Make A and y those of the weighted problem."""
         weighted = WeightedRays(self.A, weights)
+        if weighted.measured == 0:
+            raise InputError("weights are 0 everywhere: at least one sample must count")
         given = y if is_device_array(y) else masked_data(y, weighted.weights)
         copy(self.device, self.on_device(given, self.A.range, name="y"), self.y)
         weighted.weigh(self.y)

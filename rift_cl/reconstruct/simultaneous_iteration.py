@@ -86,9 +86,9 @@ class Sirt(Solver):
         self._nonnegative = nonnegative
         self._rays, self._pixels, self._length = None, None, float(relaxation)
         if data.weight is None and weights is None:
-            self._rays, self._pixels = _inverse_sums(A), _inverse_sums(A.T)
+            self._rays, self._pixels = inverse_sums(A), inverse_sums(A.T)
         elif data.weight is None:
-            self._pixels = _inverse_sums(data.A.T @ data.A)
+            self._pixels = inverse_sums(data.A.T @ data.A)
         else:
             largest = data.norm_squared()
             self._length = relaxation / largest if largest > 0 else 0.0
@@ -134,7 +134,7 @@ class Sirt(Solver):
         now.step += 1
 
 
-def _inverse_sums(A: LinearOperator) -> Any:
+def inverse_sums(A: LinearOperator) -> Any:
     """One over the sums of an operator's rows, as a device array; 0 where they are next to 0.
 
     Where sums ring below zero, none counts for less than that: a ray that grazes the image would
@@ -168,6 +168,7 @@ def sirt(
     precondition: Precondition = None,
     noise: float | None = None,
     weights: Any = None,
+    subsets: int = 1,
     out: Any = None,
 ) -> Any:
     """Simultaneous iterative reconstruction.
@@ -188,6 +189,8 @@ def sirt(
             (``poisson_weights``), 0 where nothing was measured; y may be anything there. ``noise``
             and the reported residual are then those of a sample of weight 1, and
             ``|F^(1/2) W^(1/2) (A x - y)|`` is what becomes small.
+        subsets: correct the image after each of so many subsets of the views (see
+            ``ordered_subsets``): with 10, about ten times fewer steps. Not with ``precondition``.
         out: where to put the result.
 
     Returns:
@@ -196,6 +199,16 @@ def sirt(
     Raises:
         InputError: an argument does not fit, or holds NaN or infinity.
     """
+    if one_number(subsets) != 1:
+        from rift_cl.reconstruct.ordered_subsets import OrderedSubsets
+
+        if precondition is not None:
+            raise InputError(
+                "precondition and subsets are both given: each saves steps, choose one of them"
+            )
+        given = {"start": start, "nonnegative": nonnegative, "relaxation": relaxation}
+        parts = OrderedSubsets(A, y, subsets, noise=noise, weights=weights, **given)
+        return solve(parts, steps, like=y, out=out)
     solver = Sirt(
         A,
         y,

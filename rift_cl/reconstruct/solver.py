@@ -145,12 +145,16 @@ class Solver(ABC):
             CheckpointError: it is not.
         """
         data, residual = self.data, self.data.data()
-        data.residual(data.device.array(found["image"], data.dtype), residual)
+        self._measured(data.device.array(found["image"], data.dtype), residual)
         given = data.device.array(found["residual"], data.dtype)
         axpby(data.device, -1.0, residual, 1.0, given)
         size = data.rms(residual) + data.rms(data.y)
         if data.rms(given) > _SAME_RESIDUAL * size:
             raise CheckpointError("state of another A or another y: its residual is not theirs")
+
+    def _measured(self, image: Any, out: Any) -> None:
+        """``out`` = A image - y."""
+        self.data.residual(image, out)
 
     def _entries(self) -> Iterator[tuple[str, Any]]:
         for field in fields(self._now):

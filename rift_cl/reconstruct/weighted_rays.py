@@ -28,7 +28,7 @@ class WeightedRays(LinearOperator):
 
     Raises:
         ShapeError: there is not one weight for each sample.
-        InputError: a weight is negative, NaN or infinite, or all are zero.
+        InputError: a weight is negative, NaN or infinite.
     """
 
     def __init__(self, A: LinearOperator, weights: Any) -> None:
@@ -65,7 +65,7 @@ def checked_weights(weights: Any, A: LinearOperator) -> NDArray[np.float64]:
 
     Raises:
         ShapeError: there is not one weight for each sample.
-        InputError: a weight is negative, NaN or infinite, or all are zero.
+        InputError: a weight is negative, NaN or infinite.
     """
     host = download(A.device, weights) if is_device_array(weights) else weights
     found = as_real_array(host, name="weights").astype(np.float64)
@@ -80,8 +80,6 @@ def checked_weights(weights: Any, A: LinearOperator) -> NDArray[np.float64]:
         )
     if found.min(initial=0.0) < 0:
         raise InputError(f"weights hold {found.min():g}, wanted numbers of 0 or more")
-    if not found.any():
-        raise InputError("weights are 0 everywhere: at least one sample must count")
     return found
 
 
