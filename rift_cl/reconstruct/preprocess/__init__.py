@@ -1,6 +1,31 @@
-"""What is mended in projections before they are reconstructed: stripes, zingers, phase."""
+"""What is mended in projections before they are reconstructed.
 
+Stripes, zingers and phase; binning, a tilted axis, and half acquisitions.
+"""
+
+from rift_cl.reconstruct.preprocess.alignment import straightened, tilt_halo, upright
+from rift_cl.reconstruct.preprocess.binning import (
+    binned,
+    binned_center,
+    binned_scan,
+    binning_note,
+)
+from rift_cl.reconstruct.preprocess.half_acquisition import stitched
 from rift_cl.reconstruct.preprocess.paganin import Propagation, halo_rows, paganin
 from rift_cl.reconstruct.preprocess.rings import STRIPE_METHODS, remove_rings
 
-__all__ = ["STRIPE_METHODS", "Propagation", "halo_rows", "paganin", "remove_rings"]
+__all__ = [
+    "STRIPE_METHODS",
+    "Propagation",
+    "binned",
+    "binned_center",
+    "binned_scan",
+    "binning_note",
+    "halo_rows",
+    "paganin",
+    "remove_rings",
+    "stitched",
+    "straightened",
+    "tilt_halo",
+    "upright",
+]
