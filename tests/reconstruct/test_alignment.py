@@ -6,7 +6,7 @@ import pytest
 import rift_cl as rift
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.metrics import psnr
-from rift_cl.reconstruct.preprocess.alignment import tilt_halo, straightened, upright
+from rift_cl.reconstruct.preprocess.alignment import straightened, tilt_halo, upright
 from rift_cl.reconstruct.preprocess.sinc_interpolation import resampled
 from rift_cl.reference import resample as twin
 

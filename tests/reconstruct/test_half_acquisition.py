@@ -6,7 +6,7 @@ from scipy.ndimage import gaussian_filter1d
 
 import rift_cl as rift
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.metrics import psnr
+from rift_cl.metrics import disc, psnr
 from rift_cl.reconstruct.offset_axis import widened
 from rift_cl.reconstruct.preprocess.half_acquisition import stitched
 
@@ -14,6 +14,7 @@ SIZE, BINS, VIEWS, CENTER = 160, 92, 480, 11.3
 ANGLES = 0.3 + np.arange(VIEWS) * 2 * np.pi / VIEWS
 GRID = rift.Grid((SIZE, SIZE))
 TRUTH = rift.phantom.shepp_logan(GRID)
+SEEN = disc(GRID, radius=73.0)
 
 
 def measured(center: float, angles: np.ndarray = ANGLES, bins: int = BINS):
@@ -27,7 +28,7 @@ def measured(center: float, angles: np.ndarray = ANGLES, bins: int = BINS):
 
 
 def quality(sinogram: np.ndarray, scan: rift.Parallel) -> float:
-    return psnr(rift.fbp(rift.Projector(GRID, scan, "strip"), sinogram), TRUTH)
+    return psnr(rift.fbp(rift.Projector(GRID, scan, "strip"), sinogram), TRUTH, mask=SEEN)
 
 
 @pytest.mark.parametrize("center", [10.0, 10.5, BINS - 11.5])
@@ -50,7 +51,7 @@ def test_the_slices_are_those_of_weights(center: float, views: int) -> None:
     assert len(wide) == -(-views // 2)
     score, weighed = quality(wide, joined), quality(*widened(sinogram, scan))
     print(f"axis {center:g} of {BINS}, {views} views: joined {score:.2f} dB, weighed {weighed:.2f}")
-    assert score > weighed - 0.15
+    assert score > weighed - 0.1
     whole, scan = measured(80.0, joined.angles, 161)
     assert score > quality(whole, scan) - 0.15
 
