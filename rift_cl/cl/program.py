@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import threading
 import time
+import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -51,6 +52,8 @@ class Programs:
     """
 
     def __init__(self, device: Device) -> None:
+        # Some drivers remark on kernels that they build well; a failure is told by an exception.
+        warnings.filterwarnings("ignore", message="Non-empty compiler output")
         self._device = device
         self._programs: dict[_Key, Any] = {}
         self._started: set[tuple[_Key, bool]] = set()
