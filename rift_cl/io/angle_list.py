@@ -1,13 +1,16 @@
-"""Angles for scans whose files hold none: from a text beside them, or as an even turn.
+"""The angles of a scan: where they come from, and whether they are degrees or radians.
 
-Folders of projections come with their angles in a text file, or with the knowledge in somebody's
-head that they were taken evenly over half a turn. What is assumed here is always told.
+Angles are arrays inside the scan's file, text beside it, or the knowledge in somebody's head that
+views were taken evenly over half a turn. Their unit is what a person says, else what the file says
+of them, else what their layout prescribes; and since files are wrong about it, it is held against
+their span: 3.1 degrees in hundreds of steps are radians in disguise. What is assumed is told.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,71 +19,189 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, InputError, ShapeError
 from rift_cl.io.boundary import check_claim, check_numeric, reading
-from rift_cl.io.scan_file import check_angles
+from rift_cl.io.scan_file import AngleUnit, check_angles
 
 SUFFIXES = (".txt", ".csv", ".npy")
 # Eight million angles: no scan has more, and a forged header may not ask for gigabytes.
 _LONGEST = 64 << 20
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
 _TURN = re.compile(rf"(?:({_NUMBER}):)?({_NUMBER})")
+# Spans up to this are radians of one turn or, in degrees, too little to reconstruct from.
+_RADIANS_UP_TO = 7.0
+# Two angles tell nothing about their unit.
+_TELLING = 3
+# Radians between neighbouring views of a scan of several turns, at most.
+_COARSE = 0.3
+# How closely whole and half turns must be met, as a share.
+_CLOSE = 0.01
 
 Angles = NDArray[np.float64]
 
 
-def given_angles(text: str, count: int) -> Angles | None:
+@dataclass(frozen=True, eq=False)
+class AngleList:
+    """Angles as they are given, before their unit and their number are settled.
+
+    Args:
+        name: what they are called in a sentence.
+        values: the numbers; or, of a turn that is evenly divided, its two ends in degrees.
+        even: whether they are such a turn.
+        unit: their unit where a file states it, or None.
+        usual: their unit by the layout of their file.
+    """
+
+    name: str
+    values: Angles
+    even: bool = False
+    unit: AngleUnit | None = None
+    usual: AngleUnit = "degrees"
+
+    @property
+    def count(self) -> int | None:
+        """How many there are; None for an even turn, which has as many as there are views."""
+        return None if self.even else self.values.size
+
+    def settled(
+        self, path: Path, projections: int, asked: AngleUnit | None
+    ) -> tuple[Angles, str, tuple[str, ...]]:
+        """The angles in radians, a phrase for the line about the file, and what was assumed.
+
+        Args:
+            path: the file of the scan.
+            projections: number of views.
+            asked: the unit that a person says.
+
+        Raises:
+            ShapeError: there are more angles or fewer than views.
+            NonFiniteError: an angle is not finite.
+            InputError: their unit is doubtful, or they are all the same.
+        """
+        if self.even:
+            return self._turn(path, projections)
+        values = check_angles(path, self.name, self.values, projections=projections)
+        unit, notes = self._unit(path, asked)
+        radians: Angles = np.deg2rad(values) if unit == "degrees" else values.copy()
+        radians.flags.writeable = False
+        demand_directions(path, self.name, radians)
+        span = float(np.rad2deg(np.ptp(radians)))
+        over = f"{span:.4g}" if unit == "degrees" else f"{span:.4g} degrees"
+        return radians, f"angles in {unit} over {over}", notes
+
+    def _turn(self, path: Path, projections: int) -> tuple[Angles, str, tuple[str, ...]]:
+        start, stop = (float(value) for value in self.values)
+        degrees = start + (stop - start) * np.arange(projections) / projections
+        radians: Angles = np.deg2rad(degrees)
+        radians.flags.writeable = False
+        demand_directions(path, self.name, radians)
+        phrase = f"angles even from {start:g} to {stop:g} degrees, the end left out"
+        return radians, phrase, ()
+
+    def _unit(self, path: Path, asked: AngleUnit | None) -> tuple[AngleUnit, tuple[str, ...]]:
+        if asked is not None:
+            return asked, ()
+        stated = self.unit or self.usual
+        other: AngleUnit = "radians" if stated == "degrees" else "degrees"
+        span = float(np.ptp(self.values))
+        if not _doubtful(self.values, stated):
+            return stated, ()
+        if self.unit is None and _half_turns(self.values, other):
+            return other, (
+                f"The angles {self.name!r} span {span:.4g}, which is a half or a full turn in "
+                f"{other}: they are taken as {other}, not {stated} (--angle-unit).",
+            )
+        raise InputError(
+            f"{path}: the angles {self.name!r} span {span:.4g} in {self.values.size} views, which "
+            f"is doubtful for {stated}: say which unit it is with angle_unit= (--angle-unit "
+            f"{other} or {stated})"
+        )
+
+
+def _doubtful(values: Angles, unit: AngleUnit) -> bool:
+    """Whether the span of angles speaks against their unit."""
+    span = float(np.ptp(values))
+    if values.size < _TELLING or span == 0:
+        return False
+    if unit == "degrees":
+        return span <= _RADIANS_UP_TO
+    coarse = span / (values.size - 1) > _COARSE
+    return span > _RADIANS_UP_TO and (coarse or _half_turns(values, "degrees"))
+
+
+def _half_turns(values: Angles, unit: AngleUnit) -> bool:
+    """Whether angles in a unit span half a turn or a whole one, their end included or left out."""
+    half = 180.0 if unit == "degrees" else np.pi
+    span = float(np.ptp(values))
+    ends = (span, span + span / (values.size - 1))
+    return any(abs(end / (turns * half) - 1) < _CLOSE for end in ends for turns in (1, 2))
+
+
+def demand_directions(path: Path, name: str, angles: Angles) -> None:
+    """Refuse views that tell nothing of a slice.
+
+    Args:
+        path: the file of the scan.
+        name: what the angles are called.
+        angles: in radians.
+
+    Raises:
+        InputError: there is one view alone, or all of them have one direction.
+    """
+    if angles.size == 1:
+        raise InputError(
+            f"{path}: holds one view, and a slice wants several directions; if it is a sinogram, "
+            "say which axis is which with axes= (--axes), such as --axes angle,bin"
+        )
+    if np.ptp(angles) == 0:
+        raise InputError(
+            f"{path}: all {angles.size} angles of {name!r} are {np.rad2deg(angles[0]):.4g} "
+            "degrees, wanted several directions; give the angles with theta= (--theta)"
+        )
+
+
+def given_angles(text: str) -> AngleList | None:
     """Angles that are said outside the scan: an even turn, or a file of them.
 
     Args:
-        text: see ``even_angles``; or the name of a file, see ``file_angles``.
-        count: number of angles.
+        text: see ``even_turn``; or the name of a file, see ``file_angles``.
 
     Returns:
-        The angles in radians, read-only, or None where the text names neither.
+        The angles, or None where the text names neither.
 
     Raises:
         InputError: a file's; see ``file_angles`` for its kinds.
     """
-    angles = even_angles(text, count)
-    if angles is None and text.lower().endswith(SUFFIXES):
-        angles = file_angles(Path(text).absolute(), count)
-    return angles
+    turn = even_turn(text)
+    if turn is None and text.lower().endswith(SUFFIXES):
+        return file_angles(Path(text).absolute())
+    return turn
 
 
-def even_angles(text: str, count: int) -> Angles | None:
-    """Angles evenly over a turn, in radians; the end of the turn is not one of them.
+def even_turn(text: str) -> AngleList | None:
+    """Angles evenly over a turn; the end of the turn is not one of them.
 
     Args:
         text: the turn in degrees as ``start:stop``, or ``stop`` alone where it starts at 0.
-        count: number of angles.
 
     Returns:
-        The angles, read-only, or None where the text says no such thing.
+        The angles, or None where the text says no such thing.
     """
     match = _TURN.fullmatch(text.strip())
     if match is None:
         return None
-    start, stop = float(match[1] or 0), float(match[2])
-    angles: Angles = np.deg2rad(start + (stop - start) * np.arange(count) / count)
-    angles.flags.writeable = False
-    return angles
+    ends = np.array([float(match[1] or 0), float(match[2])])
+    return AngleList(text.strip(), ends, even=True)
 
 
-def file_angles(path: Path, count: int) -> Angles:
-    """Read one angle in degrees for each projection.
+def file_angles(path: Path) -> AngleList:
+    """Read angles from a file.
 
     Args:
         path: a NumPy array (.npy), or text (.txt, .csv) of numbers that stand one to a line or
             all in one line; what follows ``#`` is a comment.
-        count: number of projections.
-
-    Returns:
-        The angles in radians, read-only.
 
     Raises:
         InputError: there is no such file, or it is named as neither.
         FileFormatError: it holds something else.
-        ShapeError: it holds more angles or fewer.
-        NonFiniteError: an angle is not finite.
         ResourceLimitError: it is far longer than any list of angles.
     """
     if path.suffix.lower() not in SUFFIXES:
@@ -88,19 +209,23 @@ def file_angles(path: Path, count: int) -> Angles:
     with reading(path, "the list of angles"):
         if not path.is_file() and path.exists():
             raise InputError(f"{path}: is not a file")
-        degrees = _array(path) if path.suffix.lower() == ".npy" else _text(path)
-    return check_angles(path, path.name, np.deg2rad(degrees), projections=count)
+        values = _array(path) if path.suffix.lower() == ".npy" else text_angles(path)
+    return AngleList(str(path), values, unit=named_unit(path.stem))
 
 
-def unit_note(angles: Angles) -> tuple[str, ...]:
-    """A doubt, where angles that were taken for degrees look like radians."""
-    span = float(np.rad2deg(np.ptp(angles)))
-    if angles.size < 16 or not 0 < span < 6.3:
-        return ()
-    return (f"The angles span {span:.3g} degrees in all; if they are radians, convert them.",)
+def named_unit(name: str) -> AngleUnit | None:
+    """The unit that a name such as ``anglesRad`` or ``theta_deg`` states, or None."""
+    words = re.findall("[a-z]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower())
+    for word in words:
+        if word in ("rad", "rads", "radian", "radians"):
+            return "radians"
+        if word in ("deg", "degs", "degree", "degrees"):
+            return "degrees"
+    return None
 
 
-def _text(path: Path) -> Angles:
+def text_angles(path: Path) -> Angles:
+    """Numbers of a text file, one to a line or all in one line."""
     check_claim(path, "the list of angles", path.stat().st_size, _LONGEST)
     lines = path.read_text(encoding="utf-8-sig").splitlines()
     rows = [re.split(r"[\s,;]+", line.split("#")[0].strip(" \t,;")) for line in lines]
@@ -118,8 +243,8 @@ def _number(path: Path, line: int, word: str) -> float:
         return float(word)
     except ValueError:
         raise FileFormatError(
-            f"{path}: line {line} holds {word[:40]!r}, wanted an angle in degrees; put # before "
-            "lines that hold none"
+            f"{path}: line {line} holds {word[:40]!r}, wanted an angle; put # before lines that "
+            "hold none"
         ) from None
 
 

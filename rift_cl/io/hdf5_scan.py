@@ -6,6 +6,7 @@ Data Exchange is the layout of the synchrotron beamlines: ``/exchange/data`` wit
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
@@ -13,100 +14,144 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError
-from rift_cl.io.angle_list import given_angles
-from rift_cl.io.hdf5_frames import FrameStack, Hdf5Rows, calibration_stack, projection_stack
+from rift_cl.io.angle_list import AngleList
+from rift_cl.io.frame_stack import FrameStack
+from rift_cl.io.hdf5_frames import Hdf5Rows
 from rift_cl.io.hdf5_tree import Hdf5Tree, open_tree
-from rift_cl.io.hdf5_values import read_angles
-from rift_cl.io.nxtomo import find_entry, read_entry
-from rift_cl.io.scan_file import ArrayNames, Kind, ScanFile, check_angles
+from rift_cl.io.hdf5_values import (
+    axes_stated,
+    numeric_shape,
+    read_angles,
+    read_length,
+    read_vector,
+    unit_of,
+)
+from rift_cl.io.named_arrays import Layout, scan_in
+from rift_cl.io.nxtomo import entry_of, find_entry, nxtomo_layout
+from rift_cl.io.scan_file import ScanFile, ScanRequest, usable_pitch
 
 _DATA = "/exchange/data"
 _WHITE = "/exchange/data_white"
 _DARK = "/exchange/data_dark"
 _THETA = "/exchange/theta"
+# Size of a pixel at the sample, then that of the detector itself.
+_PIXELS = (
+    "/measurement/instrument/detector/actual_pixel_size_x",
+    "/measurement/instrument/detector/pixel_size_x",
+)
 
 
-def open_hdf5_scan(path: Path, names: ArrayNames, *, budget: int | None) -> ScanFile:
+def open_hdf5_scan(path: Path, request: ScanRequest, *, budget: int | None) -> ScanFile:
     """Find the scan in an HDF5 file; see ``open_scan``."""
     with open_tree(path) as tree:
-        named = tree.find(names.dataset) if names.dataset else tree.root
-        if not isinstance(named, h5py.Group):
-            return _named(tree, names, budget=budget)
-        if not names.dataset and tree.find(_DATA) is not None:
-            return _data_exchange(tree, names, budget=budget)
-        entry = find_entry(tree, names.dataset or "/")
-        if entry is None:
-            raise FileFormatError(
-                f"{path}: holds neither a Data Exchange scan ({_DATA}) nor an NXtomo scan; "
-                f"{tree.contents()}"
-            )
-        return _nxtomo(tree, entry, names, budget=budget)
+        store = Hdf5Store(tree, budget)
+        return scan_in(store, _layout(tree, request.dataset), request)
 
 
-def _named(tree: Hdf5Tree, names: ArrayNames, *, budget: int | None) -> ScanFile:
-    projections = projection_stack(tree, str(names.dataset))
-    if names.theta is None:
+def _layout(tree: Hdf5Tree, dataset: str | None) -> Layout:
+    """What there is to know of the file before anything is named."""
+    named = tree.find(dataset) if dataset else tree.root
+    exchange = tree.find(_DATA)
+    if exchange is not None and (dataset is None or named == exchange):
+        return _data_exchange(tree)
+    if dataset is not None and not isinstance(named, h5py.Group):
+        entry = entry_of(tree, dataset)
+        if entry is not None:
+            return nxtomo_layout(tree, entry)
+        return Layout(source=f"array {dataset}", projections=dataset, search=True)
+    entry = find_entry(tree, dataset or "/")
+    if entry is None:
         raise FileFormatError(
-            f"{tree.path}: the angles of {names.dataset!r} are not known; name them with theta= "
-            f"(--theta); {tree.contents()}"
+            f"{tree.path}: holds neither a Data Exchange scan ({_DATA}) nor an NXtomo scan; "
+            f"{tree.contents()}"
         )
-    flats = calibration_stack(tree, names.flats, projections) if names.flats else None
-    darks = calibration_stack(tree, names.darks, projections) if names.darks else None
-    kind: Kind = "attenuation" if flats is None else "transmission"
-    rows = Hdf5Rows(tree.path, projections, flats, darks, budget)
-    return _scan(rows, _angles(tree, names.theta, projections), kind, f"array {names.dataset}")
+    return nxtomo_layout(tree, entry)
 
 
-def _data_exchange(tree: Hdf5Tree, names: ArrayNames, *, budget: int | None) -> ScanFile:
-    projections = projection_stack(tree, _DATA)
-    theta = names.theta or _THETA
-    if names.theta is None and tree.find(theta) is None:
-        raise FileFormatError(
-            f"{tree.path}: a Data Exchange scan without its angles {theta!r}; name them with "
-            f"theta= (--theta); {tree.contents()}"
-        )
-    rows = Hdf5Rows(
-        tree.path,
-        projections,
-        _present(tree, names.flats, _WHITE, projections),
-        _present(tree, names.darks, _DARK, projections),
-        budget,
+def _data_exchange(tree: Hdf5Tree) -> Layout:
+    present = {name: name if tree.find(name) is not None else None for name in (_WHITE, _DARK)}
+    theta = _THETA if tree.find(_THETA) is not None else None
+    lengths = (read_length(tree, name) for name in _PIXELS)
+    pixel, unit = next((length for length in lengths if length), (0.0, ""))
+    return Layout(
+        source="Data Exchange",
+        projections=_DATA,
+        theta=theta,
+        flats=present[_WHITE],
+        darks=present[_DARK],
+        pitch=usable_pitch(pixel),
+        unit=unit,
+        axes={2: "nb", 3: axes_stated(tree, _DATA) or "nrb"},
     )
-    return _scan(rows, _angles(tree, theta, projections), "transmission", "Data Exchange")
 
 
-def _nxtomo(tree: Hdf5Tree, group: str, names: ArrayNames, *, budget: int | None) -> ScanFile:
-    entry = read_entry(tree, group, names)
-    rows = Hdf5Rows(tree.path, entry.projections, entry.flats, entry.darks, budget)
-    source = f"NXtomo {entry.group or '/'}"
-    return _scan(rows, entry.angles, "transmission", source, pitch=entry.pitch, unit=entry.unit)
+@dataclass(frozen=True)
+class Hdf5Store:
+    """The arrays of an open HDF5 file (an ``ArrayStore``).
+
+    Args:
+        tree: the file.
+        budget: bytes that one reading may take.
+    """
+
+    tree: Hdf5Tree
+    budget: int | None
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.tree.path
+
+    def __contains__(self, name: str) -> bool:
+        return self.tree.find(name) is not None
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        """See ``numeric_shape``."""
+        return numeric_shape(self.tree, name)
+
+    def dtype(self, name: str) -> np.dtype[np.generic]:
+        """Type of the numbers as they are stored."""
+        dtype: np.dtype[np.generic] = self.tree.dataset(name).dtype
+        return dtype
+
+    def vector(self, name: str) -> NDArray[np.float64]:
+        """See ``read_vector``."""
+        return read_vector(self.tree, name)
+
+    def angles(self, name: str) -> AngleList:
+        """See ``read_angles``."""
+        return read_angles(self.tree, name)
+
+    def unit(self, name: str) -> str:
+        """The attribute ``units``."""
+        return unit_of(self.tree, name)
+
+    def axes(self, name: str) -> str | None:
+        """The attribute ``axes``."""
+        return axes_stated(self.tree, name)
+
+    def beside(self, name: str) -> list[str]:
+        """Names of the datasets in the same group."""
+        group, _, _ = name.rpartition("/")
+        node = self.tree.find(group or "/")
+        if not isinstance(node, h5py.Group):
+            return []
+        places = [f"{group}/{child}" if group else str(child) for child in node]
+        # Links that lead astray are not followed before somebody names them.
+        return [place for place in places if isinstance(_plain(node, place), h5py.Dataset)]
+
+    def contents(self) -> str:
+        """See ``Hdf5Tree.contents``."""
+        return self.tree.contents()
+
+    def rows(
+        self, projections: FrameStack, flats: FrameStack | None, darks: FrameStack | None
+    ) -> Hdf5Rows:
+        """What reads these stacks."""
+        return Hdf5Rows(self.path, projections, flats, darks, self.budget)
 
 
-def _present(
-    tree: Hdf5Tree, named: str | None, usual: str, projections: FrameStack
-) -> FrameStack | None:
-    if named is None and tree.find(usual) is None:
-        return None
-    return calibration_stack(tree, named or usual, projections)
-
-
-def _angles(tree: Hdf5Tree, name: str, projections: FrameStack) -> NDArray[np.float64]:
-    if tree.find(name) is None:
-        given = given_angles(name, projections.frames)
-        if given is not None:
-            return given
-    return check_angles(tree.path, name, read_angles(tree, name), projections=projections.frames)
-
-
-def _scan(
-    rows: Hdf5Rows,
-    angles: NDArray[np.float64],
-    kind: Kind,
-    source: str,
-    *,
-    pitch: float | None = None,
-    unit: str = "",
-) -> ScanFile:
-    stack = rows.projections
-    shape = (stack.frames, stack.rows, stack.bins)
-    return ScanFile(rows.path, shape, angles, pitch, unit, kind, source, rows)
+def _plain(group: h5py.Group, place: str) -> object:
+    child = place.rpartition("/")[2]
+    link = group.get(child, getlink=True)
+    return group[child] if isinstance(link, h5py.HardLink) else None

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, ShapeError
+from rift_cl.io.angle_list import AngleList, named_unit
 from rift_cl.io.boundary import check_claim, check_numeric
 from rift_cl.io.hdf5_tree import Hdf5Tree
+from rift_cl.io.scan_axes import spelled
 
 # Eight million frames: no scan has more, and a forged header may not ask for gigabytes.
 _LONGEST_VECTOR = 64 << 20
@@ -58,28 +60,41 @@ def read_length(tree: Hdf5Tree, name: str) -> tuple[float, str] | None:
     return float(read_vector(tree, name)[0]), unit_of(tree, name)
 
 
-def read_angles(tree: Hdf5Tree, name: str) -> NDArray[np.float64]:
-    """Read angles in radians; the dataset holds degrees unless its ``units`` say radians.
+def read_angles(tree: Hdf5Tree, name: str) -> AngleList:
+    """Read angles, in the unit that the dataset's ``units`` state, else its name.
 
     Raises:
         FileFormatError: there is no such dataset, or its unit is unknown.
         InputError: it is no vector of numbers; see ``read_vector``.
     """
-    unit = unit_of(tree, name).strip().lower()
-    values = read_vector(tree, name)
-    if unit.startswith("rad"):
-        return values
-    if unit in ("", "°") or unit.startswith("deg"):
-        return np.deg2rad(values)
-    raise FileFormatError(
-        f"{tree.path}: the units of {name!r} are {unit!r}, wanted degrees or radians; mend the "
-        "attribute, or name other angles with theta= (--theta)"
-    )
+    stated = unit_of(tree, name).strip().lower()
+    unit = named_unit(name.rsplit("/", maxsplit=1)[-1])
+    if stated.startswith("rad"):
+        unit = "radians"
+    elif stated == "°" or stated.startswith("deg"):
+        unit = "degrees"
+    elif stated:
+        raise FileFormatError(
+            f"{tree.path}: the units of {name!r} are {stated!r}, wanted degrees or radians; mend "
+            "the attribute, or name other angles with theta= (--theta)"
+        )
+    return AngleList(name, read_vector(tree, name), unit=unit)
+
+
+def axes_stated(tree: Hdf5Tree, name: str) -> str | None:
+    """The letters of the axes that a dataset's attribute ``axes`` states, or None."""
+    text = _attribute(tree, name, "axes")
+    # Data Exchange calls the frame axis of the projections theta.
+    return spelled(text) if text else None
 
 
 def unit_of(tree: Hdf5Tree, name: str) -> str:
     """The ``units`` attribute of a dataset, empty where it has none."""
-    value = tree.dataset(name).attrs.get("units", "")
+    return _attribute(tree, name, "units")
+
+
+def _attribute(tree: Hdf5Tree, name: str, key: str) -> str:
+    value = tree.dataset(name).attrs.get(key, "")
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
     if isinstance(value, bytes):

@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError
-from rift_cl.io.hdf5_frames import FrameStack
+from rift_cl.io.frame_stack import FrameStack
 from rift_cl.io.hdf5_tree import Hdf5Tree
 from rift_cl.io.hdf5_values import read_vector
-from rift_cl.io.mat_file import MatStack
 
 _DEEPEST = 8
 _MOST_ARRAYS = 4096
@@ -33,11 +32,13 @@ class Mat73Array:
 
     Args:
         shape: its shape as MATLAB has it.
+        dtype: type of the numbers as they are stored.
         real: it holds real numbers.
         text: it holds text.
     """
 
     shape: tuple[int, ...]
+    dtype: str
     real: bool
     text: bool
 
@@ -74,12 +75,11 @@ class Mat73File:
         codes = read_vector(self._tree, name.replace(".", "/"))
         return "".join(chr(int(code)) for code in codes if 0 < code < 0xD800)
 
-    def frames(self, stack: MatStack) -> FrameStack:
-        """Where the frames are in HDF5; the dataset was found to lie in the file's folder."""
+    def stored(self, stack: FrameStack) -> FrameStack:
+        """The same frames as HDF5 has them; the dataset was found to lie in the file's folder."""
         place = stack.name.replace(".", "/")
         self._tree.dataset(place)
-        runs = ((0, stack.size("n")),)
-        return FrameStack(place, stack.shape[::-1], stack.axes[::-1], runs)
+        return FrameStack(place, stack.shape[::-1], stack.axes[::-1], stack.runs)
 
 
 def _datasets(tree: Hdf5Tree, group: str, depth: int) -> Iterator[tuple[str, Any]]:
@@ -100,4 +100,5 @@ def _described(node: Any) -> Mat73Array:
     # An array without elements is stored as its shape.
     empty = "MATLAB_empty" in node.attrs or node.shape is None
     numbers = node.dtype.kind in "iuf" and not empty
-    return Mat73Array(shape, numbers and kind not in _NO_NUMBERS, numbers and kind == "char")
+    real, text = numbers and kind not in _NO_NUMBERS, numbers and kind == "char"
+    return Mat73Array(shape, node.dtype.str, real, text)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -24,6 +23,10 @@ class MatArray(Protocol):
         """Its shape as MATLAB has it."""
 
     @property
+    def dtype(self) -> str:
+        """Type of the numbers as they are stored."""
+
+    @property
     def real(self) -> bool:
         """It holds real numbers."""
 
@@ -42,25 +45,6 @@ class MatFile(Protocol):
 
     def text(self, name: str) -> str:
         """A short text, or nothing where the array is none."""
-
-
-@dataclass(frozen=True)
-class MatStack:
-    """An array of frames.
-
-    Args:
-        name: its name.
-        shape: its shape as MATLAB has it.
-        axes: one letter for each of MATLAB's axes: n frame, r row, b bin.
-    """
-
-    name: str
-    shape: tuple[int, ...]
-    axes: str
-
-    def size(self, axis: str) -> int:
-        """Length of an axis; 1 where there is none."""
-        return self.shape[self.axes.index(axis)] if axis in self.axes else 1
 
 
 def contents(file: MatFile) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,13 +11,14 @@ import numpy as np
 
 from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim
+from rift_cl.io.frame_stack import FrameStack
 from rift_cl.io.hdf5_frames import Hdf5Rows
 from rift_cl.io.hdf5_tree import open_tree
 from rift_cl.io.mat5 import Mat5File
 from rift_cl.io.mat73 import Mat73File
-from rift_cl.io.mat_file import MatStack
-from rift_cl.io.mat_layout import MatLayout, find_layout
-from rift_cl.io.scan_file import ArrayNames, Frames, RowSource, ScanFile, ScanRows
+from rift_cl.io.mat_layout import MatStore, find_layout
+from rift_cl.io.named_arrays import scan_in
+from rift_cl.io.scan_file import Frames, Part, RowSource, ScanFile, ScanRequest, ScanRows
 
 
 @dataclass(frozen=True)
@@ -32,70 +34,76 @@ class Mat5Rows:
     """
 
     path: Path
-    projections: MatStack
-    flats: MatStack | None
-    darks: MatStack | None
+    projections: FrameStack
+    flats: FrameStack | None
+    darks: FrameStack | None
     budget: int | None
 
     def read(self, start: int, stop: int) -> ScanRows:
         """Read detector rows ``start`` to ``stop`` of every stack."""
-        file = Mat5File(self.path, self.budget)
+        file = self._opened()
         stacks = [stack for stack in (self.projections, self.flats, self.darks) if stack]
-        for stack in stacks:
-            array = file.arrays.get(stack.name)
-            if array is None or array.shape != stack.shape or not array.real:
-                raise FileFormatError(
-                    f"{self.path}: {stack.name!r} changed since it was opened; open the scan again"
-                )
         rows = sum(4 * math.prod(stack.shape) for stack in stacks)
         need = rows + 2 * max(file.arrays[stack.name].size for stack in stacks)
         check_claim(self.path, "the scan", need, self.budget)
+        chosen = slice(start, stop)
         return ScanRows(
-            _rows(file, self.projections, start, stop),
-            _rows(file, self.flats, start, stop) if self.flats else None,
-            _rows(file, self.darks, start, stop) if self.darks else None,
+            _frames(file, self.projections, chosen),
+            _frames(file, self.flats, chosen) if self.flats else None,
+            _frames(file, self.darks, chosen) if self.darks else None,
         )
 
+    def look(self, part: Part, frames: Sequence[int], rows: Sequence[int]) -> Frames:
+        """Read some rows of some frames of one stack; its array is loaded whole."""
+        return _frames(self._opened(), getattr(self, part), list(rows), list(frames))
 
-def open_mat5_scan(path: Path, names: ArrayNames, *, budget: int | None) -> ScanFile:
+    def _opened(self) -> Mat5File:
+        file = Mat5File(self.path, self.budget)
+        for stack in (self.projections, self.flats, self.darks):
+            array = file.arrays.get(stack.name) if stack else None
+            if stack and (array is None or array.shape != stack.shape or not array.real):
+                raise FileFormatError(
+                    f"{self.path}: {stack.name!r} changed since it was opened; open the scan again"
+                )
+        return file
+
+
+def open_mat5_scan(path: Path, request: ScanRequest, *, budget: int | None) -> ScanFile:
     """Find the scan in a MAT file of version 5 to 7; see ``open_scan``."""
-    layout = find_layout(Mat5File(path, budget), names)
-    rows = Mat5Rows(path, layout.projections, layout.flats, layout.darks, budget)
-    return _scan(path, layout, rows)
+
+    def rows(
+        projections: FrameStack, flats: FrameStack | None, darks: FrameStack | None
+    ) -> RowSource:
+        return Mat5Rows(path, projections, flats, darks, budget)
+
+    file = Mat5File(path, budget)
+    return scan_in(MatStore(file, rows), find_layout(file, request), request)
 
 
-def open_mat73_scan(path: Path, names: ArrayNames, *, budget: int | None) -> ScanFile:
+def open_mat73_scan(path: Path, request: ScanRequest, *, budget: int | None) -> ScanFile:
     """Find the scan in a MAT file of version 7.3; see ``open_scan``."""
     with open_tree(path) as tree:
         file = Mat73File(tree)
-        layout = find_layout(file, names)
-        flats = file.frames(layout.flats) if layout.flats else None
-        darks = file.frames(layout.darks) if layout.darks else None
-        rows = Hdf5Rows(path, file.frames(layout.projections), flats, darks, budget)
-    return _scan(path, layout, rows)
+
+        def rows(
+            projections: FrameStack, flats: FrameStack | None, darks: FrameStack | None
+        ) -> RowSource:
+            return Hdf5Rows(
+                path,
+                file.stored(projections),
+                flats and file.stored(flats),
+                darks and file.stored(darks),
+                budget,
+            )
+
+        return scan_in(MatStore(file, rows), find_layout(file, request), request)
 
 
-def _scan(path: Path, layout: MatLayout, rows: RowSource) -> ScanFile:
-    stack = layout.projections
-    return ScanFile(
-        path=path,
-        shape=(stack.size("n"), stack.size("r"), stack.size("b")),
-        angles=layout.angles,
-        pitch=layout.fan.pitch if layout.fan else None,
-        unit=layout.unit,
-        kind=layout.kind,
-        source=layout.source,
-        rows=rows,
-        fan=layout.fan,
-        background=layout.background,
-        notes=layout.notes,
-    )
-
-
-def _rows(file: Mat5File, stack: MatStack, start: int, stop: int) -> Frames:
-    values = file.load(stack.name)
-    order = [stack.axes.index(axis) for axis in "nrb" if axis in stack.axes]
-    shape = (stack.size("n"), stack.size("r"), stack.size("b"))
+def _frames(
+    file: Mat5File, stack: FrameStack, rows: slice | list[int], frames: list[int] | None = None
+) -> Frames:
+    places = stack.indices()
+    values = stack.arranged(file.load(stack.name))
     with np.errstate(over="ignore"):
-        frames = values.transpose(order).reshape(shape)[:, start:stop]
-        return np.array(frames, dtype=np.float32, order="C")
+        chosen = values[places if frames is None else places[frames]]
+        return np.array(chosen[:, rows], dtype=np.float32, order="C")

@@ -107,9 +107,13 @@ class NpzArchive:
             values: NDArray[np.generic] = npy.read_array(file, allow_pickle=False)
         return values
 
+    def names(self) -> list[str]:
+        """Names of all arrays."""
+        return [name[: -len(".npy")] for name in self._members if name.endswith(".npy")]
+
     def contents(self) -> str:
         """A phrase that lists the first arrays, and how to name one."""
-        names = [name[: -len(".npy")] for name in self._members if name.endswith(".npy")]
+        names = self.names()
         if not names:
             return "it holds no array at all"
         listed = ", ".join(f"{name!r} {self._shape(name)}" for name in names[:_LISTED])

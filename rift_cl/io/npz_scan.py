@@ -4,27 +4,22 @@ from __future__ import annotations
 
 import math
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, ShapeError
-from rift_cl.io.angle_list import given_angles
+from rift_cl.io.angle_list import AngleList, named_unit
 from rift_cl.io.boundary import check_claim, reading
+from rift_cl.io.frame_stack import FrameStack
+from rift_cl.io.named_arrays import Layout, scan_in
 from rift_cl.io.npz_archive import NpzArchive
-from rift_cl.io.scan_file import (
-    ArrayNames,
-    Frames,
-    Kind,
-    ScanFile,
-    ScanRows,
-    check_angles,
-    usable_pitch,
-)
+from rift_cl.io.scan_axes import USUAL
+from rift_cl.io.scan_file import Frames, Part, ScanFile, ScanRequest, ScanRows, usable_pitch
 
 # Eight million projections: no scan has more, and a forged header may not ask for gigabytes.
 _LONGEST_VECTOR = 64 << 20
@@ -36,107 +31,158 @@ class NpzRows:
 
     Args:
         path: the file.
-        projections: name of the projections.
-        flats: name of the frames without the sample, if there are any.
-        darks: name of the frames without the beam, if there are any.
-        shape: shape of the projections as stored.
+        projections: the projections.
+        flats: the frames without the sample, if there are any.
+        darks: the frames without the beam, if there are any.
         budget: bytes that one reading may take; 60 % of the free memory when None.
     """
 
     path: Path
-    projections: str
-    flats: str | None
-    darks: str | None
-    shape: tuple[int, ...]
+    projections: FrameStack
+    flats: FrameStack | None
+    darks: FrameStack | None
     budget: int | None
 
     def read(self, start: int, stop: int) -> ScanRows:
         """Read detector rows ``start`` to ``stop`` of every stack."""
+        stacks = [stack for stack in (self.projections, self.flats, self.darks) if stack]
         with _open(self.path) as archive:
-            if archive.header(self.projections).shape != self.shape:
-                raise FileFormatError(
-                    f"{self.path}: {self.projections!r} changed its shape since it was opened; "
-                    "open the scan again"
-                )
-            names = [name for name in (self.projections, self.flats, self.darks) if name]
-            headers = [archive.header(name) for name in names]
+            _demand_unchanged(archive, self.projections)
+            headers = [archive.header(stack.name) for stack in stacks]
             kept = sum(4 * math.prod(header.shape) for header in headers)
             check_claim(self.path, "the scan", kept + max(h.size for h in headers), self.budget)
-            projections = self._rows(archive, self.projections, start, stop)
-            flats = self._rows(archive, self.flats, start, stop) if self.flats else None
-            darks = self._rows(archive, self.darks, start, stop) if self.darks else None
-        return ScanRows(projections, flats, darks)
+            rows = slice(start, stop)
+            return ScanRows(
+                self._frames(archive, self.projections, rows),
+                self._frames(archive, self.flats, rows) if self.flats else None,
+                self._frames(archive, self.darks, rows) if self.darks else None,
+            )
 
-    def _rows(self, archive: NpzArchive, name: str, start: int, stop: int) -> Frames:
-        values = archive.load(name, budget=self.budget)
-        if values.ndim < len(self.shape):
-            values = values[np.newaxis]
-        if values.ndim == 2:
-            values = values[:, np.newaxis, :]
+    def look(self, part: Part, frames: Sequence[int], rows: Sequence[int]) -> Frames:
+        """Read some rows of some frames of one stack; its array is loaded whole."""
+        stack = getattr(self, part)
+        with _open(self.path) as archive:
+            _demand_unchanged(archive, stack)
+            return self._frames(archive, stack, list(rows), list(frames))
+
+    def _frames(
+        self,
+        archive: NpzArchive,
+        stack: FrameStack,
+        rows: slice | list[int],
+        frames: list[int] | None = None,
+    ) -> Frames:
+        values = stack.arranged(archive.load(stack.name, budget=self.budget))
+        places = stack.indices()
+        whole = len(stack.runs) == 1 and places.size == values.shape[0]
+        if frames is not None or not whole:
+            values = values[places if frames is None else places[frames]]
         with np.errstate(over="ignore"):
-            return np.array(values[:, start:stop, :], dtype=np.float32, order="C")
+            return np.array(values[:, rows, :], dtype=np.float32, order="C")
 
 
-def open_npz_scan(path: Path, names: ArrayNames, *, budget: int | None) -> ScanFile:
+def _demand_unchanged(archive: NpzArchive, stack: FrameStack) -> None:
+    if archive.header(stack.name).shape != stack.shape:
+        raise FileFormatError(
+            f"{archive.path}: {stack.name!r} changed its shape since it was opened; open the scan "
+            "again"
+        )
+
+
+def open_npz_scan(path: Path, request: ScanRequest, *, budget: int | None) -> ScanFile:
     """Find the scan in an NPZ file; see ``open_scan``."""
     with _open(path) as archive:
-        names = _complete(archive, names)
-        name = str(names.dataset)
-        shape = archive.header(name).shape
-        if len(shape) not in (2, 3):
+        store = NpzStore(archive, budget)
+        return scan_in(store, _layout(store, request.dataset), request)
+
+
+def _layout(store: NpzStore, dataset: str | None) -> Layout:
+    archive = store.archive
+    usual = [name for name in ("projections", "sinogram") if name in archive]
+    if dataset is None and not usual:
+        raise FileFormatError(
+            f"{archive.path}: has neither 'projections' nor 'sinogram'; {archive.contents()}"
+        )
+    pitch = float(store.vector("pitch")[0]) if "pitch" in archive else 0.0
+    known = dataset is None
+    return Layout(
+        source="NPZ",
+        projections=dataset or usual[0],
+        theta="angles" if "angles" in archive else None,
+        flats="flats" if known and "flats" in archive else None,
+        darks="darks" if known and "darks" in archive else None,
+        axes=USUAL if known else None,
+        angle_unit="radians",
+        search=not known,
+        pitch=usable_pitch(pitch),
+    )
+
+
+@dataclass(frozen=True)
+class NpzStore:
+    """The arrays of an open NPZ archive (an ``ArrayStore``).
+
+    Args:
+        archive: the archive.
+        budget: bytes that one reading may take.
+    """
+
+    archive: NpzArchive
+    budget: int | None
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.archive.path
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.archive
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        """See ``NpzArchive.header``."""
+        return self.archive.header(name).shape
+
+    def dtype(self, name: str) -> np.dtype[np.generic]:
+        """See ``NpzArchive.header``."""
+        return self.archive.header(name).dtype
+
+    def vector(self, name: str) -> NDArray[np.float64]:
+        """An array of one number per frame."""
+        values = self.archive.load(name, budget=_LONGEST_VECTOR)
+        if values.size != max(values.shape, default=1):
             raise ShapeError(
-                f"{path}: {name!r} has shape {shape}, wanted (angle, row, bin) or (angle, bin)"
+                f"{self.path}: {name!r} has shape {values.shape}, wanted one number per projection"
             )
-        for calibration in (names.flats, names.darks):
-            if calibration:
-                _check_calibration(archive, calibration, shape)
-        theta = str(names.theta)
-        given = None if theta in archive else given_angles(theta, shape[0])
-        if given is None:
-            given = check_angles(path, theta, _vector(archive, theta), projections=shape[0])
-        pitch = usable_pitch(float(_vector(archive, "pitch")[0])) if "pitch" in archive else None
-    kind: Kind = "transmission" if names.flats else "attenuation"
-    frames = (shape[0], shape[1] if len(shape) == 3 else 1, shape[-1])
-    rows = NpzRows(path, name, names.flats, names.darks, shape, budget)
-    return ScanFile(path, frames, given, pitch, "", kind, "NPZ", rows)
+        return np.asarray(values, dtype=np.float64).reshape(values.size)
+
+    def angles(self, name: str) -> AngleList:
+        """The angles in an array, in the unit that its name states."""
+        return AngleList(name, self.vector(name), unit=named_unit(name))
+
+    def unit(self, name: str) -> str:
+        """Nothing: NPZ states no units."""
+        return ""
+
+    def axes(self, name: str) -> str | None:
+        """None: NPZ states no axes."""
+        return None
+
+    def beside(self, name: str) -> list[str]:
+        """Names of all arrays."""
+        return self.archive.names()
+
+    def contents(self) -> str:
+        """See ``NpzArchive.contents``."""
+        return self.archive.contents()
+
+    def rows(
+        self, projections: FrameStack, flats: FrameStack | None, darks: FrameStack | None
+    ) -> NpzRows:
+        """What reads these stacks."""
+        return NpzRows(self.path, projections, flats, darks, self.budget)
 
 
 @contextmanager
 def _open(path: Path) -> Iterator[NpzArchive]:
     with reading(path, "the NPZ file"), zipfile.ZipFile(path) as archive:
         yield NpzArchive(path, archive)
-
-
-def _complete(archive: NpzArchive, names: ArrayNames) -> ArrayNames:
-    usual = [name for name in ("projections", "sinogram") if name in archive]
-    if names.dataset is None and not usual:
-        raise FileFormatError(
-            f"{archive.path}: has neither 'projections' nor 'sinogram'; {archive.contents()}"
-        )
-    names = replace(names, theta=names.theta or "angles")
-    if names.dataset is not None:
-        return names
-    return replace(
-        names,
-        dataset=usual[0],
-        flats=names.flats or ("flats" if "flats" in archive else None),
-        darks=names.darks or ("darks" if "darks" in archive else None),
-    )
-
-
-def _check_calibration(archive: NpzArchive, name: str, projections: tuple[int, ...]) -> None:
-    shape = archive.header(name).shape
-    if projections[1:] not in (shape, shape[1:]):
-        raise ShapeError(
-            f"{archive.path}: {name!r} has shape {shape}, the projections have {projections}: "
-            "rows and bins must agree"
-        )
-
-
-def _vector(archive: NpzArchive, name: str) -> NDArray[np.float64]:
-    values = archive.load(name, budget=_LONGEST_VECTOR)
-    if values.size != max(values.shape, default=1):
-        raise ShapeError(
-            f"{archive.path}: {name!r} has shape {values.shape}, wanted one number per projection"
-        )
-    return np.asarray(values, dtype=np.float64).reshape(values.size)

@@ -7,18 +7,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from typing import Any
 
 import h5py
-import numpy as np
-from numpy.typing import NDArray
 
-from rift_cl.errors import FileFormatError, InputError, ShapeError
-from rift_cl.io.hdf5_frames import FrameStack, calibration_stack, projection_stack, runs_of
+from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.hdf5_tree import Hdf5Tree
-from rift_cl.io.hdf5_values import read_angles, read_length, read_vector
-from rift_cl.io.scan_file import ArrayNames, check_angles, usable_pitch
+from rift_cl.io.hdf5_values import axes_stated, read_length
+from rift_cl.io.named_arrays import Layout
+from rift_cl.io.scan_file import usable_pitch
 
 _KEY = "instrument/detector/image_key"
 _DATA = "instrument/detector/data"
@@ -26,29 +23,6 @@ _ANGLE = "sample/rotation_angle"
 _PIXEL = "instrument/detector/x_pixel_size"
 _DEEPEST = 2
 _MOST_GROUPS = 500
-
-
-@dataclass(frozen=True, eq=False)
-class TomoEntry:
-    """What one NXtomo group holds.
-
-    Args:
-        group: name of the group.
-        projections: frames of the sample.
-        flats: frames without the sample, or None.
-        darks: frames without the beam, or None.
-        angles: direction of each projection in radians.
-        pitch: pixel size, or None.
-        unit: unit of ``pitch``.
-    """
-
-    group: str
-    projections: FrameStack
-    flats: FrameStack | None
-    darks: FrameStack | None
-    angles: NDArray[np.float64]
-    pitch: float | None
-    unit: str
 
 
 def find_entry(tree: Hdf5Tree, within: str) -> str | None:
@@ -76,53 +50,28 @@ def find_entry(tree: Hdf5Tree, within: str) -> str | None:
     return next(iter(found.values()), None)
 
 
-def read_entry(tree: Hdf5Tree, group: str, names: ArrayNames) -> TomoEntry:
-    """Sort the frames of an NXtomo group by their image key.
+def entry_of(tree: Hdf5Tree, dataset: str) -> str | None:
+    """Name of the NXtomo group whose projections a dataset's name leads to, or None."""
+    group = dataset.removesuffix(_DATA).rstrip("/")
+    return group if dataset.endswith(_DATA) and _is_entry(tree, group) else None
+
+
+def nxtomo_layout(tree: Hdf5Tree, group: str) -> Layout:
+    """Where an NXtomo group keeps the parts of a scan.
 
     Raises:
-        FileFormatError: part of the group is missing, or no frame is a projection.
-        ShapeError: the numbers of frames, keys and angles differ.
-        InputError: other reasons why the arrays cannot be used.
+        InputError: the pixel size is no number.
     """
-    frames = projection_stack(tree, f"{group}/{_DATA}")
-    keys = read_vector(tree, f"{group}/{_KEY}")
-    if keys.size != frames.frames:
-        raise ShapeError(
-            f"{tree.path}: {group or '/'!r} has {keys.size} image keys for {frames.frames} frames"
-        )
-    projections = _select(frames, keys, 0)
-    if projections is None:
-        raise FileFormatError(
-            f"{tree.path}: no frame of {group or '/'!r} has image key 0, a projection"
-        )
     pixel, unit = read_length(tree, f"{group}/{_PIXEL}") or (0.0, "")
-    return TomoEntry(
-        group,
-        projections,
-        _calibration(tree, frames, _select(frames, keys, 1), names.flats),
-        _calibration(tree, frames, _select(frames, keys, 2), names.darks),
-        _angles(tree, names.theta or f"{group}/{_ANGLE}", keys),
-        usable_pitch(pixel),
-        unit,
+    return Layout(
+        source=f"NXtomo {group or '/'}",
+        projections=f"{group}/{_DATA}",
+        theta=f"{group}/{_ANGLE}",
+        image_key=f"{group}/{_KEY}",
+        axes={2: "nb", 3: axes_stated(tree, f"{group}/{_DATA}") or "nrb"},
+        pitch=usable_pitch(pixel),
+        unit=unit,
     )
-
-
-def _calibration(
-    tree: Hdf5Tree, frames: FrameStack, keyed: FrameStack | None, name: str | None
-) -> FrameStack | None:
-    return keyed if name is None else calibration_stack(tree, name, frames)
-
-
-def _select(frames: FrameStack, keys: NDArray[np.float64], key: int) -> FrameStack | None:
-    runs = runs_of(np.flatnonzero(keys == key))
-    return replace(frames, runs=runs) if runs else None
-
-
-def _angles(tree: Hdf5Tree, name: str, keys: NDArray[np.float64]) -> NDArray[np.float64]:
-    angles = read_angles(tree, name)
-    if angles.size == keys.size:
-        angles = angles[keys == 0]
-    return check_angles(tree.path, name, angles, projections=int(np.count_nonzero(keys == 0)))
 
 
 def _groups(tree: Hdf5Tree, top: str) -> Iterator[str]:

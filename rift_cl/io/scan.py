@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any, get_args
 
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.boundary import reading
 from rift_cl.io.hdf5_scan import open_hdf5_scan
 from rift_cl.io.mat_scan import open_mat5_scan, open_mat73_scan
+from rift_cl.io.mrc_scan import SUFFIXES as MRC_SUFFIXES
+from rift_cl.io.mrc_scan import open_mrc_scan
 from rift_cl.io.npz_scan import open_npz_scan
-from rift_cl.io.scan_file import ArrayNames, ScanFile
+from rift_cl.io.scan_file import AngleUnit, Kind, ScanFile, ScanRequest
 from rift_cl.io.tiff_scan import open_tiff_scan
 
 # What reads a file, by its extension and then by its content.
@@ -23,12 +26,15 @@ _READERS = {
     **{suffix: {"TIFF": open_tiff_scan} for suffix in (".tif", ".tiff")},
     ".mat": {"MAT": open_mat5_scan, "HDF5": open_mat73_scan},
     ".npz": {"NPZ": open_npz_scan},
+    **{suffix: {"MRC": open_mrc_scan} for suffix in MRC_SUFFIXES},
 }
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _ZIP_SIGNATURE = b"PK\x03\x04"
 _TIFF_SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 # The version and the order of bytes, after 124 bytes of text.
 _MAT_SIGNATURES = (b"\0\1IM", b"\1\0MI")
+# The name of the format, after 52 numbers.
+_MRC_SIGNATURE = b"MAP "
 _USER_BLOCKS = (0, 512, 1024, 2048, 4096, 8192)
 
 
@@ -39,33 +45,54 @@ def open_scan(
     theta: str | None = None,
     flats: str | None = None,
     darks: str | None = None,
+    image_key: str | None = None,
+    kind: Kind | None = None,
+    axes: str | None = None,
+    angle_unit: AngleUnit | None = None,
+    values: bool = True,
     budget: int | None = None,
 ) -> ScanFile:
-    """Find the scan in a file or a folder; only headers and angles are read.
+    """Find the scan in a file or a folder, and settle what it holds.
+
+    Only headers, angles and a few rows of a few views are read. What the values are, which axis is
+    which and the unit of the angles is taken from what is said here, else from the layout, names
+    and attributes, else from numbers and values. ``ScanFile.notes[0]`` says what was found in one
+    line; what remains doubtful is refused with the option that settles it.
 
     HDF5 (.h5, .hdf5, .hdf, .nxs) may hold a Data Exchange scan, an NXtomo scan, or arrays that
     are named here. NPZ holds ``projections`` (angle, row, bin) or ``sinogram`` (angle, bin) and
     ``angles`` in radians, and may hold ``flats``, ``darks`` and ``pitch``. MAT, of version 5 to
     7.3, holds a scan of the Helsinki Tomography Challenge, the dendrites of ToMoBAR, or arrays
     that are named here (``scan.projections`` inside a structure). TIFF is a folder with a file
-    for each projection, in the order of their numbers, or one file with a page for each; flats
-    and darks are recognised by the names of files and folders, angles by ``angles.txt`` or
-    ``theta.txt``, and are else taken as even over 180 degrees, which ``ScanFile.notes`` then says.
+    for each projection, in the order of their numbers, one file with a page for each, or sinograms;
+    flats and darks are recognised by the names of files and folders, angles by ``angles.txt`` or
+    ``theta.txt``, and are else taken as even over 180 degrees. MRC (.mrc, .st, .ali, .rec) is a
+    tilt series about the y axis, its angles in the extended header or in a .tlt or .rawtlt file.
 
     Args:
         path: the file or the folder.
         dataset: name of the projections, (angle, row, bin), or of a sinogram, (angle, bin);
             or the name of an HDF5 group that holds one NXtomo scan of several.
-        theta: name of the angles. HDF5: degrees unless their ``units`` say radians; MAT: degrees
-            unless ``rad`` is part of the name. Of all but NXtomo also a file of degrees (.txt,
-            .csv, .npy), or a turn that is evenly divided, ``0:180`` or ``360``, its end left out.
+        theta: name of the angles; or a file of them (.txt, .csv, .npy); or a turn in degrees that
+            is evenly divided, ``0:180`` or ``360``, its end left out.
         flats: name of frames with the beam but without the sample; for TIFF, of a file or folder.
-            Arrays named by ``dataset`` without them count as attenuation, and so does TIFF.
+            Counts without any: "air", where the outermost 2 % of the bins at both ends of the
+            detector see nothing but air, takes the beam of every view and row from these; "mean"
+            takes it to be the mean of every view, which leaves an unknown level.
         darks: name of frames without the beam.
+        image_key: name of an array that says what each frame is, as in NXtomo: 0 a projection, 1 a
+            flat, 2 a dark, 3 invalid.
+        kind: what the values are: "counts", "transmission" (counts divided by those of the beam)
+            or "attenuation" (line integrals).
+        axes: names of the axes of the projections in the file's order, such as "row,angle,bin" for
+            a stack of sinograms, or "bin,angle".
+        angle_unit: unit of the angles, "degrees" or "radians".
+        values: whether to look at values and settle their kind; False for who wants to know of the
+            geometry alone, to whom ``ScanFile.kind`` means nothing.
         budget: bytes that one ``read`` may take; 60 % of the free memory when not given.
 
     Raises:
-        InputError: there is no such file, or its extension is unknown.
+        InputError: there is no such file, its extension is unknown, or what it holds is doubtful.
         FileFormatError: the file is damaged, or holds no scan.
         ShapeError: the arrays do not fit each other.
         DTypeError: an array does not hold real numbers.
@@ -74,10 +101,20 @@ def open_scan(
         ResourceLimitError: an array that must be read now is larger than the budget.
     """
     path = Path(path).absolute()
-    names = ArrayNames(dataset=dataset, theta=theta, flats=flats, darks=darks)
+    request = ScanRequest(
+        dataset=dataset,
+        theta=theta,
+        flats=flats,
+        darks=darks,
+        image_key=image_key,
+        kind=_one_of("kind", kind, get_args(Kind)),
+        axes=axes,
+        angle_unit=_one_of("angle_unit", angle_unit, get_args(AngleUnit)),
+        values=values,
+    )
     suffix = path.suffix.lower()
     if suffix not in _READERS and path.is_dir():
-        return open_tiff_scan(path, names, budget=budget)
+        return open_tiff_scan(path, request, budget=budget)
     if suffix not in _READERS and not path.exists():
         raise InputError(f"{path}: there is no such file or folder")
     if suffix not in _READERS:
@@ -94,20 +131,28 @@ def open_scan(
             f"{path}: the name says {' or '.join(readers)}, the content is {content}; rename or "
             "replace the file"
         )
-    return readers[content](path, names, budget=budget)
+    return readers[content](path, request, budget=budget)
+
+
+def _one_of(name: str, value: Any, known: tuple[str, ...]) -> Any:
+    if value is not None and value not in known:
+        raise InputError(f"{name} is {value!r}, wanted {', '.join(known)}")
+    return value
 
 
 def _content(path: Path) -> str:
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: is not a file")
     with path.open("rb") as file:
-        start = file.read(128)
+        start = file.read(212)
         if start[:4] == _ZIP_SIGNATURE:
             return "NPZ"
         if start[:4] in _TIFF_SIGNATURES:
             return "TIFF"
-        if start[124:] in _MAT_SIGNATURES:
+        if start[124:128] in _MAT_SIGNATURES:
             return "MAT"
+        if start[208:] == _MRC_SIGNATURE:
+            return "MRC"
         for offset in _USER_BLOCKS:
             file.seek(offset)
             if file.read(8) == _HDF5_SIGNATURE:

@@ -7,6 +7,7 @@ file: it can be sent to another process.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Protocol
@@ -18,7 +19,9 @@ from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.geometry.fan import FanBeam
 
 Frames = NDArray[np.float32]
-Kind = Literal["transmission", "attenuation"]
+Kind = Literal["counts", "transmission", "attenuation"]
+AngleUnit = Literal["degrees", "radians"]
+Part = Literal["projections", "flats", "darks"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,20 +40,30 @@ class ScanRows:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ArrayNames:
-    """Names of arrays inside a file; None means the name that the layout gives.
+class ScanRequest:
+    """What a person says about a file; None leaves it to the file's layout and values.
 
     Args:
-        dataset: the projections.
-        theta: the angles.
-        flats: the frames without the sample.
-        darks: the frames without the beam.
+        dataset: name of the projections.
+        theta: name of the angles, a file of them, or a turn.
+        flats: name of the frames without the sample; or "air", "mean": see ``open_scan``.
+        darks: name of the frames without the beam.
+        image_key: name of the array that says what each frame is.
+        kind: what the values are.
+        axes: names of the axes of the projections, such as "angle,row,bin".
+        angle_unit: unit of the angles.
+        values: whether what the values are is to be settled; ``kind`` means nothing otherwise.
     """
 
     dataset: str | None = None
     theta: str | None = None
     flats: str | None = None
     darks: str | None = None
+    image_key: str | None = None
+    kind: Kind | None = None
+    axes: str | None = None
+    angle_unit: AngleUnit | None = None
+    values: bool = True
 
 
 class RowSource(Protocol):
@@ -59,10 +72,13 @@ class RowSource(Protocol):
     def read(self, start: int, stop: int) -> ScanRows:
         """Read rows ``start`` to ``stop``, which are known to exist."""
 
+    def look(self, part: Part, frames: Sequence[int], rows: Sequence[int]) -> Frames:
+        """Read some rows of some frames, (frame, row, bin), all of which are known to exist."""
+
 
 @dataclass(frozen=True, eq=False)
 class ScanFile:
-    """A scan in a file, known by its headers and angles alone.
+    """A scan in a file, known by its headers, its angles and a sample of its values.
 
     Args:
         path: the file, or the folder of files.
@@ -71,17 +87,21 @@ class ScanFile:
         pitch: distance between detector bins in ``unit``; None where the file gives no positive
             number.
         unit: unit of ``pitch`` as the file names it, empty where it does not.
-        kind: "transmission" for counts that want flat and dark correction and a logarithm,
-            "attenuation" for line integrals. Even counts may come without flats or darks.
+        kind: "counts" that want flats, darks and -log; "transmission", counts divided by those of
+            the beam, which wants -log; or "attenuation", line integrals.
         source: the layout that was recognised, for people.
         rows: reads the rows.
         fan: source and detector where the rays are those of a fan beam; its lengths are in
             ``unit``, and ``pitch`` is its pitch, on the detector. None for parallel rays.
-        background: bins at each end of the detector that only ever see what surrounds the
-            sample, where the layout is known for line integrals with an offset: the mean over
-            these bins of both ends is 0 in truth, and is to be subtracted from the view. 0 for
-            every other layout.
-        notes: what had to be assumed, a sentence each, to be shown to the person.
+        background: bins at each end of the detector that see nothing but air: the mean line
+            integral over these bins of both ends is 0 in truth, and is to be subtracted from the
+            view. 0 where no such bins are known.
+        notes: what the file was taken to hold, in one line, and then what had to be assumed, a
+            sentence each, to be shown to the person.
+        flats_at: for each flat the number of projections taken before it, float64 (n,), where the
+            file tells; None where it does not.
+        incident: intensity of the beam at each view, float64 (angle,), where it takes the place
+            of flats; None otherwise.
     """
 
     path: Path
@@ -95,6 +115,8 @@ class ScanFile:
     fan: FanBeam | None = None
     background: int = 0
     notes: tuple[str, ...] = ()
+    flats_at: NDArray[np.float64] | None = None
+    incident: NDArray[np.float64] | None = None
 
     def read(self, start: int, stop: int) -> ScanRows:
         """Read detector rows ``start`` to ``stop``; the file is opened for that and closed again.
@@ -124,7 +146,8 @@ def check_angles(
     if angles.size != projections:
         raise ShapeError(
             f"{path}: {name!r} holds {angles.size} angles for {projections} projections; name "
-            "the array that belongs to them with theta= (--theta)"
+            "the array that belongs to them with theta= (--theta), or say which axis is which "
+            "with axes= (--axes)"
         )
     bad = np.flatnonzero(~np.isfinite(angles))
     if bad.size:

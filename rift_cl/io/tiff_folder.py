@@ -11,27 +11,15 @@ import os
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from rift_cl.errors import FileFormatError, PathEscapeError
 from rift_cl.io.boundary import reading
 from rift_cl.io.capture_paths import CaptureFolder
-
-FrameKind = Literal["projections", "flats", "darks"]
+from rift_cl.io.frame_words import CALIBRATION, FILLERS, WORDS, FrameKind, words_of
 
 SUFFIXES = (".tif", ".tiff")
-_WORDS: dict[FrameKind, frozenset[str]] = {
-    "flats": frozenset(
-        ("flat", "flats", "flatfield", "flatfields", "ff", "white", "whites", "bright", "brights")
-    ).union(("openbeam", "ob", "ref", "refs", "reference", "references")),
-    "darks": frozenset(("dark", "darks", "darkfield", "darkfields", "df")),
-}
-_CALIBRATION = _WORDS["flats"] | _WORDS["darks"]
-_FILLERS = frozenset(
-    ("field", "fields", "frame", "frames", "image", "images", "before", "after", "pre", "post")
-)
 _LISTED = 4
 
 
@@ -57,7 +45,7 @@ def sorted_kinds(folder: Path, names: Iterable[str]) -> dict[FrameKind, list[str
     if lone_series(names):
         return {**kinds, "projections": names}
     for name in names:
-        said = [kind for kind, words in _WORDS.items() if words & _words(Path(name).stem)]
+        said = [kind for kind, words in WORDS.items() if words & words_of(Path(name).stem)]
         if len(said) > 1:
             raise FileFormatError(
                 f"{folder / name}: the name says flat and dark; name the frames with flats= and "
@@ -81,9 +69,9 @@ def lone_series(names: Iterable[str]) -> bool:
     A word for flats or darks in it says nothing of the frames; ``dark_0001`` alone does.
     """
     names = list(names)
-    words = _words(Path(names[0]).stem) if names else frozenset()
-    more = not words <= _CALIBRATION | _FILLERS
-    return bool(words & _CALIBRATION) and more and len({_series(name) for name in names}) == 1
+    words = words_of(Path(names[0]).stem) if names else frozenset()
+    more = not words <= CALIBRATION | FILLERS
+    return bool(words & CALIBRATION) and more and len({_series(name) for name in names}) == 1
 
 
 def folder_of(kind: FrameKind, place: Path) -> Path | None:
@@ -119,7 +107,7 @@ def projection_folder(scan: Path) -> Path:
     """
     with reading(scan, "the folder"):
         entries = [entry for entry in sorted(scan.iterdir()) if entry.is_dir()]
-        found = [e for e in entries if not (_words(e.name) & _CALIBRATION) and _holds_frames(e)]
+        found = [e for e in entries if not (words_of(e.name) & CALIBRATION) and _holds_frames(e)]
     if len(found) != 1:
         listed = ", ".join(repr(entry.name) for entry in found[:_LISTED])
         which = f"several folders with some ({listed})" if found else "no folder with some"
@@ -154,8 +142,8 @@ def gap(names: Sequence[str]) -> str | None:
 
 
 def _says(kind: FrameKind, entry: Path) -> bool:
-    words = _words(entry.stem if entry.suffix.lower() in SUFFIXES else entry.name)
-    return bool(words & _WORDS[kind]) and words <= _WORDS[kind] | _FILLERS
+    words = words_of(entry.stem if entry.suffix.lower() in SUFFIXES else entry.name)
+    return bool(words & WORDS[kind]) and words <= WORDS[kind] | FILLERS
 
 
 def _holds_frames(entry: Path) -> bool:
@@ -165,10 +153,6 @@ def _holds_frames(entry: Path) -> bool:
             inner.suffix.lower() in SUFFIXES for inner in entry.iterdir()
         )
     return entry.suffix.lower() in SUFFIXES
-
-
-def _words(name: str) -> frozenset[str]:
-    return frozenset(re.findall("[a-z]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()))
 
 
 def _natural(name: str) -> tuple[list[tuple[int, str]], str]:

@@ -7,9 +7,10 @@ strips are read, and says nothing; those alone are read by ``tiff_float64``.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,9 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import DTypeError, FileFormatError, ShapeError
 from rift_cl.io.boundary import check_claim, reading
+from rift_cl.io.frame_stack import FrameStack
 from rift_cl.io.pixels import first_line, image_format, opened_image
-from rift_cl.io.scan_file import Frames, ScanRows
+from rift_cl.io.scan_file import Frames, Part, ScanRows
 from rift_cl.io.tiff_chain import TiffChain
 from rift_cl.io.tiff_float64 import Float64Pages
 
@@ -43,19 +45,22 @@ class TiffStack:
     Args:
         files: the files in order.
         pages: pages of the file if it is the only one, else 1.
-        size: (row, bin) of every frame.
+        size: (line, column) of every page.
         dtype: type of a sample as it is stored.
+        axes: what page, line and column are, a letter each: n frame, r row, b bin.
     """
 
     files: tuple[Path, ...]
     pages: int
     size: tuple[int, int]
     dtype: str
+    axes: str = "nrb"
 
     @property
-    def frames(self) -> int:
-        """Number of frames."""
-        return len(self.files) * self.pages
+    def stack(self) -> FrameStack:
+        """The pages as one array."""
+        stack = FrameStack("", (len(self.files) * self.pages, *self.size), self.axes, ())
+        return replace(stack, runs=((0, stack.size("n")),))
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,7 @@ class TiffRows:
     def read(self, start: int, stop: int) -> ScanRows:
         """Read detector rows ``start`` to ``stop`` of every stack."""
         stacks = [stack for stack in (self.projections, self.flats, self.darks) if stack]
-        need = sum(4 * stack.frames * (stop - start) * stack.size[1] for stack in stacks)
+        need = sum(_need(stack, start, stop) for stack in stacks)
         check_claim(self.path, f"rows {start} to {stop} of the scan", need, self.budget)
         left = None if self.budget is None else self.budget - need
         return ScanRows(
@@ -93,6 +98,18 @@ class TiffRows:
             _read(self.flats, start, stop, left) if self.flats else None,
             _read(self.darks, start, stop, left) if self.darks else None,
         )
+
+    def look(self, part: Part, frames: Sequence[int], rows: Sequence[int]) -> Frames:
+        """Read some rows of some frames of one stack, line by line."""
+        stack: TiffStack = getattr(self, part)
+        sizes = dict(zip(stack.axes, stack.stack.shape, strict=True))
+        chosen = {"n": list(frames), "r": list(rows), "b": list(range(sizes["b"]))}
+        pages, lines, columns = (chosen[axis] for axis in stack.axes)
+        spans = [(0, stack.size[0])] if stack.axes[1] == "b" else [(i, i + 1) for i in lines]
+        need = 4 * len(pages) * len(lines) * stack.size[1]
+        check_claim(self.path, "a part of the scan", need, self.budget)
+        block = _block(stack, pages, spans, self.budget)
+        return np.ascontiguousarray(stack.stack.arranged(block[..., columns]))
 
 
 def tiff_stack(files: tuple[Path, ...]) -> TiffStack:
@@ -185,28 +202,66 @@ def _demand_same(
         )
 
 
+def _need(stack: TiffStack, start: int, stop: int) -> int:
+    """Bytes of rows, and of the pages and lines that are read to get them."""
+    sizes = dict(zip(stack.axes, stack.stack.shape, strict=True))
+    rows = 4 * sizes["n"] * (stop - start) * sizes["b"]
+    if stack.axes == "nrb":
+        return rows
+    return rows + (4 * math.prod(sizes.values()) if stack.axes[2] == "r" else rows)
+
+
 def _read(stack: TiffStack, start: int, stop: int, left: int | None) -> Frames:
-    frames = np.empty((stack.frames, stop - start, stack.size[1]), np.float32)
+    pages, (high, _) = range(len(stack.files) * stack.pages), stack.size
+    spans = [(start, stop)] if stack.axes[1] == "r" else [(0, high)]
+    if stack.axes[0] == "r":
+        pages = range(start, stop)
+    block = _block(stack, pages, spans, left)
+    if stack.axes[2] == "r":
+        block = block[..., start:stop]
+    return np.ascontiguousarray(stack.stack.arranged(block))
+
+
+def _block(
+    stack: TiffStack, pages: Sequence[int], spans: Sequence[tuple[int, int]], left: int | None
+) -> Frames:
+    """Whole lines of some pages, (page, line, column).
+
+    Args:
+        stack: the pages.
+        pages: the numbers of those that are wanted, rising.
+        spans: the lines of each that are wanted, (start, stop).
+        left: bytes that decoding may take.
+    """
+    lines = sum(stop - start for start, stop in spans)
+    block = np.empty((len(pages), lines, stack.size[1]), np.float32)
+    wanted: dict[int, list[tuple[int, int]]] = {}
+    for place, number in enumerate(pages):
+        wanted.setdefault(number // stack.pages, []).append((place, number % stack.pages))
     granted = 0
-    for index, path in enumerate(stack.files):
+    for index, places in wanted.items():
+        path = stack.files[index]
         with _opened(path) as source, np.errstate(over="ignore"):
             doubles = Float64Pages(path)
-            for page in range(stack.pages):
+            for place, page in places:
                 if not source.seek_subimage(page, 0):
                     raise FileFormatError(f"{path}: page {page} is damaged ({_complaint(source)})")
                 spec = source.spec()
                 found = _checked(path, page, spec)
                 _demand_same(path, page, found, (stack.size, stack.dtype), path)
-                scratch = _scratch(spec, start, stop)
-                if scratch > granted:
-                    check_claim(path, "a part of a frame", scratch, left)
-                    granted = scratch
-                into = frames[index * stack.pages + page]
-                if stack.dtype == "f8":
-                    into[:] = doubles.rows(page, start, stop, stack.size)
-                else:
-                    into[:] = _decoded(path, source, page, start, stop)
-    return frames
+                done = 0
+                for start, stop in spans:
+                    scratch = _scratch(spec, start, stop)
+                    if scratch > granted:
+                        check_claim(path, "a part of a frame", scratch, left)
+                        granted = scratch
+                    into = block[place, done : done + stop - start]
+                    if stack.dtype == "f8":
+                        into[:] = doubles.rows(page, start, stop, stack.size)
+                    else:
+                        into[:] = _decoded(path, source, page, start, stop)
+                    done += stop - start
+    return block
 
 
 def _scratch(spec: Any, start: int, stop: int) -> int:

@@ -1,22 +1,24 @@
-"""Finds the scan in TIFF files: a folder of projections, or one file with a page for each.
+"""Finds the scan in TIFF files: a folder of projections, one file with a page for each, sinograms.
 
-TIFF says nothing of angles, flats and darks: they come from names, or from the caller. What is
-assumed is written into the description's notes.
+TIFF says nothing of angles, flats, darks and axes: they come from names, from the number of angles,
+or from the caller. What is assumed is written into the description's notes.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, InputError, ShapeError
 from rift_cl.io import angle_list
-from rift_cl.io.scan_file import ArrayNames, Kind, ScanFile
+from rift_cl.io.angle_list import AngleList
+from rift_cl.io.frame_words import FrameKind
+from rift_cl.io.scan_axes import axes_of, parsed
+from rift_cl.io.scan_contract import AIR, MEAN, Finding, scan_of
+from rift_cl.io.scan_file import ScanFile, ScanRequest
 from rift_cl.io.tiff_folder import (
-    FrameKind,
     folder_of,
     gap,
     inside,
@@ -51,37 +53,57 @@ class _Place:
     notes: tuple[str, ...] = ()
 
 
-def open_tiff_scan(path: Path, names: ArrayNames, *, budget: int | None) -> ScanFile:
+def open_tiff_scan(path: Path, request: ScanRequest, *, budget: int | None) -> ScanFile:
     """Find the scan in a folder of TIFF files or in a TIFF file of many pages; see ``open_scan``.
 
     Raises:
         InputError: the files cannot be read, or do not make a scan.
     """
-    if names.dataset is not None:
-        raise InputError(
-            f"{path}: dataset is {names.dataset!r}, but TIFF holds no named arrays; name the "
-            "folder of the projections itself"
-        )
+    for name in ("dataset", "image_key"):
+        if getattr(request, name) is not None:
+            raise InputError(
+                f"{path}: {name} is {getattr(request, name)!r}, but TIFF holds no named arrays; "
+                "name the folder of the projections itself, and flats and darks by --flats, --darks"
+            )
     place = _folder(path) if path.is_dir() else _file(path)
-    projections = tiff_stack(place.files)
-    flats, flats_from = _calibration(place, "flats", names.flats, projections)
-    darks, darks_from = _calibration(place, "darks", names.darks, projections)
-    angles, notes = _angles(place, names.theta, projections)
-    notes = place.notes + notes
-    kind: Kind = "transmission" if flats else "attenuation"
-    if flats is None:
-        notes += (_unused(projections, darks_from),)
-    shape = (projections.frames, *projections.size)
-    rows = TiffRows(path, projections, flats, darks if flats else None, budget)
-    source = f"TIFF{flats_from}{darks_from if flats else ''}"
-    return ScanFile(path, shape, angles, None, "", kind, source, rows, notes=notes)
+    stack = tiff_stack(place.files)
+    angles, notes = _angles(place, request.theta)
+    stack = replace(stack, axes=_axes(path, stack, angles, request))
+    flats, flats_from = _calibration(place, "flats", request.flats, stack)
+    darks, darks_from = _calibration(place, "darks", request.darks, stack)
+    if angles is None:
+        angles, notes = _assumed(place, stack)
+    frames = stack.stack
+    radians, phrase, doubts = angles.settled(path, frames.frames, request.angle_unit)
+    found = Finding(
+        path=path,
+        source=f"TIFF{flats_from}{darks_from if flats else ''}",
+        name=repr(place.files[0].name),
+        shape=(frames.frames, frames.rows, frames.bins),
+        axes=stack.axes if frames.shape[0] > 1 else stack.axes[1:],
+        dtype=np.dtype(stack.dtype),
+        rows=TiffRows(path, stack, flats, darks, budget),
+        angles=radians,
+        angle_words=phrase,
+        flats=flats.stack.frames if flats else 0,
+        darks=darks.stack.frames if darks else 0,
+        evidence=(place.files[0].stem,),
+        notes=(*place.notes, *notes, *doubts),
+    )
+    return scan_of(found, request)
 
 
-def _unused(projections: TiffStack, darks_from: str) -> str:
-    what = "counts" if projections.dtype[0] in "iu" else "numbers"
-    note = f"No flats were found: the {what} are taken for line integrals as they are"
-    darks = ", and the darks are not used" if darks_from else ""
-    return f"{note}{darks}; name the flats with flats= (--flats)."
+def _axes(path: Path, stack: TiffStack, angles: AngleList | None, request: ScanRequest) -> str:
+    """What page, line and column are; a single page is a sinogram of one row."""
+    count = None if angles is None else angles.count
+    shape = stack.stack.shape
+    asked = request.axes
+    single = shape[0] == 1 and (asked is None or len(parsed(asked)) < len(shape))
+    name = stack.files[0].name
+    if single:
+        return "r" + axes_of(path, name, shape[1:], count=count, asked=asked)
+    usual = "nrb" if count is None else None
+    return axes_of(path, name, shape, count=count, asked=asked, usual=usual)
 
 
 def _folder(path: Path) -> _Place:
@@ -121,14 +143,17 @@ def _calibration(
     place: _Place, kind: FrameKind, named: str | None, projections: TiffStack
 ) -> tuple[TiffStack | None, str]:
     """The flats or the darks, and a phrase that says where they come from."""
+    if kind == "flats" and named in (AIR, MEAN):
+        return None, ""
     files, where = _calibration_files(place, kind, named)
     if not files:
         return None, ""
-    stack = tiff_stack(files)
-    if stack.size != projections.size:
+    stack = replace(tiff_stack(files), axes=projections.axes)
+    found, wanted = stack.stack, projections.stack
+    if (found.rows, found.bins) != (wanted.rows, wanted.bins):
         raise ShapeError(
-            f"{files[0]}: the {kind} have {stack.size[0]} x {stack.size[1]} rows and bins, the "
-            f"projections {projections.size[0]} x {projections.size[1]}: they must agree"
+            f"{files[0]}: the {kind} have {found.rows} x {found.bins} rows and bins, the "
+            f"projections {wanted.rows} x {wanted.bins}: they must agree"
         )
     return stack, f", {kind} from {where}"
 
@@ -167,16 +192,11 @@ def _named(place: _Place, named: str) -> Path:
     raise InputError(f"{place.path}: {named!r} is not there; it was looked for as {looked}")
 
 
-def _angles(
-    place: _Place, theta: str | None, projections: TiffStack
-) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    count = projections.frames
+def _angles(place: _Place, theta: str | None) -> tuple[AngleList | None, tuple[str, ...]]:
+    """The angles that are named, or that lie beside the frames."""
     if theta is not None:
-        even = angle_list.even_angles(theta, count)
-        if even is not None:
-            return even, ()
-        angles = angle_list.file_angles(_named(place, theta), count)
-        return angles, angle_list.unit_note(angles)
+        turn = angle_list.even_turn(theta)
+        return turn or angle_list.file_angles(_named(place, theta)), ()
     for folder in place.folders:
         found = [folder / name for name in _ANGLE_NAMES if (folder / name).is_file()]
         if len(found) > 1:
@@ -186,22 +206,20 @@ def _angles(
             )
         if found:
             (path,) = inside(folder, [found[0].name])
-            angles = angle_list.file_angles(path, count)
-            note = f"The angles are those of {path}, in degrees."
-            return angles, (note, *angle_list.unit_note(angles))
-    return _assumed(place, count)
+            return angle_list.file_angles(path), (f"The angles are those of {path}.",)
+    return None, ()
 
 
-def _assumed(place: _Place, count: int) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    after = gap([path.name for path in place.files])
+def _assumed(place: _Place, stack: TiffStack) -> tuple[AngleList, tuple[str, ...]]:
+    after = gap([path.name for path in place.files]) if stack.axes[0] == "n" else None
     if after is not None:
         raise FileFormatError(
             f"{place.path}: the numbers of the files jump after {after!r}, so that no even angles "
             "can be assumed; give the angles with theta= (--theta)"
         )
-    angles = angle_list.even_angles("180", count)
+    angles = angle_list.even_turn("180")
     assert angles is not None
     return angles, (
-        f"No angles were found: {count} projections are taken as evenly spread over 180 degrees, "
-        "the end left out; give others with theta= (--theta).",
+        f"No angles were found: {stack.stack.frames} projections are taken as evenly spread over "
+        "180 degrees, the end left out; give others with theta= (--theta).",
     )

@@ -40,9 +40,10 @@ def open_sampled(settings: AnalyzeSettings) -> Sampled:
 
 
 def _capture(settings: AnalyzeSettings) -> Sampled:
-    for name in ("dataset", "theta"):
+    for name in ("dataset", "theta", "image_key", "axes", "angle_unit"):
         if getattr(settings, name) is not None:
-            raise InputError(f"--{name} is about a scan, {settings.source} is a capture")
+            option = name.replace("_", "-")
+            raise InputError(f"--{option} is about a scan, {settings.source} is a capture")
     capture = open_capture(settings.source, photographs=False)
     cameras = [view.camera for view in capture.views]
     bounds = bounds_of_cameras(cameras)
@@ -162,7 +163,15 @@ def _scan(settings: AnalyzeSettings) -> Sampled:
         if getattr(settings, name) is not None:
             raise InputError(f"--{name} is about the cameras of a capture, {settings.source} is a "
                              "scan")  # fmt: skip
-    file = open_scan(settings.source, dataset=settings.dataset, theta=settings.theta)
+    file = open_scan(
+        settings.source,
+        dataset=settings.dataset,
+        theta=settings.theta,
+        image_key=settings.image_key,
+        axes=settings.axes,
+        angle_unit=settings.angle_unit,
+        values=False,
+    )
     up = np.array([0.0, 0, 1])
     pitch, unit = (file.pitch, file.unit or "unit") if file.pitch else (1.0, "bin")
     notes = list(file.notes)

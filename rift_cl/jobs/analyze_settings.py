@@ -10,6 +10,7 @@ from typing import Annotated
 from tyro.conf import Positional
 
 from rift_cl.errors import InputError
+from rift_cl.io.scan_file import AngleUnit
 
 _MOST_ADDED = 64
 
@@ -47,7 +48,13 @@ class AnalyzeSettings:
     dataset: str | None = None
     """Name of a scan's projections in its file; see 'rift reconstruct'."""
     theta: str | None = None
-    """Name of a scan's angles, or a file of degrees, or a turn such as 0:180."""
+    """Name of a scan's angles, or a file of them, or a turn in degrees such as 0:180."""
+    image_key: str | None = None
+    """Name of the array that says what each frame of a scan is, as in NXtomo."""
+    axes: str | None = None
+    """Which axis of a scan's projections is which, such as angle,row,bin."""
+    angle_unit: AngleUnit | None = None
+    """Unit of a scan's angles."""
     device: str | None = None
     """Device to use: its number, cpu, gpu, or a part of its name; see 'rift devices'."""
     overwrite: bool = False

@@ -17,9 +17,9 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import open_device
 from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.io.scan import open_scan
-from rift_cl.io.scan_file import ScanFile
+from rift_cl.io.scan_file import AngleUnit, Kind, ScanFile
 from rift_cl.io.tiff_frames import TiffRows
-from rift_cl.reconstruct.flatfield import Attenuation, attenuation
+from rift_cl.reconstruct.flatfield import Attenuation, attenuation, attenuation_without_flats
 
 
 @dataclass(frozen=True)
@@ -32,12 +32,26 @@ class ScanInput:
     dataset: str | None = None
     """Name of the projections in the file, where it is not the layout's own."""
     theta: str | None = None
-    """Name of the angles in the file; or a file of degrees (.txt, .csv, .npy); or a turn that is
-    evenly divided, 0:180 or 360, its end left out."""
+    """Name of the angles in the file; or a file of angles (.txt, .csv, .npy); or a turn in degrees
+    that is evenly divided, 0:180 or 360, its end left out."""
     flats: str | None = None
-    """Name of the frames without the sample; for TIFF, their folder or file."""
+    """Name of the frames without the sample; for TIFF, their folder or file. For counts without
+    any: 'air' takes the beam of every view from the outermost bins at both ends of the detector,
+    which must see nothing but air; 'mean' takes it to be the mean of the view."""
     darks: str | None = None
     """Name of the frames without the beam; for TIFF, their folder or file."""
+    image_key: str | None = None
+    """Name of the array that says what each frame is: 0 a projection, 1 a flat, 2 a dark, 3
+    invalid; NXtomo's own if not given."""
+    kind: Kind | None = None
+    """What the values are: counts of a detector, transmission (counts divided by those of the
+    beam), or attenuation (line integrals); told by flats, names, units and values if not given."""
+    axes: str | None = None
+    """Which axis of the projections is which, in the file's order: angle,row,bin, or
+    row,angle,bin for sinograms; of a single sinogram angle,bin or bin,angle. Told by the number of
+    angles if not given."""
+    angle_unit: AngleUnit | None = None
+    """Unit of the angles; what the file says, checked against their span, if not given."""
     device: str | None = None
     """Device to use: its number, cpu, gpu, or a part of its name; see 'rift devices'."""
     memory: str | None = None
@@ -60,9 +74,19 @@ class ScanInput:
         Raises:
             InputError: they are and may not be, or the background is wider than the detector.
         """
-        names = {"theta": self.theta, "flats": self.flats, "darks": self.darks}
         limit = None if self.memory is None else parse_bytes(self.memory)
-        scan = open_scan(self.scan, dataset=self.dataset, budget=limit, **names)
+        scan = open_scan(
+            self.scan,
+            dataset=self.dataset,
+            theta=self.theta,
+            flats=self.flats,
+            darks=self.darks,
+            image_key=self.image_key,
+            kind=self.kind,
+            axes=self.axes,
+            angle_unit=self.angle_unit,
+            budget=limit,
+        )
         if scan.fan is not None and not fan:
             raise InputError(
                 f"{scan.path}: its rays are those of a fan beam, this command takes parallel ones; "
@@ -113,10 +137,13 @@ def read_attenuation(scan: ScanFile, start: int, stop: int) -> Attenuation:
         frames = getattr(rows, name)
         if frames is not None:
             _check(frames, f"{scan.path}: {name}", start)
-    if scan.kind == "attenuation" or rows.flats is None:
+    if scan.kind == "attenuation":
         integrals = Attenuation(rows.projections, 0, 0)
+    elif rows.flats is None:
+        integrals = attenuation_without_flats(rows.projections, rows.darks, incident=scan.incident)
     else:
-        integrals = attenuation(rows.projections, rows.flats, rows.darks)
+        flats_at = scan.flats_at
+        integrals = attenuation(rows.projections, rows.flats, rows.darks, flats_at=flats_at)
     if scan.background:
         subtract_background(integrals.projections, scan.background)
     return integrals

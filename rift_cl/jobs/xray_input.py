@@ -48,8 +48,16 @@ class XrayInput:
     def __init__(self, settings: FitSettings, device: Device) -> None:
         self.source = ScanInput(
             settings.capture,
-            *(settings.dataset, settings.theta, settings.flats, settings.darks),
-            *(settings.device, settings.memory),
+            dataset=settings.dataset,
+            theta=settings.theta,
+            flats=settings.flats,
+            darks=settings.darks,
+            image_key=settings.image_key,
+            kind=settings.kind,
+            axes=settings.axes,
+            angle_unit=settings.angle_unit,
+            device=settings.device,
+            memory=settings.memory,
         )
         self.scan: ScanFile = self.source.open_scan()
         self.device = device

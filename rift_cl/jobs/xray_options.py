@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from rift_cl.cl.budget import parse_bytes
 from rift_cl.errors import InputError
+from rift_cl.io.scan_file import AngleUnit, Kind
 
 # What photographs alone know.
 _LIGHT = (
@@ -32,9 +33,17 @@ class XrayOptions:
     theta: str | None = None
     """X-rays: name of the angles in the file."""
     flats: str | None = None
-    """X-rays: name of the frames without the sample."""
+    """X-rays: name of the frames without the sample; air or mean where there are none."""
     darks: str | None = None
     """X-rays: name of the frames without the beam."""
+    image_key: str | None = None
+    """X-rays: name of the array that says what each frame is, as in NXtomo."""
+    kind: Kind | None = None
+    """X-rays: what the values are: counts, transmission or attenuation."""
+    axes: str | None = None
+    """X-rays: which axis of the projections is which, such as angle,row,bin."""
+    angle_unit: AngleUnit | None = None
+    """X-rays: unit of the angles."""
     center: float | None = None
     """X-rays: detector bin of the rotation axis; found automatically when not given."""
     rows: tuple[int, int] | None = None

@@ -2,9 +2,17 @@
 
 By Beer and Lambert a ray that arrives with I of its I0 quanta has the line integral
 ``-log(I / I0)`` of attenuation. Counts are corrected by the means of the dark frames (no beam)
-and of the flat frames (beam, no sample). A detector column that does not answer to the beam tells
-nothing: it is filled from its neighbours in the row, because one such column becomes a ring, and
-one NaN a ruined slice.
+and of the flat frames (beam, no sample); flats that were taken at several times are interpolated
+between them, because beams drift. Two kinds of samples tell nothing:
+
+- a *dead* detector pixel does not answer to the beam;
+- a *starved* sample has no more signal than the darks' noise. Its logarithm would be that of a
+  number nobody measured: a floor of some fraction of a quantum gives spikes of 10 to 16, in the
+  middle of line integrals of 4 or 5, which become streaks across the slice.
+
+Both are interpolated along the detector between the nearest samples that were measured, in line
+integrals. Inside a wide run of starved samples, behind metal, say, that is a lower bound, and not
+an invented peak. One such column would otherwise be a ring, and one NaN a ruined slice.
 """
 
 from __future__ import annotations
@@ -19,8 +27,10 @@ from rift_cl.errors import InputError, ShapeError
 Floats = NDArray[np.float32]
 # A pixel is dead when the beam raises it by less than this share of what is usual in its row.
 _DEAD = 0.05
-# Fewer quanta than this share of the flat are not told from none; it bounds -log at 16.1.
+# Fewer quanta than this share of the beam are not told from none, whatever the darks' noise.
 _FAINTEST = 1e-7
+# Dark frames from which on their noise can be told.
+_ENOUGH_DARKS = 3
 
 
 @dataclass(frozen=True)
@@ -30,7 +40,7 @@ class Attenuation:
     Args:
         projections: line integrals of attenuation, (angle, row, bin), no unit.
         dead: detector pixels that were filled from their neighbours.
-        starved: samples at which no quanta were left; set to the largest line integral.
+        starved: samples without a signal above the darks' noise, filled in the same way.
     """
 
     projections: Floats
@@ -38,17 +48,26 @@ class Attenuation:
     starved: int
 
 
-def attenuation(projections: Floats, flats: Floats, darks: Floats | None = None) -> Attenuation:
+def attenuation(
+    projections: Floats,
+    flats: Floats,
+    darks: Floats | None = None,
+    *,
+    flats_at: NDArray[np.float64] | None = None,
+) -> Attenuation:
     """Correct counts by flat and dark frames and take -log.
 
     Args:
         projections: counts, (angle, row, bin).
         flats: counts without a sample, (n, row, bin), n >= 1.
         darks: counts without the beam, (n, row, bin); zero if not given.
+        flats_at: (n,) for each flat the number of projections taken before it. Those with the same
+            number are averaged; between such groups the beam is interpolated linearly.
 
     Raises:
         ShapeError: frames and projections do not have the same rows and bins.
-        InputError: there is no flat frame, or the beam reaches no pixel of a row.
+        InputError: there is no flat frame, the beam reaches no pixel of a row, or no sample of a
+            row has any signal.
     """
     for name, frames in (("flats", flats), ("darks", darks)):
         if frames is not None and frames.shape[1:] != projections.shape[1:]:
@@ -58,7 +77,7 @@ def attenuation(projections: Floats, flats: Floats, darks: Floats | None = None)
             )
     if not len(flats):
         raise InputError("there is no flat frame: name one, or give data that is already -log")
-    dark = np.zeros(flats.shape[1:], np.float32) if darks is None else _mean(darks)
+    dark = _mean_dark(projections, darks)
     beam = _mean(flats) - dark
     dead = ~(beam > _DEAD * np.maximum(np.median(beam, axis=1, keepdims=True), 0)) | (beam <= 0)
     if dead.all(axis=1).any():
@@ -68,12 +87,43 @@ def attenuation(projections: Floats, flats: Floats, darks: Floats | None = None)
             "is this row outside the beam (choose rows with --rows)?"
         )
     beam[dead] = 1
-    transmission: Floats = (projections - dark) / beam
-    _fill(transmission, dead)
-    starved = transmission < _FAINTEST
-    np.maximum(transmission, _FAINTEST, out=transmission)
-    np.negative(np.log(transmission, out=transmission), out=transmission)
-    return Attenuation(transmission, int(dead.sum()), int(starved.sum()))
+    transmission: Floats = projections - dark
+    if flats_at is None or len(np.unique(flats_at)) < 2:
+        transmission /= beam
+    else:
+        _divide(transmission, flats, dark, flats_at)
+    return _minus_log(transmission, _dark_noise(darks) / beam, dead)
+
+
+def attenuation_without_flats(
+    projections: Floats,
+    darks: Floats | None = None,
+    *,
+    incident: NDArray[np.float64] | None = None,
+) -> Attenuation:
+    """Take -log of transmission, or of counts whose beam is a number for each view.
+
+    Args:
+        projections: transmission or counts, (angle, row, bin).
+        darks: counts without the beam, (n, row, bin); zero if not given.
+        incident: (angle,) the beam's counts, less the darks; 1 if not given, which leaves counts
+            with line integrals that are off by one number in each view and row.
+
+    Raises:
+        InputError: no sample of a row has any signal.
+    """
+    signal: Floats = projections - _mean_dark(projections, darks)
+    if incident is not None:
+        signal /= incident[:, None, None].astype(np.float32)
+    # Numbers of a beam that is not known are measured by the brightest sample of their row.
+    beam = np.maximum(signal.max(axis=(0, 2)), 0)[:, None]
+    scale = 1.0 if incident is None else float(np.mean(incident))
+    faintest = np.maximum(_dark_noise(darks) / np.float32(scale), _FAINTEST * beam)
+    return _minus_log(signal, faintest, np.zeros(projections.shape[1:], np.bool_))
+
+
+def _mean_dark(projections: Floats, darks: Floats | None) -> Floats:
+    return np.zeros(projections.shape[1:], np.float32) if darks is None else _mean(darks)
 
 
 def _mean(frames: Floats) -> Floats:
@@ -81,10 +131,65 @@ def _mean(frames: Floats) -> Floats:
     return mean
 
 
-def _fill(projections: Floats, dead: NDArray[np.bool_]) -> None:
-    """Replace dead columns of each row by linear interpolation between its good ones."""
-    bins = np.arange(projections.shape[2])
-    for row in np.flatnonzero(dead.any(axis=1)):
-        good = ~dead[row]
-        for view in projections[:, row]:
-            view[dead[row]] = np.interp(bins[dead[row]], bins[good], view[good])
+def _dark_noise(darks: Floats | None) -> Floats:
+    """Standard deviation of a dark sample, one for each row, (row, 1); 0 where it is not known."""
+    if darks is None or len(darks) < _ENOUGH_DARKS:
+        return np.zeros((1, 1), np.float32)
+    spread = darks.std(axis=0, ddof=1, dtype=np.float64)
+    noise: Floats = np.median(spread, axis=1, keepdims=True).astype(np.float32)
+    return noise
+
+
+def _divide(
+    transmission: Floats, flats: Floats, dark: Floats, flats_at: NDArray[np.float64]
+) -> None:
+    """Divide each view by the beam at its time."""
+    times = np.unique(flats_at)
+    beams = np.stack([_mean(flats[flats_at == time]) - dark for time in times])
+    # A pixel that is dead at one time alone is filled all the same: its beam is 0 or less.
+    for view in range(len(transmission)):
+        place = float(np.interp(view + 0.5, times, np.arange(len(times))))
+        first = min(int(place), len(times) - 2)
+        share = np.float32(place - first)
+        beam = (1 - share) * beams[first] + share * beams[first + 1]
+        transmission[view] /= np.where(beam > 0, beam, np.inf)
+
+
+def _minus_log(transmission: Floats, faintest: Floats, dead: NDArray[np.bool_]) -> Attenuation:
+    """-log in place, with dead pixels and what is not above ``faintest`` filled."""
+    unknown = ~(transmission > np.maximum(faintest, np.float32(_FAINTEST)))
+    unknown |= dead
+    starved = int(unknown.sum()) - len(transmission) * int(dead.sum())
+    transmission[unknown] = 1
+    np.negative(np.log(transmission, out=transmission), out=transmission)
+    if unknown.any():
+        for row in np.flatnonzero(unknown.any(axis=(0, 2))):
+            _fill(transmission[:, row], unknown[:, row], int(row))
+    return Attenuation(transmission, int(dead.sum()), starved)
+
+
+def _fill(lines: Floats, unknown: NDArray[np.bool_], row: int) -> None:
+    """Interpolate along each line of one row (angle, bin), and lines that are lost between views.
+
+    Raises:
+        InputError: nothing is known of any line.
+    """
+    bins = np.arange(lines.shape[1])
+    lost = unknown.all(axis=1)
+    if lost.all():
+        raise InputError(
+            f"row {row} holds no sample with a signal above the darks: choose other rows "
+            "(--rows), or check which frames are darks (--darks)"
+        )
+    for view in np.flatnonzero(unknown.any(axis=1) & ~lost):
+        gaps = unknown[view]
+        lines[view, gaps] = np.interp(bins[gaps], bins[~gaps], lines[view, ~gaps])
+    if lost.any():
+        known = np.flatnonzero(~lost)
+        for view in np.flatnonzero(lost):
+            after = min(int(np.searchsorted(known, view)), len(known) - 1)
+            before = max(after - 1, 0) if known[after] > view else after
+            first, last = known[before], known[after]
+            share = np.float32((view - first) / (last - first) if last != first else 0)
+            share = np.clip(share, 0, 1)
+            lines[view] = (1 - share) * lines[first] + share * lines[last]

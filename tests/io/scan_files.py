@@ -20,8 +20,8 @@ def data_exchange(path: Path, dtype: str = "<u2") -> np.ndarray:
     data = counts(FRAMES, ROWS, BINS, dtype=dtype)
     with h5py.File(path, "w") as file:
         file["exchange/data"] = data
-        file["exchange/data_white"] = counts(2, ROWS, BINS) + 1000
-        file["exchange/data_dark"] = counts(3, ROWS, BINS) + 2000
+        file["exchange/data_white"] = counts(2, ROWS, BINS) + 2000
+        file["exchange/data_dark"] = counts(3, ROWS, BINS) + 1000
         file["exchange/theta"] = DEGREES
         file["exchange/theta"].attrs["units"] = "degrees"
     return data
@@ -45,6 +45,6 @@ def nxtomo(path: Path, *, group: str = "entry1/tomo_entry", mode: str = "w") -> 
 
 def npz(path: Path) -> np.ndarray:
     data = counts(FRAMES, ROWS, BINS, dtype="<f4")
-    flats = counts(2, ROWS, BINS, dtype="<f8")
+    flats = counts(2, ROWS, BINS, dtype="<f8") + 500
     np.savez_compressed(path, projections=data, angles=np.deg2rad(DEGREES), flats=flats, pitch=0.25)
     return data

@@ -19,6 +19,7 @@ from rift_cl.errors import FileFormatError, InputError, PathEscapeError, Resourc
 from rift_cl.io import mat5, mat73, open_scan
 
 HEADER = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+SINOGRAM = {"axes": "angle,bin", "kind": "attenuation"}
 DOUBLE, STRUCT, FUNCTION, OPAQUE = 6, 2, 16, 17
 
 
@@ -48,7 +49,7 @@ def test_the_pieces_of_these_tests_make_a_file_that_others_read(tmp_path: Path) 
         path = write(tmp_path / "a.mat", version)
         read = scipy.io.loadmat(path)["p"]
         np.testing.assert_array_equal(read, numbers.reshape(2, 3, order="F"))
-        scan = open_scan(path, dataset="p", theta="180")
+        scan = open_scan(path, dataset="p", theta="180", **SINOGRAM)
         np.testing.assert_array_equal(scan.read(0, 1).projections[:, 0], read)
 
 
@@ -78,9 +79,8 @@ def test_a_bomb_is_unpacked_neither_when_it_is_listed_nor_when_it_is_read(tmp_pa
     path = write(tmp_path / "a.mat", bomb(1 << 27))
     assert path.stat().st_size < 1 << 20
     before, begin = grown(), time.perf_counter()
-    scan = open_scan(path, dataset="p", theta="180", budget=1 << 24)
     with pytest.raises(ResourceLimitError, match="the memory budget is 16 MiB"):
-        scan.read(0, 1)
+        open_scan(path, dataset="p", theta="180", budget=1 << 24, **SINOGRAM)
     assert grown() - before < 50 << 20 and time.perf_counter() - begin < 0.5
 
 
@@ -116,7 +116,7 @@ def test_functions_and_objects_are_passed_over(tmp_path: Path) -> None:
     strange = [matrix("f", kind, (1, 1), nested(1)) for kind in (FUNCTION, OPAQUE, 3, 1, 200)]
     good = matrix("p", DOUBLE, (2, 3), tag(9, bytes(48)))
     path = write(tmp_path / "a.mat", *strange, good)
-    assert open_scan(path, dataset="p", theta="180").shape == (2, 1, 3)
+    assert open_scan(path, dataset="p", theta="180", **SINOGRAM).shape == (2, 1, 3)
 
 
 def test_more_arrays_than_a_file_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -156,7 +156,8 @@ def test_a_packed_array_whose_sum_is_wrong(tmp_path: Path) -> None:
     content = bytearray(packed(matrix("p", DOUBLE, (2, 3), tag(9, bytes(48)))))
     content[-1] ^= 1
     with pytest.raises(FileFormatError, match="incorrect data check"):
-        open_scan(write(tmp_path / "a.mat", bytes(content)), dataset="p", theta="180").read(0, 1)
+        path = write(tmp_path / "a.mat", bytes(content))
+        open_scan(path, dataset="p", theta="180", **SINOGRAM).read(0, 1)
 
 
 @pytest.mark.parametrize("version", ["5", "5 packed", "7.3"])

@@ -29,7 +29,7 @@ def test_the_helsinki_challenge(tmp_path: Path, version: str, name: str) -> None
     scan = open_scan(write_mat(tmp_path / "a.mat", {name: challenge()}, version))
     assert (scan.shape, scan.kind, scan.unit) == ((FRAMES, 1, BINS), "attenuation", "mm")
     assert scan.fan == FanBeam(400, 500, 0.2, (BINS - 1) / 2) and scan.pitch == 0.2
-    assert name in scan.source and scan.notes == ()
+    assert name in scan.source and len(scan.notes) == 1
     np.testing.assert_allclose(scan.angles, np.deg2rad(DEGREES), rtol=1e-15)
     np.testing.assert_array_equal(whole(scan)[:, 0], counts(FRAMES, BINS))
     np.testing.assert_array_equal(whole(pickle.loads(pickle.dumps(scan))), whole(scan))
@@ -51,7 +51,7 @@ def test_dendrites(tmp_path: Path, version: str) -> None:
     values = {"sinoRD": sinogram, "anglesRad": np.arange(FRAMES)[:, None] * 0.1, "Detectors": 5.0}
     scan = open_scan(write_mat(tmp_path / "a.mat", values, version))
     assert (scan.shape, scan.kind, scan.fan) == ((FRAMES, 1, BINS), "attenuation", None)
-    assert scan.background == 1 and scan.notes == ()
+    assert scan.background == 1 and len(scan.notes) == 1
     np.testing.assert_allclose(scan.angles, np.arange(FRAMES) * 0.1, rtol=1e-15)
     np.testing.assert_array_equal(whole(scan)[:, 0], sinogram.T)
 
@@ -59,15 +59,15 @@ def test_dendrites(tmp_path: Path, version: str) -> None:
 @each_version
 def test_named_stack(tmp_path: Path, version: str) -> None:
     stack = counts(FRAMES, ROWS, BINS)
-    values = {"d": {"p": stack, "phi": DEGREES, "w": stack[:2] + 9, "k": stack[0] + 7}}
+    values = {"d": {"p": stack, "phi": DEGREES, "w": stack[:2] + 900, "k": stack[0] + 7}}
     write_mat(tmp_path / "a.mat", values, version)
     scan = open_scan(tmp_path / "a.mat", dataset="d.p", theta="d.phi", flats="d.w", darks="d.k")
-    assert (scan.shape, scan.kind) == (stack.shape, "transmission")
+    assert (scan.shape, scan.kind) == (stack.shape, "counts")
     np.testing.assert_allclose(scan.angles, np.deg2rad(DEGREES), rtol=1e-15)
     rows = scan.read(1, 3)
     assert rows.flats is not None and rows.darks is not None
     np.testing.assert_array_equal(rows.projections, stack[:, 1:3])
-    np.testing.assert_array_equal(rows.flats, stack[:2, 1:3] + 9)
+    np.testing.assert_array_equal(rows.flats, stack[:2, 1:3] + 900)
     np.testing.assert_array_equal(rows.darks, stack[:1, 1:3] + 7)
     assert all(f.flags.c_contiguous and f.dtype == np.float32 for f in vars(rows).values())
 
@@ -75,16 +75,18 @@ def test_named_stack(tmp_path: Path, version: str) -> None:
 @each_version
 def test_a_sinogram_lies_as_its_angles_say(tmp_path: Path, version: str) -> None:
     sinogram = counts(FRAMES, BINS)
-    values = {"a": sinogram, "b": sinogram.T, "rad": DEGREES, "flat": sinogram[:1].T}
+    radians = np.deg2rad(DEGREES)
+    values = {"a": sinogram, "b": sinogram.T, "rad": radians, "flat": sinogram[:1].T + 99}
     path = write_mat(tmp_path / "a.mat", values, version)
     along, across = (
-        open_scan(path, dataset="a", theta="rad"),
+        open_scan(path, dataset="a", theta="rad", kind="attenuation"),
         open_scan(path, dataset="b", theta="rad", flats="flat"),
     )
-    np.testing.assert_array_equal(along.angles, DEGREES)
+    np.testing.assert_array_equal(along.angles, radians)
     np.testing.assert_array_equal(whole(along), whole(across))
-    np.testing.assert_array_equal(across.read(0, 1).flats[:, 0], sinogram[:1])
-    assert along.notes == () and "is (bin, angle)" in across.notes[0]
+    np.testing.assert_array_equal(across.read(0, 1).flats[:, 0], sinogram[:1] + 99)
+    assert "axes (angle, bin) 6 x 5" in along.notes[0]
+    assert "axes (bin, angle) 5 x 6" in across.notes[0]
 
 
 @each_version
@@ -92,7 +94,7 @@ def test_a_sinogram_lies_as_its_angles_say(tmp_path: Path, version: str) -> None
 def test_every_type_of_number(tmp_path: Path, version: str, dtype: str) -> None:
     stack = counts(FRAMES, ROWS, BINS, dtype=dtype)
     path = write_mat(tmp_path / "a.mat", {"p": stack}, version)
-    scan = open_scan(path, dataset="p", theta="0:180")
+    scan = open_scan(path, dataset="p", theta="0:180", kind="attenuation", axes="angle,row,bin")
     np.testing.assert_array_equal(whole(scan), stack)
     np.testing.assert_allclose(np.rad2deg(scan.angles), np.arange(6) * 30.0, atol=1e-12)
 
@@ -100,7 +102,7 @@ def test_every_type_of_number(tmp_path: Path, version: str, dtype: str) -> None:
 def test_angles_from_a_file(tmp_path: Path) -> None:
     path = write_mat(tmp_path / "a.mat", {"p": counts(FRAMES, BINS)}, "5")
     np.savetxt(tmp_path / "t.txt", DEGREES)
-    scan = open_scan(path, dataset="p", theta=str(tmp_path / "t.txt"))
+    scan = open_scan(path, dataset="p", theta=str(tmp_path / "t.txt"), kind="attenuation")
     np.testing.assert_allclose(scan.angles, np.deg2rad(DEGREES), rtol=1e-15)
 
 

@@ -10,10 +10,7 @@ import numpy as np
 import pytest
 import scan_files as made
 
-from rift_cl.errors import (
-    FileFormatError,
-    ShapeError,
-)
+from rift_cl.errors import FileFormatError, InputError, ShapeError
 from rift_cl.io import ScanFile, open_scan
 
 
@@ -25,15 +22,15 @@ def whole(scan: ScanFile) -> np.ndarray:
 def test_data_exchange(tmp_path: Path, dtype: str) -> None:
     data = made.data_exchange(tmp_path / "a.h5", dtype)
     scan = open_scan(tmp_path / "a.h5")
-    assert (scan.shape, scan.kind, scan.source) == ((6, 4, 5), "transmission", "Data Exchange")
+    assert (scan.shape, scan.kind, scan.source) == ((6, 4, 5), "counts", "Data Exchange")
     assert (scan.pitch, scan.unit) == (None, "")
     np.testing.assert_allclose(scan.angles, np.deg2rad(made.DEGREES), rtol=1e-15)
     rows = scan.read(1, 3)
     assert rows.projections.dtype == np.float32
     np.testing.assert_array_equal(rows.projections, data[:, 1:3].astype(np.float32))
     assert rows.flats is not None and rows.darks is not None
-    np.testing.assert_array_equal(rows.flats, made.counts(2, 4, 5)[:, 1:3] + 1000)
-    np.testing.assert_array_equal(rows.darks, made.counts(3, 4, 5)[:, 1:3] + 2000)
+    np.testing.assert_array_equal(rows.flats, made.counts(2, 4, 5)[:, 1:3] + 2000)
+    np.testing.assert_array_equal(rows.darks, made.counts(3, 4, 5)[:, 1:3] + 1000)
 
 
 def test_radians_and_other_units(tmp_path: Path) -> None:
@@ -41,7 +38,9 @@ def test_radians_and_other_units(tmp_path: Path) -> None:
     made.data_exchange(path)
     with h5py.File(path, "a") as file:
         file["exchange/theta"].attrs["units"] = "Radians"
-    np.testing.assert_array_equal(open_scan(path).angles, made.DEGREES)
+    with pytest.raises(InputError, match="span 150 in 6 views, which is doubtful for radians"):
+        open_scan(path)
+    np.testing.assert_array_equal(open_scan(path, angle_unit="radians").angles, made.DEGREES)
     with h5py.File(path, "a") as file:
         file["exchange/theta"].attrs["units"] = "gon"
     with pytest.raises(FileFormatError, match="'gon', wanted degrees or radians"):
@@ -59,7 +58,9 @@ def test_data_exchange_without_angles_takes_named_ones(tmp_path: Path) -> None:
         del file["exchange/data_white"]
     with pytest.raises(FileFormatError, match=r"--theta.*/elsewhere/angle|/elsewhere.*--theta"):
         open_scan(path)
-    scan = open_scan(path, theta="elsewhere/angle")
+    with pytest.raises(InputError, match=r"holds counts, and there are no flats.*--flats"):
+        open_scan(path, theta="elsewhere/angle")
+    scan = open_scan(path, theta="elsewhere/angle", kind="attenuation")
     np.testing.assert_allclose(scan.angles, np.deg2rad(made.DEGREES))
     assert scan.read(0, 1).flats is None
 
@@ -68,16 +69,16 @@ def test_a_single_flat_without_its_axis(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     made.data_exchange(path)
     with h5py.File(path, "a") as file:
-        file["one"] = made.counts(4, 5)
+        file["one"] = made.counts(4, 5) + 2000
     rows = open_scan(path, flats="one").read(2, 4)
-    np.testing.assert_array_equal(rows.flats, made.counts(4, 5)[None, 2:4])
+    np.testing.assert_array_equal(rows.flats, made.counts(4, 5)[None, 2:4] + 2000)
 
 
 @pytest.mark.parametrize("group", ["entry1/tomo_entry", "entry0000", "/"])
 def test_nxtomo(tmp_path: Path, group: str) -> None:
     data = made.nxtomo(tmp_path / "a.nxs", group=group)
     scan = open_scan(tmp_path / "a.nxs")
-    assert (scan.shape, scan.kind, scan.pitch, scan.unit) == ((4, 4, 5), "transmission", 3.5, "um")
+    assert (scan.shape, scan.kind, scan.pitch, scan.unit) == ((4, 4, 5), "counts", 3.5, "um")
     assert scan.source == "NXtomo /" + group.strip("/")
     np.testing.assert_allclose(scan.angles, np.deg2rad([20, 30, 50, 70]))
     rows = scan.read(1, 4)
@@ -120,26 +121,26 @@ def test_named_arrays(tmp_path: Path) -> None:
     stack = made.counts(6, 4, 5, dtype="<f4")
     with h5py.File(path, "w") as file:
         file["a/stack"], file["a/sino"] = stack, stack[:, 2]
-        file["a/angle"], file["a/flat"] = made.DEGREES, stack[0, 2]
+        file["a/angle"], file["a/flat"] = made.DEGREES, stack[0, 2] + 99
         file["soft"] = h5py.SoftLink("/a")
-    scan = open_scan(path, dataset="soft/stack", theta="/soft/angle")
+    scan = open_scan(path, dataset="soft/stack", theta="/soft/angle", kind="attenuation")
     assert (scan.kind, scan.shape) == ("attenuation", (6, 4, 5))
     np.testing.assert_array_equal(whole(scan), stack)
     scan = open_scan(path, dataset="/a/sino", theta="a/angle", flats="a/flat")
-    assert (scan.kind, scan.shape) == ("transmission", (6, 1, 5))
+    assert (scan.kind, scan.shape) == ("counts", (6, 1, 5))
     rows = scan.read(0, 1)
     np.testing.assert_array_equal(rows.projections[:, 0], stack[:, 2])
-    np.testing.assert_array_equal(rows.flats, stack[:1, 2:3])
+    np.testing.assert_array_equal(rows.flats, stack[:1, 2:3] + 99)
 
 
 def test_npz(tmp_path: Path) -> None:
     data = made.npz(tmp_path / "a.npz")
     scan = open_scan(tmp_path / "a.npz")
-    assert (scan.shape, scan.kind, scan.pitch) == ((6, 4, 5), "transmission", 0.25)
+    assert (scan.shape, scan.kind, scan.pitch) == ((6, 4, 5), "counts", 0.25)
     rows = scan.read(2, 4)
     np.testing.assert_array_equal(rows.projections, data[:, 2:4])
     assert rows.flats is not None and rows.flats.dtype == np.float32
-    np.testing.assert_array_equal(rows.flats, made.counts(2, 4, 5)[:, 2:4])
+    np.testing.assert_array_equal(rows.flats, made.counts(2, 4, 5)[:, 2:4] + 500)
     assert rows.darks is None
 
 
@@ -161,7 +162,7 @@ def test_npz_named_arrays(tmp_path: Path) -> None:
     with np.load(tmp_path / "a.npz") as file:
         arrays = dict(file)
     np.savez(tmp_path / "a.npz", **arrays, raw=data[:4, 1], phi=np.arange(4.0))
-    scan = open_scan(tmp_path / "a.npz", dataset="raw", theta="phi")
+    scan = open_scan(tmp_path / "a.npz", dataset="raw", theta="phi", kind="attenuation")
     assert (scan.shape, scan.kind) == ((4, 1, 5), "attenuation")
     np.testing.assert_array_equal(scan.angles, np.arange(4.0))
     np.testing.assert_array_equal(whole(scan)[:, 0], data[:4, 1])
@@ -170,7 +171,7 @@ def test_npz_named_arrays(tmp_path: Path) -> None:
 def test_npz_sinogram(tmp_path: Path) -> None:
     sinogram = np.asfortranarray(made.counts(6, 5, dtype=">f8"))
     np.savez(tmp_path / "a.npz", sinogram=sinogram, angles=np.arange(6))
-    scan = open_scan(tmp_path / "a.npz")
+    scan = open_scan(tmp_path / "a.npz", kind="attenuation")
     assert (scan.shape, scan.kind, scan.pitch) == ((6, 1, 5), "attenuation", None)
     np.testing.assert_array_equal(whole(scan)[:, 0], sinogram)
 
@@ -185,7 +186,7 @@ def test_a_scan_can_be_sent_to_another_process(tmp_path: Path) -> None:
 
 def test_the_tooth(shared_data: Path) -> None:
     scan = open_scan(shared_data / "tooth" / "tooth.h5")
-    assert (scan.shape, scan.kind) == ((181, 2, 640), "transmission")
+    assert (scan.shape, scan.kind) == ((181, 2, 640), "counts")
     assert scan.angles[-1] == pytest.approx(np.deg2rad(179.0055), abs=1e-6)
     rows = scan.read(1, 2)
     assert rows.flats is not None and rows.darks is not None

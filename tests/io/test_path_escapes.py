@@ -89,7 +89,9 @@ def test_links_inside_the_folder_are_followed(tmp_path: Path) -> None:
         file["exchange"] = h5py.ExternalLink("raw/b.h5", "/exchange")
         virtual(file, "copy", "raw/b.h5", "exchange/data")
     for name in (None, "copy"):
-        scan = open_scan(tmp_path / "a.h5", dataset=name, theta="exchange/theta")
+        scan = open_scan(
+            tmp_path / "a.h5", dataset=name, theta="exchange/theta", kind="attenuation"
+        )
         np.testing.assert_array_equal(scan.read(0, 4).projections, data)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,9 @@ import tiff_files as made
 from rift_cl.errors import InputError
 from rift_cl.io import ScanFile, open_scan
 from rift_cl.io.tiff_float64 import Float64Pages
+
+# Frames of numbers that all differ, to be read as they are.
+as_they_are = partial(open_scan, kind="attenuation")
 
 
 def whole(scan: ScanFile) -> np.ndarray:
@@ -49,14 +53,14 @@ STORED = ["u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8", ">u2", ">f4", ">
 def test_every_sample_in_every_layout(tmp_path: Path, dtype: str, options: dict) -> None:
     stack = made.frames(dtype=dtype)
     options = {**options, "byteorder": dtype[0] if dtype[0] == ">" else "<"}
-    check_rows(open_scan(made.write_pages(tmp_path / "a.tif", stack, **options)), stack)
+    check_rows(as_they_are(made.write_pages(tmp_path / "a.tif", stack, **options)), stack)
 
 
 @pytest.mark.parametrize("dtype", ["u2", "i4"])
 def test_differences_of_neighbours(tmp_path: Path, dtype: str) -> None:
     stack = made.frames(dtype=dtype)
     made.write_pages(tmp_path / "a.tif", stack, compression="zlib", predictor=2)
-    check_rows(open_scan(tmp_path / "a.tif"), stack)
+    check_rows(as_they_are(tmp_path / "a.tif"), stack)
 
 
 @pytest.mark.parametrize("kind", ["uint8", "uint16", "uint", "float", "double"])
@@ -74,7 +78,7 @@ def test_what_openimageio_writes(tmp_path: Path, kind: str, packed: str) -> None
         assert output.open(str(tmp_path / "a.tif"), spec, "AppendSubimage" if page else "Create")
         assert output.write_image(frame[..., None])
     output.close()
-    check_rows(open_scan(tmp_path / "a.tif"), stack)
+    check_rows(as_they_are(tmp_path / "a.tif"), stack)
 
 
 def test_float64_keeps_what_float32_cannot(tmp_path: Path) -> None:
@@ -87,19 +91,19 @@ def test_float64_keeps_what_float32_cannot(tmp_path: Path) -> None:
 def test_files_follow_their_numbers(tmp_path: Path) -> None:
     stack = made.frames(12)
     made.write_series(tmp_path / "a", "Proj {}.TIF", stack)
-    scan = open_scan(tmp_path / "a")
+    scan = as_they_are(tmp_path / "a")
     check_rows(scan, stack)
     assert (scan.kind, scan.pitch, scan.fan, scan.source) == ("attenuation", None, None, "TIFF")
     check_rows(pickle.loads(pickle.dumps(scan)), stack)
 
 
 def test_assumed_angles_are_told(tmp_path: Path) -> None:
-    scan = open_scan(made.write_series(tmp_path / "a", "p_{:04}.tif", made.frames()))
+    scan = as_they_are(made.write_series(tmp_path / "a", "p_{:04}.tif", made.frames()))
     np.testing.assert_allclose(scan.angles, np.deg2rad(np.arange(6) * 30.0), rtol=1e-15)
     assert not scan.angles.flags.writeable
-    told = " ".join(scan.notes)
-    assert "6 projections are taken as evenly spread over 180 degrees" in told
-    assert "No flats were found: the counts are taken for line integrals" in told
+    assert "6 projections are taken as evenly spread over 180 degrees" in scan.notes[1]
+    with pytest.raises(InputError, match=r"'p_0001.tif' .uint16.* holds counts.*--flats"):
+        open_scan(tmp_path / "a")
 
 
 @pytest.mark.parametrize(
@@ -112,7 +116,7 @@ def test_assumed_angles_are_told(tmp_path: Path) -> None:
 )
 def test_turns(tmp_path: Path, theta: str, degrees: np.ndarray) -> None:
     made.write_series(tmp_path / "a", "p_{:04}.tif", made.frames())
-    scan = open_scan(tmp_path / "a", theta=theta)
+    scan = as_they_are(tmp_path / "a", theta=theta)
     np.testing.assert_allclose(np.rad2deg(scan.angles), degrees, atol=1e-12)
     assert not any("evenly" in note for note in scan.notes)
 
@@ -130,7 +134,7 @@ TEXTS = {
 def test_angles_in_a_text(tmp_path: Path, name: str) -> None:
     made.write_series(tmp_path / "a", "p_{:04}.tif", made.frames())
     (tmp_path / name).write_bytes(TEXTS[name].encode())
-    scan = open_scan(tmp_path / "a", theta=str(tmp_path / name))
+    scan = as_they_are(tmp_path / "a", theta=str(tmp_path / name))
     np.testing.assert_allclose(scan.angles, np.deg2rad(DEGREES), rtol=1e-15)
 
 
@@ -141,15 +145,22 @@ def test_angles_beside_the_projections(tmp_path: Path, place: str) -> None:
         np.save(tmp_path / place, DEGREES[:, None])
     else:
         (tmp_path / place).write_text(TEXTS["a.txt"])
-    scan = open_scan(tmp_path / "a")
+    scan = as_they_are(tmp_path / "a")
     np.testing.assert_allclose(scan.angles, np.deg2rad(DEGREES), rtol=1e-15)
-    assert place in scan.notes[0] and "degrees" in scan.notes[0]
+    assert "angles in degrees" in scan.notes[0] and place in scan.notes[1]
 
 
-def test_degrees_that_look_like_radians_are_doubted(tmp_path: Path) -> None:
-    made.write_series(tmp_path / "a", "p_{:04}.tif", made.frames(20))
-    np.savetxt(tmp_path / "a" / "angles.txt", np.linspace(0, np.pi, 20))
-    assert any("if they are radians" in note for note in open_scan(tmp_path / "a").notes)
+def test_radians_in_the_place_of_degrees(tmp_path: Path) -> None:
+    made.write_series(tmp_path / "a", "p_{:04}.tif", made.frames(18))
+    np.savetxt(tmp_path / "a" / "angles.txt", np.linspace(0, np.pi, 18))
+    scan = as_they_are(tmp_path / "a")
+    np.testing.assert_allclose(scan.angles, np.linspace(0, np.pi, 18))
+    assert any("taken as radians, not degrees" in note for note in scan.notes)
+    np.savetxt(tmp_path / "a" / "angles.txt", np.linspace(0, 2, 18))
+    with pytest.raises(InputError, match=r"span 2 in 18 views.*--angle-unit radians or degrees"):
+        as_they_are(tmp_path / "a")
+    scan = as_they_are(tmp_path / "a", angle_unit="degrees")
+    np.testing.assert_allclose(np.rad2deg(scan.angles), np.linspace(0, 2, 18))
 
 
 def calibration(kind: str) -> np.ndarray:
@@ -158,7 +169,7 @@ def calibration(kind: str) -> np.ndarray:
 
 def check_calibrated(scan: ScanFile) -> None:
     rows = scan.read(2, 9)
-    assert scan.kind == "transmission" and rows.flats is not None and rows.darks is not None
+    assert scan.kind == "counts" and rows.flats is not None and rows.darks is not None
     np.testing.assert_array_equal(rows.projections, made.frames()[:, 2:9])
     np.testing.assert_array_equal(rows.flats, calibration("flats")[:, 2:9])
     np.testing.assert_array_equal(rows.darks, calibration("darks")[:, 2:9])
@@ -209,6 +220,6 @@ def test_named_flats_and_darks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 def test_darks_without_flats_are_not_used(tmp_path: Path) -> None:
     made.write_series(tmp_path, "p{}.tif", made.frames())
     made.write_series(tmp_path, "dark{}.tif", calibration("darks"))
-    scan = open_scan(tmp_path)
+    scan = as_they_are(tmp_path)
     assert (scan.kind, scan.read(0, 1).darks) == ("attenuation", None)
-    assert any("the darks are not used" in note for note in scan.notes)
+    assert any("darks are not used" in note for note in scan.notes)

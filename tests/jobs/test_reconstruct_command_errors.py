@@ -121,4 +121,9 @@ def test_angles_that_leave_a_gap_have_no_center_to_be_found(tmp_path, capsys):
     path = tmp_path / "one.npz"
     np.savez(path, sinogram=np.random.default_rng(0).random((1, 32)), angles=[0.1])
     assert run("reconstruct", path, "--out", tmp_path / "out") == INPUT
-    assert "gap of 180 degrees" in capsys.readouterr().err
+    assert "holds one view, and a slice wants several directions" in capsys.readouterr().err
+    values = np.random.default_rng(0).random((2, 32))
+    np.savez(path, sinogram=values, angles=[0.1, 0.2])
+    options = ("--kind", "attenuation", "--out", tmp_path / "out")
+    assert run("reconstruct", path, *options) == INPUT
+    assert "gap of" in capsys.readouterr().err

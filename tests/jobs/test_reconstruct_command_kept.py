@@ -165,7 +165,8 @@ def test_a_found_axis_of_a_truncated_object_is_doubted(tmp_path):
     path = tmp_path / "scan.npz"
     save_phantom(path, HALF, 40, size=80)
     for name, center in (("found", ()), ("given", ("--center", 19.5))):
-        assert run("reconstruct", path, "--out", tmp_path / name, *center) == 0
+        options = ("--kind", "attenuation", "--out", tmp_path / name)
+        assert run("reconstruct", path, *options, *center) == 0
         assert ("off by some bins" in assumed(tmp_path / name)) == (not center)
 
 
@@ -195,9 +196,9 @@ def test_curves_and_pictures_are_named_by_the_same_rows(scan, tmp_path, monkeypa
 def test_a_series_named_after_a_dark_object_is_the_projections(tmp_path, capsys):
     frames = made.frames(8)
     folder = made.write_series(tmp_path / "scan", "dark_rock_{:04}.tif", frames)
-    scan = ScanInput(folder).open_scan()
+    scan = ScanInput(folder, kind="attenuation").open_scan()
     assert scan.shape == frames.shape
-    assert "'dark_rock_0001.tif', ...): they are taken for the projections" in scan.notes[0]
+    assert "'dark_rock_0001.tif', ...): they are taken for the projections" in scan.notes[1]
     made.write_series(tmp_path / "darks", "dark_{:04}.tif", frames)
     assert run("reconstruct", tmp_path / "darks", "--out", tmp_path / "out") == INPUT
     assert "flats or darks alone" in capsys.readouterr().err

@@ -128,7 +128,7 @@ def test_slices_of_an_offset_axis_reach_to_the_farther_end(tmp_path):
 def test_an_object_wider_than_the_detector_is_continued(tmp_path):
     path, bins = tmp_path / "scan.npz", 40
     truth = save_phantom(path, HALF, bins, size=80)[20:60, 20:60]
-    middle = ("--center", (bins - 1) / 2)
+    middle = ("--kind", "attenuation", "--center", (bins - 1) / 2)
     padded, assumed = reconstruct(path, tmp_path / "auto", *middle)
     plain, _ = reconstruct(path, tmp_path / "off", *middle, "--pad", "off")
     assert "continued smoothly" in assumed

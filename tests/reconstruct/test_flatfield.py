@@ -5,6 +5,7 @@ import pytest
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.reconstruct import attenuation
+from rift_cl.reconstruct.flatfield import attenuation_without_flats
 
 
 @pytest.fixture
@@ -48,13 +49,62 @@ def test_dead_pixels_are_filled_from_their_neighbours(scan, value):
     np.testing.assert_allclose(result.projections, truth, atol=2e-4)
 
 
-def test_starved_samples_are_bounded_and_counted(scan):
-    _, counts, flats, darks = scan
-    counts[2, 0, 5] = 0
+def test_starved_samples_are_filled_along_the_detector_and_counted(scan):
+    truth, counts, flats, darks = scan
+    truth[2, 0, 4:8] = truth[2, 0, 4]
+    counts[2, 0] = darks[0, 0] + (flats[0, 0] - darks[0, 0]) * np.exp(-truth[2, 0])
+    counts[2, 0, 5:7] = (0, darks[0, 0, 6])
     result = attenuation(counts, flats, darks)
-    assert result.starved == 1
-    assert np.isfinite(result.projections).all()
-    assert result.projections[2, 0, 5] == result.projections.max()
+    assert result.starved == 2
+    np.testing.assert_allclose(result.projections, truth, atol=2e-4)
+
+
+def test_a_view_without_any_signal_is_filled_from_the_views_beside_it(scan):
+    truth, counts, flats, darks = scan
+    truth[:, 1] = np.linspace(1, 2, 7)[:, None]
+    counts[:, 1] = darks[0, 1] + (flats[0, 1] - darks[0, 1]) * np.exp(-truth[:, 1])
+    counts[[0, 3, 4], 1] = 0
+    truth[0, 1] = truth[1, 1]
+    result = attenuation(counts, flats, darks)
+    assert result.starved == 90
+    np.testing.assert_allclose(result.projections, truth, atol=2e-4)
+    counts[:, 1] = 0
+    with pytest.raises(InputError, match="row 1 holds no sample with a signal"):
+        attenuation(counts, flats, darks)
+
+
+def test_less_than_the_noise_of_the_darks_is_no_signal(scan):
+    _, counts, flats, darks = scan
+    noisy = darks + np.array([-20, 0, 20], np.float32)[:, None, None]
+    counts[4, 0, 9] = darks[0, 0, 9] + 19
+    assert attenuation(counts, flats, darks).starved == 0
+    assert attenuation(counts, flats, noisy).starved == 1
+
+
+def test_flats_of_several_times_are_interpolated(scan):
+    truth, counts, flats, darks = scan
+    gain = flats[0] - darks[0]
+    drift = np.interp(np.arange(7) + 0.5, [0, 7], [1, 1.4])[:, None, None]
+    counts = (darks[0] + drift * gain * np.exp(-truth)).astype(np.float32)
+    flats = darks[0] + gain * np.array([1, 1, 1.4, 1.4], np.float32)[:, None, None]
+    result = attenuation(counts, flats, darks, flats_at=np.array([0.0, 0, 7, 7]))
+    np.testing.assert_allclose(result.projections, truth, atol=1e-4)
+    assert abs(attenuation(counts, flats, darks).projections - truth).max() > 0.1
+
+
+def test_transmission_wants_the_logarithm_alone():
+    truth = np.random.default_rng(1).uniform(0, 3, (5, 2, 9)).astype(np.float32)
+    result = attenuation_without_flats(np.exp(-truth))
+    np.testing.assert_allclose(result.projections, truth, atol=1e-6)
+    beam = np.linspace(100, 200, 5)
+    counts = (beam[:, None, None] * np.exp(-truth) + 7).astype(np.float32)
+    darks = np.full((2, 2, 9), 7, np.float32)
+    result = attenuation_without_flats(counts, darks, incident=beam)
+    np.testing.assert_allclose(result.projections, truth, atol=1e-5)
+    level = attenuation_without_flats(counts, darks).projections - truth
+    np.testing.assert_allclose(
+        level, np.broadcast_to(-np.log(beam)[:, None, None], level.shape), atol=1e-4
+    )
 
 
 def test_swapped_frames_are_told(scan):

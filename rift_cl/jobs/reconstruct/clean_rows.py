@@ -88,7 +88,7 @@ class CleanRows:
         if wanted != "auto":
             return _USUAL_RINGS if wanted == "on" else wanted
         wide = np.ptp(self._scan.angles) >= _RINGS_FROM
-        return _USUAL_RINGS if self._scan.kind == "transmission" and wide else None
+        return _USUAL_RINGS if self._scan.kind != "attenuation" and wide else None
 
     def _propagation(self, pixel: float | None) -> Propagation | None:
         settings = self._settings

@@ -1,0 +1,317 @@
+"""One contract for what a file holds: readers find arrays, and here it is settled what they are.
+
+Readers know where a format keeps projections, flats, darks and angles. What the values are, whether
+the flats belong to them, and the line that a person reads about it are the same for all formats,
+and so is the rule: what is said counts before what the layout prescribes, that before what the
+values look like, and what remains doubtful is refused with the option that settles it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import InputError, NonFiniteError
+from rift_cl.geometry.fan import FanBeam
+from rift_cl.io.scan_axes import words
+from rift_cl.io.scan_file import Kind, RowSource, ScanFile, ScanRequest
+from rift_cl.io.scan_kind import (
+    INTEGRAL,
+    Sample,
+    named_kind,
+    possible_kinds,
+    sample,
+    sampled,
+    spread,
+)
+
+# What ``flats`` may say in place of a name.
+AIR, MEAN = "air", "mean"
+# Bins at each end that are taken for air, as a share of the detector.
+_AIR_SHARE = 0.02
+# Rows over which the mean of a view is taken.
+_MEAN_ROWS = 16
+# Air at the ends of counts is at least this share of the brightest; projections are at most so many
+# times as bright as flats, and flats at most so many times as bright as projections.
+_AIR_LEAST, _BRIGHTER, _DIMMER = 0.7, 2.0, 20.0
+_KINDS = "--kind counts, transmission or attenuation"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Finding:
+    """A scan that was found in a file, before it is settled what its values are.
+
+    Args:
+        path: the file, or the folder of files.
+        source: the layout that was recognised.
+        name: the projections, as they are called in a sentence.
+        shape: (angle, row, bin).
+        axes: letters of the axes as they are stored.
+        dtype: type of the values as they are stored.
+        rows: reads the rows; a dataclass with the fields ``flats`` and ``darks``.
+        angles: in radians.
+        angle_words: what is told of them.
+        flats: number of flats; 0 for none.
+        darks: number of darks; 0 for none.
+        evidence: names and units that may state the kind, the weightiest first.
+        kind: the kind where the layout prescribes it.
+        flats_at: see ``ScanFile``.
+        pitch, unit, fan, background, notes: as in ``ScanFile``.
+        contents: a phrase that lists what else the file holds, or nothing.
+        advice: for formats whose values tell nothing of their kind, what to do about it; counts
+            without flats are then divided by the mean of each view.
+    """
+
+    path: Path
+    source: str
+    name: str
+    shape: tuple[int, int, int]
+    axes: str
+    dtype: np.dtype[np.generic]
+    rows: Any
+    angles: NDArray[np.float64]
+    angle_words: str
+    flats: int = 0
+    darks: int = 0
+    evidence: tuple[str, ...] = ()
+    kind: Kind | None = None
+    flats_at: NDArray[np.float64] | None = None
+    pitch: float | None = None
+    unit: str = ""
+    fan: FanBeam | None = None
+    background: int = 0
+    notes: tuple[str, ...] = ()
+    contents: Callable[[], str] = str
+    advice: str = ""
+
+
+def scan_of(found: Finding, request: ScanRequest) -> ScanFile:
+    """Settle what the values of a scan are, and describe it.
+
+    Raises:
+        InputError: that is doubtful, or what was asked for does not fit the file.
+        NonFiniteError: no value that was looked at is finite.
+    """
+    if not request.values:
+        return _unseen(found)
+    seen = sample(found.rows, found.shape, found.dtype)
+    substitute = request.flats if request.flats in (AIR, MEAN) and not found.flats else None
+    if found.advice and request.kind == "counts":
+        substitute = substitute or MEAN
+    kind, notes = _kind(found, request, seen, substitute)
+    rows: RowSource = found.rows
+    flats, darks = found.flats, found.darks
+    if kind != "counts" and (flats or darks):
+        rows = replace(found.rows, flats=None, darks=None)
+        flats = darks = 0
+    background, incident = found.background, None
+    if kind == "counts" and substitute == AIR:
+        background = _air(found, seen)
+    if kind == "counts" and substitute == MEAN:
+        incident = _means(found, rows)
+    line = _line(found, kind, seen, _calibration(found, kind, substitute, flats, darks))
+    return ScanFile(
+        path=found.path,
+        shape=found.shape,
+        angles=found.angles,
+        pitch=found.pitch,
+        unit=found.unit,
+        kind=kind,
+        source=found.source,
+        rows=rows,
+        fan=found.fan,
+        background=background,
+        notes=(line, *found.notes, *notes),
+        flats_at=found.flats_at if flats else None,
+        incident=incident,
+    )
+
+
+def _unseen(found: Finding) -> ScanFile:
+    """A scan whose values nobody wants."""
+    line = f"{found.path.name}: {found.dtype.name}; {_geometry(found)}."
+    return ScanFile(
+        path=found.path,
+        shape=found.shape,
+        angles=found.angles,
+        pitch=found.pitch,
+        unit=found.unit,
+        kind=found.kind or "counts",
+        source=found.source,
+        rows=found.rows,
+        fan=found.fan,
+        background=found.background,
+        notes=(line, *found.notes),
+        flats_at=found.flats_at,
+    )
+
+
+def _kind(
+    found: Finding, request: ScanRequest, seen: Sample, substitute: str | None
+) -> tuple[Kind, tuple[str, ...]]:
+    """What the values are, and what had to be passed over to say so."""
+    if request.kind in ("transmission", "attenuation"):
+        if request.flats is not None:
+            raise InputError(
+                f"{found.path}: --flats is about counts, and --kind {request.kind} was given: give "
+                "one of them"
+            )
+        return request.kind, _passed_over(found, request.kind)
+    if request.kind == "counts" or substitute is not None:
+        if not found.flats and substitute is None:
+            raise InputError(_wants_flats(found, seen))
+        return "counts", ()
+    if found.flats:
+        doubt = _no_counts_of(found, seen)
+        if doubt is None:
+            return "counts", ()
+        if request.flats is not None:
+            raise InputError(f"{found.path}: {doubt}; say what they are with kind= ({_KINDS})")
+        kind = _by_values(found, seen)
+        return kind, (f"The flats are not used: {doubt}.",)
+    return found.kind or _by_values(found, seen), _passed_over(found, "")
+
+
+def _passed_over(found: Finding, kind: str) -> tuple[str, ...]:
+    if kind and found.flats:
+        return (f"The flats are not used: the values are said to be {kind}.",)
+    if found.darks and not found.flats:
+        return ("The darks are not used, as there are no flats.",)
+    return ()
+
+
+def _by_values(found: Finding, seen: Sample) -> Kind:
+    """The kind that names and values agree on.
+
+    Raises:
+        InputError: they do not, leave a doubt, or say counts.
+    """
+    possible = possible_kinds(seen)
+    stated = named_kind(found.evidence)
+    if found.advice:
+        raise InputError(f"{found.path}: {found.advice}")
+    if stated is not None and (stated in possible or stated == "counts"):
+        possible = (stated,)
+    elif stated is not None:
+        raise InputError(
+            f"{found.path}: {found.name} states {stated}, and its values ({seen}) look like "
+            f"{' or '.join(possible)}: say what they are with kind= ({_KINDS})"
+        )
+    if possible == ("counts",):
+        raise InputError(_wants_flats(found, seen))
+    if len(possible) > 1:
+        left, right = seen.ends
+        raise InputError(
+            f"{found.path}: {found.name} ({seen}; {left:.4g} and {right:.4g} at the ends of the "
+            f"detector) may be {' or '.join(possible)}: say which with kind= ({_KINDS})"
+        )
+    return possible[0]
+
+
+def _wants_flats(found: Finding, seen: Sample) -> str:
+    listed = found.contents()
+    return (
+        f"{found.path}: {found.name} ({seen}) holds counts, and there are no flats: name the "
+        "frames without the sample with flats= (--flats), or give --flats air where the bins at "
+        "both ends of the detector see nothing but air; if these are no counts, say --kind "
+        f"transmission or --kind attenuation{f'; {listed}' if listed else ''}"
+    )
+
+
+def _no_counts_of(found: Finding, seen: Sample) -> str | None:
+    """Why flats cannot be those of the projections, or None."""
+    bright = _level(found, "flats")
+    dark = _level(found, "darks") if found.darks else 0.0
+    beam = bright - dark
+    if not beam > 0:
+        # Told when rows are corrected, in a sentence that names the row.
+        return None
+    if not seen.whole and seen.high <= min(beam / _DIMMER, INTEGRAL):
+        return (
+            f"{found.name} ({seen}) is far below the flats' {bright:.4g}, as data are that were "
+            "divided by flats before"
+        )
+    if seen.high - dark > _BRIGHTER * beam:
+        return (
+            f"{found.name} ({seen}) is more than {_BRIGHTER:g} times as bright as the flats, "
+            f"{bright:.4g}"
+        )
+    return None
+
+
+def _level(found: Finding, part: str) -> float:
+    """How bright flats or darks are: the brightest that is no exception."""
+    count = found.flats if part == "flats" else found.darks
+    rows = spread(found.shape[1], 3)
+    values = found.rows.look(part, spread(count, 2), rows)
+    return sampled(values, found.dtype).high
+
+
+def _air(found: Finding, seen: Sample) -> int:
+    """Bins at each end that are taken for air, which must be about as bright as anything."""
+    if seen.air[0] < _AIR_LEAST * seen.high:
+        left, right = seen.ends
+        raise InputError(
+            f"{found.path}: --flats air wants air at both ends of the detector, where {found.name} "
+            f"has {left:.4g} and {right:.4g} of {seen.high:.4g} at most: name the flats (--flats), "
+            "or take the beam to be each view's mean (--flats mean)"
+        )
+    return max(1, round(_AIR_SHARE * found.shape[2]))
+
+
+def _means(found: Finding, rows: RowSource) -> NDArray[np.float64]:
+    """The mean of each view, less that of the darks, over a few rows."""
+    some = spread(found.shape[1], _MEAN_ROWS)
+    views, _, bins = found.shape
+    step = max(1, (1 << 22) // (len(some) * bins))
+    means = np.empty(views)
+    for start in range(0, views, step):
+        chosen = range(start, min(start + step, views))
+        means[start : start + step] = rows.look("projections", chosen, some).mean(
+            axis=(1, 2), dtype=np.float64
+        )
+    if found.darks:
+        means -= float(rows.look("darks", range(found.darks), some).mean(dtype=np.float64))
+    bad = np.flatnonzero(~(np.isfinite(means) & (means > 0)))
+    if bad.size:
+        raise NonFiniteError(
+            f"{found.path}: the mean of view {bad[0]} is {means[bad[0]]:g}, wanted a positive "
+            "number to take for the beam (--flats mean)"
+        )
+    means.flags.writeable = False
+    return means
+
+
+def _calibration(found: Finding, kind: Kind, substitute: str | None, flats: int, darks: int) -> str:
+    if kind != "counts":
+        return ""
+    words = [f"{darks} dark{'s' * (darks != 1)}" if darks else "no darks"]
+    if substitute == AIR:
+        share = max(1, round(_AIR_SHARE * found.shape[2]))
+        return f", the beam from {share} bins of air at each end of every view, {words[0]}"
+    if substitute == MEAN:
+        return f", the beam taken to be the mean of every view, {words[0]}"
+    words.insert(0, f"{flats} flat{'s' * (flats != 1)}")
+    if found.flats_at is not None and len(np.unique(found.flats_at)) > 1:
+        times = len(np.unique(found.flats_at))
+        words[0] += f" at {times} times, interpolated between them,"
+    return f", {' and '.join(words)}"
+
+
+def _line(found: Finding, kind: Kind, seen: Sample, calibration: str) -> str:
+    """What the file was taken to hold."""
+    return f"{found.path.name}: {kind} ({seen}){calibration}; {_geometry(found)}."
+
+
+def _geometry(found: Finding) -> str:
+    stored = dict(zip("nrb", found.shape, strict=True))
+    sizes = " x ".join(str(stored[axis]) for axis in found.axes)
+    parts = [f"axes {words(found.axes)} {sizes}", found.angle_words]
+    if found.pitch is not None:
+        parts.append(f"pitch {found.pitch:.4g} {found.unit}".rstrip())
+    return "; ".join(parts)

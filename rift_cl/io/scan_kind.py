@@ -1,0 +1,180 @@
+"""What the values of a scan are: counts, transmission or attenuation.
+
+Three things come out of scanners and their software. *Counts* I want the flats I0, the darks and
+a logarithm; *transmission* I / I0 wants the logarithm alone; *attenuation*, -log(I / I0), is the
+line integral itself. Taking one for another gives slices that look like slices. So they are told
+apart by what the file says and by a sample of the values: air is brightest in counts, near 1 in
+transmission, near 0 in attenuation; and where that leaves a doubt, a person is asked.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.io.scan_file import Kind, RowSource
+
+# The sample: views across the scan, rows of the detector, and the most values in all.
+_VIEWS, _ROWS, _MOST = 9, 3, 1 << 18
+# Bins at each end of the detector that are looked at for air, as a share of its width.
+_END = 0.02
+# Transmission reaches from 0 to a little above 1.
+_TRANSMISSION = 1.5
+_AIR = (0.75, 1.3)
+# No more than this is left of line integrals' range: e^-20 is less than one quantum in 10^8.
+INTEGRAL = 20.0
+# Ends of line integrals in air, as a share of the largest.
+_ZERO = 0.15
+_STRICTLY_ZERO = 0.1
+# Ends of counts in air are at least this share of the brightest.
+_BRIGHT = 0.6
+
+_NAMES: tuple[tuple[Kind, frozenset[str]], ...] = (
+    ("counts", frozenset(("count", "counts", "raw", "adu", "photons", "electrons"))),
+    ("transmission", frozenset(("transmission", "transmittance", "transmissions"))),
+    (
+        "attenuation",
+        frozenset(("attenuation", "absorption", "absorbance", "neglog", "minuslog", "mlog")),
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What some lines of the detector show.
+
+    Args:
+        dtype: type of the values as they are stored.
+        low: their 0.5th percentile.
+        high: their 99.5th percentile.
+        ends: median of the outermost bins at the left and at the right.
+        middle: median of the middle half of the bins.
+        whole: every value is a whole number.
+        cleared: share of the outermost values that are 0 or less.
+    """
+
+    dtype: np.dtype[np.generic]
+    low: float
+    high: float
+    ends: tuple[float, float]
+    middle: float
+    whole: bool
+    cleared: float
+
+    @property
+    def air(self) -> tuple[float, float]:
+        """The darker and the brighter of the two ends."""
+        return min(self.ends), max(self.ends)
+
+    def __str__(self) -> str:
+        return f"{self.dtype.name}, {self.low:.4g} to {self.high:.4g}"
+
+
+def sample(rows: RowSource, shape: tuple[int, int, int], dtype: np.dtype[np.generic]) -> Sample:
+    """Look at a few rows of a few views across a scan.
+
+    Args:
+        rows: reads them.
+        shape: (angle, row, bin).
+        dtype: type of the values as they are stored.
+
+    Raises:
+        InputError: the rows cannot be read.
+    """
+    lines = max(_MOST // shape[2], 1)
+    rows_seen = spread(shape[1], min(_ROWS, lines))
+    views = spread(shape[0], max(min(_VIEWS, lines // len(rows_seen)), 1))
+    values = rows.look("projections", views, rows_seen)
+    return sampled(values, dtype)
+
+
+def sampled(values: NDArray[np.float32], dtype: np.dtype[np.generic]) -> Sample:
+    """What lines of the detector show, (..., bin); values that are not finite do not count."""
+    lines = np.where(np.isfinite(values), values, np.nan).astype(np.float64)
+    finite = lines[~np.isnan(lines)]
+    if not finite.size:
+        return Sample(dtype, 0.0, 0.0, (0.0, 0.0), 0.0, whole=False, cleared=0.0)
+    bins = lines.shape[-1]
+    edge = max(1, round(_END * bins))
+    left, right = lines[..., :edge], lines[..., -edge:]
+    outer = np.concatenate([left.ravel(), right.ravel()])
+    low, high = np.percentile(finite, [0.5, 99.5], method="nearest")
+    return Sample(
+        dtype=dtype,
+        low=float(low),
+        high=float(high),
+        ends=(_median(left), _median(right)),
+        middle=_median(lines[..., bins // 4 : max(bins - bins // 4, bins // 4 + 1)]),
+        whole=bool((finite == np.rint(finite)).all()),
+        cleared=float(np.mean(outer[~np.isnan(outer)] <= 0)) if not np.isnan(outer).all() else 0.0,
+    )
+
+
+def _median(values: NDArray[np.float64]) -> float:
+    finite = values[~np.isnan(values)]
+    return float(np.median(finite)) if finite.size else 0.0
+
+
+def spread(count: int, wanted: int) -> list[int]:
+    """So many of the numbers below ``count``, evenly spread, none of them twice."""
+    places = (np.arange(wanted) + 0.5) * count / wanted
+    return sorted({int(place) for place in places})
+
+
+def possible_kinds(seen: Sample) -> tuple[Kind, ...]:
+    """What values may be, the likelier first; one alone where there is no doubt."""
+    if seen.dtype.kind in "iu" or (seen.whole and seen.high > _TRANSMISSION):
+        return ("counts",)
+    if seen.low == seen.high == 0:
+        return ("attenuation",)
+    if seen.high <= 0:
+        return ("attenuation", "transmission")
+    if seen.high <= _TRANSMISSION:
+        return _small(seen)
+    if seen.high <= INTEGRAL:
+        return _moderate(seen)
+    return _large(seen)
+
+
+def _small(seen: Sample) -> tuple[Kind, ...]:
+    dark, bright = seen.air
+    as_attenuation = dark <= _STRICTLY_ZERO * seen.high
+    as_transmission = _AIR[0] <= bright <= _AIR[1] and seen.low >= -_STRICTLY_ZERO
+    if as_transmission and not as_attenuation:
+        return ("transmission",)
+    if as_attenuation and not as_transmission:
+        return ("attenuation",)
+    return ("transmission", "attenuation")
+
+
+def _moderate(seen: Sample) -> tuple[Kind, ...]:
+    dark, bright = seen.air
+    rises = seen.middle >= bright
+    if dark <= _ZERO * seen.high or rises:
+        return ("attenuation",)
+    return ("counts", "attenuation")
+
+
+def _large(seen: Sample) -> tuple[Kind, ...]:
+    """Counts, unless nearly all of the ends are exactly dark, as those of computed sums are."""
+    dark, bright = seen.air
+    if bright >= _BRIGHT * seen.high and seen.middle <= bright:
+        return ("counts",)
+    if dark <= _STRICTLY_ZERO * _ZERO * seen.high and seen.cleared >= 0.2:
+        return ("attenuation",)
+    return ("counts", "attenuation")
+
+
+def named_kind(names: Sequence[str]) -> Kind | None:
+    """The kind that names and units state, the first that states one; None where none does."""
+    for name in names:
+        spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
+        words = set(re.findall("[a-z]+", spaced))
+        stated = [kind for kind, known in _NAMES if known & words]
+        if len(stated) == 1:
+            return stated[0]
+    return None
