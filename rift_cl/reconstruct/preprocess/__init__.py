@@ -13,6 +13,7 @@ from rift_cl.reconstruct.preprocess.binning import (
 from rift_cl.reconstruct.preprocess.half_acquisition import stitched
 from rift_cl.reconstruct.preprocess.paganin import Propagation, halo_rows, paganin
 from rift_cl.reconstruct.preprocess.rings import STRIPE_METHODS, remove_rings
+from rift_cl.reconstruct.preprocess.zingers import remove_zingers
 
 __all__ = [
     "STRIPE_METHODS",
@@ -24,6 +25,7 @@ __all__ = [
     "halo_rows",
     "paganin",
     "remove_rings",
+    "remove_zingers",
     "stitched",
     "straightened",
     "tilt_halo",

@@ -1,0 +1,198 @@
+"""Zingers removed: single pixels hit by a cosmic ray or a scattered X-ray photon.
+
+A zinger stands in one view alone and far above its neighbours; in the slice it draws a streak
+along its ray. A pixel is taken for one where it exceeds the median of its neighbourhood by so many
+standard deviations of the noise of its own detector pixel, and where nothing next to it in the view
+before and in the view after stands out half as far, as small bright details of an object would. It
+is replaced by that median.
+
+The noise of counts grows with their square root, and the roots of counts have the same noise
+whatever the mean (Anscombe, Biometrika 35, 246 (1948)). So roots are compared, and the noise of a
+detector pixel is one number for all views, bright or dark. It is measured by second differences
+across bins, which slopes of the object leave at zero: by the median of their sizes over the views.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.budget import plan_chunks
+from rift_cl.cl.device import Device
+from rift_cl.cl.discovery import default_device
+from rift_cl.cl.memory import as_plain, as_real_array, check_finite
+from rift_cl.errors import InputError, ShapeError
+
+Floats = NDArray[np.float32]
+
+# From the median, and from the mean, of absolute deviations to the standard deviation.
+_FROM_MEDIAN, _FROM_MEAN = 1.4826, 1.2533
+# The sum of squares of a second difference's weights, 1, -2 and 1.
+_SECOND_DIFFERENCE = 6
+# Single photons have a median deviation of zero: the noise is at least this share of the mean one.
+_MEAN_SHARE = 0.5
+# Less than this share of a row's mean is no zinger, however low the noise (or none).
+_LEAST = 0.02
+# Below this share of a row's mean the detector's own noise counts, which has no root in it.
+_FLOOR = 0.01
+# Noise is measured in so many views, and over bins enough for so many samples together; of fewer
+# views than the third, over the whole row.
+_NOISE_VIEWS, _NOISE_SAMPLES, _FEW_VIEWS = 256, 256, 16
+# The rim of an object as wide as the detector moves by this share of its width in all views of half
+# a turn; and the most bins that it is followed.
+_QUARTER_TURN, _MOST_BESIDE = 2, 8
+# Line integrals beyond this are none in single precision.
+_OPAQUE = 80.0
+_CPU_RUN = 4096
+
+
+def remove_zingers(
+    stack: Any,
+    *,
+    sigma: float = 6.0,
+    excess: float | None = None,
+    size: Literal[3, 5] = 3,
+    dark: bool = False,
+    kind: Literal["transmission", "attenuation"] = "transmission",
+    device: Device | None = None,
+) -> tuple[Floats, int]:
+    """Replace single outlying pixels of projections by the median of their neighbourhood.
+
+    The neighbourhood is size x size pixels in a projection, or 3 views x size bins where the scan
+    has one row. Rows of a slab are treated as those of the whole scan, except size // 2 rows at
+    either edge, whose neighbours are missing: read so many more, and drop them.
+
+    Args:
+        stack: projections, (angle, row, bin) or (angle, bin).
+        sigma: how far a pixel stands out, in standard deviations of its detector pixel's noise.
+        excess: instead of ``sigma``, how far a pixel exceeds the median, in the unit of the
+            projections; this test alone decides then. For attenuation: in transmission.
+        size: of the neighbourhood, 3 or 5 pixels; take 5 where zingers cover more than 4 pixels.
+        dark: replace pixels that are as far below, too.
+        kind: whether the projections are counts or transmissions (both "transmission"), or line
+            integrals, in which a zinger is a dip.
+        device: where to compute; the default device if not given.
+
+    Returns:
+        float32 projections of the same shape, a new array, and the number of pixels replaced.
+
+    Raises:
+        ShapeError: the array has other axes.
+        NonFiniteError: a value is NaN or infinite.
+        InputError: an option has no meaning.
+    """
+    _check_options(sigma, excess, size, kind)
+    values = as_plain(as_real_array(stack, name="stack"), np.float32)
+    if values.ndim not in (2, 3):
+        raise ShapeError(
+            f"stack has shape {values.shape}, wanted (angle, bin) or (angle, row, bin)"
+        )
+    check_finite(values, name="stack")
+    rule = _Rule(sigma, excess, size, dark)
+    projections = values if values.ndim == 3 else values[:, None]
+    if kind == "attenuation":
+        light = np.exp(-np.clip(projections, -_OPAQUE, _OPAQUE))
+        clean = _cleaned(light, rule, device)
+        replaced = clean != light
+        out = projections.copy()
+        out[replaced] = -np.log(np.maximum(clean[replaced], np.finfo(np.float32).tiny))
+    else:
+        out = _cleaned(projections, rule, device)
+        replaced = out != projections
+    return out.reshape(values.shape), int(np.count_nonzero(replaced))
+
+
+class _Rule(NamedTuple):
+    """What is replaced: see ``remove_zingers``."""
+
+    sigma: float
+    excess: float | None
+    size: int
+    dark: bool
+
+
+def _cleaned(stack: Floats, rule: _Rule, device: Device | None) -> Floats:
+    """Projections (view, row, bin) without zingers, as many rows at a time as the device holds."""
+    views, rows, bins = stack.shape
+    away = rule.size // 2
+    if bins < rule.size or max(rows, views) < rule.size or not stack.size:
+        return stack.copy()
+    device = device or default_device()
+    out = np.empty(stack.shape, np.float32)
+    each = 3 * 4 * views * bins
+    margin = 0 if rows == 1 else 2 * away * each
+    for chunk in plan_chunks(rows, each, margin, device.budget, what="row of the projections"):
+        first = max(0, chunk.start - away)
+        slab = np.ascontiguousarray(stack[:, first : chunk.stop + away])
+        inner = slice(chunk.start - first, chunk.stop - first)
+        out[:, chunk] = _cleaned_slab(slab, rule, device, sinogram=rows == 1)[:, inner]
+    return out
+
+
+def _cleaned_slab(slab: Floats, rule: _Rule, device: Device, *, sinogram: bool) -> Floats:
+    views, rows, bins = slab.shape
+    run = _CPU_RUN if device.traits.is_cpu else 1
+    size, away = (-(-bins // run), rows, views), rule.size // 2
+    x, medians = device.array(slab), device.empty(slab.shape)
+    reach = {"VIEWS_AWAY": int(sinogram), "ROWS_AWAY": 0 if sinogram else away, "BINS_AWAY": away}
+    device.launch("local_median", size, x, medians, *slab.shape, RUN=run, **reach)
+    if rule.excess is None:
+        means = np.array([_mean(slab[:, row]) for row in range(rows)])
+        levels = means[:, None] * np.array([_LEAST, _FLOOR])
+        limits = rule.sigma / 2 * _noise(slab, device.get(medians), levels[:, 1])
+    else:
+        levels = np.repeat([[rule.excess, 0.0]], rows, axis=0)
+        limits = np.zeros((rows, bins))
+    tables = device.array(limits, np.float32), device.array(levels, np.float32)
+    out = device.empty(slab.shape)
+    alone = {"ALONE": int(rule.excess is None), "BINS_BESIDE": _bins_beside(views, bins)}
+    macros = {"DARK": int(rule.dark), **alone, "RUN": run}
+    device.launch("zinger_replace", size, x, medians, *tables, out, *slab.shape, **macros)
+    found: Floats = device.get(out)
+    return found
+
+
+def _noise(slab: Floats, medians: Floats, floors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Noise of each detector pixel in units of the root of the median, (row, bin)."""
+    from scipy.ndimage import uniform_filter1d
+
+    step = -(-len(slab) // _NOISE_VIEWS)
+    seen, usual = slab[::step], medians[::step, :, 1:-1]
+    root = np.sqrt(np.maximum(usual, floors[:, None].astype(np.float32)))
+    curved = np.abs(np.diff(seen, 2, axis=2)) / np.sqrt(np.float32(_SECOND_DIFFERENCE))
+    # A row that is zero throughout has no noise, and no level to measure it by.
+    away = np.divide(curved, root, out=np.zeros_like(curved), where=root > 0)
+    few = len(seen) < _FEW_VIEWS
+    axes = (0, 2) if few else (0,)
+    pixels = np.maximum(
+        _FROM_MEDIAN * np.median(away, axis=axes, keepdims=True),
+        _MEAN_SHARE * _FROM_MEAN * away.mean(axis=axes, dtype=np.float64, keepdims=True),
+    )[0]
+    if few:
+        return np.broadcast_to(pixels, slab.shape[1:])
+    bins = min(slab.shape[2], -(-_NOISE_SAMPLES // len(seen)))
+    smooth = uniform_filter1d(pixels, bins, axis=1, mode="reflect")
+    return np.pad(smooth, ((0, 0), (1, 1)), mode="edge")
+
+
+def _bins_beside(views: int, bins: int) -> int:
+    """How far the object may move between views, over half a turn, and one bin more."""
+    return 1 + min(_MOST_BESIDE, -(-_QUARTER_TURN * bins // views))
+
+
+def _mean(sinogram: Floats) -> float:
+    """The mean of the absolute values; of a copy, as the order of sums follows the strides."""
+    return float(np.abs(np.ascontiguousarray(sinogram)).mean(dtype=np.float64))
+
+
+def _check_options(sigma: float, excess: float | None, size: int, kind: str) -> None:
+    if not 0 < sigma < np.inf:
+        raise InputError(f"sigma is {sigma}, wanted a positive number of standard deviations")
+    if excess is not None and not 0 < excess < np.inf:
+        raise InputError(f"excess is {excess}, wanted a positive number in the projections' unit")
+    if size not in (3, 5):
+        raise InputError(f"size is {size}, wanted 3 or 5 pixels")
+    if kind not in ("transmission", "attenuation"):
+        raise InputError(f"kind is {kind!r}, wanted 'transmission' or 'attenuation'")
