@@ -16,7 +16,13 @@ import tifffile
 import zarr
 from volume_files import FORMATS, VOLUME
 
-from rift_cl.errors import FileFormatError, InputError, NonFiniteError, PathEscapeError
+from rift_cl.errors import (
+    FileFormatError,
+    InputError,
+    NonFiniteError,
+    PathEscapeError,
+    ShapeError,
+)
 from rift_cl.io import open_volume, read_volume
 
 SPACING = (1.0, 0.5, 0.25)
@@ -338,7 +344,23 @@ def test_files_that_were_cut_off(tmp_path: Path, format: str) -> None:
         read_volume(tmp_path / "v")
 
 
+@pytest.mark.parametrize("format", ["tiff", "tiff-stack"])
+def test_a_page_whose_samples_are_nowhere(tmp_path: Path, format: str, capfd) -> None:
+    """Readers take such a page for zeros, and only log it."""
+    write(tmp_path / "v", format)
+    path = tmp_path / "v" / "slice_00000.tif" if format == "tiff" else tmp_path / "v"
+    whole = path.read_bytes()
+    tag = np.array([273], "<u2").tobytes()  # StripOffsets
+    path.write_bytes(whole.replace(tag, b"\xf0\xf0", 1))
+    with pytest.raises(FileFormatError):
+        read_volume(tmp_path / "v")
+    assert capfd.readouterr().err == ""
+
+
 def test_a_picture_is_no_volume(tmp_path: Path) -> None:
-    tifffile.imwrite(tmp_path / "p.tif", VOLUME[0])
-    with pytest.raises(FileFormatError, match="no stack of plain slices"):
+    tifffile.imwrite(tmp_path / "p.tif", VOLUME[0], compression="zlib")
+    with pytest.raises(FileFormatError, match="are not plain ones"):
         read_volume(tmp_path / "p.tif")
+    tifffile.imwrite(tmp_path / "q.tif", np.zeros((4, 5, 3), np.uint8), photometric="rgb")
+    with pytest.raises(ShapeError, match="wanted one channel"):
+        read_volume(tmp_path / "q.tif")

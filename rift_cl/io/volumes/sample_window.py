@@ -123,7 +123,9 @@ class SampleWindow:
 
 
 def restored(stored: NDArray[Any], scale_factor: float, add_offset: float) -> Floats:
-    """Values of the integers of a volume (z, y, x), slice by slice for the sake of memory."""
+    """Values of the samples of a volume (z, y, x), slice by slice for the sake of memory."""
+    if (scale_factor, add_offset) == (1, 0):
+        return np.ascontiguousarray(stored, np.float32)
     values = np.empty(stored.shape, np.float32)
     for image, out in zip(stored, values, strict=True):
         out[...] = add_offset + scale_factor * image.astype(np.float64)

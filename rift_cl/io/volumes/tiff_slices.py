@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,11 +15,13 @@ import tifffile
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, OutputError, ShapeError
-from rift_cl.io.boundary import check_claim, check_numeric, reading
+from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.output import atomic_path, staged_folder
-from rift_cl.io.volumes.imagej import calibration, description, resolution
+from rift_cl.io.volumes.imagej import description, resolution
 from rift_cl.io.volumes.layout import Floats, VolumeLayout
 from rift_cl.io.volumes.plain_samples import WriteSlab
+from rift_cl.io.volumes.plain_tiff import plain_pages
+from rift_cl.io.volumes.sample_window import restored
 
 _SLICE = re.compile(r"slice_(\d{5,})\.tif")
 
@@ -39,26 +42,19 @@ def load_volume(path: Path, *, budget: int | None) -> Floats:
     missing = next((i for i in range(count) if not _slice(path, i).is_file()), None)
     if missing is not None:
         raise FileFormatError(f"{path}: slice {missing} of {count} is missing")
-    volume: Floats | None = None
+    volume = np.empty((0, 0, 0), np.float32)
     for index in range(count):
         place = _slice(path, index)
-        with reading(place, "the slice"), tifffile.TiffFile(place) as file:
-            page: Any = file.pages.first
-            check_numeric(place, "the slice", page.dtype)
-            if volume is None:
-                check_claim(path, "the volume", (4 * count + 8) * page.size, budget)
-                if len(page.shape) != 2:
-                    raise ShapeError(f"{place}: has shape {page.shape}, wanted one channel")
+        with reading(place, "the slice"):
+            page = plain_pages(place)
+            if index == 0:
+                check_claim(path, "the volume", (4 * count + 8) * math.prod(page.shape), budget)
                 volume = np.empty((count, *page.shape), np.float32)
             if page.shape != volume.shape[1:]:
                 raise ShapeError(
                     f"{place}: has shape {page.shape}, the first slice {volume.shape[1:]}"
                 )
-            step, offset = calibration(file.imagej_metadata)
-            image = page.asarray()
-            volume[index] = image if (step, offset) == (1, 0) else offset + step * image
-    if volume is None:
-        raise FileFormatError(f"{path}: holds no slice")
+            volume[index] = restored(page.samples(1), page.step, page.offset)[0]
     return volume
 
 

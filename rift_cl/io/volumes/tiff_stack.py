@@ -13,15 +13,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import tifffile
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError
-from rift_cl.io.boundary import check_claim, check_numeric
-from rift_cl.io.volumes.imagej import calibration, description, resolution
+from rift_cl.io.boundary import check_claim
+from rift_cl.io.volumes.imagej import description, resolution
 from rift_cl.io.volumes.layout import Floats, SliceStatistics, VolumeLayout
 from rift_cl.io.volumes.plain_samples import WriteSlab, staged_samples
+from rift_cl.io.volumes.plain_tiff import plain_pages
 from rift_cl.io.volumes.sample_window import restored
 
 # Offsets of a classic TIFF have 32 bits; the pages' directories take their share.
@@ -44,28 +44,13 @@ def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
 
 
 def load_volume(path: Path, *, budget: int | None) -> Floats:
-    """Read every page of a stack that ``staged_volume`` wrote."""
-    with tifffile.TiffFile(path) as file:
-        page: Any = file.pages.first
-        notes = file.imagej_metadata or {}
-        slices, place = int(notes.get("slices", 0)), page.dataoffsets[0]
-        plain = page.compression == 1 and len(page.shape) == 2 and page.is_contiguous
-        if not plain or slices < 1:
-            raise FileFormatError(
-                f"{path}: is no stack of plain slices with ImageJ's notes; save it as one in ImageJ"
-            )
-        dtype = np.dtype(page.dtype).newbyteorder(file.byteorder)
-        check_numeric(path, "the stack", dtype)
-        shape = (slices, *page.shape)
-        size = math.prod(shape)
-        if place + size * dtype.itemsize > path.stat().st_size:
-            raise FileFormatError(f"{path}: is shorter than the {slices} slices that it names")
-        check_claim(path, "the volume", size * (4 + dtype.itemsize), budget)
-        step, offset = calibration(notes)
-    samples = np.fromfile(path, dtype, size, offset=place).reshape(shape)
-    if (step, offset) == (1, 0):
-        return np.ascontiguousarray(samples, np.float32)
-    return restored(samples, step, offset)
+    """Read every page of a stack that ``staged_volume`` wrote, or ImageJ."""
+    pages = plain_pages(path)
+    if pages.slices < 1:
+        raise FileFormatError(f"{path}: names {pages.slices} slices, wanted 1 or more")
+    size = pages.slices * math.prod(pages.shape)
+    check_claim(path, "the volume", size * (4 + pages.dtype.itemsize), budget)
+    return restored(pages.samples(pages.slices), pages.step, pages.offset)
 
 
 def _write_header(layout: VolumeLayout, part: Path) -> int:
