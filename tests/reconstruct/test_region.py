@@ -34,4 +34,4 @@ def test_a_region_is_the_slice_s_part(projector, share, part) -> None:
     truth = rift.phantom.shepp_logan(GRID)[top:bottom, left:right]
     error = np.sqrt(np.mean((whole - truth) ** 2))
     assert np.sqrt(np.mean((alone - whole) ** 2)) < share * error
-    assert psnr(alone, truth) == pytest.approx(psnr(whole, truth), abs=0.05)
+    assert psnr(alone, truth) == pytest.approx(psnr(whole, truth), abs=0.1)
