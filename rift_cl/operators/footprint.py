@@ -1,12 +1,14 @@
 """What a pixel leaves on the detector: three models of it, as the numbers that kernels read.
 
-``kernels/include/footprint.h`` has the profiles. A model is its half-width on the detector and a
-record for each view; whatever else the projector does is the same for all of them.
+A model is its half-width on the detector and a record for each view; whatever else the projector
+does is the same for all of them. ``kernels/include/footprint.h`` has the profiles that weight a bin
+by its distance. Strips are otherwise summed over the edges between bins, which takes less
+(``kernels/include/shadow.h``), as long as no shadow covers many of them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,8 @@ Floats = NDArray[np.float64]
 
 FOOTPRINTS = ("strip", "joseph", "linear")
 _RECORD = 8
+# Bins, to which shares beyond edges are rounded as one number: wider shadows go bin by bin.
+_WIDEST_BY_EDGES = 4.0
 # Where a ramp has no width its inverse is never used, but must be a number.
 _NARROWEST = 1e-30
 
@@ -26,12 +30,14 @@ class FootprintRecords:
     """A footprint's numbers for a run of views.
 
     Args:
-        support: half-widths in bins, (n,).
-        records: what the kernels read for each view, (n, 8); see ``footprint.h``.
+        support: half-widths in bins, (n,), of what bins or edges in reach are weighted by.
+        records: what the kernels read for each view, (n, 8).
+        by_edges: whether they are those of ``shadow.h``, and not those of ``footprint.h``.
     """
 
     support: Floats
     records: Floats
+    by_edges: bool = False
 
 
 def check_footprint(name: str) -> str:
@@ -56,9 +62,16 @@ def footprint_records(name: str, step: Floats, cross_step: Floats, mass: float) 
         mass: what all bins of an endless detector receive from a pixel of one.
     """
     if name == "strip":
-        return _strip(step, cross_step, mass)
+        by_edges = np.max(step, initial=0) <= _WIDEST_BY_EDGES
+        return (_strip_by_edges if by_edges else _strip)(step, cross_step, mass)
     half_width = step if name == "joseph" else np.maximum(1.0, step)
     return _packed(half_width, mass / half_width, 1 / half_width)
+
+
+def _strip_by_edges(step: Floats, cross_step: Floats, mass: float) -> FootprintRecords:
+    half_width, inverse = (step + cross_step) / 2, 0.5 / np.maximum(cross_step, _NARROWEST)
+    packed = _packed(half_width, mass / step, cross_step, inverse, step)
+    return replace(packed, by_edges=True)
 
 
 def _strip(step: Floats, cross_step: Floats, mass: float) -> FootprintRecords:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
-from rift_cl.operators.footprint import footprint_records
+from rift_cl.operators.footprint import FootprintRecords, footprint_records
 
 LOG2_PHASES = 3
 PHASES = 1 << LOG2_PHASES
@@ -33,7 +33,7 @@ class PhaseTable:
     Args:
         views: which view of the scan each is, and how many columns it needs, (n, 2) int32.
         geometry: (base, slope, origin, step) per view in 32.32 fixed point, (n, 4) int64.
-        footprints: what a pixel leaves on the detector, per view, (n, 8).
+        footprints: what a pixel leaves on the detector.
         orders: the rows of each view sorted by phase, (n, rows) int32.
         starts: where each phase begins in ``orders``, (n, PHASES + 1) int32.
         columns: columns of a table, in whole segments.
@@ -43,7 +43,7 @@ class PhaseTable:
 
     views: NDArray[np.int32]
     geometry: NDArray[np.int64]
-    footprints: NDArray[np.float64]
+    footprints: FootprintRecords
     orders: NDArray[np.int32]
     starts: NDArray[np.int32]
     columns: int
@@ -94,7 +94,7 @@ def phase_table(
     return PhaseTable(
         views=np.stack([views, used], axis=1).astype(np.int32),
         geometry=np.stack([base, slope, _fixed(origin), _fixed(step)], axis=1),
-        footprints=footprint_records(footprint, *shadows, dx * dy / scan.pitch).records,
+        footprints=footprint_records(footprint, *shadows, dx * dy / scan.pitch),
         orders=orders,
         starts=starts,
         columns=-(-int(np.max(used, initial=1)) // segment) * segment,

@@ -118,7 +118,7 @@ class Projector(ParallelProjector):
         )
         bins = 64 if self.device.traits.is_cpu else 1
         self.device.launch(
-            "radon_resample_adjoint",
+            f"{walk.resample}_adjoint",
             (-(-self.scan.bins // bins), count, slab.slices),
             *(out, entries, walk.geometry, walk.footprints, walk.views),
             *(first, slab.first, slab.total, self.scan.bins, table.columns),
@@ -143,7 +143,7 @@ class Projector(ParallelProjector):
         for first, count in self._runs(walk, slab):
             entries = self.device.empty((slab.slices, count, table.entries), self.dtype)
             self.device.launch(
-                "radon_resample",
+                walk.resample,
                 (table.columns // self.device.traits.macros["LANES"], count, slab.slices),
                 *(y, entries, walk.geometry, walk.footprints, walk.views),
                 *(first, slab.first, slab.total, self.scan.bins, table.columns),
@@ -196,9 +196,11 @@ class _Walk:
     def __init__(self, device: Device, table: PhaseTable, dtype: np.dtype[Any]) -> None:
         self.table = table
         self.count = len(table.views)
+        by_edges = table.footprints.by_edges
+        self.resample = "radon_resample_edges" if by_edges else "radon_resample"
         self.views = device.array(table.views)
         self.geometry = device.array(table.geometry)
-        self.footprints = device.array(table.footprints, dtype)
+        self.footprints = device.array(table.footprints.records, dtype)
         self.orders = device.array(table.orders)
         self.starts = device.array(table.starts)
         arrays = (self.views, self.geometry, self.footprints, self.orders, self.starts)

@@ -39,6 +39,7 @@ GEOMETRIES: dict[str, tuple[Grid, Parallel]] = {
     "anisotropic": (Grid((40, 23), spacing=(0.5, 1.7)), Parallel(HALF, bins=60, pitch=0.8)),
     "very anisotropic": (Grid((9, 40), spacing=(50, 1)), Parallel(HALF, bins=60, pitch=6.0)),
     "narrow bins": (Grid((24, 25)), Parallel(HALF, bins=700, pitch=0.05)),
+    "bins of a quarter": (Grid((24, 25)), Parallel([*HALF, *TIES], bins=150, pitch=0.25)),
     "wide bins": (Grid((50, 44)), Parallel(HALF, bins=7, pitch=13.0)),
     "very wide bins": (Grid((50, 44)), Parallel(HALF, bins=3, pitch=900.0)),
     "one slice": (Grid((1, 20, 25)), Parallel(HALF, bins=34)),
@@ -63,6 +64,7 @@ FOOTPRINTED = (
     "anisotropic",
     "very anisotropic",
     "narrow bins",
+    "bins of a quarter",
     "wide bins",
     "stack",
 )

@@ -82,7 +82,7 @@ def test_counted_entries_and_hats_are_those_of_the_tables(tool, footprint):
     for along_x in (True, False):
         table = phase_table(case.plane, case.scan, footprint, along_x=along_x, segment=1)
         for (_, columns), geometry, shape in zip(
-            table.views, table.geometry, table.footprints, strict=True
+            table.views, table.geometry, table.footprints.records, strict=True
         ):
             # The table rounds up to whole columns and adds two for the overhang.
             count = PHASES * int(columns - 2)

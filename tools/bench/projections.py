@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ def entries(case: Case) -> float:
 
 
 def hats(case: Case) -> float:
-    """Pairs of a table entry and a bin within its footprint's reach."""
+    """Pairs of a table entry and a bin, or an edge between bins, within its footprint's reach."""
     cosine, sine = np.abs(np.cos(case.angles)), np.abs(np.sin(case.angles))
     step, cross_step = np.maximum(cosine, sine), np.minimum(cosine, sine)
     support = footprint_records(case.footprint, step, cross_step, 1.0).support
@@ -65,19 +65,22 @@ _UPDATE = (
 )
 _HAT = (
     "per hat (a table entry and a bin in its footprint's reach, two to an entry where that is one "
-    "bin) 5 flop: distance, multiply-subtract, multiply-add; 18 for a strip, whose footprint is "
-    "two ends of a trapezoid; bytes: the tables and the sinogram"
+    "bin) 5 flop: distance, multiply-subtract, multiply-add; bytes: the tables and the sinogram"
 )
-
-
-def _resampling(flops: int) -> dict[str, Cost]:
-    cost = Cost("hat", flops, hats, _table_and_sinogram, _HAT)
-    return {"radon_resample": cost, "radon_resample_adjoint": cost}
-
+_EDGE = (
+    "per edge (a table entry and an edge between bins in reach of the pixel's shadow) 10 flop: "
+    "distance, room within the shadow, its area by two multiply-adds and a difference, the rest of "
+    "the whole, the step between bins or columns, multiply-add; bytes: the tables and the sinogram"
+)
+_BY_HATS = Cost("hat", 5, hats, _table_and_sinogram, _HAT)
+_BY_EDGES = Cost("edge", 10, hats, _table_and_sinogram, _EDGE)
 
 COSTS: dict[str, Cost] = {
     **ROW_COSTS,
-    **_resampling(5),
+    "radon_resample": _BY_HATS,
+    "radon_resample_adjoint": _BY_HATS,
+    "radon_resample_edges": _BY_EDGES,
+    "radon_resample_edges_adjoint": _BY_EDGES,
     "axpby": Cost(
         "sample",
         1,
@@ -105,11 +108,6 @@ COSTS: dict[str, Cost] = {
 }
 
 
-def costs_of(case: Case) -> Mapping[str, Cost]:
-    """What the kernels cost with a case's footprint."""
-    return {**COSTS, **_resampling(18)} if case.footprint == "strip" else COSTS
-
-
 def projection_tasks(device: rift.Device, case: Case) -> list[Task]:
     """Both directions, and both reconstructions by integration, on device arrays."""
     A = case.projector(device)
@@ -120,7 +118,7 @@ def projection_tasks(device: rift.Device, case: Case) -> list[Task]:
         "fbp": lambda: rift.fbp(A, y),
         "unfiltered": lambda: rift.backproject(A, y),
     }
-    return [Task(name, case, run, costs_of(case)) for name, run in runs.items()]
+    return [Task(name, case, run, COSTS) for name, run in runs.items()]
 
 
 def footprint_tasks(device: rift.Device, n: int, views: int) -> Iterator[Task]:
