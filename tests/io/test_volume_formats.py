@@ -134,6 +134,16 @@ def test_more_than_four_gigabytes_are_a_bigtiff(tmp_path: Path, monkeypatch) -> 
     np.testing.assert_array_equal(read_volume(tmp_path / "v.tif"), VOLUME)
 
 
+@pytest.mark.parametrize("step", [1e-8, 6.5e-4, 0.0123456789, 1 / 3, 1.0, 37.7, 9.9e8])
+def test_resolutions_that_imagej_can_read(tmp_path: Path, step: float) -> None:
+    """As fractions of signed integers."""
+    write(tmp_path / "v", "tiff-stack", spacing=step)
+    with tifffile.TiffFile(tmp_path / "v") as file:
+        above, below = file.pages.first.tags["XResolution"].value
+    assert 0 < above < 2**31 and 0 < below < 2**31
+    assert below / above == pytest.approx(step, rel=1e-6)
+
+
 def test_units_that_ascii_lacks(tmp_path: Path) -> None:
     for name, unit, told in (("a", "\u00b5m", "micron"), ("b", "\u2113", "\\u2113")):
         write(tmp_path / name, "tiff-stack", unit=unit)

@@ -11,13 +11,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from fractions import Fraction
 from typing import Any
 
 from rift_cl.io.volumes.layout import VolumeLayout
 
 # ImageJ's own name for what it would write as an escaped micro sign otherwise.
 _UNITS = {"micrometer": "micron"}
-# TIFF keeps resolutions as fractions of 32-bit integers.
+# TIFF keeps resolutions as fractions of 32-bit integers, which ImageJ takes for signed ones.
+_LARGEST = (1 << 31) - 1
 _FINEST, _COARSEST = 1e-9, 1e9
 
 
@@ -53,7 +55,15 @@ def resolution(layout: VolumeLayout) -> dict[str, Any]:
     _, high, wide = layout.spacing
     if not all(_FINEST < step < _COARSEST for step in (high, wide)):
         return {}
-    return {"resolution": (1 / wide, 1 / high), "resolutionunit": "NONE"}
+    return {"resolution": (_per(wide), _per(high)), "resolutionunit": "NONE"}
+
+
+def _per(step: float) -> tuple[int, int]:
+    """One over a length, as the nearest fraction that both parts of fit."""
+    ratio = 1 / Fraction(step)
+    most = min(_LARGEST, int(_LARGEST / ratio)) if ratio > 1 else _LARGEST
+    near = ratio.limit_denominator(max(1, most))
+    return near.numerator, near.denominator
 
 
 def calibration(notes: Mapping[str, Any] | None) -> tuple[float, float]:

@@ -83,9 +83,11 @@ class SliceStatistics:
 
     Args:
         slices: how many.
+        moments: whether mean and spread are wanted, which cost more than the range.
     """
 
-    def __init__(self, slices: int) -> None:
+    def __init__(self, slices: int, *, moments: bool = False) -> None:
+        self._with_moments = moments
         self._low, self._high = np.full((2, slices), np.nan)
         self._sums, self._squares = np.zeros((2, slices))
         self._samples = 0
@@ -94,15 +96,17 @@ class SliceStatistics:
         """Look at slices ``start``, ``start + 1``, ..."""
         for index, image in enumerate(slab, start):
             self._samples = image.size
-            # NaN is passed over.
-            self._low[index] = np.fmin.reduce(image, None)
-            self._high[index] = np.fmax.reduce(image, None)
-            self._sums[index] = image.sum(dtype=np.float64)
-            self._squares[index] = np.square(image, dtype=np.float64).sum()
+            self._low[index], self._high[index] = image.min(), image.max()
+            if math.isnan(self._low[index]):
+                self._low[index] = np.fmin.reduce(image, None)
+                self._high[index] = np.fmax.reduce(image, None)
+            if self._with_moments:
+                self._sums[index] = image.sum(dtype=np.float64)
+                self._squares[index] = np.square(image, dtype=np.float64).sum()
 
     @property
     def range(self) -> tuple[float, float]:
-        """Least and greatest sample."""
+        """Least and greatest sample; NaN is passed over."""
         return float(np.fmin.reduce(self._low)), float(np.fmax.reduce(self._high))
 
     @property

@@ -33,7 +33,7 @@ _LABEL = re.compile(r"(add_offset|scale_factor) = (\S+)\s*")
 @contextmanager
 def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
     """Write sections into a file that gets its name at the end."""
-    statistics = SliceStatistics(layout.shape[0])
+    statistics = SliceStatistics(layout.shape[0], moments=True)
     header, finish = partial(_write_header, layout), partial(_write_statistics, statistics)
     with staged_samples(path, layout, header, finish) as write:
 
