@@ -157,14 +157,14 @@ def test_the_background_is_brought_to_zero(tmp_path):
 
 def test_rings_are_taken_out_of_counts_alone_unless_told(scan, half, tmp_path):
     cases = [
-        (scan.counts, "auto", True),
-        (scan.counts, "off", False),
-        (half[0], "auto", False),
-        (half[0], "on", True),
+        (scan.counts, "auto", "vo"),
+        (scan.counts, "off", None),
+        (half[0], "auto", None),
+        (half[0], "on", "vo"),
     ]
     for path, rings, expected in cases:
         settings = ReconstructSettings(path, out=tmp_path / "out", center=40, rings=rings)
-        assert Reconstruction(settings).source.rings is expected
+        assert Reconstruction(settings).source.clean.rings == expected
 
 
 @pytest.fixture

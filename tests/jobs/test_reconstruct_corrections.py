@@ -91,3 +91,104 @@ def test_phase_retrieval_of_a_single_row_is_told(tmp_path, capsys):
     path = write_counts(tmp_path / "scan.h5", line_integrals(rows=1))
     assert run("reconstruct", path, "--out", tmp_path / "out", "--center", 39.5, *PHASE) == INPUT
     assert "a single one" in capsys.readouterr().err
+
+
+def sharpest(volume):
+    return float(np.abs(np.diff(volume, axis=-1)).max())
+
+
+def test_binning_keeps_the_level_and_halves_the_volume(tmp_path):
+    path = write_counts(tmp_path / "scan.h5", line_integrals(center=41.5))
+    common = ("--center", 41.5, "--pitch", 0.5, "--unit", "mm", "--rings", "off")
+    fine = reconstruct(path, tmp_path / "fine", *common)
+    coarse = reconstruct(path, tmp_path / "coarse", *common, "--binning", 2)
+    assert coarse.shape == tuple(n // 2 for n in fine.shape)
+    blocks = fine.reshape(ROWS // 2, 2, BINS // 2, 2, BINS // 2, 2).mean(axis=(1, 3, 5))
+    assert np.abs(coarse - blocks).mean() < 0.02 * fine.max()
+    with h5py.File(tmp_path / "coarse/volume.h5") as file:
+        np.testing.assert_allclose(file["volume"].attrs["spacing"], 1.0)
+    # The axis is found on the detector as it is, and recorded so.
+    settings = json.loads((tmp_path / "coarse/config.json").read_text())["settings"]
+    assert (settings["center"], settings["pitch"], settings["rows"]) == (41.5, 0.5, [0, ROWS])
+
+
+def test_binning_of_an_odd_detector_says_what_it_leaves_out(tmp_path):
+    path = write_counts(tmp_path / "scan.h5", line_integrals(rows=5)[..., :-1])
+    volume = reconstruct(path, tmp_path / "out", "--center", 39.5, "--binning", 2)
+    assert volume.shape == (2, 39, 39)
+    assert "the last 1 row and the last 1 bin" in notes(tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--binning", 13), "12 rows"),
+        (("--binning", 0), "--binning is 0"),
+        (("--binning", 4, "--rows", 1, 2), "fewer rows"),
+        (("--tilt", 30), "5 degrees"),
+        (("--method", "sirt", "--subsets", 3, "--precondition", "ramp"), "give one of them"),
+        (("--subsets", 3), "means nothing"),
+    ],
+)
+def test_options_that_do_not_fit_are_told(tmp_path, capsys, options, sentence):
+    path = write_counts(tmp_path / "scan.h5", line_integrals())
+    assert run("reconstruct", path, "--out", tmp_path / "out", "--center", 39.5, *options) == INPUT
+    message = capsys.readouterr().err
+    assert sentence in message
+    assert "Traceback" not in message
+    assert not (tmp_path / "out").exists()
+
+
+def tilted_counts(path, degrees):
+    """A long object, so that a small tilt moves its projections along the bins alone."""
+    slope = np.tan(np.deg2rad(degrees))
+    rows = [
+        line_integrals(rows=1, center=39.5 + slope * (row - (ROWS - 1) / 2))[:, 0]
+        for row in range(ROWS)
+    ]
+    return write_counts(path, np.stack(rows, axis=1))
+
+
+def test_a_tilted_axis_is_made_upright(tmp_path):
+    straight = tilted_counts(tmp_path / "straight.h5", 0.0)
+    leaning = tilted_counts(tmp_path / "leaning.h5", 4.0)
+    common = ("--center", 39.5, "--rings", "off")
+    truth = reconstruct(straight, tmp_path / "truth", *common)
+    wrong = reconstruct(leaning, tmp_path / "wrong", *common, "--tilt", 0)
+    right = reconstruct(leaning, tmp_path / "right", *common, "--tilt", 4)
+    assert np.abs(right[0] - truth[0]).max() < 0.5 * np.abs(wrong[0] - truth[0]).max()
+    assert "turned by 4.000 degrees" in notes(tmp_path / "right")
+
+
+@pytest.fixture(scope="module")
+def half_acquisition(tmp_path_factory):
+    """A full turn with the axis near the detector's end, and the true slice."""
+    path = tmp_path_factory.mktemp("half") / "scan.npz"
+    angles = np.arange(240) * np.pi / 120
+    grid = rift.Grid((80, 80))
+    integrals = rift.phantom.shepp_logan_sinogram(grid, rift.Parallel(angles, 60, center=12.0))
+    np.savez(path, projections=0.2 * integrals[:, None], angles=angles)
+    return path, 0.2 * rift.phantom.shepp_logan(grid)
+
+
+@pytest.mark.parametrize(
+    "options", [(), ("--method", "cgls", "--steps", 12), ("--method", "sirt", "--subsets", 10)]
+)
+def test_half_acquisitions_may_be_stitched(half_acquisition, tmp_path, options):
+    path, truth = half_acquisition
+    common = ("--center", 12, "--size", 80, *options)
+    ways = [
+        reconstruct(path, tmp_path / way, *common, "--half-acquisition", way)[0]
+        for way in ("weighted", "stitched")
+    ]
+    errors = [np.linalg.norm(image - truth) / np.linalg.norm(truth) for image in ways]
+    assert max(errors) < 0.35
+    assert errors[1] < errors[0] + 0.05
+    assert "stitched to views of half a turn" in notes(tmp_path / "stitched")
+
+
+def test_subsets_take_fewer_steps(half_acquisition, tmp_path):
+    path, _ = half_acquisition
+    options = ("--center", 12, "--method", "sirt", "--subsets", 10)
+    reconstruct(path, tmp_path / "out", *options)
+    assert json.loads((tmp_path / "out/metrics.json").read_text())["steps"] == 10

@@ -1,13 +1,16 @@
 """Rows of a scan as clean line integrals: what a detector gets wrong is put right here.
 
 In this order, each step where it was asked for or is called for: flat-field correction and the
-logarithm, zingers, phase retrieval, stripes. A step that looks at neighbouring rows is given as
-many more as it needs, so that slices do not depend on how the rows were cut into slabs.
+logarithm, phase retrieval, stripes, a tilted or wandering axis. A step that looks at neighbouring
+rows is given as many more as it needs, so that slices do not depend on how the rows were cut into
+slabs.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,7 +22,14 @@ from rift_cl.io.scan_file import ScanFile
 from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 from rift_cl.jobs.scan_input import read_attenuation
 from rift_cl.reconstruct import Attenuation
-from rift_cl.reconstruct.preprocess import Propagation, paganin, remove_rings
+from rift_cl.reconstruct.preprocess import (
+    Propagation,
+    paganin,
+    remove_rings,
+    straightened,
+    tilt_halo,
+    upright,
+)
 
 Floats = NDArray[np.float32]
 _USUAL_RINGS = "vo"
@@ -27,6 +37,45 @@ _USUAL_RINGS = "vo"
 _RINGS_FROM = np.deg2rad(150)
 # Options of phase retrieval, all of which it needs.
 _PHASE = ("delta_beta", "energy", "propagation")
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """Where the rotation axis is seen, if not at one bin of all rows.
+
+    Args:
+        center: bin at which it is to be in all rows; of a tilted axis, where it is seen at
+            ``pivot``.
+        pivot: the row about which projections are turned.
+        tilt: of the axis in the detector's plane, in radians, positive where its bin grows with
+            the row.
+        centers: bin of each row of the scan, in place of a tilt.
+    """
+
+    center: float
+    pivot: float
+    tilt: float = 0.0
+    centers: NDArray[np.float64] | None = None
+
+    def halo(self, bins: int) -> int:
+        """Rows that are needed on either side of those that are aligned."""
+        return tilt_halo(self.tilt, bins, self.center) if self.tilt else 0
+
+    def aligned(self, rows: Floats, first: int, wanted: slice, device: Device) -> Floats:
+        """Rows of which the axis is at one bin.
+
+        Args:
+            rows: (angle, row, bin), the first of which is row ``first`` of the scan.
+            first: see there.
+            wanted: which of them to return.
+            device: where to compute.
+        """
+        if self.centers is not None:
+            centers = self.centers[first + wanted.start : first + wanted.stop]
+            return straightened(rows[:, wanted], centers, self.center, device=device)
+        part = (wanted.start, wanted.stop)
+        pivot = self.pivot - first
+        return upright(rows, self.tilt, self.center, pivot=pivot, rows=part, device=device)
 
 
 class CleanRows:
@@ -52,19 +101,36 @@ class CleanRows:
         self._scan, self._settings, self._device = scan, settings, device
         self.rings = self._ring_method()
         self.phase = self._propagation(pixel)
-        self._halo = 0 if self.phase is None else self.phase.halo_rows()
+        # Set once the axis is known, where it is not at one bin.
+        self.alignment: Alignment | None = None
 
     def read(self, start: int, stop: int) -> Attenuation:
         """Line integrals of some rows."""
-        first, last = max(0, start - self._halo), min(self._scan.shape[1], stop + self._halo)
-        integrals = read_attenuation(self._scan, first, last)
+        bins = self._scan.shape[2]
+        turned = 0 if self.alignment is None else self.alignment.halo(bins)
+        first, last = self._around(start, stop, turned)
+        integrals = self._level(first, last)
         rows = integrals.projections
-        if self.phase is not None:
-            rows = paganin(np.exp(-rows), **_arguments(self.phase))
-        rows = np.ascontiguousarray(rows[:, start - first : stop - first])
         if self.rings is not None:
             rows = remove_rings(rows, method=self.rings, device=self._device)
+        if self.alignment is not None:
+            wanted = slice(start - first, stop - first)
+            rows = self.alignment.aligned(rows, first, wanted, self._device)
         return dataclasses.replace(integrals, projections=rows)
+
+    def _level(self, start: int, stop: int) -> Attenuation:
+        """Line integrals before anything that is done in sinograms."""
+        halo = 0 if self.phase is None else self.phase.halo_rows()
+        first, last = self._around(start, stop, halo)
+        integrals = read_attenuation(self._scan, first, last)
+        if self.phase is None:
+            return integrals
+        rows = paganin(np.exp(-integrals.projections), **_arguments(self.phase))
+        rows = np.ascontiguousarray(rows[:, start - first : stop - first])
+        return dataclasses.replace(integrals, projections=rows)
+
+    def _around(self, start: int, stop: int, halo: int) -> tuple[int, int]:
+        return max(0, start - halo), min(self._scan.shape[1], stop + halo)
 
     def notes(self) -> list[str]:
         """What is corrected, a sentence each."""
@@ -78,6 +144,13 @@ class CleanRows:
             )
         if self.rings is not None:
             notes.append(f"Stripes were removed from the projections, method {self.rings} (rings).")
+        if self.alignment is not None and self.alignment.centers is not None:
+            notes.append("Each row was moved to the axis that was given for it.")
+        elif self.alignment is not None:
+            notes.append(
+                f"Projections were turned by {math.degrees(self.alignment.tilt):.3f} degrees, the "
+                "tilt of the axis."
+            )
         return notes
 
     def _ring_method(self) -> str | None:

@@ -30,19 +30,19 @@ def decided_settings(
         inversion: the method.
         values: what the integers of the volume stand for; None for floating samples.
     """
-    settings, scan, window = source.settings, source.scan, inversion.window
+    settings, file, window = source.settings, source.file, inversion.window
     decided: dict[str, Any] = {
-        "scan": scan.path,
+        "scan": file.path,
         "out": settings.out.absolute(),
         "rings": source.clean.rings or "off",
         "pad": "on" if source.pad else "off",
-        "center": source.geometry.center if source.fan is None else source.fan.center,
-        "rows": source.rows,
-        "pitch": source.pitch if source.fan is None else source.fan.pitch,
+        "center": source.axis["center"],
+        "rows": settings.rows or (0, file.shape[1]),
+        "pitch": source.detector_pitch,
         "unit": source.unit,
         "pixel": window.pixel,
         "size": window.size,
-        "background": scan.background,
+        "background": file.background,
         "window": values,
     }
     if settings.iterative:
@@ -75,6 +75,7 @@ def in_words(decided: ReconstructSettings) -> str:
         words += [f"{decided.filter} filter, {shape}", f"{decided.compensate} view weights"]
     if decided.iterative:
         words += [f"at most {decided.steps} steps"]
+        words += [f"{decided.subsets} subsets"] if decided.subsets else []
         words += [f"{decided.precondition} preconditioner"] if decided.precondition else []
         words += ["rays weighed by counts"] if decided.weights else []
         words += ["non-negative"] if decided.nonnegative else []

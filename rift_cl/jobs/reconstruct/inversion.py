@@ -22,13 +22,17 @@ from rift_cl.jobs.reconstruct.slice_window import Window
 from rift_cl.operators import FastProjector, LinearOperator, ParallelProjector, Projector
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp, poisson_weights
+from rift_cl.reconstruct.ordered_subsets import OrderedSubsets
 from rift_cl.reconstruct.seen_rays import SeenRays
 from rift_cl.reconstruct.solver import Solver
 
 Floats = NDArray[np.float32]
 # Images and sinograms, float32, that a slice needs on host and device at a time: a formula's are
 # counts, line integrals, two temporaries and the filtered ones; a method's are its state as well.
-_ARRAYS = {"fbp": (2, 6), "backproject": (2, 6), "sirt": (5, 9), "cgls": (5, 10), "tv": (16, 10)}
+# The next slab is read and the last one written at the same time: an image and two sinograms more.
+_ARRAYS = {"fbp": (3, 8), "backproject": (3, 8), "sirt": (6, 11), "cgls": (6, 12), "tv": (17, 12)}
+# Copies of what is read before it is binned.
+_READ = 2
 # Slices between two reports of progress; of those that take steps, each of which is reported.
 _SLAB, _ITERATIVE_SLAB = 16, 4
 # Steps that are timed, after a first one that builds the kernels.
@@ -66,7 +70,9 @@ class Inversion:
         images, sinograms = _ARRAYS[self.settings.method]
         views, bins = len(A.scan.angles), max(A.scan.bins, self.source.scan.shape[2])
         views = max(views, self.source.scan.shape[0])
-        return 4 * (images * int(np.prod(A.grid.shape[-2:])) + sinograms * views * bins)
+        # What is binned is read as it is.
+        fine = (self.settings.binning**2 - 1) * _READ * self.source.scan.shape[0] * bins
+        return 4 * (images * int(np.prod(A.grid.shape[-2:])) + sinograms * views * bins + fine)
 
     def projector(self, slices: int) -> ParallelProjector:
         """The projector of so many slices, kept for the next slab of the same size."""
@@ -149,7 +155,11 @@ class Inversion:
     def _solver(self, sinogram: Floats) -> Solver:
         settings = self.settings
         A, options = self._seen_rays(sinogram)
-        options |= {"precondition": settings.precondition, "noise": settings.noise}
+        options["noise"] = settings.noise
+        if settings.method == "sirt" and settings.subsets not in (None, 1):
+            subsets, nonnegative = settings.subsets, settings.nonnegative
+            return OrderedSubsets(A, sinogram, subsets, nonnegative=nonnegative, **options)
+        options["precondition"] = settings.precondition
         if settings.method == "cgls":
             return Cgls(A, sinogram, **options)
         options["nonnegative"] = settings.nonnegative

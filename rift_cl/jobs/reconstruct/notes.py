@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.reconstruct.preprocess import binning_note
+
 if TYPE_CHECKING:
     from rift_cl.jobs.reconstruct.slice_input import SliceInput
 
@@ -28,6 +30,10 @@ def notes_of(source: SliceInput, *, truncated: bool) -> list[str]:
             f"Fan-beam views were resampled to {len(angles)} parallel ones, over "
             f"{np.rad2deg(np.ptp(angles)):.1f} degrees."
         )
+    if source.settings.binning > 1:
+        notes.append(_binning(source))
+    if source.stitched is not None:
+        notes.append(_stitched(source))
     if source.offset:
         notes.append(_offset(source))
     notes += _gap(source.geometry.angles)
@@ -46,8 +52,9 @@ def _axis(source: SliceInput, *, truncated: bool) -> list[str]:
     if source.settings.center is not None:
         return []
     if source.fan is not None:
-        center = source.fan.center
-        middle = center == (source.scan.shape[2] - 1) / 2
+        assert source.file.fan is not None
+        center = source.file.fan.center
+        middle = center == (source.file.shape[2] - 1) / 2
         where = "at the detector's middle" if middle else "where the file says"
         return [
             f"The axis was taken {where}, bin {center:.2f}; give it with --center if it is not."
@@ -61,9 +68,23 @@ def _axis(source: SliceInput, *, truncated: bool) -> list[str]:
     return notes
 
 
+def _binning(source: SliceInput) -> str:
+    n, (_, rows, bins) = source.settings.binning, source.file.shape
+    lost = binning_note(rows, bins, rows=n, bins=n)
+    of = " of line integrals" if source.file.kind == "attenuation" else ""
+    return f"Blocks of {n} x {n} detector pixels were averaged{of}. {lost}".rstrip()
+
+
+def _stitched(source: SliceInput) -> str:
+    return (
+        f"The axis, bin {source.axis['center']:.2f}, lies off the middle of the detector in a full "
+        "turn: opposite views were stitched to views of half a turn."
+    )
+
+
 def _offset(source: SliceInput) -> str:
     off = (
-        f"The axis, bin {source.geometry.center:.2f}, lies off the middle of the detector in a "
+        f"The axis, bin {source.axis['center']:.2f}, lies off the middle of the detector in a "
         "full turn"
     )
     # Steps explain every view as it is: nothing is joined for them.

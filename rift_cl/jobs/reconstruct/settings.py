@@ -23,6 +23,7 @@ _ONLY = {
     "steps": ITERATIVE,
     "noise": ITERATIVE,
     "weights": ITERATIVE,
+    "subsets": ("sirt",),
     "precondition": ITERATIVE,
     "weight": ("tv",),
     "nonnegative": ("sirt", "tv"),
@@ -31,6 +32,8 @@ _ONLY = {
 _STEPS = {"sirt": 100, "cgls": 30, "tv": 200}
 # With frequencies weighed, CGLS is near its best after the first few.
 _PRECONDITIONED_CGLS = 4
+# Passes over all subsets, however many there are.
+_FEWEST_PASSES = 5
 # What may differ between a run and the one that goes on with it: it changes no bit of the result.
 _FREE = (
     *("out", "device", "memory", "format", "dtype", "window"),
@@ -69,8 +72,11 @@ class ReconstructSettings(ScanInput):
     """Relative error, such as 1e-3, that projections and backprojections may have; if given, they
     go through the Fourier transform, which is several times faster for large slices."""
     steps: int | None = None
-    """sirt, cgls, tv: most steps for a slice; 100, 30 (with
-    --precondition 4), 200 if not given."""
+    """sirt, cgls, tv: most steps for a slice; 100 (divided by --subsets), 30 (with --precondition
+    4), 200 if not given."""
+    subsets: int | None = None
+    """sirt: correct the image after each of so many subsets of the views (ordered subsets), which
+    takes about that many times fewer steps; 1 if not given."""
     noise: float | None = None
     """sirt, cgls, tv: standard deviation of the noise of a line integral; steps end where the
     slice explains the data that well."""
@@ -116,6 +122,16 @@ class ReconstructSettings(ScanInput):
     combines 'dead', 'large' and 'sorting', the filters of Vo, Atwood and Drakopoulos (2018), as are
     'filtering' and 'fitting'; 'wavelet-fft' is that of Muench et al. (2009). auto: vo, where the
     file holds counts and the views cover 150 degrees or more."""
+    binning: int = 1
+    """Average blocks of so many detector rows and bins before all else; --center, --rows, --pitch
+    and --tilt keep to the detector as it is."""
+    tilt: float | None = None
+    """Degrees by which the rotation axis leans in the detector's plane, positive where its bin
+    grows with the row; projections are turned by it. If not given: the tilt found with the axis,
+    where it moves the axis by a quarter of a bin or more; 0 for none."""
+    half_acquisition: Literal["weighted", "stitched"] = "weighted"
+    """Full turns with the axis off the detector's middle: count opposite views by weights, or
+    stitch them to views of half a turn that are nearly twice as wide."""
     delta_beta: float | None = None
     """Phase retrieval after Paganin et al. (2002), for a parallel beam and one material: the ratio
     delta / beta of its refractive index; with --energy and --propagation."""
@@ -161,7 +177,7 @@ class ReconstructSettings(ScanInput):
                 )
         # Made now, so that its arguments are checked before any work.
         self.view_filter()
-        least = {"steps": 1, "size": 1, "background": 0}
+        least = {"steps": 1, "size": 1, "background": 0, "subsets": 1, "binning": 1}
         for name, bound in least.items():
             value = getattr(self, name)
             if value is not None and value < bound:
@@ -176,6 +192,8 @@ class ReconstructSettings(ScanInput):
                 "Fourier transform: leave one of them out"
             )
         self._check_samples()
+        if self.subsets not in (None, 1) and self.precondition is not None:
+            raise InputError("--subsets and --precondition both save steps: give one of them")
         if self.resume and self.overwrite:
             raise InputError("--resume goes on with what --overwrite throws away: give one of them")
 
@@ -200,8 +218,11 @@ class ReconstructSettings(ScanInput):
         """Steps that a slice takes at most; 1 where the method is a formula."""
         if not self.iterative:
             return 1
-        few = self.method == "cgls" and self.precondition is not None
-        return self.steps or (_PRECONDITIONED_CGLS if few else _STEPS[self.method])
+        if self.steps is not None:
+            return self.steps
+        if self.method == "cgls" and self.precondition is not None:
+            return _PRECONDITIONED_CGLS
+        return max(_FEWEST_PASSES, -(-_STEPS[self.method] // (self.subsets or 1)))
 
     def view_filter(self) -> Ramp | HighPass:
         """The filter along the detector.

@@ -7,15 +7,18 @@ fan to parallel, offset axis, continuation beyond the detector.
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
+from rift_cl.errors import InputError
 from rift_cl.geometry import Parallel
 from rift_cl.geometry.length_units import length_unit
-from rift_cl.jobs.reconstruct.clean_rows import CleanRows
+from rift_cl.jobs.reconstruct.binned_file import binned_file
+from rift_cl.jobs.reconstruct.clean_rows import Alignment, CleanRows
 from rift_cl.jobs.reconstruct.notes import notes_of
 from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 from rift_cl.jobs.scan_input import (
@@ -32,6 +35,7 @@ from rift_cl.reconstruct.offset_axis import (
     widened,
 )
 from rift_cl.reconstruct.padding import extended, is_truncated
+from rift_cl.reconstruct.preprocess import binned_center, stitched
 
 Floats = NDArray[np.float32]
 # An axis found this far from the detector's middle, as a share of its width, is an offset one.
@@ -53,38 +57,51 @@ class SliceInput:
 
     def __init__(self, settings: ReconstructSettings, device: Device) -> None:
         self.settings, self.device = settings, device
-        self.scan = settings.open_scan(fan=True)
-        self.rows = chosen_rows(settings.rows, self.scan)
-        check_center(settings.center, self.scan)
+        # The scan as the file has it, and as it is worked on.
+        self.file = settings.open_scan(fan=True)
+        check_center(settings.center, self.file)
+        binning = settings.binning
+        self.scan = binned_file(self.file, binning)
+        self.rows = self._binned_rows()
+        pitch = (self.file.pitch or 1.0) if settings.pitch is None else settings.pitch
         self.fan = self.scan.fan
         if self.fan is not None:
-            pitch = self.fan.pitch if settings.pitch is None else settings.pitch
-            center = self.fan.center if settings.center is None else settings.center
-            self.fan = dataclasses.replace(self.fan, pitch=pitch, center=center)
-        pitch = (self.scan.pitch or 1.0) if settings.pitch is None else settings.pitch
-        unit = self.scan.unit or ("bin" if pitch == 1.0 else "")
+            if settings.pitch is not None:
+                self.fan = dataclasses.replace(self.fan, pitch=settings.pitch * binning)
+            if settings.center is not None:
+                center = binned_center(settings.center, binning)
+                self.fan = dataclasses.replace(self.fan, center=center)
+        unit = self.file.unit or ("bin" if pitch == 1.0 else "")
         self.unit = unit if settings.unit is None else settings.unit
-        self._pitch = pitch
+        self._pitch = pitch * binning
+        # Bin of the rotation axis on the detector as the file has it, at its middle row.
         self.center = settings.center
         # The axis as the configuration records it: the bin, and how it was found.
         self.axis: dict[str, Any] = {}
         self.pad = 0
         # (angle, bin) whether a ray was measured, where some were not.
         self.seen: NDArray[np.bool_] | None = None
-        self.notes: list[str] = [*self.scan.notes]
+        self.notes: list[str] = [*self.file.notes]
+        # The geometry of a full turn whose opposite views are stitched; None where none are.
+        self.stitched: Parallel | None = None
         # Made now, so that a bad pitch or center is told before any work.
         self.geometry = self._parallel()
         # Whether a full turn's axis is so far off the middle that slices reach beyond the detector.
         self.offset = self._sees_farther()
         length = length_unit(self.unit)
-        self.clean = CleanRows(
-            self.scan, settings, None if length is None else pitch * length.metres, device
-        )
+        pixel = None if length is None else self._pitch * length.metres
+        self.clean = CleanRows(self.scan, settings, pixel, device)
 
     @property
     def pitch(self) -> float:
         """Distance between parallel rays, at the rotation axis."""
         return self.geometry.pitch
+
+    @property
+    def detector_pitch(self) -> float:
+        """Distance between bins of the detector as the file has it."""
+        pitch = self._pitch if self.fan is None else self.fan.pitch
+        return pitch / self.settings.binning
 
     @property
     def bins(self) -> int:
@@ -116,10 +133,15 @@ class SliceInput:
         middle = sum(self.rows) // 2
         row = self.clean.read(middle, middle + 1).projections
         if not self.settled:
-            self.center = self._find_center(np.ascontiguousarray(row[:, 0]))
+            found = self._find_center(np.ascontiguousarray(row[:, 0]))
+            self.center = self.settings.binning * found + (self.settings.binning - 1) / 2
         self.geometry = self._parallel()
         self.axis = self._axis_record()
+        self.clean.alignment = self._alignment()
         self.offset = self._sees_farther()
+        if self.offset and self.settings.half_acquisition == "stitched":
+            self.stitched, self.offset = self.geometry, False
+            self.geometry = stitched(np.zeros((*row.shape[::2],), np.float32), self.stitched)[1]
         truncated = is_truncated(row)
         wanted = self.settings.pad == "auto" and truncated and not self.offset
         if wanted or self.settings.pad == "on":
@@ -128,11 +150,14 @@ class SliceInput:
 
     def identity(self) -> dict[str, str]:
         """The file and the axis, which decide the slices besides the settings."""
-        return {**scan_identity(self.scan), "axis": repr(self.center)}
+        return {**scan_identity(self.file), "axis": repr(self.center)}
 
     def read(self, start: int, stop: int) -> Attenuation:
         """Parallel projections of some rows of the file, before a formula's weights and margins."""
         integrals = self.clean.read(start, stop)
+        if self.stitched is not None:
+            wide, _ = stitched(integrals.projections, self.stitched, device=self.device)
+            return dataclasses.replace(integrals, projections=wide)
         if self.fan is None:
             return integrals
         parallel, _ = rebin_fan(
@@ -160,21 +185,39 @@ class SliceInput:
             scan, rays = covered_rays(self.scan.angles, bins, self.fan, whole=whole)
             self.seen = None if rays.all() else rays
             return scan
-        return Parallel(self.scan.angles, self.scan.shape[2], self._pitch, self.center)
+        binning = self.settings.binning
+        center = None if self.center is None else binned_center(self.center, binning)
+        return Parallel(self.scan.angles, self.scan.shape[2], self._pitch, center)
+
+    def _binned_rows(self) -> tuple[int, int]:
+        """The rows that are asked for, of the scan as it is worked on."""
+        first, stop = (
+            row // self.settings.binning for row in chosen_rows(self.settings.rows, self.file)
+        )
+        if first == stop:
+            raise InputError(
+                f"--rows has fewer rows than --binning {self.settings.binning} makes one of"
+            )
+        return first, stop
+
+    def _alignment(self) -> Alignment | None:
+        """How projections are turned, where the axis leans."""
+        tilt = math.radians(self.settings.tilt or 0.0)
+        if not tilt or self.fan is not None:
+            return None
+        pivot = binned_center((self.file.shape[1] - 1) / 2, self.settings.binning)
+        return Alignment(self.geometry.center, pivot, tilt)
 
     def _sees_farther(self) -> bool:
         return self.fan is None and is_offset(self.geometry)
 
     def _axis_record(self) -> dict[str, Any]:
+        if self.settings.center is not None:
+            return {"center": self.settings.center, "by": "--center"}
         if self.fan is not None:
-            return {
-                "center": self.fan.center,
-                "by": "the file" if self.settings.center is None else "--center",
-            }
-        return {
-            "center": self.center,
-            "by": "search" if self.settings.center is None else "--center",
-        }
+            assert self.file.fan is not None
+            return {"center": self.file.fan.center, "by": "the file"}
+        return {"center": self.center, "by": "search"}
 
     def _find_center(self, row: Floats) -> float:
         angles, bins = self.scan.angles, self.scan.shape[2]
