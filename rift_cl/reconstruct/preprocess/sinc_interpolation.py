@@ -1,7 +1,7 @@
 """Projections read between samples, along rows or bins, by a windowed sinc on the device.
 
-Twelve taps under a Kaiser window are within a hundredth of a decibel of longer ones and of the
-Fourier transform in what is lost, and ahead of cubic splines. What any of them loses is the very
+Twelve taps under a Kaiser window lose as little as the Fourier transform, to a few hundredths of a
+decibel in a slice, and less than cubic splines. What any of them loses is the very
 last of the spectrum: half a bin from its samples, a pattern that alternates from bin to bin cannot
 be read. The formula is ``rift_cl/reference/resample.py``.
 """
