@@ -89,3 +89,11 @@ def test_nothing_bad_changes_nothing(device):
     columns = DetectorColumns(device, x)
     columns.interpolate(np.zeros((2, 16), np.bool_))
     np.testing.assert_array_equal(columns.projections(), x)
+
+
+@every_shape
+def test_a_number_is_subtracted_from_each_column(device, shape):
+    x, shift = values(shape), values(shape[1:], "ties")
+    columns = DetectorColumns(device, x)
+    columns.subtract(shift)
+    np.testing.assert_array_equal(columns.projections(), x - shift)

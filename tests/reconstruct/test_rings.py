@@ -174,6 +174,16 @@ def test_every_method_treats_rows_by_themselves_and_keeps_level_data(clean, nois
     np.testing.assert_allclose(mended[:, 2], stack[:, 2], rtol=1e-5)
 
 
+def test_large_brings_levels_together_unless_told_not_to(noisy):
+    bad, _ = striped(noisy, "full")
+    levels = [
+        np.abs(np.diff(remove_rings(bad, method="large", **options).mean(axis=0))).mean()
+        for options in ({}, {"normalise": False})
+    ]
+    before, clean = (np.abs(np.diff(y.mean(axis=0))).mean() for y in (bad, noisy))
+    assert levels[0] < clean < 1.2 * levels[1] < 1.2 * before
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

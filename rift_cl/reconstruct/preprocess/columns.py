@@ -119,6 +119,13 @@ class DetectorColumns:
         arrays = (self._values, self.device.array(table), self.device.array(shares))
         self.device.launch("column_blend", size, *arrays, self.views, RUN=run)
 
+    def subtract(self, levels: NDArray[Any]) -> None:
+        """Subtract a number from each column, (row, bin)."""
+        run = _CPU_RUN if self.device.traits.is_cpu else 1
+        size = (-(-self.views // run), self.rows * self.bins)
+        shift = self.device.array(levels, np.float32)
+        self.device.launch("column_shift", size, self._values, shift, self.views, RUN=run)
+
     def _profile(self, kernel: str, *arguments: int) -> Floats:
         columns = self.rows * self.bins
         found = self.device.empty((self.rows, self.bins))

@@ -30,7 +30,13 @@ from rift_cl.cl.discovery import default_device
 from rift_cl.cl.memory import as_plain, as_real_array, check_finite
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.reconstruct.preprocess.columns import FEWEST_VIEWS, DetectorColumns, mend_columns
-from rift_cl.reconstruct.preprocess.stripe_detection import WINDOW, fluctuating, odd_window, offset
+from rift_cl.reconstruct.preprocess.stripe_detection import (
+    WINDOW,
+    fluctuating,
+    odd_window,
+    offset,
+    unevenness,
+)
 
 Floats = NDArray[np.float32]
 StripeMethod = Callable[[Floats, Device], Floats]
@@ -99,9 +105,11 @@ class LargeStripes:
 
     Args:
         ratio: a stripe begins and ends with steps of the level so many times the usual one.
+        normalise: also bring the level of every bin to the median of those around it.
     """
 
     ratio: float = 5.0
+    normalise: bool = True
 
     def __post_init__(self) -> None:
         """Check the ratio."""
@@ -119,8 +127,11 @@ class LargeStripes:
 
     def mend_sorted(self, columns: DetectorColumns) -> None:
         """Filter columns that are sorted, and stay so."""
-        levels = columns.levels(int(_DROPPED * columns.views))
+        dropped = int(_DROPPED * columns.views)
+        levels = columns.levels(dropped)
         columns.interpolate(np.stack([offset(level, self.ratio) for level in levels]))
+        if self.normalise:
+            columns.subtract(np.stack([unevenness(level) for level in columns.levels(dropped)]))
 
 
 @dataclass(frozen=True)
@@ -155,11 +166,14 @@ class CombinedFilter:
         window: bins of the median; see ``SortingFilter``.
         large_ratio: see ``LargeStripes``.
         dead_ratio: see ``DeadStripes``.
+        normalise: see ``LargeStripes``; it removes broad rings, and with them what the object has
+            that is round about the axis.
     """
 
     window: int | None = None
     large_ratio: float = LargeStripes.ratio
     dead_ratio: float = DeadStripes.ratio
+    normalise: bool = False
 
     def __post_init__(self) -> None:
         """Check the options."""
@@ -173,7 +187,7 @@ class CombinedFilter:
     def _mend(self, columns: DetectorColumns) -> None:
         DeadStripes(self.dead_ratio).mend(columns)
         columns.sort()
-        LargeStripes(self.large_ratio).mend_sorted(columns)
+        LargeStripes(self.large_ratio, self.normalise).mend_sorted(columns)
         columns.median(SortingFilter(self.window).window_for(columns.bins))
         columns.unsort()
 

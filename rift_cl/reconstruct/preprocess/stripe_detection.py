@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 Profile = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# The paper's window across bins, and the share of a smaller detector that it may be.
-WINDOW, _SHARE = 21, 8
+# The paper's windows across bins, to find stripes and to compare levels, and the share of a smaller
+# detector that they may be.
+WINDOW, _LEVEL_WINDOW, _SHARE = 21, 51, 8
 # The two jumps round a stripe are opposite, and neither is more than twice the other.
 _ALIKE = 2.0
 
@@ -56,6 +57,12 @@ def offset(levels: ArrayLike, ratio: float) -> Mask:
         for start in np.flatnonzero(steep[:-width] & steep[width:] & opposite & alike):
             found[start + 1 : start + width + 1] = True
     return _narrow(found)
+
+
+def unevenness(levels: ArrayLike) -> Profile:
+    """By how much the level of each bin exceeds the median of those around it, (bin,)."""
+    level = np.asarray(levels, np.float64)
+    return level - _median(level, odd_window(_LEVEL_WINDOW, level.size))
 
 
 def odd_window(window: int, bins: int) -> int:
