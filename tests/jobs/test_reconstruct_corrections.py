@@ -192,3 +192,25 @@ def test_subsets_take_fewer_steps(half_acquisition, tmp_path):
     options = ("--center", 12, "--method", "sirt", "--subsets", 10)
     reconstruct(path, tmp_path / "out", *options)
     assert json.loads((tmp_path / "out/metrics.json").read_text())["steps"] == 10
+
+
+@pytest.mark.parametrize("slab", [16, 1])
+def test_zingers_are_removed_and_counted_in_slabs_of_any_size(tmp_path, monkeypatch, slab):
+    integrals, chance = line_integrals(), np.random.default_rng(5)
+    hits = tuple(chance.integers(0, n, 40) for n in integrals.shape)
+
+    def hit(counts):
+        noisy = chance.poisson(counts).astype(float)
+        noisy[hits] += 2e4
+        return noisy
+
+    path = write_counts(tmp_path / "scan.h5", integrals, hit)
+    common = ("--center", 39.5, "--rings", "off")
+    truth = reconstruct(write_counts(tmp_path / "clean.h5", integrals), tmp_path / "truth", *common)
+    monkeypatch.setattr("rift_cl.jobs.reconstruct.inversion._SLAB", slab)
+    struck = reconstruct(path, tmp_path / "struck", *common)
+    mended = reconstruct(path, tmp_path / "mended", *common, "--zingers", 6)
+    assert np.abs(mended - truth).max() < 0.3 * np.abs(struck - truth).max()
+    metrics = json.loads((tmp_path / "mended/metrics.json").read_text())
+    assert metrics["zingers"] == len(set(zip(*hits, strict=True)))
+    assert "Zingers" in notes(tmp_path / "mended")

@@ -1,9 +1,9 @@
 """Rows of a scan as clean line integrals: what a detector gets wrong is put right here.
 
 In this order, each step where it was asked for or is called for: flat-field correction and the
-logarithm, phase retrieval, stripes, a tilted or wandering axis. A step that looks at neighbouring
-rows is given as many more as it needs, so that slices do not depend on how the rows were cut into
-slabs.
+logarithm, zingers, phase retrieval, stripes, a tilted or wandering axis. A step that looks at
+neighbouring rows is given as many more as it needs, so that slices do not depend on how the rows
+were cut into slabs.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from rift_cl.reconstruct.preprocess import (
     Propagation,
     paganin,
     remove_rings,
+    remove_zingers,
     straightened,
     tilt_halo,
     upright,
@@ -35,6 +36,8 @@ Floats = NDArray[np.float32]
 _USUAL_RINGS = "vo"
 # Stripes are told from the object where views go round so far: a flat face is a stripe in fewer.
 _RINGS_FROM = np.deg2rad(150)
+# Rows above and below that tell whether a pixel stands out.
+_ZINGER_HALO = 1
 # Options of phase retrieval, all of which it needs.
 _PHASE = ("delta_beta", "energy", "propagation")
 
@@ -101,6 +104,8 @@ class CleanRows:
         self._scan, self._settings, self._device = scan, settings, device
         self.rings = self._ring_method()
         self.phase = self._propagation(pixel)
+        # Zingers that were removed in the rows that were read since it was last set to zero.
+        self.zingers = 0
         # Set once the axis is known, where it is not at one bin.
         self.alignment: Alignment | None = None
 
@@ -121,13 +126,22 @@ class CleanRows:
     def _level(self, start: int, stop: int) -> Attenuation:
         """Line integrals before anything that is done in sinograms."""
         halo = 0 if self.phase is None else self.phase.halo_rows()
+        halo += 0 if self._settings.zingers is None else _ZINGER_HALO
         first, last = self._around(start, stop, halo)
         integrals = read_attenuation(self._scan, first, last)
-        if self.phase is None:
-            return integrals
-        rows = paganin(np.exp(-integrals.projections), **_arguments(self.phase))
+        rows = integrals.projections
+        if self._settings.zingers is not None:
+            rows = self._without_zingers(rows, slice(start - first, stop - first))
+        if self.phase is not None:
+            rows = paganin(np.exp(-rows), **_arguments(self.phase))
         rows = np.ascontiguousarray(rows[:, start - first : stop - first])
         return dataclasses.replace(integrals, projections=rows)
+
+    def _without_zingers(self, rows: Floats, inner: slice) -> Floats:
+        sigma = self._settings.zingers or 0.0
+        clean, _ = remove_zingers(rows, sigma=sigma, kind="attenuation", device=self._device)
+        self.zingers += int(np.count_nonzero(clean[:, inner] != rows[:, inner]))
+        return clean
 
     def _around(self, start: int, stop: int, halo: int) -> tuple[int, int]:
         return max(0, start - halo), min(self._scan.shape[1], stop + halo)
@@ -141,6 +155,11 @@ class CleanRows:
                 f"Phase was retrieved after Paganin et al. (2002): delta/beta "
                 f"{self.phase.delta_beta:g}, {self.phase.energy:g} keV, "
                 f"{1e3 * self.phase.distance:g} mm, a filter of {blur:.3g} pixels."
+            )
+        if self._settings.zingers is not None:
+            notes.append(
+                "Zingers, single pixels that stand out of their neighbours by "
+                f"{self._settings.zingers:g} standard deviations, were removed."
             )
         if self.rings is not None:
             notes.append(f"Stripes were removed from the projections, method {self.rings} (rings).")

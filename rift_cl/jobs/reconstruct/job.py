@@ -200,6 +200,8 @@ class Reconstruction:
 
     def _work(self) -> Iterator[Report]:
         """Every slice that is missing; first, of a long run, the middle one to look at."""
+        # Less those of the row that the axis was looked for in.
+        self.source.clean.zingers = 0
         if not self._gone_on and self._looks_first:
             yield from self._look()
         done = self._kept.done
@@ -278,6 +280,8 @@ class Reconstruction:
             self._show(preview.middle)
         if self.source.center is not None:
             self.metrics = {"center": self.source.center, **self.metrics}
+        if self.settings.zingers is not None:
+            self.metrics["zingers"] = self.source.clean.zingers
         self.metrics.update(self.inversion.figures())
         self.metrics.update(preview.statistics())
         self.metrics["seconds"] = time.perf_counter() - self._begin

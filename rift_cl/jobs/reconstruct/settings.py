@@ -125,6 +125,9 @@ class ReconstructSettings(ScanInput):
     binning: int = 1
     """Average blocks of so many detector rows and bins before all else; --center, --rows, --pitch
     and --tilt keep to the detector as it is."""
+    zingers: float | None = None
+    """Replace zingers, single pixels that cosmic rays or scattered photons hit, which stand out of
+    their neighbours by so many standard deviations of the noise, such as 6; none if not given."""
     tilt: float | None = None
     """Degrees by which the rotation axis leans in the detector's plane, positive where its bin
     grows with the row; projections are turned by it. If not given: the tilt found with the axis,
@@ -182,7 +185,7 @@ class ReconstructSettings(ScanInput):
             value = getattr(self, name)
             if value is not None and value < bound:
                 raise InputError(f"--{name} is {value}, wanted {bound} or more")
-        for name in ("noise", "weight", "pixel"):
+        for name in ("noise", "weight", "pixel", "zingers"):
             value = getattr(self, name)
             if value is not None and not 0 < value < float("inf"):
                 raise InputError(f"--{name} is {value:g}, wanted a positive number")
