@@ -17,16 +17,18 @@ def test_bins_between_bins_are_the_twin_s(device: rift.Device, rows: int, bins: 
     rng = np.random.default_rng(1)
     stack = rng.standard_normal((3, rows, bins)).astype(np.float32)
     for shift in rng.uniform(-7, 7, (3, rows)):
-        positions = 1.003 * np.arange(bins) + shift[:, None]
-        got = resampled(device, stack, positions, along="bins")
+        shifts = 0.003 * np.arange(bins) + shift[:, None]
+        got = resampled(device, stack, shifts, along="bins")
+        positions = np.arange(bins) + shifts
         np.testing.assert_allclose(got, twin.resampled(stack, positions, 2), atol=2e-6)
 
 
 @pytest.mark.parametrize("tilt", [-0.08, 0.003, 0.08])
 def test_rows_between_rows_are_the_twin_s(device: rift.Device, tilt: float) -> None:
     stack = np.random.default_rng(2).standard_normal((2, 9, 53)).astype(np.float32)
-    positions = 0.9 * np.arange(4)[:, None] + 2 - tilt * (np.arange(53) - 20)
-    got = resampled(device, stack, positions, along="rows")
+    shifts = -0.1 * np.arange(4)[:, None] - tilt * (np.arange(53) - 20)
+    got = resampled(device, stack, shifts, along="rows", first_row=2)
+    positions = 2 + np.arange(4)[:, None] + shifts
     np.testing.assert_allclose(got, twin.resampled(stack, positions, 1), atol=2e-6)
 
 
@@ -127,21 +129,21 @@ def test_slices_of_a_tilted_scan_are_those_of_an_upright_one() -> None:
     assert before < best - 0.5
 
 
-def test_a_slab_does_not_depend_on_the_rest() -> None:
-    stack = np.random.default_rng(4).standard_normal((2, 80, 64)).astype(np.float32)
-    tilt, center, pivot = 0.02, 30.3, 25.0
-    whole = upright(stack, tilt, center, pivot=pivot)
-    halo = tilt_halo(tilt, 64, center)
-    for start, stop in ((20, 28), (28, 33), (50, 51)):
-        first = start - halo
-        part = upright(
-            stack[:, first : stop + halo],
-            tilt,
-            center,
-            pivot=pivot - first,
-            rows=(halo, halo + stop - start),
-        )
-        np.testing.assert_allclose(part, whole[:, start:stop], atol=1e-5)
+@pytest.mark.parametrize(("tilt", "pivot"), [(0.02, 25.3), (-0.08, 700.1), (0.05, -3000.7)])
+def test_rows_are_the_same_bits_in_every_slab(
+    device: rift.Device, tilt: float, pivot: float
+) -> None:
+    center, bins = 30.3, 64
+    halo = tilt_halo(tilt, bins, center, away=abs(pivot) + 90)
+    stack = np.random.default_rng(4).standard_normal((2, 40 + 2 * halo, bins)).astype(np.float32)
+    kept = (halo, halo + 40)
+    whole = upright(stack, tilt, center, pivot=halo + pivot, rows=kept, device=device)
+    for start, stop in ((0, 8), (8, 13), (30, 31), (13, 40)):
+        part = stack[:, start : stop + 2 * halo]
+        rows = (halo, halo + stop - start)
+        there = halo + pivot - start
+        got = upright(part, tilt, center, pivot=there, rows=rows, device=device)
+        np.testing.assert_array_equal(got, whole[:, start:stop])
 
 
 def test_what_cannot_be_straightened() -> None:

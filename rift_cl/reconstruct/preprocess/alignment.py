@@ -29,6 +29,10 @@ from rift_cl.reconstruct.preprocess.sinc_interpolation import TAPS, resampled
 
 Stack = NDArray[np.float32]
 
+# The place of a pivot is rounded to one over so many rows.
+_FINE = 1 << 16
+# Rows of the tallest detectors.
+_TALL = 4096
 # More than a misaligned detector; beyond, the scan was meant to be another (laminography).
 _MOST_TILT = math.radians(5)
 
@@ -62,8 +66,8 @@ def straightened(
             f"the rows' centres run from {axis.min():g} to {axis.max():g}, wanted {center:g}, "
             f"which moves rows by more than the detector's {bins} bins"
         )
-    positions = np.arange(bins) + shift[:, None]
-    return resampled(device or open_device(), stack, positions, along="bins")
+    shifts = np.repeat(shift[:, None], bins, axis=1)
+    return resampled(device or open_device(), stack, shifts, along="bins")
 
 
 def upright(
@@ -99,27 +103,29 @@ def upright(
         raise InputError(f"rows is {rows}, the projections have the rows 0 to {stack.shape[1]}")
     sine, cosine = math.sin(_checked(tilt)), math.cos(tilt)
     device = device or open_device()
-    v = np.arange(first, stop)[:, None] - float(pivot)
+    # Rounded so that the distance of a row is the same number in every slab.
+    v = np.arange(first, stop)[:, None] - round(pivot * _FINE) / _FINE
     u = np.arange(stack.shape[2])[None] - float(center)
-    along_rows = pivot + (v - u * sine) / cosine
-    sheared = resampled(device, stack, along_rows, along="rows")
-    return resampled(device, sheared, center + u * cosine + v * sine, along="bins")
+    sheared = resampled(device, stack, (v - u * sine) / cosine - v, along="rows", first_row=first)
+    return resampled(device, sheared, u * cosine + v * sine - u, along="bins")
 
 
-def tilt_halo(tilt: float, bins: int, center: float | None = None) -> int:
+def tilt_halo(tilt: float, bins: int, center: float | None = None, *, away: float = _TALL) -> int:
     """Rows that ``upright`` takes above and below those that it returns.
 
     Args:
         tilt: in radians.
         bins: of a row.
         center: bin of the rotation axis; the middle if not given.
+        away: how many rows from the pivot a row may be.
 
     Raises:
         InputError: the tilt is no angle or more than 5 degrees.
     """
     middle = (bins - 1) / 2 if center is None else center
     reach = max(abs(middle), abs(bins - 1 - middle))
-    return math.ceil(reach * math.tan(abs(_checked(tilt)))) + TAPS // 2 + 1
+    sine, cosine = math.sin(abs(_checked(tilt))), math.cos(tilt)
+    return math.ceil((reach * sine + away * (1 - cosine)) / cosine) + TAPS // 2 + 1
 
 
 def _checked(tilt: float) -> float:

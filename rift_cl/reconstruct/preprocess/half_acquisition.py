@@ -140,9 +140,9 @@ def _mirrored(views: Stack, center: float, device: Device | None) -> tuple[Stack
     turned = views[..., ::-1]
     if first - begin <= _SAME_BIN:
         return turned, first
-    positions = (np.arange(bins) + (first - begin))[None]
+    shifts = np.full((1, bins), first - begin)
     lines = np.ascontiguousarray(turned).reshape(-1, 1, bins)
-    moved = resampled(device or open_device(), lines, positions, along="bins")
+    moved = resampled(device or open_device(), lines, shifts, along="bins")
     return moved.reshape(views.shape), first
 
 

@@ -41,25 +41,30 @@ def sinc_weights(fractions: Floats) -> Floats:
 
 
 def resampled(
-    device: Device, stack: Stack, positions: Floats, *, along: str, first_row: int = 0
+    device: Device, stack: Stack, shifts: Floats, *, along: str, first_row: int = 0
 ) -> Stack:
-    """Read every view at the same fractional positions.
+    """Read every view between samples, at the same places.
+
+    The result depends on the shifts alone and not on where in the stack a row is, so that rows
+    come out the same to the bit in whatever slab they are.
 
     Args:
         device: where to work.
         stack: (view, row, bin).
-        positions: (row, bin) of the result: the bin to read in row ``first_row + row``
-            (along="bins"), or the row to read in the same bin (along="rows"). From one bin to
-            the next they change by less than a seventh of a sample, apart from the step itself.
+        shifts: (row, bin) of the result: how far from itself each sample is read, in bins
+            (along="bins") or in rows (along="rows"). From one bin to the next they change by less
+            than a seventh of a sample. Beyond its ends the stack goes on with its last sample.
         along: "bins" or "rows".
-        first_row: of the stack, the row that the result begins with (along="bins").
+        first_row: of the stack, the row that the result begins with.
 
     Returns:
         (view, row, bin).
     """
     views, rows_in, bins = stack.shape
-    rows = len(positions)
-    weights, starts = _tables(positions, relative=along == "bins")
+    rows = len(shifts)
+    weights, starts = _tables(shifts)
+    if along == "rows":
+        starts += first_row + np.arange(rows, dtype=np.int32)[:, None]
     on_device = device.array(weights), device.array(starts)
     out = np.empty((views, rows, bins), np.float32)
     run = 4096 if device.traits.is_cpu else 1
@@ -75,24 +80,22 @@ def resampled(
     return out
 
 
-def _tables(positions: Floats, *, relative: bool) -> tuple[Stack, NDArray[np.int32]]:
-    """Weights (row, tap, bin) and the first tap of each block of bins (row, block).
+def _tables(shifts: Floats) -> tuple[Stack, NDArray[np.int32]]:
+    """Weights (row, tap, bin), and of each block of bins the first tap's distance (row, block).
 
     Places of a block that begin one sample later have their weights one tap further on.
     """
-    rows, bins = positions.shape
+    rows, bins = shifts.shape
     padded = -(-bins // _BLOCK) * _BLOCK
-    whole = np.floor(positions)
-    weights = sinc_weights(positions - whole)
+    whole = np.floor(shifts)
+    weights = sinc_weights(shifts - whole)
     first = whole.astype(np.int64) + 1 - TAPS // 2
-    if relative:
-        first -= np.arange(bins)
     first = np.pad(first, ((0, 0), (0, padded - bins)), mode="edge")
     blocks = first.reshape(rows, -1, _BLOCK)
     starts = blocks.min(axis=-1)
     later = (blocks - starts[..., None]).reshape(rows, padded)[:, :bins]
     if later.max() > 1:
-        raise ValueError("positions change too fast from bin to bin")
+        raise ValueError("shifts change too fast from bin to bin")
     table = np.zeros((rows, TAPS + 1, padded), np.float32)
     lines = np.moveaxis(weights, -1, 1)
     table[:, :TAPS, :bins] = np.where(later[:, None] == 0, lines, 0)
