@@ -2,7 +2,7 @@
  *
  *     x[c][v] -= shift[c]
  *
- * Index space: (runs of RUN views, columns). */
+ * Index space: (runs of RUN views, bins, rows): a grid's further axes end at 65,535 on some GPUs. */
 
 #include "include/portable.h"
 
@@ -14,7 +14,8 @@ KERNEL void column_shift(__global float *x, __global const float *restrict shift
 {
   const int begin = (int)get_global_id(0) * RUN;
   const int end = begin + RUN < views ? begin + RUN : views;
-  const long at = get_global_id(1) * (long)views;
-  const float by = shift[get_global_id(1)];
+  const long column = get_global_id(2) * (long)get_global_size(1) + get_global_id(1);
+  const long at = column * views;
+  const float by = shift[column];
   for (int v = begin; v < end; v++) x[at + v] -= by;
 }

@@ -2,7 +2,7 @@
  *
  *     values[c][order[c][k]] = ranked[c][k]
  *
- * Index space: (runs of RUN ranks, columns). */
+ * Index space: (runs of RUN ranks, bins, rows): a grid's further axes end at 65,535 on some GPUs. */
 
 #include "include/portable.h"
 
@@ -16,6 +16,7 @@ KERNEL void column_unsort(
 {
   const int begin = (int)get_global_id(0) * RUN;
   const int end = begin + RUN < views ? begin + RUN : views;
-  const long at = get_global_id(1) * (long)views;
+  const long column = get_global_id(2) * (long)get_global_size(1) + get_global_id(1);
+  const long at = column * views;
   for (int k = begin; k < end; k++) values[at + order[at + k]] = ranked[at + k];
 }

@@ -130,7 +130,7 @@ def test_a_beta_or_an_error_that_means_nothing_is_told():
     ("stack", "kind", "words"),
     [
         (np.ones((4, 4)), ShapeError, "wanted \\(angle, row, bin\\)"),
-        (np.ones((0, 4, 4)), ShapeError, "none of them 0"),
+        (np.ones((0, 4, 4)), ShapeError, "it holds nothing"),
         (np.ones((3, 1, 4)), ShapeError, "rows above and below"),
         (np.full((1, 4, 4), np.nan), NonFiniteError, "transmission"),
         (np.full((1, 4, 4), 3000), InputError, "the mean 3000"),

@@ -167,9 +167,9 @@ def test_fitting_removes_low_stripes_of_a_smooth_object():
 def test_every_method_treats_rows_by_themselves_and_keeps_level_data(clean, noisy, method):
     if method == "wavelet-fft":
         pytest.importorskip("pywt")
-    stack = np.stack([clean, striped(noisy, "full")[0], clean * 0 + 0.7], axis=1)
+    stack = np.stack(2 * [clean, striped(noisy, "full")[0], clean * 0 + 0.7], axis=1)
     mended = remove_rings(stack, method=method)
-    for row in range(3):
+    for row in range(6):
         np.testing.assert_array_equal(mended[:, row], remove_rings(stack[:, row], method=method))
     np.testing.assert_allclose(mended[:, 2], stack[:, 2], rtol=1e-5)
 
@@ -217,3 +217,15 @@ def test_a_wavelet_that_is_not_there_is_told():
     pytest.importorskip("pywt")
     with pytest.raises(InputError, match="wavelet is 'sine'"):
         remove_rings(np.zeros((40, 64), np.float32), method="wavelet-fft", wavelet="sine")
+
+
+def test_values_that_no_measurement_has_are_told():
+    with pytest.raises(InputError, match="beyond 1e\\+18"):
+        remove_rings(np.full((40, 64), -1e30))
+
+
+def test_any_real_array_will_do():
+    x = np.random.default_rng(7).random((40, 3, 64)).astype(np.float32)
+    expected = remove_rings(x)
+    for same in (x.astype(">f8"), np.asfortranarray(x), np.repeat(x, 2, axis=2)[:, :, ::2]):
+        np.testing.assert_array_equal(remove_rings(same), expected)

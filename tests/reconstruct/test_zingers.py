@@ -227,3 +227,15 @@ def test_a_constant_stays_and_a_single_pixel_goes(level):
 def test_what_means_nothing_is_told(stack, options, kind, words):
     with pytest.raises(kind, match=words):
         remove_zingers(stack, **options)
+
+
+def test_values_that_no_measurement_has_are_told():
+    with pytest.raises(InputError, match="beyond 1e\\+18"):
+        remove_zingers(np.full((40, 64), -1e30))
+
+
+def test_any_real_array_will_do():
+    x = np.random.default_rng(7).random((40, 3, 64)).astype(np.float32)
+    expected = remove_zingers(x)[0]
+    for same in (x.astype(">f8"), np.asfortranarray(x), np.repeat(x, 2, axis=2)[:, :, ::2]):
+        np.testing.assert_array_equal(remove_zingers(same)[0], expected)

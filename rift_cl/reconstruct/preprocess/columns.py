@@ -84,7 +84,7 @@ class DetectorColumns:
     def unsort(self) -> None:
         """Put ranked values back to the views that ``sort`` took them from."""
         run = _CPU_RUN if self.device.traits.is_cpu else 1
-        size = (-(-self.views // run), self.rows * self.bins)
+        size = (-(-self.views // run), self.bins, self.rows)
         other = self._spare()
         arrays = (self._values, self._order, other)
         self.device.launch("column_unsort", size, *arrays, self.views, RUN=run)
@@ -122,7 +122,7 @@ class DetectorColumns:
     def subtract(self, levels: NDArray[Any]) -> None:
         """Subtract a number from each column, (row, bin)."""
         run = _CPU_RUN if self.device.traits.is_cpu else 1
-        size = (-(-self.views // run), self.rows * self.bins)
+        size = (-(-self.views // run), self.bins, self.rows)
         shift = self.device.array(levels, np.float32)
         self.device.launch("column_shift", size, self._values, shift, self.views, RUN=run)
 

@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.cl.memory import as_plain, as_real_array, check_finite
 from rift_cl.errors import InputError, ShapeError
+from rift_cl.reconstruct.preprocess.projection_array import as_projections
 
 Floats = NDArray[np.float32]
 
@@ -161,8 +161,8 @@ def paganin(
     setting = Propagation(pixel, distance, energy, delta_beta, generalised)
     if beta is not None and not _is_positive(beta):
         raise InputError(f"phase retrieval: beta is {beta}, wanted a positive number")
-    stack = as_plain(as_real_array(transmission, name="transmission"), np.float32)
-    _check_projections(stack)
+    stack = as_projections(transmission, name="transmission", one_row=False)
+    _check_transmission(stack)
     mu = 1.0 if beta is None else 4 * math.pi * beta / setting.wavelength
     views, rows, bins = stack.shape
     response = setting.response(rows, bins).astype(np.float32)
@@ -199,17 +199,14 @@ def _line_integrals(stack: Floats, response: Floats) -> Floats:
     return integrals
 
 
-def _check_projections(stack: Floats) -> None:
-    if stack.ndim != 3 or 0 in stack.shape:
-        raise ShapeError(
-            f"transmission has shape {stack.shape}, wanted (angle, row, bin), none of them 0"
-        )
+def _check_transmission(stack: Floats) -> None:
+    if not stack.size:
+        raise ShapeError(f"transmission has shape {stack.shape}: it holds nothing")
     if stack.shape[1] == 1:
         raise ShapeError(
             "transmission has a single row: phase retrieval needs the rows above and below; of an "
             "object that is the same along the rotation axis, repeat the row"
         )
-    check_finite(stack, name="transmission")
     mean = float(stack.mean(dtype=np.float64))
     if mean > _BRIGHTEST:
         raise InputError(

@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
-from rift_cl.cl.memory import as_plain, as_real_array, check_finite
-from rift_cl.errors import InputError, ShapeError
+from rift_cl.errors import InputError
 from rift_cl.reconstruct.preprocess.columns import FEWEST_VIEWS, DetectorColumns, mend_columns
+from rift_cl.reconstruct.preprocess.projection_array import as_projections
 from rift_cl.reconstruct.preprocess.stripe_detection import (
     WINDOW,
     fluctuating,
@@ -342,12 +342,7 @@ def remove_rings(
         InputError: there is no such method, or it has no such option or value.
     """
     stripe_method = _method(method, options)
-    stack = as_plain(as_real_array(projections, name="projections"), np.float32)
-    if stack.ndim not in (2, 3):
-        raise ShapeError(
-            f"projections have shape {stack.shape}, wanted (angle, bin) or (angle, row, bin)"
-        )
-    check_finite(stack, name="projections")
+    stack = as_projections(projections, name="projections")
     if stack.shape[0] < FEWEST_VIEWS or stack.shape[-1] < _FEWEST_BINS or not stack.size:
         return stack.copy()
     rows = stack if stack.ndim == 3 else stack[:, None]

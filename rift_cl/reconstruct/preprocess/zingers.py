@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
-from rift_cl.cl.memory import as_plain, as_real_array, check_finite
-from rift_cl.errors import InputError, ShapeError
+from rift_cl.errors import InputError
+from rift_cl.reconstruct.preprocess.projection_array import as_projections
 
 Floats = NDArray[np.float32]
 
@@ -84,12 +84,7 @@ def remove_zingers(
         InputError: an option has no meaning.
     """
     _check_options(sigma, excess, size, kind)
-    values = as_plain(as_real_array(stack, name="stack"), np.float32)
-    if values.ndim not in (2, 3):
-        raise ShapeError(
-            f"stack has shape {values.shape}, wanted (angle, bin) or (angle, row, bin)"
-        )
-    check_finite(values, name="stack")
+    values = as_projections(stack, name="stack")
     rule = _Rule(sigma, excess, size, dark)
     projections = values if values.ndim == 3 else values[:, None]
     if kind == "attenuation":
