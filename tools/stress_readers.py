@@ -170,7 +170,9 @@ def _outcome(path: Path) -> tuple[str, str]:
     from rift_cl.io import open_scan
 
     try:
-        scan = open_scan(path, budget=_BUDGET)
+        # Frames of TIFF without flats are counts, which are refused where nothing is said of them.
+        kind = "attenuation" if path.suffix == ".tif" else None
+        scan = open_scan(path, kind=kind, budget=_BUDGET)
         scan.read(scan.shape[1] - 1, scan.shape[1])
         rows = scan.read(0, 1).projections
         if rows.shape != (scan.shape[0], 1, scan.shape[2]) or not np.isfinite(scan.angles).all():

@@ -28,6 +28,8 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
 _TURN = re.compile(rf"(?:({_NUMBER}):)?({_NUMBER})")
 # Spans up to this are radians of one turn or, in degrees, too little to reconstruct from.
 _RADIANS_UP_TO = 7.0
+# Two turns; what spans more counts something else, frames or steps of a motor, or many turns.
+_DEGREES_UP_TO = 725.0
 # Two angles tell nothing about their unit.
 _TELLING = 3
 # Radians between neighbouring views of a scan of several turns, at most.
@@ -112,7 +114,7 @@ class AngleList:
         raise InputError(
             f"{path}: the angles {self.name!r} span {span:.4g} in {self.values.size} views, which "
             f"is doubtful for {stated}: say which unit it is with angle_unit= (--angle-unit "
-            f"{other} or {stated})"
+            f"{other} or {stated}), or give other angles with theta= (--theta)"
         )
 
 
@@ -122,7 +124,7 @@ def _doubtful(values: Angles, unit: AngleUnit) -> bool:
     if values.size < _TELLING or span == 0:
         return False
     if unit == "degrees":
-        return span <= _RADIANS_UP_TO
+        return not _RADIANS_UP_TO < span < _DEGREES_UP_TO
     coarse = span / (values.size - 1) > _COARSE
     return span > _RADIANS_UP_TO and (coarse or _half_turns(values, "degrees"))
 

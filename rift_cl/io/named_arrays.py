@@ -112,6 +112,9 @@ def scan_in(store: ArrayStore, layout: Layout, request: ScanRequest) -> ScanFile
     layout, beside = _completed(store, layout, request)
     angles = _angles(store, layout)
     keys = store.vector(layout.image_key) if layout.image_key else None
+    if keys is not None and layout.image_key in beside:
+        # Keys that nobody named may be those of another array.
+        keys = keys if keys.size in store.shape(layout.projections) else None
     projections = _projections(store, layout, request, angles, keys)
     frames, flats_at = projections, None
     flats = _calibration(store, layout.flats, frames, beside)
@@ -156,9 +159,12 @@ def _completed(
         for part in ("theta", "flats", "darks", "image_key")
         if getattr(request, part) is not None
     }
+    wanted: tuple[str, ...] = ("theta", "image_key", "darks", "flats")
     if named.get("flats") in (AIR, MEAN) and named["flats"] not in store:
+        # What takes the place of flats is no name, and then none are looked for.
         del named["flats"]
-        layout = replace(layout, flats=None, search=False)
+        layout = replace(layout, flats=None)
+        wanted = wanted[:-1]
     layout = replace(layout, **named)
     if not layout.search:
         return layout, frozenset()
@@ -169,7 +175,7 @@ def _completed(
         "flats": [name for name in beside if is_said("flats", _last(name))],
         "darks": [name for name in beside if is_said("darks", _last(name))],
     }
-    only: dict[str, Any] = {part: names[0] for part, names in found.items() if len(names) == 1}
+    only: dict[str, Any] = {part: found[part][0] for part in wanted if len(found[part]) == 1}
     new = {part: name for part, name in only.items() if not getattr(layout, part)}
     return replace(layout, **new), frozenset(new.values())
 

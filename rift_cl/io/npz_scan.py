@@ -21,6 +21,11 @@ from rift_cl.io.npz_archive import NpzArchive
 from rift_cl.io.scan_axes import USUAL
 from rift_cl.io.scan_file import Frames, Part, ScanFile, ScanRequest, ScanRows, usable_pitch
 
+# How distances from the source to the axis and to the detector are called.
+_DISTANCES = (
+    *("sdd", "sid", "sod", "dso", "dsd", "odd"),
+    *("source_to_axis", "source_to_detector", "source_origin", "source_detector"),
+)
 # Eight million projections: no scan has more, and a forged header may not ask for gigabytes.
 _LONGEST_VECTOR = 64 << 20
 
@@ -115,6 +120,18 @@ def _layout(store: NpzStore, dataset: str | None) -> Layout:
         angle_unit="radians",
         search=not known,
         pitch=usable_pitch(pitch),
+        notes=_divergent(archive),
+    )
+
+
+def _divergent(archive: NpzArchive) -> tuple[str, ...]:
+    """A doubt, where arrays are named as the distances of a fan or a cone are."""
+    found = [name for name in archive.names() if name.lower() in _DISTANCES]
+    if not found:
+        return ()
+    return (
+        f"The file names distances of a source ({', '.join(map(repr, found))}), which are not "
+        "used: rays are taken as parallel.",
     )
 
 

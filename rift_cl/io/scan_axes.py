@@ -63,6 +63,7 @@ def axes_of(
     count: int | None,
     asked: str | None,
     usual: str | None = None,
+    remark: str = "",
 ) -> str:
     """The letters of an array's axes.
 
@@ -73,6 +74,7 @@ def axes_of(
         count: number of angles, or of frames; None where it is not known.
         asked: the axes that a person named.
         usual: the letters by the definition of the file's layout.
+        remark: what else the array may be, for an error.
 
     Raises:
         InputError: the axes that were named are none.
@@ -105,7 +107,7 @@ def axes_of(
         number = "" if count is None else f" with {count} angles"
         raise ShapeError(
             f"{path}: {name!r} of shape {shape}{number} can be read as {listed}: say which axis is "
-            f"which with axes= (--axes), such as --axes {spoken(readings[0])}"
+            f"which with axes= (--axes), such as --axes {spoken(readings[0])}{remark}"
         )
     return readings[0]
 

@@ -39,6 +39,10 @@ _MEAN_ROWS = 16
 # Air at the ends of counts is at least this share of the brightest; projections are at most so many
 # times as bright as flats, and flats at most so many times as bright as projections.
 _AIR_LEAST, _BRIGHTER, _DIMMER = 0.7, 2.0, 20.0
+# Ends of line integrals that are worth a word, as a share of their range.
+_OFF = 0.02
+# Bins differ from their neighbours by at most this share where the beam is taken from the ends.
+_UNEVEN = 0.05
 _KINDS = "--kind counts, transmission or attenuation"
 
 
@@ -114,6 +118,8 @@ def scan_of(found: Finding, request: ScanRequest) -> ScanFile:
         background = _air(found, seen)
     if kind == "counts" and substitute == MEAN:
         incident = _means(found, rows)
+    if kind != "counts" and not background:
+        notes += _off_air(kind, seen)
     line = _line(found, kind, seen, _calibration(found, kind, substitute, flats, darks))
     return ScanFile(
         path=found.path,
@@ -170,8 +176,11 @@ def _kind(
         doubt = _no_counts_of(found, seen)
         if doubt is None:
             return "counts", ()
-        if request.flats is not None:
-            raise InputError(f"{found.path}: {doubt}; say what they are with kind= ({_KINDS})")
+        if request.flats is not None or possible_kinds(seen) == ("counts",):
+            raise InputError(
+                f"{found.path}: {doubt}; name other flats with flats= (--flats), or say what the "
+                f"values are with kind= ({_KINDS})"
+            )
         kind = _by_values(found, seen)
         return kind, (f"The flats are not used: {doubt}.",)
     return found.kind or _by_values(found, seen), _passed_over(found, "")
@@ -183,6 +192,20 @@ def _passed_over(found: Finding, kind: str) -> tuple[str, ...]:
     if found.darks and not found.flats:
         return ("The darks are not used, as there are no flats.",)
     return ()
+
+
+def _off_air(kind: Kind, seen: Sample) -> tuple[str, ...]:
+    """A doubt, where both ends of the detector are off what air reads by about as much."""
+    air = 0.0 if kind == "attenuation" else 1.0
+    left, right = (end - air for end in seen.ends)
+    off = abs(left + right) / 2
+    if off <= _OFF * max(seen.high - seen.low, seen.high) or abs(left - right) > off / 2:
+        return ()
+    read = air + (left + right) / 2
+    return (
+        f"Both ends of the detector read {read:.3g}, and air {air:g}: if they see nothing but air, "
+        "bring their line integrals to zero with --background, so many bins at each end.",
+    )
 
 
 def _by_values(found: Finding, seen: Sample) -> Kind:
@@ -261,7 +284,25 @@ def _air(found: Finding, seen: Sample) -> int:
             f"has {left:.4g} and {right:.4g} of {seen.high:.4g} at most: name the flats (--flats), "
             "or take the beam to be each view's mean (--flats mean)"
         )
+    uneven = _unevenness(found)
+    if uneven > _UNEVEN:
+        raise InputError(
+            f"{found.path}: --flats air wants an even beam, and bins of {found.name} differ from "
+            f"their neighbours by {uneven:.0%} in all views: name the flats (--flats)"
+        )
     return max(1, round(_AIR_SHARE * found.shape[2]))
+
+
+def _unevenness(found: Finding) -> float:
+    """Standard deviation of a bin's response about its neighbours', which all views share."""
+    views, rows = spread(found.shape[0], 9), spread(found.shape[1], 1)
+    lines = found.rows.look("projections", views, rows)[:, 0].astype(np.float64)
+    if found.darks:
+        lines -= found.rows.look("darks", range(min(found.darks, 9)), rows)[:, 0].mean(axis=0)
+    logs = np.log(np.maximum(lines, 1e-3 * np.abs(lines).max() + 1e-30))
+    bumps = np.median(logs[:, 1:-1] - (logs[:, :-2] + logs[:, 2:]) / 2, axis=0)
+    # Of three bins, of which two count by half: the variance is 1.5 times that of one.
+    return float(np.std(bumps) / np.sqrt(1.5)) if bumps.size else 0.0
 
 
 def _means(found: Finding, rows: RowSource) -> NDArray[np.float64]:
@@ -293,7 +334,8 @@ def _calibration(found: Finding, kind: Kind, substitute: str | None, flats: int,
     words = [f"{darks} dark{'s' * (darks != 1)}" if darks else "no darks"]
     if substitute == AIR:
         share = max(1, round(_AIR_SHARE * found.shape[2]))
-        return f", the beam from {share} bins of air at each end of every view, {words[0]}"
+        bins = "bin" if share == 1 else "bins"
+        return f", an even beam from {share} {bins} of air at each end of every view, {words[0]}"
     if substitute == MEAN:
         return f", the beam taken to be the mean of every view, {words[0]}"
     words.insert(0, f"{flats} flat{'s' * (flats != 1)}")

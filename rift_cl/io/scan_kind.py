@@ -30,6 +30,10 @@ INTEGRAL = 20.0
 # Ends of line integrals in air, as a share of the largest.
 _ZERO = 0.15
 _STRICTLY_ZERO = 0.1
+# Ends that are higher are those of a wide object, or air with an offset: a person knows.
+_OFFSET = 0.5
+# Share of ends that are exactly 0 where sums were computed.
+_COMPUTED = 0.4
 # Ends of counts in air are at least this share of the brightest.
 _BRIGHT = 0.6
 
@@ -54,7 +58,7 @@ class Sample:
         ends: median of the outermost bins at the left and at the right.
         middle: median of the middle half of the bins.
         whole: every value is a whole number.
-        cleared: share of the outermost values that are 0 or less.
+        zeros: share of the outermost values that are exactly 0, as in sums that were computed.
     """
 
     dtype: np.dtype[np.generic]
@@ -63,7 +67,7 @@ class Sample:
     ends: tuple[float, float]
     middle: float
     whole: bool
-    cleared: float
+    zeros: float
 
     @property
     def air(self) -> tuple[float, float]:
@@ -97,7 +101,7 @@ def sampled(values: NDArray[np.float32], dtype: np.dtype[np.generic]) -> Sample:
     lines = np.where(np.isfinite(values), values, np.nan).astype(np.float64)
     finite = lines[~np.isnan(lines)]
     if not finite.size:
-        return Sample(dtype, 0.0, 0.0, (0.0, 0.0), 0.0, whole=False, cleared=0.0)
+        return Sample(dtype, 0.0, 0.0, (0.0, 0.0), 0.0, whole=False, zeros=0.0)
     bins = lines.shape[-1]
     edge = max(1, round(_END * bins))
     left, right = lines[..., :edge], lines[..., -edge:]
@@ -110,7 +114,7 @@ def sampled(values: NDArray[np.float32], dtype: np.dtype[np.generic]) -> Sample:
         ends=(_median(left), _median(right)),
         middle=_median(lines[..., bins // 4 : max(bins - bins // 4, bins // 4 + 1)]),
         whole=bool((finite == np.rint(finite)).all()),
-        cleared=float(np.mean(outer[~np.isnan(outer)] <= 0)) if not np.isnan(outer).all() else 0.0,
+        zeros=float(np.mean(outer == 0)),
     )
 
 
@@ -153,18 +157,21 @@ def _small(seen: Sample) -> tuple[Kind, ...]:
 
 def _moderate(seen: Sample) -> tuple[Kind, ...]:
     dark, bright = seen.air
-    rises = seen.middle >= bright
+    rises = seen.middle >= bright and dark <= _OFFSET * seen.high
     if dark <= _ZERO * seen.high or rises:
         return ("attenuation",)
     return ("counts", "attenuation")
 
 
 def _large(seen: Sample) -> tuple[Kind, ...]:
-    """Counts, unless nearly all of the ends are exactly dark, as those of computed sums are."""
-    dark, bright = seen.air
+    """Counts where air is bright; sums that were computed where it is exactly 0.
+
+    Ends that are merely dark may be those of a beam narrower than the detector.
+    """
+    bright = max(seen.ends)
     if bright >= _BRIGHT * seen.high and seen.middle <= bright:
         return ("counts",)
-    if dark <= _STRICTLY_ZERO * _ZERO * seen.high and seen.cleared >= 0.2:
+    if seen.zeros >= _COMPUTED:
         return ("attenuation",)
     return ("counts", "attenuation")
 

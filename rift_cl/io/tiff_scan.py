@@ -14,7 +14,7 @@ import numpy as np
 from rift_cl.errors import FileFormatError, InputError, ShapeError
 from rift_cl.io import angle_list
 from rift_cl.io.angle_list import AngleList
-from rift_cl.io.frame_words import FrameKind
+from rift_cl.io.frame_words import FrameKind, words_of
 from rift_cl.io.scan_axes import axes_of, parsed
 from rift_cl.io.scan_contract import AIR, MEAN, Finding, scan_of
 from rift_cl.io.scan_file import ScanFile, ScanRequest
@@ -29,6 +29,7 @@ from rift_cl.io.tiff_folder import (
 )
 from rift_cl.io.tiff_frames import TiffRows, TiffStack, tiff_stack
 
+_SINOGRAMS = frozenset(("sino", "sinos", "sinogram", "sinograms"))
 _ANGLE_NAMES = tuple(
     name + suffix for name in ("angles", "theta") for suffix in angle_list.SUFFIXES
 )
@@ -101,7 +102,14 @@ def _axes(path: Path, stack: TiffStack, angles: AngleList | None, request: ScanR
     single = shape[0] == 1 and (asked is None or len(parsed(asked)) < len(shape))
     name = stack.files[0].name
     if single:
-        return "r" + axes_of(path, name, shape[1:], count=count, asked=asked)
+        remark = "; if this one page is a single projection, it is no scan"
+        return "r" + axes_of(path, name, shape[1:], count=count, asked=asked, remark=remark)
+    if count is None and asked is None and words_of(stack.files[0].stem) & _SINOGRAMS:
+        raise InputError(
+            f"{path}: {name!r} is named as a sinogram, and there are no angles: give them with "
+            "theta= (--theta), and say which axis is which with axes= (--axes), such as --axes "
+            "row,angle,bin for a sinogram on each page"
+        )
     usual = "nrb" if count is None else None
     return axes_of(path, name, shape, count=count, asked=asked, usual=usual)
 

@@ -17,7 +17,7 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import open_device
 from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.io.scan import open_scan
-from rift_cl.io.scan_file import AngleUnit, Kind, ScanFile
+from rift_cl.io.scan_file import AngleUnit, Kind, ScanFile, ScanRows
 from rift_cl.io.tiff_frames import TiffRows
 from rift_cl.reconstruct.flatfield import Attenuation, attenuation, attenuation_without_flats
 
@@ -137,16 +137,25 @@ def read_attenuation(scan: ScanFile, start: int, stop: int) -> Attenuation:
         frames = getattr(rows, name)
         if frames is not None:
             _check(frames, f"{scan.path}: {name}", start)
-    if scan.kind == "attenuation":
-        integrals = Attenuation(rows.projections, 0, 0)
-    elif rows.flats is None:
-        integrals = attenuation_without_flats(rows.projections, rows.darks, incident=scan.incident)
-    else:
-        flats_at = scan.flats_at
-        integrals = attenuation(rows.projections, rows.flats, rows.darks, flats_at=flats_at)
+    try:
+        integrals = _integrals(scan, rows, start)
+    except InputError as error:
+        raise type(error)(f"{scan.path}: {error}") from error
     if scan.background:
         subtract_background(integrals.projections, scan.background)
     return integrals
+
+
+def _integrals(scan: ScanFile, rows: ScanRows, start: int) -> Attenuation:
+    if scan.kind == "attenuation":
+        return Attenuation(rows.projections, 0, 0)
+    if rows.flats is None:
+        return attenuation_without_flats(
+            rows.projections, rows.darks, incident=scan.incident, first_row=start
+        )
+    return attenuation(
+        rows.projections, rows.flats, rows.darks, flats_at=scan.flats_at, first_row=start
+    )
 
 
 def subtract_background(projections: NDArray[np.float32], bins: int) -> None:

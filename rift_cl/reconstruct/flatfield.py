@@ -54,6 +54,7 @@ def attenuation(
     darks: Floats | None = None,
     *,
     flats_at: NDArray[np.float64] | None = None,
+    first_row: int = 0,
 ) -> Attenuation:
     """Correct counts by flat and dark frames and take -log.
 
@@ -63,6 +64,7 @@ def attenuation(
         darks: counts without the beam, (n, row, bin); zero if not given.
         flats_at: (n,) for each flat the number of projections taken before it. Those with the same
             number are averaged; between such groups the beam is interpolated linearly.
+        first_row: number of the first row, for errors.
 
     Raises:
         ShapeError: frames and projections do not have the same rows and bins.
@@ -81,7 +83,7 @@ def attenuation(
     beam = _mean(flats) - dark
     dead = ~(beam > _DEAD * np.maximum(np.median(beam, axis=1, keepdims=True), 0)) | (beam <= 0)
     if dead.all(axis=1).any():
-        row = int(np.flatnonzero(dead.all(axis=1))[0])
+        row = first_row + int(np.flatnonzero(dead.all(axis=1))[0])
         raise InputError(
             f"flats are no brighter than darks anywhere in row {row}: are the two swapped, or "
             "is this row outside the beam (choose rows with --rows)?"
@@ -92,7 +94,7 @@ def attenuation(
         transmission /= beam
     else:
         _divide(transmission, flats, dark, flats_at)
-    return _minus_log(transmission, _dark_noise(darks) / beam, dead)
+    return _minus_log(transmission, _dark_noise(darks) / beam, dead, first_row)
 
 
 def attenuation_without_flats(
@@ -100,6 +102,7 @@ def attenuation_without_flats(
     darks: Floats | None = None,
     *,
     incident: NDArray[np.float64] | None = None,
+    first_row: int = 0,
 ) -> Attenuation:
     """Take -log of transmission, or of counts whose beam is a number for each view.
 
@@ -108,6 +111,7 @@ def attenuation_without_flats(
         darks: counts without the beam, (n, row, bin); zero if not given.
         incident: (angle,) the beam's counts, less the darks; 1 if not given, which leaves counts
             with line integrals that are off by one number in each view and row.
+        first_row: number of the first row, for errors.
 
     Raises:
         InputError: no sample of a row has any signal.
@@ -119,7 +123,7 @@ def attenuation_without_flats(
     beam = np.maximum(signal.max(axis=(0, 2)), 0)[:, None]
     scale = 1.0 if incident is None else float(np.mean(incident))
     faintest = np.maximum(_dark_noise(darks) / np.float32(scale), _FAINTEST * beam)
-    return _minus_log(signal, faintest, np.zeros(projections.shape[1:], np.bool_))
+    return _minus_log(signal, faintest, np.zeros(projections.shape[1:], np.bool_), first_row)
 
 
 def _mean_dark(projections: Floats, darks: Floats | None) -> Floats:
@@ -155,7 +159,9 @@ def _divide(
         transmission[view] /= np.where(beam > 0, beam, np.inf)
 
 
-def _minus_log(transmission: Floats, faintest: Floats, dead: NDArray[np.bool_]) -> Attenuation:
+def _minus_log(
+    transmission: Floats, faintest: Floats, dead: NDArray[np.bool_], first_row: int
+) -> Attenuation:
     """-log in place, with dead pixels and what is not above ``faintest`` filled."""
     unknown = ~(transmission > np.maximum(faintest, np.float32(_FAINTEST)))
     unknown |= dead
@@ -164,7 +170,7 @@ def _minus_log(transmission: Floats, faintest: Floats, dead: NDArray[np.bool_]) 
     np.negative(np.log(transmission, out=transmission), out=transmission)
     if unknown.any():
         for row in np.flatnonzero(unknown.any(axis=(0, 2))):
-            _fill(transmission[:, row], unknown[:, row], int(row))
+            _fill(transmission[:, row], unknown[:, row], first_row + int(row))
     return Attenuation(transmission, int(dead.sum()), starved)
 
 

@@ -1,0 +1,336 @@
+"""What a file holds is told in one line, or refused with the option that settles it."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import h5py
+import mrcfile
+import numpy as np
+import pytest
+import tiff_files as made
+import tifffile
+
+from rift_cl.errors import DTypeError, FileFormatError, InputError, PathEscapeError, ShapeError
+from rift_cl.io import open_scan
+from rift_cl.io.angle_list import AngleList
+from rift_cl.io.scan_axes import axes_of, parsed
+from rift_cl.io.scan_kind import named_kind, possible_kinds, sampled
+
+VIEWS, ROWS, BINS = 40, 3, 32
+DEGREES = np.arange(VIEWS) * 4.5
+BUMP = np.maximum(1 - (np.linspace(-1.2, 1.2, BINS)) ** 2, 0)
+
+
+def lines(scale: float = 1.0, offset: float = 0.0) -> np.ndarray:
+    """Line integrals of something round."""
+    return np.broadcast_to(scale * BUMP + offset, (VIEWS, ROWS, BINS)).copy()
+
+
+def hdf5(path: Path, **arrays: Any) -> Path:
+    with h5py.File(path, "w") as file:
+        for name, array in arrays.items():
+            file[name] = array
+    return path
+
+
+@pytest.mark.parametrize(
+    ("values", "kinds"),
+    [
+        (lines(), ("attenuation",)),
+        (lines(3.0), ("attenuation",)),
+        (lines(3.0, -0.2), ("attenuation",)),
+        (lines(300.0), ("attenuation",)),
+        (0 * lines(), ("attenuation",)),
+        (np.exp(-lines()), ("transmission",)),
+        (np.exp(-lines(0.01)), ("transmission",)),
+        (1.2 * np.exp(-lines(3)), ("transmission",)),
+        (np.exp(-lines())[..., 12:20], ("transmission", "attenuation")),
+        (lines(0.5, 0.4), ("transmission", "attenuation")),
+        (3000.5 * np.exp(-lines()), ("counts",)),
+        (6.5 * np.exp(-lines()), ("counts", "attenuation")),
+        (np.rint(9 * np.exp(-lines())), ("counts",)),
+        (lines(300.0, 1.5), ("counts", "attenuation")),
+        (lines(2.0, 5.0), ("counts", "attenuation")),
+        (-lines(3.0), ("attenuation", "transmission")),
+    ],
+)
+def test_values_tell_their_kind_or_leave_a_doubt(
+    values: np.ndarray, kinds: tuple[str, ...]
+) -> None:
+    assert possible_kinds(sampled(values.astype("f4"), np.dtype("f4"))) == kinds
+    assert possible_kinds(sampled(values.astype("f4"), np.dtype("u2"))) == ("counts",)
+
+
+def test_names_and_units_state_a_kind() -> None:
+    assert named_kind(("counts", "transmission")) == "counts"
+    assert named_kind(("", "sampleTransmission_01")) == "transmission"
+    assert named_kind(("data", "sinogram")) is None
+    assert named_kind(("raw_attenuation",)) is None
+
+
+def test_a_name_settles_a_doubt_and_is_not_believed_against_the_values(tmp_path: Path) -> None:
+    inner = np.exp(-lines())[..., 12:20]
+    path = hdf5(tmp_path / "a.h5", transmission=inner, theta=DEGREES)
+    assert open_scan(path, dataset="transmission").kind == "transmission"
+    path = hdf5(tmp_path / "b.h5", transmission=lines(3.0), theta=DEGREES)
+    with pytest.raises(InputError, match=r"states transmission, and its values .* attenuation"):
+        open_scan(path, dataset="transmission")
+    assert open_scan(path, dataset="transmission", kind="attenuation").kind == "attenuation"
+
+
+def test_the_line_says_everything(tmp_path: Path) -> None:
+    data = np.rint(3000 * np.exp(-lines())).astype("u2")
+    path = hdf5(
+        tmp_path / "a.h5",
+        **{"exchange/data": data, "exchange/theta": DEGREES},
+        **{"exchange/data_white": np.full((1, ROWS, BINS), 3000, "u2")},
+        **{"measurement/instrument/detector/actual_pixel_size_x": 0.65},
+    )
+    with h5py.File(path, "a") as file:
+        file["measurement/instrument/detector/actual_pixel_size_x"].attrs["units"] = "um"
+    scan = open_scan(path)
+    assert scan.notes == (
+        "a.h5: counts (uint16, 1105 to 3000), 1 flat and no darks; axes (angle, row, bin) "
+        "40 x 3 x 32; angles in degrees over 175.5; pitch 0.65 um.",
+    )
+
+
+def test_what_is_said_comes_first_and_must_make_sense(tmp_path: Path) -> None:
+    path = hdf5(tmp_path / "a.h5", p=lines(), theta=DEGREES, f=np.ones((2, ROWS, BINS)))
+    for options, message in [
+        ({"kind": "photons"}, "kind is 'photons', wanted counts, transmission, attenuation"),
+        ({"angle_unit": "gon"}, "angle_unit is 'gon', wanted degrees, radians"),
+        ({"axes": "angle,row"}, r"axes is 'angle,row', wanted angle, row and bin"),
+        ({"axes": "angle,bin"}, r"has shape .* axes .angle, bin. were named for it: name 3"),
+        ({"axes": "row,angle,bin"}, "40 angles for 3 projections"),
+        ({"kind": "attenuation", "flats": "f"}, "--flats is about counts"),
+        ({"kind": "counts"}, "holds counts, and there are no flats"),
+        ({"flats": "air"}, "wants air at both ends"),
+    ]:
+        with pytest.raises(InputError, match=message):
+            open_scan(path, dataset="p", **options)
+    assert open_scan(path, dataset="p", axes="theta:y:x").shape == (VIEWS, ROWS, BINS)
+
+
+def test_flats_beside_that_do_not_fit_are_passed_over(tmp_path: Path) -> None:
+    path = hdf5(tmp_path / "a.h5", p=lines(), theta=DEGREES, white=np.ones(7), dark=np.ones(7))
+    assert open_scan(path, dataset="p").kind == "attenuation"
+
+
+def test_geometry_alone_asks_for_no_kind(tmp_path: Path) -> None:
+    path = hdf5(tmp_path / "a.h5", p=np.full((VIEWS, ROWS, BINS), 7, "u2"), theta=DEGREES)
+    assert open_scan(path, dataset="p", values=False).shape == (VIEWS, ROWS, BINS)
+    with pytest.raises(InputError, match="holds counts"):
+        open_scan(path, dataset="p")
+
+
+@pytest.mark.parametrize(
+    ("text", "axes"),
+    [
+        ("angle,row,bin", "nrb"),
+        ("bin, angle", "bn"),
+        ("Y:Theta:X", "rnb"),
+        ("view row column", "nrb"),
+    ],
+)
+def test_axes_in_words(text: str, axes: str) -> None:
+    assert parsed(text) == axes
+
+
+@pytest.mark.parametrize("text", ["", "angle", "row,bin", "angle,angle,bin", "angle,row,bin,time"])
+def test_words_that_are_no_axes(text: str) -> None:
+    with pytest.raises(InputError, match="axes is"):
+        parsed(text)
+
+
+@pytest.mark.parametrize(
+    ("shape", "count", "usual", "axes"),
+    [
+        ((9, 4, 5), 9, None, "nrb"),
+        ((4, 9, 5), 9, None, "rnb"),
+        ((9, 5), 9, None, "nb"),
+        ((5, 9), 9, None, "bn"),
+        ((9, 9, 5), 9, "nrb", "nrb"),
+        ((9, 1, 5), None, None, "nrb"),
+        ((1, 9, 5), None, None, "rnb"),
+        ((4, 9, 5), 9, "nrb", "rnb"),
+        ((5, 4, 9), 9, "nrb", "nrb"),
+        ((4, 4, 5), 7, None, "nrb"),
+    ],
+)
+def test_the_number_of_angles_tells_the_axes(
+    shape: tuple[int, ...], count: int | None, usual: str | None, axes: str
+) -> None:
+    assert axes_of(Path("a"), "p", shape, count=count, asked=None, usual=usual) == axes
+
+
+@pytest.mark.parametrize(
+    ("shape", "count"),
+    [((9, 9, 5), 9), ((9, 5, 9), 9), ((9, 9), 9), ((5, 4, 9), 9), ((4, 5), None)],
+)
+def test_axes_that_fit_in_two_ways(shape: tuple[int, ...], count: int | None) -> None:
+    with pytest.raises(ShapeError, match=r"can be read as .* or as .*--axes"):
+        axes_of(Path("a"), "p", shape, count=count, asked=None)
+
+
+def unit(values: np.ndarray, **options: Any) -> str:
+    angles = AngleList("t", np.asarray(values, float), **options)
+    return angles.settled(Path("a"), len(values), None)[1].split()[2]
+
+
+def test_units_of_angles() -> None:
+    steps = np.arange(50) / 50
+    assert unit(180 * steps) == unit(120 * steps) == unit(-360 * steps) == "degrees"
+    assert unit(np.pi * steps) == unit(2 * np.pi * steps) == "radians"
+    assert unit(np.linspace(0, np.pi, 50)) == "radians"
+    assert unit(180 * steps, usual="radians") == "degrees"
+    assert unit(2 * steps, usual="radians") == "radians"
+    assert unit(np.linspace(0, 10 * np.pi, 500), usual="radians") == "radians"
+    for values, options in [
+        (2 * steps, {}),
+        (np.pi * steps, {"unit": "degrees"}),
+        (180 * steps, {"unit": "radians"}),
+        (100 * steps, {"usual": "radians"}),
+        (1800 * steps, {}),
+    ]:
+        with pytest.raises(InputError, match=r"is doubtful for .*--angle-unit"):
+            unit(values, **options)
+
+
+def test_views_that_tell_nothing() -> None:
+    with pytest.raises(InputError, match="holds one view"):
+        unit(np.zeros(1))
+    with pytest.raises(InputError, match=r"all 5 angles of 't' are 3 degrees"):
+        unit(np.full(5, 3.0))
+
+
+def test_pages_of_sinograms_are_read_row_by_row(tmp_path: Path) -> None:
+    stack = made.frames(6)
+    np.savetxt(tmp_path / "angles.txt", np.arange(made.ROWS) * 9.0)
+    made.write_pages(tmp_path / "a.tif", stack)
+    scan = open_scan(tmp_path / "a.tif", kind="attenuation")
+    assert scan.shape == (made.ROWS, 6, made.BINS)
+    for start, stop in ((0, 6), (2, 3), (4, 6)):
+        read = scan.read(start, stop).projections
+        assert read.flags.c_contiguous
+        np.testing.assert_array_equal(read, stack.transpose(1, 0, 2)[:, start:stop])
+    turned = open_scan(tmp_path / "a.tif", kind="attenuation", axes="bin,angle,row")
+    np.testing.assert_array_equal(turned.read(3, 7).projections, stack.transpose(1, 2, 0)[:, 3:7])
+
+
+def test_a_single_page_is_a_sinogram_where_the_angles_say_so(tmp_path: Path) -> None:
+    page = made.frames(1)[0]
+    tifffile.imwrite(tmp_path / "a.tif", page)
+    with pytest.raises(ShapeError, match=r"as .angle, bin. or as .bin, angle."):
+        open_scan(tmp_path / "a.tif", kind="attenuation")
+    for axes, count in (("(angle, bin)", made.ROWS), ("(bin, angle)", made.BINS)):
+        np.savetxt(tmp_path / "angles.txt", np.arange(count) * 7.0)
+        scan = open_scan(tmp_path / "a.tif", kind="attenuation")
+        expected = page if count == made.ROWS else page.T
+        np.testing.assert_array_equal(scan.read(0, 1).projections[:, 0], expected)
+        assert f"axes {axes} 20 x 24" in scan.notes[0]
+    np.savetxt(tmp_path / "angles.txt", [0.0])
+    with pytest.raises(InputError, match="1 angles for 20 projections"):
+        open_scan(tmp_path / "a.tif", kind="attenuation")
+
+
+def test_files_named_as_sinograms_are_not_taken_for_projections(tmp_path: Path) -> None:
+    made.write_series(tmp_path / "a", "sino_{:04}.tif", made.frames())
+    with pytest.raises(InputError, match=r"named as a sinogram.*--axes"):
+        open_scan(tmp_path / "a", kind="attenuation")
+    scan = open_scan(tmp_path / "a", kind="attenuation", axes="row,angle,bin", theta="180")
+    np.testing.assert_array_equal(
+        scan.read(1, 3).projections, made.frames().transpose(1, 0, 2)[:, 1:3]
+    )
+
+
+def mrc(path: Path, data: np.ndarray, tilts: np.ndarray | None = None) -> Path:
+    """A tilt series, its angles in SerialEM's extended header."""
+    with mrcfile.new(path, overwrite=True) as file:
+        file.set_data(data)
+        file.voxel_size = 5.2
+        if tilts is not None:
+            records = b"".join(struct.pack("<3h", round(100 * tilt), 1, 2) for tilt in tilts)
+            file.set_extended_header(np.frombuffer(records, "V1"))
+            file.header.exttyp = b"SERI"
+            extra = bytearray(bytes(file.header.extra2))
+            extra[16:20] = struct.pack("<2h", 6, 1 | 8)
+            file.header.extra2 = np.void(bytes(extra))
+    return path
+
+
+TILTS = np.linspace(-60, 60, 11)
+
+
+@pytest.mark.parametrize("dtype", ["i1", "i2", "u2", "f4", "f2"])
+def test_tilt_series(tmp_path: Path, dtype: str) -> None:
+    data = made.frames(11, "i2").astype(dtype)
+    scan = open_scan(mrc(tmp_path / "a.mrc", data, TILTS), kind="attenuation")
+    assert (scan.shape, scan.pitch, scan.unit) == (data.shape, pytest.approx(5.2), "angstrom")
+    np.testing.assert_allclose(np.rad2deg(scan.angles), TILTS, atol=1e-6)
+    np.testing.assert_array_equal(scan.read(3, 9).projections, data[:, 3:9].astype("f4"))
+    assert "extended header, about the y axis" in scan.notes[1]
+
+
+def test_tilts_beside_the_file(tmp_path: Path) -> None:
+    path = mrc(tmp_path / "a.st", made.frames(11))
+    with pytest.raises(FileFormatError, match=r"no tilt angles, and no a\.tlt or a\.rawtlt"):
+        open_scan(path, kind="attenuation")
+    np.savetxt(tmp_path / "a.rawtlt", TILTS)
+    scan = open_scan(path, kind="counts")
+    assert "each" not in scan.notes[0] and "mean of every view" in scan.notes[0]
+    np.testing.assert_allclose(scan.incident, made.frames(11)[:, 0:20].mean(axis=(1, 2)), rtol=0.1)
+    np.savetxt(tmp_path / "a.tlt", TILTS + 0.5)
+    scan = open_scan(path, kind="attenuation")
+    np.testing.assert_allclose(np.rad2deg(scan.angles), TILTS + 0.5)
+    assert "a.tlt" in scan.notes[1]
+    with pytest.raises(InputError, match=r"--kind counts.*--kind attenuation"):
+        open_scan(path)
+    (tmp_path / "a.tlt").unlink()
+    (tmp_path / "in").mkdir()
+    inner = mrc(tmp_path / "in" / "a.st", made.frames(11))
+    (tmp_path / "in" / "a.tlt").symlink_to(tmp_path / "a.rawtlt")
+    with pytest.raises(PathEscapeError):
+        open_scan(inner, kind="attenuation")
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "kind", "message"),
+    [
+        (0, 1 << 30, FileFormatError, "the header claims .* bytes, the file has"),
+        (8, -5, FileFormatError, "claims the size"),
+        (92, 1 << 30, FileFormatError, "the header claims"),
+        (92, -1, FileFormatError, "claims the size"),
+        (12, 4, DTypeError, "samples are of mode 4"),
+        (12, 99, DTypeError, "samples are of mode 99"),
+    ],
+)
+def test_headers_that_lie(
+    tmp_path: Path, place: int, value: int, kind: type[Exception], message: str
+) -> None:
+    path = mrc(tmp_path / "a.mrc", made.frames(11), TILTS)
+    content = bytearray(path.read_bytes())
+    content[place : place + 4] = struct.pack("<i", value)
+    path.write_bytes(content)
+    with pytest.raises(kind, match=message) as caught:
+        open_scan(path, kind="attenuation")
+    assert str(path) in str(caught.value)
+
+
+def test_a_tilt_series_cut_short(tmp_path: Path) -> None:
+    path = mrc(tmp_path / "a.mrc", made.frames(11), TILTS)
+    content = path.read_bytes()
+    for cut in (0, 100, 211, 212, 500, 1024, len(content) - 1):
+        path.write_bytes(content[:cut])
+        with pytest.raises(FileFormatError, match=r"a\.mrc"):
+            open_scan(path, kind="attenuation")
+
+
+def test_what_tilt_series_do_not_have(tmp_path: Path) -> None:
+    path = mrc(tmp_path / "a.mrc", made.frames(11), TILTS)
+    for options in ({"dataset": "x"}, {"darks": "x"}, {"image_key": "x"}, {"flats": "x"}):
+        with pytest.raises(InputError, match=r"a\.mrc"):
+            open_scan(path, kind="counts", **options)

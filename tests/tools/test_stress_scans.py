@@ -1,0 +1,42 @@
+"""No raw, ambiguous or mislabelled scan is read wrongly without a word; the table would tell."""
+
+from __future__ import annotations
+
+import pytest
+
+from rift_cl.io import scan_contract
+
+
+@pytest.fixture
+def stress(tool):
+    return tool("stress_scans")
+
+
+def test_every_file_gives_right_slices_or_a_sentence(stress, capsys):
+    status = stress.main(stress.Options())
+    printed = capsys.readouterr().out
+    assert status == 0, printed
+    assert int(printed.splitlines()[-1].split()[0]) >= 60
+    assert "WRONG" not in printed
+
+
+def test_every_sentence_names_the_file_and_ends(stress):
+    for case in stress.cases():
+        if case.wanted == stress.REFUSED:
+            (sentence,) = stress.tried(case).said
+            assert sentence.startswith("scan."), (case.truth, sentence)
+            assert "\n" not in sentence and not sentence.endswith((".", ":", ";", ",", " "))
+
+
+def test_counts_that_pass_for_attenuation_are_noticed(stress, monkeypatch, capsys):
+    monkeypatch.setattr(scan_contract, "possible_kinds", lambda seen: ("attenuation",))
+    assert stress.main(stress.Options(only="named: uint16 counts without flats")) == 1
+    assert "WRONG" in capsys.readouterr().out
+
+
+def test_slices_of_a_wrong_level_are_noticed(stress, monkeypatch):
+    case = next(case for case in stress.cases() if case.truth == "line integrals")
+    assert stress.tried(case).what == stress.RIGHT
+    true = stress.slices()
+    monkeypatch.setattr(stress, "slices", lambda: 1.2 * true)
+    assert stress.tried(case).what == stress.WRONG
