@@ -118,7 +118,7 @@ def scan_of(found: Finding, request: ScanRequest) -> ScanFile:
         background = _air(found, seen)
     if kind == "counts" and substitute == MEAN:
         incident = _means(found, rows)
-    if kind != "counts" and not background:
+    if kind != "counts" and found.kind is None:
         notes += _off_air(kind, seen)
     line = _line(found, kind, seen, _calibration(found, kind, substitute, flats, darks))
     return ScanFile(
