@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rift_cl.jobs.reconstruct.settings import ReconstructSettings
+from rift_cl.operators import FastProjector, Projector
 from rift_cl.reconstruct.view_weights import view_weights
 
 if TYPE_CHECKING:
@@ -45,6 +46,11 @@ def decided_settings(
         "background": file.background,
         "window": values,
     }
+    A = inversion.projector(1)
+    if isinstance(A, FastProjector):
+        decided["error"] = A.error
+    elif isinstance(A, Projector):
+        decided["footprint"] = A.footprint
     if settings.iterative:
         decided["steps"] = settings.most_steps
     if settings.method == "fbp":
@@ -79,4 +85,6 @@ def in_words(decided: ReconstructSettings) -> str:
         words += [f"{decided.precondition} preconditioner"] if decided.precondition else []
         words += ["rays weighed by counts"] if decided.weights else []
         words += ["non-negative"] if decided.nonnegative else []
+    words += [f"{decided.footprint} footprint"] if decided.footprint else []
+    words += [f"Fourier projector within {decided.error:g}"] if decided.error else []
     return ", ".join(words)

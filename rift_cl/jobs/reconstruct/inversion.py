@@ -19,7 +19,8 @@ from rift_cl.cl.device import Device
 from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 from rift_cl.jobs.reconstruct.slice_input import SliceInput
 from rift_cl.jobs.reconstruct.slice_window import Window
-from rift_cl.operators import FastProjector, LinearOperator, ParallelProjector, Projector
+from rift_cl.operators import LinearOperator, ParallelProjector
+from rift_cl.operators.cheapest_projector import cheapest_projector
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp, poisson_weights
 from rift_cl.reconstruct.ordered_subsets import OrderedSubsets
@@ -184,9 +185,14 @@ class Inversion:
             grid, scan = self.window.around(self._width())[0], self.source.geometry
         else:
             grid, scan = self.window.grid(slices), self.source.formula_geometry()
-        if settings.error is not None:
-            return FastProjector(grid, scan, settings.error, device=device)
-        return Projector(grid, scan, settings.footprint, device=device)
+        return cheapest_projector(
+            grid,
+            scan,
+            iterative=settings.iterative,
+            error=settings.error,
+            footprint=settings.footprint,
+            device=device,
+        )
 
     def _width(self) -> float:
         """What the rays meet: twice the way from the axis to the farther end of the detector."""
