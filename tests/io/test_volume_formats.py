@@ -402,6 +402,15 @@ def test_a_page_whose_samples_are_nowhere(tmp_path: Path, format: str, capfd) ->
     assert capfd.readouterr().err == ""
 
 
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("dtype", ["float32", "uint16", "uint8"])
+def test_stacks_of_imagej_s_own(tmp_path: Path, order: str, dtype: str) -> None:
+    """ImageJ writes the most significant byte first."""
+    stack = (VOLUME * 40 + 100).astype(dtype)
+    tifffile.imwrite(tmp_path / "s.tif", stack, imagej=True, byteorder=order)
+    np.testing.assert_array_equal(read_volume(tmp_path / "s.tif"), stack.astype(np.float32))
+
+
 def test_a_picture_is_no_volume(tmp_path: Path) -> None:
     tifffile.imwrite(tmp_path / "p.tif", VOLUME[0], compression="zlib")
     with pytest.raises(FileFormatError, match="are not plain ones"):

@@ -94,6 +94,6 @@ def plain_pages(path: Path) -> PlainPages:
             (int(page.shape[0]), int(page.shape[1])),
             np.dtype(page.dtype).newbyteorder(file.byteorder),
             int(page.dataoffsets[0]),
-            int(notes.get("slices", 1)),
+            int(notes.get("images", 1)),
             *calibration(notes),
         )

@@ -45,10 +45,13 @@ def halved(block: NDArray[Any], factors: Shape) -> NDArray[Any]:
 
 
 def _halved_axis(block: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
-    rows = np.moveaxis(block, axis, 0)
-    pairs = len(rows) // 2
-    means = np.empty((len(rows) - pairs, *rows.shape[1:]), np.float32)
-    np.add(rows[: 2 * pairs : 2], rows[1 : 2 * pairs : 2], out=means[:pairs])
-    means[:pairs] *= np.float32(0.5)
-    means[pairs:] = rows[2 * pairs :]
-    return np.moveaxis(means, 0, axis)
+    count = block.shape[axis]
+    pairs = count // 2
+    means = np.empty((*block.shape[:axis], count - pairs, *block.shape[axis + 1 :]), np.float32)
+    along = (slice(None),) * axis
+    first, second = (block[(*along, slice(start, 2 * pairs, 2))] for start in (0, 1))
+    both = means[(*along, slice(pairs))]
+    np.add(first, second, out=both)
+    both *= np.float32(0.5)
+    means[(*along, slice(pairs, None))] = block[(*along, slice(2 * pairs, None))]
+    return means

@@ -44,7 +44,7 @@ def stitched(
             that repeat an angle are averaged.
         scan: their geometry; the rotation axis is on the detector, near either end.
         level: bring opposite views to the same mean where they overlap, half of the difference
-            each, for a beam that faded during the scan.
+            each, for a beam that faded during the scan; over all rows that are given, together.
         device: where bins are read between samples; the default device if not given.
 
     Returns:
