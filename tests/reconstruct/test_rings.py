@@ -198,6 +198,7 @@ def test_large_brings_levels_together_unless_told_not_to(noisy):
         ({"method": "fitting", "smoothing": 0}, "smoothing is 0"),
         ({"method": "filtering", "smoothing": float("inf")}, "smoothing is inf"),
         ({"method": "wavelet-fft", "width": 0}, "width is 0"),
+        ({"method": "wavelet-fft", "levels": 11}, "levels is 11, wanted 1 to 10"),
     ],
 )
 def test_options_that_mean_nothing_are_told_in_a_sentence(options, words):
