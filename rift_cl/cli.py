@@ -105,6 +105,9 @@ def _center(settings: Any, output: Output) -> None:
     from rift_cl.jobs.center import CenterJob
 
     job = CenterJob(settings)
+    if not output.quiet:
+        for note in job.scan.notes:
+            print_line(note)
     watch(job.run(), output)
     print(f"{job.metrics['center']:.2f}")
     print(f"contact sheet and report.html are in {settings.out}", file=sys.stderr)

@@ -79,6 +79,8 @@ class XrayFit(FitRun):
         """
         if not self.settings.resume:
             yield Report(0, self.settings.steps, "steps")
+        for note in self.input.scan.notes:
+            self.announce(note)
         whole = self.input.read()
         self.folder.make()
         seen = whole.of(self.seen)
