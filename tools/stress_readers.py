@@ -2,10 +2,11 @@
 
     python tools/stress_readers.py --files 2000 --seed 0 --keep found
 
-Valid TIFF, MAT (versions 5 and 7.3) and HDF5 (Data Exchange, NXtomo) files are damaged by chance:
-bits flipped, the end cut off, sizes forged, blocks of one file put into another. Each is opened and
-one row of it read in a child process with a limit of time and of memory. Prints what became of
-them; ends with status 1 if one crashed, hung, or raised anything but one of the package's errors.
+Valid TIFF, MAT (versions 5 and 7.3), HDF5 (Data Exchange, NXtomo), NPZ and MRC files are damaged by
+chance: bits flipped, the end cut off, sizes forged, blocks of one file put into another. Each is
+opened and one row of it read in a child process with a limit of time and of memory. Prints what
+became of them; ends with status 1 if one crashed, hung, or raised anything but one of the package's
+errors.
 """
 
 from __future__ import annotations
@@ -170,8 +171,8 @@ def _outcome(path: Path) -> tuple[str, str]:
     from rift_cl.io import open_scan
 
     try:
-        # Frames of TIFF without flats are counts, which are refused where nothing is said of them.
-        kind = "attenuation" if path.suffix == ".tif" else None
+        # Files without flats hold counts, which are refused where nothing is said of them.
+        kind = "attenuation" if path.suffix in (".tif", ".mrc") else None
         scan = open_scan(path, kind=kind, budget=_BUDGET)
         scan.read(scan.shape[1] - 1, scan.shape[1])
         rows = scan.read(0, 1).projections

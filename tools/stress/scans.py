@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
+import mrcfile
 import numpy as np
 import OpenImageIO
 import scipy.io
@@ -122,6 +123,30 @@ def _nxtomo() -> bytes:
     return file.getvalue()
 
 
+def _npz() -> bytes:
+    file = io.BytesIO()
+    frames = {"projections": _frames(), "flats": _frames(2) + 300, "darks": _frames(1)}
+    np.savez_compressed(file, angles=np.arange(_VIEWS) * 0.5, pitch=0.2, **frames)
+    return file.getvalue()
+
+
+def _mrc() -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "a.mrc")
+        with mrcfile.new(path) as file:
+            file.set_data(_frames())
+            tilts = b"".join(struct.pack("<h", 1000 * view) for view in range(_VIEWS))
+            file.set_extended_header(np.frombuffer(tilts, "V1"))
+            file.header.exttyp = b"SERI"
+            extra = bytearray(bytes(file.header.extra2))
+            extra[16:20] = struct.pack("<2h", 2, 1)
+            file.header.extra2 = np.void(bytes(extra))
+        content = bytearray(path.read_bytes())
+        # The library writes the time among the labels; the same seed is to give the same files.
+        content[224:1024] = bytes(800)
+        return bytes(content)
+
+
 KINDS = {
     "TIFF strips": Kind(".tif", lambda: _tiff("u2", compression="none")),
     "TIFF deflate": Kind(".tif", lambda: _tiff("f4", compression="zip")),
@@ -133,4 +158,6 @@ KINDS = {
     "MAT 7.3": Kind(".mat", _mat73),
     "Data Exchange": Kind(".h5", _data_exchange),
     "NXtomo": Kind(".nxs", _nxtomo),
+    "NPZ": Kind(".npz", _npz),
+    "MRC": Kind(".mrc", _mrc),
 }
