@@ -20,8 +20,8 @@ TAPS = 12
 _KAISER = 7.0
 # Bins that share where their taps start, on every device.
 _BLOCK = 8
-# Bytes of projections on the device at a time.
-_CHUNK = 1 << 26
+# Bytes of projections on the device at a time, and views: grids of some GPUs end at 65,535.
+_CHUNK, _VIEWS = 1 << 26, 1 << 15
 
 
 def sinc_weights(fractions: Floats) -> Floats:
@@ -69,7 +69,7 @@ def resampled(
     out = np.empty((views, rows, bins), np.float32)
     run = 4096 if device.traits.is_cpu else 1
     macros = {"RUN": run, "TAPS": TAPS + 1, "ALONG_ROWS": int(along == "rows")}
-    step = max(1, _CHUNK // (4 * bins * max(rows_in, rows)))
+    step = min(_VIEWS, max(1, _CHUNK // (4 * bins * max(rows_in, rows))))
     sizes = [np.int32(n) for n in (first_row, rows_in, rows, bins, weights.shape[-1])]
     for start in range(0, views, step):
         source = device.array(np.ascontiguousarray(stack[start : start + step], np.float32))
