@@ -13,8 +13,8 @@ import numpy as np
 from rift_cl.errors import ShapeError
 from rift_cl.io.boundary import check_claim, check_numeric
 from rift_cl.io.hdf5_tree import open_tree
-from rift_cl.io.volumes.layout import Floats, VolumeLayout
-from rift_cl.io.volumes.plain_samples import WriteSlab, staged_samples
+from rift_cl.io.volumes.layout import Floats, VolumeLayout, WriteSlab
+from rift_cl.io.volumes.plain_samples import staged_samples
 from rift_cl.io.volumes.sample_window import restored
 
 _DATASET = "volume"

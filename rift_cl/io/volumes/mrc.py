@@ -18,13 +18,13 @@ from typing import Any
 import mrcfile
 import numpy as np
 from mrcfile.dtypes import HEADER_DTYPE
-from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim, check_numeric
-from rift_cl.io.volumes.layout import Floats, SliceStatistics, VolumeLayout
-from rift_cl.io.volumes.plain_samples import WriteSlab, staged_samples
+from rift_cl.io.volumes.layout import Floats, VolumeLayout, WriteSlab
+from rift_cl.io.volumes.plain_samples import staged_samples
 from rift_cl.io.volumes.sample_window import restored
+from rift_cl.io.volumes.slice_statistics import SliceStatistics
 
 _ANGSTROM = 1e-10
 _LABEL = re.compile(r"(add_offset|scale_factor) = (\S+)\s*")
@@ -36,12 +36,7 @@ def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
     statistics = SliceStatistics(layout.shape[0], moments=True)
     header, finish = partial(_write_header, layout), partial(_write_statistics, statistics)
     with staged_samples(path, layout, header, finish) as write:
-
-        def write_slab(start: int, slab: NDArray[Any]) -> None:
-            write(start, slab)
-            statistics.take(start, slab)
-
-        yield write_slab
+        yield statistics.watching(write)
 
 
 def load_volume(path: Path, *, budget: int | None) -> Floats:

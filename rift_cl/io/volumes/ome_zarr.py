@@ -28,10 +28,10 @@ from numpy.typing import NDArray
 from rift_cl.errors import FileFormatError, PathEscapeError, ShapeError
 from rift_cl.io.boundary import check_claim, check_numeric
 from rift_cl.io.output import staged_folder, writing
-from rift_cl.io.volumes.layout import Floats, SliceStatistics, VolumeLayout
-from rift_cl.io.volumes.plain_samples import WriteSlab
+from rift_cl.io.volumes.layout import Floats, VolumeLayout, WriteSlab
 from rift_cl.io.volumes.pyramid import coarser_shapes, halved
 from rift_cl.io.volumes.sample_window import restored, suggested_window
+from rift_cl.io.volumes.slice_statistics import SliceStatistics
 
 _CHUNK = (16, 256, 256)
 # Packing of chunks: nearly as fast as none, and every reader of Zarr has it.
@@ -59,9 +59,8 @@ def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
         def write_slab(start: int, slab: NDArray[Any]) -> None:
             with writing(path), _one_thread():
                 volume[start : start + len(slab)] = slab
-            statistics.take(start, slab)
 
-        yield write_slab
+        yield statistics.watching(write_slab)
         with writing(path):
             coarsest = _write_copies(folder, layout, volume)
             shown = _display(layout, statistics.range, coarsest)

@@ -21,9 +21,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import OutputError
 from rift_cl.io.output import staged_file, writing
-from rift_cl.io.volumes.layout import VolumeLayout
-
-WriteSlab = Callable[[int, NDArray[Any]], None]
+from rift_cl.io.volumes.layout import VolumeLayout, WriteSlab
 
 _HEADER = 1 << 16
 _CANNOT_RESERVE = (errno.EOPNOTSUPP, errno.EINVAL)

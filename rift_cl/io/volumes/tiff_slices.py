@@ -18,8 +18,7 @@ from rift_cl.errors import FileFormatError, OutputError, ShapeError
 from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.output import atomic_path, staged_folder
 from rift_cl.io.volumes.imagej import description, resolution
-from rift_cl.io.volumes.layout import Floats, VolumeLayout
-from rift_cl.io.volumes.plain_samples import WriteSlab
+from rift_cl.io.volumes.layout import Floats, VolumeLayout, WriteSlab
 from rift_cl.io.volumes.plain_tiff import plain_pages
 from rift_cl.io.volumes.sample_window import restored
 

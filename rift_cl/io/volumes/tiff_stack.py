@@ -14,15 +14,15 @@ from pathlib import Path
 from typing import Any
 
 import tifffile
-from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.volumes.imagej import description, resolution
-from rift_cl.io.volumes.layout import Floats, SliceStatistics, VolumeLayout
-from rift_cl.io.volumes.plain_samples import WriteSlab, staged_samples
+from rift_cl.io.volumes.layout import Floats, VolumeLayout, WriteSlab
+from rift_cl.io.volumes.plain_samples import staged_samples
 from rift_cl.io.volumes.plain_tiff import plain_pages
 from rift_cl.io.volumes.sample_window import restored
+from rift_cl.io.volumes.slice_statistics import SliceStatistics
 
 # Offsets of a classic TIFF have 32 bits; the pages' directories take their share.
 _CLASSIC = (1 << 32) - (1 << 25)
@@ -35,12 +35,7 @@ def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
     statistics = SliceStatistics(layout.shape[0])
     header, finish = partial(_write_header, layout), partial(_write_display, layout, statistics)
     with staged_samples(path, layout, header, finish) as write:
-
-        def write_slab(start: int, slab: NDArray[Any]) -> None:
-            write(start, slab)
-            statistics.take(start, slab)
-
-        yield write_slab
+        yield statistics.watching(write)
 
 
 def load_volume(path: Path, *, budget: int | None) -> Floats:

@@ -31,8 +31,7 @@ from rift_cl.geometry import Grid
 from rift_cl.geometry.numbers import real_numbers
 from rift_cl.io.boundary import reading
 from rift_cl.io.output import check_space
-from rift_cl.io.volumes.layout import Floats, VolumeLayout
-from rift_cl.io.volumes.plain_samples import WriteSlab
+from rift_cl.io.volumes.layout import Floats, VolumeLayout, WriteSlab
 from rift_cl.io.volumes.sample_window import SampleWindow
 
 Format = Literal["tiff", "tiff-stack", "zarr", "h5", "mrc"]
