@@ -23,6 +23,7 @@ from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError
+from rift_cl.reconstruct.preprocess.columns import FEWEST_VIEWS, DetectorColumns
 from rift_cl.reconstruct.preprocess.projection_array import as_projections
 
 Floats = NDArray[np.float32]
@@ -37,9 +38,9 @@ _MEAN_SHARE = 0.5
 _LEAST = 0.02
 # Below this share of a row's mean the detector's own noise counts, which has no root in it.
 _FLOOR = 0.01
-# Noise is measured in so many views, and over bins enough for so many samples together; of fewer
-# views than the third, over the whole row.
-_NOISE_VIEWS, _NOISE_SAMPLES, _FEW_VIEWS = 256, 256, 16
+# Noise is measured in so many views, and over bins enough for so many samples together; of very few
+# views, over the whole row.
+_NOISE_VIEWS, _NOISE_SAMPLES = 256, 256
 # The rim of an object as wide as the detector moves by this share of its width in all views of half
 # a turn; and the most bins that it is followed.
 _QUARTER_TURN, _MOST_BESIDE = 2, 8
@@ -134,9 +135,10 @@ def _cleaned_slab(slab: Floats, rule: _Rule, device: Device, *, sinogram: bool) 
     reach = {"VIEWS_AWAY": int(sinogram), "ROWS_AWAY": 0 if sinogram else away, "BINS_AWAY": away}
     device.launch("local_median", size, x, medians, *slab.shape, RUN=run, **reach)
     if rule.excess is None:
-        means = np.array([_mean(slab[:, row]) for row in range(rows)])
-        levels = means[:, None] * np.array([_LEAST, _FLOOR])
-        limits = rule.sigma / 2 * _noise(slab, device.get(medians), levels[:, 1])
+        some = slice(None, None, -(-views // _NOISE_VIEWS))
+        levels = _row_means(slab[some])[:, None] * np.array([_LEAST, _FLOOR])
+        noise = _noise(slab[some], device.get(medians)[some], levels[:, 1], device)
+        limits = rule.sigma / 2 * noise
     else:
         levels = np.repeat([[rule.excess, 0.0]], rows, axis=0)
         limits = np.zeros((rows, bins))
@@ -149,27 +151,31 @@ def _cleaned_slab(slab: Floats, rule: _Rule, device: Device, *, sinogram: bool) 
     return found
 
 
-def _noise(slab: Floats, medians: Floats, floors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _noise(
+    stack: Floats, medians: Floats, floors: NDArray[np.float64], device: Device
+) -> NDArray[np.float64]:
     """Noise of each detector pixel in units of the root of the median, (row, bin)."""
     from scipy.ndimage import uniform_filter1d
 
-    step = -(-len(slab) // _NOISE_VIEWS)
-    seen, usual = slab[::step], medians[::step, :, 1:-1]
-    root = np.sqrt(np.maximum(usual, floors[:, None].astype(np.float32)))
-    curved = np.abs(np.diff(seen, 2, axis=2)) / np.sqrt(np.float32(_SECOND_DIFFERENCE))
+    root = np.sqrt(np.maximum(medians[:, :, 1:-1], floors[:, None].astype(np.float32)))
+    curved = np.abs(np.diff(stack, 2, axis=2)) / np.sqrt(np.float32(_SECOND_DIFFERENCE))
     # A row that is zero throughout has no noise, and no level to measure it by.
     away = np.divide(curved, root, out=np.zeros_like(curved), where=root > 0)
-    few = len(seen) < _FEW_VIEWS
-    axes = (0, 2) if few else (0,)
-    pixels = np.maximum(
-        _FROM_MEDIAN * np.median(away, axis=axes, keepdims=True),
-        _MEAN_SHARE * _FROM_MEAN * away.mean(axis=axes, dtype=np.float64, keepdims=True),
-    )[0]
-    if few:
-        return np.broadcast_to(pixels, slab.shape[1:])
-    bins = min(slab.shape[2], -(-_NOISE_SAMPLES // len(seen)))
+    if len(stack) < FEWEST_VIEWS:
+        whole = _deviation(np.median(away, axis=(0, 2)), _row_means(away))
+        return np.broadcast_to(whole[:, None], stack.shape[1:])
+    columns = DetectorColumns(device, away)
+    columns.sort()
+    middle = columns.levels((columns.views - 1) // 2)
+    pixels = _deviation(middle, away.mean(axis=0, dtype=np.float64))
+    bins = min(stack.shape[2], -(-_NOISE_SAMPLES // len(stack)))
     smooth = uniform_filter1d(pixels, bins, axis=1, mode="reflect")
     return np.pad(smooth, ((0, 0), (1, 1)), mode="edge")
+
+
+def _deviation(median: NDArray[Any], mean: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The standard deviation from the median and the mean of absolute deviations."""
+    return np.maximum(_FROM_MEDIAN * median, _MEAN_SHARE * _FROM_MEAN * mean)
 
 
 def _bins_beside(views: int, bins: int) -> int:
@@ -177,9 +183,10 @@ def _bins_beside(views: int, bins: int) -> int:
     return 1 + min(_MOST_BESIDE, -(-_QUARTER_TURN * bins // views))
 
 
-def _mean(sinogram: Floats) -> float:
-    """The mean of the absolute values; of a copy, as the order of sums follows the strides."""
-    return float(np.abs(np.ascontiguousarray(sinogram)).mean(dtype=np.float64))
+def _row_means(stack: Floats) -> NDArray[np.float64]:
+    """The mean of the absolute values of each row; of copies, as sums follow the strides."""
+    rows = (np.ascontiguousarray(stack[:, row]) for row in range(stack.shape[1]))
+    return np.array([np.abs(row).mean(dtype=np.float64) for row in rows])
 
 
 def _check_options(sigma: float, excess: float | None, size: int, kind: str) -> None:
