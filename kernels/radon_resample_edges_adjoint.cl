@@ -3,14 +3,17 @@
  *     y[view][slice][b] = scale * sum over k, r of (share(x_b) - share(x_{b+1})) table[slice][view][k][r],
  *     x_b = origin + step * (k + r / PHASES) - (b - 1/2).
  *
- * Columns lie up the detector, so beyond some column all are wholly above an edge. Let B_b be the
- * sum over the columns that edge b meets of their shares beyond it, and W_b that over the columns
- * which are wholly above edge b and not above edge b + 1; then y[b] = scale * (B_b + M W_b - B_{b+1}).
- * Each edge's shares serve the bins on both of its sides.
+ * Entries follow each other up the detector, LANES at a time: the phases of a column lie together in
+ * memory. Let B_b be the sum of the shares beyond edge b of the entries whose shadows it meets, and
+ * W_b the sum of those that are wholly above edge b but not above edge b + 1; then
  *
- * Index space: (runs of BINS bins, views of this run, slices); the phases of a column lie together
- * in memory and are taken LANES at a time. No two items write the same bin: no atomics, and one
- * order of summation, whatever BINS is. */
+ *     y[b] = scale * (B_b + M W_b - B_{b+1}),
+ *
+ * so that each edge's shares serve the bins on both of its sides. In a bin that no shadow touches
+ * they cancel exactly.
+ *
+ * Index space: (runs of BINS bins, views of this run, slices). No two items write the same bin: no
+ * atomics, and one order of summation, whatever BINS is. */
 
 #include "include/portable.h"
 #include "include/phase_table.h"
@@ -21,6 +24,8 @@
 #ifndef BINS
 #define BINS (LANES == 8 ? 64 : 1)
 #endif
+/* Runs of LANES entries in a column. */
+#define GROUPS (PHASES / LANES)
 
 KERNEL void radon_resample_edges_adjoint(
     __global real *restrict sinogram, __global const real *restrict table,
@@ -30,34 +35,35 @@ KERNEL void radon_resample_edges_adjoint(
   const int b0 = (int)get_global_id(0) * BINS;
   const int b1 = b0 + BINS < bins ? b0 + BINS : bins;
   const int number = (int)get_global_id(1), count = (int)get_global_size(1), view = first + number;
-  const int slice = (int)get_global_id(2), used = views[view].y;
+  const int slice = (int)get_global_id(2), used = GROUPS * views[view].y;
   const long4 g = run_upwards(geometry[view], bins);
   const int mirrored = geometry[view].w < 0;
   const real8 shadow = shadows[view];
-  const real per_bin = 1.0f / FIXED_TO_REAL(g.w);
-  const real reach = per_bin * shadow.HALF_WIDTH + 1e-3f + 1e-6f * columns;
+  const real per_bin = (real)GROUPS / FIXED_TO_REAL(g.w);
+  const real reach = per_bin * shadow.HALF_WIDTH + GROUPS * (1e-3f + 1e-6f * columns);
   const real rest = FIXED_TO_REAL(g.z & 0xffffffffL) + 0.5f;
   __global const real *entries = table + ((long)slice * count + number) * PHASES * columns;
   __global real *y = sinogram + ((long)views[view].x * slices + slice0 + slice) * bins;
   lanes below = 0;
   int passed = 0;
   for (int b = b0; b <= b1; b++) {
-    /* The columns that edge b meets, or one more to either side where rounding hides it. */
+    /* The groups that edge b meets, or one more to either side where rounding hides it. */
     const real edge = ((real)(b - WHOLE(g.z)) - rest) * per_bin;
-    const real from = edge - reach - (1.0f - 1.0f / PHASES), to = edge + reach;
+    const real from = edge - reach - (1.0f - 1.0f / LANES), to = edge + reach;
     const int start = from < 0 ? 0 : from < used ? (int)from + 1 : used;
     const int end = to < 0 ? 0 : to < used ? (int)to + 1 : used;
     lanes beyond = 0;
-    for (int k = start; k < end; k++)
-      UNROLL for (int r = 0; r < PHASES; r += LANES)
-        beyond = beyond + share(FROM_EDGE(g, k, r, b), shadow) * LOAD(entries + k * PHASES + r);
+    for (int m = start; m < end; m++)
+      beyond = beyond + share(FROM_EDGE(g, m / GROUPS, m % GROUPS * LANES, b), shadow) *
+                            LOAD(entries + m * LANES);
     if (b > b0) {
       lanes whole = 0;
-      for (int k = passed; k < end; k++) {
-        lanes column = 0;
-        UNROLL for (int r = 0; r < PHASES; r += LANES)
-          column = column + LOAD(entries + k * PHASES + r);
-        whole = whole + column;
+      /* Wide bins hold thousands of entries: sums of sums round less than one long sum. */
+      for (int m = passed; m < end;) {
+        const int stop = m + PHASES < end ? m + PHASES : end;
+        lanes part = 0;
+        for (; m < stop; m++) part = part + LOAD(entries + m * LANES);
+        whole = whole + part;
       }
       const lanes sum = below + shadow.WHOLE_SHARE * whole - beyond;
       y[PLACE(b - 1, mirrored, bins)] = shadow.SCALE * SUM_OF_LANES(sum);

@@ -10,8 +10,11 @@ those of scikit-image 0.26. What differs:
 - Lines are integrated whole. scikit-image turns a square and sums its rows, so that it leaves out
   what a corner of the square sticks out of it; of an image that is zero outside the circle, both
   see the same.
-- Along a ray, values are read where it crosses rows or columns (Joseph's method), and not where a
-  turned image has its pixels: sinograms of noise differ by a percent, those of objects by less.
+- ``radon`` collects the areas that pixels share with bins (the footprint ``strip``), and not the
+  rows of a turned image: sinograms differ by a few tenths of a per cent. Of our footprints it is
+  the nearest to scikit-image.
+- ``iradon`` reads views between bins, as scikit-image's does (the footprint ``linear``). So the two
+  are no adjoint pair, there as here; ``rift_cl.Projector`` and its transpose are.
 - The numbers are float32 within. The result has the type that scikit-image would give.
 - NaN and infinity are refused.
 
@@ -85,7 +88,7 @@ def radon(
     else:
         bins = math.ceil(math.sqrt(2) * max(values.shape))
     theta = np.arange(180) if theta is None else theta
-    A = _projector(values.shape, theta, bins, "joseph")
+    A = _projector(values.shape, theta, bins, "strip")
     return np.ascontiguousarray(A(values, name="image").T, values.dtype)
 
 

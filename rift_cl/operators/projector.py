@@ -39,7 +39,8 @@ class Projector(ParallelProjector):
             with the strip of rays that a bin collects. Every view then holds the whole mass, and
             ``fbp(A, A(x))`` of a uniform object is flat. ``joseph``: rays through the bins'
             centres interpolate linearly between the pixels of each row or column they cross
-            (Joseph 1982); the result is flat to about 1 %. ``linear``: the pixel is spread by
+            (Joseph 1982); the result is flat to about 1 %, and worse where bins are wider than
+            samples, since rays miss what lies between them. ``linear``: the pixel is spread by
             linear interpolation over the two bins about its centre (pixel-driven); where bins are
             finer than its shadow the hat widens to that shadow. Its projections of a uniform
             object ripple in views near 45 and 135 degrees, and ``fbp(A, A(x))`` varies by
