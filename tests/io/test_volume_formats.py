@@ -316,6 +316,7 @@ def test_ome_zarr(tmp_path: Path, dtype: str) -> None:
         assert window == {"min": 0, "max": 65535, "start": 0, "end": 65535}
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_ome_zarr_by_its_own_reader(tmp_path: Path) -> None:
     """The reader of the format's makers."""
     reader = pytest.importorskip("ome_zarr.reader")
@@ -328,6 +329,7 @@ def test_ome_zarr_by_its_own_reader(tmp_path: Path) -> None:
     assert [axis["unit"] for axis in nodes[0].metadata["axes"]] == ["millimeter"] * 3
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_ome_zarr_by_its_model(tmp_path: Path) -> None:
     """A model that checks the rules of the specification."""
     model = pytest.importorskip("ome_zarr_models.v04.image")
