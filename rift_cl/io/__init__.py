@@ -22,16 +22,16 @@ if TYPE_CHECKING:
     from rift_cl.io.lens_file import open_lens
     from rift_cl.io.output import atomic_path, make_folder, write_json, write_text
     from rift_cl.io.photographs import PosedPhotographs, demand_photographs, pose_photographs
-    from rift_cl.io.scan import open_scan
-    from rift_cl.io.scan_file import ScanFile, ScanRows
+    from rift_cl.io.scans.formats import open_scan
+    from rift_cl.io.scans.scan_file import ScanFile, ScanRows
     from rift_cl.io.splat_scene import SplatScene
     from rift_cl.io.volumes import VolumeWriter, open_volume, read_volume, suggested_window
 
 _HOMES = {
     "Capture": "capture",
     "PosedPhotographs": "photographs",
-    "ScanFile": "scan_file",
-    "ScanRows": "scan_file",
+    "ScanFile": "scans.scan_file",
+    "ScanRows": "scans.scan_file",
     "SplatScene": "splat_scene",
     "View": "capture",
     "VolumeWriter": "volumes",
@@ -42,7 +42,7 @@ _HOMES = {
     "make_folder": "output",
     "open_capture": "capture",
     "open_lens": "lens_file",
-    "open_scan": "scan",
+    "open_scan": "scans.formats",
     "open_volume": "volumes",
     "pose_photographs": "photographs",
     "read_image": "image",

@@ -11,8 +11,8 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Camera, Parallel
 from rift_cl.geometry.aperture import Aperture
 from rift_cl.io.capture import Capture, capture_name, holds_capture, open_capture
-from rift_cl.io.scan import open_scan
-from rift_cl.io.scan_file import ScanFile
+from rift_cl.io.scans.formats import open_scan
+from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.jobs.analyze_settings import AnalyzeSettings
 from rift_cl.jobs.fan_views import fan_cameras
 from rift_cl.jobs.sampled import Floats, Sampled, points_of

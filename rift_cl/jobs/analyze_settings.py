@@ -10,7 +10,7 @@ from typing import Annotated
 from tyro.conf import Positional
 
 from rift_cl.errors import InputError
-from rift_cl.io.scan_file import AngleUnit
+from rift_cl.io.scans.scan_file import AngleUnit
 
 _MOST_ADDED = 64
 

@@ -16,9 +16,9 @@ from rift_cl.cl.budget import parse_bytes
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import open_device
 from rift_cl.errors import InputError, NonFiniteError
-from rift_cl.io.scan import open_scan
-from rift_cl.io.scan_file import AngleUnit, Kind, ScanFile, ScanRows
-from rift_cl.io.tiff_frames import TiffRows
+from rift_cl.io.scans.formats import open_scan
+from rift_cl.io.scans.scan_file import AngleUnit, Kind, ScanFile, ScanRows
+from rift_cl.io.scans.tiff_frames import TiffRows
 from rift_cl.reconstruct.flatfield import Attenuation, attenuation, attenuation_without_flats
 
 

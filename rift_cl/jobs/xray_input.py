@@ -17,7 +17,7 @@ from rift_cl.cl.device import Device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera, Grid, Parallel
 from rift_cl.io.boundary import check_claim
-from rift_cl.io.scan_file import ScanFile
+from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.jobs.fit_pictures import Light
 from rift_cl.jobs.fit_settings import FitSettings
 from rift_cl.jobs.scan_input import ScanInput, check_center, chosen_rows, read_attenuation

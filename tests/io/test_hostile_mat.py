@@ -16,7 +16,8 @@ from scan_files import BINS, DEGREES, FRAMES, counts
 from test_hostile_scans import grown
 
 from rift_cl.errors import FileFormatError, InputError, PathEscapeError, ResourceLimitError
-from rift_cl.io import mat5, mat73, open_scan
+from rift_cl.io import open_scan
+from rift_cl.io.scans import mat5, mat73
 
 HEADER = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
 SINOGRAM = {"axes": "angle,bin", "kind": "attenuation"}

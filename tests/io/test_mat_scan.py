@@ -14,7 +14,7 @@ from scan_files import BINS, DEGREES, FRAMES, ROWS, counts
 from rift_cl.errors import DTypeError, FileFormatError, InputError, NonFiniteError, ShapeError
 from rift_cl.geometry.fan import FanBeam
 from rift_cl.io import ScanFile, open_scan, read_image
-from rift_cl.io.mat5 import Mat5File
+from rift_cl.io.scans.mat5 import Mat5File
 
 each_version = pytest.mark.parametrize("version", VERSIONS)
 

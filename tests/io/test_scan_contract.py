@@ -15,9 +15,9 @@ import tifffile
 
 from rift_cl.errors import DTypeError, FileFormatError, InputError, PathEscapeError, ShapeError
 from rift_cl.io import open_scan
-from rift_cl.io.angle_list import AngleList
-from rift_cl.io.scan_axes import axes_of, parsed
-from rift_cl.io.scan_kind import named_kind, possible_kinds, sampled
+from rift_cl.io.scans.angle_list import AngleList
+from rift_cl.io.scans.axes import axes_of, parsed
+from rift_cl.io.scans.kind import named_kind, possible_kinds, sampled
 
 VIEWS, ROWS, BINS = 40, 3, 32
 DEGREES = np.arange(VIEWS) * 4.5

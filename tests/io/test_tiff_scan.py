@@ -13,7 +13,7 @@ import tiff_files as made
 
 from rift_cl.errors import InputError
 from rift_cl.io import ScanFile, open_scan
-from rift_cl.io.tiff_float64 import Float64Pages
+from rift_cl.io.scans.tiff_float64 import Float64Pages
 
 # Frames of numbers that all differ, to be read as they are.
 as_they_are = partial(open_scan, kind="attenuation")

@@ -10,7 +10,7 @@ import pytest
 import rift_cl as rift
 from rift_cl.cli import main
 from rift_cl.errors import InputError, StoppedError
-from rift_cl.io.scan import open_scan
+from rift_cl.io.scans.formats import open_scan
 from rift_cl.io.volumes import read_volume
 from rift_cl.jobs.fit_settings import FitSettings
 from rift_cl.jobs.xray_fit import XrayFit

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rift_cl.io import scan_contract
+from rift_cl.io.scans import contract
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def test_every_sentence_names_the_file_and_ends(stress):
 
 
 def test_counts_that_pass_for_attenuation_are_noticed(stress, monkeypatch, capsys):
-    monkeypatch.setattr(scan_contract, "possible_kinds", lambda seen: ("attenuation",))
+    monkeypatch.setattr(contract, "possible_kinds", lambda seen: ("attenuation",))
     assert stress.main(stress.Options(only="named: uint16 counts without flats")) == 1
     assert "WRONG" in capsys.readouterr().out
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.io.scan_file import RowSource, ScanFile, ScanRows
+from rift_cl.io.scans.scan_file import RowSource, ScanFile, ScanRows
 from rift_cl.reconstruct.preprocess import binned, binned_center
 
 Floats = NDArray[np.float32]

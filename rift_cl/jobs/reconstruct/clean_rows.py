@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.errors import InputError
-from rift_cl.io.scan_file import ScanFile
+from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 from rift_cl.jobs.scan_input import read_attenuation
 from rift_cl.reconstruct import Attenuation

@@ -11,14 +11,14 @@ import numpy as np
 
 from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim
-from rift_cl.io.frame_stack import FrameStack
-from rift_cl.io.hdf5_frames import Hdf5Rows
 from rift_cl.io.hdf5_tree import open_tree
-from rift_cl.io.mat5 import Mat5File
-from rift_cl.io.mat73 import Mat73File
-from rift_cl.io.mat_layout import MatStore, find_layout
-from rift_cl.io.named_arrays import scan_in
-from rift_cl.io.scan_file import Frames, Part, RowSource, ScanFile, ScanRequest, ScanRows
+from rift_cl.io.scans.frame_stack import FrameStack
+from rift_cl.io.scans.hdf5_frames import Hdf5Rows
+from rift_cl.io.scans.mat5 import Mat5File
+from rift_cl.io.scans.mat73 import Mat73File
+from rift_cl.io.scans.mat_layout import MatStore, find_layout
+from rift_cl.io.scans.named_arrays import scan_in
+from rift_cl.io.scans.scan_file import Frames, Part, RowSource, ScanFile, ScanRequest, ScanRows
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ import numpy as np
 
 from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim
-from rift_cl.io.frame_stack import FrameStack
 from rift_cl.io.hdf5_tree import Hdf5Tree, open_tree
-from rift_cl.io.scan_file import Frames, Part, ScanRows
+from rift_cl.io.scans.frame_stack import FrameStack
+from rift_cl.io.scans.scan_file import Frames, Part, ScanRows
 
 
 @dataclass(frozen=True)

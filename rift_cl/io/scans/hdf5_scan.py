@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError
-from rift_cl.io.angle_list import AngleList
-from rift_cl.io.frame_stack import FrameStack
-from rift_cl.io.hdf5_frames import Hdf5Rows
 from rift_cl.io.hdf5_tree import Hdf5Tree, open_tree
-from rift_cl.io.hdf5_values import (
+from rift_cl.io.scans.angle_list import AngleList
+from rift_cl.io.scans.frame_stack import FrameStack
+from rift_cl.io.scans.hdf5_frames import Hdf5Rows
+from rift_cl.io.scans.hdf5_values import (
     axes_stated,
     numeric_shape,
     read_angles,
@@ -26,9 +26,9 @@ from rift_cl.io.hdf5_values import (
     read_vector,
     unit_of,
 )
-from rift_cl.io.named_arrays import Layout, scan_in
-from rift_cl.io.nxtomo import entry_of, find_entry, nxtomo_layout
-from rift_cl.io.scan_file import ScanFile, ScanRequest, usable_pitch
+from rift_cl.io.scans.named_arrays import Layout, scan_in
+from rift_cl.io.scans.nxtomo import entry_of, find_entry, nxtomo_layout
+from rift_cl.io.scans.scan_file import ScanFile, ScanRequest, usable_pitch
 
 _DATA = "/exchange/data"
 _WHITE = "/exchange/data_white"

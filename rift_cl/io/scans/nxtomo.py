@@ -13,9 +13,9 @@ import h5py
 
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.hdf5_tree import Hdf5Tree
-from rift_cl.io.hdf5_values import axes_stated, read_length
-from rift_cl.io.named_arrays import Layout
-from rift_cl.io.scan_file import usable_pitch
+from rift_cl.io.scans.hdf5_values import axes_stated, read_length
+from rift_cl.io.scans.named_arrays import Layout
+from rift_cl.io.scans.scan_file import usable_pitch
 
 _KEY = "instrument/detector/image_key"
 _DATA = "instrument/detector/data"

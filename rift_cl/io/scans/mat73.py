@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError
-from rift_cl.io.frame_stack import FrameStack
 from rift_cl.io.hdf5_tree import Hdf5Tree
-from rift_cl.io.hdf5_values import read_vector
+from rift_cl.io.scans.frame_stack import FrameStack
+from rift_cl.io.scans.hdf5_values import read_vector
 
 _DEEPEST = 8
 _MOST_ARRAYS = 4096

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import reading
-from rift_cl.io.tiff_chain import Tags, TiffChain
+from rift_cl.io.scans.tiff_chain import Tags, TiffChain
 
 _WIDTH, _HEIGHT, _COMPRESSION, _ROWS_PER_STRIP, _PREDICTOR = 256, 257, 259, 278, 317
 _STRIPS, _STRIP_SIZES = 273, 279

@@ -25,13 +25,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import DTypeError, FileFormatError, InputError
-from rift_cl.io.angle_list import AngleList, even_turn, file_angles, text_angles
 from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.capture_paths import CaptureFolder
-from rift_cl.io.frame_stack import FrameStack
-from rift_cl.io.scan_axes import axes_of
-from rift_cl.io.scan_contract import AIR, MEAN, Finding, scan_of
-from rift_cl.io.scan_file import Frames, Part, ScanFile, ScanRequest, ScanRows, usable_pitch
+from rift_cl.io.scans.angle_list import AngleList, even_turn, file_angles, text_angles
+from rift_cl.io.scans.axes import axes_of
+from rift_cl.io.scans.contract import AIR, MEAN, Finding, scan_of
+from rift_cl.io.scans.frame_stack import FrameStack
+from rift_cl.io.scans.scan_file import Frames, Part, ScanFile, ScanRequest, ScanRows, usable_pitch
 
 SUFFIXES = (".mrc", ".st", ".ali", ".rec")
 _HEADER = 1024

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, InputError, ShapeError
 from rift_cl.io.boundary import check_claim, check_numeric, reading
-from rift_cl.io.scan_file import AngleUnit, check_angles
+from rift_cl.io.scans.scan_file import AngleUnit, check_angles
 
 SUFFIXES = (".txt", ".csv", ".npy")
 # Eight million angles: no scan has more, and a forged header may not ask for gigabytes.

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, ShapeError
-from rift_cl.io.angle_list import AngleList, named_unit
 from rift_cl.io.boundary import check_claim, reading
-from rift_cl.io.frame_stack import FrameStack
-from rift_cl.io.named_arrays import Layout, scan_in
 from rift_cl.io.npz_archive import NpzArchive
-from rift_cl.io.scan_axes import USUAL
-from rift_cl.io.scan_file import Frames, Part, ScanFile, ScanRequest, ScanRows, usable_pitch
+from rift_cl.io.scans.angle_list import AngleList, named_unit
+from rift_cl.io.scans.axes import USUAL
+from rift_cl.io.scans.frame_stack import FrameStack
+from rift_cl.io.scans.named_arrays import Layout, scan_in
+from rift_cl.io.scans.scan_file import Frames, Part, ScanFile, ScanRequest, ScanRows, usable_pitch
 
 # How distances from the source to the axis and to the detector are called.
 _DISTANCES = (

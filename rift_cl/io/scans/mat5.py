@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, ShapeError
 from rift_cl.io.boundary import check_claim, reading
-from rift_cl.io.mat5_bytes import ElementBytes, PackedBytes, PlainBytes
+from rift_cl.io.scans.mat5_bytes import ElementBytes, PackedBytes, PlainBytes
 
 _HEADER = 128
 _INT8, _INT32, _UINT32, _MATRIX, _PACKED = 1, 5, 6, 14, 15

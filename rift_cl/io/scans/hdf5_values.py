@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, ShapeError
-from rift_cl.io.angle_list import AngleList, named_unit
 from rift_cl.io.boundary import check_claim, check_numeric
 from rift_cl.io.hdf5_tree import Hdf5Tree
-from rift_cl.io.scan_axes import spelled
+from rift_cl.io.scans.angle_list import AngleList, named_unit
+from rift_cl.io.scans.axes import spelled
 
 # Eight million frames: no scan has more, and a forged header may not ask for gigabytes.
 _LONGEST_VECTOR = 64 << 20

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, InputError, ShapeError
 from rift_cl.geometry.fan import FanBeam
-from rift_cl.io.angle_list import AngleList, named_unit
-from rift_cl.io.frame_stack import FrameStack
-from rift_cl.io.mat_file import MatFile, array_of, contents
-from rift_cl.io.named_arrays import Layout
-from rift_cl.io.scan_file import RowSource, ScanRequest, usable_pitch
+from rift_cl.io.scans.angle_list import AngleList, named_unit
+from rift_cl.io.scans.frame_stack import FrameStack
+from rift_cl.io.scans.mat_file import MatFile, array_of, contents
+from rift_cl.io.scans.named_arrays import Layout
+from rift_cl.io.scans.scan_file import RowSource, ScanRequest, usable_pitch
 
 # Bins at each end of the dendrites' detector that lie well outside the sample.
 _DENDRITES_BACKGROUND = 20

@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import DTypeError, FileFormatError, ShapeError
 from rift_cl.io.boundary import check_claim, reading
-from rift_cl.io.frame_stack import FrameStack
 from rift_cl.io.pixels import first_line, image_format, opened_image
-from rift_cl.io.scan_file import Frames, Part, ScanRows
-from rift_cl.io.tiff_chain import TiffChain
-from rift_cl.io.tiff_float64 import Float64Pages
+from rift_cl.io.scans.frame_stack import FrameStack
+from rift_cl.io.scans.scan_file import Frames, Part, ScanRows
+from rift_cl.io.scans.tiff_chain import TiffChain
+from rift_cl.io.scans.tiff_float64 import Float64Pages
 
 _DTYPES = {
     "uint8": "u1",

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from rift_cl.errors import FileFormatError, InputError, ShapeError
-from rift_cl.io import angle_list
-from rift_cl.io.angle_list import AngleList
-from rift_cl.io.frame_words import FrameKind, words_of
-from rift_cl.io.scan_axes import axes_of, parsed
-from rift_cl.io.scan_contract import AIR, MEAN, Finding, scan_of
-from rift_cl.io.scan_file import ScanFile, ScanRequest
-from rift_cl.io.tiff_folder import (
+from rift_cl.io.scans import angle_list
+from rift_cl.io.scans.angle_list import AngleList
+from rift_cl.io.scans.axes import axes_of, parsed
+from rift_cl.io.scans.contract import AIR, MEAN, Finding, scan_of
+from rift_cl.io.scans.frame_words import FrameKind, words_of
+from rift_cl.io.scans.scan_file import ScanFile, ScanRequest
+from rift_cl.io.scans.tiff_folder import (
     folder_of,
     gap,
     inside,
@@ -27,7 +27,7 @@ from rift_cl.io.tiff_folder import (
     sorted_kinds,
     tiff_names,
 )
-from rift_cl.io.tiff_frames import TiffRows, TiffStack, tiff_stack
+from rift_cl.io.scans.tiff_frames import TiffRows, TiffStack, tiff_stack
 
 _SINOGRAMS = frozenset(("sino", "sinos", "sinogram", "sinograms"))
 _ANGLE_NAMES = tuple(

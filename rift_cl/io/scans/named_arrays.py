@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, ShapeError
 from rift_cl.geometry.fan import FanBeam
-from rift_cl.io.angle_list import AngleList, given_angles
-from rift_cl.io.frame_stack import FrameStack, runs_of
-from rift_cl.io.frame_words import is_said
-from rift_cl.io.scan_axes import axes_of
-from rift_cl.io.scan_contract import AIR, MEAN, Finding, scan_of
-from rift_cl.io.scan_file import AngleUnit, Kind, RowSource, ScanFile, ScanRequest
+from rift_cl.io.scans.angle_list import AngleList, given_angles
+from rift_cl.io.scans.axes import axes_of
+from rift_cl.io.scans.contract import AIR, MEAN, Finding, scan_of
+from rift_cl.io.scans.frame_stack import FrameStack, runs_of
+from rift_cl.io.scans.frame_words import is_said
+from rift_cl.io.scans.scan_file import AngleUnit, Kind, RowSource, ScanFile, ScanRequest
 
 _THETA = ("theta", "thetas", "angle", "angles", "rotation_angle", "rotation_angles", "anglesrad")
 _KEY = ("image_key",)

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.geometry.fan import FanBeam
-from rift_cl.io.scan_axes import words
-from rift_cl.io.scan_file import Kind, RowSource, ScanFile, ScanRequest
-from rift_cl.io.scan_kind import (
+from rift_cl.io.scans.axes import words
+from rift_cl.io.scans.kind import (
     INTEGRAL,
     Sample,
     named_kind,
@@ -29,6 +28,7 @@ from rift_cl.io.scan_kind import (
     sampled,
     spread,
 )
+from rift_cl.io.scans.scan_file import Kind, RowSource, ScanFile, ScanRequest
 
 # What ``flats`` may say in place of a name.
 AIR, MEAN = "air", "mean"
