@@ -2,8 +2,9 @@
 
 By Beer and Lambert a ray that arrives with I of its I0 quanta has the line integral
 ``-log(I / I0)`` of attenuation. Counts are corrected by the means of the dark frames (no beam)
-and of the flat frames (beam, no sample); flats that were taken at several times are interpolated
-between them, because beams drift. Two kinds of samples tell nothing:
+and of the flat frames (beam, no sample), in which outliers among five frames or more do not count;
+flats that were taken at several times are interpolated between them, because beams drift. Two kinds
+of samples tell nothing:
 
 - a *dead* detector pixel does not answer to the beam;
 - a *starved* sample has no more signal than the darks' noise. Its logarithm would be that of a
@@ -29,6 +30,9 @@ Floats = NDArray[np.float32]
 _DEAD = 0.05
 # Fewer quanta than this share of the beam are not told from none, whatever the darks' noise.
 _FAINTEST = 1e-7
+# Flats or darks from which on an outlier among them can be told: so many standard deviations, of
+# which the median deviation is one over 1.48.
+_ENOUGH_FRAMES, _OUTLIER, _SIGMAS = 5, 8.0, 1.48
 # Dark frames from which on their noise can be told.
 _ENOUGH_DARKS = 3
 
@@ -131,6 +135,16 @@ def _mean_dark(projections: Floats, darks: Floats | None) -> Floats:
 
 
 def _mean(frames: Floats) -> Floats:
+    """Mean of flats or darks, without the hits of single quanta on the sensor (zingers)."""
+    if len(frames) >= _ENOUGH_FRAMES:
+        middle = np.median(frames, axis=0)
+        away = np.abs(frames - middle)
+        # Of the pixel and of its row, the wider spread: that of few frames may be none by chance.
+        usual = _SIGMAS * np.median(away, axis=0)
+        usual = np.maximum(usual, np.median(usual, axis=1, keepdims=True))
+        hit = (away > _OUTLIER * usual) & (usual > 0)
+        if hit.any():
+            frames = np.where(hit, middle, frames)
     mean: Floats = frames.mean(axis=0, dtype=np.float64).astype(np.float32)
     return mean
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from rift_cl.cli import main
+from rift_cl.errors import InputError
 from rift_cl.io.scans import contract
 
 
@@ -26,6 +28,21 @@ def test_every_sentence_names_the_file_and_ends(stress):
             (sentence,) = stress.tried(case).said
             assert sentence.startswith("scan."), (case.truth, sentence)
             assert "\n" not in sentence and not sentence.endswith((".", ":", ";", ",", " "))
+
+
+def test_the_command_refuses_in_one_line_and_writes_nothing(stress, capsys, tmp_path):
+    refused = [case for case in stress.cases() if case.wanted == stress.REFUSED]
+    for number, case in enumerate(refused):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        options = [(f"--{name.replace('_', '-')}", str(v)) for name, v in case.options.items()]
+        words = [word for option in options for word in option]
+        command = ["reconstruct", str(case.write(folder)), "--out", str(folder / "out"), *words]
+        assert main([*command, "--center", "47.5"]) == InputError.exit_status, case.truth
+        told = capsys.readouterr().err.splitlines()
+        # Rows that turn out to be no scan are told of after the line of progress.
+        assert told[-1].startswith(f"rift: {folder}") and len(told) <= 2, (case.truth, told)
+        assert not (folder / "out").exists(), case.truth
 
 
 def test_counts_that_pass_for_attenuation_are_noticed(stress, monkeypatch, capsys):
