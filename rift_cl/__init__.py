@@ -35,7 +35,7 @@ if TYPE_CHECKING:
         cheapest_projector,
         dot_test,
     )
-    from rift_cl.reconstruct import backproject, cgls, fbp, sirt, tv
+    from rift_cl.reconstruct import AxisEstimate, backproject, cgls, fbp, find_center, sirt, tv
     from rift_cl.sampling import Constraints, Looks, Plan, Target, next_views, plan
     from rift_cl.sampling.coverage import coverage
     from rift_cl.sampling.merit import merit
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Aperture": "geometry",
+    "AxisEstimate": "reconstruct",
     "Camera": "geometry",
     "CameraType": "geometry",
     "Constraints": "sampling",
@@ -72,6 +73,7 @@ _HOMES = {
     "devices": "cl",
     "dot_test": "operators",
     "fbp": "reconstruct",
+    "find_center": "reconstruct",
     "merit": "sampling.merit",
     "next_views": "sampling",
     "open_device": "cl",
@@ -86,6 +88,7 @@ _MODULES = ("basis", "metrics", "phantom")
 
 __all__ = [
     "Aperture",
+    "AxisEstimate",
     "Camera",
     "CameraType",
     "Constraints",
@@ -116,6 +119,7 @@ __all__ = [
     "devices",
     "dot_test",
     "fbp",
+    "find_center",
     "merit",
     "metrics",
     "next_views",

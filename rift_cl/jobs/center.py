@@ -18,7 +18,8 @@ from rift_cl.jobs.scan_input import ScanInput, read_attenuation
 from rift_cl.operators import Projector
 from rift_cl.plot import curves, figure_png, image_grid
 from rift_cl.progress import Report
-from rift_cl.reconstruct import CenterSearch, fbp, find_center
+from rift_cl.jobs.axis_search import find_axis
+from rift_cl.reconstruct import AxisEstimate, fbp
 
 # Centres of the contact sheet, in bins from the best one.
 _SHEET = (-8.0, -4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0, 8.0)
@@ -64,8 +65,8 @@ class CenterJob:
         total = 1 + len(_SHEET)
         yield Report(0, total, "steps")
         sinogram = read_attenuation(self.scan, self.row, self.row + 1).projections[:, 0]
-        found = find_center(sinogram, self.scan.angles, span=self.settings.span, device=self.device)
-        self.metrics = {"center": found.center, "row": self.row, "decided_by": found.by}
+        found = find_axis(self.scan, self.device, span=self.settings.span)
+        self.metrics = {**found.record(), "row": self.row}
         slices = {}
         for step, offset in enumerate(_SHEET, start=1):
             yield Report(step, total, "steps", {"center": found.center})
@@ -80,7 +81,7 @@ class CenterJob:
         A = Projector(Grid((bins, bins)), geometry, device=self.device)
         return np.asarray(fbp(A, sinogram))
 
-    def _page(self, found: CenterSearch, slices: dict[float, NDArray[np.float32]]) -> Page:
+    def _page(self, found: AxisEstimate, slices: dict[float, NDArray[np.float32]]) -> Page:
         page = Page(f"Centre of rotation of {self.scan.path.name}", f"bin {found.center:.2f}")
         best = slices[found.center]
         low, high = np.percentile(best, [0.5, 99.5])
@@ -100,25 +101,19 @@ class CenterJob:
         self._score_curves(page, found)
         return page
 
-    def _score_curves(self, page: Page, found: CenterSearch) -> None:
-        titles = {
-            "mirror": "correlation of opposite views, mirrored",
-            "sharpness": "mean absolute value of the slice",
-        }
-        captions = {
-            "mirror": "First search: the reflection that makes opposite views most alike.",
-            "sharpness": "Second search: the centre whose slice has the least mean absolute "
-            "value; the mark is the bottom of a parabola through the lowest scores.",
-        }
-        for name, title in titles.items():
-            scores = getattr(found, name)
-            if not scores.size:
-                continue
-            series = {"score": (scores[0], scores[1])}
-            figure = curves(
-                series, xlabel="centre, bins", ylabel=title, mark=round(found.center, 2)
-            )
-            page.figure(figure_png(figure), caption=captions[name], alt=f"Curve of {title}")
+    def _score_curves(self, page: Page, found: AxisEstimate) -> None:
+        title = "log-likelihood"
+        figure = curves(
+            {"score": (found.scores[0], found.scores[1])},
+            xlabel="centre, bins",
+            ylabel=title,
+            mark=round(found.center, 2),
+        )
+        page.figure(
+            figure_png(figure),
+            caption="How likely each centre is, by all rows together (" + found.by + ").",
+            alt=f"Curve of {title}",
+        )
 
 
 def _middle(image: NDArray[np.float32]) -> NDArray[np.float32]:

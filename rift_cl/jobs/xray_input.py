@@ -18,10 +18,10 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Camera, Grid, Parallel
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.scans.scan_file import ScanFile
+from rift_cl.jobs.axis_search import find_axis
 from rift_cl.jobs.fit_pictures import Light
 from rift_cl.jobs.fit_settings import FitSettings
 from rift_cl.jobs.scan_input import ScanInput, check_center, chosen_rows, read_attenuation
-from rift_cl.reconstruct import find_center
 from rift_cl.train.solve_settings import SolveSettings
 
 # Line integrals are measured by the value that this share of them stays below.
@@ -88,9 +88,7 @@ class XrayInput:
         integrals = read_attenuation(self.scan, *self.rows).projections
         center = self.center
         if center is None:
-            middle = integrals[:, integrals.shape[1] // 2]
-            found = find_center(np.ascontiguousarray(middle), self.scan.angles, device=self.device)
-            center = found.center
+            center = find_axis(self.scan, self.device).center
         scale = float(np.quantile(integrals, _STRONG))
         if scale <= 0:
             raise InputError(

@@ -1,12 +1,12 @@
 """Reconstruction methods, one file each; they see operators only."""
 
-from rift_cl.reconstruct.center import CenterSearch, find_center
+from rift_cl.reconstruct.axis import AxisEstimate, find_center
 from rift_cl.reconstruct.conjugate_gradients import Cgls, cgls
 from rift_cl.reconstruct.fan_rebin import rebin_fan
 from rift_cl.reconstruct.filtered_backprojection import FilteredBackprojection, backproject, fbp
 from rift_cl.reconstruct.fista import Fista
 from rift_cl.reconstruct.flatfield import Attenuation, attenuation
-from rift_cl.reconstruct.offset_axis import find_offset_center, widened
+from rift_cl.reconstruct.offset_axis import widened
 from rift_cl.reconstruct.ordered_subsets import OrderedSubsets
 from rift_cl.reconstruct.padding import extended
 from rift_cl.reconstruct.pdhg import Pdhg
@@ -18,7 +18,7 @@ from rift_cl.reconstruct.tv_reconstruction import tv
 
 __all__ = [
     "Attenuation",
-    "CenterSearch",
+    "AxisEstimate",
     "Cgls",
     "FilteredBackprojection",
     "Fista",
@@ -33,7 +33,6 @@ __all__ = [
     "extended",
     "fbp",
     "find_center",
-    "find_offset_center",
     "poisson_weights",
     "rebin_fan",
     "remove_rings",

@@ -25,14 +25,8 @@ _OFFSET = 0.8
 # A full turn may lack as much of it as this many steps between views, or this angle: a view or
 # two that were lost, and the jitter of a turntable, leave it what it is.
 _SLACK, _HOLE = 1.5, np.pi / 36
-# The least overlap at which an axis is looked for, in bins and as a share of the detector.
-_LEAST_BINS, _LEAST_SHARE = 8, 0.03
-# Bins over which differences are taken, so that noise does not decide.
-_SMOOTH = 2.0
 # Angles closer than this are the same, in radians.
 _SAME = 1e-6
-# Most pairs of opposite views that are compared.
-_PAIRS = 180
 
 
 def is_full_turn(angles: Floats) -> bool:
@@ -91,67 +85,3 @@ def widened(projections: Stack, scan: Parallel) -> tuple[Stack, Parallel]:
     margins = [(0, 0)] * (weighted.ndim - 1) + [(before, after)]
     wide = Parallel(scan.angles, scan.bins + missing, scan.pitch, scan.center + before)
     return np.pad(weighted, margins), wide
-
-
-def find_offset_center(sinogram: Stack, angles: Floats) -> tuple[float, float]:
-    """Look for the axis of a full turn anywhere on the detector, by mirrored opposite views.
-
-    The overlap of opposite views decides: slopes along the detector of each view are compared
-    with those of the opposite one, turned round, for every half bin as the axis.
-
-    Args:
-        sinogram: line integrals of one slice, (angle, bin).
-        angles: directions in radians; a full turn.
-
-    Returns:
-        The bin, and the correlation there, 1 at best.
-
-    Raises:
-        InputError: the views are no full turn, or the detector is too short.
-    """
-    bins = sinogram.shape[1]
-    least = max(_LEAST_BINS, round(_LEAST_SHARE * bins))
-    if not is_full_turn(angles) or bins < 2 * least:
-        raise InputError("the axis is looked for near a detector's end only in full turns")
-    views, opposite = _opposite(sinogram, angles)
-    centers = np.arange(least, 2 * (bins - 1) - least + 1) / 2
-    scores = np.array([_overlap_score(views, opposite, round(2 * center)) for center in centers])
-    best = int(scores.argmax())
-    return _peak(centers, scores, best), float(scores[best])
-
-
-def _opposite(sinogram: Stack, angles: Floats) -> tuple[Floats, Floats]:
-    """Slopes of some views, and of what is seen from the opposite side, interpolated."""
-    from scipy.ndimage import gaussian_filter1d
-
-    slopes = gaussian_filter1d(sinogram.astype(np.float64), _SMOOTH, axis=1, order=1)
-    order = np.argsort(np.mod(angles, 2 * np.pi))
-    circle, slopes = np.mod(angles, 2 * np.pi)[order], slopes[order]
-    chosen = np.unique(np.linspace(0, len(circle) - 1, min(_PAIRS, len(circle))).astype(int))
-    wanted = np.mod(circle[chosen] + np.pi, 2 * np.pi)
-    after = np.searchsorted(circle, wanted)
-    before, after = (after - 1) % circle.size, after % circle.size
-    gap = np.mod(circle[after] - circle[before], 2 * np.pi)
-    share = np.divide(
-        np.mod(wanted - circle[before], 2 * np.pi), gap, out=np.zeros(gap.size), where=gap > 0
-    )
-    share = np.clip(share, 0, 1)[:, None]
-    return slopes[chosen], (1 - share) * slopes[before] + share * slopes[after]
-
-
-def _overlap_score(views: Floats, opposite: Floats, turn: int) -> float:
-    last = views.shape[1] - 1
-    bins = np.arange(max(0, turn - last), min(last, turn) + 1)
-    one, other = views[:, bins], -opposite[:, turn - bins]
-    scale = np.linalg.norm(one) * np.linalg.norm(other)
-    return float((one * other).sum() / scale) if scale > 0 else 0.0
-
-
-def _peak(centers: Floats, scores: Floats, best: int) -> float:
-    """The top of a parabola through the best score and its neighbours."""
-    if not 0 < best < scores.size - 1:
-        return float(centers[best])
-    left, top, right = scores[best - 1 : best + 2]
-    bend = left - 2 * top + right
-    shift = 0.5 * (left - right) / bend if bend < 0 else 0.0
-    return float(centers[best] + 0.5 * np.clip(shift, -1, 1))

@@ -17,6 +17,7 @@ from rift_cl.cl.device import Device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Parallel
 from rift_cl.geometry.length_units import length_unit
+from rift_cl.jobs.axis_search import find_axis
 from rift_cl.jobs.reconstruct.binned_file import binned_file
 from rift_cl.jobs.reconstruct.clean_rows import Alignment, CleanRows
 from rift_cl.jobs.reconstruct.notes import notes_of
@@ -26,10 +27,10 @@ from rift_cl.jobs.scan_input import (
     chosen_rows,
     scan_identity,
 )
-from rift_cl.reconstruct import Attenuation, find_center
+from rift_cl.reconstruct import Attenuation
+from rift_cl.reconstruct.axis import AxisEstimate
 from rift_cl.reconstruct.fan_rebin import covered_rays, rebin_fan
 from rift_cl.reconstruct.offset_axis import (
-    find_offset_center,
     is_full_turn,
     is_offset,
     widened,
@@ -38,8 +39,6 @@ from rift_cl.reconstruct.padding import extended, is_truncated
 from rift_cl.reconstruct.preprocess import binned_center, stitched
 
 Floats = NDArray[np.float32]
-# An axis found this far from the detector's middle, as a share of its width, is an offset one.
-_MIDDLE = 0.25
 # The detector is continued by this share of its width on each side.
 _PAD_SHARE = 2
 
@@ -76,6 +75,8 @@ class SliceInput:
         self._pitch = pitch * binning
         # Bin of the rotation axis on the detector as the file has it, at its middle row.
         self.center = settings.center
+        # What the search for the axis found, where there was one.
+        self.estimate: AxisEstimate | None = None
         # The axis as the configuration records it: the bin, and how it was found.
         self.axis: dict[str, Any] = {}
         self.pad = 0
@@ -125,7 +126,7 @@ class SliceInput:
     def locate(self) -> None:
         """Find the axis, and whether it is offset and the object wider than the detector.
 
-        Looks at the middle row.
+        The axis is that of the whole scan; the object's width is judged by the middle row.
 
         Raises:
             InputError: the axis cannot be found.
@@ -133,8 +134,8 @@ class SliceInput:
         middle = sum(self.rows) // 2
         row = self.clean.read(middle, middle + 1).projections
         if not self.settled:
-            found = self._find_center(np.ascontiguousarray(row[:, 0]))
-            self.center = self.settings.binning * found + (self.settings.binning - 1) / 2
+            self.estimate = find_axis(self.file, self.device)
+            self.center = self.estimate.center
         self.geometry = self._parallel()
         self.axis = self._axis_record()
         self.clean.alignment = self._alignment()
@@ -217,12 +218,6 @@ class SliceInput:
         if self.fan is not None:
             assert self.file.fan is not None
             return {"center": self.file.fan.center, "by": "the file"}
-        return {"center": self.center, "by": "search"}
-
-    def _find_center(self, row: Floats) -> float:
-        angles, bins = self.scan.angles, self.scan.shape[2]
-        if is_full_turn(angles) and bins >= 4 * 8:
-            found, _ = find_offset_center(row, angles)
-            if abs(found - (bins - 1) / 2) > _MIDDLE * bins:
-                return found
-        return find_center(row, angles, device=self.device).center
+        if self.estimate is None:
+            return {"center": self.center, "by": "search"}
+        return self.estimate.record()

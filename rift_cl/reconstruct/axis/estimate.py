@@ -1,0 +1,51 @@
+"""What is known of a rotation axis after a search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class AxisEstimate:
+    """Where a rotation axis is seen on the detector.
+
+    Args:
+        center: bin of the axis at the middle row, ``(rows - 1) / 2``.
+        interval: the 95 % confidence interval of ``center``, in bins.
+        tilt: by how many bins the axis moves from one row to the next; 0 for a single row.
+        spread: root mean square distance of the rows' centres from the axis, in bins; 0 for a
+            single row.
+        by: the measure that found it: "opposite views", "double wedge" or "centre of mass".
+        rows: (n,) the detector rows that were looked at and could tell.
+        centers: (n,) the centre that each of them gives, in bins.
+        errors: (n,) the standard error of each, in bins.
+        scores: (2, m) trial centres and their log-likelihood, all rows together, 0 where the data
+            say nothing and greatest at the best.
+    """
+
+    center: float
+    interval: tuple[float, float]
+    tilt: float
+    spread: float
+    by: str
+    rows: Floats
+    centers: Floats
+    errors: Floats
+    scores: Floats
+
+    def record(self) -> dict[str, Any]:
+        """The estimate in words and numbers, as reports and configurations keep it."""
+        return {
+            "center": self.center,
+            "interval": list(self.interval),
+            "tilt": self.tilt,
+            "spread": self.spread,
+            "by": self.by,
+            "rows": [int(row) for row in self.rows],
+        }

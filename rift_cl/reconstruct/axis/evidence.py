@@ -1,0 +1,97 @@
+"""What data say about the axis, frequency by frequency along the detector.
+
+Turning a view round about an axis at bin c multiplies its Fourier coefficient at frequency k
+(radians per bin) by ``exp(-2i k c)`` and conjugates it. The energy by which views contradict
+turned ones is therefore ``A(k) + 2 Re(exp(2i k c) C(k))``: one complex number C(k), found by one
+pass over the data, tells the energy for every trial centre, whole bin or not, without another
+transform or any interpolation.
+
+Energies are divided by their expectation at the right centre, which makes them log-likelihoods.
+Each frequency's share, ``X(k) = 2 |C| (1 + cos(2 k c + arg C))`` above its own least, is then
+bounded as in Student's t-distribution, ``nu log(1 + X / nu)``: a frequency that contradicts all
+others, because the object leaves the field of view or the beam drifted, is outvoted instead of
+deciding. The standard error is the sandwich estimate (Huber, Proc. 5th Berkeley Symposium 1, 221,
+1967) over bands of frequencies, so that it also grows where bands disagree.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# Bands of frequencies of about equal weight, whose disagreement tells the error.
+_BANDS = 16
+# Newton steps, the longest of them, and the one that ends the search, in bins.
+_STEPS, _LONGEST, _SHORTEST = 12, 0.2, 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What one sinogram says of its axis.
+
+    Args:
+        frequencies: (n,) along the detector, in radians per bin, ascending.
+        terms: (n,) the numbers C(k), for centres counted in bins of the detector.
+        freedom: degrees of freedom nu of the t-distribution; the fewer, the more a frequency that
+            contradicts the others is outvoted.
+    """
+
+    frequencies: Floats
+    terms: Complexes
+    freedom: float
+
+    @cached_property
+    def _weight(self) -> Floats:
+        return 2 * np.abs(self.terms) / self.freedom
+
+    @cached_property
+    def _phase(self) -> Floats:
+        return np.angle(self.terms)
+
+    def scores(self, centers: Floats) -> Floats:
+        """Log-likelihood of trial centres, less what centres reach on average if data are mute."""
+        a = self._weight
+        # The mean of log(1 + a + a cos u) over a turn of u.
+        mute = np.log((1 + a + np.sqrt(1 + 2 * a)) / 2).sum()
+        angles = 2 * np.multiply.outer(centers, self.frequencies) + self._phase
+        scores: Floats = self.freedom * (mute - np.log1p(a * (1 + np.cos(angles))).sum(axis=-1))
+        return scores
+
+    def peak(self, start: float) -> float:
+        """The likeliest centre next to ``start``, by Newton's method."""
+        center = start
+        for _ in range(_STEPS):
+            slope, bend = self._derivatives(center)
+            if bend.sum() <= 0:
+                break
+            step = float(np.clip(-slope.sum() / bend.sum(), -_LONGEST, _LONGEST))
+            center += step
+            if abs(step) < _SHORTEST:
+                break
+        return center
+
+    def error(self, center: float) -> float:
+        """Standard error of a centre at a peak, in bins; infinite where there is no peak."""
+        slope, bend = self._derivatives(center)
+        total = bend.sum()
+        if not total > 0:
+            return np.inf
+        share = np.cumsum(np.maximum(bend, 0))
+        bands = np.minimum((_BANDS * share / share[-1]).astype(int), _BANDS - 1)
+        slopes = np.bincount(bands, slope, minlength=_BANDS)
+        return float(max(np.linalg.norm(slopes) / total, 1 / np.sqrt(total)))
+
+    def _derivatives(self, center: float) -> tuple[Floats, Floats]:
+        """First and second derivative of the negative log-likelihood, by frequency."""
+        a, twice = self._weight, 2 * self.frequencies
+        angle = twice * center + self._phase
+        share = a / (1 + a * (1 + np.cos(angle)))
+        slope = -self.freedom * share * np.sin(angle) * twice
+        bend = -self.freedom * twice**2 * (share * np.cos(angle) + (share * np.sin(angle)) ** 2)
+        return slope, bend

@@ -1,0 +1,255 @@
+"""How one row is searched: which views are compared, where, and at what size.
+
+A search begins with few wide bins, all over the detector, and ends with narrow ones at the best
+place. Where the object leaves the field of view, the part of the detector that counts depends on
+the centre that is tried, so that several places are followed until they settle, and the likeliest
+is compared with the best of the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.reconstruct.axis.double_wedge import wedge_evidence
+from rift_cl.reconstruct.axis.evidence import Evidence
+from rift_cl.reconstruct.axis.moments import mass_center
+from rift_cl.reconstruct.axis.opposite_views import (
+    Pairs,
+    mirror_scores,
+    opposite_pairs,
+    pair_evidence,
+)
+from rift_cl.reconstruct.axis.views import Row, Views, binned, evenly, is_cut
+
+Floats = NDArray[np.float64]
+
+# The widest gap between neighbouring directions of a half turn, and what may lack of it, in radians.
+_GAP, _SLACK = np.deg2rad(7.0), np.deg2rad(3.0)
+# Where the axis of a half turn is looked for: from this share of the detector to as far from its
+# other end. The least overlap of opposite views, as a share of the detector and in bins.
+_HALF, _OVERLAP, _OVERLAP_BINS = 0.2, 0.03, 8
+# Pairs of opposite views decide from so many on, or from this share of the views on.
+_PAIRS, _PAIR_SHARE = 24, 0.1
+# Bins that the coarse and the fine search work with, about, and views for each of them.
+_COARSE, _FINE, _VIEWS = 256, 512, 1.4
+# Distance of windows about trial centres, as a share of the detector.
+_WINDOWS = 1 / 16
+# Step of trial centres all over the detector and next to the best, and how far the latter go, in
+# bins of the row.
+_STEP, _NARROW, _REACH = 0.25, 0.1, 2.0
+# Places that are followed, and their least distance as a share of the detector.
+_FOLLOWED, _APART = 6, 0.012
+# Most rounds in which a place is followed, the change that ends it and the longest jump, in bins.
+_ROUNDS, _SETTLED, _JUMP = 8, 0.004, 2.0
+# Changes that shrink by a factor in this range are taken to the end of their series at once.
+_SLOW = (0.2, 0.95)
+
+
+Look = Callable[[float, float], Evidence]
+
+
+class RowAxis(NamedTuple):
+    """What one row tells of the axis.
+
+    Args:
+        center: in bins of the detector.
+        error: its standard error.
+        score: log-likelihood of the centre; infinite where that is not known.
+        rival: the greatest one anywhere else.
+        evidence: what the row says near the centre, where it is told by frequencies.
+    """
+
+    center: float
+    error: float
+    score: float
+    rival: float
+    evidence: Evidence | None
+
+
+class Measure(Protocol):
+    """A way to find the axis of one row."""
+
+    by: str
+
+    def find(self, views: Views) -> RowAxis | None:
+        """The axis of a row, (angle, bin); None where this measure does not apply to it."""
+
+
+class OppositeViews:
+    """Registration of opposite views.
+
+    Args:
+        pairs: which views are opposite.
+        span: where to search, in bins of the detector; all of it but the ends if None.
+    """
+
+    by = "opposite views"
+
+    def __init__(self, pairs: Pairs, span: tuple[float, float] | None) -> None:
+        self._pairs, self._span = pairs, span
+
+    def find(self, views: Views) -> RowAxis | None:
+        """The axis of a row."""
+        bins = views.shape[1]
+        least = max(_OVERLAP_BINS, _OVERLAP * bins) / 2
+        low, high = self._span or (least, bins - 1 - least)
+        count = _binning(bins, _FINE)
+        row = Row(binned(views, count), count, is_cut(views))
+        centers, scores = mirror_scores(row, self._pairs, row.place(low), row.place(high))
+        starts = _peaks(row.detector(centers), scores, _APART * bins)
+        return _best([self._settled(row, start) for start in starts], bins)
+
+    def _settled(self, row: Row, start: float) -> RowAxis:
+        def look(window: float, near: float) -> Evidence:
+            return pair_evidence(row, self._pairs, window, near)
+
+        return _followed(row, look, start)
+
+
+class DoubleWedge:
+    """The double wedge of a half turn.
+
+    Args:
+        angles: of the views, in radians.
+        start: the direction at which the half turn begins.
+        span: where to search, in bins of the detector; its middle part if None.
+    """
+
+    by = "double wedge"
+
+    def __init__(self, angles: Floats, start: float, span: tuple[float, float] | None) -> None:
+        self._angles, self._start, self._span = angles, start, span
+
+    def find(self, views: Views) -> RowAxis | None:
+        """The axis of a row."""
+        bins = views.shape[1]
+        low, high = self._span or (_HALF * (bins - 1), (1 - _HALF) * (bins - 1))
+        cut = is_cut(views)
+        coarse = self._row(views, _binning(bins, _COARSE), cut)
+        centers, scores = _everywhere(coarse, low, high)
+        starts = _peaks(centers, scores, _APART * bins)
+        best = _best([self._settled(coarse, start) for start in starts], bins)
+        if _binning(bins, _FINE) == coarse.bin:
+            return best
+        fine = self._settled(self._row(views, _binning(bins, _FINE), cut), best.center)
+        # The rival's score in proportion, since the finer search has more to tell of both.
+        return fine._replace(rival=fine.score * best.rival / best.score if best.score > 0 else 0.0)
+
+    def _row(self, views: Views, count: int, cut: bool) -> Row:
+        bins = views.shape[1] // count
+        average = max(1, int(len(self._angles) / (_VIEWS * bins)))
+        wanted = max(2, len(self._angles) // average)
+        even = evenly(self._angles, self._start, np.pi, wanted, average)
+        return Row(even @ binned(views, count), count, cut)
+
+    def _settled(self, row: Row, start: float) -> RowAxis:
+        def look(window: float, near: float) -> Evidence:
+            return wedge_evidence(row, window, near)
+
+        return _followed(row, look, start)
+
+
+class CentreOfMass:
+    """The centres of mass of all views.
+
+    Args:
+        angles: of the views, in radians.
+    """
+
+    by = "centre of mass"
+
+    def __init__(self, angles: Floats) -> None:
+        self._angles = angles
+
+    def find(self, views: Views) -> RowAxis | None:
+        """The axis of a row; None where the object leaves the field of view or changes."""
+        told = None if is_cut(views) else mass_center(views, self._angles)
+        return None if told is None else RowAxis(*told, np.inf, 0.0, None)
+
+
+def chosen_measure(angles: Floats, span: tuple[float, float] | None) -> Measure:
+    """The measure that the directions of views allow.
+
+    Args:
+        angles: in radians.
+        span: where to search, in bins.
+    """
+    pairs = opposite_pairs(angles)
+    if pairs is not None and pairs.first.size >= min(_PAIRS, _PAIR_SHARE * angles.size):
+        return OppositeViews(pairs, span)
+    circle = np.sort(np.mod(angles, 2 * np.pi))
+    gaps = np.diff(circle, append=circle[0] + 2 * np.pi)
+    widest = int(gaps.argmax())
+    start = float(circle[(widest + 1) % circle.size])
+    ahead = np.sort(np.mod(angles - start + 1e-9, 2 * np.pi))
+    ahead = np.append(ahead[ahead < np.pi - 1e-6], np.pi)
+    inner = np.diff(ahead)
+    if inner.size > 1 and inner[:-1].max() <= _GAP and inner[-1] <= inner[:-1].max() + _SLACK:
+        return DoubleWedge(angles, start, span)
+    return CentreOfMass(angles)
+
+
+def _binning(bins: int, aim: int) -> int:
+    return max(1, round(bins / aim))
+
+
+def _everywhere(row: Row, low: float, high: float) -> tuple[Floats, Floats]:
+    """Trial centres all over a span of the detector, and their scores."""
+    step = _STEP * row.bin
+    if not row.cut:
+        told = wedge_evidence(row, row.place((low + high) / 2), None)
+        centers = np.arange(low, high + step / 2, step)
+        return centers, told.scores(centers)
+    width = _WINDOWS * row.views.shape[1] * row.bin
+    count = max(1, round((high - low) / width))
+    edges = np.linspace(low, high, count + 1)
+    centers, scores = [], []
+    for left, right in zip(edges[:-1], edges[1:], strict=True):
+        told = wedge_evidence(row, row.place((left + right) / 2), None)
+        centers.append(np.arange(left, right, step))
+        scores.append(told.scores(centers[-1]))
+    return np.concatenate(centers), np.concatenate(scores)
+
+
+def _peaks(centers: Floats, scores: Floats, apart: float) -> Floats:
+    """The highest places, no two closer than ``apart``."""
+    taken: list[float] = []
+    for index in np.argsort(-scores, kind="stable"):
+        if all(abs(centers[index] - other) >= apart for other in taken):
+            taken.append(float(centers[index]))
+        if len(taken) == _FOLLOWED:
+            break
+    return np.array(taken)
+
+
+def _followed(row: Row, look: Look, start: float) -> RowAxis:
+    """The centre that a place leads to, with the window and the noise taken about it."""
+    center, last = start, 0.0
+    trial = row.bin * np.arange(-_REACH, _REACH + _NARROW / 2, _NARROW)
+    for _ in range(_ROUNDS):
+        told = look(row.place(center), row.place(center))
+        best = center + trial[told.scores(center + trial).argmax()]
+        change = told.peak(float(best)) - center
+        found = center + change
+        ratio = change / last if last else 0.0
+        if abs(change) < _SETTLED * row.bin:
+            center = found
+            break
+        if _SLOW[0] < ratio < _SLOW[1]:
+            found = center + float(np.clip(change / (1 - ratio), -_JUMP, _JUMP)) * row.bin
+            change = 0.0
+        center, last = found, change
+    center = told.peak(center)
+    score = float(told.scores(np.array([center]))[0])
+    return RowAxis(center, told.error(center), score, 0.0, told)
+
+
+def _best(settled: list[RowAxis], bins: int) -> RowAxis:
+    """The likeliest of some places, and the best score of those that are not next to it."""
+    best = max(settled, key=lambda place: place.score)
+    away = [p.score for p in settled if abs(p.center - best.center) > _APART * bins / 2]
+    return best._replace(rival=max(away, default=0.0))

@@ -1,0 +1,218 @@
+"""The search for the rotation axis: a measure that the views allow, several rows, one answer.
+
+Each row is searched by itself, first coarsely everywhere and then finely at the best, and a line
+through the rows' centres, weighted by how sure each is, is the axis. Where rows or frequencies
+contradict each other, nothing stands out, or the interval comes out too wide, no answer is given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.device import Device
+from rift_cl.cl.memory import as_host_array
+from rift_cl.errors import InputError, ShapeError
+from rift_cl.geometry import Parallel
+from rift_cl.reconstruct.axis.estimate import AxisEstimate
+from rift_cl.reconstruct.axis.measures import RowAxis, chosen_measure
+from rift_cl.reconstruct.axis.views import Views
+
+Floats = NDArray[np.float64]
+
+# A search needs some detail, and views from several directions.
+_FEWEST_BINS, _FEWEST_VIEWS = 8, 4
+# Most rows that are looked at.
+_ROWS = 5
+# Half a 95 % interval in standard errors, which are themselves estimated from 16 bands.
+_HALF_INTERVAL = 2.5
+# The widest half interval that is still an answer, in bins.
+_WIDEST = 0.5
+# A rival's share of the best log-likelihood from which on neither is believed.
+_RIVAL = 0.75
+# Rows further from the line than so many standard errors, and than this many bins, do not count.
+_OUTLIER, _STRAY = 6.0, 2.0
+# How far from the best the reported scores reach, in bins, and their step.
+_REACH, _STEP = 8.0, 0.05
+
+
+def find_center(
+    sinogram: NDArray[np.float32],
+    angles: Floats,
+    *,
+    span: tuple[float, float] | None = None,
+    device: Device | None = None,
+) -> AxisEstimate:
+    """Find the detector bin at which the rotation axis is seen.
+
+    Views from opposite sides decide where there are enough of them (full turns, and those with the
+    axis near an end of the detector), the double wedge for half turns, and the centres of mass for
+    less, where nothing leaves the field of view.
+
+    Args:
+        sinogram: line integrals, (angle, bin) or (angle, row, bin); of a stack, at most five rows
+            are looked at, evenly chosen.
+        angles: directions in radians, in any order.
+        span: where to search, in bins; for half turns the middle 60 % of the detector if not
+            given, for full turns all of it but the outermost bins.
+        device: accepted as by every method; the search runs on the host.
+
+    Returns:
+        The estimate; ``center`` is that of the middle row.
+
+    Raises:
+        InputError: the data do not tell the axis: no contrast, too few views, a wide gap between
+            them, or nothing that stands out of the noise. Also: the span is not on the detector.
+        ShapeError: the sinogram has not two or three axes, or not a view for each angle.
+        NonFiniteError: a sample is not finite.
+    """
+    shape = np.shape(sinogram)
+    if len(shape) not in (2, 3):
+        raise ShapeError(
+            f"find_center: sinogram has shape {shape}, wanted (angle, bin) or (angle, row, bin)"
+        )
+    directions = Parallel(angles, shape[-1]).angles
+    y = as_host_array(sinogram, (directions.size, *shape[1:]), name="sinogram", wants="find_center")
+    stack = y if y.ndim == 3 else y[:, None]
+    rows = searched_rows(stack.shape[1])
+    return axis_of_rows((stack[:, row] for row in rows), rows, stack.shape[1], directions, span)
+
+
+def searched_rows(count: int) -> list[int]:
+    """The rows of a detector that a search looks at: evenly spread, the middle one among them."""
+    taken = min(_ROWS, count)
+    return [int((index + 0.5) * count / taken) for index in range(taken)]
+
+
+def axis_of_rows(
+    sinograms: Iterable[Views],
+    rows: list[int],
+    count: int,
+    angles: Floats,
+    span: tuple[float, float] | None = None,
+) -> AxisEstimate:
+    """Find the axis from some rows of a detector.
+
+    Args:
+        sinograms: line integrals of each row, (angle, bin).
+        rows: their numbers.
+        count: of all the detector's rows, whose middle the estimate is for.
+        angles: directions in radians.
+        span: where to search, in bins.
+
+    Raises:
+        InputError: as for ``find_center``.
+    """
+    measure = chosen_measure(angles, span)
+    places, found, why = [], [], ""
+    for row, sinogram in zip(rows, sinograms, strict=True):
+        views = np.ascontiguousarray(sinogram, np.float32)
+        _check_searchable(views, span)
+        told = measure.find(views) if np.ptp(views) > 0 else None
+        doubt = _doubt(told, span, measure.by, views)
+        if told is None or doubt:
+            why = why or doubt
+        else:
+            places.append(row)
+            found.append(told)
+    if 2 * len(found) <= len(rows):
+        raise _refusal(why)
+    return _line(np.array(places, float), found, (count - 1) / 2, measure.by)
+
+
+def _check_searchable(views: Views, span: tuple[float, float] | None) -> None:
+    count, bins = views.shape
+    if bins < _FEWEST_BINS or count < _FEWEST_VIEWS:
+        raise _refusal(
+            f"a search takes {_FEWEST_VIEWS} views of {_FEWEST_BINS} bins at least, there are "
+            f"{count} of {bins}"
+        )
+    if span is not None and not 0 <= span[0] < span[1] <= bins - 1:
+        raise InputError(
+            f"span is {span}, wanted two bins in ascending order, between 0 and {bins - 1}"
+        )
+
+
+def _doubt(told: RowAxis | None, span: tuple[float, float] | None, by: str, views: Views) -> str:
+    """Why the answer of one row cannot be trusted; empty where it can."""
+    bins = views.shape[1]
+    if not np.ptp(views) > 0:
+        return "the sinogram has no contrast"
+    if told is None:
+        return (
+            "the views go round less than half a turn, and the object leaves the field of view, "
+            "changes, or air is not at zero"
+        )
+    low, high = span or (0, bins - 1)
+    if not low <= told.center <= high:
+        return f"nothing between the bins {low:g} and {high:g} stands out"
+    if not told.score > 0 or told.rival > _RIVAL * told.score:
+        return "no place on the detector stands out from the others"
+    if not _HALF_INTERVAL * told.error <= _WIDEST * 4:
+        return _too_wide(_HALF_INTERVAL * told.error)
+    return ""
+
+
+def _too_wide(half: float) -> str:
+    return f"the data tell it to no better than {half:.2g} bins either way"
+
+
+def _refusal(why: str) -> InputError:
+    return InputError(f"the rotation axis cannot be found: {why}; give it yourself (--center)")
+
+
+def _line(places: Floats, found: list[RowAxis], middle: float, by: str) -> AxisEstimate:
+    """The axis through the rows' centres.
+
+    Raises:
+        InputError: rows contradict each other, or the interval is too wide.
+    """
+    centers = np.array([row.center for row in found])
+    errors = np.array([row.error for row in found])
+    kept = np.ones(places.size, bool)
+    while True:
+        center, tilt, error = _fitted(places[kept] - middle, centers[kept], errors[kept])
+        away = np.abs(centers - center - tilt * (places - middle))
+        far = kept & (away > np.maximum(_OUTLIER * errors, _STRAY))
+        if not far.any():
+            break
+        kept &= away < away[far].max()
+        if 2 * np.count_nonzero(kept) <= places.size:
+            raise _refusal("rows of the detector contradict each other")
+    half = _HALF_INTERVAL * error
+    if not half <= _WIDEST:
+        raise _refusal(_too_wide(half))
+    told = [row.evidence for row, used in zip(found, kept, strict=True) if used]
+    known = [evidence for evidence in told if evidence is not None]
+    trial = center + np.arange(-_REACH, _REACH + _STEP / 2, _STEP)
+    scores = sum(e.scores(trial) for e in known) if known else -(((trial - center) / error) ** 2) / 2
+    return AxisEstimate(
+        center=float(center),
+        interval=(float(center - half), float(center + half)),
+        tilt=float(tilt),
+        spread=float(np.sqrt(np.mean(away[kept] ** 2))),
+        by=by,
+        rows=places[kept],
+        centers=centers[kept],
+        errors=errors[kept],
+        scores=np.stack([trial, scores]),
+    )
+
+
+def _fitted(places: Floats, centers: Floats, errors: Floats) -> tuple[float, float, float]:
+    """Centre at 0, tilt, and the centre's standard error, of a weighted line through centres.
+
+    With fewer than three rows a slope would be noise, and the axis is taken as upright. Where rows
+    scatter more than their errors explain, the error grows accordingly.
+    """
+    terms = 2 if places.size >= 3 else 1
+    model = np.stack([np.ones_like(places), places], axis=1)[:, :terms] / errors[:, None]
+    inverse = np.linalg.pinv(model)
+    fit = inverse @ (centers / errors)
+    left = centers / errors - model @ fit
+    free = places.size - terms
+    scatter = max(1.0, float(np.sqrt((left**2).sum() / free))) if free else 1.0
+    tilt = float(fit[1]) if terms == 2 else 0.0
+    return float(fit[0]), tilt, scatter * float(np.linalg.norm(inverse[0]))

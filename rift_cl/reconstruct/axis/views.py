@@ -1,0 +1,163 @@
+"""Views of one row made ready for a search: evenly spread, and cut where their mirror images end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.reconstruct.axis.evidence import Evidence
+
+Floats = NDArray[np.float64]
+Views = NDArray[np.float32]
+
+# Share of a window's half-width over which it falls off at its ends.
+_TAPER = 0.1
+# Ends of the detector, as a share of its bins, where air is looked for; views over which they are
+# averaged; and the level, as a share of strong line integrals, above which they are not air.
+_END, _BLUR, _AIR = 0.01, 9, 0.04
+_STRONG, _MOST = 99.0, 98.0
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """The line integrals of one detector row, in bins that may hold several of the detector's.
+
+    Args:
+        views: (angle, bin).
+        bin: how many of the detector's bins one of them holds.
+        cut: whether the object reaches beyond the detector, or air is not at zero.
+    """
+
+    views: Views
+    bin: int
+    cut: bool
+
+    def detector(self, place: float) -> float:
+        """A place in these bins, in bins of the detector."""
+        return place * self.bin + (self.bin - 1) / 2
+
+    def place(self, detector: float) -> float:
+        """A place in bins of the detector, in these bins."""
+        return (detector - (self.bin - 1) / 2) / self.bin
+
+
+def is_cut(views: Views) -> bool:
+    """Whether some views of a row do not end in air at zero on both sides."""
+    from scipy.ndimage import uniform_filter1d
+
+    end = max(2, round(_END * views.shape[1]))
+    ends = np.stack([views[:, :end].mean(axis=1), views[:, -end:].mean(axis=1)])
+    level = np.percentile(np.abs(uniform_filter1d(ends, _BLUR, axis=1)), _MOST, axis=1)
+    return bool(level.max() > _AIR * np.percentile(np.abs(views), _STRONG))
+
+
+def binned(views: Views, count: int) -> Views:
+    """Means over ``count`` bins; what is left over at the end is dropped."""
+    if count == 1:
+        return views
+    whole = views.shape[1] // count * count
+    return views[:, :whole].reshape(len(views), -1, count).mean(axis=2)
+
+
+def evenly(angles: Floats, start: float, turn: float, count: int, average: int) -> object:
+    """The linear map from views in any directions to evenly spread ones.
+
+    Args:
+        angles: directions of the views, in radians.
+        start: the first direction.
+        turn: what the views go round: a whole turn, or half of one that begins at ``start``.
+        count: of evenly spread views.
+        average: how many directions are averaged for each, interpolated linearly.
+
+    Returns:
+        A sparse (count, angles.size) matrix. The views that it gives lie ``turn / count`` apart.
+    """
+    from scipy.sparse import coo_array
+
+    ahead = np.mod(angles - start + 1e-9, 2 * np.pi) - 1e-9
+    ahead, first = np.unique(np.round(ahead, 9), return_inverse=True)
+    share = 1 / np.bincount(first)
+    wanted = np.arange(count * average) * turn / (count * average)
+    whole = turn > 1.5 * np.pi
+    after = np.searchsorted(ahead, wanted - 1e-9)
+    before = after - 1
+    if whole:
+        gap = np.mod(ahead[after % ahead.size] - ahead[before], 2 * np.pi)
+        weight = np.mod(wanted - ahead[before], 2 * np.pi) / np.where(gap > 0, gap, 2 * np.pi)
+    else:
+        inside = (after > 0) & (after < ahead.size)
+        before, after = np.clip(before, 0, None), np.clip(after, 0, ahead.size - 1)
+        gap = np.where(inside, ahead[after] - ahead[before], 1)
+        weight = np.where(inside, (wanted - ahead[before]) / np.where(gap > 0, gap, 1), 0.0)
+    row = np.arange(wanted.size) // average
+    merged = coo_array(
+        (
+            np.concatenate([1 - weight, weight]) / average,
+            (np.tile(row, 2), np.concatenate([before % ahead.size, after % ahead.size])),
+        ),
+        shape=(count, ahead.size),
+    ).tocsr()
+    spread = coo_array((share[first], (first, np.arange(angles.size))), shape=(ahead.size, angles.size))
+    return (merged @ spread.tocsr()).astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Spectra:
+    """Fourier transforms of views along the detector.
+
+    Args:
+        values: (angle, frequency), complex.
+        frequencies: in radians per bin of the row.
+        origin: the bin of the row that phases are counted from.
+    """
+
+    values: NDArray[np.complex64]
+    frequencies: Floats
+    origin: float
+
+    def turned(self, center: float) -> NDArray[np.complex64]:
+        """What conjugated spectra of views are multiplied with to turn them about a centre."""
+        phase = np.exp(-2j * self.frequencies * (center - self.origin))
+        return phase.astype(np.complex64)
+
+    def evidence(self, terms: NDArray[np.complex128], row: Row, freedom: float) -> Evidence:
+        """Evidence in bins of the detector from terms that count centres from ``origin``."""
+        shift = self.origin + (row.bin - 1) / (2 * row.bin)
+        phase = np.exp(-2j * self.frequencies * shift)
+        return Evidence(self.frequencies / row.bin, terms * phase, freedom)
+
+
+def spectra(row: Row, center: float) -> Spectra:
+    """Spectra of the part of views that lies as far to the left of a centre as to its right.
+
+    Views that end in air are taken whole, with zeros beyond, since nothing is missing. Others are
+    cut by a window that is symmetric about the centre, after their mean in it is subtracted, so
+    that a step at the end of the window is not taken for a feature that turns with the object.
+    """
+    from scipy.fft import next_fast_len
+
+    bins = row.views.shape[1]
+    last = bins - 1
+    if not row.cut:
+        length = next_fast_len(int(2 * max(center, last - center)) + 2, real=True)
+        return _transformed(row.views, length, 0)
+    half = max(min(center, last - center), 4.0)
+    first, end = max(0, int(np.ceil(center - half))), min(bins, int(center + half) + 1)
+    away = np.abs(np.arange(first, end) - center) / half
+    window = np.sin(np.pi / 2 * np.clip((1 - away) / _TAPER, 0, 1)) ** 2
+    window = window.astype(np.float32)
+    part = row.views[:, first:end]
+    part = (part - (part @ window / window.sum())[:, None]) * window
+    length = next_fast_len(end - first, real=True)
+    return _transformed(part, length, first)
+
+
+def _transformed(part: Views, length: int, first: int) -> Spectra:
+    """Without frequency zero and the highest of an even length, which tell nothing of places."""
+    from scipy.fft import rfft
+
+    inner = slice(1, (length + 1) // 2)
+    frequencies = 2 * np.pi * np.arange(length // 2 + 1) / length
+    return Spectra(rfft(part, length, axis=1)[:, inner], frequencies[inner], float(first))
