@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.html_page import Page
+from rift_cl.jobs.axis_search import find_axis
 from rift_cl.jobs.run_folder import RunFolder
 from rift_cl.jobs.scan_input import ScanInput, read_attenuation
 from rift_cl.operators import Projector
 from rift_cl.plot import curves, figure_png, image_grid
 from rift_cl.progress import Report
-from rift_cl.jobs.axis_search import find_axis
 from rift_cl.reconstruct import AxisEstimate, fbp
 
 # Centres of the contact sheet, in bins from the best one.

@@ -122,8 +122,8 @@ def test_center(scan, tmp_path, capsys):
     printed = capsys.readouterr().out
     assert float(printed.split()[0]) == pytest.approx(45, abs=0.3)
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 3
-    assert json.loads((out / "metrics.json").read_text())["decided_by"] == "sharpness"
+    assert page.count("data:image/png;base64,") == 2
+    assert json.loads((out / "metrics.json").read_text())["by"] == "double wedge"
 
 
 def test_center_of_a_row_that_is_not_there(scan, tmp_path, capsys):

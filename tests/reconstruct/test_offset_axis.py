@@ -7,7 +7,6 @@ import rift_cl as rift
 from rift_cl.errors import InputError
 from rift_cl.metrics import psnr
 from rift_cl.reconstruct.offset_axis import (
-    find_offset_center,
     is_full_turn,
     is_offset,
     offset_weights,
@@ -69,21 +68,21 @@ def test_only_full_turns_with_an_axis_off_the_middle_are_offset():
 def test_the_axis_is_found_near_an_end(center, noise):
     sinogram, _ = half_sinogram(center)
     noisy = sinogram + np.random.default_rng(2).normal(0, noise * sinogram.max(), sinogram.shape)
-    found, score = find_offset_center(noisy.astype(np.float32), ANGLES)
-    assert found == pytest.approx(center, abs=0.25)
-    assert 0 < score <= 1
+    found = rift.find_center(noisy.astype(np.float32), ANGLES)
+    assert found.center == pytest.approx(center, abs=0.1)
+    assert found.by == "opposite views"
 
 
 def test_an_odd_number_of_views_has_opposites_too():
     angles = np.arange(241) * 2 * np.pi / 241
     sinogram, _ = half_sinogram(CENTER, angles=angles)
-    assert find_offset_center(sinogram, angles)[0] == pytest.approx(CENTER, abs=0.25)
+    assert rift.find_center(sinogram, angles).center == pytest.approx(CENTER, abs=0.1)
 
 
 def test_half_turns_and_axes_off_the_detector_are_told():
     sinogram, scan = half_sinogram(CENTER)
-    with pytest.raises(InputError, match="full turns"):
-        find_offset_center(sinogram[: VIEWS // 2], ANGLES[: VIEWS // 2])
+    with pytest.raises(InputError, match="--center"):
+        rift.find_center(sinogram[: VIEWS // 2], ANGLES[: VIEWS // 2])
     with pytest.raises(InputError, match="overlap"):
         offset_weights(rift.Parallel(ANGLES, BINS, center=-4))
     assert scan.bins == BINS

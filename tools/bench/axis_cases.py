@@ -110,7 +110,10 @@ def _filled(radius: float, bins: int, count: int, random: np.random.Generator) -
     flat = random.uniform(0.8, 1)
     x, y = random.uniform(-0.04, 0.04, 2) * bins
     body = [1.0, x, y, radius, flat * radius, random.uniform(0, np.pi)]
-    away, turn = flat * radius * np.sqrt(random.uniform(0, 0.95, count)), random.uniform(0, 7, count)
+    away, turn = (
+        flat * radius * np.sqrt(random.uniform(0, 0.95, count)),
+        random.uniform(0, 7, count),
+    )
     size = bins * random.uniform(0.004, 0.02, (2, count))
     value = np.where(random.uniform(size=count) < 0.7, -1.0, 0.6) * random.uniform(0.4, 1, count)
     holes = [value, x + away * np.cos(turn), y + away * np.sin(turn), *size]

@@ -1,9 +1,9 @@
 """The rotation axis: where on the detector it is seen, how surely, and whether it is tilted.
 
-``search`` asks several rows and draws a line through their answers; ``measures`` says how one row is
-searched, by a measure that the directions of its views allow. The measures are ``opposite_views``,
-``double_wedge`` and ``moments``, one a file; the first two hand over ``evidence``, a phase for every
-frequency along the detector.
+``search`` asks several rows and draws a line through their answers; ``measures`` says how one row
+is searched, by a measure that the directions of its views allow. The measures are
+``opposite_views``, ``double_wedge`` and ``moments``, one a file; the first two hand over
+``evidence``, a phase for every frequency along the detector.
 """
 
 from rift_cl.reconstruct.axis.estimate import AxisEstimate

@@ -52,7 +52,8 @@ def wedge_evidence(row: Row, window: float, near: float | None) -> Evidence:
     forth, back = _angular(fft(half.values, 2 * views, axis=0))
     sign = np.where(np.arange(views + 1) % 2, -1, 1).astype(np.float32)[:, None]
     taper = np.sqrt(8 / 3) * np.sin(np.pi * (np.arange(views) + 0.5) / views) ** 2
-    energy = _energies(*_angular(fft(half.values * taper.astype(np.float32)[:, None], 2 * views, axis=0)))
+    tapered = half.values * taper.astype(np.float32)[:, None]
+    energy = _energies(*_angular(fft(tapered, 2 * views, axis=0)))
     if near is not None:
         whole = np.abs(forth + sign * half.turned(near) * back.conj()) ** 2
         known = np.exp(-2 * (half.frequencies * _DOUBT) ** 2).astype(np.float32)

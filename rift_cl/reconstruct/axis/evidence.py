@@ -54,13 +54,16 @@ class Evidence:
     def _phase(self) -> Floats:
         return np.angle(self.terms)
 
+    @property
+    def most(self) -> float:
+        """The score of a centre on which all frequencies agreed."""
+        return float(self.freedom * _mute(self._weight))
+
     def scores(self, centers: Floats) -> Floats:
         """Log-likelihood of trial centres, less what centres reach on average if data are mute."""
         a = self._weight
-        # The mean of log(1 + a + a cos u) over a turn of u.
-        mute = np.log((1 + a + np.sqrt(1 + 2 * a)) / 2).sum()
         angles = 2 * np.multiply.outer(centers, self.frequencies) + self._phase
-        scores: Floats = self.freedom * (mute - np.log1p(a * (1 + np.cos(angles))).sum(axis=-1))
+        scores: Floats = self.freedom * (_mute(a) - np.log1p(a * (1 + np.cos(angles))).sum(axis=-1))
         return scores
 
     def peak(self, start: float) -> float:
@@ -95,3 +98,8 @@ class Evidence:
         slope = -self.freedom * share * np.sin(angle) * twice
         bend = -self.freedom * twice**2 * (share * np.cos(angle) + (share * np.sin(angle)) ** 2)
         return slope, bend
+
+
+def _mute(a: Floats) -> float:
+    """What centres lose on average over all phases: the mean of log(1 + a + a cos u) over u."""
+    return float(np.log((1 + a + np.sqrt(1 + 2 * a)) / 2).sum())

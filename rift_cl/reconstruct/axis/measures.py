@@ -9,6 +9,7 @@ is compared with the best of the others.
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -27,7 +28,7 @@ from rift_cl.reconstruct.axis.views import Row, Views, binned, evenly, is_cut
 
 Floats = NDArray[np.float64]
 
-# The widest gap between neighbouring directions of a half turn, and what may lack of it, in radians.
+# The widest gap between neighbouring directions of a half turn, and what may lack of it, radians.
 _GAP, _SLACK = np.deg2rad(7.0), np.deg2rad(3.0)
 # Where the axis of a half turn is looked for: from this share of the detector to as far from its
 # other end. The least overlap of opposite views, as a share of the detector and in bins.
@@ -60,6 +61,7 @@ class RowAxis(NamedTuple):
         error: its standard error.
         score: log-likelihood of the centre; infinite where that is not known.
         rival: the greatest one anywhere else.
+        coherence: the score as a share of what it were if all frequencies agreed.
         evidence: what the row says near the centre, where it is told by frequencies.
     """
 
@@ -67,6 +69,7 @@ class RowAxis(NamedTuple):
     error: float
     score: float
     rival: float
+    coherence: float
     evidence: Evidence | None
 
 
@@ -168,7 +171,7 @@ class CentreOfMass:
     def find(self, views: Views) -> RowAxis | None:
         """The axis of a row; None where the object leaves the field of view or changes."""
         told = None if is_cut(views) else mass_center(views, self._angles)
-        return None if told is None else RowAxis(*told, np.inf, 0.0, None)
+        return None if told is None else RowAxis(*told, np.inf, 0.0, 1.0, None)
 
 
 def chosen_measure(angles: Floats, span: tuple[float, float] | None) -> Measure:
@@ -208,7 +211,7 @@ def _everywhere(row: Row, low: float, high: float) -> tuple[Floats, Floats]:
     count = max(1, round((high - low) / width))
     edges = np.linspace(low, high, count + 1)
     centers, scores = [], []
-    for left, right in zip(edges[:-1], edges[1:], strict=True):
+    for left, right in pairwise(edges):
         told = wedge_evidence(row, row.place((left + right) / 2), None)
         centers.append(np.arange(left, right, step))
         scores.append(told.scores(centers[-1]))
@@ -245,7 +248,7 @@ def _followed(row: Row, look: Look, start: float) -> RowAxis:
         center, last = found, change
     center = told.peak(center)
     score = float(told.scores(np.array([center]))[0])
-    return RowAxis(center, told.error(center), score, 0.0, told)
+    return RowAxis(center, told.error(center), score, 0.0, score / max(told.most, 1e-9), told)
 
 
 def _best(settled: list[RowAxis], bins: int) -> RowAxis:

@@ -1,8 +1,8 @@
 """Limited angles: the centre of mass of every view, which follows a sinusoid about the axis.
 
 The mass of a view is that of the object, and its centre of mass lies at ``c + x cos(angle) +
-y sin(angle)``, where (x, y) is the object's: the first two of the consistency conditions of Helgason
-and Ludwig (Natterer, The Mathematics of Computerized Tomography, section II.4). They need no
+y sin(angle)``, where (x, y) is the object's: the first two of the consistency conditions of
+Helgason and Ludwig (Natterer, The Mathematics of Computerized Tomography, II.4). They need no
 opposite views, but all of the object in every view, and air at zero; whether mass stays the same
 from view to view tells.
 """

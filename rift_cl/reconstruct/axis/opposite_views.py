@@ -94,7 +94,8 @@ def mirror_scores(row: Row, pairs: Pairs, low: float, high: float) -> tuple[Floa
     Args:
         row: the views.
         pairs: which of them are opposite.
-        low, high: where to look.
+        low: where to begin, in bins of the row.
+        high: where to end.
 
     Returns:
         Trial centres, every half bin of the row, and their correlations, 1 at most.
@@ -109,7 +110,10 @@ def mirror_scores(row: Row, pairs: Pairs, low: float, high: float) -> tuple[Floa
     # Sums over products of one view and another turned round about half of each number.
     products = rfft(first, length, axis=1) * rfft(opposite, length, axis=1)
     both = -irfft(products.sum(axis=0), length)[: 2 * bins - 1]
-    squares = [np.concatenate([[0], np.cumsum((part**2).sum(axis=0, dtype=float))]) for part in (first, opposite)]
+    squares = [
+        np.concatenate([[0], np.cumsum((part**2).sum(axis=0, dtype=float))])
+        for part in (first, opposite)
+    ]
     turn = np.arange(2 * bins - 1)
     start, stop = np.maximum(0, turn - bins + 1), np.minimum(bins - 1, turn) + 1
     power = np.prod([part[stop] - part[start] for part in squares], axis=0)

@@ -28,10 +28,13 @@ _FEWEST_BINS, _FEWEST_VIEWS = 8, 4
 _ROWS = 5
 # Half a 95 % interval in standard errors, which are themselves estimated from 16 bands.
 _HALF_INTERVAL = 2.5
+# The least standard error: views are sums over bins, and detectors are not perfect.
+_FINEST = 0.01
 # The widest half interval that is still an answer, in bins.
 _WIDEST = 0.5
-# A rival's share of the best log-likelihood from which on neither is believed.
-_RIVAL = 0.75
+# A rival's share of the best log-likelihood from which on neither is believed; the least of the
+# best, and the least share of it of what it were if all frequencies agreed.
+_RIVAL, _SCORE, _COHERENCE = 0.75, 25.0, 0.5
 # Rows further from the line than so many standard errors, and than this many bins, do not count.
 _OUTLIER, _STRAY = 6.0, 2.0
 # How far from the best the reported scores reach, in bins, and their step.
@@ -148,7 +151,7 @@ def _doubt(told: RowAxis | None, span: tuple[float, float] | None, by: str, view
     low, high = span or (0, bins - 1)
     if not low <= told.center <= high:
         return f"nothing between the bins {low:g} and {high:g} stands out"
-    if not told.score > 0 or told.rival > _RIVAL * told.score:
+    if told.score < _SCORE or told.coherence < _COHERENCE or told.rival > _RIVAL * told.score:
         return "no place on the detector stands out from the others"
     if not _HALF_INTERVAL * told.error <= _WIDEST * 4:
         return _too_wide(_HALF_INTERVAL * told.error)
@@ -170,7 +173,7 @@ def _line(places: Floats, found: list[RowAxis], middle: float, by: str) -> AxisE
         InputError: rows contradict each other, or the interval is too wide.
     """
     centers = np.array([row.center for row in found])
-    errors = np.array([row.error for row in found])
+    errors = np.hypot(_FINEST, [row.error for row in found])
     kept = np.ones(places.size, bool)
     while True:
         center, tilt, error = _fitted(places[kept] - middle, centers[kept], errors[kept])
@@ -187,7 +190,9 @@ def _line(places: Floats, found: list[RowAxis], middle: float, by: str) -> AxisE
     told = [row.evidence for row, used in zip(found, kept, strict=True) if used]
     known = [evidence for evidence in told if evidence is not None]
     trial = center + np.arange(-_REACH, _REACH + _STEP / 2, _STEP)
-    scores = sum(e.scores(trial) for e in known) if known else -(((trial - center) / error) ** 2) / 2
+    scores = (
+        sum(e.scores(trial) for e in known) if known else -(((trial - center) / error) ** 2) / 2
+    )
     return AxisEstimate(
         center=float(center),
         interval=(float(center - half), float(center + half)),

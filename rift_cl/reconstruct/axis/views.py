@@ -1,4 +1,4 @@
-"""Views of one row made ready for a search: evenly spread, and cut where their mirror images end."""
+"""Views of one row made ready for a search: evenly spread, cut where their mirror images end."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from rift_cl.reconstruct.axis.evidence import Evidence
 Floats = NDArray[np.float64]
 Views = NDArray[np.float32]
 
-# Share of a window's half-width over which it falls off at its ends.
-_TAPER = 0.1
+# Share of a window's half-width over which it falls off at its ends, and the least of that in bins.
+_TAPER, _TAPER_BINS = 0.1, 8.0
 # Ends of the detector, as a share of its bins, where air is looked for; views over which they are
 # averaged; and the level, as a share of strong line integrals, above which they are not air.
 _END, _BLUR, _AIR = 0.01, 9, 0.04
@@ -99,7 +99,9 @@ def evenly(angles: Floats, start: float, turn: float, count: int, average: int) 
         ),
         shape=(count, ahead.size),
     ).tocsr()
-    spread = coo_array((share[first], (first, np.arange(angles.size))), shape=(ahead.size, angles.size))
+    spread = coo_array(
+        (share[first], (first, np.arange(angles.size))), shape=(ahead.size, angles.size)
+    )
     return (merged @ spread.tocsr()).astype(np.float32)
 
 
@@ -146,7 +148,8 @@ def spectra(row: Row, center: float) -> Spectra:
     half = max(min(center, last - center), 4.0)
     first, end = max(0, int(np.ceil(center - half))), min(bins, int(center + half) + 1)
     away = np.abs(np.arange(first, end) - center) / half
-    window = np.sin(np.pi / 2 * np.clip((1 - away) / _TAPER, 0, 1)) ** 2
+    taper = min(1.0, max(_TAPER, _TAPER_BINS / half))
+    window = np.sin(np.pi / 2 * np.clip((1 - away) / taper, 0, 1)) ** 2
     window = window.astype(np.float32)
     part = row.views[:, first:end]
     part = (part - (part @ window / window.sum())[:, None]) * window
