@@ -210,12 +210,12 @@ def _everywhere(row: Row, low: float, high: float) -> tuple[Floats, Floats]:
     width = _WINDOWS * row.views.shape[1] * row.bin
     count = max(1, round((high - low) / width))
     edges = np.linspace(low, high, count + 1)
-    centers, scores = [], []
+    parts, heights = [], []
     for left, right in pairwise(edges):
-        told = wedge_evidence(row, row.place((left + right) / 2), None)
-        centers.append(np.arange(left, right, step))
-        scores.append(told.scores(centers[-1]))
-    return np.concatenate(centers), np.concatenate(scores)
+        told = wedge_evidence(row, row.place(float(left + right) / 2), None)
+        parts.append(np.arange(left, right, step))
+        heights.append(told.scores(parts[-1]))
+    return np.concatenate(parts), np.concatenate(heights)
 
 
 def _peaks(centers: Floats, scores: Floats, apart: float) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from rift_cl.reconstruct.axis.evidence import Evidence
 
 Floats = NDArray[np.float64]
 Views = NDArray[np.float32]
+Place = TypeVar("Place", float, NDArray[np.float64])
 
 # Share of a window's half-width over which it falls off at its ends, and the least of that in bins.
 _TAPER, _TAPER_BINS = 0.1, 8.0
@@ -34,7 +36,7 @@ class Row:
     bin: int
     cut: bool
 
-    def detector(self, place: float) -> float:
+    def detector(self, place: Place) -> Place:
         """A place in these bins, in bins of the detector."""
         return place * self.bin + (self.bin - 1) / 2
 
@@ -58,10 +60,11 @@ def binned(views: Views, count: int) -> Views:
     if count == 1:
         return views
     whole = views.shape[1] // count * count
-    return views[:, :whole].reshape(len(views), -1, count).mean(axis=2)
+    means: Views = views[:, :whole].reshape(len(views), -1, count).mean(axis=2)
+    return means
 
 
-def evenly(angles: Floats, start: float, turn: float, count: int, average: int) -> object:
+def evenly(angles: Floats, start: float, turn: float, count: int, average: int) -> Any:
     """The linear map from views in any directions to evenly spread ones.
 
     Args:
@@ -122,7 +125,8 @@ class Spectra:
     def turned(self, center: float) -> NDArray[np.complex64]:
         """What conjugated spectra of views are multiplied with to turn them about a centre."""
         phase = np.exp(-2j * self.frequencies * (center - self.origin))
-        return phase.astype(np.complex64)
+        turned: NDArray[np.complex64] = phase.astype(np.complex64)
+        return turned
 
     def evidence(self, terms: NDArray[np.complex128], row: Row, freedom: float) -> Evidence:
         """Evidence in bins of the detector from terms that count centres from ``origin``."""
