@@ -18,6 +18,7 @@ nothing in air.
 from __future__ import annotations
 
 import dataclasses
+import numbers
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -42,8 +43,8 @@ Floats = NDArray[np.float32]
 StripeMethod = Callable[[Floats, Device], Floats]
 
 _FEWEST_BINS = 16
-# A detector of so many bins for each of the window's takes the whole window of the median; on a
-# smaller one the same object is as much smaller, and a median blurs.
+# The median's window grows with the detector, by a bin for so many, as the object does: a wider
+# window than needed blurs.
 _BINS_PER_WINDOW, _LEAST_WINDOW = 100, 3
 # Sorted windows of the median live in registers and caches.
 _LARGEST_WINDOW = 127
@@ -69,13 +70,11 @@ class SortingFilter:
 
     def __post_init__(self) -> None:
         """Check the window."""
-        if self.window is not None and not (
-            self.window % 2 == 1 and _LEAST_WINDOW <= self.window <= _LARGEST_WINDOW
-        ):
-            raise InputError(
-                f"window is {self.window}, wanted an odd number of bins from {_LEAST_WINDOW} to "
-                f"{_LARGEST_WINDOW}"
-            )
+        if self.window is None:
+            return
+        _demand_whole(_LEAST_WINDOW, _LARGEST_WINDOW, window=self.window)
+        if self.window % 2 == 0:
+            raise InputError(f"window is {self.window}, wanted an odd number of bins")
 
     def __call__(self, stack: Floats, device: Device) -> Floats:
         """Filter projections (view, row, bin)."""
@@ -238,8 +237,7 @@ class FittingFilter:
     def __post_init__(self) -> None:
         """Check the options."""
         _demand_above(0, smoothing=self.smoothing)
-        if not 0 <= self.degree < FEWEST_VIEWS:
-            raise InputError(f"degree is {self.degree}, wanted 0 to {FEWEST_VIEWS - 1}")
+        _demand_whole(0, FEWEST_VIEWS - 1, degree=self.degree)
 
     def __call__(self, stack: Floats, device: Device) -> Floats:
         """Filter projections (view, row, bin)."""
@@ -274,8 +272,8 @@ class WaveletFourierFilter:
     def __post_init__(self) -> None:
         """Check the options."""
         _demand_above(0, width=self.width)
-        if self.levels is not None and not 1 <= self.levels <= _MOST_LEVELS:
-            raise InputError(f"levels is {self.levels}, wanted 1 to {_MOST_LEVELS}")
+        if self.levels is not None:
+            _demand_whole(1, _MOST_LEVELS, levels=self.levels)
 
     def __call__(self, stack: Floats, device: Device) -> Floats:
         """Filter projections (view, row, bin)."""
@@ -374,10 +372,16 @@ def _method(name: str, options: dict[str, Any]) -> StripeMethod:
     return made
 
 
-def _demand_above(least: float, **values: float) -> None:
+def _demand_above(least: float, **values: Any) -> None:
     for name, value in values.items():
-        if not least < value < np.inf:
-            raise InputError(f"{name} is {value}, wanted a number above {least}")
+        if not isinstance(value, numbers.Real) or not least < value < np.inf:
+            raise InputError(f"{name} is {value!r}, wanted a number above {least}")
+
+
+def _demand_whole(least: int, most: int, **values: Any) -> None:
+    for name, value in values.items():
+        if not isinstance(value, numbers.Integral) or not least <= value <= most:
+            raise InputError(f"{name} is {value!r}, wanted a whole number from {least} to {most}")
 
 
 def _gaussian(values: NDArray[Any], deviation: float, *, axis: int) -> NDArray[Any]:

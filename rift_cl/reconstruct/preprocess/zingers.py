@@ -14,6 +14,7 @@ across bins, which slopes of the object leave at zero: by the median of their si
 
 from __future__ import annotations
 
+import numbers
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -190,11 +191,15 @@ def _row_means(stack: Floats) -> NDArray[np.float64]:
 
 
 def _check_options(sigma: float, excess: float | None, size: int, kind: str) -> None:
-    if not 0 < sigma < np.inf:
-        raise InputError(f"sigma is {sigma}, wanted a positive number of standard deviations")
-    if excess is not None and not 0 < excess < np.inf:
-        raise InputError(f"excess is {excess}, wanted a positive number in the projections' unit")
+    if not _is_positive(sigma):
+        raise InputError(f"sigma is {sigma!r}, wanted a positive number of standard deviations")
+    if excess is not None and not _is_positive(excess):
+        raise InputError(f"excess is {excess!r}, wanted a positive number in the projections' unit")
     if size not in (3, 5):
         raise InputError(f"size is {size}, wanted 3 or 5 pixels")
     if kind not in ("transmission", "attenuation"):
         raise InputError(f"kind is {kind!r}, wanted 'transmission' or 'attenuation'")
+
+
+def _is_positive(value: Any) -> bool:
+    return isinstance(value, numbers.Real) and 0 < value < np.inf
