@@ -18,7 +18,6 @@ nothing in air.
 from __future__ import annotations
 
 import dataclasses
-import numbers
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -374,13 +373,16 @@ def _method(name: str, options: dict[str, Any]) -> StripeMethod:
 
 def _demand_above(least: float, **values: Any) -> None:
     for name, value in values.items():
-        if not isinstance(value, numbers.Real) or not least < value < np.inf:
+        if (
+            not isinstance(value, (int, float, np.floating, np.integer))
+            or not least < value < np.inf
+        ):
             raise InputError(f"{name} is {value!r}, wanted a number above {least}")
 
 
 def _demand_whole(least: int, most: int, **values: Any) -> None:
     for name, value in values.items():
-        if not isinstance(value, numbers.Integral) or not least <= value <= most:
+        if not isinstance(value, (int, np.integer)) or not least <= value <= most:
             raise InputError(f"{name} is {value!r}, wanted a whole number from {least} to {most}")
 
 

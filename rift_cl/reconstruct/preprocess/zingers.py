@@ -2,9 +2,9 @@
 
 A zinger stands in one view alone and far above its neighbours; in the slice it draws a streak
 along its ray. A pixel is taken for one where it exceeds the median of its neighbourhood by so many
-standard deviations of the noise of its own detector pixel, and where nothing next to it in the view
-before and in the view after stands out half as far, as small bright details of an object would. It
-is replaced by that median.
+standard deviations of the noise of its own detector pixel, and where nothing near it in the views
+before and after stands out half as far, as small bright details of the object would. It is replaced
+by that median.
 
 The noise of counts grows with their square root, and the roots of counts have the same noise
 whatever the mean (Anscombe, Biometrika 35, 246 (1948)). So roots are compared, and the noise of a
@@ -14,7 +14,6 @@ across bins, which slopes of the object leave at zero: by the median of their si
 
 from __future__ import annotations
 
-import numbers
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -35,15 +34,15 @@ _FROM_MEDIAN, _FROM_MEAN = 1.4826, 1.2533
 _SECOND_DIFFERENCE = 6
 # Single photons have a median deviation of zero: the noise is at least this share of the mean one.
 _MEAN_SHARE = 0.5
-# Less than this share of a row's mean is no zinger, however low the noise (or none).
+# A difference of less than this share of a row's mean is no zinger, however low the noise is.
 _LEAST = 0.02
 # Below this share of a row's mean the detector's own noise counts, which has no root in it.
 _FLOOR = 0.01
 # Noise is measured in so many views, and over bins enough for so many samples together; of very few
 # views, over the whole row.
 _NOISE_VIEWS, _NOISE_SAMPLES = 256, 256
-# The rim of an object as wide as the detector moves by this share of its width in all views of half
-# a turn; and the most bins that it is followed.
+# The rim of an object as wide as the detector moves between two of n views over half a turn by at
+# most pi / 2n, rounded up to 2 / n, of the detector's width; and the most bins that it is followed.
 _QUARTER_TURN, _MOST_BESIDE = 2, 8
 # Line integrals beyond this are none in single precision.
 _OPAQUE = 80.0
@@ -202,4 +201,5 @@ def _check_options(sigma: float, excess: float | None, size: int, kind: str) -> 
 
 
 def _is_positive(value: Any) -> bool:
-    return isinstance(value, numbers.Real) and 0 < value < np.inf
+    is_number = isinstance(value, (int, float, np.floating, np.integer))
+    return is_number and bool(0 < value < np.inf)
