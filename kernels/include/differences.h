@@ -4,10 +4,16 @@
  * beyond the border, and nothing is assumed. The adjoint sums what every sample gave:
  * (D' u)[i] = sum over a of (u_a[i - e_a] - u_a[i]) / h_a, with u_a = 0 at the last sample.
  *
- * A field u holds one image per axis, z first (AXES 3) or y first (AXES 2), each of `size` samples. */
+ * A field u holds one image per axis, z first (AXES 3) or y first (AXES 2), each of `size` samples.
+ *
+ * A directional variation is that of M D x, M a symmetric matrix on the components along y and x at
+ * every sample, the same at all; the component along z stays as it is. Its adjoint is D' M u. */
 
 #ifndef AXES
 #define AXES 2
+#endif
+#ifndef DIRECTIONAL
+#define DIRECTIONAL 0
 #endif
 
 /* A sample's place in a volume of (nz, ny, nx), and the step to the next one along each axis. */
@@ -36,4 +42,11 @@ static real difference(__global const real *x, const Place *p, int a) {
 static real difference_adjoint(__global const real *u, const Place *p, int a) {
   const real behind = p->index[a] > 0 ? u[p->at - p->step[a]] : 0;
   return p->index[a] < p->last[a] ? behind - u[p->at] : behind;
+}
+
+/* M v for a vector of AXES components. */
+static void weigh_direction(real *v, real m_yy, real m_yx, real m_xx) {
+  const real y = v[AXES - 2], x = v[AXES - 1];
+  v[AXES - 2] = m_yy * y + m_yx * x;
+  v[AXES - 1] = m_yx * y + m_xx * x;
 }

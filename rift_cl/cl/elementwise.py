@@ -1,4 +1,4 @@
-"""What solvers do to whole device arrays besides adding them: copy, weigh, clip.
+"""What solvers do to whole device arrays besides adding them: copy, weigh, clip, pull.
 
 Sums and multiples are in ``rift_cl.cl.arithmetic``, inner products in ``rift_cl.cl.reductions``.
 """
@@ -35,6 +35,16 @@ def multiply(device: Device, w: Any, y: Any) -> None:
 def clip_negative(device: Device, y: Any) -> None:
     """Y = max(y, 0), sample by sample."""
     _launch(device, "clip_negative", (y,))
+
+
+def clip_between(device: Device, low: Any, high: Any, y: Any) -> None:
+    """Y = min(max(y, low), high), sample by sample."""
+    _launch(device, "clip_between", (low, high, y))
+
+
+def pull_to_levels(device: Device, levels: Any, strength: float, x: Any, y: Any) -> None:
+    """Y += strength (m - x), m the middle of the two of the ascending levels about x."""
+    _launch(device, "level_pull", (levels, levels.size, float(strength), x, y))
 
 
 def _launch(device: Device, kernel: str, arrays: tuple[Any, ...]) -> None:

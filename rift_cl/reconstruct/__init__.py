@@ -2,7 +2,10 @@
 
 from rift_cl.reconstruct.axis import AxisEstimate, find_center
 from rift_cl.reconstruct.conjugate_gradients import Cgls, cgls
+from rift_cl.reconstruct.direction_weights import DirectionWeights
+from rift_cl.reconstruct.disc_prior import Disc, find_disc, material_lengths
 from rift_cl.reconstruct.fan_rebin import rebin_fan
+from rift_cl.reconstruct.few_levels import FewLevels
 from rift_cl.reconstruct.filtered_backprojection import FilteredBackprojection, backproject, fbp
 from rift_cl.reconstruct.fista import Fista
 from rift_cl.reconstruct.flatfield import Attenuation, attenuation
@@ -20,6 +23,9 @@ __all__ = [
     "Attenuation",
     "AxisEstimate",
     "Cgls",
+    "DirectionWeights",
+    "Disc",
+    "FewLevels",
     "FilteredBackprojection",
     "Fista",
     "OrderedSubsets",
@@ -33,6 +39,8 @@ __all__ = [
     "extended",
     "fbp",
     "find_center",
+    "find_disc",
+    "material_lengths",
     "poisson_weights",
     "rebin_fan",
     "remove_rings",

@@ -17,9 +17,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from rift_cl.cl.arithmetic import axpby
-from rift_cl.cl.elementwise import clip_negative
+from rift_cl.cl.elementwise import clip_between
+from rift_cl.errors import InputError
+from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.linear import LinearOperator
+from rift_cl.reconstruct.data_term import DataTerm
+from rift_cl.reconstruct.direction_weights import DirectionWeights
 from rift_cl.reconstruct.residual_weight import Precondition
 from rift_cl.reconstruct.variation_problem import VariationSolver, VariationState
 
@@ -41,9 +47,21 @@ class _State(VariationState):
 
 
 class Pdhg(VariationSolver):
-    """PDHG that has begun; arguments and errors are those of ``tv``."""
+    """PDHG that has begun; arguments and errors are those of ``tv``, and these.
 
-    arrays = 8, 7
+    Args:
+        bounds: least and greatest value of the image, each a number or an array of ``A.domain``;
+            with an upper bound of 0 outside a support nothing is put there.
+        direction_weights: how much a gradient counts by its direction.
+        sigma: step of the data's dual, a number without unit; a smaller one gets further where A
+            is badly conditioned, as with a wedge of views.
+
+    Raises:
+        InputError: bounds cross each other or are given beside ``nonnegative``, or sigma is not
+            positive.
+    """
+
+    arrays = 10, 7
     _now: _State
 
     def __init__(
@@ -57,6 +75,9 @@ class Pdhg(VariationSolver):
         precondition: Precondition = None,
         noise: float | None = None,
         weights: Any = None,
+        bounds: tuple[Any, Any] | None = None,
+        direction_weights: DirectionWeights | None = None,
+        sigma: float | None = None,
     ) -> None:
         super().__init__(
             A,
@@ -66,10 +87,17 @@ class Pdhg(VariationSolver):
             precondition=precondition,
             noise=noise,
             weights=weights,
+            direction_weights=direction_weights,
         )
         data = self.data
+        if bounds is not None and nonnegative:
+            raise InputError("bounds and nonnegative are both given: make 0 the lower bound")
+        if sigma is not None and not one_number(sigma) > 0:
+            raise InputError(f"sigma is {sigma!r}, wanted a positive number")
+        self._bounds = None if bounds is None else checked_bounds(bounds, data)
         largest = data.norm_squared() or 1.0
-        self._sigma = _SIGMA if data.weight is None else _WEIGHTED_SIGMA
+        usual = _SIGMA if data.weight is None else _WEIGHTED_SIGMA
+        self._sigma = usual if sigma is None else float(sigma)
         self._tau = 1 / (2 * self._sigma * largest)
         steepest = self.variation.norm_squared
         self._step = self._sigma * largest / steepest if steepest else 0.0
@@ -82,9 +110,9 @@ class Pdhg(VariationSolver):
         image, fresh = self._spare
         data.gradient(now.data_dual, image)
         self.variation.add_adjoint(1.0, image, 1.0, now.dual, image)
+        self._add_pull(image)
         axpby(device, 1.0, now.image, -self._tau, image)
-        if self._nonnegative:
-            clip_negative(device, image)
+        self._constrain(image)
         # The old image becomes the point ahead, 2 new - old.
         axpby(device, 2.0, image, -1.0, now.image)
         radius = self._weight * self.variation.cell
@@ -100,6 +128,15 @@ class Pdhg(VariationSolver):
         now.objective = self._objective(now.image, now.residual, now.weighted)
         now.step += 1
 
+    def _add_pull(self, gradient: Any) -> None:
+        """Add the gradient of what else is minimised, at the image; nothing here."""
+
+    def _constrain(self, image: Any) -> None:
+        if self._bounds is None:
+            super()._constrain(image)
+        else:
+            clip_between(self.data.device, *self._bounds, image)
+
     def _measure(self, fresh: Any) -> Any:
         """The residual of the new image, and its weighted one; gives back the old weighted one."""
         now, data = self._now, self.data
@@ -111,3 +148,24 @@ class Pdhg(VariationSolver):
         data.weigh(now.residual, fresh)
         now.weighted, fresh = fresh, now.weighted
         return fresh
+
+
+def checked_bounds(bounds: Any, data: DataTerm) -> tuple[Any, Any]:
+    """The least and greatest image, device arrays.
+
+    Raises:
+        InputError: they are not two, do not fit the image, are not finite, or cross each other.
+    """
+    try:
+        low, high = bounds
+        both = [np.broadcast_to(np.asarray(end, np.float64), data.A.domain) for end in (low, high)]
+    except (TypeError, ValueError):
+        raise InputError(
+            f"bounds are wanted as two, each a number or an array of shape {data.A.domain}"
+        ) from None
+    if not all(np.isfinite(end).all() for end in both):
+        raise InputError("bounds hold NaN or infinity: leave them out where there are none")
+    if (both[0] > both[1]).any():
+        raise InputError("bounds cross: the lower one is above the upper one somewhere")
+    low, high = (data.device.array(np.ascontiguousarray(end), data.dtype) for end in both)
+    return low, high

@@ -1,10 +1,11 @@
-"""Isotropic total variation on the device: its value, its dual steps, and its proximal map.
+"""Total variation on the device: its value, its dual steps, and its proximal map.
 
     TV(x) = sum over samples of |D x| * volume of a sample,
 
 D the forward differences divided by the grid's spacing. This is the integral of the gradient's
 length, in the image's unit times length^(axes - 1): for an image, jump times length of the edge,
-whatever the grid's spacing. ``kernels/include/differences.h`` says what happens at the borders.
+whatever the grid's spacing. It is isotropic, or weighs D x by direction (``direction_weights``).
+``kernels/include/differences.h`` says what happens at the borders.
 
 Its proximal map has no closed form; it is found on the dual, where every sample holds a vector
 ``u`` of length at most the weight (Chambolle, J. Math. Imaging Vis. 20, 2004), by the accelerated
@@ -25,6 +26,7 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.elementwise import copy
 from rift_cl.cl.reductions import total
 from rift_cl.errors import ShapeError
+from rift_cl.reconstruct.direction_weights import DirectionWeights
 
 # Samples of a row that one work-item of a CPU goes through.
 _CPU_RUN = 4096
@@ -38,13 +40,19 @@ class TotalVariation:
         shape: (y, x) or (z, y, x).
         spacing: distance between samples along each axis.
         dtype: of the images.
+        directions: how much a gradient counts by its direction; None: all alike.
 
     Raises:
         ShapeError: the shape is neither an image's nor a volume's.
     """
 
     def __init__(
-        self, device: Device, shape: tuple[int, ...], spacing: tuple[float, ...], dtype: DTypeLike
+        self,
+        device: Device,
+        shape: tuple[int, ...],
+        spacing: tuple[float, ...],
+        dtype: DTypeLike,
+        directions: DirectionWeights | None = None,
     ) -> None:
         if len(shape) not in (2, 3) or len(spacing) != len(shape):
             raise ShapeError(
@@ -57,26 +65,33 @@ class TotalVariation:
         self.field_shape = (len(shape), *shape)
         """Shape of a gradient or dual field."""
         lengths = zip(shape, spacing, strict=True)
-        self.norm_squared = 4 * sum(1 / h**2 for n, h in lengths if n > 1)
+        heaviest = 1.0 if directions is None else directions.heaviest(len(shape))
+        self.norm_squared = heaviest**2 * 4 * sum(1 / h**2 for n, h in lengths if n > 1)
         """An upper bound of |D|^2, next to attained; 0 for a single sample."""
         full = (1,) * (3 - len(shape)) + shape
         self._sizes = full
         self._inverse = tuple(1 / h for h in (1.0,) * (3 - len(shape)) + tuple(spacing))
         run = _CPU_RUN if device.traits.is_cpu else 1
         self._items = (-(-full[2] // run), full[1], full[0])
-        self._macros = {"AXES": len(shape), "RUN": run, "DOUBLE": int(self.dtype == np.float64)}
+        self._matrix = (1.0, 0.0, 1.0) if directions is None else directions.matrix
+        self._macros = {
+            "AXES": len(shape),
+            "RUN": run,
+            "DOUBLE": int(self.dtype == np.float64),
+            "DIRECTIONAL": int(directions is not None),
+        }
 
     def value(self, image: Any) -> float:
         """TV of a device array."""
         lengths = self.device.empty(self.shape, self.dtype)
-        arguments = (image, lengths, *self._sizes, *self._inverse)
+        arguments = (image, lengths, *self._sizes, *self._inverse, *self._matrix)
         self.device.launch("tv_magnitude", self._items, *arguments, **self._macros)
         return self.cell * total(self.device, lengths)
 
     def dual_step(self, u: Any, image: Any, moved: Any, *, step: float, radius: float) -> None:
         """``moved`` = u + step D image, each sample's vector shortened to the radius."""
         scales = (step * inverse for inverse in self._inverse)
-        arguments = (u, image, moved, *self._sizes, *scales, float(radius))
+        arguments = (u, image, moved, *self._sizes, *scales, float(radius), *self._matrix)
         self.device.launch("tv_dual_step", self._items, *arguments, **self._macros)
 
     def add_adjoint(
@@ -84,7 +99,7 @@ class TotalVariation:
     ) -> None:
         """``out`` = a image + scale D' u, with negative values cut off if asked for."""
         scales = (scale * inverse for inverse in self._inverse)
-        arguments = (image, u, out, float(a), *self._sizes, *scales)
+        arguments = (image, u, out, float(a), *self._sizes, *scales, *self._matrix)
         macros = {**self._macros, "NONNEGATIVE": int(nonnegative)}
         self.device.launch("tv_adjoint", self._items, *arguments, **macros)
 

@@ -20,6 +20,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.reconstruct.data_term import DataTerm
+from rift_cl.reconstruct.direction_weights import DirectionWeights
 from rift_cl.reconstruct.residual_weight import Precondition
 from rift_cl.reconstruct.solver import Solver, SolverState
 from rift_cl.reconstruct.total_variation import TotalVariation
@@ -55,6 +56,7 @@ class VariationSolver(Solver):
         precondition: Precondition = None,
         noise: float | None = None,
         weights: Any = None,
+        direction_weights: DirectionWeights | None = None,
     ) -> None:
         if not one_number(weight) >= 0:
             raise InputError(f"weight is {weight!r}, wanted a number, 0 or more")
@@ -62,14 +64,15 @@ class VariationSolver(Solver):
         super().__init__(data, noise)
         self._weight, self._nonnegative = float(weight), bool(nonnegative)
         spacing = (1.0,) * len(A.domain) if A.grid is None else A.grid.spacing
-        self.variation = TotalVariation(data.device, A.domain, spacing, data.dtype)
+        self.variation = TotalVariation(
+            data.device, A.domain, spacing, data.dtype, direction_weights
+        )
 
     def _begin(self, start: Any) -> dict[str, Any]:
         """What both methods keep, for the image to begin from."""
         data = self.data
         image, residual = data.start(start), data.data()
-        if self._nonnegative:
-            clip_negative(data.device, image)
+        self._constrain(image)
         data.residual(image, residual)
         weighted = None if data.weight is None else data.data()
         if weighted is not None:
@@ -78,6 +81,11 @@ class VariationSolver(Solver):
         objective = self._objective(image, residual, weighted)
         rms = data.rms(residual)
         return vars(VariationState(image, residual, 0, rms, weighted, dual, objective))
+
+    def _constrain(self, image: Any) -> None:
+        """Bring an image to the nearest one that is allowed, in place."""
+        if self._nonnegative:
+            clip_negative(self.data.device, image)
 
     def _objective(self, image: Any, residual: Any, weighted: Any) -> float:
         square = dot(self.data.device, residual, residual if weighted is None else weighted)

@@ -72,3 +72,12 @@ def denoise(
         previous, t = moved, following
     x = b - gradient_adjoint(previous, spacing)
     return (np.maximum(x, 0) if nonnegative else x), previous
+
+
+def directed(field: ArrayLike, matrix: tuple[float, float, float]) -> Floats:
+    """M at every vector of a field: its last two components (y, x) by (yy, yx, xx)."""
+    u = np.array(field, np.float64)
+    yy, yx, xx = matrix
+    y, x = u[-2].copy(), u[-1].copy()
+    u[-2], u[-1] = yy * y + yx * x, yx * y + xx * x
+    return u
