@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from rift_cl.cl.device import Device
+from rift_cl.operators.block_transform import BlockTransform
 from rift_cl.operators.column_transform import ColumnTransform, turns
 
 Floats = NDArray[np.float64]
 
-# Bytes of a slab of rows with its copy: on a CPU it should stay in its caches.
-_SLAB_BYTES = {"cpu": 2 << 20, "gpu": 64 << 20}
-# What a work-item of a CPU goes through: bins to pack or unpack, columns to weigh.
-_CPU_RUN, _CPU_COLUMNS = 1024, 4096
+# Bytes of a slab of rows with its copy, on a GPU.
+_SLAB_BYTES = {"gpu": 64 << 20}
 
 
 def transform_length(bins: int) -> int:
@@ -46,23 +45,27 @@ class RowTransform:
         self, device: Device, taps: Floats, rows: int, dtype: DTypeLike = np.float32
     ) -> None:
         self.device, self.dtype = device, np.dtype(dtype)
+        self._double = int(self.dtype == np.float64)
         self.bins = taps.shape[1]
         self.length = transform_length(self.bins)
         self._weights = tuple(device.array(table, dtype) for table in _weights(taps, self.length))
-        self._transform = ColumnTransform(device, self.length, dtype)
         half_turns = turns(2 * self.length, self.length // 2 + 1)
         self._half_turns = device.array(half_turns, dtype)
-        kind = "cpu" if device.traits.is_cpu else "gpu"
-        lanes = device.traits.macros["LANES"]
-        fitting = min(rows, _SLAB_BYTES[kind] // (4 * self.dtype.itemsize * self.length))
-        self._columns = max(1, -(-fitting // lanes)) * lanes
-        self._double = int(self.dtype == np.float64)
+        self._blocks: BlockTransform | None = None
+        if device.traits.is_cpu:
+            self._blocks = BlockTransform(device, self.length, dtype)
+            return
+        self._transform = ColumnTransform(device, self.length, dtype)
+        fitting = min(rows, _SLAB_BYTES["gpu"] // (4 * self.dtype.itemsize * self.length))
+        self._columns = max(1, fitting)
 
     @property
     def scratch(self) -> int:
-        """Bytes of the device besides the rows: a slab, its copy, and the responses."""
-        slabs = 4 * self.dtype.itemsize * self.length * self._columns
-        return slabs + sum(int(table.nbytes) for table in self._weights)
+        """Bytes of the device besides the rows: blocks or a slab, with copies, and responses."""
+        responses = sum(int(table.nbytes) for table in self._weights)
+        if self._blocks is not None:
+            return responses + self._blocks.nbytes
+        return responses + 4 * self.dtype.itemsize * self.length * self._columns
 
     def __call__(self, x: Any, out: Any, gains: Any, per_view: int) -> None:
         """Fill ``out`` with the filtered rows.
@@ -73,8 +76,14 @@ class RowTransform:
             gains: (views,) device array of factors.
             per_view: rows of a view.
         """
-        rows, lanes = x.size // self.bins, self.device.traits.macros["LANES"]
-        columns = min(self._columns, -(-rows // lanes) * lanes)
+        rows, filters = x.size // self.bins, self._weights[0].shape[1]
+        if self._blocks is not None:
+            arguments = (x, out, gains, *self._weights, self._half_turns)
+            sizes = (rows, per_view, filters, self.bins)
+            shared = int(filters == 1)
+            self._blocks.launch("rows_filter", rows, *arguments, *sizes, SHARED=shared)
+            return
+        columns = min(self._columns, rows)
         planes = self.device.empty((2, self.length, columns), self.dtype)
         spare = self.device.empty(planes.shape, self.dtype)
         for first in range(0, rows, columns):
@@ -86,32 +95,25 @@ class RowTransform:
             self._unpack(planes, out, gains, slab, per_view)
 
     def _pack(self, x: Any, planes: Any, slab: _Slab) -> None:
-        size, run = self._blocks(2 * self.length, slab)
         sizes = (slab.first, slab.rows, self.bins, self.length, slab.columns)
-        self.device.launch("rows_pack", size, x, planes, *sizes, RUN=run, DOUBLE=self._double)
+        size = (2 * self.length, slab.columns)
+        self.device.launch("rows_pack", size, x, planes, *sizes, DOUBLE=self._double)
 
     def _weigh(self, planes: Any, slab: _Slab, per_view: int) -> None:
         filters = self._weights[0].shape[1]
-        run = _CPU_COLUMNS if self.device.traits.is_cpu else 1
         self.device.launch(
             "rows_weigh",
-            (-(-slab.columns // run), self.length // 2 + 1),
+            (slab.columns, self.length // 2 + 1),
             *(planes, *self._weights, self._half_turns),
             *(slab.first, per_view, filters, self.length, slab.columns),
-            RUN=run,
             SHARED=int(filters == 1),
             DOUBLE=self._double,
         )
 
     def _unpack(self, planes: Any, out: Any, gains: Any, slab: _Slab, per_view: int) -> None:
-        size, run = self._blocks(self.bins, slab)
         sizes = (slab.first, slab.rows, per_view, self.bins, self.length, slab.columns)
-        arguments = (planes, out, gains, *sizes)
-        self.device.launch("rows_unpack", size, *arguments, RUN=run, DOUBLE=self._double)
-
-    def _blocks(self, bins: int, slab: _Slab) -> tuple[tuple[int, int], int]:
-        run = _CPU_RUN if self.device.traits.is_cpu else 1
-        return (-(-bins // run), slab.columns // self.device.traits.macros["LANES"]), run
+        size = (self.bins, slab.columns)
+        self.device.launch("rows_unpack", size, planes, out, gains, *sizes, DOUBLE=self._double)
 
 
 class _Slab(NamedTuple):
