@@ -17,6 +17,8 @@
 #ifndef TILE
 #define TILE (LANES == 8 ? 32 : 4)
 #endif
+#include "include/ray_span.h"
+
 #if LANES == 8
 #define OVERHANG TABLE_PITCH
 #define ADD(p, v) { lane_sum *sum_at = (lane_sum *)(p); *sum_at = *sum_at + (v); }
@@ -33,7 +35,8 @@ typedef float8 lane_sum __attribute__((aligned(4)));
 KERNEL void rays_spread(
     __global const float *restrict rays, __global float *restrict grid,
     __global const float *restrict table, __global const long2 *restrict steps,
-    __global const float2 *restrict inverses, __global const int *restrict ends, __global const int4 *restrict visits, __global const int *restrict starts, int count, int samples,
+    __global const float2 *restrict inverses, __global const int *restrict ends,
+    __global const int4 *restrict visits, __global const int *restrict starts, int count, int samples,
     int tiles, int across, int rows, int columns)
 {
   const int tile = (int)get_global_id(0);
@@ -42,29 +45,15 @@ KERNEL void rays_spread(
   for (int n = 0; n < CELLS; n++) re[n] = im[n] = 0;
   for (int v = starts[tile]; v < starts[tile + 1]; v++) {
     const int4 visit = visits[v];
-    const float low_x = visit.x - 0.5f * WIDTH, high_x = low_x + (TILE + WIDTH);
-    const float low_y = visit.y - 0.5f * WIDTH, high_y = low_y + (TILE + WIDTH);
     for (int n = visit.z; n < visit.z + visit.w; n++) {
       const int ray = n < count ? n : n - count;
-      /* Where the ray enters the tile and where it leaves it, on either axis, and a sample more. */
-      const float2 inverse = inverses[ray];
-      const float ax = low_x * inverse.x, bx = high_x * inverse.x;
-      const float ay = low_y * inverse.y, by = high_y * inverse.y;
-      const float near_y = ay < by ? ay : by, far_y = ay < by ? by : ay;
-      float enter = ax > near_y ? ax : near_y, leave = bx < far_y ? bx : far_y;
-      const int kept = ends[ray];
-      if (enter < (float)-kept) enter = (float)-kept;
-      if (leave > (float)kept) leave = (float)kept;
-      if (enter > leave) continue;
-      int l = (int)enter - 1, last = (int)leave + 1;
-      if (l <= -kept) l = 1 - kept;
-      if (last >= kept) last = kept - 1;
+      const span near = samples_near(visit, inverses[ray], ends[ray]);
       const long step_x = steps[ray].x, step_y = steps[ray].y;
-      long px = l * step_x - ((long)visit.x << 32), py = l * step_y - ((long)visit.y << 32);
+      long px = near.first * step_x - ((long)visit.x << 32), py = near.first * step_y - ((long)visit.y << 32);
       __global const float *values = rays + (long)ray * samples;
-      for (; l <= last; l++, px += step_x, py += step_y) {
+      for (int l = near.first; l <= near.last; l++, px += step_x, py += step_y) {
         const int x = first_cell(px), y = first_cell(py);
-        if (x <= -WIDTH || x >= TILE || y <= -WIDTH || y >= TILE) continue;
+        if (!REACHES(x, y)) continue;
         const int m = l < 0 ? -l : l;
         const float qr = values[m], qi = values[(long)count * samples + m];
         const float pr = qr, pi = l < 0 ? -qi : qi;

@@ -20,6 +20,7 @@ from rift_cl.cl.device import Device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.geometry.numbers import one_number
+from rift_cl.operators.block_transform import BLOCK
 from rift_cl.operators.gridding import LOG2_ROWS, choose
 from rift_cl.operators.padded_spectrum import PaddedSpectrum, in_steps
 from rift_cl.operators.parallel_projector import ParallelProjector
@@ -27,6 +28,9 @@ from rift_cl.operators.ray_geometry import IMAGE, rays
 from rift_cl.operators.ray_tables import RayTables
 
 _MOST_LOBES = 8
+# Slices that a CPU spreads at once, as kernels/rays_spread_stack.cl has them, and the bytes of rays
+# and grids that they may take.
+_TOGETHER, _TOGETHER_BYTES = 4, 512 << 20
 
 
 class FastProjector(ParallelProjector):
@@ -80,10 +84,11 @@ class FastProjector(ParallelProjector):
         self._samples = in_steps(int(found.ends.max()))
         spread = int(found.ends.sum())
         self.gridding = choose((grid.shape[-2], grid.shape[-1]), spread, float(error))
-        self._columns = in_steps(-(-len(scan.angles) // 2))
+        self._columns = BLOCK * -(-len(scan.angles) // (2 * BLOCK))
         self._spectrum = PaddedSpectrum(
             self.device, grid.slice(), scan, self.gridding, found.length
         )
+        self._together = min(self._slices_together(), grid.slices)
 
     def prepare(self) -> None:
         """Make the tables now, which is otherwise left to the first application."""
@@ -113,26 +118,32 @@ class FastProjector(ParallelProjector):
             self._views_of(values, out, k)
 
     def _apply_adjoint(self, y: Any, out: Any) -> None:
-        for k in range(out.shape[0] if len(out.shape) == 3 else 1):
-            values = self._rays_of(y, k)
-            grid = self._spread(values)
+        slices = out.shape[0] if len(out.shape) == 3 else 1
+        for first in range(0, slices, self._together):
+            run = range(first, min(first + self._together, slices))
+            values = [self._rays_of(y, k) for k in run]
+            grids = self._spread(values)
             del values
-            self._spectrum.crop(grid, out, k)
+            for k in run:
+                self._spectrum.crop(grids.pop(0), out, k)
 
     def _rays_of(self, views: Any, k: int) -> Any:
         """Transforms of the views of slice k, as rays (2, n, samples)."""
         found, tables, device = self._rays, self._tables, self.device
         count, length, columns = len(found.order), found.length, self._columns
+        values = device.empty((2, count, self._samples))
+        if tables.blocks is not None:
+            where = (tables.order, tables.starts, *tables.factors, tables.ends)
+            sizes = (count, *self._slice_sizes(views, k), found.window, self._samples, columns)
+            tables.blocks.launch("rays_of_views", columns, views, values, *where, *sizes)
+            return values
         fields, spare = self._planes(length, columns)
         arguments = self._view_arguments(views, k)
-        size = (*self._blocks(columns, length), 2)
-        device.launch("rays_pack", size, views, fields, *arguments, RUN=self._run)
+        device.launch("rays_pack", (*self._blocks(columns, length), 2), views, fields, *arguments)
         fields, spare = tables.views(fields, spare)
-        values = device.empty((2, count, self._samples))
         size = (*self._blocks(columns, self._samples), 2)
-        sizes = (count, self._samples, length, columns)
         arrays = (fields, values, *tables.factors, tables.ends)
-        device.launch("rays_weigh", size, *arrays, *sizes, RUN=self._run)
+        device.launch("rays_weigh", size, *arrays, count, self._samples, length, columns)
         return values
 
     def _views_of(self, values: Any, views: Any, k: int) -> None:
@@ -151,25 +162,33 @@ class FastProjector(ParallelProjector):
 
     def _view_arguments(self, views: Any, k: int) -> tuple[Any, ...]:
         found, tables = self._rays, self._tables
-        slices = views.shape[1] if len(views.shape) == 3 else 1
-        sizes = (len(found.order), k, slices, self.scan.bins)
+        sizes = (len(found.order), *self._slice_sizes(views, k))
         return (tables.order, tables.starts, *sizes, found.window, found.length, self._columns)
 
-    def _spread(self, values: Any) -> Any:
-        """Rays to the grid of frequencies, (2, rows, columns)."""
+    def _slice_sizes(self, views: Any, k: int) -> tuple[int, int, int]:
+        """Slice k, of how many, and its bins."""
+        return k, views.shape[1] if len(views.shape) == 3 else 1, self.scan.bins
+
+    def _spread(self, values: list[Any]) -> list[Any]:
+        """Rays of some slices to grids of frequencies, (2, rows, columns) each."""
         tables, (rows, edge) = self._tables, self.gridding.edges
-        grid = self.device.empty((2, rows, self._spectrum.across))
-        tiles = len(tables.tiles) - 1
+        across, tiles = self._spectrum.across, len(tables.tiles) - 1
+        grids = [self.device.empty((2, rows, across)) for _ in values]
+        macros = {**self._macros, "TILE": tables.tile}
+        kernel, arrays = "rays_spread", [*values, *grids]
+        if len(values) > 1:
+            kernel, macros["SLICES"] = "rays_spread_stack", len(values)
+            spare = [values[0]] * (_TOGETHER - len(values))
+            arrays = [*values, *spare, *grids, *([grids[0]] * len(spare))]
         self.device.launch(
-            "rays_spread",
+            kernel,
             (tiles,),
-            *(values, grid, tables.kernel, tables.steps, tables.inverses, tables.ends),
-            *(tables.visits, tables.tiles, *values.shape[1:], tiles),
-            *(-(-(edge // 2 + 1) // tables.tile), rows, self._spectrum.across),
-            **self._macros,
-            TILE=tables.tile,
+            *(*arrays, tables.kernel, tables.steps, tables.inverses, tables.ends),
+            *(tables.visits, tables.tiles, *values[0].shape[1:], tiles),
+            *(-(-(edge // 2 + 1) // tables.tile), rows, across),
+            **macros,
         )
-        return grid
+        return grids
 
     def _read(self, grid: Any) -> Any:
         """The transpose of ``_spread``."""
@@ -209,8 +228,23 @@ class FastProjector(ParallelProjector):
     def scratch(self) -> int:
         """Bytes needed besides the arrays that go in and come out."""
         found = self._rays
-        values = 2 * len(found.order) * self._samples
         fields = 2 * found.length * self._columns
         grid, transform = self._spectrum.entries, self._spectrum.scratch_entries
-        most = max(2 * fields + values, values + grid, transform)
+        more = self._together - 1
+        spreading = self._together * (self._ray_entries + grid)
+        transforming = more * max(self._ray_entries, grid) + max(
+            2 * fields + self._ray_entries, transform
+        )
+        most = max(spreading, transforming)
         return 4 * most + self._tables.nbytes + self._spectrum.nbytes
+
+    @property
+    def _ray_entries(self) -> int:
+        """Numbers of a slice's rays."""
+        return 2 * len(self._rays.order) * self._samples
+
+    def _slices_together(self) -> int:
+        """How many slices are spread at once, which no result depends on."""
+        each = 4 * (self._ray_entries + self._spectrum.entries)
+        most = min(_TOGETHER_BYTES, self.device.budget // 4)
+        return _TOGETHER if self.device.traits.is_cpu and _TOGETHER * each <= most else 1

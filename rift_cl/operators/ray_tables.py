@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from rift_cl.cl.device import Device
+from rift_cl.operators.block_transform import BlockTransform
 from rift_cl.operators.column_transform import ColumnTransform
 from rift_cl.operators.gridding import Gridding
 from rift_cl.operators.ray_geometry import Rays, fixed_steps, inverse_steps, tile_visits
@@ -43,6 +44,8 @@ class RayTables:
         self.visits, self.tiles = device.array(visits), device.array(tiles)
         self.kernel = device.array(gridding.table())
         self.views = ColumnTransform(device, rays.length)
+        cpu = device.traits.is_cpu
+        self.blocks = BlockTransform(device, rays.length) if cpu else None
 
     @property
     def nbytes(self) -> int:
@@ -56,4 +59,5 @@ class RayTables:
             self.inverses,
         ]
         arrays += [self.visits, self.tiles, self.kernel]
-        return sum(int(array.nbytes) for array in arrays) + self.views.nbytes
+        blocks = 0 if self.blocks is None else self.blocks.nbytes
+        return sum(int(array.nbytes) for array in arrays) + self.views.nbytes + blocks
