@@ -22,11 +22,13 @@
 #if LANES == 8
 #define OVERHANG TABLE_PITCH
 #define ADD(p, v) { lane_sum *sum_at = (lane_sum *)(p); *sum_at = *sum_at + (v); }
+#define SUM_AT(p) (*(lane_sum *)(p))
 typedef float8 lane_sum __attribute__((aligned(4)));
 #define INSIDE(x) 1
 #else
 #define OVERHANG 0
 #define ADD(p, v) *(p) += (v);
+#define SUM_AT(p) (*(p))
 #define INSIDE(x) ((uint)(x) < TILE)
 #endif
 #define ACROSS (TILE + 2 * OVERHANG)
@@ -37,7 +39,7 @@ KERNEL void rays_spread(
     __global const float *restrict table, __global const long2 *restrict steps,
     __global const float2 *restrict inverses, __global const int *restrict ends,
     __global const int4 *restrict visits, __global const int *restrict starts, int count, int samples,
-    int tiles, int across, int rows, int columns)
+    int tiles, int across, int width, int rows, int columns)
 {
   const int tile = (int)get_global_id(0);
   if (tile >= tiles) return;
@@ -76,11 +78,10 @@ KERNEL void rays_spread(
     }
   }
   const int x0 = tile % across * TILE, y0 = tile / across * TILE;
-  for (int r = 0; r < TILE && y0 + r < rows; r++) {
-    __global float *out = grid + (long)(y0 + r) * columns + MARGIN + x0;
-    for (int k = 0; k < TILE && MARGIN + x0 + k < columns; k++) {
-      out[k] = re[(OVERHANG + r) * ACROSS + OVERHANG + k];
-      out[(long)rows * columns + k] = im[(OVERHANG + r) * ACROSS + OVERHANG + k];
+  for (int r = 0; r < TILE && y0 + r < rows; r++)
+    for (int k = 0; k < TILE && x0 + k < width; k += LANES) {
+      const int at = (OVERHANG + r) * ACROSS + OVERHANG + k;
+      STORE(grid + cell_at(0, y0 + r, x0 + k, rows, columns), SUM_AT(re + at));
+      STORE(grid + cell_at(1, y0 + r, x0 + k, rows, columns), SUM_AT(im + at));
     }
-  }
 }

@@ -29,7 +29,7 @@ KERNEL void rays_spread_stack(
     __global const float *restrict table, __global const long2 *restrict steps,
     __global const float2 *restrict inverses, __global const int *restrict ends,
     __global const int4 *restrict visits, __global const int *restrict starts, int count, int samples,
-    int tiles, int across, int rows, int columns)
+    int tiles, int across, int width, int rows, int columns)
 {
   const int tile = (int)get_global_id(0);
   if (tile >= tiles) return;
@@ -65,18 +65,17 @@ KERNEL void rays_spread_stack(
     }
   }
   const int x0 = tile % across * TILE, y0 = tile / across * TILE;
-  const long plane = (long)rows * columns;
   for (int r = 0; r < TILE && y0 + r < rows; r++)
-    for (int k = 0; k < TILE && MARGIN + x0 + k < columns; k += LANES) {
+    for (int k = 0; k < TILE && x0 + k < width; k += LANES) {
       lanes block[LANES];
       UNROLL for (int n = 0; n < LANES; n++) block[n] = sums[(OVERHANG + r) * ACROSS + OVERHANG + k + n];
       TRANSPOSE(block)
-      const long at = (long)(y0 + r) * columns + MARGIN + x0 + k;
       UNROLL for (int part = 0; part < 2; part++) {
-        STORE(grid0 + at + part * plane, block[4 * part]);
-        if (SLICES > 1) STORE(grid1 + at + part * plane, block[4 * part + 1]);
-        if (SLICES > 2) STORE(grid2 + at + part * plane, block[4 * part + 2]);
-        if (SLICES > 3) STORE(grid3 + at + part * plane, block[4 * part + 3]);
+        const long at = cell_at(part, y0 + r, x0 + k, rows, columns);
+        STORE(grid0 + at, block[4 * part]);
+        if (SLICES > 1) STORE(grid1 + at, block[4 * part + 1]);
+        if (SLICES > 2) STORE(grid2 + at, block[4 * part + 2]);
+        if (SLICES > 3) STORE(grid3 + at, block[4 * part + 3]);
       }
     }
 }

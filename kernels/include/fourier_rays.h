@@ -19,7 +19,23 @@
 #define TABLE_PITCH 8
 /* Cells that stand before zero frequency in a row of the grid. */
 #define MARGIN 8
+#if LANES == 8
+#ifndef BLOCK
+#define BLOCK (2 * LANES)
+#endif
+#endif
 #define FIXED_ONE ((long)1 << 32)
+
+/* Where rays_spread puts cell x of a row of one part: a GPU as the grid is read, a CPU in blocks of
+ * BLOCK columns, each with its real parts and then its imaginary ones, as pairs_of_spectrum takes
+ * them. */
+static long cell_at(int part, int row, int x, int rows, int columns) {
+#if LANES == 8
+  return ((2L * (x / BLOCK) + part) * rows + row) * BLOCK + x % BLOCK;
+#else
+  return ((long)part * rows + row) * columns + MARGIN + x;
+#endif
+}
 
 /* The first cell that a kernel about a position reaches. */
 static int first_cell(long position) {

@@ -170,10 +170,10 @@ class FastProjector(ParallelProjector):
         return k, views.shape[1] if len(views.shape) == 3 else 1, self.scan.bins
 
     def _spread(self, values: list[Any]) -> list[Any]:
-        """Rays of some slices to grids of frequencies, (2, rows, columns) each."""
+        """Rays of some slices to grids of frequencies, as ``crop`` takes them."""
         tables, (rows, edge) = self._tables, self.gridding.edges
         across, tiles = self._spectrum.across, len(tables.tiles) - 1
-        grids = [self.device.empty((2, rows, across)) for _ in values]
+        grids = [self._spectrum.empty_grid() for _ in values]
         macros = {**self._macros, "TILE": tables.tile}
         kernel, arrays = "rays_spread", [*values, *grids]
         if len(values) > 1:
@@ -185,7 +185,7 @@ class FastProjector(ParallelProjector):
             (tiles,),
             *(*arrays, tables.kernel, tables.steps, tables.inverses, tables.ends),
             *(tables.visits, tables.tiles, *values[0].shape[1:], tiles),
-            *(-(-(edge // 2 + 1) // tables.tile), rows, across),
+            *(-(-(edge // 2 + 1) // tables.tile), self._spectrum.width, rows, across),
             **macros,
         )
         return grids

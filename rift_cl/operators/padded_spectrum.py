@@ -13,6 +13,7 @@ import numpy as np
 
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Grid, Parallel
+from rift_cl.operators.block_transform import BLOCK, BlockTransform
 from rift_cl.operators.column_transform import ColumnTransform
 from rift_cl.operators.gridding import Gridding
 
@@ -38,8 +39,11 @@ class PaddedSpectrum:
         self.device, self._grid, self._gridding = device, grid, gridding
         self._edges = gridding.edges
         self._scale = grid.spacing[0] * grid.spacing[1] / (scan.pitch * length)
-        self.pairs = in_steps(-(-grid.shape[0] // 2))
-        self.across = 2 * _MARGIN + in_steps(self._edges[1] // 2 + 1)
+        self.pairs = BLOCK * -(-grid.shape[0] // (2 * BLOCK))
+        self.width = self._edges[1] // 2 + 1
+        self.across = 2 * _MARGIN + in_steps(self.width)
+        if device.traits.is_cpu:
+            self.width = BLOCK * -(-self.width // BLOCK)
 
     @cached_property
     def _weights(self) -> tuple[Any, Any]:
@@ -57,10 +61,18 @@ class PaddedSpectrum:
     def _along(self) -> ColumnTransform:
         return ColumnTransform(self.device, self._edges[1])
 
+    @cached_property
+    def _blocks(self) -> tuple[BlockTransform, BlockTransform]:
+        down, along = self._edges
+        return BlockTransform(self.device, down), BlockTransform(self.device, along)
+
     @property
     def nbytes(self) -> int:
         """Bytes that are kept on the device."""
-        return 4 * sum(self._grid.shape) + 8 * sum(self._edges)
+        tables = 4 * sum(self._grid.shape) + 8 * sum(self._edges)
+        if not self.device.traits.is_cpu:
+            return tables
+        return tables + sum(blocks.nbytes for blocks in self._blocks)
 
     @property
     def entries(self) -> int:
@@ -73,9 +85,18 @@ class PaddedSpectrum:
         folded = 2 * self._edges[1] * self.pairs
         return max(2 * self.entries + folded, 2 * folded + self.entries)
 
+    def empty_grid(self) -> Any:
+        """A grid for ``crop``, whose cells are where kernels/include/fourier_rays.h puts them."""
+        if self.device.traits.is_cpu:
+            return self.device.empty((self.width // BLOCK, 2, self._edges[0], BLOCK))
+        return self.device.empty((2, self._edges[0], self.across))
+
     def crop(self, grid: Any, image: Any, k: int) -> None:
         """Transform a grid back, and crop it to slice k of the image; the grid is written to."""
         (rows, edge), (height, width) = self._edges, image.shape[-2:]
+        if self.device.traits.is_cpu:
+            self._crop_blocks(grid, image, k)
+            return
         grid, spare = self._down(grid, self.device.empty(grid.shape), inverse=True)
         fields = self.device.empty((2, edge, self.pairs))
         sizes = (height, height // 2, rows, self.across, edge, self.pairs)
@@ -87,8 +108,17 @@ class PaddedSpectrum:
         size = (*self._tiles(width, self.pairs), 2)
         self.device.launch("slice_crop", size, fields, image, *self._weights, *sizes)
 
+    def _crop_blocks(self, grid: Any, image: Any, k: int) -> None:
+        (down, along), (height, width) = self._blocks, image.shape[-2:]
+        edge, pairs = self._edges[1], self.pairs
+        fields = self.device.empty((pairs // BLOCK, 2, edge, BLOCK))
+        sizes = (height, height // 2, edge, pairs)
+        down.launch("pairs_of_spectrum", self.width, grid, fields, *sizes)
+        sizes = (k, height, width, width // 2, pairs)
+        along.launch("slice_of_pairs", pairs, fields, image, *self._weights, *sizes)
+
     def of(self, image: Any, k: int) -> Any:
-        """The grid of slice k of the image, (2, rows, columns): the transpose of ``crop``."""
+        """The grid of slice k of the image, (2, rows, columns) with margins, to be read from."""
         (rows, edge), (height, width) = self._edges, image.shape[-2:]
         fields = self.device.empty((2, edge, self.pairs))
         spare = self.device.empty(fields.shape)

@@ -12,7 +12,7 @@ from rift_cl.operators.column_transform import ColumnTransform
 from rift_cl.operators.gridding import Gridding
 from rift_cl.operators.ray_geometry import Rays, fixed_steps, inverse_steps, tile_visits
 
-_TILE = {"cpu": 32, "gpu": 4}
+_TILE = {"cpu": 48, "gpu": 4}
 
 
 class RayTables:
