@@ -2,11 +2,17 @@
 
     python tools/bench_fast.py --json fast.json
     python tools/bench_fast.py --sizes 512 1024 2048 4096 --json fast.json
+    python tools/bench_fast.py --sizes --fbp-sizes 512 1024 --against ../old-checkout --json fbp.json
 
 Both run in one process, in turns, on the same arrays of the device. An error is the norm of a
 difference over the norm of what it is measured against; `own limit` is the transform that the fast
 projector approximates, computed by itself with an error of 1e-6 (which tests compare with a matrix
 in float64).
+
+Filtered backprojection is measured with as many views and bins as pixels along an edge, one slice at
+a time and several: processor seconds of a slice (all threads), the median over the rounds, and the
+reconstructions' PSNR from analytic line integrals and from noisy ones. The other version is a
+checkout of this repository, whose projector has its turns in the same process.
 """
 
 from __future__ import annotations
@@ -24,6 +30,7 @@ import tyro
 
 import rift_cl as rift
 from bench.command import report, say
+from bench.formula_race import formula_case, formula_tables
 from bench.surroundings import surroundings
 from bench.tables import Table
 from rift_cl.metrics import psnr
@@ -43,6 +50,9 @@ class Options:
     Args:
         json: file for every figure and every raw time.
         sizes: pixels along an edge; there are 1.5 times as many views.
+        fbp_sizes: pixels along an edge for filtered backprojection.
+        slices: of its stack.
+        against: checkout of another version, for filtered backprojection.
         kinds: ERROR:LOBES that the fast projector is asked for, any number of them.
         accuracy: also measure the errors, which takes most of the memory.
         rounds: how often each has its turn.
@@ -52,6 +62,9 @@ class Options:
 
     json: Path
     sizes: tuple[int, ...] = (512, 1024, 2048)
+    fbp_sizes: tuple[int, ...] = (256, 512, 1024)
+    slices: int = 4
+    against: Path | None = None
     kinds: tuple[str, ...] = ("1e-3:0", "1e-2:1", "1e-3:1", "1e-4:1", "1e-3:2", "1e-3:3")
     accuracy: bool = True
     rounds: int = 7
@@ -62,11 +75,16 @@ class Options:
 def measure_all(options: Options) -> Iterator[dict[str, Any]]:
     """Run the benchmark, size by size; the record of all that was measured so far."""
     device = rift.open_device(options.device)
-    head, cases = surroundings(device), list[dict[str, Any]]()
+    head, cases, formula = surroundings(device), list[dict[str, Any]](), list[dict[str, Any]]()
+    head = {**head, "seed": options.seed}
+    for size in options.fbp_sizes:
+        say(f"filtered backprojection, {size} x {size}")
+        formula.append(formula_case(device, size, options))
+        yield {**head, "cases": cases, "fbp": formula}
     for size in options.sizes:
         say(f"{size} x {size}, {int(_VIEWS * size)} views")
         cases.append(_case(device, size, options))
-        yield {**head, "seed": options.seed, "cases": cases}
+        yield {**head, "cases": cases, "fbp": formula}
 
 
 def _case(device: rift.Device, n: int, options: Options) -> dict[str, Any]:
@@ -182,6 +200,7 @@ def _tables(record: dict[str, Any]) -> Iterator[Table]:
     yield Table("Times", timing, rows)
     heads = ["size", "data", "projector", "to own limit", "to direct", "PSNR"]
     yield Table("Errors", heads, accuracy)
+    yield from formula_tables(record.get("fbp", []))
 
 
 def main() -> int:
