@@ -1,4 +1,4 @@
-/* Complex columns become views again: the transpose of rays_pack.
+/* Complex columns become views again: the transpose of rays_pack_gpu.
  *
  * Bins that the image's shadow does not reach become zero. Index space: (blocks of LANES columns,
  * runs of RUN rows of the window, parts); the first run and the last also clear what lies before

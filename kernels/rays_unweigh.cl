@@ -1,4 +1,4 @@
-/* Rays of the spectrum become transforms of pairs of views: the transpose of rays_weigh.
+/* Rays of the spectrum become transforms of pairs of views: the transpose of rays_weigh_gpu.
  *
  * Sample l of a ray, after the conjugate factor, belongs to place l of the periodic transform of a
  * real view, and its conjugate to place -l:
@@ -31,8 +31,8 @@ static void load_samples(
 
 KERNEL void rays_unweigh(
     __global const float *restrict rays, __global float *restrict fields,
-    __global const uint *restrict turns, __global const float *restrict half_shadows,
-    __global const float *restrict signs, int count, int samples, int length, int columns)
+    __global const uint *restrict turns, __global const float *restrict shadows,
+    __global const float *restrict signs, __global const float *restrict bins, int count, int samples, int length, int columns)
 {
   const int c = (int)get_global_id(0) * LANES;
   if (c >= columns) return;
@@ -43,8 +43,8 @@ KERNEL void rays_unweigh(
     lanes re[2][LANES], im[2][LANES];
     UNROLL for (int part = 0; part < 2; part++) {
       const int ray0 = part * columns + c;
-      const lanes_whole turn = LOAD_WHOLE(turns + ray0);
-      const lanes half_shadow = LOAD(half_shadows + ray0), sign = LOAD(signs + ray0);
+      const ray_shape shape = shape_of(turns, shadows, ray0, 2 * columns);
+      const lanes sign = LOAD(signs + ray0);
       UNROLL for (int k = 0; k < LANES; k++) re[part][k] = im[part][k] = 0;
       /* Even n: samples n/2 periods above l. Odd n: those that lie l below a whole period. */
       for (int n = 0; n / 2 * length < samples; n++) {
@@ -55,7 +55,8 @@ KERNEL void rays_unweigh(
         load_samples(rays + (long)count * samples, ray0, count, first, samples, qi);
         UNROLL for (int k = 0; k < LANES; k++) {
           const int at = back ? LANES - 1 - k : k;
-          const response w = ray_response(first + at, turn, half_shadow);
+          const int sample = first + at < 0 ? 0 : first + at < samples ? first + at : samples - 1;
+          const response w = ray_response(sample, &shape, bins[sample]);
           const lanes r = qr[at], i = sign * qi[at];
           re[part][k] = re[part][k] + (r * w.real + i * w.imaginary);
           im[part][k] = im[part][k] + (back ? -1.0f : 1.0f) * (i * w.real - r * w.imaginary);

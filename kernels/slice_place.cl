@@ -1,4 +1,4 @@
-/* An image becomes pairs of rows: the transpose of slice_crop, and the transform's first step.
+/* An image becomes pairs of rows: the transpose of slice_crop_gpu, and the transform's first step.
  *
  * Beyond the image there are zeros. Index space: (blocks of LANES pairs, blocks of LANES columns of
  * the padded image, parts). */

@@ -2,7 +2,7 @@
  *
  *     R1 = (Z[x] + conj Z[-x]) / 2,      R2 = (Z[x] - conj Z[-x]) / 2i,
  *
- * which is the transpose of spectrum_fold for spectra of real rows. Rows of the grid that no image
+ * which is the transpose of spectrum_fold_gpu for spectra of real rows. Rows of the grid that no image
  * row stands in, and columns before zero and behind the last frequency, become zero.
  *
  * Index space: (blocks of LANES columns of the grid, blocks of LANES rows). */

@@ -2,16 +2,16 @@
 
     python tools/bench_fast.py --json fast.json
     python tools/bench_fast.py --sizes 512 1024 2048 4096 --json fast.json
-    python tools/bench_fast.py --sizes --fbp-sizes 512 1024 --against ../old-checkout --json fbp.json
+    python tools/bench_fast.py --sizes --fbp-sizes 512 1024 --against ../old --json fbp.json
 
 Both run in one process, in turns, on the same arrays of the device. An error is the norm of a
 difference over the norm of what it is measured against; `own limit` is the transform that the fast
 projector approximates, computed by itself with an error of 1e-6 (which tests compare with a matrix
 in float64).
 
-Filtered backprojection is measured with as many views and bins as pixels along an edge, one slice at
-a time and several: processor seconds of a slice (all threads), the median over the rounds, and the
-reconstructions' PSNR from analytic line integrals and from noisy ones. The other version is a
+Filtered backprojection is measured with as many views and bins as pixels along an edge, one slice
+at a time and several: processor seconds of a slice (all threads), the median over the rounds, and
+the reconstructions' PSNR from analytic line integrals and from noisy ones. The other version is a
 checkout of this repository, whose projector has its turns in the same process.
 """
 

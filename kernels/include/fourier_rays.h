@@ -27,7 +27,7 @@
 #define FIXED_ONE ((long)1 << 32)
 
 /* Where rays_spread puts cell x of a row of one part: a GPU as the grid is read, a CPU in blocks of
- * BLOCK columns, each with its real parts and then its imaginary ones, as pairs_of_spectrum takes
+ * BLOCK columns, each with its real parts and then its imaginary ones, as pairs_of_spectrum_cpu takes
  * them. */
 static long cell_at(int part, int row, int x, int rows, int columns) {
 #if LANES == 8

@@ -39,14 +39,15 @@ static void pack_views(
 static void weigh_views(
     __global const float *restrict zr, __global const float *restrict zi, long pitch, int part, int length,
     __global float *restrict rays, __global const uint *restrict turns,
-    __global const float *restrict half_shadows, __global const float *restrict signs,
-    __global const int *restrict ends, int ray0, int count, int samples, int begin, int most)
+    __global const float *restrict shadows, __global const float *restrict signs,
+    __global const float *restrict bins, __global const int *restrict ends, int ray0, int columns,
+    int count, int samples, int begin, int most)
 {
   int end = 0;
   for (int k = 0; k < LANES && ray0 + k < count; k++) end = ends[ray0 + k] > end ? ends[ray0 + k] : end;
   if (most < end) end = most;
-  const lanes_whole turn = LOAD_WHOLE(turns + ray0);
-  const lanes half_shadow = LOAD(half_shadows + ray0), sign = LOAD(signs + ray0);
+  const ray_shape shape = shape_of(turns, shadows, ray0, 2 * columns);
+  const lanes sign = LOAD(signs + ray0);
   for (int l0 = begin; l0 < end; l0 += LANES) {
     lanes re[LANES], im[LANES];
     UNROLL for (int k = 0; k < LANES; k++) {
@@ -54,7 +55,7 @@ static void weigh_views(
       const lanes ar = LOAD(zr + l * pitch), ai = LOAD(zi + l * pitch);
       const lanes br = LOAD(zr + m * pitch), bi = LOAD(zi + m * pitch);
       const lanes qr = part ? ai + bi : ar + br, qi = part ? br - ar : ai - bi;
-      const response w = ray_response(l0 + k, turn, half_shadow);
+      const response w = ray_response(l0 + k, &shape, bins[l0 + k]);
       re[k] = 0.5f * (qr * w.real - qi * w.imaginary);
       im[k] = 0.5f * sign * (qr * w.imaginary + qi * w.real);
     }

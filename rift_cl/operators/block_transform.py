@@ -41,7 +41,7 @@ class BlockTransform:
 
     @cached_property
     def _scratch(self) -> Any:
-        return self.device.empty((self._items, 4, self.length, BLOCK), self._dtype)
+        return self.device.empty((self._items, 2, 2, self.length, BLOCK), self._dtype)
 
     @property
     def nbytes(self) -> int:

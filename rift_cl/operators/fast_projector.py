@@ -28,7 +28,7 @@ from rift_cl.operators.ray_geometry import IMAGE, rays
 from rift_cl.operators.ray_tables import RayTables
 
 _MOST_LOBES = 8
-# Slices that a CPU spreads at once, as kernels/rays_spread_stack.cl has them, and the bytes of rays
+# Slices that a CPU spreads at once (kernels/rays_spread_stack_cpu.cl), and the bytes of rays
 # and grids that they may take.
 _TOGETHER, _TOGETHER_BYTES = 4, 512 << 20
 
@@ -36,13 +36,13 @@ _TOGETHER, _TOGETHER_BYTES = 4, 512 << 20
 class FastProjector(ParallelProjector):
     """Line integrals of an image, or of every slice of a volume, with an error that is named.
 
-    It approximates the transform with the footprint ``linear`` of ``Projector``, which reads views
-    by straight lines from bin to bin. The spectrum of such lines never ends: it is that of the
-    bins, repeated, under sinc^2. Here it ends where the image has no more to show:
-    along either axis at 0.55 cycles per sample of the image, of which 1/2 can be told apart, or at
-    0.71 as far as that lies below the detector's own Nyquist frequency. What lies beyond would fold
-    back into the image. By that the two projectors differ on sharp data; reconstructions are as
-    good.
+    It approximates the transform with the footprint ``strip`` of ``Projector``, which counts the
+    area that pixel and bin share. The spectrum of that never ends: that of the bins, repeated,
+    under the sinc of the bin and those of the pixel's two edges. Here it ends where the image has
+    no more to show: along either axis at 0.55 cycles per sample of the image, of which 1/2 can be
+    told apart (0.71 where bins are finer than samples), or at 0.85 as far as that lies below the
+    detector's own Nyquist frequency. What lies beyond would fold back into the image. By that the
+    two projectors differ on sharp data; reconstructions are as good.
 
     Args:
         grid: where the image lives, (ny, nx) or (nz, ny, nx).
@@ -51,12 +51,12 @@ class FastProjector(ParallelProjector):
             over the norm of the result: for data as rough as white noise or smoother, on a detector
             that sees the image. Rougher data (a checkerboard, a lone corner pixel) may differ by a
             little more, and float32 rounds at 1e-6.
-        lobes: ``image``, or how many lobes of sinc^2 are kept, folded or not. 0: nothing
-            beyond the detector's Nyquist frequency; edges ring. 3: the same values as with
-            straight lines, as far as phase tables give those.
+        lobes: ``image``, or how many lobes of the bin's sinc are kept, folded or not. 0: nothing
+            beyond the detector's Nyquist frequency; edges ring. 3: nearly the values that
+            phase tables give.
         device: where to work; the default device if not given.
 
-    Bins of which the hats lie further than eight bins from the image's shadow are taken for zero.
+    Bins further from the image's shadow than a pixel's own and eight bins are taken for zero.
 
     Raises:
         InputError: the error is smaller than this method allows, or bins are very much finer than
@@ -108,7 +108,7 @@ class FastProjector(ParallelProjector):
 
     @cached_property
     def _tables(self) -> RayTables:
-        return RayTables(self.device, self._rays, self.gridding, self._columns)
+        return RayTables(self.device, self._rays, self.gridding, self._columns, self._samples)
 
     def _apply(self, x: Any, out: Any) -> None:
         for k in range(x.shape[0] if len(x.shape) == 3 else 1):
@@ -135,15 +135,17 @@ class FastProjector(ParallelProjector):
         if tables.blocks is not None:
             where = (tables.order, tables.starts, *tables.factors, tables.ends)
             sizes = (count, *self._slice_sizes(views, k), found.window, self._samples, columns)
-            tables.blocks.launch("rays_of_views", columns, views, values, *where, *sizes)
+            tables.blocks.launch("rays_of_views_cpu", columns, views, values, *where, *sizes)
             return values
         fields, spare = self._planes(length, columns)
         arguments = self._view_arguments(views, k)
-        device.launch("rays_pack", (*self._blocks(columns, length), 2), views, fields, *arguments)
+        device.launch(
+            "rays_pack_gpu", (*self._blocks(columns, length), 2), views, fields, *arguments
+        )
         fields, spare = tables.views(fields, spare)
         size = (*self._blocks(columns, self._samples), 2)
         arrays = (fields, values, *tables.factors, tables.ends)
-        device.launch("rays_weigh", size, *arrays, count, self._samples, length, columns)
+        device.launch("rays_weigh_gpu", size, *arrays, count, self._samples, length, columns)
         return values
 
     def _views_of(self, values: Any, views: Any, k: int) -> None:
@@ -177,7 +179,7 @@ class FastProjector(ParallelProjector):
         macros = {**self._macros, "TILE": tables.tile}
         kernel, arrays = "rays_spread", [*values, *grids]
         if len(values) > 1:
-            kernel, macros["SLICES"] = "rays_spread_stack", len(values)
+            kernel, macros["SLICES"] = "rays_spread_stack_cpu", len(values)
             spare = [values[0]] * (_TOGETHER - len(values))
             arrays = [*values, *spare, *grids, *([grids[0]] * len(spare))]
         self.device.launch(

@@ -101,21 +101,21 @@ class PaddedSpectrum:
         fields = self.device.empty((2, edge, self.pairs))
         sizes = (height, height // 2, rows, self.across, edge, self.pairs)
         tiles = self._tiles(self.pairs, edge // 2 + 1)
-        self.device.launch("spectrum_fold", tiles, grid, fields, *sizes)
+        self.device.launch("spectrum_fold_gpu", tiles, grid, fields, *sizes)
         del grid, spare
         fields = self._along(fields, self.device.empty(fields.shape), inverse=True)[0]
         sizes = (k, height, width, width // 2, edge, self.pairs)
         size = (*self._tiles(width, self.pairs), 2)
-        self.device.launch("slice_crop", size, fields, image, *self._weights, *sizes)
+        self.device.launch("slice_crop_gpu", size, fields, image, *self._weights, *sizes)
 
     def _crop_blocks(self, grid: Any, image: Any, k: int) -> None:
         (down, along), (height, width) = self._blocks, image.shape[-2:]
         edge, pairs = self._edges[1], self.pairs
         fields = self.device.empty((pairs // BLOCK, 2, edge, BLOCK))
         sizes = (height, height // 2, edge, pairs)
-        down.launch("pairs_of_spectrum", self.width, grid, fields, *sizes)
-        sizes = (k, height, width, width // 2, pairs)
-        along.launch("slice_of_pairs", pairs, fields, image, *self._weights, *sizes)
+        down.launch("pairs_of_spectrum_cpu", self.width, grid, fields, *sizes)
+        place = (k, height, width, width // 2, pairs)
+        along.launch("slice_of_pairs_cpu", pairs, fields, image, *self._weights, *place)
 
     def of(self, image: Any, k: int) -> Any:
         """The grid of slice k of the image, (2, rows, columns) with margins, to be read from."""

@@ -31,11 +31,15 @@ _LARGEST_INVERSE = 1e9
 _ANGLE_ROUNDING = 1e-9
 # Frequencies up to which rays are kept if no lobes are asked for, in cycles per sample of the
 # image along either axis, of which 1/2 can be told apart. Below the detector's own Nyquist
-# frequency the data say something about what lies beyond and folds back into a sampled image; above
-# it, only straight lines between bins do, and a margin is left so that nothing ends within the
-# square. Shepp and Logan's phantom, 512 x 512, 768 views: with bins half as wide as samples, 0.71
-# instead of 0.55 is worth 1.7 dB; with bins as wide as samples 0.55 loses 0.02 dB, 0.5 loses 0.16.
-_MEASURED, _CONTINUED = 0.71, 0.55
+# frequency the data say something about what lies beyond and folds back into a sampled image:
+# _MEASURED. Above it there are only repetitions, which the footprint spares as it does in the
+# direct projector: _CONTINUED, and _FINER where bins are finer than samples. Filtered
+# backprojection of Shepp and Logan's phantom, 256 x 256, 384 views, is then never more than 0.05 dB
+# behind the direct one's, with bins of 1/4 to 5/4 of a sample; with 0.71 for the first it is 1.4
+# behind at 1/4, with 0.55 for the last 0.23 at 3/4, and with 0.5 for the second 0.1 at 1.
+_MEASURED, _CONTINUED, _FINER = 0.85, 0.55, 0.71
+# A pitch below this share of a spacing is a finer one, and no rounding.
+_SAME = 0.999
 # What stands for these in the place of a number of lobes.
 IMAGE = "image"
 
@@ -48,7 +52,7 @@ class Rays:
         order: which view each is, (n,) int32.
         starts: bin in the first row of its transform, (n,) int32.
         turns: by how much sample l is turned, in 2^-32 turns for each l, (n,) uint32.
-        half_shadows: half-width of a pixel's shadow in bins, over 2 length, (n,) float64.
+        shadows: of a pixel's edges along x and along y in bins, over 2 length, (2, n) float64.
         signs: -1 for rays that were reflected, (n,) float64.
         directions: cells along (x, y) for each cycle per ``length`` bins, times the edges, (n, 2).
         window: bins that the image's shadow can reach.
@@ -59,7 +63,7 @@ class Rays:
     order: NDArray[np.int32]
     starts: NDArray[np.int32]
     turns: NDArray[np.uint32]
-    half_shadows: NDArray[np.float64]
+    shadows: NDArray[np.float64]
     signs: NDArray[np.float64]
     directions: NDArray[np.float64]
     window: int
@@ -78,7 +82,7 @@ def rays(grid: Grid, scan: Parallel, lobes: int | str = IMAGE) -> Rays:
     Args:
         grid: the slice.
         scan: how it is looked at.
-        lobes: of the spectrum of straight lines between bins that are kept, see ``FastProjector``.
+        lobes: of the spectrum of a bin that are kept, see ``FastProjector``.
 
     Raises:
         InputError: bins are too fine for this method.
@@ -93,8 +97,8 @@ def rays(grid: Grid, scan: Parallel, lobes: int | str = IMAGE) -> Rays:
     middle_y, middle_x = float(y[len(y) // 2]), float(x[len(x) // 2])
     radius = math.hypot(len(x) // 2 * dx, len(y) // 2 * dy) / pitch
     cosine, sine = np.cos(scan.angles), np.sin(scan.angles)
-    shadows = np.maximum(1.0, np.maximum(np.abs(dx * cosine), np.abs(dy * sine)) / pitch)
-    reach = radius + float(shadows.max()) + _BESIDE
+    shadows = np.abs(np.stack([dx * cosine, dy * sine])) / pitch
+    reach = radius + max(1.0, float(shadows.max())) + _BESIDE
     length = fast_lengths(math.ceil(2 * reach) + 1, _STEP)[0]
     seen = scan.center + (middle_x * cosine + middle_y * sine) / pitch
     starts = np.clip(np.ceil(seen - reach), -_FAR, _FAR)
@@ -107,16 +111,16 @@ def rays(grid: Grid, scan: Parallel, lobes: int | str = IMAGE) -> Rays:
         order=order.astype(np.int32),
         starts=starts[order].astype(np.int32),
         turns=(np.rint(turns[order] * 2.0**32).astype(np.int64) & 0xFFFFFFFF).astype(np.uint32),
-        half_shadows=shadows[order] / (2 * length),
+        shadows=shadows[:, order] / (2 * length),
         signs=signs[order],
         directions=directions[order],
         window=math.floor(2 * reach) + 1,
         length=length,
-        ends=_ends(directions[order], length, lobes),
+        ends=_ends(directions[order], length, lobes, finer=pitch < _SAME * max(dx, dy)),
     )
 
 
-def _ends(directions: Floats, length: int, lobes: int | str) -> NDArray[np.int32]:
+def _ends(directions: Floats, length: int, lobes: int | str, *, finer: bool) -> NDArray[np.int32]:
     """How many samples of each ray are kept."""
     if lobes != IMAGE:
         kept = int(lobes) * length if lobes else length // 2
@@ -124,7 +128,7 @@ def _ends(directions: Floats, length: int, lobes: int | str) -> NDArray[np.int32
     # Samples from one cycle per sample of the image to the next, on the axis where they are fewer.
     cycle = 1 / np.abs(directions).max(axis=1)
     measured = np.minimum(_MEASURED * cycle, length / 2)
-    continued = np.minimum(_CONTINUED * cycle, length)
+    continued = np.minimum((_FINER if finer else _CONTINUED) * cycle, length)
     ends: NDArray[np.int32] = np.ceil(np.maximum(measured, continued)).astype(np.int32)
     return ends
 

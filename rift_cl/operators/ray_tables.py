@@ -23,6 +23,7 @@ class RayTables:
         rays: of the scan.
         gridding: the kernel.
         columns: that pairs of views are laid out in.
+        samples: of a ray, with those behind the last that is kept.
     """
 
     def __init__(
@@ -31,6 +32,7 @@ class RayTables:
         rays: Rays,
         gridding: Gridding,
         columns: int,
+        samples: int,
     ) -> None:
         self.tile = _TILE["cpu" if device.traits.is_cpu else "gpu"]
         steps = fixed_steps(rays, gridding.edges)
@@ -38,8 +40,12 @@ class RayTables:
         self.order, self.starts = device.array(rays.order), device.array(rays.starts)
         self.ends = device.array(rays.ends)
         padding = (0, 2 * columns - len(rays.order))
-        factors = (rays.turns, rays.half_shadows, rays.signs)
-        self.factors = tuple(device.array(np.pad(factor, padding)) for factor in factors)
+        self.factors = (
+            device.array(np.pad(rays.turns, padding)),
+            device.array(np.pad(rays.shadows, ((0, 0), padding))),
+            device.array(np.pad(rays.signs, padding)),
+            device.array(np.sinc(np.arange(samples) / rays.length)),
+        )
         self.steps, self.inverses = device.array(steps), device.array(inverse_steps(steps))
         self.visits, self.tiles = device.array(visits), device.array(tiles)
         self.kernel = device.array(gridding.table())

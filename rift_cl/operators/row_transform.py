@@ -4,7 +4,7 @@ In real space a row of n bins costs n^2 multiplications; here it costs some n lo
 continued by zeros to twice their length, so that nothing meets itself, and multiplied by the
 spectrum of the very taps that would be convolved with, so that the result is the same to the
 rounding of the arithmetic. Every row is transformed on its own (two bins make a complex sample,
-kernels/rows_weigh.cl): what stands beside it does not change a bit of it.
+kernels/rows_weigh_gpu.cl): what stands beside it does not change a bit of it.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class RowTransform:
             arguments = (x, out, gains, *self._weights, self._half_turns)
             sizes = (rows, per_view, filters, self.bins)
             shared = int(filters == 1)
-            self._blocks.launch("rows_filter", rows, *arguments, *sizes, SHARED=shared)
+            self._blocks.launch("rows_filter_cpu", rows, *arguments, *sizes, SHARED=shared)
             return
         columns = min(self._columns, rows)
         planes = self.device.empty((2, self.length, columns), self.dtype)
@@ -97,12 +97,12 @@ class RowTransform:
     def _pack(self, x: Any, planes: Any, slab: _Slab) -> None:
         sizes = (slab.first, slab.rows, self.bins, self.length, slab.columns)
         size = (2 * self.length, slab.columns)
-        self.device.launch("rows_pack", size, x, planes, *sizes, DOUBLE=self._double)
+        self.device.launch("rows_pack_gpu", size, x, planes, *sizes, DOUBLE=self._double)
 
     def _weigh(self, planes: Any, slab: _Slab, per_view: int) -> None:
         filters = self._weights[0].shape[1]
         self.device.launch(
-            "rows_weigh",
+            "rows_weigh_gpu",
             (slab.columns, self.length // 2 + 1),
             *(planes, *self._weights, self._half_turns),
             *(slab.first, per_view, filters, self.length, slab.columns),
@@ -113,7 +113,7 @@ class RowTransform:
     def _unpack(self, planes: Any, out: Any, gains: Any, slab: _Slab, per_view: int) -> None:
         sizes = (slab.first, slab.rows, per_view, self.bins, self.length, slab.columns)
         size = (self.bins, slab.columns)
-        self.device.launch("rows_unpack", size, planes, out, gains, *sizes, DOUBLE=self._double)
+        self.device.launch("rows_unpack_gpu", size, planes, out, gains, *sizes, DOUBLE=self._double)
 
 
 class _Slab(NamedTuple):

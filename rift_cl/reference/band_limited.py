@@ -1,12 +1,13 @@
-"""The X-ray transform with the linear footprint, without the frequencies beyond some limit.
+"""The X-ray transform with the footprint of strips, without the frequencies beyond some limit.
 
-A pixel at t meets the detector with the hat of ``rift_cl.reference.radon``, whose half-width is h
-bins. Its spectrum is h sinc(h f)^2, f in cycles per bin, which never ends; here it does. With
-bins that are continued periodically after ``period`` of them, a pixel u bins from a bin gives it
+The area that a pixel and a bin share is, along the detector, three boxes convolved: the bin and
+the shadows of the pixel's two edges, a and b bins long. Its spectrum, sinc(f) sinc(a f) sinc(b f)
+with f in cycles per bin, never ends; here it does. With bins that are continued periodically after
+``period`` of them, a pixel u bins from a bin gives it, with f = l / period,
 
-    dx dy / (pitch period) sum over |l| < samples of sinc(h l / period)^2 cos(2 pi l u / period).
+    dx dy / (pitch period) sum over |l| < samples of sinc(f) sinc(a f) sinc(b f) cos(2 pi f u).
 
-Bins further than h + 8 bins from the shadow of the image's circle get nothing.
+Bins further than max(1, a, b) + 8 bins from the shadow of the image's circle get nothing.
 """
 
 from __future__ import annotations
@@ -51,9 +52,9 @@ def _view(
     cosine, sine = math.cos(angle), math.sin(angle)
     y, x = grid.coordinates(0), grid.coordinates(1)
     t = (x * cosine + y[:, None] * sine).ravel() / pitch + scan.center
-    half_width = max(1.0, abs(dx * cosine) / pitch, abs(dy * sine) / pitch)
     frequencies = np.arange(1, samples) / period
-    response = 2 * np.sinc(half_width * frequencies) ** 2
+    boxes = [1.0, abs(dx * cosine) / pitch, abs(dy * sine) / pitch]
+    response = 2 * np.prod([np.sinc(width * frequencies) for width in boxes], axis=0)
     of_bins = np.exp(2j * np.pi * np.arange(scan.bins)[:, None] * frequencies)
     of_pixels = np.exp(-2j * np.pi * frequencies[:, None] * t)
     weights = 1 + ((of_bins * response) @ of_pixels).real

@@ -9,7 +9,7 @@ import rift_cl as rift
 from rift_cl import FastProjector, Grid, Parallel, Projector
 from rift_cl.metrics import psnr
 from rift_cl.phantom import shepp_logan, shepp_logan_sinogram
-from rift_cl.reconstruct.simultaneous_iteration import _inverse_sums
+from rift_cl.reconstruct.simultaneous_iteration import inverse_sums
 
 HALF = np.linspace(0, np.pi, 60, endpoint=False)
 SCENES = {
@@ -55,6 +55,6 @@ def test_no_ray_gets_more_weight_than_ringing_allows(device):
     A = FastProjector(grid, scan, device=device)
     sums = A(np.ones(A.domain))
     assert sums.min() < -1e-3 * sums.max()
-    weights = device.get(_inverse_sums(A))
+    weights = device.get(inverse_sums(A))
     assert weights.max() <= 1.0001 / -sums.min()
     assert (weights >= 0).all()

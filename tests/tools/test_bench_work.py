@@ -39,7 +39,8 @@ def launched(device, run):
     plain, found = device.launch, defaultdict(list)
 
     def launch(kernel, size, *arguments, **macros):
-        arrays = [array for array in arguments if is_device_array(array)]
+        # Blocks that stay in a core's caches, the only arrays of five axes, are nothing handed.
+        arrays = [each for each in arguments if is_device_array(each) and each.ndim < 5]
         found[kernel].append({array.base_data.int_ptr: array for array in arrays}.values())
         plain(kernel, size, *arguments, **macros)
 
@@ -65,7 +66,9 @@ def test_counted_work_is_that_of_the_arrays(tool):
                 sizes = sum(max(array.size for array in arrays) for arrays in launches)
                 assert cost.units(task.case) == sizes, where
             checked.add(kernel)
-    assert checked.issuperset(WHOLE) and checked.issuperset(["rows_weigh", "backproject_spline"])
+    assert checked.issuperset(WHOLE) and checked.issuperset(
+        ["rows_filter_cpu", "backproject_spline"]
+    )
 
 
 def test_kernel_that_nothing_launches_is_noticed(tool):

@@ -19,7 +19,7 @@ from bench.row_filters import ROW_COSTS
 from bench.transform_work import transform_bytes, transform_flops
 from rift_cl.operators.fast_projector import FastProjector
 
-_ERROR = 1e-3
+_ERROR, _SLICES = 1e-3, 4
 
 
 @dataclass(frozen=True)
@@ -92,10 +92,11 @@ def _rays_and_grid(case: FastCase) -> float:
     return 8 * (case.ray_samples + case.half_spectrum)
 
 
+_WEIGH_FLOP = 78
 _PACK = "no arithmetic; bytes: bins on one side, samples of the transform on the other"
 _WEIGH = (
-    "52 flop per sample of a ray: told apart from its pair 2, the response's sine, cosine and "
-    "sinc² 44, complex product 6; bytes: views' transforms on one side, rays on the other"
+    "78 flop per sample of a ray: told apart from its pair 2, the response's four sines and their "
+    "products 70, complex product 6; bytes: views' transforms on one side, rays on the other"
 )
 _CELL = (
     "per cell that a sample's kernel reaches 4 flop, a multiply-add each for the real and the "
@@ -104,7 +105,7 @@ _CELL = (
 _PACKING = Cost("bin", 0, lambda c: c.case.views * c.case.bins, _views_and_rays, _PACK)
 _WEIGHING = Cost(
     "sample",
-    52,
+    _WEIGH_FLOP,
     lambda c: c.ray_samples,
     lambda c: 4 * c.case.views * c.length + 8 * c.ray_samples,
     _WEIGH,
@@ -112,9 +113,30 @@ _WEIGHING = Cost(
 
 
 _REGULAR: dict[str, Cost] = {
-    "rays_pack": _PACKING,
+    "rays_of_views_cpu": Cost(
+        "flop",
+        1,
+        lambda c: c.case.views / 2 * transform_flops(c.length) + _WEIGH_FLOP * c.ray_samples,
+        lambda c: 4 * c.case.views * c.case.bins + 8 * c.ray_samples,
+        "transforms of pairs of views, and 78 flop per sample of a ray; bytes: views in, rays out",
+    ),
+    "pairs_of_spectrum_cpu": Cost(
+        "flop",
+        1,
+        lambda c: (c.edges[1] // 2 + 1) * transform_flops(c.edges[0]) + 2 * c.folded,
+        lambda c: 8 * (c.half_spectrum + c.folded),
+        "transforms of columns, and 2 flop per sample of a pair of rows; bytes: grid in, pairs out",
+    ),
+    "slice_of_pairs_cpu": Cost(
+        "flop",
+        1,
+        lambda c: c.case.n / 2 * transform_flops(c.edges[1]) + 2 * c.case.n**2,
+        lambda c: 8 * c.folded + 4 * c.case.n**2,
+        "transforms of pairs of rows, and two weights per pixel; bytes: pairs in, pixels out",
+    ),
+    "rays_pack_gpu": _PACKING,
     "rays_unpack": _PACKING,
-    "rays_weigh": _WEIGHING,
+    "rays_weigh_gpu": _WEIGHING,
     "rays_unweigh": _WEIGHING,
     "fft_pass": ROW_COSTS["fft_pass"]._replace(
         units=lambda c: c.transforms(transform_flops),
@@ -127,7 +149,7 @@ _REGULAR: dict[str, Cost] = {
         lambda c: 16 * 2 * c.width * c.edges[0],
         "no arithmetic; bytes: as many cells as the kernel is wide, at both ends of a row",
     ),
-    "spectrum_fold": Cost(
+    "spectrum_fold_gpu": Cost(
         "sample",
         2,
         lambda c: c.folded,
@@ -141,7 +163,7 @@ _REGULAR: dict[str, Cost] = {
         lambda c: 8 * (c.folded + c.half_spectrum),
         "2 flop per sample of a pair of rows; bytes: pairs in, the grid out, zeros included",
     ),
-    "slice_crop": Cost(
+    "slice_crop_gpu": Cost(
         "pixel",
         2,
         lambda c: c.case.n**2,
@@ -161,22 +183,35 @@ _REGULAR: dict[str, Cost] = {
 def fast_costs(width: int) -> dict[str, Cost]:
     """Costs for a kernel of so many cells along an axis."""
     cell = Cost("cell", 4 + 8 / width, lambda c: c.cells, _rays_and_grid, _CELL)
-    return {**_REGULAR, "rays_spread": cell, "rays_read": cell}
+    kernels = {"rays_spread": cell, "rays_spread_stack_cpu": cell, "rays_read": cell}
+    return {name: _of_all(cost) for name, cost in {**_REGULAR, **kernels}.items()}
+
+
+def _of_all(cost: Cost) -> Cost:
+    """What all slices cost, of what one does."""
+    return cost._replace(
+        units=lambda c: c.case.slices * cost.units(c), bytes=lambda c: c.case.slices * cost.bytes(c)
+    )
 
 
 FAST_COSTS = fast_costs(8)
 
 
 def fast_tasks(device: rift.Device, n: int, views: int) -> list[Task]:
-    """Both directions."""
-    case = Case(n, views)
+    """Both directions of a slice, and a stack's backprojection."""
+    forward, backward = (_task(device, Case(n, views), way) for way in ("forward", "backward"))
+    return [forward, backward, _task(device, Case(n, views, _SLICES), "backward")]
+
+
+def _task(device: rift.Device, case: Case, way: str) -> Task:
     A = FastProjector(case.grid, case.scan, _ERROR, device=device)
     A.prepare()
     gridding = A.gridding
     samples = round(sum(A.samples) / len(A.samples))
     sizes = FastCase(case, _ERROR, A.period, samples, gridding.width, gridding.edges)
-    x, y, costs = device.array(case.image), device.array(case.projections), fast_costs(sizes.width)
-    return [
-        Task("forward", sizes, lambda: A(x), costs),
-        Task("backward", sizes, lambda: A.T(y), costs),
-    ]
+    if way == "forward":
+        given, operator = device.array(case.image), A
+    else:
+        given, operator = device.array(case.projections), A.T
+    name = way if case.slices == 1 else f"{way}, {case.slices} slices"
+    return Task(name, sizes, lambda: operator(given), fast_costs(sizes.width))

@@ -1,4 +1,4 @@
-"""Filtered backprojection by each projector, in turns: processor time of a slice, and its quality."""
+"""Filtered backprojection by each projector, in turns: processor time of a slice, and quality."""
 
 from __future__ import annotations
 

@@ -36,6 +36,14 @@ def _weighing_bytes(case: Any) -> float:
 
 
 ROW_COSTS: dict[str, Cost] = {
+    "rows_filter_cpu": Cost(
+        "flop",
+        1,
+        lambda c: 2 * c.rows * transform_flops(transform_length(c.bins)) + 16 * _spectrum(c),
+        lambda c: 2 * c.itemsize * _samples(c),
+        "two transforms, 168, 98, 34, 28, 10 flop per butterfly of radix 9, 8, 4, 3, 2, and 16 "
+        "flop per complex sample for the response; bytes: the rows in and out",
+    ),
     "filter_views": Cost(
         "MAC",
         2,
@@ -43,7 +51,7 @@ ROW_COSTS: dict[str, Cost] = {
         lambda c: 2 * c.itemsize * _samples(c),
         "2 flop per MAC, bins² of them to a detector row; bytes: the sinogram in and out",
     ),
-    "rows_pack": Cost(
+    "rows_pack_gpu": Cost(
         "bin",
         0,
         _samples,
@@ -55,10 +63,10 @@ ROW_COSTS: dict[str, Cost] = {
         1,
         lambda c: 2 * c.rows * transform_flops(transform_length(c.bins)),
         lambda c: 2 * c.rows * transform_bytes(transform_length(c.bins), c.itemsize),
-        "34, 28, 10 flop per butterfly of radix 4, 3, 2; bytes: each pass reads and writes every "
-        "sample",
+        "168, 98, 34, 28, 10 flop per butterfly of radix 9, 8, 4, 3, 2; bytes: each pass reads and "
+        "writes every sample",
     ),
-    "rows_weigh": Cost(
+    "rows_weigh_gpu": Cost(
         "complex sample",
         16,
         _spectrum,
@@ -66,7 +74,7 @@ ROW_COSTS: dict[str, Cost] = {
         "32 flop per pair of samples k and length - k: even and odd bins told apart, turned, "
         "weighed, put together; bytes: the samples in and out, the responses in",
     ),
-    "rows_unpack": Cost(
+    "rows_unpack_gpu": Cost(
         "bin",
         1,
         _samples,

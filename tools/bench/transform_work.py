@@ -1,14 +1,16 @@
 """How many passes a Fourier transform takes, and the operations in them.
 
-A pass of radix 4, 3 or 2 (kernels/fft_pass.cl) adds up the samples of a butterfly and turns all
-results but the first: 8 complex additions and 3 complex products for 4 samples, and so on. A
-complex addition is 2 flop, a complex product 6.
+A pass of radix 9, 8, 4, 3 or 2 (kernels/include/butterfly.h) adds up the samples of a butterfly
+and turns all results but the first: 8 complex additions and 3 complex products for 4 samples, and
+so on. Nine samples are six transforms of three with four products between them; eight are two
+transforms of four, two turns of an eighth and eight additions. A complex addition is 2 flop, a
+complex product 6.
 """
 
 from __future__ import annotations
 
 # Flop of a butterfly: additions and factors, then the products.
-_BUTTERFLY = {4: 16 + 18, 3: 16 + 12, 2: 4 + 6}
+_BUTTERFLY = {9: 6 * 16 + 4 * 6 + 48, 8: 2 * 16 + 8 + 16 + 42, 4: 16 + 18, 3: 16 + 12, 2: 4 + 6}
 
 
 def radices(length: int) -> list[int]:

@@ -1,4 +1,4 @@
-/* The columns of a Fourier transform become rows of a detector again, for GPUs: rows_pack.cl backwards.
+/* The columns of a Fourier transform become rows of a detector again, for GPUs: rows_pack_gpu.cl backwards.
  *
  * Index space: (blocks of LANES bins, blocks of LANES rows). */
 
@@ -6,7 +6,7 @@
 #include "include/transpose.h"
 #include "include/row_columns.h"
 
-KERNEL void rows_unpack(
+KERNEL void rows_unpack_gpu(
     __global const real *restrict planes, __global real *restrict rows, __global const real *restrict gains,
     int first, int count, int rows_per_view, int bins, int length, int columns)
 {

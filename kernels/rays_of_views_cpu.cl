@@ -1,6 +1,6 @@
 /* Views become rays of the image's spectrum, BLOCK pairs of views at a time, for CPUs.
  *
- * What a GPU does by rays_pack, fft_pass and rays_weigh, all in the caches of a core (see
+ * What a GPU does by rays_pack_gpu, fft_pass and rays_weigh_gpu, all in the caches of a core (see
  * include/view_columns.h). Index space: items, each of which takes every so many-th block. */
 
 #include "include/portable.h"
@@ -11,12 +11,12 @@
 #include "include/view_columns.h"
 #include "include/fft_block.h"
 
-KERNEL void rays_of_views(
+KERNEL void rays_of_views_cpu(
     __global const float *restrict views, __global float *restrict rays,
     __global const int *restrict order, __global const int *restrict starts,
-    __global const uint *restrict offsets, __global const float *restrict half_shadows,
-    __global const float *restrict signs, __global const int *restrict ends,
-    int count, int slice, int slices, int bins, int window, int samples, int columns,
+    __global const uint *restrict offsets, __global const float *restrict shadows,
+    __global const float *restrict signs, __global const float *restrict bin_response,
+    __global const int *restrict ends, int count, int slice, int slices, int bins, int window, int samples, int columns,
     __global float *scratch, __global const float *restrict turns, int length, int blocks, int items)
 {
   const int item = (int)get_global_id(0);
@@ -32,7 +32,7 @@ KERNEL void rays_of_views(
     for (int part = 0; part < 2; part++)
       for (int c = 0; c < BLOCK; c += LANES)
         weigh_views(
-            z.re + c, z.im + c, BLOCK, part, length, rays, offsets, half_shadows, signs, ends,
-            part * columns + n * BLOCK + c, count, samples, 0, samples);
+            z.re + c, z.im + c, BLOCK, part, length, rays, offsets, shadows, signs, bin_response, ends,
+            part * columns + n * BLOCK + c, columns, count, samples, 0, samples);
   }
 }

@@ -10,7 +10,7 @@
 #include "include/fourier_rays.h"
 #include "include/view_columns.h"
 
-KERNEL void rays_pack(
+KERNEL void rays_pack_gpu(
     __global const float *restrict views, __global float *restrict fields,
     __global const int *restrict order, __global const int *restrict starts,
     int rays, int slice, int slices, int bins, int window, int length, int columns)

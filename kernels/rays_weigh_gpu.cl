@@ -9,17 +9,17 @@
 #include "include/fourier_rays.h"
 #include "include/view_columns.h"
 
-KERNEL void rays_weigh(
+KERNEL void rays_weigh_gpu(
     __global const float *restrict fields, __global float *restrict rays,
-    __global const uint *restrict turns, __global const float *restrict half_shadows,
-    __global const float *restrict signs, __global const int *restrict ends,
-    int count, int samples, int length, int columns)
+    __global const uint *restrict turns, __global const float *restrict shadows,
+    __global const float *restrict signs, __global const float *restrict bins,
+    __global const int *restrict ends, int count, int samples, int length, int columns)
 {
   const int c = (int)get_global_id(0) * LANES, l = (int)get_global_id(1) * LANES;
   const int part = (int)get_global_id(2);
   if (c >= columns) return;
   __global const float *zr = fields + c, *zi = zr + (long)length * columns;
   weigh_views(
-      zr, zi, columns, part, length, rays, turns, half_shadows, signs, ends, part * columns + c, count,
-      samples, l, l + LANES);
+      zr, zi, columns, part, length, rays, turns, shadows, signs, bins, ends, part * columns + c, columns,
+      count, samples, l, l + LANES);
 }

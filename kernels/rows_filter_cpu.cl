@@ -1,6 +1,6 @@
 /* Convolve rows of a detector by their transforms, BLOCK rows at a time, for CPUs.
  *
- * What a GPU does by rows_pack, fft_pass, rows_weigh, fft_pass and rows_unpack, all in the caches of a
+ * What a GPU does by rows_pack_gpu, fft_pass, rows_weigh_gpu, fft_pass and rows_unpack_gpu, all in the caches of a
  * core (see include/row_columns.h). Index space: items, each of which takes every so many-th block. */
 
 #include "include/portable.h"
@@ -8,7 +8,7 @@
 #include "include/row_columns.h"
 #include "include/fft_block.h"
 
-KERNEL void rows_filter(
+KERNEL void rows_filter_cpu(
     __global const real *restrict rows, __global real *restrict out, __global const real *restrict gains,
     __global const real *restrict sums, __global const real *restrict differences,
     __global const real *restrict half_turns, int count, int rows_per_view, int filters, int bins,

@@ -7,7 +7,7 @@
 #include "include/transpose.h"
 #include "include/row_columns.h"
 
-KERNEL void rows_pack(
+KERNEL void rows_pack_gpu(
     __global const real *restrict rows, __global real *restrict planes,
     int first, int count, int bins, int length, int columns)
 {

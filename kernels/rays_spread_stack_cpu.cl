@@ -22,7 +22,7 @@
 #define OVERHANG (WIDTH - 1)
 #define ACROSS (TILE + 2 * OVERHANG)
 
-KERNEL void rays_spread_stack(
+KERNEL void rays_spread_stack_cpu(
     __global const float *restrict rays0, __global const float *restrict rays1,
     __global const float *restrict rays2, __global const float *restrict rays3,
     __global float *grid0, __global float *grid1, __global float *grid2, __global float *grid3,

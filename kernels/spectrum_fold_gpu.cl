@@ -7,7 +7,7 @@
 #include "include/fourier_rays.h"
 #include "include/row_pairs.h"
 
-KERNEL void spectrum_fold(
+KERNEL void spectrum_fold_gpu(
     __global const float *restrict grid, __global float *restrict fields,
     int height, int middle, int rows, int columns, int edge, int pairs)
 {

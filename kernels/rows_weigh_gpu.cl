@@ -6,7 +6,7 @@
 #include "include/transpose.h"
 #include "include/row_columns.h"
 
-KERNEL void rows_weigh(
+KERNEL void rows_weigh_gpu(
     __global real *restrict planes, __global const real *restrict sums,
     __global const real *restrict differences, __global const real *restrict half_turns,
     int first, int rows_per_filter, int filters, int length, int columns)

@@ -1,7 +1,7 @@
 /* Pairs of rows are transformed back and cropped to a slice of the image, for CPUs.
  *
- * What a GPU does by fft_pass and slice_crop, BLOCK pairs at a time in the caches of a core (see
- * include/row_pairs.h). Pairs come as pairs_of_spectrum leaves them, and are overwritten.
+ * What a GPU does by fft_pass and slice_crop_gpu, BLOCK pairs at a time in the caches of a core (see
+ * include/row_pairs.h). Pairs come as pairs_of_spectrum_cpu leaves them, and are overwritten.
  *
  * Index space: items, each of which takes every so many-th block. */
 
@@ -11,7 +11,7 @@
 #include "include/fourier_rays.h"
 #include "include/row_pairs.h"
 
-KERNEL void slice_of_pairs(
+KERNEL void slice_of_pairs_cpu(
     __global float *fields, __global float *restrict image, __global const float *restrict down,
     __global const float *restrict across, int slice, int height, int width, int middle, int pairs,
     __global float *scratch, __global const float *restrict turns, int length, int blocks, int items)

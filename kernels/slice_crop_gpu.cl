@@ -7,7 +7,7 @@
 #include "include/fourier_rays.h"
 #include "include/row_pairs.h"
 
-KERNEL void slice_crop(
+KERNEL void slice_crop_gpu(
     __global const float *restrict fields, __global float *restrict image,
     __global const float *restrict down, __global const float *restrict across,
     int slice, int height, int width, int middle, int edge, int pairs)
