@@ -10,8 +10,8 @@ projector approximates, computed by itself with an error of 1e-6 (which tests co
 in float64).
 
 Filtered backprojection is measured with as many views and bins as pixels along an edge, one slice
-at a time and several: processor seconds of a slice (all threads), the median over the rounds, and
-the reconstructions' PSNR from analytic line integrals and from noisy ones. The other version is a
+at a time and several: processor seconds of a slice (all threads), the least of the rounds, and the
+reconstructions' PSNR from analytic line integrals and from noisy ones. The other version is a
 checkout of this repository, whose projector has its turns in the same process.
 """
 

@@ -18,7 +18,7 @@ from rift_cl.geometry import Grid, Parallel
 from rift_cl.operators.fast_projector import FastProjector
 from rift_cl.operators.parallel_projector import ParallelProjector
 from rift_cl.operators.projector import Projector
-from rift_cl.operators.ray_geometry import too_fine
+from rift_cl.operators.ray_geometry import IMAGE, too_fine
 
 # What a formula and what a solver may differ by, in norm. With the first, filtered backprojection
 # of Shepp and Logan's phantom loses 0.01 dB; the residual of a solver goes below it.
@@ -85,7 +85,10 @@ def cheapest_projector(
     wanted = error if error is not None else _SOLVER_ERROR if iterative else _FORMULA_ERROR
     if too_fine(grid, scan):
         return Projector(grid, scan, device=device)
-    fast = FastProjector(grid, scan, wanted, device=device)
+    # Steps that keep an image from negative values lose up to 0.3 dB on 64 x 64 pixels where the
+    # spectrum ends with what the image shows.
+    lobes = 1 if iterative else IMAGE
+    fast = FastProjector(grid, scan, wanted, lobes=lobes, device=device)
     costs = _COSTS["cpu" if device.traits.is_cpu else "gpu"]
     if _fast_cost(fast, costs) < _direct_cost(grid, scan, costs):
         return fast

@@ -11,16 +11,16 @@ from rift_cl.metrics import psnr
 from rift_cl.phantom import shepp_logan, shepp_logan_sinogram
 from rift_cl.reconstruct.simultaneous_iteration import inverse_sums
 
-HALF = np.linspace(0, np.pi, 60, endpoint=False)
+HALF = np.linspace(0, np.pi, 100, endpoint=False)
 SCENES = {
     "detector wider than the image": (Grid((64, 64)), Parallel(HALF, bins=91)),
-    "as wide": (Grid((64, 64)), Parallel(HALF, bins=64)),
+    "as wide": (Grid((96, 96)), Parallel(HALF, bins=96)),
     "narrower": (Grid((64, 64)), Parallel(HALF, bins=40)),
     "fine bins": (Grid((48, 48)), Parallel(HALF, bins=140, pitch=0.5)),
     "wide bins": (Grid((64, 64)), Parallel(HALF, bins=46, pitch=2.0)),
-    "off-centre axis": (Grid((64, 64)), Parallel(HALF, bins=101, center=40.3)),
+    "off-centre axis": (Grid((96, 96)), Parallel(HALF, bins=151, center=60.4)),
     "uneven pixels": (Grid((40, 80), spacing=(2.0, 1.0)), Parallel(HALF, bins=117)),
-    "limited angle": (Grid((64, 64)), Parallel(HALF[:20], bins=91)),
+    "limited angle": (Grid((64, 64)), Parallel(HALF[:33], bins=91)),
 }
 
 
