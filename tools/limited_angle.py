@@ -63,7 +63,7 @@ class Options:
     Args:
         out: folder for the pictures.
         data: folder with NAME.mat and NAME_truth.png; phantoms alone if not given.
-        seeds: of the phantoms.
+        seeds: of the phantoms; none to leave them out.
         size: pixels along an edge of a reconstruction.
         steps: of every method, twice as many where a pull sets in later.
     """
@@ -241,9 +241,15 @@ def otsu(image: Floats) -> float:
 
 
 def score(image: Floats, threshold: float, truth: Mask) -> float:
-    """The Matthews correlation of an image's segmentation, on the truth's pixels."""
+    """The Matthews correlation of an image's segmentation, on the truth's pixels.
+
+    A segmentation of one class alone scores 0.
+    """
     fine = ndimage.zoom(image, truth.shape[0] / len(image), order=1, grid_mode=True, mode="nearest")
-    return float(np.corrcoef((fine > threshold).ravel(), truth.ravel())[0, 1])
+    found = fine > threshold
+    if found.all() or not found.any():
+        return 0.0
+    return float(np.corrcoef(found.ravel(), truth.ravel())[0, 1])
 
 
 def main() -> int:
@@ -253,7 +259,7 @@ def main() -> int:
     groups = {"phantoms": [simulated(seed) for seed in options.seeds]}
     if options.data is not None:
         groups["challenge"] = list(measured(options.data))
-    for scans in groups.values():
+    for scans in filter(None, groups.values()):
         rows = []
         for number, (name, method) in enumerate(methods(options).items()):
             images = [method(scan) for scan in scans]

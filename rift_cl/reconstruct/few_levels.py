@@ -8,8 +8,8 @@ values that no material has. The problem stays convex, with one answer, whatever
 
 The other half is a pull of every pixel to its nearest level, the concave penalty ``(x - low)
 (high - x) / 2`` between neighbouring levels. It sets in once the convex problem has settled, rises
-slowly and stays weak, so that it decides what is nearly decided. Ten times stronger it loses more
-than it gains, since it settles what the data leave open.
+slowly and stays weak, so that it decides what is nearly decided. A strong one loses more than it
+gains, since it settles what the data leave open.
 
 ``disc_prior`` finds support and scale of a round object; ``direction_weights`` the variation that
 knows the missing wedge. ``tools/limited_angle.py`` prints what each of them is worth.

@@ -188,7 +188,7 @@ def test_what_does_not_go_with_subsets_is_refused(device):
         OrderedSubsets(Matrix(-np.ones((12, 20)), (4, 5), (12,), device), np.ones(12), 3)
 
 
-def test_one_view_to_a_subset_is_as_good_as_astras_sart(device):
+def test_one_view_to_a_subset_is_astras_sart(device):
     astra = pytest.importorskip("astra")
     size, views = 48, 60
     angles = np.linspace(0, np.pi, views, endpoint=False)
@@ -199,14 +199,18 @@ def test_one_view_to_a_subset_is_as_good_as_astras_sart(device):
     truth = phantom.shepp_logan(Grid((size, size)))
     y = (matrix @ truth.ravel()).reshape(views, 71)
     data, image = astra.data2d.create("-sino", detector, y), astra.data2d.create("-vol", volume)
+    A = Matrix(matrix.toarray(), (size, size), (views, 71), device)
+    A.scan = Parallel(angles, 71)
+    order = [int(one[0]) for one in view_subsets(A, views)]
     settings = astra.astra_dict("SART")
     settings.update(ProjectorId=projector, ProjectionDataId=data, ReconstructionDataId=image)
+    settings["option"] = {"ProjectionOrder": "custom", "ProjectionOrderList": order}
     algorithm = astra.algorithm.create(settings)
     astra.algorithm.run(algorithm, 5 * views)
     theirs = astra.data2d.get(image)
     astra.clear()
-    A = Matrix(matrix.toarray(), (size, size), (views, 71), device)
     ours = sirt(A, y, 5, subsets=views)
     gaps = [np.linalg.norm(matrix @ x.ravel() - y.ravel()) for x in (ours, theirs)]
     print(f"residual after 5 passes: {gaps[0]:.4f}, ASTRA's SART {gaps[1]:.4f}")
-    assert gaps[0] < 1.3 * gaps[1]
+    assert gaps[0] == pytest.approx(gaps[1], rel=1e-2)
+    np.testing.assert_allclose(ours, theirs, atol=0.01 * theirs.max())
