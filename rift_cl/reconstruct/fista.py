@@ -20,6 +20,7 @@ from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import copy
 from rift_cl.errors import InputError
 from rift_cl.operators.linear import LinearOperator
+from rift_cl.reconstruct.direction_weights import DirectionWeights
 from rift_cl.reconstruct.residual_weight import Precondition
 from rift_cl.reconstruct.solver import check_steps
 from rift_cl.reconstruct.total_variation import following_weight
@@ -50,7 +51,8 @@ class _State(VariationState):
 class Fista(VariationSolver):
     """FISTA that has begun; arguments and errors are those of ``tv``.
 
-    ``inner`` is the number of denoising steps within each step.
+    ``inner`` is the number of denoising steps within each step; ``direction_weights`` say how much
+    a gradient counts by its direction (all alike if not given).
     """
 
     arrays = 14, 6
@@ -69,6 +71,7 @@ class Fista(VariationSolver):
         noise: float | None = None,
         weights: Any = None,
         inner: int = 5,
+        direction_weights: DirectionWeights | None = None,
     ) -> None:
         super().__init__(
             A,
@@ -78,6 +81,7 @@ class Fista(VariationSolver):
             precondition=precondition,
             noise=noise,
             weights=weights,
+            direction_weights=direction_weights,
         )
         self._inner = check_steps(inner, name="inner") if weight > 0 else 0
         if weight > 0 and self._inner == 0:

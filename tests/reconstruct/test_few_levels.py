@@ -9,7 +9,7 @@ from solver_cases import GRID, SCAN, Matrix, finished, problem
 from rift_cl import FastProjector, Grid, Parallel, Projector
 from rift_cl.cl.elementwise import clip_between, pull_to_levels
 from rift_cl.errors import InputError, RiftError, ShapeError
-from rift_cl.reconstruct import DirectionWeights, FewLevels, Pdhg
+from rift_cl.reconstruct import DirectionWeights, FewLevels, Fista, Pdhg
 from rift_cl.reconstruct.total_variation import TotalVariation
 from rift_cl.reference import total_variation as twin
 from rift_cl.reference.level_pull import level_penalty, level_pull
@@ -124,6 +124,18 @@ def test_bounds_give_the_bounded_least_squares_solution(device):
     finished(solver, 2000)
     expected = lsq_linear(matrix, y, (low.ravel() - 1e-12, high.ravel() + 1e-12)).x
     np.testing.assert_allclose(device.get(solver.image).ravel(), expected, atol=1e-5)
+
+
+def test_fista_and_pdhg_reach_the_same_directional_minimum(device):
+    A, _, _, y = problem(device, noise=0.1)
+    values = [
+        finished(method(A, y, 0.1, direction_weights=WEDGE), 150)[-1].values["objective"]
+        for method in (Fista, Pdhg)
+    ]
+    assert values[0] == pytest.approx(values[1], rel=1e-3)
+    assert finished(Fista(A, y, 0.1), 150)[-1].values["objective"] != pytest.approx(
+        values[0], rel=0.02
+    )
 
 
 def test_bounds_zero_and_much_are_nonnegativity(device):
