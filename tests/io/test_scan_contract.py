@@ -46,7 +46,7 @@ def hdf5(path: Path, **arrays: Any) -> Path:
         (0 * lines(), ("attenuation",)),
         (np.exp(-lines()), ("transmission",)),
         (np.exp(-lines(0.01)), ("transmission",)),
-        (1.2 * np.exp(-lines(3)), ("transmission",)),
+        (1.15 * np.exp(-lines(3)), ("transmission",)),
         (np.exp(-lines())[..., 12:20], ("transmission", "attenuation")),
         (lines(0.5, 0.4), ("transmission", "attenuation")),
         (3000.5 * np.exp(-lines()), ("counts",)),
@@ -62,6 +62,45 @@ def test_values_tell_their_kind_or_leave_a_doubt(
 ) -> None:
     assert possible_kinds(sampled(values.astype("f4"), np.dtype("f4"))) == kinds
     assert possible_kinds(sampled(values.astype("f4"), np.dtype("u2"))) == ("counts",)
+
+
+def random_views(random: np.random.Generator, shift: float, radius: float) -> np.ndarray:
+    """Line integrals of up to four discs in nine views, the first of them apart by ``shift``."""
+    t = np.linspace(-1, 1, 200)
+    total = np.zeros((9, 200))
+    for part in range(random.integers(1, 5)):
+        r = radius * (random.uniform(0.1, 1) if part else 1)
+        off = shift + (random.uniform(-1, 1) * (radius - r) if part else 0)
+        angles = np.arange(9)[:, None] * np.pi / 9
+        across = t - off * (np.cos(angles) if part or shift == 0 else 1)
+        total += random.uniform(0.3, 1) * np.sqrt(np.maximum(r * r - across**2, 0)) / r
+    return total * 10 ** random.uniform(-2, 0.9)
+
+
+def test_attenuation_and_transmission_are_never_taken_for_one_another() -> None:
+    random = np.random.default_rng(0)
+    for _ in range(500):
+        views = random_views(random, random.choice([0, 0.5, 0.9]), 10 ** random.uniform(-0.7, 0.1))
+        noise = random.normal(0, 10 ** random.uniform(-4, -1.3), views.shape)
+        for truth, other, values in (
+            ("attenuation", "transmission", views + random.choice([0, 0, 0.1, -0.1])),
+            ("transmission", "attenuation", np.exp(-views) * random.uniform(0.85, 1.15)),
+        ):
+            found = possible_kinds(sampled((values + noise).astype("f4"), np.dtype("f4")))
+            assert found != (other,), (truth, values)
+
+
+def test_what_lies_inside_the_detector_is_told_without_asking() -> None:
+    random = np.random.default_rng(1)
+    for _ in range(300):
+        views = random_views(random, 0.0, random.uniform(0.2, 0.95))
+        views *= random.uniform(0.3, 4) / views.max()
+        noise = random.normal(0, 0.02, views.shape)
+        for truth, values in (
+            ("attenuation", views + noise * views.max()),
+            ("transmission", np.exp(-views) + noise),
+        ):
+            assert possible_kinds(sampled(values.astype("f4"), np.dtype("f4"))) == (truth,)
 
 
 def test_names_and_units_state_a_kind() -> None:

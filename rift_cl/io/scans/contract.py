@@ -277,7 +277,7 @@ def _level(found: Finding, part: str) -> float:
 
 def _air(found: Finding, seen: Sample) -> int:
     """Bins at each end that are taken for air, which must be about as bright as anything."""
-    if seen.air[0] < _AIR_LEAST * seen.high:
+    if min(seen.ends) < _AIR_LEAST * seen.high:
         left, right = seen.ends
         raise InputError(
             f"{found.path}: --flats air wants air at both ends of the detector, where {found.name} "

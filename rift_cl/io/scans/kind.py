@@ -24,18 +24,21 @@ _VIEWS, _ROWS, _MOST = 9, 3, 1 << 18
 _END = 0.02
 # Transmission reaches from 0 to a little above 1.
 _TRANSMISSION = 1.5
-_AIR = (0.75, 1.3)
+_AIR = (0.8, 1.2)
 # No more than this is left of line integrals' range: e^-20 is less than one quantum in 10^8.
 INTEGRAL = 20.0
-# Ends of line integrals in air, as a share of the largest.
-_ZERO = 0.15
-_STRICTLY_ZERO = 0.1
-# Ends that are higher are those of a wide object, or air with an offset: a person knows.
-_OFFSET = 0.5
+# Line integrals in air are no more than this share of the largest, in nearly all views.
+_ZERO = 0.04
+# Where one end of the detector alone sees air, the middle sees this share of the largest.
+_FILLED = 0.25
+# Negative values of this share of the largest are noise, in which nothing is told.
+_NOISE = 0.5
 # Share of ends that are exactly 0 where sums were computed.
 _COMPUTED = 0.4
-# Ends of counts in air are at least this share of the brightest.
-_BRIGHT = 0.6
+# Ends of counts in air are at least this share of the brightest, of transmission nearly that.
+_BRIGHT, _NEARLY = 0.6, 0.85
+# Transmission reads about the same at both ends, unless an object reaches one: a person knows.
+_BOTH = 0.7
 
 _NAMES: tuple[tuple[Kind, frozenset[str]], ...] = (
     ("counts", frozenset(("count", "counts", "raw", "adu", "photons", "electrons"))),
@@ -56,6 +59,7 @@ class Sample:
         low: their 0.5th percentile.
         high: their 99.5th percentile.
         ends: median of the outermost bins at the left and at the right.
+        peaks: what these are at most in 19 of 20 lines, at the left and at the right.
         middle: median of the middle half of the bins.
         whole: every value is a whole number.
         zeros: share of the outermost values that are exactly 0, as in sums that were computed.
@@ -65,14 +69,10 @@ class Sample:
     low: float
     high: float
     ends: tuple[float, float]
+    peaks: tuple[float, float]
     middle: float
     whole: bool
     zeros: float
-
-    @property
-    def air(self) -> tuple[float, float]:
-        """The darker and the brighter of the two ends."""
-        return min(self.ends), max(self.ends)
 
     def __str__(self) -> str:
         return f"{self.dtype.name}, {self.low:.4g} to {self.high:.4g}"
@@ -101,7 +101,8 @@ def sampled(values: NDArray[np.float32], dtype: np.dtype[np.generic]) -> Sample:
     lines = np.where(np.isfinite(values), values, np.nan).astype(np.float64)
     finite = lines[~np.isnan(lines)]
     if not finite.size:
-        return Sample(dtype, 0.0, 0.0, (0.0, 0.0), 0.0, whole=False, zeros=0.0)
+        nothing = (0.0, 0.0)
+        return Sample(dtype, 0.0, 0.0, nothing, nothing, 0.0, whole=False, zeros=0.0)
     bins = lines.shape[-1]
     edge = max(1, round(_END * bins))
     left, right = lines[..., :edge], lines[..., -edge:]
@@ -112,6 +113,7 @@ def sampled(values: NDArray[np.float32], dtype: np.dtype[np.generic]) -> Sample:
         low=float(low),
         high=float(high),
         ends=(_median(left), _median(right)),
+        peaks=(_peak(left), _peak(right)),
         middle=_median(lines[..., bins // 4 : max(bins - bins // 4, bins // 4 + 1)]),
         whole=bool((finite == np.rint(finite)).all()),
         zeros=float(np.mean(outer == 0)),
@@ -121,6 +123,12 @@ def sampled(values: NDArray[np.float32], dtype: np.dtype[np.generic]) -> Sample:
 def _median(values: NDArray[np.float64]) -> float:
     finite = values[~np.isnan(values)]
     return float(np.median(finite)) if finite.size else 0.0
+
+
+def _peak(values: NDArray[np.float64]) -> float:
+    """What the medians of lines stay below in 19 of 20."""
+    complete = values[~np.isnan(values).any(axis=-1)]
+    return float(np.percentile(np.median(complete, axis=-1), 95)) if complete.size else 0.0
 
 
 def spread(count: int, wanted: int) -> list[int]:
@@ -145,22 +153,17 @@ def possible_kinds(seen: Sample) -> tuple[Kind, ...]:
 
 
 def _small(seen: Sample) -> tuple[Kind, ...]:
-    dark, bright = seen.air
-    as_attenuation = dark <= _STRICTLY_ZERO * seen.high
-    as_transmission = _AIR[0] <= bright <= _AIR[1] and seen.low >= -_STRICTLY_ZERO
-    if as_transmission and not as_attenuation:
-        return ("transmission",)
-    if as_attenuation and not as_transmission:
-        return ("attenuation",)
+    bright = max(seen.ends)
+    air = _AIR[0] <= bright <= _AIR[1] and bright >= _NEARLY * max(seen.high, seen.middle)
+    both = min(seen.ends) >= _BOTH * bright
+    as_transmission = air and both and seen.low >= -_ZERO
+    if as_transmission != _rises_from_zero(seen):
+        return ("transmission",) if as_transmission else ("attenuation",)
     return ("transmission", "attenuation")
 
 
 def _moderate(seen: Sample) -> tuple[Kind, ...]:
-    dark, bright = seen.air
-    rises = seen.middle >= bright and dark <= _OFFSET * seen.high
-    if dark <= _ZERO * seen.high or rises:
-        return ("attenuation",)
-    return ("counts", "attenuation")
+    return ("attenuation",) if _rises_from_zero(seen) else ("counts", "attenuation")
 
 
 def _large(seen: Sample) -> tuple[Kind, ...]:
@@ -168,12 +171,24 @@ def _large(seen: Sample) -> tuple[Kind, ...]:
 
     Ends that are merely dark may be those of a beam narrower than the detector.
     """
-    bright = max(seen.ends)
-    if bright >= _BRIGHT * seen.high and seen.middle <= bright:
+    dark, bright = min(seen.ends), max(seen.ends)
+    if bright >= _BRIGHT * seen.high and dark > _ZERO * seen.high and seen.middle <= bright:
         return ("counts",)
     if seen.zeros >= _COMPUTED:
         return ("attenuation",)
     return ("counts", "attenuation")
+
+
+def _rises_from_zero(seen: Sample) -> bool:
+    """Whether air reads zero at both ends, or at one of an object that reaches the other."""
+    air = _ZERO * seen.high
+    if seen.low < -_NOISE * seen.high:
+        return False
+    if max(seen.peaks) <= air:
+        return True
+    # An opaque object at one end of a view of air would look the same, but for the brightest.
+    inside = _FILLED * seen.high <= seen.middle and max(seen.ends) < _NEARLY * seen.high
+    return min(seen.peaks) <= air and inside
 
 
 def named_kind(names: Sequence[str]) -> Kind | None:
