@@ -147,7 +147,7 @@ def test_an_object_wider_than_the_detector_is_continued(tmp_path):
 def test_the_background_is_brought_to_zero(tmp_path):
     path = tmp_path / "scan.npz"
     truth = save_phantom(path, HALF, 80, offset=0.7)
-    options = ("--center", 39.5, "--size", SIZE, "--pad", "off")
+    options = ("--kind", "attenuation", "--center", 39.5, "--size", SIZE, "--pad", "off")
     volume, assumed = reconstruct(path, tmp_path / "out", *options, "--background", 5)
     assert "outermost 5 bins" in assumed
     assert error(volume[0], truth) < 0.3
