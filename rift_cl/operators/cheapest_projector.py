@@ -2,7 +2,7 @@
 
 ``Projector`` costs something for every pixel of every view, ``FastProjector`` for every sample of a
 view and for the transforms: the one wins where slices are small or views are few, the other from
-some 200 samples along an edge up. Costs are counted, never timed, so that the choice, and with it
+some 150 samples along an edge up. Costs are counted, never timed, so that the choice, and with it
 the result, does not depend on what else a machine does.
 """
 
@@ -20,9 +20,9 @@ from rift_cl.operators.parallel_projector import ParallelProjector
 from rift_cl.operators.projector import Projector
 from rift_cl.operators.ray_geometry import IMAGE, too_fine
 
-# What a formula and what a solver may differ by, in norm. With the first, filtered backprojection
-# of Shepp and Logan's phantom loses 0.01 dB; the residual of a solver goes below it.
-_FORMULA_ERROR, _SOLVER_ERROR = 1e-2, 1e-3
+# What FastProjector may differ by in norm. A uniform disc then comes back as flat as from
+# Projector; with 1e-2 it is twice as rough at 360 views, though the phantom loses 0.01 dB alone.
+_ERROR = 1e-3
 
 
 class _Costs(NamedTuple):
@@ -32,22 +32,27 @@ class _Costs(NamedTuple):
         pixel: of ``Projector``, for a pixel of a view.
         bin: of ``Projector``, for a bin of a view.
         sample: of ``FastProjector``, for a sample of a view's transform that is kept.
+        stacked: the same, where several slices are spread at once.
         point: of ``FastProjector``, for a number that is transformed.
-        launch: for a kernel's launch.
+        launches: of ``Projector``'s kernels.
+        fast_launches: of those of ``FastProjector``.
     """
 
     pixel: float
     bin: float
     sample: float
+    stacked: float
     point: float
-    launch: float
+    launches: float
+    fast_launches: float
 
 
-# Launches of a backprojection of either kind.
-_DIRECT_LAUNCHES, _FAST_LAUNCHES = 5, 20
+# Fitted to processor times of filtered backprojection at 64 to 512 pixels on two cores under PoCL.
+# No GPU was measured: its arithmetic is taken for fifty times as fast and its launches for dear, so
+# that only large slices go through the spectrum.
 _COSTS = {
-    "cpu": _Costs(pixel=0.13, bin=6.0, sample=22.0, point=8.0, launch=2e4),
-    "gpu": _Costs(pixel=0.004, bin=0.05, sample=0.2, point=0.1, launch=5e3),
+    "cpu": _Costs(0.17, 4.0, 20.0, 10.0, 5.0, launches=1e5, fast_launches=1e5),
+    "gpu": _Costs(0.0034, 0.08, 0.4, 0.4, 0.1, launches=5e4, fast_launches=2.5e5),
 }
 
 
@@ -66,8 +71,8 @@ def cheapest_projector(
         grid: where the image lives, (ny, nx) or (nz, ny, nx).
         scan: how it is looked at.
         iterative: whether a solver will use it, rather than ``fbp`` or ``backproject``.
-        error: what ``FastProjector`` may differ by in norm; 1e-2 if not given, by which filtered
-            backprojection loses less than 0.05 dB, and 1e-3 for solvers.
+        error: what ``FastProjector`` may differ by in norm; 1e-3 if not given, by which filtered
+            backprojection loses less than 0.05 dB.
         footprint: of ``Projector``; whoever names one wants that projector.
         device: where to work; the default device if not given.
 
@@ -82,13 +87,12 @@ def cheapest_projector(
     device = device or default_device()
     if footprint is not None:
         return Projector(grid, scan, footprint, device=device)
-    wanted = error if error is not None else _SOLVER_ERROR if iterative else _FORMULA_ERROR
     if too_fine(grid, scan):
         return Projector(grid, scan, device=device)
     # Steps that keep an image from negative values lose up to 0.3 dB on 64 x 64 pixels where the
     # spectrum ends with what the image shows.
     lobes = 1 if iterative else IMAGE
-    fast = FastProjector(grid, scan, wanted, lobes=lobes, device=device)
+    fast = FastProjector(grid, scan, _ERROR if error is None else error, lobes=lobes, device=device)
     costs = _COSTS["cpu" if device.traits.is_cpu else "gpu"]
     if _fast_cost(fast, costs) < _direct_cost(grid, scan, costs):
         return fast
@@ -97,7 +101,7 @@ def cheapest_projector(
 
 def _direct_cost(grid: Grid, scan: Parallel, costs: _Costs) -> float:
     each = math.prod(grid.shape[-2:]) * costs.pixel + scan.bins * costs.bin
-    return len(scan.angles) * each + _DIRECT_LAUNCHES * costs.launch
+    return len(scan.angles) * each + costs.launches
 
 
 def _fast_cost(fast: FastProjector, costs: _Costs) -> float:
@@ -107,4 +111,5 @@ def _fast_cost(fast: FastProjector, costs: _Costs) -> float:
     points = (
         len(fast.scan.angles) * fast.period + rows * columns + fast.grid.shape[-2] * columns
     ) / 2
-    return sum(fast.samples) * costs.sample + points * costs.point + _FAST_LAUNCHES * costs.launch
+    sample = costs.stacked if fast.grid.slices > 1 else costs.sample
+    return sum(fast.samples) * sample + points * costs.point + costs.fast_launches

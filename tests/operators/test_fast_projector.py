@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import rift_cl as rift
-from rift_cl import Grid, Parallel, Projector, dot_test
+from rift_cl import Grid, Parallel, Projector, dot_test, phantom
 from rift_cl.operators import Ramp, ViewFilter
 from rift_cl.operators.fast_projector import FastProjector
 from rift_cl.phantom import shepp_logan, shepp_logan_sinogram
@@ -196,6 +196,26 @@ def test_reconstructions_are_as_good_as_the_direct_ones(device):
         for kind in (FastProjector, Projector)
     )
     assert fast > direct
+
+
+@pytest.mark.parametrize(("views", "most"), [(180, 4e-3), (360, 1e-3)])
+@pytest.mark.parametrize(
+    ("size", "spacing", "center"), [(255, 0.8, 2.4), (256, 1, 0), (255, 1, -3.3), (128, 2, 1.7)]
+)
+def test_a_uniform_disc_comes_back_flat(device, views, most, size, spacing, center):
+    """The law that ``Projector`` obeys, too (test_projector_footprints.py)."""
+    grid, radius = Grid((size, size), spacing), 0.4 * size * spacing
+    bins = int(1.42 * size * spacing) + 4
+    axis = (bins - 1) / 2 + center
+    angles = np.linspace(0, np.pi, views, endpoint=False)
+    scan = Parallel(angles, bins + int(2 * abs(center)), center=axis)
+    A = FastProjector(grid, scan, device=device)
+    disc = phantom.render([phantom.Ellipsoid((0, 0, 0), (1, radius, radius), 0, 1)], grid)
+    y, x = grid.coordinates(0)[:, None], grid.coordinates(1)
+    inside = np.hypot(y, x) < radius - 6 * max(1, spacing)
+    values = rift.fbp(A, A(disc))[inside].astype(float)
+    assert abs(values.mean() - 1) < 1e-3
+    assert values.std() < most
 
 
 def test_a_detector_that_misses_sees_nothing(device):
