@@ -197,9 +197,11 @@ def _tables(record: dict[str, Any]) -> Iterator[Table]:
                 cells.append("" if quality is None else f"{quality:.2f}")
                 accuracy.append([str(case["size"]), data, name, *cells])
     timing = ["size", "views", "projector", "project, s", "times", "backproject, s", "times"]
-    yield Table("Times", timing, rows)
+    if rows:
+        yield Table("Times", timing, rows)
     heads = ["size", "data", "projector", "to own limit", "to direct", "PSNR"]
-    yield Table("Errors", heads, accuracy)
+    if accuracy:
+        yield Table("Errors", heads, accuracy)
     yield from formula_tables(record.get("fbp", []))
 
 
