@@ -1,13 +1,15 @@
 """One self-contained HTML page: text, tables and pictures in a single file that needs no network.
 
 Reports are mailed, archived and opened years later, so style and pictures are inside the file, no
-script runs, and a content policy in the page forbids every request. All text is escaped here; the
-caller writes plain text and saves what ``Page.html`` returns.
+script runs but the one of a slider, and a content policy in the page forbids every request and any
+other script. All text is escaped here; the caller writes plain text and saves what ``Page.html``
+returns.
 """
 
 from __future__ import annotations
 
 import base64
+import hashlib
 import html
 import numbers
 import re
@@ -18,6 +20,18 @@ from rift_cl.errors import InputError, ShapeError
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _QUANTITY = re.compile(r"[-+−±]?[\d.,]*\d(e[-+−]?\d+)?[%×°]?( [^\s\d]+)?|[-+−]?inf|nan|[-–—]?")
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff]")
+
+# Shows the sliders, and of each the picture that it points at.
+_SLIDER = """
+for (const figure of document.querySelectorAll("figure.slider")) {
+  const pictures = figure.querySelectorAll("img"), shown = figure.querySelector("output");
+  figure.querySelector("input").addEventListener("input", (event) => {
+    pictures.forEach((picture, number) => { picture.hidden = number !== +event.target.value; });
+    shown.textContent = pictures[event.target.value].dataset.label;
+  });
+  figure.hidden = false;
+}
+"""
 
 _STYLE = """
 :root { color-scheme: light dark; --ink: #1c1d1f; --soft: #63666b; --line: #d9dbde; --paper: #fff;
@@ -49,6 +63,9 @@ tr > .number:first-child { padding-left: 0; }
 figure { margin: 1.75rem 0; }
 img { display: block; max-width: 100%; height: auto; background: #fff; }
 figcaption { max-width: 42rem; margin-top: 0.5rem; }
+[hidden] { display: none !important; }
+.slider input { width: min(32rem, 70%); vertical-align: middle; }
+.slider output { font-variant-numeric: tabular-nums; }
 pre { overflow-x: auto; margin: 1.25rem 0; padding: 0.9rem 1.1rem; background: var(--tint);
   border-radius: 4px; font: 0.85rem/1.5 ui-monospace, Menlo, Consolas, "DejaVu Sans Mono",
   monospace; }
@@ -86,6 +103,7 @@ class Page:
         self._title = title
         self._subtitle = subtitle
         self._blocks: list[str] = []
+        self._slides = False
 
     def section(self, heading: str) -> None:
         """Begin a section."""
@@ -159,10 +177,58 @@ class Page:
             f"<figcaption>{_escape(caption)}</figcaption>\n</figure>"
         )
 
+    def slider(
+        self,
+        pictures: Sequence[bytes],
+        *,
+        labels: Sequence[str],
+        start: int,
+        caption: str,
+        alt: str,
+    ) -> None:
+        """Add pictures of which a slider shows one; nothing where scripts do not run.
+
+        Args:
+            pictures: PNG files' contents, all of one size.
+            labels: a text for each, shown beside the slider.
+            start: number of the picture that is shown first.
+            caption: what the pictures show, printed below them.
+            alt: what a person who cannot see the pictures should read.
+
+        Raises:
+            InputError: a picture is no PNG file, ``alt`` is empty, or there is not a label for
+                each picture.
+        """
+        if not pictures or len(pictures) != len(labels) or not 0 <= start < len(pictures):
+            raise InputError(
+                f"slider: there are {len(pictures)} pictures, {len(labels)} labels and the start "
+                f"{start}, wanted a label for each picture and one of them to start with"
+            )
+        if not all(picture.startswith(_PNG_SIGNATURE) for picture in pictures) or not alt.strip():
+            raise InputError("slider: wanted complete PNG files, and a text in alt")
+        encoded = [base64.b64encode(picture).decode("ascii") for picture in pictures]
+        images = "\n".join(
+            f'<img src="data:image/png;base64,{data}" alt="{_escape(f"{alt}: {label}")}" '
+            f'data-label="{_escape(label)}"{"" if number == start else " hidden"}>'
+            for number, (data, label) in enumerate(zip(encoded, labels, strict=True))
+        )
+        self._slides = True
+        self._blocks.append(
+            f'<figure class="slider" hidden>\n{images}\n'
+            f'<label><input type="range" min="0" max="{len(pictures) - 1}" value="{start}" '
+            f'aria-label="{_escape(alt)}"> <output>{_escape(labels[start])}</output></label>\n'
+            f"<figcaption>{_escape(caption)}</figcaption>\n</figure>"
+        )
+
     def html(self) -> str:
         """The whole page, to be saved as UTF-8."""
         subtitle = f"\n<p>{_escape(self._subtitle)}</p>" if self._subtitle else ""
         policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+        script = ""
+        if self._slides:
+            digest = base64.b64encode(hashlib.sha256(_SLIDER.encode()).digest()).decode()
+            policy += f"; script-src 'sha256-{digest}'"
+            script = f"\n<script>{_SLIDER}</script>"
         return (
             '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
             f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
@@ -170,7 +236,7 @@ class Page:
             f"<title>{_escape(self._title)}</title>\n<style>{_STYLE}</style>\n</head>\n"
             f"<body>\n<main>\n<header>\n<h1>{_escape(self._title)}</h1>{subtitle}\n</header>\n"
             + "\n".join(self._blocks)
-            + "\n</main>\n</body>\n</html>\n"
+            + f"\n</main>{script}\n</body>\n</html>\n"
         )
 
 

@@ -14,6 +14,7 @@ from rift_cl.io.capture import Capture, capture_name, holds_capture, open_captur
 from rift_cl.io.scans.formats import open_scan
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.jobs.analyze_settings import AnalyzeSettings
+from rift_cl.jobs.axis_search import find_axis
 from rift_cl.jobs.fan_views import fan_cameras
 from rift_cl.jobs.sampled import Floats, Sampled, points_of
 from rift_cl.jobs.scene_bounds import SceneBounds, bounds_of_cameras
@@ -163,21 +164,13 @@ def _scan(settings: AnalyzeSettings) -> Sampled:
         if getattr(settings, name) is not None:
             raise InputError(f"--{name} is about the cameras of a capture, {settings.source} is a "
                              "scan")  # fmt: skip
-    file = open_scan(
-        settings.source,
-        dataset=settings.dataset,
-        theta=settings.theta,
-        image_key=settings.image_key,
-        axes=settings.axes,
-        angle_unit=settings.angle_unit,
-        values=False,
-    )
+    file = _opened(settings, values=False)
     up = np.array([0.0, 0, 1])
     pitch, unit = (file.pitch, file.unit or "unit") if file.pitch else (1.0, "bin")
     notes = list(file.notes)
     if file.pitch is None:
         notes.append("The file gives no pitch of the detector: lengths are in bins.")
-    cameras, scan, edge = _rays(file, pitch, notes)
+    cameras, scan, edge = _rays(settings, file, pitch, notes)
     diameter = edge * file.shape[2] if settings.diameter is None else settings.diameter
     if settings.diameter is None:
         notes.append(
@@ -198,12 +191,37 @@ def _scan(settings: AnalyzeSettings) -> Sampled:
     )
 
 
+def _opened(settings: AnalyzeSettings, *, values: bool) -> ScanFile:
+    return open_scan(
+        settings.source,
+        dataset=settings.dataset,
+        theta=settings.theta,
+        image_key=settings.image_key,
+        axes=settings.axes,
+        angle_unit=settings.angle_unit,
+        values=values,
+    )
+
+
 def _rays(
-    file: ScanFile, pitch: float, notes: list[str]
+    settings: AnalyzeSettings, file: ScanFile, pitch: float, notes: list[str]
 ) -> tuple[tuple[Camera, ...], Parallel | None, float]:
     """Cameras of a fan beam or parallel rays, and the edge of a bin at the axis."""
     if file.fan is not None:
         edge = file.fan.pitch / file.fan.magnification
         return fan_cameras(file.fan, file.angles, file.shape[2]), None, edge
-    notes.append("The rotation axis is taken to be seen in the middle of the detector.")
-    return (), Parallel(file.angles, file.shape[2], pitch), pitch
+    return (), Parallel(file.angles, file.shape[2], pitch, _axis(settings, notes)), pitch
+
+
+def _axis(settings: AnalyzeSettings, notes: list[str]) -> float | None:
+    """Bin of the rotation axis, None for the middle: a file is analysed even if it hides it."""
+    try:
+        found = find_axis(_opened(settings, values=True))
+    except InputError as error:
+        notes.append(
+            "The rotation axis is taken to be seen in the middle of the detector, as it was not "
+            f"found: {error}"
+        )
+        return None
+    notes.append(f"The rotation axis was found {found.in_words()}.")
+    return found.center

@@ -10,7 +10,7 @@ from rift_cl.reconstruct.axis import AxisEstimate, axis_of_rows, searched_rows
 
 
 def find_axis(
-    scan: ScanFile, device: Device, *, span: tuple[float, float] | None = None
+    scan: ScanFile, device: Device | None = None, *, span: tuple[float, float] | None = None
 ) -> AxisEstimate:
     """Find the rotation axis of a parallel-beam scan.
 
@@ -20,7 +20,7 @@ def find_axis(
 
     Args:
         scan: the scan.
-        device: the device of the command; the search itself runs on the host.
+        device: accepted as by every search; this one runs on the host.
         span: first and last bin between which to search; as for ``find_center`` if not given.
 
     Raises:

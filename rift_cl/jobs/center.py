@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,11 @@ from rift_cl.plot import curves, figure_png, image_grid
 from rift_cl.progress import Report
 from rift_cl.reconstruct import AxisEstimate, fbp
 
-# Centres of the contact sheet, in bins from the best one.
-_SHEET = (-8.0, -4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0, 8.0)
+# Centres of the slider in bins from the best one, and those of the contact sheet among them.
+_SLIDER = (-8.0, -6, -4, -3, -2, -1.5, -1, -0.5, 0, 0.5, 1, 1.5, 2, 3, 4, 6, 8)
+_SHEET = (-8.0, -4, -2, -1, 0, 1, 2, 4, 8)
+# Percentiles of the best slice that are shown black and white, in percent.
+_WINDOW = (0.5, 99.5)
 
 
 @dataclass(frozen=True)
@@ -33,11 +37,13 @@ class CenterSettings(ScanInput):
     """
 
     out: Path = Path("rift-center")
-    """Folder for the contact sheet, the score curves and report.html."""
+    """Folder for the pictures, the score curve and report.html."""
     row: int | None = None
-    """Detector row to look at; the middle one when not given."""
+    """Detector row that the pictures show; the middle one when not given. The axis is searched in
+    several rows, whichever this is."""
     span: tuple[float, float] | None = None
-    """First and last detector bin between which to search; the middle half when not given."""
+    """First and last detector bin between which to search; when not given, the middle 60 % of the
+    detector for half turns and all of it for full turns."""
 
 
 class CenterJob:
@@ -61,62 +67,98 @@ class CenterJob:
         self.metrics: dict[str, Any] = {}
 
     def run(self) -> Iterator[Report]:
-        """Do it: the search, then a slice for each centre of the contact sheet."""
-        total = 1 + len(_SHEET)
+        """Do it: the search, then a slice for each centre of the slider."""
+        total = 1 + len(_SLIDER)
         yield Report(0, total, "steps")
-        sinogram = read_attenuation(self.scan, self.row, self.row + 1).projections[:, 0]
         found = find_axis(self.scan, self.device, span=self.settings.span)
         self.metrics = {**found.record(), "row": self.row}
+        middle = (self.scan.shape[1] - 1) / 2
+        here = found.center + found.tilt * (self.row - middle)
+        sinogram = read_attenuation(self.scan, self.row, self.row + 1).projections[:, 0]
         slices = {}
-        for step, offset in enumerate(_SHEET, start=1):
+        for step, offset in enumerate(_SLIDER, start=1):
             yield Report(step, total, "steps", {"center": found.center})
-            slices[found.center + offset] = self._slice(sinogram, found.center + offset)
+            slices[offset] = self._slice(sinogram, here + offset)
         self.folder.make()
-        self.folder.finish(self.settings, self.metrics, self._page(found, slices), self.device)
+        page = self._page(found, here, slices)
+        self.folder.finish(self.settings, self.metrics, page, self.device)
         yield Report(total, total, "steps", {"center": found.center})
 
     def _slice(self, sinogram: NDArray[np.float32], center: float) -> NDArray[np.float32]:
         bins = self.scan.shape[2]
         geometry = Parallel(self.scan.angles, bins, center=center)
         A = Projector(Grid((bins, bins)), geometry, device=self.device)
-        return np.asarray(fbp(A, sinogram))
+        return _middle(np.asarray(fbp(A, sinogram)))
 
-    def _page(self, found: AxisEstimate, slices: dict[float, NDArray[np.float32]]) -> Page:
-        page = Page(f"Centre of rotation of {self.scan.path.name}", f"bin {found.center:.2f}")
-        best = slices[found.center]
-        low, high = np.percentile(best, [0.5, 99.5])
+    def _page(
+        self, found: AxisEstimate, here: float, slices: dict[float, NDArray[np.float32]]
+    ) -> Page:
+        page = Page(f"Centre of rotation of {self.scan.path.name}", found.in_words())
+        page.facts(_facts(found))
+        black, white = (float(level) for level in np.percentile(slices[0.0], _WINDOW))
+        white = white if white > black else black + 1
+        page.slider(
+            [_grey(image, black, white) for image in slices.values()],
+            labels=[f"bin {here + offset:.2f}" for offset in slices],
+            start=_SLIDER.index(0.0),
+            caption=f"The middle of the slice at row {self.row} for the chosen centre; a wrong one "
+            "shows arcs and doubled edges.",
+            alt="Slice with the centre at",
+        )
         sheet = image_grid(
-            [_middle(image) for image in slices.values()],
-            titles=[f"{center:.2f}" for center in slices],
+            [slices[offset] for offset in _SHEET],
+            titles=[f"{here + offset:.2f}" for offset in _SHEET],
             columns=3,
-            window=(float(low), float(high)) if high > low else None,
+            window=(black, white),
             size=3.2,
         )
         page.figure(
             figure_png(sheet),
-            caption="The middle of the slice for centres about the best one, which is in the "
-            "middle; a wrong one shows arcs and doubled edges.",
-            alt=f"{len(slices)} slices reconstructed with different centres",
+            caption="The same side by side, about the best one, which is in the middle.",
+            alt=f"{len(_SHEET)} slices reconstructed with different centres",
         )
-        self._score_curves(page, found)
-        return page
-
-    def _score_curves(self, page: Page, found: AxisEstimate) -> None:
-        title = "log-likelihood"
         figure = curves(
-            {"score": (found.scores[0], found.scores[1])},
-            xlabel="centre, bins",
-            ylabel=title,
+            {"all rows": (found.scores[0], found.scores[1])},
+            xlabel="centre at the middle row, bins",
+            ylabel="log-likelihood",
             mark=round(found.center, 2),
         )
         page.figure(
             figure_png(figure),
-            caption="How likely each centre is, by all rows together (" + found.by + ").",
-            alt=f"Curve of {title}",
+            caption=f"How likely each centre is by the {found.by}, all rows together; 0 is what "
+            "data without any sign of the axis would give.",
+            alt="Curve of the log-likelihood against the centre",
         )
+        page.table(
+            ["row", "centre, bins", "standard error"],
+            [list(row) for row in zip(found.rows, found.centers, found.errors, strict=True)],
+            caption="The rows that were looked at",
+        )
+        return page
+
+
+def _facts(found: AxisEstimate) -> dict[str, object]:
+    low, high = found.interval
+    return {
+        "centre, bins": f"{found.center:.2f}, at the middle row",
+        "95 % interval": f"{low:.2f} to {high:.2f}",
+        "tilt, bins per row": found.tilt,
+        "spread between rows, bins": found.spread,
+        "found by": found.by,
+    }
 
 
 def _middle(image: NDArray[np.float32]) -> NDArray[np.float32]:
     """The central half of an image, where a wrong centre shows first."""
     ny, nx = (max(n // 4, 0) for n in image.shape)
     return image[ny : image.shape[0] - ny, nx : image.shape[1] - nx]
+
+
+def _grey(image: NDArray[np.float32], black: float, white: float) -> bytes:
+    """An image as an 8-bit PNG file."""
+    from PIL import Image
+
+    codes = np.rint(np.clip((image - black) / (white - black), 0, 1) * 255).astype(np.uint8)
+    buffer = BytesIO()
+    Image.fromarray(codes).save(buffer, format="PNG")
+    return buffer.getvalue()

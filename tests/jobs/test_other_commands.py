@@ -122,7 +122,9 @@ def test_center(scan, tmp_path, capsys):
     printed = capsys.readouterr().out
     assert float(printed.split()[0]) == pytest.approx(45, abs=0.3)
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 2
+    assert page.count("data:image/png;base64,") == 17 + 2
+    assert page.count("<script>") == 1
+    assert "script-src 'sha256-" in page
     assert json.loads((out / "metrics.json").read_text())["by"] == "double wedge"
 
 

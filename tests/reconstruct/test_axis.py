@@ -1,8 +1,9 @@
-"""The centre of rotation is found on phantoms, under noise and truncation, and on a real scan."""
+"""The rotation axis is found in every kind of scan, or refused in a sentence."""
 
 import h5py
 import numpy as np
 import pytest
+from axis_scenes import BINS, FULL, HALF, PARTS, grains, sinogram
 
 import rift_cl as rift
 from rift_cl.errors import InputError, NonFiniteError
@@ -74,3 +75,131 @@ def test_real_tooth(shared_data):
     y = attenuation(*frames).projections
     for row in range(y.shape[1]):
         assert find_center(y[:, row], angles).center == pytest.approx(296.0, abs=0.5)
+
+
+KINDS = {"parts": PARTS, "porous": grains(45, 80), "wider than the detector": grains(110, 1500)}
+RANDOM = np.random.default_rng(3)
+VIEWS = {
+    "half turn": HALF,
+    "its end too": np.linspace(0, np.pi, 225),
+    "backwards": -HALF,
+    "from elsewhere": HALF + 4,
+    "200 degrees": np.deg2rad(np.arange(0, 200, 0.8)),
+    "repeated": np.tile(HALF[::2], 2),
+    "views missing": np.delete(HALF, range(90, 94)),
+    "full turn": FULL,
+    "two turns": np.arange(600) * 4 * np.pi / 600,
+    "full turn at random": RANDOM.uniform(0, 2 * np.pi, 300),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("views", VIEWS)
+def test_every_kind_of_object_and_of_views(kind, views):
+    center, angles = 83.7, VIEWS[views]
+    found = rift.find_center(sinogram(KINDS[kind], angles, center), angles)
+    assert found.center == pytest.approx(center, abs=0.25 if kind.startswith("wider") else 0.15)
+    assert found.interval[1] - found.interval[0] < 0.8
+    assert abs(found.center - center) < 1.5 * (found.interval[1] - found.interval[0])
+    assert found.tilt == found.spread == 0
+
+
+@pytest.mark.parametrize("offset", [-0.15, -0.08, 0.05, 0.12])
+@pytest.mark.parametrize("angles", [HALF, FULL], ids=["half", "full"])
+def test_an_axis_off_the_middle_is_not_pulled_towards_it(offset, angles):
+    center = (BINS - 1) / 2 + offset * BINS
+    found = rift.find_center(sinogram(PARTS, angles, center), angles)
+    assert found.center == pytest.approx(center, abs=0.1)
+
+
+@pytest.mark.parametrize("span", [90, 120, 150])
+def test_limited_angles_are_told_by_the_centres_of_mass(span):
+    angles = np.deg2rad(np.arange(0, span, 0.5))
+    found = rift.find_center(sinogram(PARTS, angles, 74.2), angles)
+    assert found.by == "centre of mass"
+    assert found.center == pytest.approx(74.2, abs=0.2)
+
+
+def test_nothing_but_the_detector_changes_the_answer():
+    y = sinogram(KINDS["porous"], HALF, 83.7)
+    order = np.random.default_rng(1).permutation(HALF.size)
+    first = rift.find_center(y, HALF)
+    again = rift.find_center(y, HALF)
+    assert first.center == again.center
+    assert first.interval == again.interval
+    assert rift.find_center(y[order], HALF[order]).center == pytest.approx(first.center, abs=1e-3)
+    assert rift.find_center(1000 * y, HALF).center == pytest.approx(first.center, abs=1e-3)
+    mirrored = rift.find_center(y[:, ::-1], -HALF)
+    assert mirrored.center == pytest.approx(BINS - 1 - first.center, abs=0.03)
+
+
+def test_rows_tell_the_tilt():
+    rows = 9
+    centers = 80 + 0.4 * (np.arange(rows) - 4)
+    stack = np.stack([sinogram(PARTS, HALF, c, seed=row) for row, c in enumerate(centers)], axis=1)
+    found = rift.find_center(stack, HALF)
+    assert found.center == pytest.approx(80, abs=0.1)
+    assert found.tilt == pytest.approx(0.4, abs=0.03)
+    assert found.spread < 0.1
+    np.testing.assert_allclose(found.centers, centers[found.rows.astype(int)], atol=0.1)
+
+
+def test_rows_that_contradict_each_other_are_refused():
+    centers = [60.0, 95, 60, 95, 78]
+    stack = np.stack([sinogram(PARTS, HALF, c) for c in centers], axis=1)
+    with pytest.raises(InputError, match="contradict"):
+        rift.find_center(stack, HALF)
+
+
+@pytest.mark.parametrize("noise", [0.03, 0.05])
+def test_the_interval_holds_the_axis_and_grows_with_noise(noise):
+    quiet = rift.find_center(sinogram(PARTS, HALF, 83.7, noise=0.005), HALF)
+    wide = []
+    for seed in range(6):
+        found = rift.find_center(sinogram(PARTS, HALF, 83.7, noise=noise, seed=seed), HALF)
+        wide.append(found.interval[1] - found.interval[0])
+        assert found.interval[0] - 0.03 < 83.7 < found.interval[1] + 0.03
+    assert np.median(wide) > 1.5 * (quiet.interval[1] - quiet.interval[0])
+
+
+@pytest.mark.parametrize("angles", [HALF, FULL], ids=["half", "full"])
+def test_rings_do_not_decide(angles):
+    y = sinogram(PARTS, angles, 88.3)
+    rings = 0.02 * y.max() * np.random.default_rng(5).standard_normal(BINS)
+    found = rift.find_center((y + rings).astype(np.float32), angles)
+    assert found.center == pytest.approx(88.3, abs=0.2)
+
+
+def _noise(views):
+    return np.random.default_rng(0).standard_normal((views, 96)).astype(np.float32)
+
+
+REFUSED = {
+    "one view": (np.ones((1, 64), np.float32), np.zeros(1)),
+    "one angle": (sinogram(PARTS, np.zeros(40), 80.0), np.zeros(40)),
+    "few bins": (sinogram(PARTS, HALF, 3.0, bins=6), HALF),
+    "constant": (np.ones((224, 64), np.float32), HALF),
+    "noise, half turn": (_noise(224), HALF),
+    "noise, full turn": (_noise(300), FULL),
+    "noise, limited": (_noise(100), HALF[:100]),
+    "limited and too wide": (
+        sinogram(KINDS["wider than the detector"], HALF[:150], 80.0),
+        HALF[:150],
+    ),
+    "axis off the detector": (sinogram(KINDS["porous"], HALF, -30.0), HALF),
+    "axis at its end": (sinogram(KINDS["porous"], HALF, 6.0), HALF),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_does_not_tell_the_axis_is_refused(case):
+    y, angles = REFUSED[case]
+    with pytest.raises(InputError, match="--center"):
+        rift.find_center(y, angles)
+
+
+def test_another_shape_is_told():
+    with pytest.raises(rift.RiftError, match="angle, row, bin"):
+        rift.find_center(np.ones(5, np.float32), np.zeros(5))
+    with pytest.raises(rift.RiftError, match="sinogram"):
+        rift.find_center(np.ones((5, 64), np.float32), np.zeros(4))

@@ -102,7 +102,7 @@ def _objects(kind: Kind, bins: int, random: np.random.Generator) -> Floats:
         return _parts(bins, random)
     if kind == "porous":
         return _filled(random.uniform(0.25, 0.42) * bins, bins, random.integers(60, 200), random)
-    return _filled(random.uniform(0.6, 0.8) * bins, bins, random.integers(300, 600), random)
+    return _filled(random.uniform(0.6, 0.8) * bins, bins, random.integers(800, 1400), random)
 
 
 def _filled(radius: float, bins: int, count: int, random: np.random.Generator) -> Floats:

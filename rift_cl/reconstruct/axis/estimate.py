@@ -39,6 +39,11 @@ class AxisEstimate:
     errors: Floats
     scores: Floats
 
+    def in_words(self) -> str:
+        """Where the axis is, how surely, and what told it."""
+        low, high = self.interval
+        return f"at bin {self.center:.2f} ({low:.2f} to {high:.2f}, by {self.by})"
+
     def record(self) -> dict[str, Any]:
         """The estimate in words and numbers, as reports and configurations keep it."""
         return {

@@ -30,6 +30,8 @@ Floats = NDArray[np.float64]
 
 # The widest gap between neighbouring directions of a half turn, and what may lack of it, radians.
 _GAP, _SLACK = np.deg2rad(7.0), np.deg2rad(3.0)
+# The least that limited angles go round, in radians.
+_LIMITED = np.deg2rad(60.0)
 # Where the axis of a half turn is looked for: from this share of the detector to as far from its
 # other end. The least overlap of opposite views, as a share of the detector and in bins.
 _HALF, _OVERLAP, _OVERLAP_BINS = 0.2, 0.03, 8
@@ -44,6 +46,8 @@ _WINDOWS = 1 / 16
 _STEP, _NARROW, _REACH = 0.25, 0.1, 2.0
 # Places that are followed, and their least distance as a share of the detector.
 _FOLLOWED, _APART = 6, 0.012
+# How far to either side of a place the fine search begins, in bins of the row.
+_SIDES = 1.5
 # Most rounds in which a place is followed, the change that ends it and the longest jump, in bins.
 _ROUNDS, _SETTLED, _JUMP = 8, 0.004, 2.0
 # Changes that shrink by a factor in this range are taken to the end of their series at once.
@@ -136,11 +140,20 @@ class DoubleWedge:
         centers, scores = _everywhere(coarse, low, high)
         starts = _peaks(centers, scores, _APART * bins)
         best = _best([self._settled(coarse, start) for start in starts], bins)
-        if _binning(bins, _FINE) == coarse.bin:
+        if not cut and _binning(bins, _FINE) == coarse.bin:
             return best
-        fine = self._settled(self._row(views, _binning(bins, _FINE), cut), best.center)
+        fine = self._fine(self._row(views, _binning(bins, _FINE), cut), best.center)
         # The rival's score in proportion, since the finer search has more to tell of both.
         return fine._replace(rival=fine.score * best.rival / best.score if best.score > 0 else 0.0)
+
+    def _fine(self, row: Row, center: float) -> RowAxis:
+        """The centre near a place; where windows hold it back, as it is reached from both sides."""
+        if not row.cut:
+            return self._settled(row, center)
+        left, right = (self._settled(row, center + side * row.bin) for side in (-_SIDES, _SIDES))
+        best = max(left, right, key=lambda reached: reached.score)
+        apart = abs(left.center - right.center) / 2
+        return best._replace(error=float(np.hypot(best.error, apart)))
 
     def _row(self, views: Views, count: int, cut: bool) -> Row:
         bins = views.shape[1] // count
@@ -170,7 +183,11 @@ class CentreOfMass:
 
     def find(self, views: Views) -> RowAxis | None:
         """The axis of a row; None where the object leaves the field of view or changes."""
-        told = None if is_cut(views) else mass_center(views, self._angles)
+        circle = np.sort(np.mod(self._angles, 2 * np.pi))
+        gaps = np.diff(circle, append=circle[0] + 2 * np.pi)
+        if 2 * np.pi - gaps.max() < _LIMITED or is_cut(views):
+            return None
+        told = mass_center(views, self._angles)
         return None if told is None else RowAxis(*told, np.inf, 0.0, 1.0, None)
 
 
@@ -254,5 +271,5 @@ def _followed(row: Row, look: Look, start: float) -> RowAxis:
 def _best(settled: list[RowAxis], bins: int) -> RowAxis:
     """The likeliest of some places, and the best score of those that are not next to it."""
     best = max(settled, key=lambda place: place.score)
-    away = [p.score for p in settled if abs(p.center - best.center) > _APART * bins / 2]
+    away = [p.score for p in settled if abs(p.center - best.center) > 2 * _APART * bins]
     return best._replace(rival=max(away, default=0.0))

@@ -142,6 +142,9 @@ def pair_evidence(row: Row, pairs: Pairs, window: float, near: float) -> Evidenc
     known = np.exp(-2 * (ones.frequencies * _DOUBT) ** 2)
     least = energy - 2 * np.abs(terms)
     left = known * (energy + 2 * np.real(phase * terms)) + (1 - known) * least
-    noise = uniform_filter1d(left, _BLUR, mode="nearest") / len(one)
-    terms /= np.maximum(noise, 1e-12 * energy.max() / len(one))
-    return ones.evidence(terms, row, _FREEDOM)
+    noise = np.maximum(uniform_filter1d(left, _BLUR, mode="nearest"), 1e-12 * energy.max())
+    # How far views exceed noise, in its variance; where they do not, two noises that happen to
+    # agree tell nothing, and the best weight for two measurements of one signal falls to zero.
+    excess = np.maximum(uniform_filter1d(energy, _BLUR, mode="nearest") / noise - 1, 0)
+    weights = 2 * excess / (2 * excess + 1) * len(one) / noise
+    return ones.evidence(terms * weights, row, _FREEDOM)

@@ -18,7 +18,7 @@ from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
 from rift_cl.reconstruct.axis.estimate import AxisEstimate
 from rift_cl.reconstruct.axis.measures import RowAxis, chosen_measure
-from rift_cl.reconstruct.axis.views import Views
+from rift_cl.reconstruct.axis.views import Views, without_rings
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ _FEWEST_BINS, _FEWEST_VIEWS = 8, 4
 # Most rows that are looked at.
 _ROWS = 5
 # Half a 95 % interval in standard errors, which are themselves estimated from 16 bands.
-_HALF_INTERVAL = 2.5
+_HALF_INTERVAL = 2.3
 # The least standard error: views are sums over bins, and detectors are not perfect.
 _FINEST = 0.01
 # The widest half interval that is still an answer, in bins.
@@ -114,7 +114,10 @@ def axis_of_rows(
         views = np.ascontiguousarray(sinogram, np.float32)
         _check_searchable(views, span)
         told = measure.find(views) if np.ptp(views) > 0 else None
-        doubt = _doubt(told, span, measure.by, views)
+        doubt = _doubt(told, span, views)
+        if told is not None and doubt:
+            told = measure.find(without_rings(views))
+            doubt = doubt and _doubt(told, span, views)
         if told is None or doubt:
             why = why or doubt
         else:
@@ -138,15 +141,15 @@ def _check_searchable(views: Views, span: tuple[float, float] | None) -> None:
         )
 
 
-def _doubt(told: RowAxis | None, span: tuple[float, float] | None, by: str, views: Views) -> str:
+def _doubt(told: RowAxis | None, span: tuple[float, float] | None, views: Views) -> str:
     """Why the answer of one row cannot be trusted; empty where it can."""
     bins = views.shape[1]
     if not np.ptp(views) > 0:
         return "the sinogram has no contrast"
     if told is None:
         return (
-            "the views go round less than half a turn, and the object leaves the field of view, "
-            "changes, or air is not at zero"
+            "the views go round less than half a turn, which takes at least 60 degrees, all of the "
+            "object in every view, and air at zero"
         )
     low, high = span or (0, bins - 1)
     if not low <= told.center <= high:
@@ -197,7 +200,7 @@ def _line(places: Floats, found: list[RowAxis], middle: float, by: str) -> AxisE
         center=float(center),
         interval=(float(center - half), float(center + half)),
         tilt=float(tilt),
-        spread=float(np.sqrt(np.mean(away[kept] ** 2))),
+        spread=float(np.sqrt(np.mean(away[kept] ** 2))) if kept.sum() > 1 else 0.0,
         by=by,
         rows=places[kept],
         centers=centers[kept],

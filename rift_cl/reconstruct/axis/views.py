@@ -16,6 +16,8 @@ Place = TypeVar("Place", float, NDArray[np.float64])
 
 # Share of a window's half-width over which it falls off at its ends, and the least of that in bins.
 _TAPER, _TAPER_BINS = 0.1, 8.0
+# Bins over which the mean view is smoothed to tell rings from it.
+_RING = 9
 # Ends of the detector, as a share of its bins, where air is looked for; views over which they are
 # averaged; and the level, as a share of strong line integrals, above which they are not air.
 _END, _BLUR, _AIR = 0.01, 9, 0.04
@@ -53,6 +55,19 @@ def is_cut(views: Views) -> bool:
     ends = np.stack([views[:, :end].mean(axis=1), views[:, -end:].mean(axis=1)])
     level = np.percentile(np.abs(uniform_filter1d(ends, _BLUR, axis=1)), _MOST, axis=1)
     return bool(level.max() > _AIR * np.percentile(np.abs(views), _STRONG))
+
+
+def without_rings(views: Views) -> Views:
+    """Views less what stays at its bin in all of them and is narrow: the mean view's fine detail.
+
+    Good enough for a search that rings confuse, not for a slice: what the object has in common
+    over all directions goes as well.
+    """
+    from scipy.ndimage import median_filter
+
+    mean = views.mean(axis=0)
+    rings: Views = mean - median_filter(mean, _RING, mode="nearest")
+    return views - rings
 
 
 def binned(views: Views, count: int) -> Views:

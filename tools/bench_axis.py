@@ -1,0 +1,167 @@
+"""How well the rotation axis is found: sixty sinograms with a known axis, and the time it takes.
+
+    python tools/bench_axis.py
+    python tools/bench_axis.py --peers --sizes 256 --cases 24
+
+The sinograms are sums of ellipses projected by their formula (``bench/axis_cases.py``), with 256,
+512 and 1024 bins, the axis up to 15 % of the detector off its middle, three kinds of object, noise
+of 1 and 5 % of the greatest line integral, and half and full turns. The seed of the sixty that are
+reported is not one that thresholds or intervals were set with. `--peers` runs algotom's
+find_center_vo (half turns) and find_center_360 (full turns) on the same sinograms where it is
+installed.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import tyro
+
+import rift_cl as rift
+from bench.axis_cases import KINDS, AxisCase
+from rift_cl.errors import InputError
+
+# Seed of the cases that are reported.
+_SEED = 20261122
+# Errors that count as right and as wrong, in bins.
+_RIGHT, _WRONG = 0.1, 0.5
+_NOISES, _TURNS, _OFFSET = (0.01, 0.05), (180, 360), 0.15
+# Views, bins and rows of the scan that is timed.
+_TIMED = (1500, 1024, 5)
+
+
+@dataclass(frozen=True)
+class Options:
+    """Measure the search for the rotation axis."""
+
+    cases: int = 60
+    """Number of sinograms."""
+    sizes: tuple[int, ...] = (256, 512, 1024)
+    """Bins of the detector."""
+    seed: int = _SEED
+    """Seed of objects, offsets and noise."""
+    peers: bool = False
+    """Run algotom on the same sinograms; minutes for 1024 bins."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one search said of one case: its error and interval in bins, None where it refused."""
+
+    error: float | None
+    half: float = np.nan
+    seconds: float = 0.0
+
+    def __str__(self) -> str:
+        """The error, or that there was no answer."""
+        return "refused" if self.error is None else f"{self.error:+.3f}"
+
+
+def drawn(options: Options) -> list[AxisCase]:
+    """The cases: every combination of size, kind, noise and turn in turn, at random offsets."""
+    random = np.random.default_rng(options.seed)
+    grid = itertools.cycle(itertools.product(options.sizes, KINDS, _NOISES, _TURNS))
+    return [
+        AxisCase(
+            bins, float(random.uniform(-_OFFSET, _OFFSET)), kind, noise, turn,
+            int(random.integers(1 << 30)),
+        )
+        for bins, kind, noise, turn in itertools.islice(grid, options.cases)
+    ]  # fmt: skip
+
+
+def ours(case: AxisCase, sinogram: Any) -> Outcome:
+    """The search of this package."""
+    begun = time.process_time()
+    try:
+        found = rift.find_center(sinogram, case.angles)
+    except InputError:
+        return Outcome(None, seconds=time.process_time() - begun)
+    half = (found.interval[1] - found.interval[0]) / 2
+    return Outcome(found.center - case.center, half, time.process_time() - begun)
+
+
+def algotom() -> Callable[[AxisCase, Any], Outcome] | None:
+    """The searches of algotom, or None where it is not installed."""
+    try:
+        from algotom.prep.calculation import find_center_360, find_center_vo
+    except ImportError:
+        return None
+
+    def search(case: AxisCase, sinogram: Any) -> Outcome:
+        begun = time.process_time()
+        if case.turn == 180:
+            low, high = int(0.3 * case.bins), int(0.7 * case.bins)
+            center = float(find_center_vo(sinogram, start=low, stop=high))
+        else:
+            # It wants the side of the overlap, and the views of the turn with both its ends.
+            whole = np.concatenate([sinogram, sinogram[:1]])
+            center = float(find_center_360(whole, case.bins // 2)[0])
+        return Outcome(center - case.center, seconds=time.process_time() - begun)
+
+    return search
+
+
+def summary(name: str, outcomes: list[Outcome]) -> str:
+    """One line on all outcomes of one search."""
+    told = [outcome for outcome in outcomes if outcome.error is not None]
+    errors = np.abs([outcome.error for outcome in told])
+    halves = np.array([outcome.half for outcome in told])
+    line = (
+        f"{name}: {len(outcomes)} cases, {np.count_nonzero(errors <= _RIGHT)} within {_RIGHT} bin, "
+        f"{np.count_nonzero(errors > _WRONG)} answered and off by more than {_WRONG}, "
+        f"{len(outcomes) - len(told)} refused, median error {np.median(errors):.3f}, "
+        f"greatest {errors.max():.3f}, "
+        f"{sum(outcome.seconds for outcome in outcomes) / len(outcomes):.2f} s each"
+    )
+    if np.isfinite(halves).all():
+        line += (
+            f"; interval: median width {np.median(2 * halves):.3f} bin, "
+            f"covers the truth in {np.mean(errors <= halves):.0%}"
+        )
+    return line
+
+
+def timed() -> str:
+    """The processor time of a search over several rows of a large scan."""
+    views, bins, rows = _TIMED
+    case = AxisCase(bins, 0.03, "porous", 0.01, 180, _SEED)
+    angles = np.arange(views) * np.pi / views
+    stack = np.repeat(case.sinogram(angles)[:, None], rows, axis=1)
+    begun = time.process_time()
+    found = rift.find_center(stack, angles)
+    spent = time.process_time() - begun
+    return (
+        f"{views} views x {rows} rows x {bins} bins: {spent:.2f} s of processor time, "
+        f"error {found.center - case.center:+.3f}"
+    )
+
+
+def main(options: Options) -> None:
+    """Print a line for each case and the summaries."""
+    peer = algotom() if options.peers else None
+    mine, theirs = [], []
+    for case in drawn(options):
+        sinogram = case.sinogram()
+        mine.append(ours(case, sinogram))
+        line = (
+            f"{case.bins:5d} {case.turn:4d} {case.kind:8s} noise {case.noise:.0%} "
+            f"offset {case.offset:+.1%}: {mine[-1]!s:>8} +- {mine[-1].half:.3f}"
+        )
+        if peer is not None:
+            theirs.append(peer(case, sinogram))
+            line += f"   algotom {theirs[-1]}"
+        print(line, flush=True)
+    print(summary("rift_cl", mine))
+    if theirs:
+        print(summary("algotom", theirs))
+    print(timed())
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Options))
