@@ -30,7 +30,9 @@ Floats = NDArray[np.float64]
 # An edge is looked for where the line integral first exceeds this share of the largest ones, and
 # read from so many bins after that; outside it as many of air are wanted.
 _FOOT, _BINS = 0.15, 5
-# Edges further than this share of the radius from the fitted disc are not its own.
+# How well the edges place the disc along the rays beside across them, at least.
+_PLACED = 0.01
+# Edges further than this share of the radius, and than a bin, from the fitted disc are not its own.
 _ROUND = 0.02
 # The share of edges, and of rays through the rim, that must agree on one disc of one material.
 _AGREE = 0.7
@@ -126,6 +128,12 @@ def _fitted(edges: list[tuple[float, int, Floats, Floats]]) -> Disc:
 
     angles, sides = (np.array([edge[k] for edge in edges]) for k in (0, 1))
     design = np.stack([np.cos(angles), np.sin(angles), -sides], axis=1)
+    strengths = np.linalg.svd(design, compute_uv=False)
+    if strengths[-1] < _PLACED * strengths[0]:
+        raise InputError(
+            "the views in which edges are seen differ too little in direction to say how far along "
+            "the rays the disc lies: two degrees between them are wanted, better twenty"
+        )
     places = np.array([_zero(t, square) for _, _, t, square in edges])
     for _ in range(3):
         least = np.linalg.lstsq(design, places, rcond=None)[0]
@@ -142,11 +150,11 @@ def _fitted(edges: list[tuple[float, int, Floats, Floats]]) -> Disc:
         found = np.array([_zero(t, square) for _, _, t, square in edges])
         places = found - sides * np.array(bent)
     misses = np.abs(design @ fit.x - places)
-    round_ = misses < _ROUND * radius
+    round_ = misses < max(_ROUND * radius, pitch)
     if not (radius > 0 and round_.mean() >= _AGREE):
         raise InputError(
             f"the edges of the views are not those of a disc: {1 - round_.mean():.0%} of them are "
-            f"further than {_ROUND:.0%} of the radius from the nearest one, of radius {radius:.3g}"
+            f"not those of the nearest one, of radius {radius:.3g}"
         )
     misfit = float(np.sqrt(np.mean(misses[round_] ** 2)))
     return Disc(float(fit.x[0]), float(fit.x[1]), radius, misfit)
@@ -210,7 +218,10 @@ def material_lengths(
     chosen = measured & (distances > inner) & (distances < outer)
     p, length = values[chosen], disc.chords(scan)[chosen]
     if p.size < 4 or not p.max(initial=0.0) > 0:
-        raise InputError("no ray passes through the disc's rim: its lengths cannot be calibrated")
+        raise InputError(
+            f"no ray passes through the disc's rim, {rim:.2g} of the radius less two bins: give a "
+            "larger rim if the disc is solid there"
+        )
     design = np.stack([p, p * p], axis=1)
     kept = np.ones(p.size, bool)
     for _ in range(6):

@@ -100,6 +100,13 @@ def test_what_is_no_disc_is_refused():
         find_disc(wide, scan, seen=np.zeros(wide.shape, bool))
 
 
+@pytest.mark.parametrize("angles", [[0.3], [0.3, 0.3], [0.3, 0.3, 0.3 + np.pi], [0.3, 0.31]])
+def test_views_of_one_direction_do_not_place_a_disc(angles):
+    scan = Parallel(angles, 200)
+    with pytest.raises(InputError, match=r"edges with air beside|differ too little"):
+        find_disc(0.02 * Disc(4.0, 3.0, 60.0).chords(scan), scan)
+
+
 def test_a_rim_that_is_not_solid_is_refused():
     disc, scan = Disc(0.0, 0.0, 80.0), scan_of(180)
     exact = disc.chords(scan)
