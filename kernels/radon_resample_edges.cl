@@ -4,7 +4,7 @@
  * reads its mean over the pixel's shadow: the bin below the shadow, and of each step that the
  * shadow meets the share that lies beyond it,
  *
- *     table[slice][view][r][k] = scale * (M y[b0 - 1] + sum over edges b of (y[b] - y[b-1]) share(x_b)),
+ *     table[slice][view][r][k] = scale * (M y[b0-1] + sum over b of (y[b] - y[b-1]) share(x_b)),
  *     x_b = origin + step * (k + r / PHASES) - (b - 1/2),
  *
  * b0 being the first edge in reach of the column. A shadow meets one edge fewer than bins, and a

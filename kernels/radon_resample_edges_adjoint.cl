@@ -1,6 +1,7 @@
 /* Phase tables to sinogram with the strip footprint: the transpose of radon_resample_edges.
  *
- *     y[view][slice][b] = scale * sum over k, r of (share(x_b) - share(x_{b+1})) table[slice][view][k][r],
+ *     y[view][slice][b] =
+ *         scale * sum over k, r of (share(x_b) - share(x_{b+1})) table[slice][view][k][r],
  *     x_b = origin + step * (k + r / PHASES) - (b - 1/2).
  *
  * Entries follow each other up the detector, LANES at a time: the phases of a column lie together in

@@ -6,13 +6,14 @@
  * STRIP 0, a hat: 1 - |d| / h; s2 = 1 / h. It is linear interpolation between bins where h is 1,
  * and between pixels (Joseph 1982) where h is the pixel's step over the detector.
  *
- * STRIP 1, the area that a pixel and a bin's strip share, for shadows that cover many bins (shadow.h
- * has others for less). A square's shadow is a trapezoid, two boxes convolved; the bin is a third
- * one. Let S <= M <= L be the three widths and c the integral of the trapezoid of S and M, from 0 to
- * M; then c(d + L/2) - c(d - L/2) is the share times L M. With the longest taken out the difference
- * is of the order of M, and has its rounding. Both integrals are taken from their ends: the trapezoid's outer half-width is s3 = (S + M) / 2, its ramps are
- * s4 = S wide, s5 = 1 / (2 S), or any number where S is zero, s2 = L/2 and s7 = M. Of the first,
- * what is missing from M is never more than half of a ramp, s6 = (S + M - L) / 2 long or none. */
+ * STRIP 1, the area that a pixel and a bin's strip share, for shadows that cover many bins
+ * (shadow.h has others for less). A square's shadow is a trapezoid, two boxes convolved; the bin is
+ * a third one. Let S <= M <= L be the three widths and c the integral of the trapezoid of S and M,
+ * from 0 to M; then c(d + L/2) - c(d - L/2) is the share times L M. With the longest taken out the
+ * difference is of the order of M, and has its rounding. Both integrals are taken from their ends:
+ * the trapezoid's outer half-width is s3 = (S + M) / 2, its ramps are s4 = S wide, s5 = 1 / (2 S),
+ * or any number where S is zero, s2 = L/2 and s7 = M. Of the first, what is missing from M is never
+ * more than half of a ramp, s6 = (S + M - L) / 2 long or none. */
 
 #ifndef STRIP
 #define STRIP 0

@@ -57,7 +57,8 @@ class ParallelProjector(LinearOperator):
 
     def _description(self) -> str:
         samples = " x ".join(map(str, self.grid.shape))
-        spacing = ", ".join(f"{length:g}" for length in sorted(set(self.grid.spacing)))
+        lengths = self.grid.spacing if len(set(self.grid.spacing)) > 1 else self.grid.spacing[:1]
+        spacing = " x ".join(f"{length:g}" for length in lengths)
         return (
             f"{samples} samples {spacing} apart, {len(self.scan.angles)} views of "
             f"{self.scan.bins} bins {self.scan.pitch:g} apart"

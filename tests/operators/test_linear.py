@@ -181,6 +181,8 @@ def test_operators_say_what_they_are(A, F, device):
     place = f"float32, device {device.selector}>"
     samples = "12 x 15 samples 1 apart, 8 views of 21 bins 1 apart"
     assert repr(A) == f"<Projector: {samples}, footprint strip, {place}"
+    stack = rift.Projector(rift.Grid((2, 12, 15), (3, 1, 0.5)), SCAN, device=device)
+    assert "2 x 12 x 15 samples 3 x 1 x 0.5 apart" in repr(stack)
     assert repr(A.T) == f"{A!r}.T"
     assert repr(F) == f"<ViewFilter: {F.domain} -> {F.range}, {place}"
     assert repr(2 * A) == f"<Scaled: {A.domain} -> {A.range}, {place}"
