@@ -9,6 +9,7 @@ is compared with the best of the others.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple, Protocol
 
@@ -40,12 +41,12 @@ _PAIRS, _PAIR_SHARE = 24, 0.1
 # Bins that the coarse and the fine search work with, about, and views for each of them.
 _COARSE, _FINE, _VIEWS = 256, 512, 1.4
 # Distance of windows about trial centres, as a share of the detector.
-_WINDOWS = 1 / 16
+_WINDOWS = 1 / 32
 # Step of trial centres all over the detector and next to the best, and how far the latter go, in
 # bins of the row.
 _STEP, _NARROW, _REACH = 0.25, 0.1, 2.0
 # Places that are followed, and their least distance as a share of the detector.
-_FOLLOWED, _APART = 6, 0.012
+_FOLLOWED, _APART = 8, 0.012
 # How far to either side of a place the fine search begins, in bins of the row.
 _SIDES = 1.5
 # Most rounds in which a place is followed, the change that ends it and the longest jump, in bins.
@@ -147,13 +148,18 @@ class DoubleWedge:
         return fine._replace(rival=fine.score * best.rival / best.score if best.score > 0 else 0.0)
 
     def _fine(self, row: Row, center: float) -> RowAxis:
-        """The centre near a place; where windows hold it back, as it is reached from both sides."""
+        """The centre near a place.
+
+        Where windows hold it back it is reached from both sides, and once with views whose mean is
+        kept; by how much these differ is part of the error.
+        """
         if not row.cut:
             return self._settled(row, center)
         left, right = (self._settled(row, center + side * row.bin) for side in (-_SIDES, _SIDES))
         best = max(left, right, key=lambda reached: reached.score)
-        apart = abs(left.center - right.center) / 2
-        return best._replace(error=float(np.hypot(best.error, apart)))
+        other = self._settled(replace(row, level=False), best.center)
+        apart = np.array([left.center, right.center, other.center]) - best.center
+        return best._replace(error=float(np.hypot(best.error, np.abs(apart).max() / 2)))
 
     def _row(self, views: Views, count: int, cut: bool) -> Row:
         bins = views.shape[1] // count

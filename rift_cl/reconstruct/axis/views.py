@@ -32,11 +32,13 @@ class Row:
         views: (angle, bin).
         bin: how many of the detector's bins one of them holds.
         cut: whether the object reaches beyond the detector, or air is not at zero.
+        level: whether the mean of a view in a window is subtracted where it is cut.
     """
 
     views: Views
     bin: int
     cut: bool
+    level: bool = True
 
     def detector(self, place: Place) -> Place:
         """A place in these bins, in bins of the detector."""
@@ -171,7 +173,9 @@ def spectra(row: Row, center: float) -> Spectra:
     window = np.sin(np.pi / 2 * np.clip((1 - away) / taper, 0, 1)) ** 2
     window = window.astype(np.float32)
     part = row.views[:, first:end]
-    part = (part - (part @ window / window.sum())[:, None]) * window
+    if row.level:
+        part = part - (part @ window / window.sum())[:, None]
+    part = part * window
     length = next_fast_len(end - first, real=True)
     return _transformed(part, length, first)
 
