@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import re
 from html.parser import HTMLParser
 
@@ -161,3 +162,26 @@ def test_useless_arguments_are_named():
     with pytest.raises(InputError, match="alt"):
         page.figure(PNG, caption="", alt=" ")
     assert page.html() == Page("t").html()
+
+
+def test_a_slider_is_hidden_until_its_script_runs():
+    page = Page("Title")
+    png = b"\x89PNG\r\n\x1a\n"
+    page.slider([png, png, png], labels=["1 <", "2", "3"], start=1, caption="c", alt="slice")
+    text = page.html()
+    assert '<figure class="slider" hidden>' in text
+    assert text.count(" hidden>") == 3
+    assert "slice: 1 &lt;" in text
+    script = re.search(r"<script>(.*?)</script>", text, re.DOTALL).group(1)
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in text
+    assert "script" not in Page("Title").html()
+
+
+@pytest.mark.parametrize(
+    "labels, start, alt", [(["1"], 0, "a"), (["1", "2"], 2, "a"), (["1", "2"], 0, " ")]
+)
+def test_a_slider_without_labels_or_text_is_told(labels, start, alt):
+    png = b"\x89PNG\r\n\x1a\n"
+    with pytest.raises(InputError, match="slider"):
+        Page("Title").slider([png, png], labels=labels, start=start, caption="c", alt=alt)

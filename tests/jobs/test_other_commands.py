@@ -6,6 +6,7 @@ import shlex
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 import rift_cl as rift
@@ -159,3 +160,22 @@ def test_help_has_an_example(command, capsys):
         main([command, "--help"])
     assert exit.value.code == 0
     assert "Example:" in capsys.readouterr().out
+
+
+def test_every_way_to_ask_gives_the_same_axis(scan, tmp_path, capsys):
+    from rift_cl.io.scans.formats import open_scan
+    from rift_cl.jobs.analyze_input import open_sampled
+    from rift_cl.jobs.analyze_settings import AnalyzeSettings
+    from rift_cl.jobs.axis_search import find_axis
+
+    with np.load(scan.integrals) as file:
+        python = rift.find_center(file["projections"], file["angles"]).center
+    assert main(["center", str(scan.integrals), "--out", str(tmp_path / "c")]) == 0
+    assert json.loads((tmp_path / "c/metrics.json").read_text())["center"] == python
+    options = ["--rows", "0", "1", "--out", str(tmp_path / "r")]
+    assert main(["reconstruct", str(scan.integrals), *options]) == 0
+    assert json.loads((tmp_path / "r/metrics.json").read_text())["center"] == python
+    assert find_axis(open_scan(scan.integrals)).center == python
+    analysed = open_sampled(AnalyzeSettings(source=scan.integrals))
+    assert analysed.scan.center == python
+    assert any(f"at bin {python:.2f}" in note for note in analysed.notes)
