@@ -23,6 +23,7 @@ INK, SOFT, LINE = "#1c1d1f", "#63666b", "#c9ccd0"
 # Okabe and Ito's palette, told apart by colour-blind readers; its yellow is too pale for lines.
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", INK)
 POINTS = 8.5
+_COMPRESSION = 3
 
 Reals = NDArray[np.float64]
 
@@ -61,5 +62,9 @@ def add_panel(figure: Figure, left: float, top: float, wide: float, high: float)
 def figure_png(figure: Figure) -> bytes:
     """The figure as the content of a PNG file, the same bytes for the same figure."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=figure.dpi, metadata={"Software": None})
+    # As small as by the usual 6 for images of samples, in two thirds of the time.
+    options = {"compress_level": _COMPRESSION}
+    figure.savefig(
+        buffer, format="png", dpi=figure.dpi, metadata={"Software": None}, pil_kwargs=options
+    )
     return buffer.getvalue()

@@ -125,7 +125,8 @@ def test_binning_of_an_odd_detector_says_what_it_leaves_out(tmp_path):
         (("--binning", 13), "12 rows"),
         (("--binning", 0), "--binning is 0"),
         (("--binning", 4, "--rows", 1, 2), "fewer rows"),
-        (("--tilt", 30), "5 degrees"),
+        (("--tilt", 30), "wanted 5 at most"),
+        (("--tilt", "nan"), "wanted 5 at most"),
         (("--method", "sirt", "--subsets", 3, "--precondition", "ramp"), "give one of them"),
         (("--subsets", 3), "means nothing"),
     ],
@@ -214,3 +215,10 @@ def test_zingers_are_removed_and_counted_in_slabs_of_any_size(tmp_path, monkeypa
     metrics = json.loads((tmp_path / "mended/metrics.json").read_text())
     assert metrics["zingers"] == len(set(zip(*hits, strict=True)))
     assert "Zingers" in notes(tmp_path / "mended")
+
+
+def test_a_scan_of_one_row_is_binned_along_its_bins(tmp_path):
+    path = write_counts(tmp_path / "scan.h5", line_integrals(rows=1))
+    volume = reconstruct(path, tmp_path / "out", "--center", 39.5, "--binning", 2)
+    assert volume.shape == (1, 40, 40)
+    assert "Blocks of 1 x 2" in notes(tmp_path / "out")

@@ -5,13 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.io.scans.scan_file import RowSource, ScanFile, ScanRows
+from rift_cl.io.scans.scan_file import Part, RowSource, ScanFile, ScanRows
 from rift_cl.reconstruct.preprocess import binned, binned_center
 
 Floats = NDArray[np.float32]
@@ -22,34 +21,37 @@ class BinnedRows:
     """Rows of a coarser detector.
 
     Args:
-        rows: of the detector as it is.
-        binning: rows and bins to a block.
+        fine: reads the rows of the detector as it is.
+        rows: rows to a block.
+        bins: bins to a block.
     """
 
-    rows: RowSource
-    binning: int
+    fine: RowSource
+    rows: int
+    bins: int
 
     def read(self, start: int, stop: int) -> ScanRows:
         """Read rows of blocks; flats and darks are averaged as the projections are."""
-        fine = self.rows.read(start * self.binning, stop * self.binning)
-        return ScanRows(*(self._binned(getattr(fine, field.name)) for field in _PARTS))
+        read = self.fine.read(start * self.rows, stop * self.rows)
+        parts = (read.projections, read.flats, read.darks)
+        return ScanRows(*(None if part is None else self._binned(part) for part in parts))  # type: ignore[arg-type]
 
-    def look(self, part: Any, frames: Sequence[int], rows: Sequence[int]) -> Floats:
+    def look(self, part: Part, frames: Sequence[int], rows: Sequence[int]) -> Floats:
         """Some rows of some frames."""
-        fine = [row * self.binning + k for row in rows for k in range(self.binning)]
-        return binned(self.rows.look(part, frames, fine), rows=self.binning, bins=self.binning)
+        fine = [row * self.rows + k for row in rows for k in range(self.rows)]
+        return self._binned(self.fine.look(part, frames, fine))
 
-    def _binned(self, frames: Floats | None) -> Any:
-        if frames is None:
-            return None
-        return binned(frames, rows=self.binning, bins=self.binning)
+    def _binned(self, frames: Floats) -> Floats:
+        return binned(frames, rows=self.rows, bins=self.bins)
 
 
-_PARTS = dataclasses.fields(ScanRows)
+def row_binning(scan: ScanFile, binning: int) -> int:
+    """Rows to a block: as many as bins, but one where the detector has but one."""
+    return 1 if scan.shape[1] == 1 else binning
 
 
 def binned_file(scan: ScanFile, binning: int) -> ScanFile:
-    """A scan of which so many rows and bins are averaged to one.
+    """A scan of which blocks of detector pixels are averaged to one; see ``row_binning``.
 
     Raises:
         InputError: the detector has fewer rows or bins.
@@ -57,7 +59,8 @@ def binned_file(scan: ScanFile, binning: int) -> ScanFile:
     if binning == 1:
         return scan
     views, rows, bins = scan.shape
-    if binning > min(rows, bins):
+    block = row_binning(scan, binning)
+    if block > rows or binning > bins:
         raise InputError(
             f"--binning is {binning}, the detector of {scan.path} has {rows} rows and {bins} bins"
         )
@@ -67,9 +70,9 @@ def binned_file(scan: ScanFile, binning: int) -> ScanFile:
         fan = dataclasses.replace(fan, pitch=fan.pitch * binning, center=center)
     return dataclasses.replace(
         scan,
-        shape=(views, rows // binning, bins // binning),
+        shape=(views, rows // block, bins // binning),
         pitch=None if scan.pitch is None else scan.pitch * binning,
-        rows=BinnedRows(scan.rows, binning),
+        rows=BinnedRows(scan.rows, block, binning),
         fan=fan,
         background=-(-scan.background // binning),
     )

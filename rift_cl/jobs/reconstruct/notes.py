@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.jobs.reconstruct.binned_file import row_binning
 from rift_cl.reconstruct.preprocess import binning_note
 
 if TYPE_CHECKING:
@@ -70,9 +71,12 @@ def _axis(source: SliceInput, *, truncated: bool) -> list[str]:
 
 def _binning(source: SliceInput) -> str:
     n, (_, rows, bins) = source.settings.binning, source.file.shape
-    lost = binning_note(rows, bins, rows=n, bins=n)
+    block = row_binning(source.file, n)
+    lost = binning_note(rows, bins, rows=block, bins=n)
     of = " of line integrals" if source.file.kind == "attenuation" else ""
-    return f"Blocks of {n} x {n} detector pixels were averaged{of}. {lost}".rstrip()
+    return (
+        f"Blocks of {block} x {n} (rows x bins) detector pixels were averaged{of}. {lost}".rstrip()
+    )
 
 
 def _stitched(source: SliceInput) -> str:

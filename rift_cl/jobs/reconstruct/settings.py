@@ -32,6 +32,8 @@ _ONLY = {
 _STEPS = {"sirt": 100, "cgls": 30, "tv": 200}
 # With frequencies weighed, CGLS is near its best after the first few.
 _PRECONDITIONED_CGLS = 4
+# A detector that leans by more is no misalignment, in degrees.
+_MOST_TILT = 5.0
 # Passes over all subsets, however many there are.
 _FEWEST_PASSES = 5
 # What may differ between a run and the one that goes on with it: it changes no bit of the result.
@@ -197,6 +199,8 @@ class ReconstructSettings(ScanInput):
                 "Fourier transform: leave one of them out"
             )
         self._check_samples()
+        if self.tilt is not None and not abs(self.tilt) <= _MOST_TILT:
+            raise InputError(f"--tilt is {self.tilt:g} degrees, wanted {_MOST_TILT:g} at most")
         if self.subsets not in (None, 1) and self.precondition is not None:
             raise InputError("--subsets and --precondition both save steps: give one of them")
         if self.resume and self.overwrite:

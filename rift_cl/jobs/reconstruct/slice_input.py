@@ -18,7 +18,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Parallel
 from rift_cl.geometry.length_units import length_unit
 from rift_cl.jobs.axis_search import find_axis
-from rift_cl.jobs.reconstruct.binned_file import binned_file
+from rift_cl.jobs.reconstruct.binned_file import binned_file, row_binning
 from rift_cl.jobs.reconstruct.clean_rows import Alignment, CleanRows
 from rift_cl.jobs.reconstruct.notes import notes_of
 from rift_cl.jobs.reconstruct.settings import ReconstructSettings
@@ -192,9 +192,8 @@ class SliceInput:
 
     def _binned_rows(self) -> tuple[int, int]:
         """The rows that are asked for, of the scan as it is worked on."""
-        first, stop = (
-            row // self.settings.binning for row in chosen_rows(self.settings.rows, self.file)
-        )
+        block = row_binning(self.file, self.settings.binning)
+        first, stop = (row // block for row in chosen_rows(self.settings.rows, self.file))
         if first == stop:
             raise InputError(
                 f"--rows has fewer rows than --binning {self.settings.binning} makes one of"
@@ -206,7 +205,8 @@ class SliceInput:
         tilt = math.radians(self.settings.tilt or 0.0)
         if not tilt or self.fan is not None:
             return None
-        pivot = binned_center((self.file.shape[1] - 1) / 2, self.settings.binning)
+        block = row_binning(self.file, self.settings.binning)
+        pivot = binned_center((self.file.shape[1] - 1) / 2, block)
         return Alignment(self.geometry.center, pivot, tilt)
 
     def _sees_farther(self) -> bool:
