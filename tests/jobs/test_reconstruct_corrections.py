@@ -222,3 +222,23 @@ def test_a_scan_of_one_row_is_binned_along_its_bins(tmp_path):
     volume = reconstruct(path, tmp_path / "out", "--center", 39.5, "--binning", 2)
     assert volume.shape == (1, 40, 40)
     assert "Blocks of 1 x 2" in notes(tmp_path / "out")
+
+
+def test_a_tilt_is_found_with_the_axis_and_turned(tmp_path):
+    slope, rows = 0.05, 24
+    grid, parts = rift.Grid((64, 64)), rift.phantom.SHEPP_LOGAN
+    head = [part.placed(30, (0, 2, -3)) for part in parts]
+    stack = [
+        rift.phantom.project(head, grid, rift.Parallel(ANGLES, BINS, center=40.2 + slope * n))
+        for n in np.arange(rows) - (rows - 1) / 2
+    ]
+    path = write_counts(tmp_path / "scan.h5", 0.02 * np.stack(stack, axis=1))
+    reconstruct(path, tmp_path / "out", "--rings", "off")
+    settings = json.loads((tmp_path / "out/config.json").read_text())["settings"]
+    assert settings["center"] == pytest.approx(40.2, abs=0.1)
+    assert settings["tilt"] == pytest.approx(np.rad2deg(np.arctan(slope)), rel=0.1)
+    assert "the tilt of the axis" in notes(tmp_path / "out")
+    again = tmp_path / "again"
+    assert run("reconstruct", "--config", tmp_path / "out/config.json", "--out", again) == 0
+    first, second = (read_volume(out / "volume.h5") for out in (tmp_path / "out", again))
+    np.testing.assert_array_equal(first, second)

@@ -38,6 +38,7 @@ def decided_settings(
         "rings": source.clean.rings or "off",
         "pad": "on" if source.pad else "off",
         "center": source.axis["center"],
+        "tilt": source.tilt,
         "rows": settings.rows or (0, file.shape[1]),
         "pitch": source.detector_pitch,
         "unit": source.unit,

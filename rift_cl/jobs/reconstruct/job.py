@@ -44,6 +44,8 @@ from rift_cl.reconstruct import Attenuation
 # Slices from which a run by a formula is worth a look before it goes on.
 _PREVIEW_FROM = 8
 
+# What decides the slices and is found on the way.
+_FOUND = ("axis", "tilt of the axis", "volume")
 Floats = NDArray[np.float32]
 
 
@@ -153,8 +155,9 @@ class Reconstruction:
             CheckpointError: what there is to go on with belongs to another run.
         """
         going_on = self.settings.resume and self._kept.begun
-        if going_on and self.settings.center is None:
-            self.source.center = self._kept.center()
+        axis = self._kept.axis() if going_on and self.settings.center is None else None
+        if axis is not None:
+            self.source.center, self.source.tilt = axis
         self.source.locate()
         if going_on and not self.settings.preview:
             self._kept.go_on(self._facts())
@@ -177,7 +180,7 @@ class Reconstruction:
         before = finished_run(self.settings) if self.settings.resume else None
         if before is None or self._kept.begun:
             return False
-        now = {**self._facts(), **{name: before.get(name) for name in ("axis", "volume")}}
+        now = {**self._facts(), **{name: before.get(name) for name in _FOUND}}
         demand_same(self.settings.out, "the finished run", before, now)
         return True
 

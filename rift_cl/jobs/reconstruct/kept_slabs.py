@@ -57,10 +57,11 @@ class SlabFolder:
         check_space(self.path / _RUN, 2 * 4 * int(np.prod(self.shape)))
         write_json(self.path / _RUN, dict(run))
 
-    def center(self) -> float | None:
-        """The rotation axis of the run that was cut off, if it was found or given."""
+    def axis(self) -> tuple[float, float] | None:
+        """Bin and tilt of the rotation axis of the run that was cut off, if it had one."""
+        recorded = self._recorded()
         try:
-            return float(self._recorded()["axis"])
+            return float(recorded["axis"]), float(recorded["tilt of the axis"])
         except (KeyError, TypeError, ValueError):
             return None
 

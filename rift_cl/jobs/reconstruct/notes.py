@@ -17,14 +17,13 @@ if TYPE_CHECKING:
 _GAP_STEPS, _GAP = 2.0, np.deg2rad(5)
 
 
-def notes_of(source: SliceInput, *, truncated: bool) -> list[str]:
+def notes_of(source: SliceInput) -> list[str]:
     """All that is to be said of a scan whose axis is known.
 
     Args:
         source: the scan; located.
-        truncated: whether projections end above zero.
     """
-    notes = _axis(source, truncated=truncated)
+    notes = _axis(source)
     if source.fan is not None:
         angles = source.geometry.angles
         notes.append(
@@ -48,7 +47,7 @@ def notes_of(source: SliceInput, *, truncated: bool) -> list[str]:
     return notes
 
 
-def _axis(source: SliceInput, *, truncated: bool) -> list[str]:
+def _axis(source: SliceInput) -> list[str]:
     """Where the axis is, unless a person said it."""
     if source.settings.center is not None:
         return []
@@ -60,13 +59,9 @@ def _axis(source: SliceInput, *, truncated: bool) -> list[str]:
         return [
             f"The axis was taken {where}, bin {center:.2f}; give it with --center if it is not."
         ]
-    notes = [f"The rotation axis was found at bin {source.center:.2f}."]
-    if truncated and not source.offset:
-        notes.append(
-            "The object is wider than the detector, so that the axis found may be off by some "
-            "bins: check it with 'rift center', or give --center."
-        )
-    return notes
+    if source.estimate is None:
+        return [f"The rotation axis was found before, at bin {source.center:.2f}."]
+    return [f"The rotation axis was found {source.estimate.in_words()}."]
 
 
 def _binning(source: SliceInput) -> str:

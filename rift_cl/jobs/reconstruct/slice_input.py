@@ -39,6 +39,9 @@ from rift_cl.reconstruct.padding import extended, is_truncated
 from rift_cl.reconstruct.preprocess import binned_center, stitched
 
 Floats = NDArray[np.float32]
+# A tilt is turned where it is so many times its standard error, and moves the axis by so many bins
+# between the middle row and the first.
+_SURE_TILT, _TILT_MATTERS = 4.0, 0.25
 # The detector is continued by this share of its width on each side.
 _PAD_SHARE = 2
 
@@ -75,6 +78,8 @@ class SliceInput:
         self._pitch = pitch * binning
         # Bin of the rotation axis on the detector as the file has it, at its middle row.
         self.center = settings.center
+        # Degrees by which the axis leans, and by which projections are turned.
+        self.tilt = settings.tilt or 0.0
         # What the search for the axis found, where there was one.
         self.estimate: AxisEstimate | None = None
         # The axis as the configuration records it: the bin, and how it was found.
@@ -136,6 +141,8 @@ class SliceInput:
         if not self.settled:
             self.estimate = find_axis(self.file, self.device)
             self.center = self.estimate.center
+            if self.settings.tilt is None:
+                self.tilt = _tilt_worth_turning(self.estimate, self.file.shape[1])
         self.geometry = self._parallel()
         self.axis = self._axis_record()
         self.clean.alignment = self._alignment()
@@ -143,15 +150,15 @@ class SliceInput:
         if self.offset and self.settings.half_acquisition == "stitched":
             self.stitched, self.offset = self.geometry, False
             self.geometry = stitched(np.zeros((*row.shape[::2],), np.float32), self.stitched)[1]
-        truncated = is_truncated(row)
-        wanted = self.settings.pad == "auto" and truncated and not self.offset
+        wanted = self.settings.pad == "auto" and is_truncated(row) and not self.offset
         if wanted or self.settings.pad == "on":
             self.pad = max(1, self.scan.shape[2] // _PAD_SHARE)
-        self.notes += notes_of(self, truncated=truncated)
+        self.notes += notes_of(self)
 
     def identity(self) -> dict[str, str]:
         """The file and the axis, which decide the slices besides the settings."""
-        return {**scan_identity(self.file), "axis": repr(self.center)}
+        axis = {"axis": repr(self.center), "tilt of the axis": repr(self.tilt)}
+        return {**scan_identity(self.file), **axis}
 
     def read(self, start: int, stop: int) -> Attenuation:
         """Parallel projections of some rows of the file, before a formula's weights and margins."""
@@ -202,7 +209,7 @@ class SliceInput:
 
     def _alignment(self) -> Alignment | None:
         """How projections are turned, where the axis leans."""
-        tilt = math.radians(self.settings.tilt or 0.0)
+        tilt = math.radians(self.tilt)
         if not tilt or self.fan is not None:
             return None
         block = row_binning(self.file, self.settings.binning)
@@ -221,3 +228,10 @@ class SliceInput:
         if self.estimate is None:
             return {"center": self.center, "by": "search"}
         return self.estimate.record()
+
+
+def _tilt_worth_turning(estimate: AxisEstimate, rows: int) -> float:
+    """The tilt that was found, in degrees, where it is sure and moves the axis; else 0."""
+    sure = abs(estimate.tilt) > _SURE_TILT * estimate.tilt_error
+    moves = abs(estimate.tilt) * (rows - 1) / 2 >= _TILT_MATTERS
+    return math.degrees(math.atan(estimate.tilt)) if sure and moves else 0.0

@@ -39,10 +39,24 @@ class AxisEstimate:
     errors: Floats
     scores: Floats
 
+    @property
+    def tilt_error(self) -> float:
+        """The standard error of ``tilt``, in bins per row; infinite of fewer than three rows."""
+        if self.rows.size < 3:
+            return float("inf")
+        weights = 1 / self.errors**2
+        away = self.rows - np.average(self.rows, weights=weights)
+        left = self.centers - np.average(self.centers, weights=weights) - self.tilt * away
+        scatter = np.sqrt((weights * left**2).sum() / (self.rows.size - 2))
+        return float(max(1.0, scatter) / np.sqrt((weights * away**2).sum()))
+
     def in_words(self) -> str:
         """Where the axis is, how surely, and what told it."""
         low, high = self.interval
-        return f"at bin {self.center:.2f} ({low:.2f} to {high:.2f}, by {self.by})"
+        return (
+            f"at bin {self.center:.2f} ({low:.2f} to {high:.2f} at 95 % confidence, by {self.by} in "
+            f"{self.rows.size} rows)"
+        )
 
     def record(self) -> dict[str, Any]:
         """The estimate in words and numbers, as reports and configurations keep it."""
