@@ -20,7 +20,7 @@ from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 from rift_cl.jobs.reconstruct.slice_input import SliceInput
 from rift_cl.jobs.reconstruct.slice_window import Window
 from rift_cl.operators import LinearOperator, ParallelProjector
-from rift_cl.operators.cheapest_projector import cheapest_projector
+from rift_cl.operators.projector_choice import cheapest_projector
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp, poisson_weights
 from rift_cl.reconstruct.ordered_subsets import OrderedSubsets

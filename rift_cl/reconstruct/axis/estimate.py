@@ -54,8 +54,8 @@ class AxisEstimate:
         """Where the axis is, how surely, and what told it."""
         low, high = self.interval
         return (
-            f"at bin {self.center:.2f} ({low:.2f} to {high:.2f} at 95 % confidence, by {self.by} in "
-            f"{self.rows.size} rows)"
+            f"at bin {self.center:.2f} ({low:.2f} to {high:.2f} at 95 % confidence, by {self.by} "
+            f"in {self.rows.size} rows)"
         )
 
     def record(self) -> dict[str, Any]:
