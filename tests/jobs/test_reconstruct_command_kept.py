@@ -161,13 +161,16 @@ def test_the_axis_of_a_fan_is_not_searched_and_that_is_said(tmp_path, monkeypatc
         assert (said in assumed(tmp_path / name)) == (not center)
 
 
-def test_a_found_axis_of_a_truncated_object_is_doubted(tmp_path):
+def test_a_found_axis_is_told_with_its_interval(tmp_path):
     path = tmp_path / "scan.npz"
     save_phantom(path, HALF, 40, size=80)
     for name, center in (("found", ()), ("given", ("--center", 19.5))):
         options = ("--kind", "attenuation", "--out", tmp_path / name)
         assert run("reconstruct", path, *options, *center) == 0
-        assert ("off by some bins" in assumed(tmp_path / name)) == (not center)
+        assert ("at 95 % confidence" in assumed(tmp_path / name)) == (not center)
+    axis = json.loads((tmp_path / "found/config.json").read_text())["axis"]
+    assert axis["interval"][0] < axis["center"] < axis["interval"][1]
+    assert axis["center"] == pytest.approx(19.5, abs=0.5)
 
 
 @pytest.mark.parametrize("background", [None, 0, 3])

@@ -17,7 +17,7 @@ from bench.case import Case
 from bench.costs import Cost
 from bench.operations import Task
 from rift_cl.cl.arithmetic import axpby
-from rift_cl.cl.elementwise import clip_negative, multiply
+from rift_cl.cl.elementwise import clip_between, clip_negative, multiply, pull_to_levels
 from rift_cl.cl.reductions import dot
 from rift_cl.reconstruct.total_variation import TotalVariation
 
@@ -90,6 +90,13 @@ VECTOR_COSTS: dict[str, Cost] = {
     "axpby": _vector(3, 3, "3 flop per sample; bytes: two arrays in, one out"),
     "multiply": _vector(1, 3, "1 flop per sample; bytes: two arrays in, one out"),
     "clip_negative": _vector(0, 2, "no arithmetic; bytes: an array in and out"),
+    "clip_between": _vector(0, 4, "no arithmetic; bytes: an array and its bounds in, it out"),
+    "level_pull": _vector(
+        5,
+        3,
+        "5 flop per sample: the middle of two levels, distance, multiply-add; bytes: the image in, "
+        "the gradient in and out",
+    ),
     "dot_product": _vector(
         5,
         2,
@@ -117,12 +124,15 @@ def _runs(device: rift.Device, shape: tuple[int, ...]) -> dict[str, Callable[[],
     head = Case(shape[-1], 2, slices=math.prod(shape[:-2])).image.reshape(shape)
     x = device.array(head + _NOISE * np.random.default_rng(0).standard_normal(shape))
     y, ones, out = device.array(head), device.array(np.ones(shape)), device.empty(shape)
+    low, levels = device.zeros(shape), device.array(np.array([0.0, 0.5, 1.0], np.float32))
     V = TotalVariation(device, shape, (1.0,) * len(shape), np.float32)
     u = device.zeros(V.field_shape)
     return {
         "sum": lambda: axpby(device, 0.5, x, 0.5, y),
         "weights": lambda: multiply(device, ones, y),
         "clip": lambda: clip_negative(device, y),
+        "clip between": lambda: clip_between(device, low, ones, y),
+        "level pull": lambda: pull_to_levels(device, levels, 0.1, x, out),
         "inner product": lambda: dot(device, x, y),
         "variation": lambda: V.value(x),
         "dual step": lambda: V.dual_step(u, x, u, step=0.1, radius=_RADIUS),
