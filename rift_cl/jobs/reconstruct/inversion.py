@@ -23,6 +23,9 @@ from rift_cl.operators import LinearOperator, ParallelProjector
 from rift_cl.operators.projector_choice import cheapest_projector
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp, poisson_weights
+from rift_cl.reconstruct.direction_weights import DirectionWeights
+from rift_cl.reconstruct.disc_prior import find_disc, material_lengths
+from rift_cl.reconstruct.few_levels import FewLevels
 from rift_cl.reconstruct.ordered_subsets import OrderedSubsets
 from rift_cl.reconstruct.seen_rays import SeenRays
 from rift_cl.reconstruct.solver import Solver
@@ -31,7 +34,16 @@ Floats = NDArray[np.float32]
 # Images and sinograms, float32, that a slice needs on host and device at a time: a formula's are
 # counts, line integrals, two temporaries and the filtered ones; a method's are its state as well.
 # The next slab is read and the last one written at the same time: an image and two sinograms more.
-_ARRAYS = {"fbp": (3, 8), "backproject": (3, 8), "sirt": (6, 11), "cgls": (6, 12), "tv": (17, 12)}
+_ARRAYS = {
+    "fbp": (3, 8),
+    "backproject": (3, 8),
+    "sirt": (6, 11),
+    "cgls": (6, 12),
+    "tv": (17, 12),
+    "levels": (20, 13),
+}
+# Directions that no view looks along, in one piece, from which on angles count as limited.
+_LIMITED = np.pi / 6
 # Copies of what is read before it is binned.
 _READ = 2
 # Slices between two reports of progress; of those that take steps, each of which is reported.
@@ -113,12 +125,12 @@ class Inversion:
         _, part = self.window.around(self._width())
         slab = np.empty((projections.shape[1], *self.window.shape), np.float32)
         for row in range(projections.shape[1]):
-            solver = self._solver(np.ascontiguousarray(projections[:, row]))
+            solver, level = self._solver(np.ascontiguousarray(projections[:, row]))
             curve = self.residuals.setdefault(first + row, [])
             for report in solver.run(self.settings.most_steps):
                 curve.append(report.values["residual"])
                 yield Report(report.done, self.settings.most_steps, "steps", report.values)
-            slab[row] = self.device.get(solver.image)[part]
+            slab[row] = level * self.device.get(solver.image)[part]
         return slab
 
     def figures(self) -> dict[str, float]:
@@ -139,7 +151,7 @@ class Inversion:
                 begin = time.perf_counter()
                 self._formula(projections)
             return time.perf_counter() - begin
-        solver = self._solver(np.ascontiguousarray(projections[:, 0]))
+        solver, _ = self._solver(np.ascontiguousarray(projections[:, 0]))
         moments = [time.perf_counter() for _ in solver.run(1 + _TIMED_STEPS)]
         each = (moments[-1] - moments[0]) / max(len(moments) - 1, 1)
         # Steps that end early in the slices that are done do so in the others.
@@ -153,21 +165,41 @@ class Inversion:
         settings = self.settings
         return np.asarray(fbp(A, prepared, settings.view_filter(), settings.compensate))
 
-    def _solver(self, sinogram: Floats) -> Solver:
+    def _solver(self, sinogram: Floats) -> tuple[Solver, float]:
+        """The method at its beginning, and the attenuation that its image is in units of."""
         settings = self.settings
+        if settings.method == "levels":
+            return self._few_levels(sinogram)
         A, options = self._seen_rays(sinogram)
         options["noise"] = settings.noise
         if settings.method == "sirt" and settings.subsets not in (None, 1):
             subsets, nonnegative = settings.subsets, settings.nonnegative
-            return OrderedSubsets(A, sinogram, subsets, nonnegative=nonnegative, **options)
+            return OrderedSubsets(A, sinogram, subsets, nonnegative=nonnegative, **options), 1.0
         options["precondition"] = settings.precondition
         if settings.method == "cgls":
-            return Cgls(A, sinogram, **options)
+            return Cgls(A, sinogram, **options), 1.0
         options["nonnegative"] = settings.nonnegative
         if settings.method == "sirt":
-            return Sirt(A, sinogram, **options)
+            return Sirt(A, sinogram, **options), 1.0
         weight = usual_weight(sinogram) if settings.weight is None else settings.weight
-        return Pdhg(A, sinogram, weight, **options)
+        return Pdhg(A, sinogram, weight, **options), 1.0
+
+    def _few_levels(self, sinogram: Floats) -> tuple[Solver, float]:
+        """One material in a disc of it: lengths of material are solved for, from 0 to 1."""
+        A, seen = self.projector(1), self.source.seen
+        disc = find_disc(sinogram, A.scan, seen=seen)
+        material = material_lengths(sinogram, A.scan, disc, seen=seen)
+        lengths = np.asarray(material.lengths, np.float32)
+        weight = self.settings.weight
+        solver = FewLevels(
+            A,
+            lengths,
+            usual_weight(lengths) if weight is None else weight,
+            support=disc.coverage(A.grid),
+            weights=None if seen is None else seen.astype(np.float32),
+            direction_weights=_direction_weights(A.scan.angles),
+        )
+        return solver, 1 / material.linear
 
     def _seen_rays(self, sinogram: Floats) -> tuple[LinearOperator, dict[str, Any]]:
         """The projector of the rays that were measured, and the solver's weights of them."""
@@ -199,6 +231,13 @@ class Inversion:
         scan = self.source.geometry
         reach = max(scan.center + 0.5, scan.bins - 0.5 - scan.center) + self.source.pad
         return float(2 * reach * scan.pitch)
+
+
+def _direction_weights(angles: NDArray[np.float64]) -> DirectionWeights | None:
+    """Less weight along directions that no view looks across; None where views go all round."""
+    directions = np.sort(np.mod(angles, np.pi))
+    gap = np.diff(directions, append=directions[0] + np.pi).max()
+    return DirectionWeights.of(angles) if gap > _LIMITED else None
 
 
 def usual_weight(sinogram: Floats) -> float:

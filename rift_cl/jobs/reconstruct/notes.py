@@ -44,6 +44,11 @@ def notes_of(source: SliceInput) -> list[str]:
         )
     if source.pad:
         notes.append(_wide(source))
+    if source.settings.method == "levels":
+        notes.append(
+            "The object was taken for a disc of one material with holes, whose rim is solid; its "
+            "rim also told the air's level and the beam's hardening."
+        )
     return notes
 
 

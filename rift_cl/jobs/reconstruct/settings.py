@@ -12,7 +12,8 @@ from rift_cl.io.volumes import SampleWindow
 from rift_cl.jobs.scan_input import ScanInput
 from rift_cl.operators import HighPass, Ramp
 
-ITERATIVE = ("sirt", "cgls", "tv")
+SOLVERS = ("sirt", "cgls", "tv")
+ITERATIVE = (*SOLVERS, "levels")
 Switch = Literal["auto", "on", "off"]
 # Options that belong to some methods only; the others take no notice of them, and say so.
 _ONLY = {
@@ -21,15 +22,15 @@ _ONLY = {
     "exponent": ("fbp",),
     "compensate": ("fbp",),
     "steps": ITERATIVE,
-    "noise": ITERATIVE,
-    "weights": ITERATIVE,
+    "noise": SOLVERS,
+    "weights": SOLVERS,
     "subsets": ("sirt",),
-    "precondition": ITERATIVE,
-    "weight": ("tv",),
+    "precondition": SOLVERS,
+    "weight": ("tv", "levels"),
     "nonnegative": ("sirt", "tv"),
 }
 # Steps that serve as a beginning: SIRT is slow, CGLS gets noisy when it goes on for long.
-_STEPS = {"sirt": 100, "cgls": 30, "tv": 200}
+_STEPS = {"sirt": 100, "cgls": 30, "tv": 200, "levels": 1200}
 # With frequencies weighed, CGLS is near its best after the first few.
 _PRECONDITIONED_CGLS = 4
 # A detector that leans by more is no misalignment, in degrees.
@@ -52,9 +53,10 @@ class ReconstructSettings(ScanInput):
 
     out: Path = Path("rift-reconstruct")
     """Folder for the slices, preview.png, report.html, config.json and metrics.json."""
-    method: Literal["fbp", "backproject", "sirt", "cgls", "tv"] = "fbp"
-    """Filtered backprojection; backprojection without a filter; or steps towards the slice whose
-    projections are the measured ones (sirt, cgls), also with the fewest edges (tv)."""
+    method: Literal["fbp", "backproject", "sirt", "cgls", "tv", "levels"] = "fbp"
+    """Filtered backprojection; backprojection without a filter; steps towards the slice whose
+    projections are the measured ones (sirt, cgls), also with the fewest edges (tv); or, of limited
+    angles, one material with holes in a disc of it (levels)."""
     filter: Literal["ram-lak", "shepp-logan", "cosine", "hamming", "hann", "high-pass"] | None = (
         None
     )
@@ -76,8 +78,8 @@ class ReconstructSettings(ScanInput):
     up the Fourier transform, with an error of 1e-2 for formulas, by which their result loses less
     than 0.05 dB, and of 1e-3 for solvers; else strip."""
     steps: int | None = None
-    """sirt, cgls, tv: most steps for a slice; 100 (divided by --subsets), 30 (with --precondition
-    4), 200 if not given."""
+    """sirt, cgls, tv, levels: most steps for a slice; 100 (divided by --subsets), 30 (with
+    --precondition 4), 200, 1200 if not given."""
     subsets: int | None = None
     """sirt: correct the image after each of so many subsets of the views (ordered subsets), which
     takes about that many times fewer steps; 1 if not given."""
@@ -85,7 +87,7 @@ class ReconstructSettings(ScanInput):
     """sirt, cgls, tv: standard deviation of the noise of a line integral; steps end where the
     slice explains the data that well."""
     weight: float | None = None
-    """tv: of the total variation; the greater, the smoother."""
+    """tv, levels: of the total variation; the greater, the smoother."""
     nonnegative: bool = False
     """sirt, tv: no value below zero."""
     weights: Literal["counts"] | None = None
