@@ -84,12 +84,15 @@ class MaterialLengths(NamedTuple):
         linear: length for each unit of line integral of a thin layer: one over its attenuation.
         hardening: what the square of the line integral adds.
         air: mean line integral outside the disc, which was taken off.
+        attenuation: line integral over length along the rays that pass through the rim, all
+            together; of a hardened beam, less than that of a thin layer.
     """
 
     lengths: NDArray[np.float32]
     linear: float
     hardening: float
     air: float
+    attenuation: float
 
 
 def find_disc(sinogram: ArrayLike, scan: Parallel, *, seen: ArrayLike | None = None) -> Disc:
@@ -235,7 +238,9 @@ def material_lengths(
             "its rays disagree with the others; give a smaller rim"
         )
     lengths = np.where(measured, found[0] * values + found[1] * values**2, 0)
-    return MaterialLengths(lengths.astype(np.float32), float(found[0]), float(found[1]), air)
+    attenuation = float(p[kept].sum() / length[kept].sum())
+    linear, hardening = (float(term) for term in found)
+    return MaterialLengths(lengths.astype(np.float32), linear, hardening, air, attenuation)
 
 
 def _checked(

@@ -148,7 +148,7 @@ def test_a_dataset_has_no_meaning(series: Path) -> None:
         ("a.csv", "0, 1\n1, 2\n", FileFormatError, "line 1 holds 2 numbers"),
         ("a.txt", b"\xff\xfe\x00", FileFormatError, "cannot be read"),
         ("a.npy", b"no array", FileFormatError, "cannot be read"),
-        ("a.npy", np.zeros((2, 3)), ShapeError, "one angle for each"),
+        ("a.npy", np.zeros((2, 3)), ShapeError, "wanted angles along one axis"),
         ("a.npy", np.array([{}] * 6), DTypeError, "object"),
         ("a.npy", np.zeros(6, "?"), DTypeError, "bool"),
         ("a.doc", "", InputError, "angles are read from .txt"),

@@ -244,3 +244,36 @@ def test_a_tilt_is_found_with_the_axis_and_turned(tmp_path):
     assert run("reconstruct", "--config", tmp_path / "out/config.json", "--out", again) == 0
     first, second = (read_volume(out / "volume.h5") for out in (tmp_path / "out", again))
     np.testing.assert_array_equal(first, second)
+
+
+def test_each_row_may_have_an_axis_of_its_own(tmp_path):
+    chance = np.random.default_rng(3)
+    centers = 39.5 + chance.integers(-3, 4, ROWS)
+    rows = [line_integrals(rows=1, center=center)[:, 0] for center in centers]
+    path = write_counts(tmp_path / "scan.h5", np.stack(rows, axis=1))
+    np.savetxt(tmp_path / "axis.txt", centers)
+    volume = reconstruct(path, tmp_path / "out", "--centers", tmp_path / "axis.txt")
+    assert np.abs(volume - volume[:1]).max() < 0.25 * volume.max()
+    upright = reconstruct(path, tmp_path / "one", "--center", 39.5)
+    assert np.abs(upright - upright[:1]).max() > 0.6 * upright.max()
+    again = tmp_path / "again"
+    assert run("reconstruct", "--config", tmp_path / "out/config.json", "--out", again) == 0
+    np.testing.assert_array_equal(volume, read_volume(again / "volume.h5"))
+
+
+@pytest.mark.parametrize(
+    ("content", "options", "sentence"),
+    [
+        ("39.5\n39.5\n", (), "holds 2 rotation axes"),
+        ("39.5\n" * 11 + "x\n", (), "line 12"),
+        ("39.5\n" * 11 + "nan\n", (), "bins from 0 to 79"),
+        ("39.5\n" * 12, ("--center", 3), "leave those out"),
+    ],
+)
+def test_a_list_of_axes_that_does_not_fit_is_told(tmp_path, capsys, content, options, sentence):
+    path = write_counts(tmp_path / "scan.h5", line_integrals())
+    (tmp_path / "axis.txt").write_text(content)
+    arguments = ("--centers", tmp_path / "axis.txt", *options)
+    assert run("reconstruct", path, "--out", tmp_path / "out", *arguments) == INPUT
+    assert sentence in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -63,6 +63,8 @@ def test_a_hardened_beam_and_an_offset_are_undone():
     assert material.linear == pytest.approx(1 / 0.0178, rel=0.02)
     plain = material_lengths(0.02 * exact, scan, disc)
     assert plain.hardening == pytest.approx(0, abs=1e-6) and plain.linear == pytest.approx(50)
+    assert plain.attenuation == pytest.approx(0.02, rel=1e-3)
+    assert 0.014 < material.attenuation < 0.0178
 
 
 def test_the_coverage_of_a_disc_is_its_area():

@@ -8,22 +8,17 @@ their span: 3.1 degrees in hundreds of steps are radians in disguise. What is as
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from rift_cl.errors import FileFormatError, InputError, ShapeError
-from rift_cl.io.boundary import check_claim, check_numeric, reading
+from rift_cl.errors import InputError
+from rift_cl.io.number_list import SUFFIXES, read_numbers
 from rift_cl.io.scans.scan_file import AngleUnit, check_angles
 
-SUFFIXES = (".txt", ".csv", ".npy")
-# Eight million angles: no scan has more, and a forged header may not ask for gigabytes.
-_LONGEST = 64 << 20
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
 _TURN = re.compile(rf"(?:({_NUMBER}):)?({_NUMBER})")
 # Spans up to this are radians of one turn or, in degrees, too little to reconstruct from.
@@ -206,12 +201,7 @@ def file_angles(path: Path) -> AngleList:
         FileFormatError: it holds something else.
         ResourceLimitError: it is far longer than any list of angles.
     """
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path}: angles are read from {', '.join(SUFFIXES)}")
-    with reading(path, "the list of angles"):
-        if not path.is_file() and path.exists():
-            raise InputError(f"{path}: is not a file")
-        values = _array(path) if path.suffix.lower() == ".npy" else text_angles(path)
+    values = read_numbers(path, "angles")
     return AngleList(str(path), values, unit=named_unit(path.stem))
 
 
@@ -224,44 +214,3 @@ def named_unit(name: str) -> AngleUnit | None:
         if word in ("deg", "degs", "degree", "degrees"):
             return "degrees"
     return None
-
-
-def text_angles(path: Path) -> Angles:
-    """Numbers of a text file, one to a line or all in one line."""
-    check_claim(path, "the list of angles", path.stat().st_size, _LONGEST)
-    lines = path.read_text(encoding="utf-8-sig").splitlines()
-    rows = [re.split(r"[\s,;]+", line.split("#")[0].strip(" \t,;")) for line in lines]
-    filled = [(index, row) for index, row in enumerate(rows, 1) if row != [""]]
-    for index, row in filled:
-        if len(row) > 1 and len(filled) > 1:
-            raise FileFormatError(
-                f"{path}: line {index} holds {len(row)} numbers, wanted one angle to a line"
-            )
-    return np.array([_number(path, index, word) for index, row in filled for word in row])
-
-
-def _number(path: Path, line: int, word: str) -> float:
-    try:
-        return float(word)
-    except ValueError:
-        raise FileFormatError(
-            f"{path}: line {line} holds {word[:40]!r}, wanted an angle; put # before lines that "
-            "hold none"
-        ) from None
-
-
-def _array(path: Path) -> Angles:
-    with path.open("rb") as file:
-        version = npy.read_magic(file)
-        if version not in ((1, 0), (2, 0)):
-            raise FileFormatError(f"{path}: NPY version {version} is not known")
-        header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, _, dtype = header(file)
-        check_numeric(path, path.name, dtype)
-        size = math.prod(shape)
-        check_claim(path, "the list of angles", 8 * size, _LONGEST)
-        if size != max(shape, default=1):
-            raise ShapeError(f"{path}: has shape {shape}, wanted one angle for each projection")
-        file.seek(0)
-        values = npy.read_array(file, allow_pickle=False)
-    return np.asarray(values, np.float64).reshape(size)

@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 from rift_cl.errors import DTypeError, FileFormatError, InputError
 from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.capture_paths import CaptureFolder
-from rift_cl.io.scans.angle_list import AngleList, even_turn, file_angles, text_angles
+from rift_cl.io.number_list import text_numbers
+from rift_cl.io.scans.angle_list import AngleList, even_turn, file_angles
 from rift_cl.io.scans.axes import axes_of
 from rift_cl.io.scans.contract import AIR, MEAN, Finding, scan_of
 from rift_cl.io.scans.frame_stack import FrameStack
@@ -189,7 +190,7 @@ def _angles(path: Path, file: Any, theta: str | None) -> tuple[AngleList, str]:
         if path.with_suffix(suffix).exists():
             sidecar = folder.file(str(path), path.with_suffix(suffix).name)
             with reading(sidecar, "the list of angles"):
-                values = text_angles(sidecar)
+                values = text_numbers(sidecar, "angles")
             told = f"The tilt angles are those of {sidecar.name}, about the y axis."
             return AngleList(str(sidecar), values, unit="degrees"), told
     recorded = _header_angles(file)

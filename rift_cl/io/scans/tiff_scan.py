@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rift_cl.errors import FileFormatError, InputError, ShapeError
+from rift_cl.io.number_list import SUFFIXES
 from rift_cl.io.scans import angle_list
 from rift_cl.io.scans.angle_list import AngleList
 from rift_cl.io.scans.axes import axes_of, parsed
@@ -30,9 +31,7 @@ from rift_cl.io.scans.tiff_folder import (
 from rift_cl.io.scans.tiff_frames import TiffRows, TiffStack, tiff_stack
 
 _SINOGRAMS = frozenset(("sino", "sinos", "sinogram", "sinograms"))
-_ANGLE_NAMES = tuple(
-    name + suffix for name in ("angles", "theta") for suffix in angle_list.SUFFIXES
-)
+_ANGLE_NAMES = tuple(name + suffix for name in ("angles", "theta") for suffix in SUFFIXES)
 
 
 @dataclass(frozen=True)

@@ -52,6 +52,8 @@ def decided_settings(
         decided["error"] = A.error
     elif isinstance(A, Projector):
         decided["footprint"] = A.footprint
+    if settings.centers is not None:
+        decided |= {"center": None, "tilt": None, "centers": settings.centers.absolute()}
     if settings.iterative:
         decided["steps"] = settings.most_steps
     if settings.method == "fbp":

@@ -199,7 +199,7 @@ class Inversion:
             weights=None if seen is None else seen.astype(np.float32),
             direction_weights=_direction_weights(A.scan.angles),
         )
-        return solver, 1 / material.linear
+        return solver, material.attenuation
 
     def _seen_rays(self, sinogram: Floats) -> tuple[LinearOperator, dict[str, Any]]:
         """The projector of the rays that were measured, and the solver's weights of them."""

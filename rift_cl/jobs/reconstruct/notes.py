@@ -54,7 +54,7 @@ def notes_of(source: SliceInput) -> list[str]:
 
 def _axis(source: SliceInput) -> list[str]:
     """Where the axis is, unless a person said it."""
-    if source.settings.center is not None:
+    if source.settings.center is not None or source.centers is not None:
         return []
     if source.fan is not None:
         assert source.file.fan is not None

@@ -138,6 +138,9 @@ class ReconstructSettings(ScanInput):
     """Degrees by which the rotation axis leans in the detector's plane, positive where its bin
     grows with the row; projections are turned by it. If not given: the tilt found with the axis,
     where it moves the axis by a quarter of a bin or more; 0 for none."""
+    centers: Path | None = None
+    """File of the rotation axis of every detector row, a bin for each (.txt, .csv or .npy), for an
+    axis that wanders; in place of --center and --tilt."""
     half_acquisition: Literal["weighted", "stitched"] = "weighted"
     """Full turns with the axis off the detector's middle: count opposite views by weights, or
     stitch them to views of half a turn that are nearly twice as wide."""
@@ -203,6 +206,8 @@ class ReconstructSettings(ScanInput):
         self._check_samples()
         if self.tilt is not None and not abs(self.tilt) <= _MOST_TILT:
             raise InputError(f"--tilt is {self.tilt:g} degrees, wanted {_MOST_TILT:g} at most")
+        if self.centers is not None and (self.center is not None or self.tilt is not None):
+            raise InputError("--centers takes the place of --center and --tilt: leave those out")
         if self.subsets not in (None, 1) and self.precondition is not None:
             raise InputError("--subsets and --precondition both save steps: give one of them")
         if self.resume and self.overwrite:

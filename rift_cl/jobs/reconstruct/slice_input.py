@@ -17,6 +17,7 @@ from rift_cl.cl.device import Device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Parallel
 from rift_cl.geometry.length_units import length_unit
+from rift_cl.io.number_list import read_numbers
 from rift_cl.jobs.axis_search import find_axis
 from rift_cl.jobs.reconstruct.binned_file import binned_file, row_binning
 from rift_cl.jobs.reconstruct.clean_rows import Alignment, CleanRows
@@ -78,6 +79,10 @@ class SliceInput:
         self._pitch = pitch * binning
         # Bin of the rotation axis on the detector as the file has it, at its middle row.
         self.center = settings.center
+        # That of each row, where each has its own.
+        self.centers = self._row_centers()
+        if self.centers is not None:
+            self.center = float(self.centers.mean())
         # Degrees by which the axis leans, and by which projections are turned.
         self.tilt = settings.tilt or 0.0
         # What the search for the axis found, where there was one.
@@ -158,6 +163,8 @@ class SliceInput:
     def identity(self) -> dict[str, str]:
         """The file and the axis, which decide the slices besides the settings."""
         axis = {"axis": repr(self.center), "tilt of the axis": repr(self.tilt)}
+        if self.centers is not None:
+            axis["axes of the rows"] = str(self.centers.tolist())
         return {**scan_identity(self.file), **axis}
 
     def read(self, start: int, stop: int) -> Attenuation:
@@ -207,12 +214,32 @@ class SliceInput:
             )
         return first, stop
 
+    def _row_centers(self) -> NDArray[np.float64] | None:
+        """Bins of the axis in the rows of the file, where a list of them is given."""
+        path = self.settings.centers
+        if path is None:
+            return None
+        if self.file.fan is not None:
+            raise InputError(f"{self.file.path}: --centers is for parallel rays, these are a fan's")
+        centers = read_numbers(path, "rotation axes")
+        rows, bins = self.file.shape[1:]
+        if centers.size != rows or not (np.abs(centers - (bins - 1) / 2) < bins).all():
+            raise InputError(
+                f"{path}: holds {centers.size} rotation axes, wanted one for each of the {rows} "
+                f"rows of {self.file.path}, bins from 0 to {bins - 1}"
+            )
+        return centers
+
     def _alignment(self) -> Alignment | None:
         """How projections are turned, where the axis leans."""
         tilt = math.radians(self.tilt)
-        if not tilt or self.fan is not None:
+        if self.fan is not None or (not tilt and self.centers is None):
             return None
         block = row_binning(self.file, self.settings.binning)
+        if self.centers is not None:
+            rows = self.centers[: self.scan.shape[1] * block].reshape(-1, block).mean(axis=1)
+            centers = np.array([binned_center(row, self.settings.binning) for row in rows])
+            return Alignment(self.geometry.center, 0.0, centers=centers)
         pivot = binned_center((self.file.shape[1] - 1) / 2, block)
         return Alignment(self.geometry.center, pivot, tilt)
 
@@ -222,6 +249,8 @@ class SliceInput:
     def _axis_record(self) -> dict[str, Any]:
         if self.settings.center is not None:
             return {"center": self.settings.center, "by": "--center"}
+        if self.centers is not None:
+            return {"center": self.center, "by": "--centers", "rows": list(self.centers)}
         if self.fan is not None:
             assert self.file.fan is not None
             return {"center": self.file.fan.center, "by": "the file"}
