@@ -197,11 +197,14 @@ def chosen_rows(wanted: tuple[int, int] | None, scan: ScanFile) -> tuple[int, in
 
 
 def check_center(center: float | None, scan: ScanFile) -> None:
-    """A rotation axis may lie off the detector, but not where no ray meets the slice.
+    """Make sure that a rotation axis lies on the detector: else no point is seen all round.
 
     Raises:
-        InputError: it does.
+        InputError: it does not.
     """
     bins = scan.shape[2]
-    if center is not None and not -bins < center < 2 * bins:
-        raise InputError(f"--center is {center:g}, the detector has the bins 0 to {bins - 1}")
+    if center is not None and not -0.5 <= center <= bins - 0.5:
+        raise InputError(
+            f"--center is {center:g}, off the detector of {scan.path}, which has the bins 0 to "
+            f"{bins - 1}"
+        )

@@ -155,9 +155,10 @@ def _fitted(edges: list[tuple[float, int, Floats, Floats]]) -> Disc:
     misses = np.abs(design @ fit.x - places)
     round_ = misses < max(_ROUND * radius, pitch)
     if not (radius > 0 and round_.mean() >= _AGREE):
+        nearest = f"the nearest one, of radius {radius:.3g}" if radius > 0 else "any disc"
         raise InputError(
-            f"the edges of the views are not those of a disc: {1 - round_.mean():.0%} of them are "
-            f"not those of the nearest one, of radius {radius:.3g}"
+            "the edges of the views are not those of a disc: "
+            f"{1 - round_.mean():.0%} of them are not those of {nearest}"
         )
     misfit = float(np.sqrt(np.mean(misses[round_] ** 2)))
     return Disc(float(fit.x[0]), float(fit.x[1]), radius, misfit)

@@ -123,6 +123,8 @@ def test_binning_of_an_odd_detector_says_what_it_leaves_out(tmp_path):
     ("options", "sentence"),
     [
         (("--binning", 13), "12 rows"),
+        (("--center", 85), "off the detector"),
+        (("--center", -1), "off the detector"),
         (("--binning", 0), "--binning is 0"),
         (("--binning", 4, "--rows", 1, 2), "fewer rows"),
         (("--tilt", 30), "wanted 5 at most"),
