@@ -126,7 +126,8 @@ def test_center(scan, tmp_path, capsys):
     assert page.count("data:image/png;base64,") == 17 + 2
     assert page.count("<script>") == 1
     assert "script-src 'sha256-" in page
-    assert json.loads((out / "metrics.json").read_text())["by"] == "double wedge"
+    by = json.loads((out / "metrics.json").read_text())["by"]
+    assert by == "double wedge and centre of mass"
 
 
 def test_center_of_a_row_that_is_not_there(scan, tmp_path, capsys):

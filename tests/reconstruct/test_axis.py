@@ -120,6 +120,41 @@ def test_limited_angles_are_told_by_the_centres_of_mass(span):
     assert found.center == pytest.approx(74.2, abs=0.2)
 
 
+@pytest.mark.parametrize("center", [39.225, 37.675, 41.9, 44.675])
+def test_bins_that_sample_instead_of_averaging_do_not_pull_to_half_a_bin(center):
+    angles = np.arange(120) * np.pi / 120
+    small = [(part[0], *(0.5 * length for length in part[1:5]), part[5]) for part in PARTS]
+    found = rift.find_center(sinogram(small, angles, center, bins=80, noise=0.002), angles)
+    off = abs(found.center - center)
+    assert off < 0.1 or found.interval[0] < center < found.interval[1]
+
+
+def test_of_noisy_half_turns_the_centre_of_mass_is_part_of_the_answer():
+    off = []
+    for seed in range(6):
+        y = sinogram(KINDS["porous"], HALF, 83.7, noise=0.05, seed=seed)
+        found = rift.find_center(y, HALF)
+        assert found.by == "double wedge and centre of mass"
+        off.append(found.center - 83.7)
+    assert np.sqrt(np.mean(np.square(off))) < 0.06
+
+
+@pytest.mark.parametrize("level", [[0.02, 0.02], [0.0, 0.03], [-0.02, 0.01], [0.0, 0.01]])
+def test_air_that_is_not_at_zero_does_not_move_the_axis(level):
+    clean = sinogram(PARTS, HALF, 88.3, noise=0.01)
+    air = (clean.max() * np.linspace(*level, BINS)).astype(np.float32)
+    found = rift.find_center(clean + air, HALF)
+    assert found.center == pytest.approx(88.3, abs=0.06)
+    assert found.interval[0] < 88.3 < found.interval[1]
+
+
+def test_limited_angles_over_sloping_air_are_refused():
+    y = sinogram(PARTS, HALF[:120], 74.2)
+    air = (0.03 * y.max() * np.linspace(0, 1, BINS)).astype(np.float32)
+    with pytest.raises(InputError, match="--center"):
+        rift.find_center(y + air, HALF[:120])
+
+
 def test_nothing_but_the_detector_changes_the_answer():
     y = sinogram(KINDS["porous"], HALF, 83.7)
     order = np.random.default_rng(1).permutation(HALF.size)

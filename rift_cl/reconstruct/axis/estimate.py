@@ -21,7 +21,8 @@ class AxisEstimate:
         tilt: by how many bins the axis moves from one row to the next; 0 for a single row.
         spread: root mean square distance of the rows' centres from the axis, in bins; 0 for a
             single row.
-        by: the measure that found it: "opposite views", "double wedge" or "centre of mass".
+        by: the measure that found it: "opposite views", "double wedge", "double wedge and centre
+            of mass" where both told at least one row, or "centre of mass".
         rows: (n,) the detector rows that were looked at and could tell.
         centers: (n,) the centre that each of them gives, in bins.
         errors: (n,) the standard error of each, in bins.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rift_cl.reconstruct.axis.double_wedge import wedge_evidence
 from rift_cl.reconstruct.axis.evidence import Evidence
-from rift_cl.reconstruct.axis.moments import mass_center
+from rift_cl.reconstruct.axis.moments import MassCenter, mass_center
 from rift_cl.reconstruct.axis.opposite_views import (
     Pairs,
     mirror_scores,
@@ -53,6 +53,9 @@ _SIDES = 1.5
 _ROUNDS, _SETTLED, _JUMP = 8, 0.004, 2.0
 # Changes that shrink by a factor in this range are taken to the end of their series at once.
 _SLOW = (0.2, 0.95)
+# Most by which wedge and centre of mass may differ to be averaged, in standard errors of that.
+_AGREE = 3.0
+_WEDGE, _MASS = "double wedge", "centre of mass"
 
 
 Look = Callable[[float, float], Evidence]
@@ -68,6 +71,8 @@ class RowAxis(NamedTuple):
         rival: the greatest one anywhere else.
         coherence: the score as a share of what it were if all frequencies agreed.
         evidence: what the row says near the centre, where it is told by frequencies.
+        by: the measure that found it.
+        mass: what the centres of mass say, where they are part of the answer.
     """
 
     center: float
@@ -76,12 +81,12 @@ class RowAxis(NamedTuple):
     rival: float
     coherence: float
     evidence: Evidence | None
+    by: str
+    mass: MassCenter | None = None
 
 
 class Measure(Protocol):
     """A way to find the axis of one row."""
-
-    by: str
 
     def find(self, views: Views) -> RowAxis | None:
         """The axis of a row, (angle, bin); None where this measure does not apply to it."""
@@ -94,8 +99,6 @@ class OppositeViews:
         pairs: which views are opposite.
         span: where to search, in bins of the detector; all of it but the ends if None.
     """
-
-    by = "opposite views"
 
     def __init__(self, pairs: Pairs, span: tuple[float, float] | None) -> None:
         self._pairs, self._span = pairs, span
@@ -115,7 +118,7 @@ class OppositeViews:
         def look(window: float, near: float) -> Evidence:
             return pair_evidence(row, self._pairs, window, near)
 
-        return _followed(row, look, start)
+        return _followed(row, look, start, "opposite views")
 
 
 class DoubleWedge:
@@ -126,8 +129,6 @@ class DoubleWedge:
         start: the direction at which the half turn begins.
         span: where to search, in bins of the detector; its middle part if None.
     """
-
-    by = "double wedge"
 
     def __init__(self, angles: Floats, start: float, span: tuple[float, float] | None) -> None:
         self._angles, self._start, self._span = angles, start, span
@@ -141,11 +142,29 @@ class DoubleWedge:
         centers, scores = _everywhere(coarse, low, high)
         starts = _peaks(centers, scores, _APART * bins)
         best = _best([self._settled(coarse, start) for start in starts], bins)
-        if not cut and _binning(bins, _FINE) == coarse.bin:
-            return best
-        fine = self._fine(self._row(views, _binning(bins, _FINE), cut), best.center)
-        # The rival's score in proportion, since the finer search has more to tell of both.
-        return fine._replace(rival=fine.score * best.rival / best.score if best.score > 0 else 0.0)
+        if cut or _binning(bins, _FINE) != coarse.bin:
+            fine = self._fine(self._row(views, _binning(bins, _FINE), cut), best.center)
+            # The rival's score in proportion, since the finer search has more to tell of both.
+            share = best.rival / best.score if best.score > 0 else 0.0
+            best = fine._replace(rival=fine.score * share)
+        return best if cut else self._with_mass(best, views)
+
+    def _with_mass(self, wedge: RowAxis, views: Views) -> RowAxis:
+        """The mean of the wedge's answer and the centre of mass's, where they agree.
+
+        They owe nothing to each other: one comes from frequencies above all of the object's size,
+        the other from the limit of frequency zero.
+        """
+        mass = mass_center(views, self._angles)
+        if mass is None:
+            return wedge
+        errors = np.array([wedge.error, mass.error])
+        if not abs(mass.center - wedge.center) <= _AGREE * np.linalg.norm(errors):
+            return wedge
+        weights = 1 / errors**2
+        center = float(weights @ [wedge.center, mass.center] / weights.sum())
+        error = float(1 / np.sqrt(weights.sum()))
+        return wedge._replace(center=center, error=error, by=f"{_WEDGE} and {_MASS}", mass=mass)
 
     def _fine(self, row: Row, center: float) -> RowAxis:
         """The centre near a place.
@@ -172,7 +191,7 @@ class DoubleWedge:
         def look(window: float, near: float) -> Evidence:
             return wedge_evidence(row, window, near)
 
-        return _followed(row, look, start)
+        return _followed(row, look, start, _WEDGE)
 
 
 class CentreOfMass:
@@ -181,8 +200,6 @@ class CentreOfMass:
     Args:
         angles: of the views, in radians.
     """
-
-    by = "centre of mass"
 
     def __init__(self, angles: Floats) -> None:
         self._angles = angles
@@ -194,7 +211,9 @@ class CentreOfMass:
         if 2 * np.pi - gaps.max() < _LIMITED or is_cut(views):
             return None
         told = mass_center(views, self._angles)
-        return None if told is None else RowAxis(*told, np.inf, 0.0, 1.0, None)
+        if told is None:
+            return None
+        return RowAxis(told.center, told.error, np.inf, 0.0, 1.0, None, _MASS, told)
 
 
 def chosen_measure(angles: Floats, span: tuple[float, float] | None) -> Measure:
@@ -252,7 +271,7 @@ def _peaks(centers: Floats, scores: Floats, apart: float) -> Floats:
     return np.array(taken)
 
 
-def _followed(row: Row, look: Look, start: float) -> RowAxis:
+def _followed(row: Row, look: Look, start: float, by: str) -> RowAxis:
     """The centre that a place leads to, with the window and the noise taken about it."""
     center, last = start, 0.0
     trial = row.bin * np.arange(-_REACH, _REACH + _NARROW / 2, _NARROW)
@@ -271,7 +290,7 @@ def _followed(row: Row, look: Look, start: float) -> RowAxis:
         center, last = found, change
     center = told.peak(center)
     score = float(told.scores(np.array([center]))[0])
-    return RowAxis(center, told.error(center), score, 0.0, score / max(told.most, 1e-9), told)
+    return RowAxis(center, told.error(center), score, 0.0, score / max(told.most, 1e-9), told, by)
 
 
 def _best(settled: list[RowAxis], bins: int) -> RowAxis:

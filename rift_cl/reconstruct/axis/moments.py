@@ -1,13 +1,19 @@
-"""Limited angles: the centre of mass of every view, which follows a sinusoid about the axis.
+"""The centre of mass of every view, which follows a sinusoid about the axis.
 
 The mass of a view is that of the object, and its centre of mass lies at ``c + x cos(angle) +
 y sin(angle)``, where (x, y) is the object's: the first two of the consistency conditions of
 Helgason and Ludwig (Natterer, The Mathematics of Computerized Tomography, II.4). They need no
-opposite views, but all of the object in every view, and air at zero; whether mass stays the same
-from view to view tells.
+opposite views, but all of the object in every view, and air at zero. Whether mass stays the same
+from view to view tells of the former; bins that the object never reaches tell of the latter, and
+what their level would do to the centre is part of its error.
+
+Limited angles have nothing else to go by. For half turns it is a second opinion that owes nothing
+to the first, and the surer one where noise is strong, since it is told by the lowest frequencies.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +22,34 @@ Floats = NDArray[np.float64]
 
 # Most by which the mass may vary between views, as a share of it, beyond what noise explains.
 _MASS = 0.02
-# Share of the greatest mean line integral above which a bin sees the object; margin in bins.
-_OBJECT, _MARGIN = 0.02, 2
+# Share of the greatest mean line integral above which a bin sees the object, in addition to so many
+# standard deviations of the noise of that mean; margin in bins.
+_OBJECT, _SURE, _MARGIN = 0.02, 4.5, 2
+# Bins of such a mean, and the share of the views in it.
+_ACROSS, _AROUND = 5, 1 / 40
+# Least number of bins on either side of the object that tell the level of air.
+_AIR = 4
 # Groups of neighbouring views whose disagreement tells the error.
 _GROUPS = 12
 
 
-def mass_center(views: NDArray[np.float32], angles: Floats) -> tuple[float, float] | None:
+class MassCenter(NamedTuple):
+    """The axis that centres of mass turn about, in bins.
+
+    Args:
+        center: its bin.
+        error: the standard error of that, what air may add included.
+    """
+
+    center: float
+    error: float
+
+    def scores(self, centers: Floats) -> Floats:
+        """Log-likelihood of trial centres, 0 at the best."""
+        return -(((centers - self.center) / self.error) ** 2) / 2
+
+
+def mass_center(views: NDArray[np.float32], angles: Floats) -> MassCenter | None:
     """The axis that the centres of mass turn about.
 
     Args:
@@ -30,8 +57,10 @@ def mass_center(views: NDArray[np.float32], angles: Floats) -> tuple[float, floa
         angles: in radians.
 
     Returns:
-        Its bin and the standard error of that; None where mass is not the same in all views.
+        Its bin and how sure that is; None where mass is not the same in all views.
     """
+    order = np.argsort(angles, kind="stable")
+    views, angles = views[order], angles[order]
     bins = _object_bins(views)
     part, places = views[:, bins].astype(float), np.arange(views.shape[1])[bins]
     mass = part.sum(axis=1)
@@ -47,21 +76,43 @@ def mass_center(views: NDArray[np.float32], angles: Floats) -> tuple[float, floa
     center = float(inverse[0] @ centers)
     left = centers - model @ (inverse @ centers)
     # Sums over groups of neighbours, so that residuals that go together count together.
-    order = np.argsort(angles, kind="stable")
-    groups = np.array_split((inverse[0] * left)[order], min(_GROUPS, len(order)))
-    free = len(order) / max(len(order) - 3, 1)
+    groups = np.array_split(inverse[0] * left, min(_GROUPS, len(left)))
+    free = len(left) / max(len(left) - 3, 1)
     error = max(
         np.sqrt(sum(group.sum() ** 2 for group in groups)),
         float(np.linalg.norm(inverse[0])) * float(left.std()) * np.sqrt(free),
     )
-    return center, float(error)
+    # What a level that each bin adds to all views would do to the centre.
+    pull = inverse[0] @ ((places - centers[:, None]) / mass[:, None])
+    return MassCenter(center, float(np.hypot(error, _air_error(views, bins, pull))))
+
+
+def _air_error(views: NDArray[np.float32], bins: NDArray[np.intp], pull: Floats) -> float:
+    """What the level of air, and bins that are off by themselves, may do to the centre.
+
+    Both are read from the bins that the object never reaches, or from the outermost where there are
+    none: what is seen there must not decide. The level is taken to go on as a straight line
+    underneath the object.
+    """
+    mean = views.mean(axis=0, dtype=float)
+    sides = mean[: max(bins[0], _AIR)], mean[min(bins[-1] + 1, mean.size - _AIR) :]
+    across = (bins - bins[0]) / max(bins.size - 1, 1)
+    pulls = np.array([pull @ (1 - across), pull @ across])
+    levels = np.array([side.mean() for side in sides])
+    single = np.sqrt(np.mean([side.var(ddof=1) for side in sides]))
+    doubts = single * pulls / np.sqrt([side.size for side in sides])
+    noise = _noise(views) / np.sqrt(len(views))
+    rings = np.sqrt(max(single**2 - noise**2, 0.0)) * np.linalg.norm(pull)
+    return float(np.linalg.norm([pulls @ levels, *doubts, rings]))
 
 
 def _object_bins(views: NDArray[np.float32]) -> NDArray[np.intp]:
     from scipy.ndimage import uniform_filter
 
-    level = uniform_filter(views, (9, 3), mode="nearest").max(axis=0)
-    floor = _OBJECT * level.max() + 4 * _noise(views) / np.sqrt(27)
+    around = max(3, round(_AROUND * len(views)))
+    level = uniform_filter(views, (around, _ACROSS), mode="nearest").max(axis=0)
+    noise = _noise(views) / np.sqrt(around * _ACROSS)
+    floor = _OBJECT * level.max() + _SURE * noise
     seen = np.flatnonzero(level > floor)
     if not seen.size:
         return np.arange(views.shape[1])

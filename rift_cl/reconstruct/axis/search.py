@@ -125,7 +125,7 @@ def axis_of_rows(
             found.append(told)
     if 2 * len(found) <= len(rows):
         raise _refusal(why)
-    return _line(np.array(places, float), found, (count - 1) / 2, measure.by)
+    return _line(np.array(places, float), found, (count - 1) / 2)
 
 
 def _check_searchable(views: Views, span: tuple[float, float] | None) -> None:
@@ -169,7 +169,7 @@ def _refusal(why: str) -> InputError:
     return InputError(f"the rotation axis cannot be found: {why}; give it yourself (--center)")
 
 
-def _line(places: Floats, found: list[RowAxis], middle: float, by: str) -> AxisEstimate:
+def _line(places: Floats, found: list[RowAxis], middle: float) -> AxisEstimate:
     """The axis through the rows' centres.
 
     Raises:
@@ -190,18 +190,16 @@ def _line(places: Floats, found: list[RowAxis], middle: float, by: str) -> AxisE
     half = _HALF_INTERVAL * error
     if not half <= _WIDEST:
         raise _refusal(_too_wide(half))
-    told = [row.evidence for row, used in zip(found, kept, strict=True) if used]
-    known = [evidence for evidence in told if evidence is not None]
+    used = [row for row, counts in zip(found, kept, strict=True) if counts]
+    said = [part for row in used for part in (row.evidence, row.mass) if part is not None]
     trial = center + np.arange(-_REACH, _REACH + _STEP / 2, _STEP)
-    scores = (
-        sum(e.scores(trial) for e in known) if known else -(((trial - center) / error) ** 2) / 2
-    )
+    scores = sum(part.scores(trial) for part in said)
     return AxisEstimate(
         center=float(center),
         interval=(float(center - half), float(center + half)),
         tilt=float(tilt),
         spread=float(np.sqrt(np.mean(away[kept] ** 2))) if kept.sum() > 1 else 0.0,
-        by=by,
+        by=max((row.by for row in used), key=len),
         rows=places[kept],
         centers=centers[kept],
         errors=errors[kept],

@@ -22,6 +22,11 @@ _RING = 9
 # averaged; and the level, as a share of strong line integrals, above which they are not air.
 _END, _BLUR, _AIR = 0.01, 9, 0.04
 _STRONG, _MOST = 99.0, 98.0
+# Share of the frequencies up to Nyquist that tell of places. Views that were sampled at the bins'
+# centres instead of averaged over them, as many simulated ones are, fold higher frequencies about
+# Nyquist, so that the upper ones pull the axis to half a bin; of noisy views they say little. Of
+# short windows so many are kept in any case, without which nothing could be told.
+_SAMPLED, _FEWEST = 0.6, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,9 +186,10 @@ def spectra(row: Row, center: float) -> Spectra:
 
 
 def _transformed(part: Views, length: int, first: int) -> Spectra:
-    """Without frequency zero and the highest of an even length, which tell nothing of places."""
+    """Without frequency zero, which tells nothing of places, and those that may be folded."""
     from scipy.fft import rfft
 
-    inner = slice(1, (length + 1) // 2)
+    least = min((length + 1) // 2, 1 + _FEWEST)
+    inner = slice(1, max(least, int(_SAMPLED * length / 2)))
     frequencies = 2 * np.pi * np.arange(length // 2 + 1) / length
     return Spectra(rfft(part, length, axis=1)[:, inner], frequencies[inner], float(first))
