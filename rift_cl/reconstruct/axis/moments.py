@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 _MASS = 0.02
 # Share of the greatest mean line integral above which a bin sees the object, in addition to so many
 # standard deviations of the noise of that mean; margin in bins.
-_OBJECT, _SURE, _MARGIN = 0.02, 4.5, 2
+_OBJECT, _SURE, _MARGIN = 0.02, 3.5, 6
 # Bins of such a mean, and the share of the views in it.
 _ACROSS, _AROUND = 5, 1 / 40
 # Least number of bins on either side of the object that tell the level of air.
@@ -61,13 +61,13 @@ def mass_center(views: NDArray[np.float32], angles: Floats) -> MassCenter | None
     """
     order = np.argsort(angles, kind="stable")
     views, angles = views[order], angles[order]
-    bins = _object_bins(views)
-    part, places = views[:, bins].astype(float), np.arange(views.shape[1])[bins]
+    seen, places = _seen(views), np.arange(views.shape[1])
+    part = np.where(seen, views, 0).astype(float)
     mass = part.sum(axis=1)
     mean = float(mass.mean())
     if not mean > 0:
         return None
-    noise = _noise(views) * np.sqrt(places.size)
+    noise = _noise(views) * np.sqrt(seen.sum(axis=1).mean())
     if mass.std() > np.hypot(_MASS * mean, 2 * noise):
         return None
     centers = (part @ places) / mass
@@ -83,11 +83,11 @@ def mass_center(views: NDArray[np.float32], angles: Floats) -> MassCenter | None
         float(np.linalg.norm(inverse[0])) * float(left.std()) * np.sqrt(free),
     )
     # What a level that each bin adds to all views would do to the centre.
-    pull = inverse[0] @ ((places - centers[:, None]) / mass[:, None])
-    return MassCenter(center, float(np.hypot(error, _air_error(views, bins, pull))))
+    pull = inverse[0] @ (seen * (places - centers[:, None]) / mass[:, None])
+    return MassCenter(center, float(np.hypot(error, _air_error(views, seen, pull))))
 
 
-def _air_error(views: NDArray[np.float32], bins: NDArray[np.intp], pull: Floats) -> float:
+def _air_error(views: NDArray[np.float32], seen: NDArray[np.bool_], pull: Floats) -> float:
     """What the level of air, and bins that are off by themselves, may do to the centre.
 
     Both are read from the bins that the object never reaches, or from the outermost where there are
@@ -95,8 +95,10 @@ def _air_error(views: NDArray[np.float32], bins: NDArray[np.intp], pull: Floats)
     underneath the object.
     """
     mean = views.mean(axis=0, dtype=float)
-    sides = mean[: max(bins[0], _AIR)], mean[min(bins[-1] + 1, mean.size - _AIR) :]
-    across = (bins - bins[0]) / max(bins.size - 1, 1)
+    reached = np.flatnonzero(seen.any(axis=0))
+    first, last = reached[0], reached[-1]
+    sides = mean[: max(first, _AIR)], mean[min(last + 1, mean.size - _AIR) :]
+    across = (np.arange(mean.size) - first) / max(last - first, 1)
     pulls = np.array([pull @ (1 - across), pull @ across])
     levels = np.array([side.mean() for side in sides])
     single = np.sqrt(np.mean([side.var(ddof=1) for side in sides]))
@@ -106,17 +108,25 @@ def _air_error(views: NDArray[np.float32], bins: NDArray[np.intp], pull: Floats)
     return float(np.linalg.norm([pulls @ levels, *doubts, rings]))
 
 
-def _object_bins(views: NDArray[np.float32]) -> NDArray[np.intp]:
-    from scipy.ndimage import uniform_filter
+def _seen(views: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """The bins of each view from one end of the object to the other; all if nothing is seen.
+
+    What noise hides is not seen; ends are therefore the furthest of neighbouring views.
+    """
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter
 
     around = max(3, round(_AROUND * len(views)))
-    level = uniform_filter(views, (around, _ACROSS), mode="nearest").max(axis=0)
+    level = uniform_filter(views, (around, _ACROSS), mode="nearest")
     noise = _noise(views) / np.sqrt(around * _ACROSS)
-    floor = _OBJECT * level.max() + _SURE * noise
-    seen = np.flatnonzero(level > floor)
-    if not seen.size:
-        return np.arange(views.shape[1])
-    return np.arange(max(0, seen[0] - _MARGIN), min(views.shape[1], seen[-1] + 1 + _MARGIN))
+    over = level > _OBJECT * level.max() + _SURE * noise
+    some, last = over.any(axis=1), views.shape[1] - 1
+    left = np.where(some, over.argmax(axis=1), 0)
+    right = np.where(some, last - over[:, ::-1].argmax(axis=1), last)
+    left = minimum_filter1d(left, around, mode="nearest") - _MARGIN
+    right = maximum_filter1d(right, around, mode="nearest") + _MARGIN
+    bins = np.arange(views.shape[1])
+    seen: NDArray[np.bool_] = (bins >= left[:, None]) & (bins <= right[:, None])
+    return seen
 
 
 def _noise(views: NDArray[np.float32]) -> float:
