@@ -61,14 +61,15 @@ def mass_center(views: NDArray[np.float32], angles: Floats) -> MassCenter | None
     """
     order = np.argsort(angles, kind="stable")
     views, angles = views[order], angles[order]
-    seen, places = _seen(views), np.arange(views.shape[1])
+    noise = _noise(views)
+    seen, places = _seen(views, noise), np.arange(views.shape[1])
     part = np.where(seen, views, 0).astype(float)
     mass = part.sum(axis=1)
     mean = float(mass.mean())
     if not mean > 0:
         return None
-    noise = _noise(views) * np.sqrt(seen.sum(axis=1).mean())
-    if mass.std() > np.hypot(_MASS * mean, 2 * noise):
+    spread = noise * np.sqrt(seen.sum(axis=1).mean())
+    if mass.std() > np.hypot(_MASS * mean, 2 * spread):
         return None
     centers = (part @ places) / mass
     model = np.stack([np.ones_like(angles), np.cos(angles), np.sin(angles)], axis=1)
@@ -84,10 +85,12 @@ def mass_center(views: NDArray[np.float32], angles: Floats) -> MassCenter | None
     )
     # What a level that each bin adds to all views would do to the centre.
     pull = inverse[0] @ (seen * (places - centers[:, None]) / mass[:, None])
-    return MassCenter(center, float(np.hypot(error, _air_error(views, seen, pull))))
+    return MassCenter(center, float(np.hypot(error, _air_error(views, seen, pull, noise))))
 
 
-def _air_error(views: NDArray[np.float32], seen: NDArray[np.bool_], pull: Floats) -> float:
+def _air_error(
+    views: NDArray[np.float32], seen: NDArray[np.bool_], pull: Floats, noise: float
+) -> float:
     """What the level of air, and bins that are off by themselves, may do to the centre.
 
     Both are read from the bins that the object never reaches, or from the outermost where there are
@@ -103,12 +106,11 @@ def _air_error(views: NDArray[np.float32], seen: NDArray[np.bool_], pull: Floats
     levels = np.array([side.mean() for side in sides])
     single = np.sqrt(np.mean([side.var(ddof=1) for side in sides]))
     doubts = single * pulls / np.sqrt([side.size for side in sides])
-    noise = _noise(views) / np.sqrt(len(views))
-    rings = np.sqrt(max(single**2 - noise**2, 0.0)) * np.linalg.norm(pull)
+    rings = np.sqrt(max(single**2 - noise**2 / len(views), 0.0)) * np.linalg.norm(pull)
     return float(np.linalg.norm([pulls @ levels, *doubts, rings]))
 
 
-def _seen(views: NDArray[np.float32]) -> NDArray[np.bool_]:
+def _seen(views: NDArray[np.float32], noise: float) -> NDArray[np.bool_]:
     """The bins of each view from one end of the object to the other; all if nothing is seen.
 
     What noise hides is not seen; ends are therefore the furthest of neighbouring views.
@@ -117,8 +119,7 @@ def _seen(views: NDArray[np.float32]) -> NDArray[np.bool_]:
 
     around = max(3, round(_AROUND * len(views)))
     level = uniform_filter(views, (around, _ACROSS), mode="nearest")
-    noise = _noise(views) / np.sqrt(around * _ACROSS)
-    over = level > _OBJECT * level.max() + _SURE * noise
+    over = level > _OBJECT * level.max() + _SURE * noise / np.sqrt(around * _ACROSS)
     some, last = over.any(axis=1), views.shape[1] - 1
     left = np.where(some, over.argmax(axis=1), 0)
     right = np.where(some, last - over[:, ::-1].argmax(axis=1), last)
