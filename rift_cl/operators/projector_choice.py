@@ -32,7 +32,6 @@ class _Costs(NamedTuple):
         pixel: of ``Projector``, for a pixel of a view.
         bin: of ``Projector``, for a bin of a view.
         sample: of ``FastProjector``, for a sample of a view's transform that is kept.
-        stacked: the same, where several slices are spread at once.
         point: of ``FastProjector``, for a number that is transformed.
         launches: of ``Projector``'s kernels.
         fast_launches: of those of ``FastProjector``.
@@ -41,18 +40,18 @@ class _Costs(NamedTuple):
     pixel: float
     bin: float
     sample: float
-    stacked: float
     point: float
     launches: float
     fast_launches: float
 
 
-# Fitted to processor times of filtered backprojection at 64 to 512 pixels on two cores under PoCL.
-# No GPU was measured: its arithmetic is taken for fifty times as fast and its launches for dear, so
-# that only large slices go through the spectrum.
+# Fitted to filtered backprojections of single slices: at 64 to 512 pixels on two cores under PoCL,
+# and at 1,024 and 2,048 on an NVIDIA H100, where the many small kernels of the Fourier projector
+# take 7 ms whatever the size. The number of slices does not count, though several at once cost less
+# each: a slice is to come out the same alone and in a stack.
 _COSTS = {
-    "cpu": _Costs(0.17, 4.0, 20.0, 10.0, 5.0, launches=1e5, fast_launches=1e5),
-    "gpu": _Costs(0.0034, 0.08, 0.4, 0.4, 0.1, launches=5e4, fast_launches=2.5e5),
+    "cpu": _Costs(0.17, 4.0, 20.0, 5.0, launches=1e5, fast_launches=1e5),
+    "gpu": _Costs(0.0018, 0.05, 2.0, 0.95, launches=3e5, fast_launches=7.1e6),
 }
 
 
@@ -111,5 +110,4 @@ def _fast_cost(fast: FastProjector, costs: _Costs) -> float:
     points = (
         len(fast.scan.angles) * fast.period + rows * columns + fast.grid.shape[-2] * columns
     ) / 2
-    sample = costs.stacked if fast.grid.slices > 1 else costs.sample
-    return sum(fast.samples) * sample + points * costs.point + costs.fast_launches
+    return sum(fast.samples) * costs.sample + points * costs.point + costs.fast_launches

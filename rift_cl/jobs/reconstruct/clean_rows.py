@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +81,24 @@ class Alignment:
         return upright(rows, self.tilt, self.center, pivot=pivot, rows=part, device=device)
 
 
+class LoadedRows(NamedTuple):
+    """Rows as they were read.
+
+    Args:
+        start: the first row that is wanted.
+        stop: the one after the last.
+        kept: the same of the rows that are left when all but the axis is corrected.
+        first: number of the first row that was read.
+        integrals: line integrals of the rows that were read.
+    """
+
+    start: int
+    stop: int
+    kept: tuple[int, int]
+    first: int
+    integrals: Attenuation
+
+
 class CleanRows:
     """Reads rows of a scan and corrects them.
 
@@ -111,31 +129,40 @@ class CleanRows:
 
     def read(self, start: int, stop: int) -> Attenuation:
         """Line integrals of some rows."""
+        return self.clean(self.load(start, stop))
+
+    def load(self, start: int, stop: int) -> LoadedRows:
+        """Read some rows, and those around them that corrections look at.
+
+        Works on the host alone, so that another thread than the one that uses the device can do it.
+        """
         bins = self._scan.shape[2]
         turned = 0 if self.alignment is None else self.alignment.halo(bins)
-        first, last = self._around(start, stop, turned)
-        integrals = self._level(first, last)
-        rows = integrals.projections
+        kept = self._around(start, stop, turned)
+        first, last = self._around(*kept, self._halo)
+        return LoadedRows(start, stop, kept, first, read_attenuation(self._scan, first, last))
+
+    def clean(self, loaded: LoadedRows) -> Attenuation:
+        """Correct what was loaded."""
+        (first, last), rows = loaded.kept, loaded.integrals.projections
+        kept = slice(first - loaded.first, last - loaded.first)
+        if self._settings.zingers is not None:
+            rows = self._without_zingers(rows, kept)
+        if self.phase is not None:
+            rows = paganin(np.exp(-rows), **_arguments(self.phase))
+        rows = np.ascontiguousarray(rows[:, kept])
         if self.rings is not None:
             rows = remove_rings(rows, method=self.rings, device=self._device)
         if self.alignment is not None:
-            wanted = slice(start - first, stop - first)
+            wanted = slice(loaded.start - first, loaded.stop - first)
             rows = self.alignment.aligned(rows, first, wanted, self._device)
-        return dataclasses.replace(integrals, projections=rows)
+        return dataclasses.replace(loaded.integrals, projections=rows)
 
-    def _level(self, start: int, stop: int) -> Attenuation:
-        """Line integrals before anything that is done in sinograms."""
+    @property
+    def _halo(self) -> int:
+        """Rows on either side that zingers and phase retrieval look at."""
         halo = 0 if self.phase is None else self.phase.halo_rows()
-        halo += 0 if self._settings.zingers is None else _ZINGER_HALO
-        first, last = self._around(start, stop, halo)
-        integrals = read_attenuation(self._scan, first, last)
-        rows = integrals.projections
-        if self._settings.zingers is not None:
-            rows = self._without_zingers(rows, slice(start - first, stop - first))
-        if self.phase is not None:
-            rows = paganin(np.exp(-rows), **_arguments(self.phase))
-        rows = np.ascontiguousarray(rows[:, start - first : stop - first])
-        return dataclasses.replace(integrals, projections=rows)
+        return halo + (0 if self._settings.zingers is None else _ZINGER_HALO)
 
     def _without_zingers(self, rows: Floats, inner: slice) -> Floats:
         sigma = self._settings.zingers or 0.0

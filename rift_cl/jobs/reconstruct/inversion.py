@@ -19,8 +19,12 @@ from rift_cl.cl.device import Device
 from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 from rift_cl.jobs.reconstruct.slice_input import SliceInput
 from rift_cl.jobs.reconstruct.slice_window import Window
-from rift_cl.operators import LinearOperator, ParallelProjector
-from rift_cl.operators.projector_choice import cheapest_projector
+from rift_cl.operators import (
+    FastProjector,
+    LinearOperator,
+    ParallelProjector,
+    cheapest_projector,
+)
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp, poisson_weights
 from rift_cl.reconstruct.direction_weights import DirectionWeights
@@ -217,11 +221,14 @@ class Inversion:
             grid, scan = self.window.around(self._width())[0], self.source.geometry
         else:
             grid, scan = self.window.grid(slices), self.source.formula_geometry()
+        if settings.error is not None:
+            # A whole lobe of the bins' spectrum, as cheapest_projector takes for solvers.
+            lobes: Any = 1 if settings.iterative else "image"
+            return FastProjector(grid, scan, settings.error, lobes=lobes, device=device)
         return cheapest_projector(
             grid,
             scan,
             iterative=settings.iterative,
-            error=settings.error,
             footprint=settings.footprint,
             device=device,
         )

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.device import Device
 from rift_cl.errors import StoppedError
 from rift_cl.io.volumes import VOLUME_NAMES, suggested_window
+from rift_cl.jobs.reconstruct.clean_rows import LoadedRows
 from rift_cl.jobs.reconstruct.decided import decided_settings
 from rift_cl.jobs.reconstruct.inversion import Inversion
 from rift_cl.jobs.reconstruct.kept_slabs import (
@@ -213,8 +214,9 @@ class Reconstruction:
             yield Report(done * self.settings.most_steps, self._total, self._what)
         values = {} if self.source.center is None else {"center": self.source.center}
         slabs = self.inversion.slabs(self._kept.missing())
-        with Behind() as behind, ahead(slabs, self._read) as read:
-            for slab, integrals in read:
+        with Behind() as behind, ahead(slabs, self._load) as load:
+            for slab, loaded in load:
+                integrals = self.source.projections(loaded)
                 slices = yield from self._slab(slab, integrals, done)
                 behind.do(self._kept.save, slab.start, slices)
                 done += slab.stop - slab.start
@@ -224,7 +226,7 @@ class Reconstruction:
         """Reconstruct the middle slice and show it; alone, tell how long the others would take."""
         middle = self.shape[0] // 2
         slab = slice(middle, middle + 1)
-        image = yield from self._slab(slab, self._read(slab), 0)
+        image = yield from self._slab(slab, self.source.projections(self._load(slab)), 0)
         path = self._show(image[0])
         if not self.settings.preview:
             self._kept.save(middle, image)
@@ -245,9 +247,9 @@ class Reconstruction:
         self._shown = True
         return path
 
-    def _read(self, slab: slice) -> Attenuation:
+    def _load(self, slab: slice) -> LoadedRows:
         first = self.rows[0]
-        return self.source.read(first + slab.start, first + slab.stop)
+        return self.source.clean.load(first + slab.start, first + slab.stop)
 
     def _slab(
         self, slab: slice, integrals: Attenuation, before: int

@@ -1,8 +1,9 @@
 """Reading ahead and writing behind, so that disk, processor and device work at the same time.
 
-While one slab is reconstructed, the next is read and corrected in one thread and the last is
-written in another. Every slab still goes through the same steps in the same order, so that the
-result does not depend on who was faster.
+While one slab is reconstructed, the next is read in one thread and the last is written in another;
+the device is spoken to by the main thread alone, since drivers differ in what they allow others
+(NVIDIA's was seen to crash). Every slab still goes through the same steps in the same order, so
+that the result does not depend on who was faster.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from rift_cl.geometry.length_units import length_unit
 from rift_cl.io.number_list import read_numbers
 from rift_cl.jobs.axis_search import find_axis
 from rift_cl.jobs.reconstruct.binned_file import binned_file, row_binning
-from rift_cl.jobs.reconstruct.clean_rows import Alignment, CleanRows
+from rift_cl.jobs.reconstruct.clean_rows import Alignment, CleanRows, LoadedRows
 from rift_cl.jobs.reconstruct.notes import notes_of
 from rift_cl.jobs.reconstruct.settings import ReconstructSettings
 from rift_cl.jobs.scan_input import (
@@ -169,7 +169,11 @@ class SliceInput:
 
     def read(self, start: int, stop: int) -> Attenuation:
         """Parallel projections of some rows of the file, before a formula's weights and margins."""
-        integrals = self.clean.read(start, stop)
+        return self.projections(self.clean.load(start, stop))
+
+    def projections(self, loaded: LoadedRows) -> Attenuation:
+        """The same of rows that were loaded before."""
+        integrals = self.clean.clean(loaded)
         if self.stitched is not None:
             wide, _ = stitched(integrals.projections, self.stitched, device=self.device)
             return dataclasses.replace(integrals, projections=wide)
