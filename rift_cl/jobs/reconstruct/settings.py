@@ -74,9 +74,9 @@ class ReconstructSettings(ScanInput):
     interpolation between pixels (joseph) or bins (linear)."""
     error: float | None = None
     """Project through the Fourier transform, with this relative error, such as 1e-3. If neither
-    this nor --footprint is given, whichever costs less is taken: for slices from about 200 samples
-    up the Fourier transform, with an error of 1e-2 for formulas, by which their result loses less
-    than 0.05 dB, and of 1e-3 for solvers; else strip."""
+    this nor --footprint is given, whichever costs less is taken: the Fourier transform with an
+    error of 1e-3 for larger slices (from about 150 samples up on a CPU), by which filtered
+    backprojection loses nothing, else strip."""
     steps: int | None = None
     """sirt, cgls, tv, levels: most steps for a slice; 100 (divided by --subsets), 30 (with
     --precondition 4), 200, 1200 if not given."""
