@@ -279,3 +279,10 @@ def test_a_list_of_axes_that_does_not_fit_is_told(tmp_path, capsys, content, opt
     assert run("reconstruct", path, "--out", tmp_path / "out", *arguments) == INPUT
     assert sentence in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_it_is_told_where_there_is_nothing_to_stitch(tmp_path):
+    path = write_counts(tmp_path / "scan.h5", line_integrals(rows=1))
+    options = ("--center", 39.5, "--half-acquisition", "stitched")
+    reconstruct(path, tmp_path / "out", *options)
+    assert "Nothing was stitched" in notes(tmp_path / "out")

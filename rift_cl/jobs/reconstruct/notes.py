@@ -34,6 +34,11 @@ def notes_of(source: SliceInput) -> list[str]:
         notes.append(_binning(source))
     if source.stitched is not None:
         notes.append(_stitched(source))
+    elif source.settings.half_acquisition == "stitched":
+        notes.append(
+            "Nothing was stitched: the views are no full turn with the axis off the detector's "
+            "middle."
+        )
     if source.offset:
         notes.append(_offset(source))
     notes += _gap(source.geometry.angles)

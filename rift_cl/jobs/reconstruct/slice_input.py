@@ -69,6 +69,10 @@ class SliceInput:
         pitch = (self.file.pitch or 1.0) if settings.pitch is None else settings.pitch
         self.fan = self.scan.fan
         if self.fan is not None:
+            if settings.tilt:
+                raise InputError(
+                    f"{self.file.path}: --tilt is for parallel rays, these are a fan's"
+                )
             if settings.pitch is not None:
                 self.fan = dataclasses.replace(self.fan, pitch=settings.pitch * binning)
             if settings.center is not None:
@@ -224,7 +228,7 @@ class SliceInput:
         if path is None:
             return None
         if self.file.fan is not None:
-            raise InputError(f"{self.file.path}: --centers is for parallel rays, these are a fan's")
+            raise InputError(f"{self.file.path}: --centers is for parallel rays, not a fan's")
         centers = read_numbers(path, "rotation axes")
         rows, bins = self.file.shape[1:]
         if centers.size != rows or not (np.abs(centers - (bins - 1) / 2) < bins).all():
