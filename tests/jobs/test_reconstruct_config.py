@@ -31,6 +31,7 @@ def test_every_decision_is_recorded(first):
     config = config_of(first)
     settings = config["settings"]
     wanted = {"filter": "ram-lak", "cutoff": 1.0, "compensate": "voronoi", "rings": "vo"}
+    wanted["kind"] = "counts"
     assert {name: settings[name] for name in wanted} == wanted
     open_ones = ("center", "rows", "pitch", "unit", "pixel", "size", "background", "pad")
     assert all(settings[name] not in (None, "auto") for name in open_ones)

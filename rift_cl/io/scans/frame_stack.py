@@ -7,6 +7,7 @@ altogether, and NXtomo keeps projections, flats and darks in one array.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -71,3 +72,22 @@ def runs_of(indices: NDArray[np.intp]) -> Runs:
     """Cut rising indices into runs (start, stop) of consecutive ones."""
     edges = np.flatnonzero(np.diff(indices) > 1) + 1
     return tuple((int(run[0]), int(run[-1]) + 1) for run in np.split(indices, edges) if run.size)
+
+
+@dataclass(frozen=True)
+class StackedRows:
+    """The stacks of a scan in a file of arrays; readers of such files add how rows are read.
+
+    Args:
+        path: the file.
+        projections: the projections.
+        flats: the frames without the sample, if there are any.
+        darks: the frames without the beam, if there are any.
+        budget: bytes that one reading may take; 60 % of the free memory when None.
+    """
+
+    path: Path
+    projections: FrameStack
+    flats: FrameStack | None
+    darks: FrameStack | None
+    budget: int | None

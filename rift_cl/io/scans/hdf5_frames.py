@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,27 +11,12 @@ import numpy as np
 from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.hdf5_tree import Hdf5Tree, open_tree
-from rift_cl.io.scans.frame_stack import FrameStack
+from rift_cl.io.scans.frame_stack import FrameStack, StackedRows
 from rift_cl.io.scans.scan_file import Frames, Part, ScanRows
 
 
-@dataclass(frozen=True)
-class Hdf5Rows:
-    """Reads rows of a scan in an HDF5 file (a ``RowSource``).
-
-    Args:
-        path: the file.
-        projections: the projections.
-        flats: the frames without the sample, if there are any.
-        darks: the frames without the beam, if there are any.
-        budget: bytes that one reading may take; 60 % of the free memory when None.
-    """
-
-    path: Path
-    projections: FrameStack
-    flats: FrameStack | None
-    darks: FrameStack | None
-    budget: int | None
+class Hdf5Rows(StackedRows):
+    """Reads rows of a scan in an HDF5 file (a ``RowSource``)."""
 
     def read(self, start: int, stop: int) -> ScanRows:
         """Read detector rows ``start`` to ``stop`` of every stack."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.hdf5_tree import open_tree
-from rift_cl.io.scans.frame_stack import FrameStack
+from rift_cl.io.scans.frame_stack import FrameStack, StackedRows
 from rift_cl.io.scans.hdf5_frames import Hdf5Rows
 from rift_cl.io.scans.mat5 import Mat5File
 from rift_cl.io.scans.mat73 import Mat73File
@@ -21,23 +20,8 @@ from rift_cl.io.scans.named_arrays import scan_in
 from rift_cl.io.scans.scan_file import Frames, Part, RowSource, ScanFile, ScanRequest, ScanRows
 
 
-@dataclass(frozen=True)
-class Mat5Rows:
-    """Reads rows of a scan in a MAT file of version 5 (a ``RowSource``); arrays are loaded whole.
-
-    Args:
-        path: the file.
-        projections: the projections.
-        flats: the frames without the sample, if there are any.
-        darks: the frames without the beam, if there are any.
-        budget: bytes that one reading may take; 60 % of the free memory when None.
-    """
-
-    path: Path
-    projections: FrameStack
-    flats: FrameStack | None
-    darks: FrameStack | None
-    budget: int | None
+class Mat5Rows(StackedRows):
+    """Reads rows of a scan in a MAT file of version 5 (a ``RowSource``); arrays come whole."""
 
     def read(self, start: int, stop: int) -> ScanRows:
         """Read detector rows ``start`` to ``stop`` of every stack."""

@@ -17,7 +17,7 @@ from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.npz_archive import NpzArchive
 from rift_cl.io.scans.angle_list import AngleList, named_unit
 from rift_cl.io.scans.axes import USUAL
-from rift_cl.io.scans.frame_stack import FrameStack
+from rift_cl.io.scans.frame_stack import FrameStack, StackedRows
 from rift_cl.io.scans.named_arrays import Layout, scan_in
 from rift_cl.io.scans.scan_file import Frames, Part, ScanFile, ScanRequest, ScanRows, usable_pitch
 
@@ -30,23 +30,8 @@ _DISTANCES = (
 _LONGEST_VECTOR = 64 << 20
 
 
-@dataclass(frozen=True)
-class NpzRows:
-    """Reads rows of a scan in an NPZ file (a ``RowSource``); each array is loaded whole.
-
-    Args:
-        path: the file.
-        projections: the projections.
-        flats: the frames without the sample, if there are any.
-        darks: the frames without the beam, if there are any.
-        budget: bytes that one reading may take; 60 % of the free memory when None.
-    """
-
-    path: Path
-    projections: FrameStack
-    flats: FrameStack | None
-    darks: FrameStack | None
-    budget: int | None
+class NpzRows(StackedRows):
+    """Reads rows of a scan in an NPZ file (a ``RowSource``); each array is loaded whole."""
 
     def read(self, start: int, stop: int) -> ScanRows:
         """Read detector rows ``start`` to ``stop`` of every stack."""

@@ -34,6 +34,7 @@ def decided_settings(
     settings, file, window = source.settings, source.file, inversion.window
     decided: dict[str, Any] = {
         "scan": file.path,
+        "kind": file.kind,
         "out": settings.out.absolute(),
         "rings": source.clean.rings or "off",
         "pad": "on" if source.pad else "off",

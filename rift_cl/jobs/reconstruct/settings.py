@@ -81,8 +81,8 @@ class ReconstructSettings(ScanInput):
     """sirt, cgls, tv, levels: most steps for a slice; 100 (divided by --subsets), 30 (with
     --precondition 4), 200, 1200 if not given."""
     subsets: int | None = None
-    """sirt: correct the image after each of so many subsets of the views (ordered subsets), which
-    takes about that many times fewer steps; 1 if not given."""
+    """sirt: number of ordered subsets of the views; the image is updated after each, so that about
+    that many times fewer steps are needed; 1 if not given."""
     noise: float | None = None
     """sirt, cgls, tv: standard deviation of the noise of a line integral; steps end where the
     slice explains the data that well."""
@@ -127,7 +127,7 @@ class ReconstructSettings(ScanInput):
     """Remove the stripes in the sinogram that make rings in the slice: 'vo' (the same as 'on')
     combines 'dead', 'large' and 'sorting', the filters of Vo, Atwood and Drakopoulos (2018), as are
     'filtering' and 'fitting'; 'wavelet-fft' is that of Muench et al. (2009). auto: vo, where the
-    file holds counts and the views cover 150 degrees or more."""
+    file holds counts or transmission and the views cover 150 degrees or more; else off."""
     binning: int = 1
     """Average blocks of so many detector rows and bins before all else; --center, --rows, --pitch
     and --tilt keep to the detector as it is."""
@@ -139,14 +139,15 @@ class ReconstructSettings(ScanInput):
     grows with the row; projections are turned by it. If not given: the tilt found with the axis,
     where it moves the axis by a quarter of a bin or more; 0 for none."""
     centers: Path | None = None
-    """File of the rotation axis of every detector row, a bin for each (.txt, .csv or .npy), for an
-    axis that wanders; in place of --center and --tilt."""
+    """File with the bin of the rotation axis in every detector row (.txt, .csv or .npy), for an
+    axis that drifts along the rows; replaces --center and --tilt."""
     half_acquisition: Literal["weighted", "stitched"] = "weighted"
     """Full turns with the axis off the detector's middle: count opposite views by weights, or
     stitch them to views of half a turn that are nearly twice as wide."""
     delta_beta: float | None = None
     """Phase retrieval after Paganin et al. (2002), for a parallel beam and one material: the ratio
-    delta / beta of its refractive index; with --energy and --propagation."""
+    delta / beta of its refractive index; needs --energy, --propagation and a pitch in a unit of
+    length; off if not given."""
     energy: float | None = None
     """Phase retrieval: energy of the photons, in keV."""
     propagation: float | None = None
@@ -171,8 +172,8 @@ class ReconstructSettings(ScanInput):
     dry_run: bool = False
     """Show what would be done, and write nothing."""
     config: Path | None = None
-    """config.json of an earlier run: its settings are used, with every value that was decided
-    there, where this command line gives no other."""
+    """config.json of an earlier run, whose settings, with every value that was decided there, are
+    the defaults of this one."""
 
     def check(self) -> None:
         """Check what depends on nothing but the settings.
