@@ -151,7 +151,7 @@ def _render(settings: Any, output: Output) -> None:
 
 
 def _view(settings: Any, output: Output) -> None:
-    from rift_cl.jobs.view import ViewJob
+    from rift_cl.jobs.viewing.job import ViewJob
 
     # Ctrl-C is the usual way to end it, and nothing is lost by it.
     with ViewJob(settings) as job, suppress(KeyboardInterrupt):
@@ -204,7 +204,7 @@ _COMMANDS: dict[str, tuple[Callable[[Any, Output], None], str, str]] = {
     "fit": (_fit, "fit_settings", "FitSettings"),
     "eval": (_eval, "evaluate", "EvalSettings"),
     "render": (_render, "render_settings", "RenderSettings"),
-    "view": (_view, "view", "ViewSettings"),
+    "view": (_view, "viewing.job", "ViewSettings"),
     "analyze": (_analyze, "analyze_settings", "AnalyzeSettings"),
     "plan": (_plan, "plan_settings", "PlanSettings"),
     "cache": (_cache, "cache", "CacheSettings"),

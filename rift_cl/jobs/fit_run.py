@@ -60,7 +60,7 @@ class FitRun:
         every, kept = self.settings.checkpoint_every, trainer.parameters.step
         reports = trainer.run(lambda: self._stopping)
         if self.settings.view:
-            from rift_cl.jobs.fit_viewer import watched
+            from rift_cl.jobs.viewing.watched import watched
 
             title = self.settings.capture.name
             reports = watched(reports, trainer, pictures, title=title, announce=self.announce)

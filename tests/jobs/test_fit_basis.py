@@ -16,7 +16,7 @@ from rift_cl.io.volumes import read_volume
 from rift_cl.jobs.basis_options import BasisOptions
 from rift_cl.jobs.fit import Fit
 from rift_cl.jobs.fit_settings import FitSettings
-from rift_cl.jobs.view import ViewJob, ViewSettings
+from rift_cl.jobs.viewing.job import ViewJob, ViewSettings
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 
 KINDS = {

@@ -22,7 +22,7 @@ import pytest
 from rift_cl.io.image import read_image
 from rift_cl.io.splat_scene import SplatScene
 from rift_cl.jobs.scene_bounds import bounds_of_splats
-from rift_cl.jobs.viewer import orbit_camera
+from rift_cl.jobs.viewing.viewer import orbit_camera
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 FLAGS = (

@@ -14,9 +14,10 @@ from rift_cl.cli import main
 from rift_cl.errors import InputError
 from rift_cl.geometry.pose import look_at
 from rift_cl.io.splat_scene import SplatScene
-from rift_cl.jobs import viewer as viewer_module
 from rift_cl.jobs.scene_bounds import SceneBounds
-from rift_cl.jobs.viewer import Pose, SplatViewer
+from rift_cl.jobs.viewing import viewer as viewer_module
+from rift_cl.jobs.viewing.pose import Pose
+from rift_cl.jobs.viewing.viewer import SplatViewer
 from rift_cl.splat.renderer import Renderer
 
 BOUNDS = SceneBounds(np.zeros(3), 1.0, np.array([0.0, 0, 1]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rift_cl.cl.discovery import open_device
 from rift_cl.jobs.orbit_input import OrbitInput
-from rift_cl.jobs.viewer import SplatViewer, orbit_camera
+from rift_cl.jobs.viewing.viewer import SplatViewer, orbit_camera
 from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
 

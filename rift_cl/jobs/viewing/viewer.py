@@ -18,13 +18,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
-from rift_cl.io.poses import view_of_quaternion
-from rift_cl.jobs.camera_path import orbit, orbit_distance, pinhole
+from rift_cl.jobs.camera_path import orbit, orbit_distance
 from rift_cl.jobs.depth_picture import depth_and_alpha, depth_picture, window_of
 from rift_cl.jobs.fit_pictures import Light
 from rift_cl.jobs.scene_bounds import SceneBounds
 from rift_cl.jobs.scene_input import in_display_light
-from rift_cl.jobs.viewer_page import KINDS, ViewerPage
+from rift_cl.jobs.viewing.page import KINDS, ViewerPage
+from rift_cl.jobs.viewing.pose import NARROWEST, Pose
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
 
@@ -39,43 +39,6 @@ _ROUGH, _SHARP = 70, 92
 _ELEVATION, _FOV = 20.0, 45.0
 # Height and width, up to scale, of a window in which all of the scene is seen at first.
 _WINDOW = (3, 4)
-# Windows narrower or wider than this are drawn as if they were not.
-_NARROWEST = 0.1
-
-
-@dataclass(frozen=True)
-class Pose:
-    """Where the camera of a page is, as viser says it.
-
-    Args:
-        wxyz: camera-to-world rotation as a quaternion; the axes are OpenCV's.
-        position: of the camera in world coordinates.
-        fov: vertical field of view in radians.
-        aspect: width of the window divided by its height.
-    """
-
-    wxyz: tuple[float, ...]
-    position: tuple[float, ...]
-    fov: float
-    aspect: float
-
-    def camera(self, edge: int) -> Camera:
-        """The camera for a picture of which the longer edge has so many pixels.
-
-        Raises:
-            InputError: the page says nonsense.
-        """
-        aspect = min(max(self.aspect, _NARROWEST), 1 / _NARROWEST)
-        height, width = edge / max(aspect, 1), edge * min(aspect, 1)
-        size = max(1, round(height)), max(1, round(width))
-        if not 0 < self.fov < np.pi:
-            raise InputError(f"the page's field of view is {self.fov}, wanted 0 to pi")
-        # A quaternion turned about is the inverse rotation.
-        w, x, y, z = self.wxyz
-        view = view_of_quaternion((w, -x, -y, -z), (0, 0, 0))
-        with np.errstate(all="ignore"):
-            view[:3, 3] = -view[:3, :3] @ np.asarray(self.position, np.float64)
-        return pinhole(size, float(np.degrees(self.fov)), view)
 
 
 @dataclass
@@ -211,7 +174,7 @@ class SplatViewer:
         if self._pace is None:
             return min(edge, _FIRST)
         share = min(pose.aspect, 1 / pose.aspect)
-        fits = int(np.sqrt(self._pace * _PICTURE / max(share, _NARROWEST)))
+        fits = int(np.sqrt(self._pace * _PICTURE / max(share, NARROWEST)))
         return min(edge, max(_LEAST, fits))
 
     def _joined(self, handle: Any, pose: Pose) -> None:

@@ -11,15 +11,14 @@ import importlib
 import io
 import socket
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError
-
-if TYPE_CHECKING:
-    from rift_cl.jobs.viewer import Pose
+from rift_cl.jobs.viewing.guard import Guard
+from rift_cl.jobs.viewing.pose import Pose
 
 _HOST = "127.0.0.1"
 KINDS = ("colour", "depth")
@@ -44,13 +43,19 @@ class ViewerPage:
             raise InputError(f"--size is {size}, wanted {_SMALLEST} to {_LARGEST} pixels")
         viser = _viser()
         _check_port(port)
-        with contextlib.redirect_stdout(io.StringIO()):
+        guard = Guard()
+        with contextlib.redirect_stdout(io.StringIO()), guard.before_viser():
             self._server = viser.ViserServer(host=_HOST, port=port, label=title, verbose=False)
         # viser takes the next port that is free, which is not what was asked for.
         if port and self._server.get_port() != port:
             self.close()
             raise _taken(port)
-        self.url = f"http://{_HOST}:{self._server.get_port()}"
+        if not guard.asked:
+            self.close()
+            raise InputError("this viser cannot be guarded: pip install 'viser>=1.1,<1.2'")
+        self.url = f"http://{_HOST}:{self._server.get_port()}/{guard.token}"
+        # What a page sends may make viser's callbacks fail: its own loss, and nobody's concern.
+        self._server.get_event_loop().set_exception_handler(lambda *_: None)
         # A page may ask for a tunnel through a server on the internet, whatever it shows.
         self._server.request_share_url = lambda *_, **__: None
         gui = self._server.gui
@@ -92,11 +97,15 @@ class ViewerPage:
 
         # Coroutines run on the thread that takes messages, so that a pose is never half new.
         async def on_move(camera: Any) -> None:
-            moved(camera.client.client_id, _pose_of(camera))
+            pose = _pose_of(camera)
+            if pose is not None:
+                moved(camera.client.client_id, pose)
 
         async def on_join(client: Any) -> None:
-            joined(client, _pose_of(client.camera))
-            client.camera.on_update(on_move)
+            pose = _pose_of(client.camera)
+            if pose is not None:
+                joined(client, pose)
+                client.camera.on_update(on_move)
 
         async def on_leave(client: Any) -> None:
             left(client.client_id)
@@ -133,16 +142,13 @@ def _viser() -> Any:
         ) from error
 
 
-def _pose_of(camera: Any) -> Pose:
-    from rift_cl.jobs.viewer import Pose
-
-    height, width = camera.image_height, camera.image_width
-    return Pose(
-        tuple(np.asarray(camera.wxyz, float).tolist()),
-        tuple(np.asarray(camera.position, float).tolist()),
-        float(camera.fov),
-        float(width) / float(height) if height > 0 < width else 1.0,
-    )
+def _pose_of(camera: Any) -> Pose | None:
+    """Where a page says that its camera is; None where it says nonsense."""
+    size = camera.image_height, camera.image_width
+    try:
+        return Pose.said(camera.wxyz, camera.position, camera.fov, *size)
+    except InputError:
+        return None
 
 
 def _check_port(port: int) -> None:
