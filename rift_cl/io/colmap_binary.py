@@ -84,12 +84,14 @@ def read_points(path: Path) -> PointRecords:
         check_claim(path, "the points", count * _POINT.size, None)
         positions = np.empty((count, 3))
         colors = np.empty((count, 3), np.uint8)
+        errors = np.empty(count)
         for index in range(count):
-            _, x, y, z, red, green, blue, _, track = file.take(_POINT)
+            _, x, y, z, red, green, blue, error, track = file.take(_POINT)
             positions[index] = x, y, z
             colors[index] = red, green, blue
+            errors[index] = error
             file.skip(_TRACK_BYTES * track)
-    return PointRecords(positions, colors)
+    return PointRecords(positions, colors, errors)
 
 
 class _Records:

@@ -60,8 +60,8 @@ def open_model(
     images = replace(images or _images_folder(folder), complete=photographs)
     views = [_view(path, images, cameras, record) for record in records]
     checked = check_views(path, views)
-    points, colors = _points(model / f"points3D{suffix}", reader)
-    return Capture(checked, points, colors, model)
+    points, colors, error = _points(model / f"points3D{suffix}", reader)
+    return Capture(checked, points, colors, model, error)
 
 
 def _images_folder(folder: Path) -> CaptureFolder:
@@ -100,11 +100,14 @@ def _view(
 
 def _points(
     path: Path, reader: ModuleType
-) -> tuple[NDArray[np.float32] | None, NDArray[np.float32] | None]:
+) -> tuple[NDArray[np.float32] | None, NDArray[np.float32] | None, float | None]:
+    """Sparse points, their colours, and the mean of the errors that are not -1, unknown."""
     if not path.is_file():
-        return None, None
+        return None, None, None
     records = reader.read_points(path)
     points = finite_points(str(path), records.positions)
     if points is None:
-        return None, None
-    return points, np.asarray(records.colors, np.float32).reshape(-1, 3) / np.float32(255)
+        return None, None, None
+    known = records.errors[np.isfinite(records.errors) & (records.errors >= 0)]
+    error = float(known.mean()) if known.size else None
+    return points, np.asarray(records.colors, np.float32).reshape(-1, 3) / np.float32(255), error

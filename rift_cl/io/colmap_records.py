@@ -60,10 +60,11 @@ class ImageRecord:
 
 @dataclass(frozen=True, eq=False)
 class PointRecords:
-    """Sparse points (P, 3), and their colours (P, 3) from 0 to 255."""
+    """Sparse points (P, 3), their colours (P, 3) from 0 to 255, their errors (P,) in pixels."""
 
     positions: NDArray[np.float64]
     colors: ArrayLike
+    errors: NDArray[np.float64]
 
 
 def parameter_count(where: str, model: str) -> int:

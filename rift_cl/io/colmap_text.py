@@ -68,15 +68,17 @@ def read_points(path: Path) -> PointRecords:
         FileFormatError: it is damaged.
         ResourceLimitError: it does not fit into memory.
     """
-    positions, colors = [], []
+    positions, colors, errors = [], [], []
     with _opened(path) as file:
         for where, line in _records(path, file):
             words = _words(where, line, _BEFORE_TRACK, _BEFORE_TRACK + 1)
             positions.append(_numbers(where, float, words[1:4]))
             colors.append(_numbers(where, int, words[4:7]))
+            errors += _numbers(where, float, words[7:8])
             if not all(0 <= code <= 255 for code in colors[-1]):
                 raise FileFormatError(f"{where}: the colour is {colors[-1]}, wanted 0 to 255")
-    return PointRecords(np.array(positions, np.float64).reshape(-1, 3), colors)
+    places = np.array(positions, np.float64).reshape(-1, 3)
+    return PointRecords(places, colors, np.array(errors, np.float64))
 
 
 @contextmanager

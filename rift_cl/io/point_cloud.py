@@ -1,4 +1,4 @@
-"""The sparse points of a capture, from the PLY file that its transforms.json names."""
+"""The sparse points of a capture, from the PLY file that its transforms.json names, and to one."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim, reading
+from rift_cl.io.output import atomic_path
 from rift_cl.io.ply_body import read_blocks
 from rift_cl.io.ply_header import PlyHeader, read_header
 from rift_cl.io.view import finite_points
@@ -40,6 +41,32 @@ def read_point_cloud(path: Path) -> tuple[Floats | None, Floats | None]:
         if points is None or len(wanted) == len(_PLACE):
             return points, None
         return points, _scaled(columns[:, 3:], header)
+
+
+def write_point_cloud(path: Path, points: Floats, colors: Floats | None) -> None:
+    """Write a binary PLY file of positions as float32 and colours as 8-bit codes.
+
+    Args:
+        path: the file.
+        points: (P, 3) in world coordinates.
+        colors: (P, 3) in [0, 1], or None.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    fields: list[tuple[str, str]] = [(name, "<f4") for name in _PLACE]
+    columns = list(points.T)
+    if colors is not None:
+        fields += [(name, "u1") for name in _COLOR]
+        columns += list(np.rint(colors.T * 255))
+    body = np.empty(len(points), fields)
+    for (name, _), column in zip(fields, columns, strict=True):
+        body[name] = column
+    words = {"<f4": "float", "u1": "uchar"}
+    lines = [f"property {words[kind]} {name}" for name, kind in fields]
+    head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}", *lines]
+    with atomic_path(path) as part:
+        part.write_bytes("\n".join([*head, "end_header\n"]).encode() + body.tobytes())
 
 
 def _read_columns(

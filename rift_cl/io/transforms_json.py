@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import reprlib
+from dataclasses import replace
 from pathlib import Path
 
 from rift_cl.errors import FileFormatError, InputError
@@ -23,23 +24,24 @@ from rift_cl.io.point_cloud import read_point_cloud
 from rift_cl.io.poses import view_of_opengl
 from rift_cl.io.view import Capture, View, check_views, located
 
-_COEFFICIENTS = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2")
-_MODELS = (
-    "SIMPLE_PINHOLE",
-    "PINHOLE",
-    "SIMPLE_RADIAL",
-    "RADIAL",
-    "OPENCV",
-    "FULL_OPENCV",
-    "OPENCV_FISHEYE",
-)
+_COEFFICIENTS = tuple(dict.fromkeys(name for names in LENS_MODELS.values() for name in names))
+_MODELS = ("SIMPLE_PINHOLE", "PINHOLE", *LENS_MODELS)
 
 
-def open_transforms(path: Path, *, photographs: bool = True) -> Capture:
-    """Read the views of a transforms.json; see ``open_capture``."""
+def open_transforms(
+    path: Path, *, photographs: bool = True, images: CaptureFolder | None = None
+) -> Capture:
+    """Read the views of a transforms.json; see ``open_capture``.
+
+    Args:
+        path: the file.
+        photographs: whether they have to be there.
+        images: where the photographs are, if not beside the file.
+    """
     top = read_json_object(path)
     folder = CaptureFolder(path.parent, complete=photographs)
-    views = [_view(folder, frame, top) for frame in top.objects("frames")]
+    place = folder if images is None else replace(images, complete=photographs)
+    views = [_view(place, frame, top) for frame in top.objects("frames")]
     checked = check_views(path, views)
     ply = top.text("ply_file_path")
     if ply is None:

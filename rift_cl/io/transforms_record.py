@@ -1,7 +1,8 @@
 """Cameras as a transforms.json says them, the other way round from ``transforms_json``.
 
 nerfstudio's flavour: each frame has intrinsics of its own and a camera-to-world pose with OpenGL's
-axes; the opening of a lens is ``aperture_radius``, ``focus_distance`` and ``wavelength``.
+axes; the opening of a lens is ``aperture_radius``, ``focus_distance`` and ``wavelength``, what it
+distorts ``camera_model`` and its coefficients by COLMAP's names.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from rift_cl.errors import InputError
 from rift_cl.geometry.camera import Camera
+from rift_cl.geometry.lens_distortion import LENS_MODELS, Lens
 
 
 def transforms_of(
@@ -39,6 +41,14 @@ def transforms_of(
     more = fields or [{}] * len(cameras)
     frames = [_frame(*entry) for entry in zip(cameras, names, more, strict=True)]
     return {"camera_model": "PINHOLE", "frames": frames}
+
+
+def lens_fields(lens: Lens | None) -> dict[str, Any]:
+    """What a frame says of a lens that distorts; nothing where it does not."""
+    if lens is None:
+        return {}
+    names = LENS_MODELS[lens.model]
+    return {"camera_model": lens.model, **dict(zip(names, lens.coefficients, strict=True))}
 
 
 def _frame(camera: Camera, name: str, more: Mapping[str, Any]) -> dict[str, Any]:

@@ -44,12 +44,15 @@ class Capture:
         points: sparse points of the scene, float32 (P, 3) in world coordinates, or None.
         point_colors: their colours in display light, float32 (P, 3) in [0, 1], or None.
         path: the file, or the folder of the COLMAP model, that the views were found in.
+        reprojection_error: how far from where a photograph shows them the sparse points are
+            seen, in pixels of the photographs, the mean over the points; None where nobody says.
     """
 
     views: tuple[View, ...]
     points: NDArray[np.float32] | None
     point_colors: NDArray[np.float32] | None
     path: Path
+    reprojection_error: float | None = None
 
 
 def camera_at(view: View, downscale: int) -> Camera:

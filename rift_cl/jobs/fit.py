@@ -22,6 +22,9 @@ from rift_cl.io.capture import (
 )
 from rift_cl.io.photographs import demand_photographs, pose_photographs
 from rift_cl.io.splat_scene import SplatScene
+from rift_cl.jobs.cameras.arc import demand_places
+from rift_cl.jobs.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras
+from rift_cl.jobs.cameras.photograph_place import place_record
 from rift_cl.jobs.few import evenly
 from rift_cl.jobs.fit_pictures import CapturePictures
 from rift_cl.jobs.fit_report import fit_page
@@ -59,6 +62,7 @@ class Fit(FitRun):
         if self.bare and not self._posed.exists():
             demand_photographs(settings.capture)
         self.capture = None if self.bare else open_seen(settings.capture, pinhole=settings.pinhole)
+        self._photographs: int | None = None
         self.seen: tuple[View, ...] = ()
         self.unseen: tuple[View, ...] = ()
         if self.capture is not None:
@@ -121,6 +125,7 @@ class Fit(FitRun):
         if capture is None:
             capture = yield from self._find_poses()
             self._split(capture)
+        self._keep_cameras(capture)
         pictures = self._pictures(self.seen)
         if settings.refine_exposures and pictures.any_cut_out():
             raise InputError(
@@ -149,16 +154,25 @@ class Fit(FitRun):
             **score_record(self.scores),
         }
         page = fit_page(capture.path.name, self.scores, self.losses, self.metrics)
-        self.folder.finish(settings, self.metrics, page, self.device)
+        self.folder.finish(settings, self.metrics, page, self.device, **self.decided)
+
+    def _keep_cameras(self, capture: Capture) -> None:
+        """Leave the cameras in the folder, so that an unfinished fit has them too."""
+        out, seen, unseen = self.settings.out, self.seen, self.unseen
+        self.folder.drop(*CAMERA_FILES)
+        self.decided = {"photographs": place_record([*seen, *unseen], out)}
+        save_fit_cameras(out, capture, seen, unseen, photographs=self._photographs)
 
     def _split(self, capture: Capture) -> None:
         settings = self.settings
+        demand_places([view.camera for view in capture.views], settings.capture)
         self.seen, self.unseen = split_views(capture.views, settings.hold_out, settings.views)
 
     def _find_poses(self) -> Generator[Report, None, Capture]:
         """A capture of bare photographs; what could not be placed is said."""
         settings = self.settings
         found = yield from pose_photographs(settings.capture, self._posed, seed=settings.seed)
+        self._photographs = len(found.placed) + len(found.missing)
         for name, reason in found.missing.items():
             warnings.warn(f"{name} has no pose and is left out: {reason}", stacklevel=2)
         return open_capture(found.model, images=settings.capture)

@@ -43,6 +43,8 @@ class FitRun:
         self.losses: list[tuple[int, float]] = []
         self.scores: dict[str, list[ViewScore]] = {}
         self.metrics: dict[str, Any] = {}
+        # What config.json holds besides the settings, from when the training begins.
+        self.decided: dict[str, Any] = {}
         self.announce: Callable[[str], None] = lambda line: None
         self._stopping = False
 
@@ -55,7 +57,7 @@ class FitRun:
         if self.settings.resume:
             self.losses = self.checkpoints.restore(trainer)
         else:
-            self.folder.mark()
+            self.folder.mark(**self.decided)
             self.folder.drop("checkpoints")
         every, kept = self.settings.checkpoint_every, trainer.parameters.step
         reports = trainer.run(lambda: self._stopping)

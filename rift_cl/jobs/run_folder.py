@@ -61,9 +61,13 @@ class RunFolder:
         if not (self.path / _CONFIG).exists():
             self.mark()
 
-    def mark(self) -> None:
-        """Say that the folder is this command's, and that its run is not finished."""
-        write_json(self.path / _CONFIG, {"job": self._job, "complete": False})
+    def mark(self, **decided: Any) -> None:
+        """Say that the folder is this command's, and that its run is not finished.
+
+        Args:
+            **decided: what the configuration is to hold already, by name.
+        """
+        write_json(self.path / _CONFIG, {"job": self._job, "complete": False, **decided})
 
     def discard(self) -> None:
         """Remove the folder if a failed run left nothing in it but the mark."""

@@ -81,7 +81,7 @@ def test_a_colmap_model(tmp_path: Path, folder: str, write: type) -> None:
         capture = open_capture(given)
         check_cameras(capture)
         check_points(capture)
-        assert capture.path == model
+        assert capture.path == model and capture.reprojection_error == 0.5
         assert [view.name for view in capture.views] == made.NAMES
         assert capture.views[2].image == tmp_path / "images" / "sub" / "c.png"
 
