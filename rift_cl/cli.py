@@ -159,6 +159,16 @@ def _view(settings: Any, output: Output) -> None:
         watch(job.run(), Output(quiet=True))
 
 
+def _export(settings: Any, output: Output) -> None:
+    from rift_cl.jobs.export.export import Export
+
+    job = Export(settings)
+    if not output.quiet:
+        job.announce = lambda note: print_line(f"rift: {note}")
+    if ran(job, settings, output):
+        print(job.result)
+
+
 def _analyze(settings: Any, output: Output) -> None:
     from rift_cl.jobs.analyze import Analysis
 
@@ -205,6 +215,7 @@ _COMMANDS: dict[str, tuple[Callable[[Any, Output], None], str, str]] = {
     "eval": (_eval, "evaluate", "EvalSettings"),
     "render": (_render, "render_settings", "RenderSettings"),
     "view": (_view, "viewing.job", "ViewSettings"),
+    "export": (_export, "export.settings", "ExportSettings"),
     "analyze": (_analyze, "analyze_settings", "AnalyzeSettings"),
     "plan": (_plan, "plan_settings", "PlanSettings"),
     "cache": (_cache, "cache", "CacheSettings"),

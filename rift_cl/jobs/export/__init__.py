@@ -1,0 +1,1 @@
+"""``rift export``: a scene in the files that other people's viewers, editors and printers read."""

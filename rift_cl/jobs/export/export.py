@@ -1,0 +1,115 @@
+"""``rift export``: one file out of a scene, and a sentence for each thing that it cannot hold."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from rift_cl.cl.budget import format_bytes
+from rift_cl.errors import InputError, OutputError
+from rift_cl.io.output import atomic_path, check_space
+from rift_cl.io.splat_formats.formats import DEGREE, FORMATS
+from rift_cl.io.splat_scene import SplatScene
+from rift_cl.jobs.export.axes import turn_between, turned
+from rift_cl.jobs.export.plain_scene import plain_scene
+from rift_cl.jobs.export.settings import ExportSettings
+from rift_cl.progress import Report
+
+_UP = np.array([0.0, 1, 0])
+# What viewers add to splats on the screen, in square pixels.
+_VIEWERS = 0.3
+
+
+class Export:
+    """An export that is planned; nothing is written yet.
+
+    Args:
+        settings: what to do.
+
+    Raises:
+        RiftError: the scene cannot be read, the format cannot hold it, or the file is there.
+    """
+
+    def __init__(self, settings: ExportSettings) -> None:
+        self.settings = settings
+        self.announce: Callable[[str], None] = lambda sentence: None
+        name = settings.to or "html"
+        if name not in FORMATS:
+            raise InputError(f"--to {name} is about triangles: add --mesh")
+        self.format = FORMATS[name]
+        self.scene = settings.open_scene()
+        self.path = output_path(settings, self.format.suffix)
+        self._plain, self.notes = plain_scene(self.scene.splats, self.scene.light)
+        if self._plain.degree > DEGREE:
+            self._plain = _lower(self._plain)
+            self.notes.append(f"harmonics of degree {DEGREE + 1} are left out")
+        if self.format.upright:
+            up = settings.bounds(self._plain).up
+            self._turn = turn_between(up, _UP)
+            self.notes.append(
+                "the scene is turned so that up, ({:.3g}, {:.3g}, {:.3g}), is y".format(*up)
+            )
+        else:
+            self._turn = np.eye(3)
+        if self.scene.drawing.eps2d != _VIEWERS:
+            self.notes.append(
+                f"viewers blur by {_VIEWERS:g} square pixels, the scene was fitted with "
+                f"{self.scene.drawing.eps2d:g}: pictures smaller than the photographs look softer"
+            )
+
+    def plan(self) -> dict[str, str]:
+        """What would be done, by name."""
+        scene = self._plain
+        facts = {
+            "scene": f"{self.scene.name}, {len(self.scene.splats)} splats",
+            "output": str(self.path),
+            "splats": f"{len(scene)}, harmonics of degree {scene.degree}",
+            "rounded": self.format.rounds,
+        }
+        return facts | {f"note {n}": note for n, note in enumerate(self.notes, 1)}
+
+    def run(self) -> Iterator[Report]:
+        """Do it; a report at the end."""
+        for note in self.notes:
+            self.announce(note)
+        content = self.format.encode(turned(self._plain, self._turn))
+        write_whole(self.path, content)
+        self.result = f"{self.path}, {format_bytes(len(content))}"
+        yield Report(len(self._plain), len(self._plain), "splats")
+
+
+def output_path(settings: ExportSettings, suffix: str) -> Path:
+    """Where the file goes.
+
+    Raises:
+        OutputError: a file is there already, or it is the scene itself.
+    """
+    path = settings.out
+    if path is None:
+        name = settings.scene.resolve().name
+        path = Path((name if settings.scene.is_dir() else Path(name).stem) + suffix)
+    here = settings.scene / "scene.ply" if settings.scene.is_dir() else settings.scene
+    if path.exists() and here.exists() and path.samefile(here):
+        raise OutputError(f"{path}: is the scene itself; name another file (--out)")
+    if path.exists() and not settings.overwrite:
+        raise OutputError(f"{path}: is there already; name another file (--out) or add --overwrite")
+    return path
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file that appears complete or not at all.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    check_space(path, len(content))
+    with atomic_path(path) as part:
+        part.write_bytes(content)
+
+
+def _lower(scene: SplatScene) -> SplatScene:
+    """Without the harmonics that formats do not hold."""
+    return dataclasses.replace(scene, sh=np.ascontiguousarray(scene.sh[:, : (DEGREE + 1) ** 2]))

@@ -1,0 +1,134 @@
+"""Formats of other makers: read back by readers of the tests, within what the formats round."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from splat_readers import C0, read_compressed_ply, read_glb, read_spz
+
+from rift_cl.errors import InputError
+from rift_cl.io.splat_activations import opacities_of, scales_of
+from rift_cl.io.splat_formats.formats import FORMATS
+from rift_cl.io.splat_formats.plain import along_curve, unit_quats
+from rift_cl.io.splat_formats.spz import encode_spz, fraction_bits
+from rift_cl.io.splat_scene import SplatScene, XrayScene
+
+# Of a rotation's smaller components, by 10 bits: half a step, as an angle of the whole rotation.
+TURN = 4e-3
+
+
+def scene(count: int = 700, degree: int = 3) -> SplatScene:
+    random = np.random.default_rng(count)
+    rest = random.normal(0, 0.2, (count, (degree + 1) ** 2, 3)).clip(-0.9, 0.9)
+    return SplatScene(
+        means=random.normal(0, 3, (count, 3)),
+        log_scales=random.uniform(-6, 0, (count, 3)),
+        quats=random.normal(size=(count, 4)),
+        logit_opacities=random.normal(0, 3, count),
+        sh=rest,
+    )
+
+
+def angles(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    cosines = np.abs(np.einsum("ni,ni->n", one, other)) / np.linalg.norm(other, axis=1)
+    return 2 * np.arccos(np.clip(cosines, 0, 1))
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2, 3])
+@pytest.mark.parametrize("name", ["compressed-ply", "spz"])
+def test_what_is_read_back_is_what_was_written_within_the_levels(name: str, degree: int) -> None:
+    given = along_curve(scene(degree=degree))
+    content = FORMATS[name].encode(given)
+    read = (read_compressed_ply if name == "compressed-ply" else read_spz)(content)
+    apart = {key: np.abs(read[key]).max(initial=0) * 1e-6 + 1e-6 for key in read}
+    if name == "spz":
+        places, scales, colors, rest = 0.5 ** fraction_bits(given) / 2, 1 / 32, 0.0037, 1 / 16
+    else:
+        cut = [slice(k, k + 256) for k in range(0, len(given), 256)]
+        boxes = [np.ptp(given.means[part], axis=0) for part in cut]
+        sizes = np.repeat(boxes, [256, 256, 700 - 512], axis=0)
+        places, scales = sizes / 2046, 6 / 2046
+        colors, rest = np.ptp(C0 * given.sh[:, 0]) / 510, 1 / 64
+    assert np.all(np.abs(read["means"] - given.means) <= places + apart["means"])
+    assert np.abs(read["log_scales"] - given.log_scales).max() <= scales + apart["log_scales"]
+    opacities = opacities_of(given.logit_opacities)
+    assert np.abs(read["opacities"] - opacities).max() <= 1 / 510 + 1e-6
+    assert np.abs(read["colors"] - 0.5 - C0 * given.sh[:, 0]).max() <= colors + 1e-6
+    assert read["rest"].shape == given.sh[:, 1:].shape
+    assert np.abs(read["rest"] - given.sh[:, 1:]).max(initial=0) <= rest + 1e-6
+    assert angles(unit_quats(given), read["quats"]).max() <= TURN
+
+
+def test_gltf_keeps_every_bit_and_says_what_it_is() -> None:
+    given = scene(degree=2)
+    document, read = read_glb(FORMATS["glb"].encode(given))
+    mark = "KHR_gaussian_splatting"
+    assert document["extensionsUsed"] == [mark]
+    primitive = document["meshes"][0]["primitives"][0]
+    assert primitive["mode"] == 0
+    assert primitive["extensions"][mark]["colorSpace"] == "srgb_rec709_display"
+    np.testing.assert_array_equal(read["POSITION"], given.means)
+    np.testing.assert_array_equal(read[f"{mark}:SCALE"], scales_of(given.log_scales))
+    np.testing.assert_array_equal(read[f"{mark}:OPACITY"], opacities_of(given.logit_opacities))
+    quats = np.roll(read[f"{mark}:ROTATION"], 1, axis=1)
+    np.testing.assert_allclose(quats, unit_quats(given), atol=1e-7)
+    orders = [(degree, m) for degree in range(3) for m in range(2 * degree + 1)]
+    for number, (degree, m) in enumerate(orders):
+        values = read[f"{mark}:SH_DEGREE_{degree}_COEF_{m}"]
+        np.testing.assert_array_equal(values, given.sh[:, number])
+    bounds = document["accessors"][primitive["attributes"]["POSITION"]]
+    assert bounds["min"] == given.means.min(0).tolist()
+    colors = np.clip(0.5 + C0 * given.sh[:, 0], 0, 1)
+    assert np.abs(read["COLOR_0"][:, :3] / 255 - colors).max() <= 1 / 510 + 1e-6
+
+
+@pytest.mark.parametrize("name", list(FORMATS))
+def test_the_same_splats_are_the_same_bytes(name: str) -> None:
+    assert FORMATS[name].encode(scene(300)) == FORMATS[name].encode(scene(300))
+
+
+@pytest.mark.parametrize("name", list(FORMATS))
+@pytest.mark.parametrize("count", [1, 2, 256, 257])
+def test_few_splats_and_splats_in_one_place_are_written(name: str, count: int) -> None:
+    given = scene(count, degree=1)
+    flat = SplatScene(
+        means=np.ones((count, 3)),
+        log_scales=np.full((count, 3), -2.0),
+        quats=given.quats,
+        logit_opacities=np.full(count, 80.0),
+        sh=np.full((count, 4, 3), 3.0),
+    )
+    assert FORMATS[name].encode(given) and FORMATS[name].encode(flat)
+
+
+@pytest.mark.parametrize("name", list(FORMATS))
+def test_what_a_format_cannot_hold_is_refused_in_a_sentence(name: str) -> None:
+    plain = scene(4, 0)
+    arrays = {key: getattr(plain, key) for key in ("means", "log_scales", "quats")}
+    strengths = {"logit_opacities": plain.logit_opacities, "sh": plain.sh}
+    modes = SplatScene(**arrays, **strengths, shape_modes=np.zeros((4, 3)))
+    for wrong, words in (
+        (modes, "shape order 1"),
+        (XrayScene(**arrays, **strengths), "densities"),
+        (SplatScene(**arrays, **strengths, activation="exp"), "activation exp"),
+        (scene(4, 4), "degree 3"),
+    ):
+        with pytest.raises(InputError, match=words):
+            FORMATS[name].encode(wrong)
+
+
+def test_spz_takes_the_finest_numbers_that_hold_the_scene() -> None:
+    given = scene(5, 0)
+    for farthest, digits in ((4.0, 20), (100.0, 16), (8388607.0, 0)):
+        far = np.zeros((5, 3))
+        far[0, 0] = -farthest
+        moved = SplatScene(far, given.log_scales, given.quats, given.logit_opacities, given.sh)
+        assert fraction_bits(moved) == digits
+        assert np.abs(read_spz(encode_spz(moved))["means"][:, 0]).max() == farthest
+    with pytest.raises(InputError, match="scale the scene"):
+        encode_spz(
+            SplatScene(
+                2 * far,
+                *(getattr(given, n) for n in ("log_scales", "quats", "logit_opacities", "sh")),
+            )
+        )
