@@ -1,6 +1,7 @@
 """Paths: rings are round, splines smooth, views evenly spaced, limits kept."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ PATHS = {
     "two rings": Constraints(path=TiltedRings(2), elevation=(-0.3, 0.9)),
     "three rings": Constraints(path=TiltedRings(3)),
     "below a pole": Constraints(path=TiltedRings(2), elevation=(0.2, math.pi / 2)),
-    "closed": Constraints(path=Spline(6), **SECTOR),
+    "closed": Constraints(path=Spline(6, closed=True), **SECTOR),
     "open": Constraints(path=Spline(6, closed=False), **SECTOR),
     "round": Constraints(path=Spline(6), elevation=(-0.2, 0.8)),
 }
@@ -129,6 +130,23 @@ def test_a_path_goes_round_keep_outs_or_says_that_none_does():
     wall = KeepOut(Cone((0, 0, 0), (1, 0, 0), 1.5))
     with pytest.raises(InputError, match=r"no path Ring with 9 views .* keepouts\[0\] cuts"):
         plan(TARGET, 9, Constraints(path=Ring(), elevation=(-0.5, 0.5), keepouts=(wall,)))
+
+
+def test_a_spline_finds_its_way_beside_a_wall_that_cuts_every_full_turn():
+    wall = KeepOut(Cone((0, 0, 0), (1, 0, 0), 1.3))
+    limits = Constraints(elevation=(0, 0.6), keepouts=(wall,))
+    found = plan(TARGET, 12, replace(limits, path=Spline(6)))
+    assert permitted(found.objective.site, found.stations)
+    with pytest.raises(InputError, match="no path Ring"):
+        plan(TARGET, 12, replace(limits, path=Ring()))
+
+
+@pytest.mark.parametrize("limits", [Constraints(elevation=(0, 1.3)), Constraints(**SECTOR)])
+def test_a_spline_is_as_good_as_the_best_arc(limits):
+    target = Target((0, 0, 0), 10.0, snr=1000.0, frequencies=half_ball(1.6, 600))
+    found = plan(target, 16, replace(limits, path=Spline(6)))
+    # But for views that stand half a step inside the ends of half a turn.
+    assert found.merit <= 1.02 * found.baselines["arc"].merit
 
 
 def test_free_views_follow_no_curve():

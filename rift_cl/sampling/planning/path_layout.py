@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.sampling.planning.curves import Curve
+from rift_cl.sampling.planning.curve import Curve
 from rift_cl.sampling.planning.site import (
     AZIMUTH,
     COLUMNS,

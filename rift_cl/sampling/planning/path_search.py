@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.sampling.planning.candidates import settings_of
-from rift_cl.sampling.planning.curves import Curve, curves_of
+from rift_cl.sampling.planning.curve import Curve
+from rift_cl.sampling.planning.curves import curves_of
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.path_layout import PathLayout
 from rift_cl.sampling.planning.polish import permitted, polish
@@ -61,8 +62,17 @@ def best_path(objective: Objective, views: int, *, moved: bool) -> Stations:
     found.sort(key=lambda entry: entry[0])
     ends = [layout.stations(layout.start) for _, layout in found[:1]]
     if moved:
-        ends += [polish(objective, layout) for _, layout in found[:_MOVED]]
+        ends += [polish(objective, layout) for layout in _best_of_each(found)]
     return min(ends, key=objective.value)
+
+
+def _best_of_each(found: list[tuple[float, PathLayout]]) -> list[PathLayout]:
+    """The best few starts, one of each family of curves before a second of any; best first."""
+    ranked = [layout for _, layout in found]
+    first = {id(layout.curve): layout for layout in reversed(ranked)}
+    leaders = [layout for layout in ranked if first[id(layout.curve)] is layout]
+    others = [layout for layout in ranked if first[id(layout.curve)] is not layout]
+    return [*leaders, *others][:_MOVED]
 
 
 def _fits(site: Site, kind: int, curve: Curve, start: Floats) -> bool:
@@ -102,5 +112,5 @@ def _no_path(site: Site, curves: list[Curve], views: int) -> str:
     shares = ", ".join(f"keepouts[{i}] cuts {n}" for i, n in enumerate(lost.tolist()))
     return (
         f"Constraints: no path {name} with {views} views keeps clear of the keep-outs (of {tried} "
-        f"tried {shares}): take the path Free, or Spline, or limit elevations"
+        f"tried {shares}): take the path Free, or Spline, or allow other elevations"
     )

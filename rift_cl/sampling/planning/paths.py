@@ -46,18 +46,19 @@ class Spline:
     """One smooth curve (a uniform cubic B-spline in azimuth, elevation and distance).
 
     It stays within the box of its control points, so that it keeps the limits that they keep.
-    Views are evenly spaced along its length. The planner tries one turn and more.
+    Views are evenly spaced along its length. The planner tries one turn and more, and arcs and
+    loops within sectors.
 
     Args:
         controls: number of control points.
-        closed: whether it ends where it began.
+        closed: whether it ends where it began; whichever is better if None.
 
     Raises:
         InputError: there are fewer than four control points.
     """
 
     controls: int = 8
-    closed: bool = True
+    closed: bool | None = None
 
     def __post_init__(self) -> None:
         """Check the count."""

@@ -21,9 +21,10 @@ from rift_cl.sampling.planning.spending import cost, total
 from rift_cl.sampling.planning.stations import Stations
 
 Floats = NDArray[np.float64]
-# Evaluations of the merit, and the relative fall below which no more is looked for.
+# Evaluations of the merit. One that falls little says nothing, since the method first finds out how
+# far it may go: it ends where so many together lowered the merit by less than a share of it.
 STEPS = 60
-_ENOUGH = 1e-4
+_ENOUGH, _SEVERAL = 1e-3, 8
 # How far a keep-out may be entered while views move, in target diameters; steps back out of it.
 _TOLERANCE, _BACK = 1e-7, 40
 
@@ -71,7 +72,6 @@ def polish(objective: Objective, layout: Layout, steps: int = STEPS) -> Stations
     optimiser.set_lower_bounds(low)
     optimiser.set_upper_bounds(high)
     optimiser.set_maxeval(steps)
-    optimiser.set_ftol_rel(_ENOUGH)
     seen: list[tuple[float, Floats]] = []
 
     def merit(numbers: Floats, slope: Floats) -> float:
@@ -79,14 +79,24 @@ def polish(objective: Objective, layout: Layout, steps: int = STEPS) -> Stations
         seen.append((value, numbers.copy()))
         if slope.size:
             slope[:] = layout.pulled_back(numbers, by_table[None])[0]
+        if _settled([entry[0] for entry in seen]):
+            optimiser.force_stop()
         return value
 
     optimiser.set_min_objective(merit)
     _constrain(optimiser, objective.site, layout)
     # Where it breaks off, what was seen until then stands.
-    with contextlib.suppress(nlopt.RoundoffLimited):
+    with contextlib.suppress(nlopt.RoundoffLimited, nlopt.ForcedStop):
         optimiser.optimize(np.clip(start, low, high))
     return _best(objective, layout, sorted(seen, key=lambda entry: entry[0]))
+
+
+def _settled(merits: list[float]) -> bool:
+    """Whether the last several evaluations together brought next to nothing."""
+    if len(merits) <= _SEVERAL:
+        return False
+    before, now = min(merits[:-_SEVERAL]), min(merits)
+    return before - now <= _ENOUGH * abs(before)
 
 
 def _best(objective: Objective, layout: Layout, seen: list[tuple[float, Floats]]) -> Stations:
