@@ -83,8 +83,8 @@ def _demo(settings: Any, output: Output) -> None:
     job = DemoJob(settings)
     watch(job.run(), output)
     print_table(COLUMNS, job.rows, caption=SCORING)
-    if job.fit is not None:
-        print_table(FIT_COLUMNS, score_rows(job.fit.metrics), caption=FIT_SCORING)
+    for name, fit in job.fits.items():
+        print_table(FIT_COLUMNS, score_rows(fit.metrics), caption=f"{name}: {FIT_SCORING}")
     print(f"pictures and report.html are in {settings.out}")
 
 

@@ -30,12 +30,12 @@ from ornament.cameras import (
     with_aperture,
 )
 from ornament.capture_folder import render_capture
+from ornament.command import run
 from ornament.tracer import BACKGROUND, Tracer, choose_variant
-from rift_cl.errors import InputError, RiftError
+from rift_cl.errors import InputError
 from rift_cl.progress_bar import print_line, show_progress
 
 _SIZE = (224, 168)
-_INTERRUPTED = 130
 # Nearer than this a camera stands among the hairs, further away behind the lights.
 _NEAREST, _FURTHEST = 2.0, 9.0
 
@@ -75,15 +75,7 @@ class Settings:
 def main() -> int:
     """Render what was asked for."""
     settings = tyro.cli(Settings, description=__doc__)
-    try:
-        _render(settings)
-    except RiftError as error:
-        print_line(f"render_ornament: {error}")
-        return error.exit_status
-    except KeyboardInterrupt:
-        print_line("render_ornament: interrupted; the same command goes on")
-        return _INTERRUPTED
-    return 0
+    return run("render_ornament", lambda: _render(settings))
 
 
 def _render(settings: Settings) -> None:

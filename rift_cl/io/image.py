@@ -1,4 +1,4 @@
-"""Pictures: PNG out, and PNG, OpenEXR, TIFF, JPEG or HDR in."""
+"""Pictures: PNG out, and PNG, OpenEXR, TIFF, JPEG, HDR or HEIC in."""
 
 from __future__ import annotations
 
@@ -53,7 +53,8 @@ def read_image(path: str | os.PathLike[str], *, budget: int | None = None) -> ND
 
     Raises:
         InputError: there is no such file.
-        FileFormatError: the file is damaged, or is none of PNG, OpenEXR, TIFF, JPEG and HDR.
+        FileFormatError: the file is damaged, or is none of PNG, OpenEXR, TIFF, JPEG, HDR
+            and HEIC.
         ResourceLimitError: the image is larger than the budget; nothing was allocated.
     """
     pixels = read_pixels(Path(path), budget=budget)

@@ -16,6 +16,7 @@ from typing import Any
 from rift_cl.errors import InputError, RiftError
 from rift_cl.io.capture_paths import CaptureFolder
 from rift_cl.io.colmap_process import colmap_result, demand_pycolmap, run_colmap
+from rift_cl.io.heic import demand_heic
 from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import make_folder, staged_folder, write_json, writing
 from rift_cl.io.photograph_folder import (
@@ -26,6 +27,7 @@ from rift_cl.io.photograph_folder import (
     whole_photographs,
     with_headers,
 )
+from rift_cl.io.pixels import HEIC, SUFFIXES
 from rift_cl.progress import Report
 
 # Fewer do not tell where the scene is from where the lens is.
@@ -62,9 +64,13 @@ def demand_photographs(folder: str | os.PathLike[str]) -> list[str]:
         The names of its photographs.
 
     Raises:
-        InputError: there are fewer than three, there is no such folder, or pycolmap is missing.
+        InputError: there are fewer than three, there is no such folder, or pycolmap is missing, or
+            pi-heif where there is HEIC.
     """
     names = photograph_names(photographs_in(Path(folder)))
+    heic = next((name for name in names if SUFFIXES[Path(name).suffix.lower()] == HEIC), None)
+    if heic is not None:
+        demand_heic(Path(folder, heic))
     if len(names) < _FEWEST:
         raise InputError(
             f"{folder}: holds {len(names)} photographs, poses can be found from {_FEWEST} on"

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rift_cl.io.boundary import reading
-from rift_cl.io.pixels import image_format, opened_image
+from rift_cl.io.heic import heic_taken_by, opened_heic
+from rift_cl.io.pixels import HEIC, image_format, opened_image
 
 _TAKEN_BY = ("Make", "Model", "Exif:FocalLength", "Exif:FocalLengthIn35mmFilm")
 
@@ -22,7 +23,7 @@ class PictureHeader:
         linear: the colours are proportional to light; integers are display light by custom.
         eight_bit: each number is a code of 8 bits.
         orientation: how EXIF wants it shown, 1 to 8; 1 as it is stored, 5 to 8 with the axes
-            swapped. No reader here turns a picture.
+            swapped. Only HEIC comes turned from its decoder, and is 1 here.
         taken_by: maker and model of the camera and its focal lengths, as EXIF has them; empty
             where it has none.
     """
@@ -37,13 +38,32 @@ class PictureHeader:
 
 
 def read_picture_header(path: Path) -> PictureHeader:
-    """Read the header of a PNG, OpenEXR, TIFF, JPEG or HDR.
+    """Read the header of a PNG, OpenEXR, TIFF, JPEG, HDR or HEIC.
 
     Raises:
-        InputError: there is no such file.
+        InputError: there is no such file, or pi-heif is wanted and not installed.
         FileFormatError: the file is damaged, or is none of these.
     """
-    with reading(path, "the image"), opened_image(path, image_format(path)) as source:
+    with reading(path, "the image"):
+        format = image_format(path)
+        return _heic_header(path) if format == HEIC else _header(path, format)
+
+
+def _heic_header(path: Path) -> PictureHeader:
+    picture = opened_heic(path)
+    return PictureHeader(
+        size=picture.size[::-1],
+        channels=len(picture.mode),
+        alpha=picture.mode.endswith("A"),
+        linear=False,
+        eight_bit=True,
+        orientation=1,
+        taken_by=heic_taken_by(picture),
+    )
+
+
+def _header(path: Path, format: str) -> PictureHeader:
+    with opened_image(path, format) as source:
         spec = source.spec()
         taken_by = (spec.getattribute(name) for name in _TAKEN_BY)
         return PictureHeader(

@@ -2,7 +2,8 @@
 
 OpenImageIO reports failure by return values, and for some formats by ``geterror`` alone: a PNG on
 a full disk counts as written otherwise. On the way in it would try every decoder it has on a file
-that the first one refuses, so the few formats wanted here are recognised before it is asked.
+that the first one refuses, so the few formats wanted here are recognised before it is asked. HEIC,
+which its wheels lack, goes through pi-heif.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, ResourceLimitError
 from rift_cl.io.boundary import check_claim, reading
+from rift_cl.io.heic import BRANDS, heic_codes, opened_heic
 
+HEIC = "heic"
 SUFFIXES = {
     ".png": "png",
     ".exr": "openexr",
@@ -27,6 +30,8 @@ SUFFIXES = {
     ".jpg": "jpeg",
     ".jpeg": "jpeg",
     ".hdr": "hdr",
+    ".heic": HEIC,
+    ".heif": HEIC,
 }
 _SIGNATURES = {
     b"\x89PNG\r\n\x1a\n": "png",
@@ -80,10 +85,24 @@ def read_pixels(path: Path, *, budget: int | None = None) -> NDArray[np.float32]
 
     Raises:
         InputError: there is no such file.
-        FileFormatError: the file is damaged, or is none of PNG, OpenEXR, TIFF, JPEG and HDR.
+        FileFormatError: the file is damaged, or is none of PNG, OpenEXR, TIFF, JPEG, HDR and HEIC.
         ResourceLimitError: the image is larger than the budget; nothing was allocated.
     """
-    with reading(path, "the image"), opened_image(path, image_format(path)) as source:
+    with reading(path, "the image"):
+        format = image_format(path)
+        return _heic(path, budget) if format == HEIC else _opened(path, format, budget)
+
+
+def _heic(path: Path, budget: int | None) -> NDArray[np.float32]:
+    picture = opened_heic(path)
+    width, height = picture.size
+    check_claim(path, "the image", 5 * width * height * len(picture.mode), budget)
+    return heic_codes(picture).astype(np.float32) / np.float32(255)
+
+
+def _opened(path: Path, format: str, budget: int | None) -> NDArray[np.float32]:
+    """The pixels of a file that OpenImageIO reads; see ``read_pixels``."""
+    with opened_image(path, format) as source:
         spec = source.spec()
         if spec.deep or spec.depth > 1:
             raise FileFormatError(f"{path}: holds deep pixels, a flat image is wanted")
@@ -136,11 +155,13 @@ def image_format(path: Path) -> str:
     with path.open("rb") as file:
         start = file.read(16)
     content = next((name for mark, name in _SIGNATURES.items() if start.startswith(mark)), None)
+    if start[4:8] == b"ftyp" and start[8:12] in BRANDS:
+        content = HEIC
     if content is None or SUFFIXES.get(path.suffix.lower()) != content:
         raise FileFormatError(
             f"{path}: the content is {content or 'of no known format'}, the name says "
-            f"{path.suffix or 'nothing'}; an image is .png, .exr, .tif, .jpg or .hdr and what its "
-            "name says"
+            f"{path.suffix or 'nothing'}; an image is .png, .exr, .tif, .jpg, .hdr or .heic and "
+            "what its name says"
         )
     return content
 

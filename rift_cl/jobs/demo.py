@@ -1,7 +1,8 @@
 """``rift demo``: both ways to a radiance field, so that a new user sees them work in a minute.
 
 Integration: a phantom from exact projections, by filtered backprojection. Regression: splats fitted
-to the pictures that come with the package, which leaves a folder as ``rift fit`` does.
+to the captures that come with the package, a ring round an ornament and a wall that is seen from
+one side; each leaves a folder as ``rift fit`` does.
 """
 
 from __future__ import annotations
@@ -22,13 +23,23 @@ from rift_cl.jobs.run_folder import RunFolder
 from rift_cl.jobs.view_study import ViewScore, view_study
 from rift_cl.plot import curves, figure_png, image_grid
 from rift_cl.progress import Report
-from rift_cl.sample import ornament, ornament_off_path
+from rift_cl.sample import ornament, ornament_off_path, wall
 
 COLUMNS = ("views", "PSNR unfiltered", "SSIM unfiltered", "PSNR filtered", "SSIM filtered")
 # SSIM looks at windows of 11 samples.
 _SMALLEST = 11
-# The fit's folder within the demo's.
-FIT = "ornament"
+# The fits' folders within the demo's, and what is said of each.
+FITS = {
+    "ornament": (
+        "a glossy ornament from a ring of cameras. Held out are views of that ring, where the mean "
+        "of two neighbours already looks good; off_path are views from elsewhere, where it does "
+        "not"
+    ),
+    "wall": (
+        "a wall from its front, as one photographs what hangs there: nobody saw what lies behind "
+        "it. Every eighth view is held out"
+    ),
+}
 SCORES = ("psnr_unfiltered", "ssim_unfiltered", "psnr_filtered", "ssim_filtered")
 
 SCORING = (
@@ -39,21 +50,23 @@ SCORING = (
 
 @dataclass(frozen=True)
 class DemoSettings:
-    """Reconstruct a phantom from few views and many, then fit splats to a small sample capture.
+    """Reconstruct a phantom from few views and many, then fit splats to two small sample captures.
 
     Example: rift demo --size 256 --views 8 32 128
     """
 
     out: Path = Path("rift-demo")
-    """Folder for the pictures, report.html, config.json, metrics.json and the fit in ornament/."""
+    """Folder for the pictures, report.html, config.json, metrics.json and the fits in ornament/ and
+    wall/."""
     size: int = 512
     """Samples along each side of the slice."""
     views: tuple[int, ...] = (2, 12, 24, 95, 512)
     """Numbers of views; the default is that of the paper's Figure 5."""
     steps: int = 1500
-    """Pictures that the fit looks at, one after the other; 0 for no fit."""
+    """Pictures that the fit of the ornament looks at, one after the other, and a third of that for
+    the wall; 0 for no fits."""
     splats: int = 4000
-    """Most splats of the fit."""
+    """Most splats of a fit."""
     device: str | None = None
     """Device to use: its number, cpu, gpu, or a part of its name; see 'rift devices'."""
 
@@ -73,18 +86,19 @@ class DemoJob:
             raise InputError(f"--views is {settings.views}, wanted one number or more, each >= 1")
         self.device = open_device(settings.device)
         self.folder = RunFolder(settings.out, "demo", overwrite=True)
-        # Whatever else is there under the fit's name is not lost either.
-        RunFolder(settings.out / FIT, "fit", overwrite=True)
-        self.fit = Fit(self._fit_settings()) if settings.steps else None
+        # Whatever else is there under a fit's name is not lost either.
+        for name in FITS:
+            RunFolder(settings.out / name, "fit", overwrite=True)
+        self.fits = {name: Fit(self._fit_settings(name)) for name in FITS if settings.steps}
         self.rows: list[tuple[float, ...]] = []
 
-    def _fit_settings(self) -> FitSettings:
-        settings = self.settings
+    def _fit_settings(self, name: str) -> FitSettings:
+        settings, ring = self.settings, name == "ornament"
         return FitSettings(
-            capture=ornament(),
-            test=(ornament_off_path(),),
-            out=settings.out / FIT,
-            steps=settings.steps,
+            capture=ornament() if ring else wall(),
+            test=(ornament_off_path(),) if ring else (),
+            out=settings.out / name,
+            steps=settings.steps if ring else -(-settings.steps // 3),
             splats=settings.splats,
             checkpoint_every=0,
             device=settings.device,
@@ -100,17 +114,17 @@ class DemoJob:
             self.rows.append(study_row(score))
             yield Report(len(scores), len(counts), "view counts")
         self.folder.make()
-        self.folder.drop("filtered_*.png", "unfiltered_*.png", FIT)
+        self.folder.drop("filtered_*.png", "unfiltered_*.png", *FITS)
         for score in scores:
             for name in ("unfiltered", "filtered"):
                 write_png(self.settings.out / f"{name}_{score.views}.png", getattr(score, name))
         metrics: dict[str, Any] = {"views": [{"count": s.views, **s.scores} for s in scores]}
         page = Page("Radiance field tomography: a first look", "By integration and by regression")
         _show_study(page, scores, self.rows)
-        if self.fit is not None:
-            yield from self.fit.run()
-            metrics["fit"] = self.fit.metrics
-            _show_regression(page, self.fit)
+        for name, fit in self.fits.items():
+            yield from fit.run()
+            metrics.setdefault("fits", {})[name] = fit.metrics
+            _show_regression(page, name, fit)
         self.folder.finish(self.settings, metrics, page, self.device)
 
 
@@ -130,14 +144,12 @@ def _show_study(page: Page, scores: list[ViewScore], rows: list[tuple[float, ...
         page.figure(figure_png(figure), caption=SCORING, alt=f"{label} against views")
 
 
-def _show_regression(page: Page, fit: Fit) -> None:
-    page.section("Regression: splats fitted to pictures")
+def _show_regression(page: Page, name: str, fit: Fit) -> None:
+    page.section(f"Regression: splats fitted to pictures of the {name}")
     page.paragraph(
-        f"{fit.metrics['splats']} splats after {fit.settings.steps} steps on pictures of a glossy "
-        "ornament, path-traced, from a ring of cameras. Held out are views of that ring, where "
-        "the mean of two neighbours already looks good; off_path are views from elsewhere, where "
-        "it does not. This is a beginning: 'rift fit' takes more steps and more splats. "
-        f"'rift view' shows the splats, which are in the folder {FIT}."
+        f"{fit.metrics['splats']} splats after {fit.settings.steps} steps on path-traced pictures "
+        f"of {FITS[name]}. This is a beginning: 'rift fit' takes more steps and more splats. "
+        f"'rift view' shows the splats, which are in the folder {name}."
     )
     show_fit(page, fit.scores, fit.losses, fit.metrics)
 

@@ -38,21 +38,23 @@ def test_demo_fits_the_sample_and_shows_both_ways(tmp_path, capsys):
     out = tmp_path / "demo"
     arguments = ["demo", "--out", str(out), "--size", "32", "--views", "4", "--splats", "300"]
     assert main([*arguments, "--steps", "40"]) == 0
-    fit = json.loads((out / "metrics.json").read_text())["fit"]
-    assert fit == json.loads((out / "ornament" / "metrics.json").read_text())
-    assert set(fit["scores"]) == {"held out", "off_path"}
-    for scores in fit["scores"].values():
-        assert {"fit_psnr", "nearest_psnr", "blend_psnr"} <= set(scores)
-    assert 0 < len(rift.SplatScene.load(out / "ornament" / "scene.ply")) <= 300
+    fits = json.loads((out / "metrics.json").read_text())["fits"]
+    groups = {"ornament": {"held out", "off_path"}, "wall": {"held out"}}
+    assert {name: set(fit["scores"]) for name, fit in fits.items()} == groups
+    for name, fit in fits.items():
+        assert fit == json.loads((out / name / "metrics.json").read_text())
+        for scores in fit["scores"].values():
+            assert {"fit_psnr", "nearest_psnr", "blend_psnr"} <= set(scores)
+        assert 0 < len(rift.SplatScene.load(out / name / "scene.ply")) <= 300
     page = (out / "report.html").read_text()
-    headings = ["Integration", "Regression", "Pictures: held out", "Pictures: off_path", "Training"]
-    assert [page.index(f"<h2>{heading}") for heading in headings] == sorted(
-        page.index(f"<h2>{heading}") for heading in headings
-    )
-    # Slices, two curves, pictures of two groups, the loss.
-    assert page.count("data:image/png;base64,") == 6
+    regression = "Regression: splats fitted to pictures of the "
+    headings = ["Integration", f"{regression}ornament", "Pictures: off_path", f"{regression}wall"]
+    places = [page.index(f"<h2>{heading}") for heading in headings]
+    assert places == sorted(places)
+    # Slices, two curves, pictures of three groups, two losses.
+    assert page.count("data:image/png;base64,") == 8
     assert main([*arguments, *NO_FIT]) == 0
-    assert not (out / "ornament").exists()
+    assert not (out / "ornament").exists() and not (out / "wall").exists()
 
 
 def test_demo_keeps_what_else_lies_under_the_fits_name(tmp_path, capsys):

@@ -6,6 +6,7 @@ What needs the path tracer is skipped where Mitsuba is not installed.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 from importlib.util import find_spec
 
@@ -67,6 +68,11 @@ def test_a_variant_that_does_not_exist_is_told_with_what_there_is(tool):
         tool("ornament.tracer").choose_variant("frog")
 
 
+def ball_alone(tool, samples):
+    scenes = functools.partial(tool("ornament.scene").scenes, parts=("ball",))
+    return tool("ornament.tracer").Tracer("scalar_rgb", seed=0, samples=samples, scenes=scenes)
+
+
 def coverage(camera, parts=16):
     """(height, width) share of each pixel that sees the ball, by rays of the package's camera."""
     height, width = camera.size
@@ -86,7 +92,7 @@ def centroid(mask):
 
 @needs_mitsuba
 def test_the_ball_is_where_the_camera_says_to_a_hundredth_of_a_pixel(tool, cameras):
-    tracer = tool("ornament.tracer").Tracer("scalar_rgb", seed=0, samples=150, parts=("ball",))
+    tracer = ball_alone(tool, samples=150)
     poses = [cameras.ring(7, 12, 5.5)[2], cameras.off_path(8)[7]]
     shots = cameras.shots_at(poses, (45, 60), 45)
     shots.append(dataclasses.replace(shots[1], center=(23.4, 27.8)))
@@ -101,7 +107,7 @@ def test_the_ball_is_where_the_camera_says_to_a_hundredth_of_a_pixel(tool, camer
 @pytest.mark.parametrize(("radius", "focus"), [(0.12, 2.5), (0.25, 4.6), (0.25, 2.5)])
 def test_a_thin_lens_blurs_an_edge_as_its_formula_says(tool, cameras, radius, focus):
     """A point at depth z becomes a disc, 2 A f |1/z - 1/F| pixels wide; so does the ball's edge."""
-    tracer = tool("ornament.tracer").Tracer("scalar_rgb", seed=0, samples=900, parts=("ball",))
+    tracer = ball_alone(tool, samples=900)
     pose = cameras.around(0, 0, 5.5)
     pose[2, 3] = 0
     (shot,) = cameras.shots_at([pose], (6, 160), 45)

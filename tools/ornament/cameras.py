@@ -58,14 +58,16 @@ class Shot:
         return Camera(self.size, K, view_of_opengl(self.pose[:3]))
 
 
-def around(azimuth: float, elevation: float, distance: float) -> NDArray[np.float64]:
-    """The pose of a camera that looks at the ornament; angles in degrees, z up."""
+def around(
+    azimuth: float, elevation: float, distance: float, target: Sequence[float] = TARGET
+) -> NDArray[np.float64]:
+    """The pose of a camera that looks at a target; angles in degrees, z up."""
     a, e = math.radians(azimuth), math.radians(elevation)
     backward = np.array([math.cos(a) * math.cos(e), math.sin(a) * math.cos(e), math.sin(e)])
     right = np.array([-math.sin(a), math.cos(a), 0.0])
     pose = np.eye(4)
     pose[:3, 0], pose[:3, 1], pose[:3, 2] = right, np.cross(backward, right), backward
-    pose[:3, 3] = np.array(TARGET) + distance * backward
+    pose[:3, 3] = np.array(target) + distance * backward
     return pose
 
 
@@ -185,19 +187,19 @@ def with_aperture(shot: Shot, radius: float | None, focus: float | None) -> Shot
     return replace(shot, aperture_radius=radius, focus_distance=focus if radius else None)
 
 
-def transforms(shots: Sequence[Shot], **facts: Any) -> dict[str, Any]:
+def transforms(shots: Sequence[Shot], suffix: str = ".png", **facts: Any) -> dict[str, Any]:
     """What transforms.json says about shots of one lens; ``facts`` are written beside it."""
     first = shots[0]
     height, width = first.size
     lens = {"w": width, "h": height, "fl_x": first.focal, "fl_y": first.focal}
     lens |= {"cx": first.center[0], "cy": first.center[1]}
     angle = {"camera_angle_x": 2 * math.atan(width / 2 / first.focal)}
-    frames = [_frame(number, shot) for number, shot in enumerate(shots)]
+    frames = [_frame(number, shot, suffix) for number, shot in enumerate(shots)]
     return {"camera_model": "OPENCV", **lens, **angle, **facts, "frames": frames}
 
 
-def _frame(number: int, shot: Shot) -> dict[str, Any]:
-    frame: dict[str, Any] = {"file_path": f"images/{number:04d}.png"}
+def _frame(number: int, shot: Shot, suffix: str) -> dict[str, Any]:
+    frame: dict[str, Any] = {"file_path": f"images/{number:04d}{suffix}"}
     frame["transform_matrix"] = shot.pose.tolist()
     if shot.aperture_radius:
         frame["aperture_radius"] = shot.aperture_radius

@@ -10,12 +10,14 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import OutputError, RiftError
 from rift_cl.io import make_folder, write_json, write_png
 from rift_cl.io.json_fields import read_json_object
-from rift_cl.io.output import writing
+from rift_cl.io.output import atomic_path, writing
+from rift_cl.io.pixels import write_pixels
 from rift_cl.progress import Report
 
 TRANSFORMS, PLAN = "transforms.json", "render.json"
@@ -45,11 +47,22 @@ def render_capture(
     for number, frame in enumerate(frames):
         path = out / frame["file_path"]
         if not path.exists():
-            write_png(path, draw(number))
+            _write(path, draw(number))
         yield Report(number + 1, len(frames), "pictures")
     write_json(out / TRANSFORMS, record)
     with writing(out / PLAN):
         (out / PLAN).unlink(missing_ok=True)
+
+
+def _write(path: Path, picture: NDArray[Any]) -> None:
+    """A picture in display light, as PNG or JPEG, as its name says."""
+    if path.suffix == ".png":
+        write_png(path, picture)
+        return
+    codes = np.rint(255 * np.clip(picture, 0, 1)).astype(np.uint8)
+    attributes = {"Compression": "jpeg:85"}
+    with atomic_path(path) as part:
+        write_pixels(part, codes, format="jpeg", attributes=attributes)
 
 
 def _check(out: Path, record: Mapping[str, Any]) -> None:

@@ -42,7 +42,7 @@ def ball() -> tuple[Codes, Codes]:
     paint(np.abs(latitude - wave) < 2.2, _GREEN)
     for middle, count in ((17.5, 8), (-22.5, 10), (52, 6)):
         paint(_stars(latitude, azimuth, middle, count), _TEAL)
-    return _codes(colors), _codes(painted[..., None].astype(float))
+    return codes(colors), codes(painted[..., None].astype(float))
 
 
 def _offsets(latitude: Floats, azimuth: Floats, middle: float, count: int) -> tuple[Floats, Floats]:
@@ -82,8 +82,9 @@ def base(seed: int) -> Codes:
     inside = (np.abs(far - 0.9) < 0.045) & (np.abs(turn * 30 % 1 - 0.5) < 0.34)
     for number, color in enumerate((_MAGENTA, _BLUE, _GREEN, _RED)):
         colors[inside & (tiles == number)] = color
-    return _codes(colors)
+    return codes(colors)
 
 
-def _codes(values: Floats) -> Codes:
+def codes(values: Floats) -> Codes:
+    """Numbers from 0 to 1 as codes of 8 bits."""
     return np.rint(255 * np.clip(values, 0, 1)).astype(np.uint8)

@@ -11,6 +11,7 @@ import math
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ornament.cameras import Shot
-from ornament.scene import PARTS, scenes
+from ornament.scene import scenes as ornament
 from rift_cl.errors import InputError
 from rift_cl.io.display_light import to_display, to_linear
 
@@ -78,24 +79,30 @@ def _trial(variant: str) -> str | None:
 
 
 class Tracer:
-    """The ornament, ready to be looked at.
+    """A scene, ready to be looked at.
 
     Args:
         variant: of Mitsuba.
         seed: of the scene and of the noise.
         samples: least number of samples per pixel, shared out among the lights.
-        parts: of the scene, for tests.
+        scenes: makes the scene under each of its lights, from the module mitsuba, the seed and a
+            folder for files that are wanted for a moment.
     """
 
     def __init__(
-        self, variant: str, *, seed: int, samples: int, parts: tuple[str, ...] = PARTS
+        self,
+        variant: str,
+        *,
+        seed: int,
+        samples: int,
+        scenes: Callable[[Any, int, Path], list[Any]] = ornament,
     ) -> None:
         import mitsuba as mi
 
         mi.set_variant(variant)
         self._mi, self._seed, self._samples = mi, seed, samples
-        with tempfile.TemporaryDirectory(prefix="ornament-") as folder:
-            self._scenes = scenes(mi, seed, Path(folder), parts)
+        with tempfile.TemporaryDirectory(prefix="tracer-") as folder:
+            self._scenes = scenes(mi, seed, Path(folder))
         self.name = f"Mitsuba {mi.__version__}, {variant}"
 
     def picture(self, shot: Shot, number: int) -> NDArray[np.float32]:
@@ -127,6 +134,15 @@ class Tracer:
         total[..., :3] /= passes
         total[..., 3] = np.clip(total[..., 3] / (passes * len(self._scenes)), 0, 1)
         return total
+
+    def places(self, shot: Shot, number: int) -> NDArray[np.float32]:
+        """(height, width, 3) the point of the scene that somewhere in each pixel is seen."""
+        positions = self._mi.load_dict({"type": "aov", "aovs": "place:position"})
+        sensor = self._mi.load_dict(self._sensor(shot))
+        drawn = self._mi.render(
+            self._scenes[0], sensor=sensor, integrator=positions, spp=1, seed=number
+        )
+        return np.asarray(drawn, np.float32)[..., -3:]
 
     def _sensor(self, shot: Shot) -> dict[str, Any]:
         height, width = shot.size
