@@ -145,6 +145,7 @@ def _render(settings: Any, output: Output) -> None:
     from rift_cl.jobs.render import Render
 
     job = Render(settings)
+    _say_assumed(job.notes)
     if not ran(job, settings, output):
         return
     print(f"frames, animation.png and report.html are in {settings.out}")
@@ -155,6 +156,7 @@ def _view(settings: Any, output: Output) -> None:
 
     # Ctrl-C is the usual way to end it, and nothing is lost by it.
     with ViewJob(settings) as job, suppress(KeyboardInterrupt):
+        _say_assumed(job.notes)
         print(f"{job.url} shows {settings.scene}; Ctrl-C ends it", flush=True)
         watch(job.run(), Output(quiet=True))
 

@@ -15,6 +15,7 @@ from rift_cl.io.scans.formats import open_scan
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.jobs.analyze_settings import AnalyzeSettings
 from rift_cl.jobs.axis_search import find_axis
+from rift_cl.jobs.cameras.arc import demand_places
 from rift_cl.jobs.fan_views import fan_cameras
 from rift_cl.jobs.sampled import Floats, Sampled, points_of
 from rift_cl.jobs.scene_bounds import SceneBounds, bounds_of_cameras
@@ -47,7 +48,8 @@ def _capture(settings: AnalyzeSettings) -> Sampled:
             raise InputError(f"--{option} is about a scan, {settings.source} is a capture")
     capture = open_capture(settings.source, photographs=False)
     cameras = [view.camera for view in capture.views]
-    bounds = bounds_of_cameras(cameras)
+    demand_places(cameras, settings.source)
+    bounds = bounds_of_cameras(cameras, points=capture.points)
     center, diameter, notes = _ball(settings, capture, cameras, bounds)
     lens, more = _with_lens(settings, cameras, center)
     sampled = Sampled(

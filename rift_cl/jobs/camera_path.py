@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rift_cl.errors import InputError
 from rift_cl.geometry import Aperture, Camera
 from rift_cl.geometry.pose import look_at
+from rift_cl.jobs.cameras.arc import across
 from rift_cl.jobs.scene_bounds import SceneBounds
 
 Floats = NDArray[np.float64]
@@ -56,10 +57,8 @@ def orbit(
         size: (height, width) in pixels.
         fov: vertical field of view in degrees.
     """
-    up = bounds.up
-    along = np.eye(3)[np.abs(up).argmin()]
-    second = np.cross(up, along) / np.linalg.norm(np.cross(up, along))
-    first = np.cross(second, up)
+    up, first = bounds.up, across(bounds.up)
+    second = np.cross(up, first)
     rise = math.radians(elevation)
     cameras = []
     for angle in np.arange(frames) * 2 * np.pi / frames:

@@ -12,6 +12,7 @@ from tyro.conf import Positional
 from rift_cl.cl.discovery import open_device
 from rift_cl.errors import InputError
 from rift_cl.io.capture import View, camera_at, capture_name
+from rift_cl.jobs.cameras.fit_cameras import FitCameras, open_fit_cameras
 from rift_cl.jobs.evaluate_report import eval_page
 from rift_cl.jobs.fit import open_seen, split_views
 from rift_cl.jobs.fit_pictures import CapturePictures
@@ -24,17 +25,21 @@ from rift_cl.splat.renderer import Renderer
 
 @dataclass(frozen=True)
 class EvalSettings(SceneInput):
-    """Score a scene by captures of it.
+    """Score a scene by the photographs that its fit held out, or by captures of it.
 
-    Example: rift eval fit capture/transforms_test.json --train capture --out scores
+    Example: rift eval fit --out scores
     """
 
     captures: Annotated[tuple[Path, ...], Positional] = ()
-    """Captures to score: each a transforms.json, a folder with one, or a COLMAP model."""
+    """Captures to score: each a transforms.json, a folder with one, or a COLMAP model; the
+    photographs that the fit held out when not given."""
     out: Path = Path("rift-eval")
     """Folder for report.html, config.json and metrics.json."""
     train: Path | None = None
-    """The capture that was trained on: for the scores of its nearest pictures, and the angles."""
+    """The capture that was trained on: for the scores of its nearest pictures, and the angles;
+    what the fit was trained on when not given."""
+    photographs: Path | None = None
+    """Folder of the fit's own photographs, if they have moved."""
     hold_out: int = 0
     """Score every so many-th photograph of each capture, and take those of --train for unseen, as
     'rift fit' does; 0 scores all of them."""
@@ -58,15 +63,16 @@ class Evaluation:
 
     def __init__(self, settings: EvalSettings) -> None:
         self.settings = settings
-        if not settings.captures:
-            raise InputError("there is no capture to score: name one or more after the scene")
         if settings.hold_out < 0:
             raise InputError(f"--hold-out is {settings.hold_out}, wanted 0 or more")
         self.scene = settings.open_scene()
         chosen = settings.downscale
         self.downscale = self.scene.downscale if chosen is None else chosen
+        self.cameras = self._cameras()
         self.groups = {capture_name(path): self._scored(path) for path in settings.captures}
-        if len(self.groups) < len(settings.captures):
+        if not self.groups:
+            self.groups = {"held out": self._held_out()}
+        elif len(self.groups) < len(settings.captures):
             raise InputError("two captures have the same name: rename one folder")
         self.seen = self._seen()
         for view in [*self.seen, *(v for views in self.groups.values() for v in views)]:
@@ -81,20 +87,57 @@ class Evaluation:
         return views[::every] if every else views
 
     def _seen(self) -> tuple[View, ...]:
-        """What was trained on; empty where nobody says."""
+        """What was trained on; empty where nobody says, or where it is what is scored."""
         if self.settings.train is None:
-            return ()
+            return self._trained()
         views = open_seen(self.settings.train, pinhole=self.scene.pinhole).views
         seen, _ = split_views(views, self.settings.hold_out, 0)
-        files = {view.image.resolve() for view in seen}
-        for name, scored in self.groups.items():
-            both = next((view for view in scored if view.image.resolve() in files), None)
-            if both is not None:
-                raise InputError(
-                    f"{both.name} of {name} is a photograph of --train, which is its own "
-                    "nearest: leave --train out, or hold the scored ones out (--hold-out)"
-                )
+        both = self._in_both(seen)
+        if both is not None:
+            raise InputError(
+                f"{both} is a photograph of --train, which is its own nearest: leave --train out, "
+                "or hold the scored ones out (--hold-out)"
+            )
         return seen
+
+    def _cameras(self) -> FitCameras | None:
+        """Those of the fit, whose photographs may have moved."""
+        folder, moved = self.scene.folder, self.settings.photographs
+        if folder is None or moved is None:
+            return self.scene.cameras
+        return open_fit_cameras(folder, photographs=moved)
+
+    def _held_out(self) -> tuple[View, ...]:
+        """The photographs that the fit held out."""
+        where, cameras = self.settings.scene, self.cameras
+        if self.settings.hold_out:
+            raise InputError("--hold-out is about captures: the fit knows what it held out")
+        if cameras is None or self.scene.folder is None:
+            why = "is no fit's folder" if self.scene.folder is None else "is of an older version"
+            raise InputError(
+                f"there is no capture to score: name one or more after the scene, since {where} "
+                f"{why} and holds no cameras"
+            )
+        if not cameras.unseen:
+            raise InputError(
+                f"{where} held no photographs out: name a capture to score after the scene"
+            )
+        cameras.demand_photographs(where)
+        return cameras.unseen
+
+    def _trained(self) -> tuple[View, ...]:
+        """What the fit was trained on; empty where those photographs are gone, or are scored."""
+        cameras = self.cameras
+        if cameras is None or not all(view.image.is_file() for view in cameras.seen):
+            return ()
+        return () if self._in_both(cameras.seen) else cameras.seen
+
+    def _in_both(self, seen: tuple[View, ...]) -> str | None:
+        """A photograph that is scored and was trained on, with its capture's name."""
+        files = {view.image.resolve() for view in seen}
+        scored = ((view, name) for name, views in self.groups.items() for view in views)
+        names = (f"{view.name} of {name}" for view, name in scored if view.image.resolve() in files)
+        return next(names, None)
 
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""

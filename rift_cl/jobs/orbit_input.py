@@ -10,9 +10,9 @@ import numpy as np
 
 from rift_cl.errors import InputError
 from rift_cl.io.capture import open_capture
-from rift_cl.io.splat_scene import SplatScene
+from rift_cl.jobs.cameras.arc import demand_places
 from rift_cl.jobs.scene_bounds import SceneBounds, bounds_of_cameras, bounds_of_splats
-from rift_cl.jobs.scene_input import SceneInput
+from rift_cl.jobs.scene_input import OpenedScene, SceneInput
 
 
 @dataclass(frozen=True)
@@ -20,24 +20,40 @@ class OrbitInput(SceneInput):
     """Where a scene is, what a camera turns about, and which way is up."""
 
     capture: Path | None = None
-    """A capture of the same scene: turn where its cameras looked, upright and as far off as they
-    are."""
+    """A capture of the same scene (its photographs need not be there): look from where its cameras
+    did, upright and as far off. The fit's own cameras when not given."""
     up: tuple[float, float, float] | None = None
-    """Which way is up; from --capture, or from the scene's shape, when not given."""
+    """Which way is up; as the cameras of --capture or of the fit were held, or from the scene's
+    shape, when not given."""
 
-    def bounds(self, scene: SplatScene) -> SceneBounds:
-        """Where the scene lies.
+    def bounds(self, scene: OpenedScene) -> SceneBounds:
+        """Where the scene lies, and the cameras that it was seen by.
 
         Raises:
-            RiftError: the capture cannot be read, or --up has no direction.
+            RiftError: the capture cannot be read, or its cameras all stand in one place, or --up
+                has no direction.
         """
-        bounds = bounds_of_splats(scene)
+        bounds, own = bounds_of_splats(scene.splats), scene.cameras
         if self.capture is not None:
-            views = open_capture(self.capture).views
-            bounds = bounds_of_cameras([view.camera for view in views], bounds)
+            capture = open_capture(self.capture, photographs=False)
+            cameras = [view.camera for view in capture.views]
+            demand_places(cameras, self.capture)
+            bounds = bounds_of_cameras(cameras, bounds, capture.points)
+        elif own is not None:
+            bounds = bounds_of_cameras([view.camera for view in own.views], bounds)
+            bounds = replace(bounds, center=own.focus, up=own.up)
         if self.up is None:
             return bounds
         length = float(np.linalg.norm(self.up))
         if not 0 < length < math.inf:
             raise InputError(f"--up is {' '.join(map(str, self.up))}, wanted a direction")
         return replace(bounds, up=np.array(self.up) / length)
+
+    def notes(self, scene: OpenedScene) -> tuple[str, ...]:
+        """What had to be guessed of a fit's cameras, a sentence each."""
+        if scene.folder is None or scene.cameras is not None or self.capture is not None:
+            return ()
+        return (
+            f"{self.scene} holds no cameras, since an older version fitted it: the way of the "
+            "camera and what is up are guessed from the splats (name its capture with --capture).",
+        )

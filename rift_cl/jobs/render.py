@@ -1,4 +1,4 @@
-"""``rift render``: pictures of a scene, from an orbit or along a capture's cameras."""
+"""``rift render``: pictures of a scene, in a film or from a capture's cameras."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.discovery import open_device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
-from rift_cl.io.capture import open_capture
+from rift_cl.io.capture import Capture, open_capture
 from rift_cl.io.image import write_png
 from rift_cl.io.output import atomic_path, make_folder, write_json
 from rift_cl.io.pixels import write_pixels
 from rift_cl.io.transforms_record import transforms_of
 from rift_cl.jobs.animation import shrunk
-from rift_cl.jobs.camera_path import opened, orbit, orbit_distance, resized, smooth_path
+from rift_cl.jobs.camera_path import opened, resized, smooth_path
+from rift_cl.jobs.cameras.film import capture_arc, farthest_from_cameras, film, frame_of
 from rift_cl.jobs.depth_picture import LEAST_ALPHA, depth_picture, depth_window
+from rift_cl.jobs.few import evenly
 from rift_cl.jobs.render_report import Sheet, render_page, write_bytes
 from rift_cl.jobs.render_settings import MOST_FRAMES, RenderSettings
 from rift_cl.jobs.run_folder import RunFolder
@@ -29,8 +31,8 @@ from rift_cl.progress import Report
 from rift_cl.splat.bands import FrameMemory
 from rift_cl.splat.renderer import DepthKind, Renderer
 
-# What an orbit is when nothing is said.
-_FRAMES, _ELEVATION, _FOV, _SIZE = 96, 20.0, 45.0, (640, 480)
+# Frames of a film when nothing is said, and those that it is made again from.
+_FRAMES, _KEYS = 96, 13
 # Longer edge of the animation in pixels.
 _MOVING = 360
 
@@ -49,8 +51,8 @@ class Render:
         settings.check()
         self.settings = settings
         self.scene = settings.open_scene()
-        self.bounds = settings.bounds(self.scene.splats)
-        cameras = self._path() if settings.path is not None else self._orbit()
+        self.bounds = settings.bounds(self.scene)
+        cameras = self._path() if settings.path is not None else self._film()
         self.cameras = [
             opened(camera, settings.aperture, settings.focus, self.bounds.center)
             for camera in cameras
@@ -62,30 +64,46 @@ class Render:
         self.folder = RunFolder(settings.out, "render", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
 
-    def _orbit(self) -> list[Camera]:
-        """Cameras round the scene; what is not set comes from the scene or its capture."""
-        settings, bounds = self.settings, self.bounds
-        size = (settings.size or _SIZE)[::-1]
-        fov = settings.fov or _FOV
-        found = bounds.elevation if bounds.elevation is not None else _ELEVATION
-        elevation = found if settings.elevation is None else settings.elevation
-        return orbit(
-            bounds,
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What had to be guessed, a sentence each."""
+        return () if self.settings.path is not None else self.settings.notes(self.scene)
+
+    def _film(self) -> list[Camera]:
+        """Cameras round the scene or along its capture; what is not set comes from there."""
+        settings, asked = self.settings, self.settings.size
+        size, fov = frame_of(self.bounds, asked and (asked[1], asked[0]), settings.fov)
+        return film(
+            self.bounds,
             frames=settings.frames or _FRAMES,
-            elevation=elevation,
-            distance=settings.distance or orbit_distance(bounds, size, fov),
             size=size,
             fov=fov,
+            elevation=settings.elevation,
+            distance=settings.distance,
         )
 
     def _path(self) -> list[Camera]:
         settings = self.settings
-        cameras = [view.camera for view in open_capture(Path(settings.path or "")).views]
+        cameras = [view.camera for view in self._named().views]
         if settings.size is not None:
             cameras = [resized(camera, settings.size[::-1]) for camera in cameras]
         if len(cameras) + settings.between * (len(cameras) - 1) > MOST_FRAMES:
             raise InputError(f"--between {settings.between} makes more than {MOST_FRAMES} frames")
         return smooth_path(cameras, settings.between) if settings.between else cameras
+
+    def _named(self) -> Capture:
+        """The capture whose views are drawn; its photographs need not be there."""
+        return open_capture(Path(self.settings.path or ""), photographs=False)
+
+    def _way(self) -> str:
+        """The way of the film's camera, in words."""
+        arc, bounds = capture_arc(self.bounds), self.bounds
+        if self.settings.path is not None:
+            return str(self.settings.path)
+        if arc is None or arc.closed:
+            return f"orbit at {np.linalg.norm(self.cameras[0].center - bounds.center):.4g}"
+        first, last = arc.azimuth
+        return f"there and back along {len(bounds.cameras)} cameras, {last - first:.0f} degrees"
 
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""
@@ -93,13 +111,12 @@ class Render:
         largest = max((camera.size for camera in self.cameras), key=lambda size: size[0] * size[1])
         channels = 3 + self.settings.depth
         memory = FrameMemory.of(scene, largest, channels, self.scene.drawing)
-        orbit = f"orbit at {np.linalg.norm(self.cameras[0].center - bounds.center):.4g}"
         return {
             "scene": f"{self.scene.name}, {len(scene)} splats",
             "middle": "({:.4g}, {:.4g}, {:.4g})".format(*bounds.center),
             "radius": f"{bounds.radius:.4g}",
             "up": "({:.3g}, {:.3g}, {:.3g})".format(*bounds.up),
-            "cameras": str(self.settings.path) if self.settings.path is not None else orbit,
+            "cameras": self._way(),
             "frames": f"{len(self.cameras)}, at most {largest[1]} x {largest[0]} pixels",
             "eps2d": f"{self.scene.drawing.eps2d:g}",
             "device memory": f"{format_bytes(memory.fixed)} and the tile lists",
@@ -111,7 +128,7 @@ class Render:
         folder, total = self.settings.out, len(self.cameras)
         self.folder.make()
         self.folder.mark()
-        self.folder.drop("frames", "depth", "*.png", "transforms.json")
+        self.folder.drop("frames", "depth", "*.png", "transforms.json", "key_frames.json")
         make_folder(folder / "frames")
         renderer = Renderer(self.scene.drawing, device=self.device)
         splats = self.scene.splats.upload(self.device)
@@ -154,12 +171,17 @@ class Render:
     def _finish(self, sheet: Sheet, names: list[str], window: tuple[float, float]) -> None:
         folder, bounds = self.settings.out, self.bounds
         write_json(folder / "transforms.json", transforms_of(self.cameras, names))
+        if self.settings.path is None:
+            keys = evenly(len(names), _KEYS)
+            chosen = [self.cameras[k] for k in keys], [names[k] for k in keys]
+            write_json(folder / "key_frames.json", transforms_of(*chosen))
         self.metrics = {
             "frames": len(self.cameras),
             "splats": len(self.scene.splats),
             "center": bounds.center,
             "radius": bounds.radius,
             "up": bounds.up,
+            "degrees_to_photographs": farthest_from_cameras(self.cameras, bounds),
             "eps2d": self.scene.drawing.eps2d,
             "background": self.scene.background,
             "depth_window": list(window) if self.settings.depth else None,

@@ -16,25 +16,33 @@ _LONGEST, MOST_FRAMES = 16384, 100_000
 
 @dataclass(frozen=True)
 class RenderSettings(OrbitInput):
-    """Draw a scene from an orbit round it, or from the cameras of a capture.
+    """Film a scene from where it was photographed, or draw it from the cameras of a capture.
 
-    Example: rift render fit --out film --frames 120 --elevation 15 --depth
+    A ring of cameras gives an orbit at their height and distance, cameras on one side a way there
+    and back along them; a file of splats, whose cameras nobody knows, an orbit.
+
+    Example: rift render fit --out film --frames 120 --depth
     """
 
     out: Path = Path("rift-render")
-    """Folder for frames, animation.png, contact.png, transforms.json and report.html."""
+    """Folder for frames, animation.png, contact.png, transforms.json, key_frames.json and
+    report.html."""
     path: Path | None = None
-    """A transforms.json or a COLMAP model: draw each of its views, instead of an orbit."""
+    """A transforms.json, a COLMAP model, or a fit: draw each of its views, in its order, instead of
+    the film; key_frames.json of an earlier film, changed at will, with --between, for another."""
     between: int = 0
     """Frames between each two views of --path."""
     frames: int | None = None
-    """Frames of the orbit; 96 when not given."""
+    """Frames of the film; 96 when not given."""
     elevation: float | None = None
-    """Of the orbit above the horizon, in degrees; that of --capture, or 20, when not given."""
+    """Of the film's camera above the horizon, in degrees; as the photographs' cameras, or 20, when
+    not given."""
     distance: float | None = None
-    """Of the orbit from the scene's middle, in scene units; so that all is seen when not given."""
+    """Of the film's camera from the scene's middle, in scene units; as the photographs' cameras, or
+    so that all is seen, when not given."""
     fov: float | None = None
-    """Vertical field of view of the orbit in degrees; 45 when not given."""
+    """Vertical field of view of the film in degrees; that of the photographs, or 45, when not
+    given."""
     aperture: float | None = None
     """Radius of the lens's opening, in scene units, so that one depth alone is sharp; 0 for a
     pinhole. That of the views of --path, or 0, when not given."""
@@ -42,7 +50,8 @@ class RenderSettings(OrbitInput):
     """Depth that is sharp, in scene units; that of the views of --path, or of the scene's middle,
     when not given."""
     size: tuple[int, int] | None = None
-    """Width and height in pixels; 640 480, or the views' own, when not given."""
+    """Width and height in pixels; when not given the views' own, or for a film the photographs'
+    shape with 640 pixels along its longer edge, or 640 480."""
     rate: float = 24.0
     """Frames of the animation in a second."""
     depth: bool = False
@@ -83,7 +92,7 @@ class RenderSettings(OrbitInput):
             self._check_path()
 
     def _check_path(self) -> None:
-        """What makes an orbit has no meaning along a path."""
+        """What makes a film has no meaning along a path."""
         for name in ("capture", "frames", "elevation", "distance", "up", "fov"):
             if getattr(self, name) is not None:
-                raise InputError(f"--{name} is about an orbit, --path names cameras: leave one out")
+                raise InputError(f"--{name} is about a film, --path names cameras: leave one out")

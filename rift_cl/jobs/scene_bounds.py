@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rift_cl.geometry import Camera
 from rift_cl.io.splat_activations import opacities_of
 from rift_cl.io.splat_scene import SplatScene
-from rift_cl.train.start import focus_of
+from rift_cl.jobs.cameras.focus import focus_among
 
 Floats = NDArray[np.float64]
 
@@ -43,6 +43,7 @@ class SceneBounds:
         up: (3,) unit vector.
         distance: at which the cameras stood, or None.
         elevation: above the horizon at which they stood, in degrees, or None.
+        cameras: those cameras; empty where nobody knows them.
     """
 
     center: Floats
@@ -50,6 +51,7 @@ class SceneBounds:
     up: Floats
     distance: float | None = None
     elevation: float | None = None
+    cameras: tuple[Camera, ...] = ()
 
 
 def bounds_of_splats(scene: SplatScene) -> SceneBounds:
@@ -71,14 +73,19 @@ def bounds_of_splats(scene: SplatScene) -> SceneBounds:
     return SceneBounds(center, radius, _thin_axis(means - center, weights * (away <= radius)))
 
 
-def bounds_of_cameras(cameras: Sequence[Camera], splats: SceneBounds | None = None) -> SceneBounds:
+def bounds_of_cameras(
+    cameras: Sequence[Camera],
+    splats: SceneBounds | None = None,
+    points: NDArray[np.float32] | None = None,
+) -> SceneBounds:
     """Where cameras look, how far off they stand, and their common up.
 
     Args:
         cameras: of the capture that the splats were fitted to.
         splats: where the splats lie: their radius, and their up where cameras have none.
+        points: (P, 3) sparse points of the scene, or None.
     """
-    center = focus_of(cameras)
+    center = focus_among(cameras, points)
     ways = np.array([camera.center for camera in cameras]) - center
     up = common_up(cameras)
     if up is None:
@@ -87,10 +94,10 @@ def bounds_of_cameras(cameras: Sequence[Camera], splats: SceneBounds | None = No
     distance = float(np.median(distances))
     radius = distance / 2 if splats is None else splats.radius
     if distance <= 0:
-        return SceneBounds(center, radius or 1.0, up)
+        return SceneBounds(center, radius or 1.0, up, cameras=tuple(cameras))
     rise = np.clip(ways @ up / np.where(distances > 0, distances, 1), -1, 1)
     elevation = float(np.degrees(np.median(np.arcsin(rise))))
-    return SceneBounds(center, radius, up, distance, elevation)
+    return SceneBounds(center, radius, up, distance, elevation, tuple(cameras))
 
 
 def common_up(cameras: Sequence[Camera]) -> Floats | None:

@@ -20,6 +20,7 @@ from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.display_light import to_display, to_linear
 from rift_cl.io.json_fields import Fields, read_json_object
 from rift_cl.io.splat_scene import SplatScene
+from rift_cl.jobs.cameras.fit_cameras import FitCameras, open_fit_cameras
 from rift_cl.jobs.fit_pictures import Light
 from rift_cl.splat.settings import SplatSettings
 
@@ -91,6 +92,15 @@ class OpenedScene:
     def pinhole(self) -> bool:
         """Whether the fit took every lens for a pinhole, so that blur is in the splats."""
         return self._settings is not None and self._settings.flag("pinhole")
+
+    @cached_property
+    def cameras(self) -> FitCameras | None:
+        """Those that the fit knows; None where there is no fit, or an older version's.
+
+        Raises:
+            RiftError: the files that say so are damaged.
+        """
+        return None if self.folder is None else open_fit_cameras(self.folder)
 
     def _fitted(self, name: str) -> float | None:
         """A number among the settings of the fit."""

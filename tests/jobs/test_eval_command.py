@@ -84,7 +84,7 @@ def test_how_splats_are_drawn_changes_the_scores(capture, fitted, tmp_path):
 
 
 def test_a_dry_run_says_what_would_be_scored(capture, fitted, tmp_path, capsys):
-    assert evaluate(fitted, tmp_path / "scores", capture, "--dry-run") == 0
+    assert evaluate(fitted / "scene.ply", tmp_path / "scores", capture, "--dry-run") == 0
     printed = capsys.readouterr().out
     assert "8 views" in printed and "no baselines" in printed
     assert not (tmp_path / "scores").exists()
@@ -93,7 +93,7 @@ def test_a_dry_run_says_what_would_be_scored(capture, fitted, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ((), "no capture to score"),
+        (("--hold-out", 2), "knows what it held out"),
         (("CAPTURE", "CAPTURE"), "same name"),
         (("CAPTURE", "--train", "CAPTURE"), "its own nearest"),
         (("CAPTURE", "--hold-out", -1), "--hold-out is -1"),

@@ -105,8 +105,11 @@ def test_depth_is_that_of_the_renderer_in_scene_units(scene, tmp_path):
         assert picture.shape == (32, 48, 3) and picture[16, 24].sum() > 0.5
 
 
-def test_a_capture_gives_the_orbit_its_distance_and_elevation(scene, capture, tmp_path):
-    assert render(scene, tmp_path / "film", *small("--capture", capture)) == 0
+def test_a_capture_gives_the_orbit_its_distance_and_elevation(scene, tmp_path):
+    cameras = ring(5)
+    names = [f"{k}.png" for k in range(len(cameras))]
+    write_json(tmp_path / "transforms.json", transforms_of(cameras, names))
+    assert render(scene, tmp_path / "film", *small("--capture", tmp_path)) == 0
     for view in open_capture(tmp_path / "film").views:
         way = view.camera.center - MIDDLE
         assert np.linalg.norm(way) == pytest.approx(5 * np.hypot(1, 0.3), rel=1e-6)
@@ -179,7 +182,7 @@ def test_a_fit_in_linear_light_is_shown_as_a_display_shows_it(scene, tmp_path):
         (("--background", 0, 0, 2), "--background is 0.0 0.0 2.0"),
         (("--between", 3), "--between is about"),
         (("--path", "nowhere"), "nowhere"),
-        (("--path", "nowhere", "--fov", 50), "--fov is about an orbit"),
+        (("--path", "nowhere", "--fov", 50), "--fov is about a film"),
         (("--eps2d", -1), "eps2d is -1"),
         (("--capture", "nowhere"), "nowhere"),
     ],

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
+from rift_cl.jobs.cameras.focus import axes_meet
 
 Floats = NDArray[np.float64]
 
@@ -31,13 +32,15 @@ class Arc:
         azimuth: least and largest, in degrees about up, to the left as seen from above.
         elevation: least and largest, in degrees above the horizon.
         distances: from the focus in scene units: the least, the median, the largest.
-        closed: the cameras stood all round, with no gap wider than that of five of them.
+        inward: the cameras looked at the focus, and not past it or side by side.
+        closed: they did so from all round, with no gap wider than that of five of them.
     """
 
     front: Floats
     azimuth: tuple[float, float]
     elevation: tuple[float, float]
     distances: tuple[float, float, float]
+    inward: bool
     closed: bool
 
     def record(self) -> dict[str, Any]:
@@ -47,6 +50,7 @@ class Arc:
             "azimuth": self.azimuth,
             "elevation": self.elevation,
             "distances": self.distances,
+            "inward": self.inward,
             "closed": self.closed,
         }
 
@@ -70,13 +74,15 @@ def arc_of(cameras: Sequence[Camera], focus: Floats, up: Floats) -> Arc:
     gaps = np.diff(angles, append=angles[0] + 360)
     widest = int(gaps.argmax())
     extent = float(360 - gaps[widest])
+    inward = axes_meet(cameras, focus)
     middle = np.radians(angles[(widest + 1) % len(angles)] + extent / 2)
     return Arc(
         front=np.cos(middle) * first + np.sin(middle) * second,
         azimuth=(-extent / 2, extent / 2),
         elevation=(float(elevations.min()), float(elevations.max())),
         distances=(least, median, most),
-        closed=bool(gaps[widest] <= _WIDEST_GAP),
+        inward=inward,
+        closed=inward and bool(gaps[widest] <= _WIDEST_GAP),
     )
 
 

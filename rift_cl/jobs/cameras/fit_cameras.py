@@ -112,7 +112,7 @@ def save_fit_cameras(
     splits = {view.name: _SEEN for view in seen} | {view.name: _UNSEEN for view in unseen}
     views = [view for view in capture.views if view.name in splits]
     cameras = [view.camera for view in views]
-    bounds = bounds_of_cameras(cameras)
+    bounds = bounds_of_cameras(cameras, points=capture.points)
     fields = [{"split": splits[view.name], **_files(view)} for view in views]
     record = transforms_of(cameras, [view.name for view in views], fields)
     if capture.points is not None:

@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from rift_cl.cl.discovery import open_device
+from rift_cl.jobs.camera_path import resized
+from rift_cl.jobs.cameras.film import first_view
 from rift_cl.jobs.orbit_input import OrbitInput
-from rift_cl.jobs.viewing.viewer import SplatViewer, orbit_camera
+from rift_cl.jobs.viewing.viewer import SplatViewer
 from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
 
@@ -40,12 +42,13 @@ class ViewJob:
 
     def __init__(self, settings: ViewSettings) -> None:
         scene = settings.open_scene()
-        bounds = settings.bounds(scene.splats)
+        self.notes = settings.notes(scene)
+        bounds = settings.bounds(scene)
         device = open_device(settings.device)
         self._renderer = Renderer(scene.drawing, device=device)
         self._splats = scene.splats.upload(device)
         # Kernels are built before anybody waits for a picture.
-        self._renderer.forward(self._splats, orbit_camera(bounds, (16, 16)))
+        self._renderer.forward(self._splats, resized(first_view(bounds)[0], (16, 16)))
         self._viewer = SplatViewer(
             bounds,
             port=settings.port,

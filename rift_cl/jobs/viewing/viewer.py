@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
-from rift_cl.jobs.camera_path import orbit, orbit_distance
+from rift_cl.jobs.cameras.film import first_view
 from rift_cl.jobs.depth_picture import depth_and_alpha, depth_picture, window_of
 from rift_cl.jobs.fit_pictures import Light
 from rift_cl.jobs.scene_bounds import SceneBounds
@@ -36,9 +36,6 @@ _REST, _PICTURE = 0.2, 0.06
 _FIRST, _LEAST = 240, 96
 # Quality of JPEG while the camera moves and while it rests.
 _ROUGH, _SHARP = 70, 92
-_ELEVATION, _FOV = 20.0, 45.0
-# Height and width, up to scale, of a window in which all of the scene is seen at first.
-_WINDOW = (3, 4)
 
 
 @dataclass
@@ -87,8 +84,9 @@ class SplatViewer:
         # Pixels in a second, as the last picture was drawn and sent.
         self._pace: float | None = None
         self._page = ViewerPage(port=port, size=size, title=title, asked=self._asked.set)
-        first = orbit_camera(bounds, _WINDOW)
-        self._page.begin_at(first.center, bounds.center, bounds.up, _FOV)
+        first, target = first_view(bounds)
+        fov = np.degrees(2 * np.arctan(first.height / 2 / first.intrinsics[1]))
+        self._page.begin_at(first.center, target, bounds.up, float(fov))
         self._page.watch(self._joined, self._moved, self._left)
 
     @property
@@ -194,10 +192,3 @@ class SplatViewer:
     def _left(self, number: int) -> None:
         with self._lock:
             self._clients.pop(number, None)
-
-
-def orbit_camera(bounds: SceneBounds, size: tuple[int, int]) -> Camera:
-    """Where the camera of a page that is opened stands, for (height, width) pixels."""
-    elevation = _ELEVATION if bounds.elevation is None else bounds.elevation
-    distance = orbit_distance(bounds, _WINDOW, _FOV)
-    return orbit(bounds, frames=1, elevation=elevation, distance=distance, size=size, fov=_FOV)[0]
