@@ -11,16 +11,22 @@ import numpy as np
 from rift_cl.cl.budget import format_bytes
 from rift_cl.errors import InputError, OutputError
 from rift_cl.io.output import atomic_path, check_space
-from rift_cl.io.splat_formats.formats import DEGREE, FORMATS
+from rift_cl.io.splat_formats.formats import DEGREE, FORMATS, SplatFormat
 from rift_cl.io.splat_scene import SplatScene
+from rift_cl.jobs.cameras.fit_cameras import open_fit_cameras
 from rift_cl.jobs.export.axes import turn_between, turned
 from rift_cl.jobs.export.plain_scene import plain_scene
 from rift_cl.jobs.export.settings import ExportSettings
+from rift_cl.jobs.export.web_page import FirstView, web_page
+from rift_cl.jobs.scene_input import in_display_light
+from rift_cl.jobs.viewing.viewer import orbit_camera
 from rift_cl.progress import Report
 
 _UP = np.array([0.0, 1, 0])
 # What viewers add to splats on the screen, in square pixels.
 _VIEWERS = 0.3
+# Height and width of the first view where no camera is known.
+_WINDOW = (480, 640)
 
 
 class Export:
@@ -36,29 +42,51 @@ class Export:
     def __init__(self, settings: ExportSettings) -> None:
         self.settings = settings
         self.announce: Callable[[str], None] = lambda sentence: None
-        name = settings.to or "html"
-        if name not in FORMATS:
-            raise InputError(f"--to {name} is about triangles: add --mesh")
-        self.format = FORMATS[name]
         self.scene = settings.open_scene()
+        self.format = self._format(settings.to or "html")
         self.path = output_path(settings, self.format.suffix)
         self._plain, self.notes = plain_scene(self.scene.splats, self.scene.light)
         if self._plain.degree > DEGREE:
-            self._plain = _lower(self._plain)
+            kept = np.ascontiguousarray(self._plain.sh[:, : (DEGREE + 1) ** 2])
+            self._plain = dataclasses.replace(self._plain, sh=kept)
             self.notes.append(f"harmonics of degree {DEGREE + 1} are left out")
+        self._bounds = settings.bounds(self._plain)
+        self._turn = np.eye(3)
         if self.format.upright:
-            up = settings.bounds(self._plain).up
-            self._turn = turn_between(up, _UP)
+            self._turn = turn_between(self._bounds.up, _UP)
             self.notes.append(
-                "the scene is turned so that up, ({:.3g}, {:.3g}, {:.3g}), is y".format(*up)
+                "the scene is turned so that up, ({:.3g}, {:.3g}, {:.3g}), is y".format(
+                    *self._bounds.up
+                )
             )
-        else:
-            self._turn = np.eye(3)
         if self.scene.drawing.eps2d != _VIEWERS:
             self.notes.append(
                 f"viewers blur by {_VIEWERS:g} square pixels, the scene was fitted with "
                 f"{self.scene.drawing.eps2d:g}: pictures smaller than the photographs look softer"
             )
+
+    def _format(self, name: str) -> SplatFormat:
+        if name == "html":
+            rounds = "colours to one for all directions and 8 bits, covariances to half floats"
+            return SplatFormat(".html", self._page, False, rounds)
+        if name not in FORMATS:
+            raise InputError(f"--to {name} is about triangles: add --mesh")
+        return FORMATS[name]
+
+    def _page(self, scene: SplatScene) -> bytes:
+        """A page that begins at a photograph's view, where the cameras are known."""
+        folder = self.scene.folder
+        known = None if folder is None else open_fit_cameras(folder)
+        if known is None:
+            first = FirstView(
+                orbit_camera(self._bounds, _WINDOW), self._bounds.center, self._bounds.up
+            )
+            cameras = []
+        else:
+            first = FirstView(known.seen[0].camera, known.focus, known.up)
+            cameras = [view.camera for view in known.seen]
+        behind = in_display_light(self.scene.background, self.scene.light)
+        return web_page(scene, first, cameras, title=self.scene.name, background=behind).encode()
 
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""
@@ -108,8 +136,3 @@ def write_whole(path: Path, content: bytes) -> None:
     check_space(path, len(content))
     with atomic_path(path) as part:
         part.write_bytes(content)
-
-
-def _lower(scene: SplatScene) -> SplatScene:
-    """Without the harmonics that formats do not hold."""
-    return dataclasses.replace(scene, sh=np.ascontiguousarray(scene.sh[:, : (DEGREE + 1) ** 2]))

@@ -1,0 +1,161 @@
+"""One self-contained page that draws splats in any browser: viser's client with the scene in it.
+
+viser (https://viser.studio, MIT) brings the client and writes the scene into it; its server runs
+for a moment on this computer alone, guarded as that of ``rift view``. The page asks nothing of the
+network, and a content security policy in its head makes sure of it.
+
+viser draws Gaussians of one colour each. A splat's colour is the mean of what the cameras saw that
+have it in front of them, which is nearer to the photographs than the mean over all directions.
+Covariances are sent as half floats: the page's unit is a tenth of the first camera's distance, so
+that they lie where half floats are exact to a thousandth.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.basis.angular import SphericalHarmonics
+from rift_cl.errors import InputError
+from rift_cl.geometry import Camera
+from rift_cl.io.splat_activations import opacities_of
+from rift_cl.io.splat_scene import SplatScene
+from rift_cl.jobs.export.axes import matrices_of
+from rift_cl.jobs.few import evenly
+from rift_cl.jobs.viewing.guard import Guard
+
+Floats = NDArray[np.float64]
+
+# Cameras that colours are averaged over, and splats at a time.
+_CAMERAS, _BLOCK = 32, 8192
+# How far the first camera stands from what it looks at, in the page's units, and how near and far
+# the page draws.
+_AWAY, _NEAR, _FAR = 10.0, 0.01, 1e5
+# The client is packed into its page: it unpacks itself, compiles and starts workers, and no more.
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob: data:; worker-src blob: "
+    "data:; style-src 'unsafe-inline'; img-src data: blob:; font-src data:; connect-src data: blob:"
+)
+# The client sorts splats in a worker made from a blob. Chromium starts no such worker, a module,
+# for a page that was opened from a disk; told that there are no blobs, the client takes a data URL.
+_WORKERS = (
+    '<script>if(location.protocol==="file:"){const make=URL.createObjectURL;'
+    "URL.createObjectURL=(blob)=>{if(/javascript/.test(blob.type))"
+    'throw new Error("no workers from blobs here");return make.call(URL,blob);};}</script>'
+)
+
+
+@dataclass(frozen=True, eq=False)
+class FirstView:
+    """Where a page begins.
+
+    Args:
+        camera: whose picture is seen first.
+        target: (3,) what it turns about.
+        up: (3,) unit vector.
+    """
+
+    camera: Camera
+    target: Floats
+    up: Floats
+
+
+def web_page(
+    scene: SplatScene,
+    first: FirstView,
+    cameras: Sequence[Camera],
+    *,
+    title: str,
+    background: NDArray[np.float32],
+) -> str:
+    """The page.
+
+    Args:
+        scene: of plain splats in display light.
+        first: where it begins.
+        cameras: that colours are averaged over; the first one where there are none.
+        title: of the page.
+        background: (3,) behind the splats, in display light.
+
+    Raises:
+        InputError: viser is not installed.
+    """
+    unit = _AWAY / max(float(np.linalg.norm(first.camera.center - first.target)), 1e-12)
+    means = scene.means.astype(np.float64) * unit
+    rotations = matrices_of(scene.quats.astype(np.float64))
+    frames = rotations * (np.exp(scene.log_scales.astype(np.float64)) * unit)[:, None, :]
+    server = _server()
+    try:
+        server.scene.set_up_direction(_numbers(first.up))
+        _begin(server.initial_camera, first, unit)
+        server.scene.set_background_image(
+            np.rint(np.tile(255 * background, (2, 2, 1))).astype(np.uint8), format="png"
+        )
+        server.scene.add_gaussian_splats(
+            "/splats",
+            centers=means,
+            covariances=frames @ np.swapaxes(frames, 1, 2),
+            rgbs=seen_colors(scene, cameras or [first.camera]),
+            opacities=opacities_of(scene.logit_opacities)[:, None],
+        )
+        page: str = server.scene.as_html(dark_mode=True)
+    finally:
+        with contextlib.redirect_stdout(io.StringIO()):
+            server.stop()
+    policy = f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}" />'
+    page = page.replace("<head>", f"<head>{policy}{_WORKERS}", 1)
+    return page.replace("<title>Viser</title>", f"<title>{escape(title)}</title>", 1)
+
+
+def seen_colors(scene: SplatScene, cameras: Sequence[Camera]) -> Floats:
+    """(N, 3) means from 0 to 1 of the colours that cameras see which have a splat before them."""
+    basis, means = SphericalHarmonics(scene.degree), scene.means.astype(np.float64)
+    chosen = [cameras[number] for number in evenly(len(cameras), _CAMERAS)]
+    colors = np.empty((len(scene), 3))
+    for start in range(0, len(scene), _BLOCK):
+        here = slice(start, start + _BLOCK)
+        total, seen = np.zeros((len(means[here]), 3)), np.zeros(len(means[here]))
+        for camera in chosen:
+            away = means[here] - camera.center
+            before = away @ camera.view[2, :3] > 0
+            color = np.einsum("nk,nkc->nc", basis.functions(None, away), scene.sh[here]) + 0.5
+            total += np.where(before[:, None], np.clip(color, 0, 1), 0)
+            seen += before
+        constant = np.clip(0.5 + basis.functions(None, [0, 0, 1])[0] * scene.sh[here, 0], 0, 1)
+        colors[here] = np.where(seen[:, None] > 0, total / np.maximum(seen, 1)[:, None], constant)
+    return colors
+
+
+def _begin(handle: Any, first: FirstView, unit: float) -> None:
+    """Tell viser of the first view; its roll is given up, so that turning keeps the horizon."""
+    camera = first.camera
+    forward = camera.view[2, :3]
+    depth = max(float(forward @ (first.target - camera.center)), 1e-6 / unit)
+    handle.position = _numbers(camera.center * unit)
+    handle.look_at = _numbers((camera.center + depth * forward) * unit)
+    handle.fov = 2 * float(np.arctan(camera.size[0] / 2 / camera.K[1, 1]))
+    handle.near, handle.far = _NEAR, _FAR
+
+
+def _server() -> Any:
+    try:
+        viser = importlib.import_module("viser")
+    except ImportError as error:
+        raise InputError(
+            "a page wants viser, which is not installed: pip install 'rift-cl[view]'"
+        ) from error
+    guard = Guard()
+    with contextlib.redirect_stdout(io.StringIO()), guard.before_viser():
+        return viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+
+
+def _numbers(vector: Floats) -> tuple[float, ...]:
+    return tuple(np.asarray(vector, float).tolist())
