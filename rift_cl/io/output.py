@@ -52,19 +52,28 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 
 
 def write_json(path: str | os.PathLike[str], value: Any) -> None:
-    """Write a JSON file; NumPy numbers and arrays count as numbers and lists, paths as text.
-
-    NaN and infinity have no place in JSON and are written as null.
+    """Write a JSON file of what ``json_text`` gives.
 
     Raises:
         InputError: the value holds something that JSON cannot say.
         OutputError: the file cannot be written.
     """
     try:
-        text = json.dumps(_plain(value), indent=2, allow_nan=False, ensure_ascii=False)
+        text = json_text(value)
     except (TypeError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: the value cannot be written as JSON ({error})") from error
-    write_text(path, text + "\n")
+    write_text(path, text)
+
+
+def json_text(value: Any) -> str:
+    """A value as JSON; NumPy numbers and arrays count as numbers and lists, paths as text.
+
+    NaN and infinity have no place in JSON and become null.
+
+    Raises:
+        TypeError, ValueError, RecursionError: the value holds something that JSON cannot say.
+    """
+    return json.dumps(_plain(value), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:

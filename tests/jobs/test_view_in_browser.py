@@ -21,8 +21,9 @@ import pytest
 
 from rift_cl.io.image import read_image
 from rift_cl.io.splat_scene import SplatScene
+from rift_cl.jobs.camera_path import resized
+from rift_cl.jobs.cameras.film import first_view
 from rift_cl.jobs.scene_bounds import bounds_of_splats
-from rift_cl.jobs.viewing.viewer import orbit_camera
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 FLAGS = (
@@ -204,7 +205,7 @@ def middles(picture):
 
 def expected(scene, size):
     """Where our own camera sees the splats in a window of (height, width)."""
-    camera = orbit_camera(bounds_of_splats(scene), size)
+    camera = resized(first_view(bounds_of_splats(scene))[0], size)
     local = scene.means @ camera.view[:3, :3].T + camera.view[:3, 3]
     fx, fy, cx, cy = camera.intrinsics
     return local[:, :2] / local[:, 2:] * (fx, fy) + (cx, cy)

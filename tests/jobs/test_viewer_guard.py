@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import http.client
-import time
 from types import SimpleNamespace
 from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
+from viewer_wire import dialled, told, until
 
 from rift_cl.errors import InputError
 from rift_cl.jobs.fit import Fit
@@ -17,22 +17,10 @@ from rift_cl.jobs.scene_bounds import SceneBounds
 from rift_cl.jobs.viewing import page as page_module
 from rift_cl.jobs.viewing import watched as watched_module
 from rift_cl.jobs.viewing.guard import Guard
-from rift_cl.jobs.viewing.page import ViewerPage
 from rift_cl.jobs.viewing.viewer import SplatViewer
 
-viser = pytest.importorskip("viser", reason="viser is not installed")
+pytest.importorskip("viser", reason="viser is not installed")
 BOUNDS = SceneBounds(np.zeros(3), 1.0, np.array([0.0, 0, 1]))
-CAMERA = {
-    "wxyz": (1.0, 0, 0, 0),
-    "position": (0.0, 0, -4),
-    "fov": 0.8,
-    "near": 0.1,
-    "far": 100.0,
-    "image_height": 90,
-    "image_width": 120,
-    "look_at": (0.0, 0, 0),
-    "up_direction": (0, 1, 0),
-}
 
 
 @pytest.fixture
@@ -51,30 +39,6 @@ def status(url, **headers):
         return answer.status, answer.read()
     finally:
         connection.close()
-
-
-def dialled(url, **more):
-    """A WebSocket as viser's page opens it."""
-    from websockets.sync.client import connect
-
-    parts = urlsplit(url)
-    given = {"origin": f"http://{parts.netloc}", "open_timeout": 20, **more}
-    version = f"viser-v{viser.__version__}"
-    return connect(url.replace("http:", "ws:"), subprotocols=[version], max_size=None, **given)
-
-
-def told(**changed):
-    """A message that a page sends of its camera."""
-    import msgspec
-
-    return msgspec.msgpack.encode({"type": "ViewerCameraMessage", **CAMERA, **changed})
-
-
-def until(true):
-    end = time.monotonic() + 60
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 def test_the_page_is_for_those_who_have_its_address_on_this_computer(viewer):
@@ -159,7 +123,7 @@ def test_a_viser_that_does_not_ask_the_guard_is_not_used(monkeypatch):
 
     monkeypatch.setattr(page_module, "_viser", lambda: SimpleNamespace(ViserServer=Unasked))
     with pytest.raises(InputError, match="cannot be guarded"):
-        ViewerPage(port=0, size=100, title="", asked=lambda: None)
+        SplatViewer(BOUNDS, port=0)
     assert closed
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from rift_cl.cl.discovery import open_device
+from rift_cl.io.capture import View, open_capture
 from rift_cl.jobs.camera_path import resized
 from rift_cl.jobs.cameras.film import first_view
 from rift_cl.jobs.orbit_input import OrbitInput
+from rift_cl.jobs.scene_input import OpenedScene
+from rift_cl.jobs.viewing.photographs import photographs_of
 from rift_cl.jobs.viewing.viewer import SplatViewer
 from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
@@ -51,6 +54,7 @@ class ViewJob:
         self._renderer.forward(self._splats, resized(first_view(bounds)[0], (16, 16)))
         self._viewer = SplatViewer(
             bounds,
+            photographs=photographs_of(_views(settings, scene)),
             port=settings.port,
             size=settings.size,
             background=scene.background,
@@ -81,3 +85,10 @@ class ViewJob:
     def __exit__(self, *_: object) -> None:
         """Stop serving."""
         self._viewer.close()
+
+
+def _views(settings: ViewSettings, scene: OpenedScene) -> Sequence[View]:
+    """The photographs of --capture, or of the fit."""
+    if settings.capture is not None:
+        return open_capture(settings.capture, photographs=False).views
+    return () if scene.cameras is None else scene.cameras.views

@@ -1,7 +1,7 @@
-"""The page that a viewer shows: viser's server, its panel, and where its cameras are.
+"""The page that a viewer shows: viser's server, its panels, and where its cameras are.
 
-All that is spoken with viser is in this file. It prints where it listens and offers to share the
-page with the world through a server of its own; neither is wanted here.
+viser prints where it listens and offers to share the page with the world through a server of its
+own; neither is wanted here. What is spoken with viser is in this file and in the panels.
 """
 
 from __future__ import annotations
@@ -10,37 +10,60 @@ import contextlib
 import importlib
 import io
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
+from rift_cl.jobs.scene_bounds import SceneBounds
+from rift_cl.jobs.viewing.crop_panel import CropPanel
 from rift_cl.jobs.viewing.guard import Guard
+from rift_cl.jobs.viewing.path_panel import PathPanel
+from rift_cl.jobs.viewing.photograph_panel import PhotographPanel
+from rift_cl.jobs.viewing.photographs import Photograph
 from rift_cl.jobs.viewing.pose import Pose
+from rift_cl.jobs.viewing.standpoint import Standpoint
+from rift_cl.jobs.viewing.view_panel import ViewPanel
+from rift_cl.jobs.viewing.viser_camera import pose_of
+from rift_cl.jobs.viewing.wish import Wish
 
 _HOST = "127.0.0.1"
-KINDS = ("colour", "depth")
-_SMALLEST, _LARGEST = 64, 4096
+SMALLEST, LARGEST = 64, 4096
 
 
 class ViewerPage:
-    """viser's server on this computer alone, with our panel.
+    """viser's server on this computer alone, with our panels.
 
     Args:
         port: to listen on; 0 for any that is free.
         size: longer edge in pixels that the panel begins with.
-        title: above the panel.
-        asked: called from viser's threads when the panel is changed.
+        title: above the panels.
+        bounds: what is shown, and which way is up.
+        first: where the camera of a page that is opened stands.
+        photographs: that may be jumped to.
+        number: of the photograph at which a page opens.
+        asked: called from viser's threads when a panel is changed.
 
     Raises:
         InputError: viser is not installed, or the port cannot be had.
     """
 
-    def __init__(self, *, port: int, size: int, title: str, asked: Callable[[], None]) -> None:
-        if not _SMALLEST <= size <= _LARGEST:
-            raise InputError(f"--size is {size}, wanted {_SMALLEST} to {_LARGEST} pixels")
+    def __init__(
+        self,
+        *,
+        port: int,
+        size: int,
+        title: str,
+        bounds: SceneBounds,
+        first: Standpoint,
+        photographs: Sequence[Photograph],
+        number: int,
+        asked: Callable[[], None],
+    ) -> None:
+        if not SMALLEST <= size <= LARGEST:
+            raise InputError(f"--size is {size}, wanted {SMALLEST} to {LARGEST} pixels")
         viser = _viser()
         _check_port(port)
         guard = Guard()
@@ -58,34 +81,36 @@ class ViewerPage:
         self._server.get_event_loop().set_exception_handler(lambda *_: None)
         # A page may ask for a tunnel through a server on the internet, whatever it shows.
         self._server.request_share_url = lambda *_, **__: None
-        gui = self._server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False, control_width="small")
-        self._kind = gui.add_dropdown("show", KINDS, initial_value=KINDS[0])
-        self._size = gui.add_slider(
-            "size", min=_SMALLEST, max=max(2048, size), step=1, initial_value=size
+        self._server.gui.configure_theme(
+            show_logo=False, show_share_button=False, control_width="small"
         )
-        self._facts = gui.add_markdown("")
-        for handle in (self._kind, self._size):
-            handle.on_update(lambda _: asked())
+        self._begin_at(first)
+        self.view = ViewPanel(self._server, size, first, asked)
+        self.photographs = PhotographPanel(self._server, photographs, number, bounds, asked)
+        self.crop = CropPanel(self._server, bounds, asked)
+        self.path = PathPanel(self._server, lambda: self.view.size)
 
-    @property
-    def kind(self) -> str:
-        """Which of ``KINDS`` is to be shown."""
-        kind = self._kind.value
-        return kind if kind in KINDS else KINDS[0]
-
-    @property
-    def size(self) -> int:
-        """Longer edge in pixels that is asked for."""
-        return int(np.clip(self._size.value, _SMALLEST, _LARGEST))
-
-    def begin_at(self, position: ArrayLike, target: ArrayLike, up: ArrayLike, fov: float) -> None:
-        """Where the camera of a page that is opened stands; the field of view in degrees."""
-        self._server.scene.set_up_direction(tuple(np.asarray(up, float).tolist()))
+    def _begin_at(self, first: Standpoint) -> None:
+        """Where the camera of a page that is opened stands."""
+        self._server.scene.set_up_direction(tuple(first.up.tolist()))
         camera = self._server.initial_camera
-        camera.position = tuple(np.asarray(position, float).tolist())
-        camera.look_at = tuple(np.asarray(target, float).tolist())
-        camera.fov = float(np.radians(fov))
+        camera.position = tuple(first.position.tolist())
+        camera.look_at = tuple(first.target.tolist())
+        camera.fov = first.fov
+
+    @property
+    def wish(self) -> Wish:
+        """What the panels ask for now."""
+        photographs = self.photographs
+        how = photographs.comparison
+        return Wish(
+            kind=self.view.kind,
+            edge=self.view.size,
+            crop=self.crop.box,
+            comparison=how,
+            share=0.0 if how == "off" else photographs.share,
+            photograph=None if how == "off" else photographs.chosen,
+        )
 
     def watch(
         self,
@@ -97,12 +122,12 @@ class ViewerPage:
 
         # Coroutines run on the thread that takes messages, so that a pose is never half new.
         async def on_move(camera: Any) -> None:
-            pose = _pose_of(camera)
+            pose = pose_of(camera)
             if pose is not None:
                 moved(camera.client.client_id, pose)
 
         async def on_join(client: Any) -> None:
-            pose = _pose_of(client.camera)
+            pose = pose_of(client.camera)
             if pose is not None:
                 joined(client, pose)
                 client.camera.on_update(on_move)
@@ -119,12 +144,9 @@ class ViewerPage:
         client.scene.set_background_image(codes, format="jpeg", jpeg_quality=quality)
         client.flush()
 
-    def tell(self, splats: int, size: tuple[int, int], seconds: float) -> None:
+    def tell(self, facts: str) -> None:
         """What the panel says about the last picture."""
-        self._facts.content = (
-            f"{splats} splats, {size[1]} x {size[0]} pixels, "
-            f"{1 / max(seconds, 1e-6):.3g} frames per second"
-        )
+        self.view.tell(facts)
 
     def close(self) -> None:
         """Stop serving."""
@@ -140,15 +162,6 @@ def _viser() -> Any:
         raise InputError(
             f"showing splats in a browser needs viser ({error}): pip install 'rift-cl[view]'"
         ) from error
-
-
-def _pose_of(camera: Any) -> Pose | None:
-    """Where a page says that its camera is; None where it says nonsense."""
-    size = camera.image_height, camera.image_width
-    try:
-        return Pose.said(camera.wxyz, camera.position, camera.fov, *size)
-    except InputError:
-        return None
 
 
 def _check_port(port: int) -> None:

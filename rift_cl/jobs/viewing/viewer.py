@@ -10,43 +10,48 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.jobs.cameras.film import first_view
-from rift_cl.jobs.depth_picture import depth_and_alpha, depth_picture, window_of
 from rift_cl.jobs.fit_pictures import Light
 from rift_cl.jobs.scene_bounds import SceneBounds
-from rift_cl.jobs.scene_input import in_display_light
-from rift_cl.jobs.viewing.page import KINDS, ViewerPage
+from rift_cl.jobs.viewing.page import ViewerPage
+from rift_cl.jobs.viewing.photographs import Photograph, nearest_one
+from rift_cl.jobs.viewing.picture import Painter
 from rift_cl.jobs.viewing.pose import NARROWEST, Pose
+from rift_cl.jobs.viewing.standpoint import standpoint_of
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
-
-Floats = NDArray[np.float32]
 
 # A camera rests when it has not moved for so many seconds; until then a picture may take so long.
 _REST, _PICTURE = 0.2, 0.06
 # Longer edge of a picture while nobody knows how fast they are drawn, and the least there is.
 _FIRST, _LEAST = 240, 96
+# Pictures of a fit whose page rests are so many times their own length apart.
+_BETWEEN = 4.0
 # Quality of JPEG while the camera moves and while it rests.
 _ROUGH, _SHARP = 70, 92
+# Width divided by height of a window in which all of the first view is seen.
+_ASPECT = 4 / 3
 
 
 @dataclass
 class _Client:
-    """A page that is open: its newest pose, when that came, and what it was sent for."""
+    """A page that is open: its newest pose, when that came, what it was sent, and when again."""
 
     handle: Any
     pose: Pose
     since: float
     rough: Any = None
     sharp: Any = None
+    again: float = 0.0
 
 
 class SplatViewer:
@@ -54,6 +59,7 @@ class SplatViewer:
 
     Args:
         bounds: what the camera turns about, and which way is up.
+        photographs: that may be jumped to; the page opens where one of them was taken.
         port: to listen on, at 127.0.0.1; 0 for any that is free.
         size: longer edge in pixels of a picture whose camera rests.
         background: (3,) behind the splats, in their light; black if not given.
@@ -68,6 +74,7 @@ class SplatViewer:
         self,
         bounds: SceneBounds,
         *,
+        photographs: Sequence[Photograph] = (),
         port: int = 8080,
         size: int = 960,
         background: ArrayLike | None = None,
@@ -75,18 +82,25 @@ class SplatViewer:
         title: str = "RiFT",
     ) -> None:
         behind = np.zeros(3) if background is None else background
-        self._background: Floats = np.asarray(behind, np.float32)
-        self._light: Light = light
+        self._painter = Painter(np.asarray(behind, np.float32), light, bounds)
         self._clients: dict[int, _Client] = {}
         self._lock, self._asked = threading.Lock(), threading.Event()
         self._splats: Splats | None = None
         self._version = 0
         # Pixels in a second, as the last picture was drawn and sent.
         self._pace: float | None = None
-        self._page = ViewerPage(port=port, size=size, title=title, asked=self._asked.set)
+        self.state = ""
         first, target = first_view(bounds)
-        fov = np.degrees(2 * np.arctan(first.height / 2 / first.intrinsics[1]))
-        self._page.begin_at(first.center, target, bounds.up, float(fov))
+        self._page = ViewerPage(
+            port=port,
+            size=size,
+            title=title,
+            bounds=bounds,
+            first=standpoint_of(first, target, bounds.up, _ASPECT),
+            photographs=photographs,
+            number=nearest_one(photographs, first),
+            asked=self._asked.set,
+        )
         self._page.watch(self._joined, self._moved, self._left)
 
     @property
@@ -134,38 +148,44 @@ class SplatViewer:
 
     def _serve_one(self, client: _Client, splats: Splats, renderer: Renderer) -> bool:
         """Draw for one page if it wants anything that it does not have."""
-        pose, since = client.pose, client.since
-        kind, edge = self._page.kind, self._page.size
-        want = (pose, kind, edge, self._version)
+        pose, since, wish = client.pose, client.since, self._page.wish
+        want = (pose, wish, self._version)
         resting = time.monotonic() - since >= _REST
         if want == client.sharp or (want == client.rough and not resting):
             return False
-        small = edge if resting else self._small(pose, edge)
+        # Nothing but the splats has changed: a fit shall not wait for its pictures all the time.
+        waits = client.sharp is not None and want[:2] == client.sharp[:2]
+        if waits and time.monotonic() < client.again:
+            return False
+        small = wish.edge if resting else self._small(pose, wish.edge)
         try:
             camera = pose.camera(small)
         except InputError:
             # What a page says is not ours to trust, and no reason to end a fit.
             return False
         begin = time.perf_counter()
-        picture = self._draw(splats, renderer, camera, kind)
-        quality = _ROUGH if small < edge else _SHARP
+        picture = self._painter.paint(splats, renderer, camera, wish, self._version)
+        quality = _ROUGH if small < wish.edge else _SHARP
         self._page.show(client.handle, picture, quality)
         seconds = time.perf_counter() - begin
         self._pace = camera.height * camera.width / seconds
-        self._page.tell(len(splats), camera.size, seconds)
         client.rough = want
-        if small == edge:
-            client.sharp = want
+        if small == wish.edge:
+            client.sharp, client.again = want, time.monotonic() + _BETWEEN * seconds
+            self._page.tell(self._facts(splats, camera, seconds))
         return True
 
-    def _draw(self, splats: Splats, renderer: Renderer, camera: Camera, kind: str) -> Floats:
-        if kind == KINDS[0] or renderer.settings.mode == "xray":
-            device = renderer.device
-            behind = device.array(self._background)
-            frame = renderer.forward(splats, camera, background=behind)
-            return in_display_light(device.get(frame.image)[..., :3], self._light)
-        depth, alpha = depth_and_alpha(renderer, splats, camera)
-        return depth_picture(depth, alpha, window_of(depth, alpha))
+    def _facts(self, splats: Splats, camera: Camera, seconds: float) -> str:
+        """What the panel says: lines of Markdown."""
+        arrays = [array for array in vars(splats).values() if array is not None]
+        megabytes = sum(array.nbytes for array in arrays) / 2**20
+        lines = [
+            f"{len(splats)} splats, {megabytes:.1f} MiB",
+            f"{camera.width} x {camera.height} pixels in {1000 * seconds:.0f} ms",
+            f"{1 / max(seconds, 1e-6):.3g} pictures a second",
+            *filter(None, [self.state]),
+        ]
+        return "  \n".join(lines)
 
     def _small(self, pose: Pose, edge: int) -> int:
         """The longer edge at which a picture is drawn in time, while the camera moves."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 from rift_cl.jobs.fit_pictures import CapturePictures
 from rift_cl.jobs.scene_bounds import bounds_of_cameras
+from rift_cl.jobs.viewing.photographs import photographs_in_work
 from rift_cl.jobs.viewing.viewer import SplatViewer
 from rift_cl.progress import Report
 from rift_cl.train.trainer import Trainer
@@ -28,7 +29,7 @@ def watched(
     window.heed(lambda: window.open(pictures, title))
     try:
         for report in reports:
-            window.heed(window.draw)
+            window.heed(lambda report=report: window.draw(report))  # type: ignore[misc]
             yield report
     finally:
         window.heed(window.close)
@@ -53,8 +54,12 @@ class _Window:
             self._failed = True
 
     def open(self, pictures: CapturePictures, title: str) -> None:
+        # Projections of X-rays are no photographs to lay over a picture.
+        seen = isinstance(pictures, CapturePictures)
+        photographs = photographs_in_work(pictures) if seen else ()
         self._viewer = SplatViewer(
             bounds_of_cameras(pictures.cameras),
+            photographs=photographs,
             port=0,
             background=pictures.behind,
             light=pictures.light,
@@ -62,8 +67,11 @@ class _Window:
         )
         self._announce(f"{self._viewer.url} shows the fit")
 
-    def draw(self) -> None:
+    def draw(self, report: Report) -> None:
         if self._viewer is not None:
+            loss = report.values.get("loss")
+            words = "" if loss is None else f", loss {loss:.4g}"
+            self._viewer.state = f"step {report.done} of {report.total}{words}"
             self._viewer.serve(self._trainer.parameters.drawn, self._trainer.renderer, changed=True)
 
     def close(self) -> None:

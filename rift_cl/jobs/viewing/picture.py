@@ -1,0 +1,94 @@
+"""One picture for a page: drawn by our kernels, cropped, with a photograph over it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import RiftError
+from rift_cl.geometry import Camera
+from rift_cl.jobs.depth_picture import depth_and_alpha, depth_picture, window_of
+from rift_cl.jobs.fit_pictures import Light
+from rift_cl.jobs.scene_bounds import SceneBounds
+from rift_cl.jobs.scene_input import in_display_light
+from rift_cl.jobs.viewing.crop import Crop, cropped
+from rift_cl.jobs.viewing.photographs import Photograph, compared, seen_by, taken_from
+from rift_cl.jobs.viewing.wish import KINDS, Wish
+from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.splats import Splats
+
+Floats = NDArray[np.float32]
+
+
+class Painter:
+    """Draws what is wished for, and keeps what the next picture may be made of.
+
+    Args:
+        background: (3,) behind the splats, in their light.
+        light: that the splats' colours are in.
+        bounds: of the scene.
+    """
+
+    def __init__(self, background: Floats, light: Light, bounds: SceneBounds) -> None:
+        self._background, self._light = background, light
+        distance = bounds.distance
+        self._reach = bounds.radius if distance is None else distance
+        # The splats in a box, what was drawn last, and the photograph as it was seen last.
+        self._kept: dict[str, tuple[Any, Any]] = {}
+
+    def paint(
+        self, splats: Splats, renderer: Renderer, camera: Camera, wish: Wish, version: int
+    ) -> Floats:
+        """A picture (height, width, 3) in display light.
+
+        Args:
+            splats: to draw, on the renderer's device.
+            renderer: draws them.
+            camera: of the page.
+            wish: what the page asks for.
+            version: changes whenever the splats do.
+        """
+        key = (camera, wish.kind, wish.crop, version)
+        drawn = self._known("drawn", key, lambda: self._drawn(splats, renderer, *key))
+        photograph = wish.photograph
+        if photograph is None or not taken_from(photograph, camera, self._reach):
+            return np.asarray(drawn)
+        seen = self._known("seen", (photograph, camera), lambda: _seen(photograph, camera))
+        if seen is None:
+            return np.asarray(drawn)
+        image, known = seen
+        return compared(drawn, image, known, wish.comparison, wish.share)
+
+    def _drawn(
+        self,
+        splats: Splats,
+        renderer: Renderer,
+        camera: Camera,
+        kind: str,
+        crop: Crop | None,
+        version: int,
+    ) -> Floats:
+        device = renderer.device
+        inside = self._known("crop", (crop, version), lambda: cropped(splats, crop, device))
+        if kind == KINDS[0] or renderer.settings.mode == "xray":
+            behind = device.array(self._background)
+            frame = renderer.forward(inside, camera, background=behind)
+            return in_display_light(device.get(frame.image)[..., :3], self._light)
+        depth, alpha = depth_and_alpha(renderer, inside, camera)
+        return depth_picture(depth, alpha, window_of(depth, alpha))
+
+    def _known(self, what: str, key: Any, make: Any) -> Any:
+        """What was made for this key, or is made now."""
+        if what not in self._kept or self._kept[what][0] != key:
+            self._kept[what] = key, make()
+        return self._kept[what][1]
+
+
+def _seen(photograph: Photograph, camera: Camera) -> Any:
+    """A photograph from the page's camera; None where it is gone."""
+    try:
+        return seen_by(photograph, camera)
+    except RiftError:
+        return None

@@ -1,0 +1,88 @@
+"""The panel of what is shown and from where: colour or depth, size, reset, up, statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from rift_cl.jobs.viewing.standpoint import Standpoint
+from rift_cl.jobs.viewing.viser_camera import go, pose_of
+from rift_cl.jobs.viewing.wish import KINDS, Kind
+
+_SMALLEST, _LARGEST, _USUAL = 64, 4096, 2048
+
+
+class ViewPanel:
+    """What is shown, and from where.
+
+    Args:
+        server: viser's.
+        size: longer edge of a picture in pixels to begin with.
+        first: the standpoint that 'reset view' returns to.
+        asked: called when anything is changed.
+    """
+
+    def __init__(
+        self, server: Any, size: int, first: Standpoint, asked: Callable[[], None]
+    ) -> None:
+        self._server, self._first = server, first
+        gui = server.gui
+        self._kind = gui.add_dropdown("show", KINDS, initial_value=KINDS[0])
+        self._size = gui.add_slider(
+            "size",
+            min=_SMALLEST,
+            max=max(_USUAL, size),
+            step=1,
+            initial_value=size,
+            hint="longer edge of a picture in pixels, once the camera rests",
+        )
+        reset = gui.add_button("reset view", hint="go back to where the page began")
+        upright = gui.add_button(
+            "set up", hint="what is up in the window now is up from now on: turn about it"
+        )
+        self._up = gui.add_markdown("", visible=False)
+        self._facts = gui.add_markdown("")
+
+        async def on_change(_: Any) -> None:
+            asked()
+
+        async def on_reset(event: Any) -> None:
+            if event.client is not None:
+                go(event.client, self._first)
+
+        async def on_upright(event: Any) -> None:
+            if event.client is not None:
+                self._set_up(event.client)
+
+        self._kind.on_update(on_change)
+        self._size.on_update(on_change)
+        reset.on_click(on_reset)
+        upright.on_click(on_upright)
+
+    @property
+    def kind(self) -> Kind:
+        """Which of ``KINDS`` is to be shown."""
+        kind = self._kind.value
+        return kind if kind in KINDS else KINDS[0]
+
+    @property
+    def size(self) -> int:
+        """Longer edge in pixels that is asked for."""
+        return int(np.clip(self._size.value, _SMALLEST, _LARGEST))
+
+    def tell(self, facts: str) -> None:
+        """What the panel says about the last picture."""
+        self._facts.content = facts
+
+    def _set_up(self, client: Any) -> None:
+        """Take the page's own upright for the scene's."""
+        pose = pose_of(client.camera)
+        if pose is None:
+            return
+        up = -pose.camera(_SMALLEST).view[1, :3]
+        self._server.scene.set_up_direction(tuple(up.tolist()))
+        client.camera.up_direction = up
+        self._up.content = "`--up " + " ".join(f"{part:.4f}" for part in up) + "`"
+        self._up.visible = True
