@@ -13,20 +13,17 @@ from rift_cl.errors import InputError, OutputError
 from rift_cl.io.output import atomic_path, check_space
 from rift_cl.io.splat_formats.formats import DEGREE, FORMATS, SplatFormat
 from rift_cl.io.splat_scene import SplatScene
-from rift_cl.jobs.cameras.fit_cameras import open_fit_cameras
+from rift_cl.jobs.cameras.film import first_view
 from rift_cl.jobs.export.axes import turn_between, turned
 from rift_cl.jobs.export.plain_scene import plain_scene
 from rift_cl.jobs.export.settings import ExportSettings
 from rift_cl.jobs.export.web_page import FirstView, web_page
 from rift_cl.jobs.scene_input import in_display_light
-from rift_cl.jobs.viewing.viewer import orbit_camera
 from rift_cl.progress import Report
 
 _UP = np.array([0.0, 1, 0])
 # What viewers add to splats on the screen, in square pixels.
 _VIEWERS = 0.3
-# Height and width of the first view where no camera is known.
-_WINDOW = (480, 640)
 
 
 class Export:
@@ -50,7 +47,8 @@ class Export:
             kept = np.ascontiguousarray(self._plain.sh[:, : (DEGREE + 1) ** 2])
             self._plain = dataclasses.replace(self._plain, sh=kept)
             self.notes.append(f"harmonics of degree {DEGREE + 1} are left out")
-        self._bounds = settings.bounds(self._plain)
+        self._bounds = settings.bounds(self.scene)
+        self.notes += settings.notes(self.scene)
         self._turn = np.eye(3)
         if self.format.upright:
             self._turn = turn_between(self._bounds.up, _UP)
@@ -75,18 +73,12 @@ class Export:
 
     def _page(self, scene: SplatScene) -> bytes:
         """A page that begins at a photograph's view, where the cameras are known."""
-        folder = self.scene.folder
-        known = None if folder is None else open_fit_cameras(folder)
-        if known is None:
-            first = FirstView(
-                orbit_camera(self._bounds, _WINDOW), self._bounds.center, self._bounds.up
-            )
-            cameras = []
-        else:
-            first = FirstView(known.seen[0].camera, known.focus, known.up)
-            cameras = [view.camera for view in known.seen]
+        camera, target = first_view(self._bounds)
+        first = FirstView(camera, target, self._bounds.up)
         behind = in_display_light(self.scene.background, self.scene.light)
-        return web_page(scene, first, cameras, title=self.scene.name, background=behind).encode()
+        return web_page(
+            scene, first, self._bounds.cameras, title=self.scene.name, background=behind
+        ).encode()
 
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""
