@@ -4,18 +4,31 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import io
 import re
+import shutil
+import subprocess
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.html_page import Page
+from rift_cl.html_page import Compared, Page
 
-PNG = b"\x89PNG\r\n\x1a\n" + bytes(range(40))
+
+def picture(kind="PNG", size=(6, 4)):
+    buffer = io.BytesIO()
+    Image.new("RGB", size, "red").save(buffer, format=kind)
+    return buffer.getvalue()
+
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+PNG, JPEG = picture(), picture("JPEG")
+SVG = b'<svg width="300" height="200" viewBox="0 0 3 2"><path d="M0 0"/></svg>'
 ATTACK = '</title></style><script>alert(1)</script><img src=x onerror="f()" \'&amp;'
-VOID = {"meta", "img", "link", "br"}
+VOID = {"meta", "img", "link", "br", "input", "source"}
 
 
 class Reader(HTMLParser):
@@ -58,7 +71,12 @@ def full_page(text: str) -> Page:
     page.code(text)
     page.facts({text: text})
     page.table([text, text], [[text, text]], caption=text)
+    with page.folded(text):
+        page.paragraph(text)
     page.figure(PNG, caption=text, alt=text)
+    page.panels([JPEG, Compared(PNG, PNG, (text, text))], titles=[text] * 2, columns=2,
+                caption=text, alt=text)  # fmt: skip
+    page.slider([PNG, JPEG], labels=[text] * 2, start=1, caption=text, alt=text)
     return page
 
 
@@ -67,19 +85,48 @@ def test_no_text_becomes_markup():
     assert [entry[0] for entry in found] == [entry[0] for entry in harmless]
     assert [sorted(entry[1]) for entry in found] == [sorted(entry[1]) for entry in harmless]
     assert of(found, "img")[0][1]["alt"] == ATTACK
-    for tag in ("title", "h1", "h2", "code", "dt", "dd", "caption", "th", "td", "figcaption"):
+    texts = ("title", "h1", "h2", "code", "dt", "dd", "caption", "th", "td", "figcaption")
+    for tag in (*texts, "summary", "output", "span"):
         assert all(entry[2] == ATTACK for entry in of(found, tag)), tag
 
 
 def test_the_page_is_self_contained():
     text = full_page("text").html()
-    assert not re.search(r"https?:|//[a-z]|url\(|@import|<script|<link|<iframe", text)
+    markup = re.sub(r"base64,[^\"]*", "", text)
+    assert not re.search(r"https?:|//[a-z]|url\(|@import|<link|<iframe| on[a-z]+=", markup)
     found = read(full_page("text"))
     sources = [entry[1]["src"] for entry in found if "src" in entry[1]]
-    assert sources == ["data:image/png;base64," + base64.b64encode(PNG).decode()]
+    assert sources[0] == "data:image/png;base64," + base64.b64encode(PNG).decode()
+    assert all(re.match(r"data:image/(png|jpeg);base64,", source) for source in sources)
     assert not [entry for entry in found if "href" in entry[1]]
     policies = [m[1]["content"] for m in of(found, "meta") if "http-equiv" in m[1]]
     assert policies[0].startswith("default-src 'none'")
+
+
+def test_the_only_script_is_the_one_that_the_policy_names():
+    text = full_page("text").html()
+    (script,) = re.findall(r"<script>(.*?)</script>", text, re.DOTALL)
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'\"" in text
+    assert "script" not in Page("Title").html()
+
+
+def test_every_picture_is_enlarged_by_a_checkbox_of_its_own():
+    found = read(full_page("text"))
+    boxes = [e[1] for e in of(found, "input") if e[1]["type"] == "checkbox"]
+    names = [box["id"] for box in boxes]
+    assert len(names) == len(set(names)) == 4
+    assert sorted(e[1]["for"] for e in of(found, "label") if "for" in e[1]) == sorted(names)
+    assert all(box["aria-label"].startswith("Enlarge: text") for box in boxes)
+    assert all(entry[1]["alt"] for entry in of(found, "img"))
+
+
+def test_a_drawing_for_narrow_pages_stands_beside_that_for_wide_ones():
+    page = Page("t")
+    page.figure((SVG, SVG), caption="c", alt="a")
+    found = read(page)
+    assert of(found, "source")[0][1]["srcset"].startswith("data:image/svg+xml;base64,")
+    assert (of(found, "img")[0][1]["width"], of(found, "img")[0][1]["height"]) == ("300", "200")
 
 
 def test_the_page_is_accessible_and_adapts():
@@ -159,29 +206,40 @@ def test_useless_arguments_are_named():
         page.table(["a", "b"], [[1, 2], [3]])
     with pytest.raises(InputError, match="PNG"):
         page.figure(b"GIF89a", caption="", alt="a picture")
+    with pytest.raises(InputError, match="no complete PNG"):
+        page.figure(PNG[:20], caption="", alt="a picture")
+    with pytest.raises(InputError, match="panels"):
+        page.panels([PNG], titles=[], columns=1, caption="", alt="a")
     with pytest.raises(InputError, match="alt"):
         page.figure(PNG, caption="", alt=" ")
-    assert page.html() == Page("t").html()
+    assert "<figure" not in page.html()
 
 
-def test_a_slider_is_hidden_until_its_script_runs():
+def test_a_slider_begins_where_it_is_told():
     page = Page("Title")
-    png = b"\x89PNG\r\n\x1a\n"
-    page.slider([png, png, png], labels=["1 <", "2", "3"], start=1, caption="c", alt="slice")
-    text = page.html()
-    assert '<figure class="slider" hidden>' in text
-    assert text.count(" hidden>") == 3
-    assert "slice: 1 &lt;" in text
-    script = re.search(r"<script>(.*?)</script>", text, re.DOTALL).group(1)
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    assert f"script-src 'sha256-{digest}'" in text
-    assert "script" not in Page("Title").html()
+    page.slider([PNG, JPEG, PNG], labels=["1 <", "2", "3"], start=1, caption="c", alt="slice")
+    found = read(page)
+    assert [e[1].get("class", "") for e in of(found, "img")] == ["coarse", "shown coarse", "coarse"]
+    assert [e[1]["data-label"] for e in of(found, "img")] == ["1 <", "2", "3"]
+    assert of(found, "output")[0][2] == "2"
+    (choice,) = [e[1] for e in of(found, "input") if e[1]["type"] == "range"]
+    assert (choice["min"], choice["max"], choice["value"]) == ("0", "2", "1")
+    assert "slice: 1 &lt;" in page.html()
 
 
 @pytest.mark.parametrize(
     "labels, start, alt", [(["1"], 0, "a"), (["1", "2"], 2, "a"), (["1", "2"], 0, " ")]
 )
 def test_a_slider_without_labels_or_text_is_told(labels, start, alt):
-    png = b"\x89PNG\r\n\x1a\n"
-    with pytest.raises(InputError, match="slider"):
-        Page("Title").slider([png, png], labels=labels, start=start, caption="c", alt=alt)
+    with pytest.raises(InputError, match=r"slider|alt"):
+        Page("Title").slider([PNG, PNG], labels=labels, start=start, caption="c", alt=alt)
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium to look with")
+def test_a_browser_lets_the_script_run_under_the_policy(tmp_path):
+    path = tmp_path / "page.html"
+    path.write_text(full_page(ATTACK).html(), encoding="utf-8")
+    command = [CHROMIUM, "--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run"]
+    command += [f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", path.as_uri()]
+    found = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    assert '<html lang="en" class="live">' in found.stdout

@@ -11,7 +11,7 @@ from rift_cl.html_page import Page
 from rift_cl.jobs.analyze_facts import Findings
 from rift_cl.jobs.coverage_pictures import add_coverage, camera_figure, direction_figure
 from rift_cl.jobs.sampled import Floats, Sampled, place_of
-from rift_cl.plot import figure_png
+from rift_cl.plot import figure_svg
 
 _HEADINGS = ("What is missing", "What limits detail", "What to add")
 
@@ -57,7 +57,7 @@ def _views(page: Page, sampled: Sampled, added: Sequence[Camera], device: Device
         page.section("Where the cameras stand")
         groups = {"at hand": sampled.cameras, "to add": tuple(added)}
         page.figure(
-            figure_png(camera_figure(groups, sampled)),
+            figure_svg(camera_figure(groups, sampled)),
             caption="The target is the grey disc; lines point where the cameras look.",
             alt="Cameras from above and from the side",
         )
@@ -65,7 +65,7 @@ def _views(page: Page, sampled: Sampled, added: Sequence[Camera], device: Device
         return
     page.section("Directions")
     page.figure(
-        figure_png(direction_figure(sampled, device, added)),
+        figure_svg(direction_figure(sampled, device, added)),
         caption="The upper hemisphere, up in the middle; opposite directions count as one, so "
         "that a view from below is shown above. Left, lines of sight. Right, how many views see "
         "detail along each direction, at 8 cycles per diameter; hatched is what lies on no view's "

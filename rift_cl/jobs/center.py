@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from io import BytesIO
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from rift_cl.jobs.axis_search import find_axis
 from rift_cl.jobs.run_folder import RunFolder
 from rift_cl.jobs.scan_input import ScanInput, read_attenuation
 from rift_cl.operators import Projector
-from rift_cl.plot import curves, figure_png, image_grid
+from rift_cl.plot import curves, figure_svgs, framed
 from rift_cl.progress import Report
 from rift_cl.reconstruct import AxisEstimate, fbp
 
@@ -94,37 +94,35 @@ class CenterJob:
         self, found: AxisEstimate, here: float, slices: dict[float, NDArray[np.float32]]
     ) -> Page:
         page = Page(f"Centre of rotation of {self.scan.path.name}", found.in_words())
-        page.facts(_facts(found))
         black, white = (float(level) for level in np.percentile(slices[0.0], _WINDOW))
         white = white if white > black else black + 1
+        files, _ = framed(list(slices.values()), window=(black, white))
         page.slider(
-            [_grey(image, black, white) for image in slices.values()],
+            files,
             labels=[f"bin {here + offset:.2f}" for offset in slices],
             start=_SLIDER.index(0.0),
             caption=f"The middle of the slice at row {self.row} for the chosen centre; a wrong one "
             "shows arcs and doubled edges.",
             alt="Slice with the centre at",
         )
-        sheet = image_grid(
-            [slices[offset] for offset in _SHEET],
+        page.facts(_facts(found))
+        by_offset = dict(zip(slices, files, strict=True))
+        page.panels(
+            [by_offset[offset] for offset in _SHEET],
             titles=[f"{here + offset:.2f}" for offset in _SHEET],
             columns=3,
-            window=(black, white),
-            size=3.2,
-        )
-        page.figure(
-            figure_png(sheet),
             caption="The same side by side, about the best one, which is in the middle.",
-            alt=f"{len(_SHEET)} slices reconstructed with different centres",
+            alt="Slice with the centre at",
         )
-        figure = curves(
+        draw = partial(
+            curves,
             {"all rows": (found.scores[0], found.scores[1])},
             xlabel="centre at the middle row, bins",
             ylabel="log-likelihood",
             mark=round(found.center, 2),
         )
         page.figure(
-            figure_png(figure),
+            figure_svgs(lambda width: draw(width=width)),
             caption=f"How likely each centre is by the {found.by}, all rows together; 0 is what "
             "data without any sign of the axis would give.",
             alt="Curve of the log-likelihood against the centre",
@@ -152,13 +150,3 @@ def _middle(image: NDArray[np.float32]) -> NDArray[np.float32]:
     """The central half of an image, where a wrong centre shows first."""
     ny, nx = (max(n // 4, 0) for n in image.shape)
     return image[ny : image.shape[0] - ny, nx : image.shape[1] - nx]
-
-
-def _grey(image: NDArray[np.float32], black: float, white: float) -> bytes:
-    """An image as an 8-bit PNG file."""
-    from PIL import Image
-
-    codes = np.rint(np.clip((image - black) / (white - black), 0, 1) * 255).astype(np.uint8)
-    buffer = BytesIO()
-    Image.fromarray(codes).save(buffer, format="PNG")
-    return buffer.getvalue()

@@ -13,7 +13,7 @@ from rift_cl.cl.device import Device
 from rift_cl.geometry import Camera
 from rift_cl.html_page import Page
 from rift_cl.jobs.sampled import Sampled
-from rift_cl.plot import curves, figure_png
+from rift_cl.plot import curves, figure_svg
 from rift_cl.plot.camera_plot import Stands, camera_plot
 from rift_cl.plot.direction_map import direction_maps
 from rift_cl.plot.frequency_map import FrequencySlice, frequency_maps
@@ -176,7 +176,7 @@ def add_coverage(
 ) -> None:
     """Add the maps of density near and far, and density against frequency, to a report."""
     page.figure(
-        figure_png(slice_maps(sampled, points, device)),
+        figure_svg(slice_maps(sampled, points, device)),
         caption="Planes of the target's Fourier domain: how many views see each frequency. White "
         "is what hardly any sees.",
         alt="Maps of density over planes of frequencies",
@@ -184,13 +184,13 @@ def add_coverage(
     support = support_maps(sampled, device)
     if support is not None:
         page.figure(
-            figure_png(support),
+            figure_svg(support),
             caption="The same about the middle, out to what the finest of the views passes; "
             "slices thinner than a sample count for the part of it that they fill.",
             alt="Maps of density out to the finest detail",
         )
     page.figure(
-        figure_png(density_curves(sampled, device)),
+        figure_svg(density_curves(sampled, device)),
         caption="Mean density over all directions, that of the least seen tenth, and the law that "
         "views without pixels and lenses follow in the mean.",
         alt="Density against frequency",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from rift_cl.jobs.fit_report import show_fit
 from rift_cl.jobs.fit_settings import FitSettings
 from rift_cl.jobs.run_folder import RunFolder
 from rift_cl.jobs.view_study import ViewScore, view_study
-from rift_cl.plot import curves, figure_png, image_grid
+from rift_cl.plot import WIDE, curves, figure_svg, figure_svgs, image_grid
 from rift_cl.progress import Report
 from rift_cl.sample import ornament, ornament_off_path, wall
 
@@ -131,7 +132,7 @@ class DemoJob:
 def _show_study(page: Page, scores: list[ViewScore], rows: list[tuple[float, ...]]) -> None:
     page.section("Integration: a phantom from exact projections")
     page.figure(
-        figure_png(study_panels(scores)),
+        figure_svg(study_panels(scores)),
         caption="Above: backprojection without a filter. The views sample low frequencies "
         "too densely, and that bias washes out the detail however many views there are. "
         "Below: the ramp filter takes the bias away.",
@@ -140,8 +141,8 @@ def _show_study(page: Page, scores: list[ViewScore], rows: list[tuple[float, ...
     page.table(COLUMNS, rows, caption=SCORING)
     views = [s.views for s in scores]
     for metric, label in (("psnr", "PSNR, dB"), ("ssim", "SSIM")):
-        figure = study_curves(views, [s.scores for s in scores], metric, label)
-        page.figure(figure_png(figure), caption=SCORING, alt=f"{label} against views")
+        draw = partial(study_curves, views, [s.scores for s in scores], metric, label)
+        page.figure(figure_svgs(draw), caption=SCORING, alt=f"{label} against views")
 
 
 def _show_regression(page: Page, name: str, fit: Fit) -> None:
@@ -171,11 +172,15 @@ def study_panels(scores: list[ViewScore]) -> Any:
 
 
 def study_curves(
-    views: Sequence[int], scores: Sequence[Mapping[str, float]], metric: str, label: str
+    views: Sequence[int],
+    scores: Sequence[Mapping[str, float]],
+    metric: str,
+    label: str,
+    width: int = WIDE,
 ) -> Any:
     """One metric of a study against the number of views."""
     series = {
         name: (views, [score[f"{metric}_{name}"] for score in scores])
         for name in ("unfiltered", "filtered")
     }
-    return curves(series, xlabel="number of views", ylabel=label, log_x=True)
+    return curves(series, xlabel="number of views", ylabel=label, log_x=True, width=width)

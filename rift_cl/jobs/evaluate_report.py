@@ -8,9 +8,8 @@ from itertools import compress
 from typing import Any
 
 from rift_cl.html_page import Page
-from rift_cl.jobs.fit_report import COLUMNS, ERROR_GAIN, SCORING, score_rows, view_panels
+from rift_cl.jobs.fit_report import COLUMNS, SCORING, score_rows, show_views
 from rift_cl.jobs.fit_scores import ViewScore
-from rift_cl.plot import figure_png
 
 _TRAINED = ("degrees away", "nearest PSNR", "blend PSNR")
 
@@ -20,20 +19,18 @@ def eval_page(
 ) -> Page:
     """The report of a finished evaluation."""
     page = Page(f"Scores of {name}", f"{metrics['splats']} splats, eps2d {metrics['eps2d']:g}")
-    page.table(*score_table(metrics), caption=SCORING)
     for group, scores in groups.items():
         page.section(f"Pictures: {group}")
-        page.figure(
-            figure_png(view_panels(scores)),
-            caption="The best, the middle and the worst by PSNR: truth, scene, error, "
-            f"{ERROR_GAIN:g} times brighter.",
-            alt="Pictures: truth, scene, error",
-        )
+        show_views(page, scores, "scene")
+    page.section("Scores")
+    page.table(*score_table(metrics), caption=SCORING)
+    for group, scores in groups.items():
         trained = any("nearest_psnr" in score.values for score in scores)
         front = any("fit_psnr_foreground" in score.values for score in scores)
         columns = ["picture", "PSNR", *(["PSNR foreground"] if front else []), "SSIM"]
         columns += _TRAINED if trained else []
-        page.table(columns, [_row(score, front, trained) for score in scores])
+        rows = [_row(score, front, trained) for score in scores]
+        page.table(columns, rows, caption=group)
     return page
 
 

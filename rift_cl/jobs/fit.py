@@ -27,7 +27,7 @@ from rift_cl.jobs.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras
 from rift_cl.jobs.cameras.photograph_place import place_record
 from rift_cl.jobs.few import evenly
 from rift_cl.jobs.fit_pictures import CapturePictures
-from rift_cl.jobs.fit_report import fit_page
+from rift_cl.jobs.fit_report import fit_page, history_notes, ramp_notes
 from rift_cl.jobs.fit_run import FitRun
 from rift_cl.jobs.fit_scores import score_record, score_views
 from rift_cl.jobs.fit_settings import FitSettings
@@ -149,12 +149,15 @@ class Fit(FitRun):
         self.metrics = {
             "splats": len(splats),
             "loss": self.losses[-1][1],
+            "history": self._history,
             "background": pictures.behind.tolist(),
             **settings.basis_facts(),
             **score_record(self.scores),
         }
-        page = fit_page(capture.path.name, self.scores, self.losses, self.metrics)
-        self.folder.finish(settings, self.metrics, page, self.device, **self.decided)
+        decided = dataclasses.replace(settings, homogenise=settings.exponent_for(len(self.seen)))
+        notes = [*ramp_notes(settings, len(self.seen)), *history_notes(self._history)]
+        page = fit_page(capture.path.name, self.scores, self.losses, self.metrics, notes)
+        self.folder.finish(decided, self.metrics, page, self.device, asked=settings, **self.decided)
 
     def _keep_cameras(self, capture: Capture) -> None:
         """Leave the cameras in the folder, so that an unfinished fit has them too."""

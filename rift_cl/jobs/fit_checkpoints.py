@@ -1,7 +1,9 @@
 """A fit that can be broken off at any moment and taken up again, to the same bits.
 
 What a checkpoint says of its fit is compared with what is asked for now: to go on with other
-settings would give splats that no single command could give.
+settings would give splats that nobody could account for. The number of steps alone may grow: from
+there on the fit goes by the schedules of the longer one, and its checkpoints and report say since
+when.
 """
 
 from __future__ import annotations
@@ -18,6 +20,8 @@ from rift_cl.io.checkpoint import Checkpoint, newest_checkpoint, save_checkpoint
 from rift_cl.train.trainer import Trainer
 
 Losses = list[tuple[int, float]]
+# Stages of a fit: the step that each ended with, and the steps of the fit whose schedules it had.
+History = list[tuple[int, int]]
 
 
 class FitCheckpoints:
@@ -36,6 +40,7 @@ class FitCheckpoints:
             "rift_cl": __version__,
             "device": device,
         }
+        self.history: History = []
 
     def save(self, trainer: Trainer, losses: Losses) -> None:
         """Write one.
@@ -46,7 +51,8 @@ class FitCheckpoints:
         arrays = trainer.state()
         if losses:
             arrays["losses"] = np.array(losses, float)
-        save_checkpoint(self.folder, Checkpoint(trainer.parameters.step, arrays, self._facts))
+        facts = {**self._facts, "history": self.history}
+        save_checkpoint(self.folder, Checkpoint(trainer.parameters.step, arrays, facts))
 
     def restore(self, trainer: Trainer) -> Losses:
         """Bring a trainer to the newest whole checkpoint; one that has not begun if there is none.
@@ -55,7 +61,8 @@ class FitCheckpoints:
             The losses up to there.
 
         Raises:
-            CheckpointError: it belongs to a fit with other settings, or all are damaged.
+            CheckpointError: it belongs to a fit with other settings or has more steps than are
+                asked for, or all are damaged.
         """
         found, problems = newest_checkpoint(self.folder)
         for problem in problems:
@@ -63,6 +70,7 @@ class FitCheckpoints:
         if found is None:
             return []
         self._compare(found.facts)
+        self.history = self._stages(found)
         arrays = dict(found.arrays)
         losses = arrays.pop("losses", np.empty((0, 2)))
         trainer.restore(arrays)
@@ -70,7 +78,8 @@ class FitCheckpoints:
 
     def _compare(self, facts: Any) -> None:
         before, now = facts.get("settings", {}), self._facts["settings"]
-        differing = sorted(k for k in before.keys() | now.keys() if before.get(k) != now.get(k))
+        names = (before.keys() | now.keys()) - {"steps"}
+        differing = sorted(k for k in names if before.get(k) != now.get(k))
         if differing:
             name = differing[0]
             raise CheckpointError(
@@ -84,3 +93,14 @@ class FitCheckpoints:
                     f"{self._facts[name]!r}: the last bits may differ",
                     stacklevel=3,
                 )
+
+    def _stages(self, found: Checkpoint) -> History:
+        """The stages before the one that begins or goes on now."""
+        steps, asked = found.facts["settings"].get("steps"), self._facts["settings"]["steps"]
+        if found.step > asked:
+            raise CheckpointError(
+                f"{self.folder}: the fit to resume has {found.step} steps, --steps is {asked}: ask "
+                "for more, or begin anew with --overwrite"
+            )
+        earlier = [(int(until), int(of)) for until, of in found.facts.get("history", [])]
+        return earlier if steps == asked else [*earlier, (found.step, int(steps))]

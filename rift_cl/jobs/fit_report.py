@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from rift_cl.html_page import Page
+from rift_cl.html_page import Compared, Page
 from rift_cl.jobs.few import evenly
 from rift_cl.jobs.fit_scores import ViewScore
-from rift_cl.plot import curves, figure_png, image_grid
+from rift_cl.jobs.fit_settings import ENOUGH_VIEWS, FitSettings
+from rift_cl.plot import curves, figure_svgs, jpeg
 
 _SHOWN = 3
 # Errors are shown this much brighter.
@@ -42,12 +44,37 @@ def fit_page(
     groups: Mapping[str, Sequence[ViewScore]],
     losses: Sequence[tuple[int, float]],
     metrics: Mapping[str, Any],
+    notes: Sequence[str] = (),
 ) -> Page:
-    """The report of a finished fit."""
+    """The report of a finished fit; ``notes`` are sentences about what it decided by itself."""
     basis = f", {metrics['basis']}" if "basis" in metrics else ""
     page = Page(f"Splats fitted to {name}", f"{metrics['splats']} splats{basis}")
     show_fit(page, groups, losses, metrics)
+    if notes:
+        page.section("What was decided")
+        for note in notes:
+            page.paragraph(note)
     return page
+
+
+def history_notes(history: Sequence[tuple[int, int]]) -> list[str]:
+    """A sentence about the stages of a fit that was trained on."""
+    if len(history) < 2:
+        return []
+    stages = [f"to step {until} by the schedules of a fit of {steps}" for until, steps in history]
+    return [f"It was trained {', then '.join(stages)}."]
+
+
+def ramp_notes(settings: FitSettings, views: int) -> list[str]:
+    """A sentence about the ramp, where its exponent was not asked for."""
+    exponent = settings.exponent_for(views)
+    if settings.homogenise is not None or exponent == settings.exponent:
+        return []
+    return [
+        f"The ramp that weighs the residual's frequencies was off: with {views} photographs, fewer "
+        f"than {ENOUGH_VIEWS}, it was never found to help. --homogenise {settings.exponent:g} "
+        "turns it on."
+    ]
 
 
 def show_fit(
@@ -56,24 +83,23 @@ def show_fit(
     losses: Sequence[tuple[int, float]],
     metrics: Mapping[str, Any],
 ) -> None:
-    """Add to a page: mean scores, truth, fit and error of each group's pictures, the loss."""
-    if metrics["scores"]:
-        page.table(COLUMNS, score_rows(metrics), caption=SCORING)
+    """Add to a page: wipes between photographs and fit, errors, scores, the loss."""
     for group, scores in groups.items():
         page.section(f"Pictures: {group}")
-        page.figure(
-            figure_png(view_panels(scores)),
-            caption=f"The best, the middle and the worst by PSNR; errors {ERROR_GAIN:g} times "
-            "brighter.",
-            alt="Pictures that were not trained on: truth, fit, error",
-        )
+        show_views(page, scores, "fit")
+    if metrics["scores"]:
+        page.section("Scores")
+        page.table(COLUMNS, score_rows(metrics), caption=SCORING)
+    for group, scores in groups.items():
         rows = [_row(score) for score in scores]
         columns = ("picture", "degrees away", "PSNR", "SSIM", "blend PSNR")
-        page.table(columns, rows, caption="Away from the nearest picture that was trained on.")
+        caption = f"{group}: degrees away from the nearest picture that was trained on."
+        page.table(columns, rows, caption=caption)
     page.section("Training")
     steps, values = zip(*losses, strict=True)
-    figure = curves({"loss": (steps, values)}, xlabel="step", ylabel="loss")
-    page.figure(figure_png(figure), caption="Of the pictures as they came.", alt="Loss by step")
+    draw = partial(curves, {"loss": (steps, values)}, xlabel="step", ylabel="loss")
+    figure = figure_svgs(lambda width: draw(width=width))
+    page.figure(figure, caption="Of the pictures as they came.", alt="Loss by step")
 
 
 def _row(score: ViewScore) -> tuple[Any, ...]:
@@ -82,14 +108,22 @@ def _row(score: ViewScore) -> tuple[Any, ...]:
     return (score.name, score.angle, values["fit_psnr"], values["fit_ssim"], blend)
 
 
-def view_panels(scores: Sequence[ViewScore]) -> Any:
-    """Truth, picture and error of the best, the middle and the worst by PSNR."""
+def show_views(page: Page, scores: Sequence[ViewScore], what: str) -> None:
+    """Add wipes between truth and picture, and errors, of the best, middle and worst by PSNR."""
     order = sorted(scores, key=lambda score: -score.values["fit_psnr"])
-    places = evenly(len(order), _SHOWN)
-    images, titles = [], []
-    for place in places:
+    cells: list[bytes | Compared] = []
+    titles = []
+    for place in evenly(len(order), _SHOWN):
         score = order[place]
-        error = np.abs(score.image - score.truth) * ERROR_GAIN
-        images += [score.truth, score.image, np.clip(error, 0, 1)]
-        titles += [score.name, f"{score.values['fit_psnr']:.1f} dB", "error"]
-    return image_grid(images, titles=titles, columns=3, window=(0.0, 1.0))
+        error = np.clip(np.abs(score.image - score.truth) * ERROR_GAIN, 0, 1)
+        pair = (jpeg(score.truth), jpeg(score.image))
+        cells += [Compared(*pair, names=("photograph", what)), jpeg(error)]
+        titles += [f"{score.name}, {score.values['fit_psnr']:.1f} dB", "error"]
+    page.panels(
+        cells,
+        titles=titles,
+        columns=2,
+        caption="The best, the middle and the worst by PSNR. Left of the line the photograph, "
+        f"right of it the {what}; draw the line aside. Errors are {ERROR_GAIN:g} times brighter.",
+        alt=f"Photograph and {what}",
+    )

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from rift_cl.cl.discovery import open_device
-from rift_cl.errors import StoppedError
+from rift_cl.errors import CheckpointError, StoppedError
 from rift_cl.jobs.fit_checkpoints import FitCheckpoints
 from rift_cl.jobs.fit_scores import ViewScore
 from rift_cl.jobs.fit_settings import FitSettings
@@ -56,6 +56,7 @@ class FitRun:
         """Train, with a checkpoint now and then, at the end, and when broken off."""
         if self.settings.resume:
             self.losses = self.checkpoints.restore(trainer)
+            self._demand_a_beginning(trainer)
         else:
             self.folder.mark(**self.decided)
             self.folder.drop("checkpoints")
@@ -75,6 +76,19 @@ class FitRun:
                 self.checkpoints.save(trainer, self.losses)
             yield report
             self._heed(report.done)
+
+    def _demand_a_beginning(self, trainer: Trainer) -> None:
+        """Refuse to replace a finished fit that kept no checkpoint by one that begins anew."""
+        if self.folder.is_complete and not trainer.parameters.step:
+            raise CheckpointError(
+                f"{self.settings.out}: this fit is finished and kept no checkpoint, so that it "
+                "cannot be trained on: begin anew with --overwrite"
+            )
+
+    @property
+    def _history(self) -> list[tuple[int, int]]:
+        """The stages of the fit; see ``fit_checkpoints.History``."""
+        return [*self.checkpoints.history, (self.settings.steps, self.settings.steps)]
 
     def _heed(self, step: int) -> None:
         """Break off if that was asked for."""

@@ -20,9 +20,11 @@ from rift_cl.train.solve_settings import SolveSettings
 from rift_cl.train.xray_trainer import RIDGE, xray_settings
 
 # Photographs from which on the ramp is used: with 8 to 36 it never gained, with 64 short fits did.
-_ENOUGH = 40
+ENOUGH_VIEWS = 40
 # Rates of poses and exposures where they are refined.
 _POSE_RATE, _EXPOSURE_RATE = 1e-3, 1e-2
+# Steps that no fit will ever take, and that every counter still holds.
+_MOST_STEPS = 2**62
 # What may differ between a run and the one that goes on with it: it changes no bit of the result.
 _FREE = (
     *("out", "resume", "overwrite", "dry_run", "checkpoint_every", "view", "device"),
@@ -92,7 +94,9 @@ class FitSettings(XrayOptions, BasisOptions):
     checkpoint_every: int = 1000
     """Steps between two checkpoints, of which the last two are kept; 0 for none."""
     resume: bool = False
-    """Go on from the last checkpoint in the same folder, to the same bits."""
+    """Go on from the last checkpoint in the same folder, to the same bits. With more --steps than
+    before a fit, finished or not, is trained on: from there with the learning rates, densification
+    and final phase that a fit of so many steps has, so that rates rise again before they fall."""
     view: bool = False
     """Show the fit in a browser while it runs, on this machine alone."""
     device: str | None = None
@@ -120,6 +124,8 @@ class FitSettings(XrayOptions, BasisOptions):
             if getattr(self, name) < bound:
                 option = name.replace("_", "-")
                 raise InputError(f"--{option} is {getattr(self, name)}, wanted {bound} or more")
+        if self.solve > _MOST_STEPS:
+            raise InputError(f"--solve is {self.solve}, wanted at most {_MOST_STEPS}")
         if not (self.first_splats is None or 0 < self.first_splats <= 1):
             raise InputError(f"--first-splats is {self.first_splats}, wanted above 0, at most 1")
         if self.homogenise_by == "coverage" and not self.exponent:
@@ -144,7 +150,7 @@ class FitSettings(XrayOptions, BasisOptions):
     def exponent_for(self, views: int) -> float:
         """The exponent for so many photographs; what was asked for holds for any number."""
         asked = self.homogenise is not None or self.homogenise_by == "coverage"
-        return self.exponent if asked or views >= _ENOUGH else 0.0
+        return self.exponent if asked or views >= ENOUGH_VIEWS else 0.0
 
     def asks_for_noise(self, exponent: float) -> bool:
         """Whether the pictures' noise must be known, where this is the ramp's exponent."""

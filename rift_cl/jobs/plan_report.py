@@ -13,7 +13,7 @@ from rift_cl.html_page import Page
 from rift_cl.jobs.coverage_pictures import add_coverage, camera_figure, direction_figure
 from rift_cl.jobs.plan_input import PlanInput
 from rift_cl.jobs.sampled import Sampled, points_of
-from rift_cl.plot import curves, figure_png
+from rift_cl.plot import curves, figure_svg
 from rift_cl.sampling.planning.view_plan import Knee, Plan
 
 # What a merit is, for people.
@@ -131,7 +131,7 @@ def _cameras(page: Page, given: PlanInput, found: Plan, sampled: Sampled) -> Non
     page.section("Where the cameras stand")
     groups = {"taken already": found.fixed, "planned": found.cameras}
     page.figure(
-        figure_png(camera_figure(groups, sampled)),
+        figure_svg(camera_figure(groups, sampled)),
         caption="The target is the grey disc; lines point where the cameras look. views.csv has "
         "the angles, distances and settings, the most useful view first, so that the first views "
         "of the list are themselves a good plan of fewer.",
@@ -161,7 +161,7 @@ def _gains(page: Page, found: Plan, knee: Knee, name: str) -> None:
         mark=None if knee.views is None else float(knee.views + len(found.fixed)),
     )
     page.figure(
-        figure_png(figure),
+        figure_svg(figure),
         caption="The merit as views are added, the most useful first.",
         alt="Merit against the number of views",
     )
@@ -178,7 +178,7 @@ def _coverage(page: Page, sampled: Sampled, device: Device) -> None:
     target = sampled.target
     page.section("What the views sample")
     page.figure(
-        figure_png(direction_figure(sampled, device)),
+        figure_svg(direction_figure(sampled, device)),
         caption="Left, lines of sight on the upper hemisphere, up in the middle; opposite ones "
         "count as one. Right, how many views see detail along each direction, at 8 cycles per "
         "diameter; hatched is what lies on no view's slice.",

@@ -21,6 +21,7 @@ from rift_cl.cl.device import Device
 from rift_cl.errors import OutputError
 from rift_cl.html_page import Page
 from rift_cl.io.output import make_folder, write_json, write_text, writing
+from rift_cl.jobs.settings_table import changed, show_settings
 
 _CONFIG = "config.json"
 
@@ -48,12 +49,17 @@ class RunFolder:
             raise OutputError(f"{path}: {above} is no folder; name another place (--out)")
         with writing(path):
             used = path.exists() and (not path.is_dir() or any(path.iterdir()))
-        if used and _job_of(path) != job:
+        if used and _record_of(path).get("job") != job:
             raise OutputError(f"{path}: holds other things already; name another folder (--out)")
         if used and not (overwrite or resume):
             raise OutputError(
                 f"{path}: holds an earlier run; name another folder (--out) or add --overwrite"
             )
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether it holds a run that came to its end."""
+        return _record_of(self.path).get("complete") is True
 
     def make(self) -> None:
         """Make the folder, and mark it as ours if no earlier run did: the first thing written."""
@@ -88,6 +94,8 @@ class RunFolder:
         metrics: Mapping[str, Any],
         page: Page,
         device: Device,
+        *,
+        asked: Any = None,
         **decided: Any,
     ) -> None:
         """Write the report, the metrics and, last, the configuration.
@@ -97,20 +105,22 @@ class RunFolder:
             metrics: its figures.
             page: the report, to which settings and environment are added.
             device: where it ran.
+            asked: the settings that were given, where ``settings`` holds what was decided too.
             **decided: what else the configuration is to hold, by name.
         """
+        given = {} if asked is None else {"asked": changed(asked)}
         config = {
             "job": self._job,
             "complete": True,
             "rift_cl": __version__,
             "settings": dataclasses.asdict(settings),
+            **given,
             **decided,
             "environment": environment(device),
         }
-        page.section("Settings")
-        page.code(json.dumps(config["settings"], indent=2, default=str))
-        page.section("Environment")
-        page.facts(environment(device))
+        show_settings(page, settings, asked)
+        with page.folded("Environment"):
+            page.facts(environment(device))
         write_text(self.path / "report.html", page.html())
         write_json(self.path / "metrics.json", metrics)
         write_json(self.path / _CONFIG, config)
@@ -130,10 +140,10 @@ def environment(device: Device) -> dict[str, str]:
     }
 
 
-def _job_of(path: Path) -> str | None:
-    """The command whose run a folder holds, or None."""
+def _record_of(path: Path) -> dict[str, Any]:
+    """What a folder says of the run that it holds; nothing where it holds none."""
     try:
-        job = json.loads((path / _CONFIG).read_text(encoding="utf-8"))["job"]
-    except (OSError, ValueError, LookupError, TypeError):
-        return None
-    return job if isinstance(job, str) else None
+        record = json.loads((path / _CONFIG).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return record if isinstance(record, dict) else {}

@@ -100,6 +100,7 @@ class XrayFit(FitRun):
         self.metrics = {
             "splats": len(splats),
             "loss": self.losses[-1][1],
+            "history": self._history,
             "center": whole.center,
             "scale": whole.scale,
             "start_error": first,
@@ -158,7 +159,14 @@ class XrayFit(FitRun):
         self.folder.drop(*(set(VOLUME_NAMES.values()) - {path.name}))
         shown = (slices, density * volume)
         page = xray_page(source.scan.path.name, shown, self.scores, self.losses, self.metrics)
-        self.folder.finish(settings, self.metrics, page, self.device)
+        decided = dataclasses.replace(
+            settings,
+            homogenise=settings.exponent,
+            center=whole.center,
+            rows=source.rows,
+            pitch=pitch,
+        )
+        self.folder.finish(decided, self.metrics, page, self.device, asked=settings)
 
     def _voxels(self, splats: Splats, whole: Projections) -> Floats:
         """The splats on the grid; plain ones to the last bits of fits from before modes."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,21 @@ from numpy.typing import NDArray
 
 from rift_cl.html_page import Page
 from rift_cl.jobs.few import evenly
+from rift_cl.jobs.fit_report import history_notes
 from rift_cl.jobs.fit_scores import ViewScore
+from rift_cl.jobs.slice_pictures import (
+    ENOUGH,
+    FRAMES,
+    UPRIGHT,
+    display_window,
+    show_slices,
+    smaller,
+)
 from rift_cl.jobs.xray_scores import COLUMNS, SCORING, score_rows
-from rift_cl.plot import curves, figure_png, image_grid
+from rift_cl.plot import curves, figure_svgs
 
-_SLICES = 3
-# The display window leaves out this share of the darkest and of the brightest samples.
-_TAIL = 0.5
+# Samples between two slices that stand side by side.
+_GAP = 4
 
 Floats = NDArray[np.float32]
 
@@ -39,22 +48,20 @@ def xray_page(
     """
     basis = f", {metrics['basis']}" if "basis" in metrics else ""
     page = Page(f"Splats fitted to {name}", f"{metrics['splats']} splats, X-rays{basis}")
+    _show_slices(page, *slices)
     if metrics["scores"]:
+        page.section("Scores")
         page.table(COLUMNS, score_rows(metrics), caption=SCORING)
-    page.section("Slices")
-    page.figure(
-        figure_png(_slices(*slices)),
-        caption="Attenuation per unit of length: of the splats, as means over voxels, and by "
-        "filtered backprojection of the same views.",
-        alt="Slices of the splats beside those of filtered backprojection",
-    )
     for group, scores in groups.items():
         _show_projections(page, group, scores)
     page.section("Training")
     steps, values = zip(*losses, strict=True)
-    figure = curves({"loss": (steps, values)}, xlabel="step", ylabel="loss")
-    page.figure(figure_png(figure), caption="Of the projections as they came.", alt="Loss by step")
+    draw = partial(curves, {"loss": (steps, values)}, xlabel="step", ylabel="loss")
+    figure = figure_svgs(lambda width: draw(width=width))
+    page.figure(figure, caption="Of the projections as they came.", alt="Loss by step")
     shown = {k: v for k, v in metrics.items() if isinstance(v, (int, float, str))}
+    for note in history_notes(metrics["history"]):
+        page.paragraph(note)
     page.facts(shown)
     return page
 
@@ -62,7 +69,7 @@ def xray_page(
 def _show_projections(page: Page, group: str, scores: Sequence[ViewScore]) -> None:
     page.section(f"Projections: {group}")
     page.figure(
-        figure_png(_profile(scores)),
+        figure_svgs(partial(_profile, scores)),
         caption="The middle row of the worst by PSNR: line integrals by detector bin.",
         alt="Line integrals of an unseen projection: truth and fit",
     )
@@ -75,19 +82,43 @@ def _row(score: ViewScore) -> tuple[Any, ...]:
     return (score.name, score.angle, *(score.values[name] for name in names))
 
 
-def _slices(splats: Floats, voxels: Floats) -> Any:
-    count = len(splats)
-    few = evenly(count, min(count, _SLICES))
-    images = [volume[k] for k in few for volume in (splats, voxels)]
-    titles = [f"{name}, slice {k}" for k in few for name in ("splats", "fbp")]
-    low, high = np.percentile(np.stack(images), [_TAIL, 100 - _TAIL])
-    window = (float(low), float(high) if high > low else float(low) + 1)
-    return image_grid(images, titles=titles, columns=2, window=window, size=5.0)
+def _show_slices(page: Page, splats: Floats, voxels: Floats) -> None:
+    """Sliders through z and, of more than a few slices, through planes along the axis."""
+    across = evenly(len(splats), min(len(splats), FRAMES))
+    few = across[:: len(across) // 8 + 1]
+    window = display_window([volume[k] for k in few for volume in (splats, voxels)])
+    what = (
+        "Attenuation per unit of length: left of the splats, as means over voxels, right by "
+        "filtered backprojection of the same views"
+    )
+    show_slices(
+        page,
+        [_side_by_side(splats[k], voxels[k], window[1]) for k in across],
+        labels=[f"slice {k}" for k in across],
+        window=window,
+        what=f"{what}; slices across the axis",
+    )
+    if len(splats) < ENOUGH:
+        return
+    along = evenly(splats.shape[1], min(splats.shape[1], UPRIGHT))
+    show_slices(
+        page,
+        [_side_by_side(splats[:, k], voxels[:, k], window[1]) for k in along],
+        labels=[f"y {k}" for k in along],
+        window=window,
+        what=f"{what}; planes along the axis",
+    )
 
 
-def _profile(scores: Sequence[ViewScore]) -> Any:
+def _side_by_side(left: Floats, right: Floats, white: float) -> Floats:
+    left, right = smaller(left), smaller(right)
+    gap = np.full((len(left), _GAP), white, np.float32)
+    return np.concatenate([left, gap, right], axis=1)
+
+
+def _profile(scores: Sequence[ViewScore], width: int) -> Any:
     worst = min(scores, key=lambda score: score.values["fit_psnr"])
     row = len(worst.truth) // 2
     bins = np.arange(worst.truth.shape[1])
     series = {"truth": (bins, worst.truth[row]), "fit": (bins, worst.image[row])}
-    return curves(series, xlabel="detector bin", ylabel="line integral")
+    return curves(series, xlabel="detector bin", ylabel="line integral", width=width)

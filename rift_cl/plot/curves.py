@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.plot.figure import COLORS, INK, LINE, POINTS, SOFT, new_figure, real_values
+from rift_cl.plot.figure import COLORS, INK, LINE, POINTS, SOFT, WIDE, new_figure, real_values
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +28,7 @@ def curves(
     log_y: bool = False,
     title: str = "",
     mark: float | None = None,
+    width: int = WIDE,
 ) -> Figure:
     """Curves over one pair of axes, each named at its right end in its own colour.
 
@@ -39,6 +40,8 @@ def curves(
         log_y: whether y is.
         title: a text above the axes.
         mark: a position along x that is shown by a dashed line and its value.
+        width: of the figure in pixels; letters keep their size.
+        width: of the figure in pixels; letters keep their size.
 
     Raises:
         ShapeError: there is no curve, or x and y of one are not (n,) with one n of 1 or more.
@@ -55,7 +58,7 @@ def curves(
     marked = [] if mark is None else [mark]
     _check_scale("x", log_x, min([float(x.min()) for x, _ in lines] + marked))
     _check_scale("y", log_y, min(float(y.min()) for _, y in lines))
-    figure = new_figure(1024, 576)
+    figure = new_figure(width, round(width * (0.5625 if width >= WIDE else 0.75)))
     figure.set_layout_engine("constrained", w_pad=0.1, h_pad=0.1)
     axes = figure.add_subplot(xscale=_scale(log_x), yscale=_scale(log_y))
     for k, (x, y) in enumerate(lines):

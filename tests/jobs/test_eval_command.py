@@ -58,7 +58,7 @@ def test_a_fit_is_scored_as_it_scored_itself(capture, fitted, tmp_path, capsys):
         assert scores[name] == pytest.approx(value, abs=1e-4), name
     assert [view["name"] for view in found["views"][capture.name]] == ["0.png", "4.png"]
     page = (out / "report.html").read_text()
-    assert "degrees away" in page and page.count("<img") == 1
+    assert "degrees away" in page and page.count('class="pair"') == 2
 
 
 def test_without_training_views_there_are_no_baselines(capture, fitted, tmp_path, capsys):

@@ -1,8 +1,12 @@
-"""A fit that is broken off, or killed, and taken up again: the same splats to the bit."""
+"""A fit that is broken off, or killed, and taken up again: the same splats to the bit.
+
+And one that is finished and trained on with more steps, which its report tells.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import subprocess
 import sys
 import time
@@ -13,6 +17,7 @@ import pytest
 
 from rift_cl.cli import main
 from rift_cl.errors import StoppedError
+from rift_cl.io.checkpoint import newest_checkpoint
 from rift_cl.jobs.fit import Fit
 from rift_cl.jobs.fit_settings import FitSettings
 
@@ -130,3 +135,81 @@ def test_few_photographs_are_fitted_without_the_ramp_unless_it_is_asked_for(capt
     assert [settings(capture, tmp_path).exponent_for(views) for views in (39, 40)] == [0.0, 0.5]
     for more in ({"homogenise": 0.3}, {"homogenise_by": "coverage"}):
         assert settings(capture, tmp_path, **more).exponent_for(8) > 0
+
+
+def run(given):
+    job = Fit(given)
+    reports = [report.done for report in job.run() if report.what == "steps"]
+    return job, reports
+
+
+def metrics_of(folder):
+    return json.loads((folder / "metrics.json").read_text())
+
+
+@pytest.mark.parametrize("more", [{}, VARIANTS["default"]], ids=["mcmc", "default"])
+def test_a_finished_fit_is_trained_on_to_the_same_bits(capture, tmp_path, more):
+    found = []
+    for name in ("once", "again"):
+        out = tmp_path / name
+        run(settings(capture, out, steps=50, **more))
+        before = digest(out)
+        _, reports = run(settings(capture, out, steps=100, resume=True, **more))
+        assert reports[0] > 50 and reports[-1] == 100
+        assert digest(out) != before
+        found.append(digest(out))
+    assert found[0] == found[1]
+    assert metrics_of(tmp_path / "once")["history"] == [[50, 50], [100, 100]]
+    page = (tmp_path / "once" / "report.html").read_text()
+    assert "to step 50 by the schedules of a fit of 50, then to step 100" in page
+    state, _ = newest_checkpoint(tmp_path / "once" / "checkpoints")
+    assert state.step == 100
+    assert bool(more) == any(name.startswith("poses.") for name in state.arrays)
+
+
+def test_the_second_part_may_be_broken_off_as_well(capture, tmp_path):
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    for out in (whole, cut):
+        run(settings(capture, out, steps=50))
+    run(settings(capture, whole, steps=125, resume=True))
+    first = digest(cut)
+    broken_off(settings(capture, cut, steps=125, resume=True), 75)
+    assert digest(cut) == first, "what was finished stays until there is something better"
+    run(settings(capture, cut, steps=125, resume=True))
+    assert digest(cut) == digest(whole)
+    assert metrics_of(cut)["history"] == [[50, 50], [125, 125]]
+
+
+def test_a_fit_that_was_broken_off_may_become_longer(capture, tmp_path):
+    broken_off(settings(capture, tmp_path / "fit", steps=100), 50)
+    job, _ = run(settings(capture, tmp_path / "fit", steps=125, resume=True))
+    (until, of), last = job.metrics["history"]
+    assert 50 <= until < 100 and of == 100 and last == (125, 125)
+
+
+def test_fewer_steps_and_no_checkpoints_are_told(capture, tmp_path, capsys):
+    out = tmp_path / "fit"
+    assert fit(capture, out) == 0
+    before = digest(out)
+    assert fit(capture, out, "--resume", "--steps", "50") == 3
+    assert "has 60 steps, --steps is 50" in capsys.readouterr().err
+    assert fit(capture, out, "--overwrite", "--checkpoint-every", "0") == 0
+    assert fit(capture, out, "--resume", "--steps", "90") == 3
+    assert "kept no checkpoint" in capsys.readouterr().err
+    assert digest(out) == before
+
+
+def test_the_report_says_what_was_decided_and_folds_defaults_away(capture, tmp_path):
+    run(settings(capture, tmp_path / "fit", steps=25))
+    page = (tmp_path / "fit" / "report.html").read_text()
+    assert "was off: with 6 photographs, fewer than 40" in page
+    config = json.loads((tmp_path / "fit" / "config.json").read_text())
+    assert config["settings"]["homogenise"] == 0.0 and "homogenise" not in config["asked"]
+    table = page[page.index(">Settings<") : page.index("settings at their defaults")]
+    assert '>homogenise</th><td class="number">' not in table
+    assert ">homogenise</th><td>0</td><td>decided</td>" in table
+    assert "<details>" in table and ">eps2d<" not in table
+    run(settings(capture, tmp_path / "asked", steps=25, homogenise=0.5))
+    page = (tmp_path / "asked" / "report.html").read_text()
+    assert "was off" not in page
+    assert ">homogenise</th><td>0.5</td><td>asked for</td>" in page

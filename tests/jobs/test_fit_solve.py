@@ -69,6 +69,8 @@ def test_fits_that_do_not_solve_say_nothing_of_it(scan, tmp_path):
 def test_negative_steps_between_solves_are_refused(scan, tmp_path, capsys):
     assert fit(scan, tmp_path / "fit", "--solve", "-5") == 3
     assert "--solve is -5, wanted 0 or more" in capsys.readouterr().err
+    assert fit(scan, tmp_path / "fit", "--solve", "9" * 20) == 3
+    assert "--solve is 99999999999999999999, wanted at most" in capsys.readouterr().err
     assert not (tmp_path / "fit").exists()
 
 

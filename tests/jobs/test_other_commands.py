@@ -51,8 +51,8 @@ def test_demo_fits_the_sample_and_shows_both_ways(tmp_path, capsys):
     headings = ["Integration", f"{regression}ornament", "Pictures: off_path", f"{regression}wall"]
     places = [page.index(f"<h2>{heading}") for heading in headings]
     assert places == sorted(places)
-    # Slices, two curves, pictures of three groups, two losses.
-    assert page.count("data:image/png;base64,") == 8
+    # The best, the middle and the worst picture of three groups.
+    assert page.count('class="pair"') == 9
     assert main([*arguments, *NO_FIT]) == 0
     assert not (out / "ornament").exists() and not (out / "wall").exists()
 
@@ -125,7 +125,7 @@ def test_center(scan, tmp_path, capsys):
     printed = capsys.readouterr().out
     assert float(printed.split()[0]) == pytest.approx(45, abs=0.3)
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 17 + 2
+    assert page.count("data:image/jpeg;base64,") == 17 + 9
     assert page.count("<script>") == 1
     assert "script-src 'sha256-" in page
     by = json.loads((out / "metrics.json").read_text())["by"]

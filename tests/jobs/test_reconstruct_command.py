@@ -36,7 +36,7 @@ def test_slices_are_quantitative(scan, tmp_path, format, kind):
 def test_the_report_stands_alone(scan, tmp_path):
     assert run("reconstruct", scan.counts, "--out", tmp_path / "out", "--center", 45) == 0
     page = (tmp_path / "out" / "report.html").read_text()
-    assert page.count("data:image/png;base64,") >= 1
+    assert page.count("data:image/jpeg;base64,") == 3
     assert "http://" not in page
     assert "https://" not in page
     config = json.loads((tmp_path / "out" / "config.json").read_text())

@@ -132,7 +132,7 @@ def test_a_long_run_shows_a_slice_first(scan, tmp_path):
     assert (out / "preview.png").exists()
     metrics = json.loads((out / "metrics.json").read_text())
     assert metrics["steps"] == 6
-    assert "data:image/png" in (out / "report.html").read_text()
+    assert "data:image/jpeg" in (out / "report.html").read_text()
 
 
 def test_an_earlier_run_is_kept_unless_told(scan, tmp_path, capsys):

@@ -293,8 +293,8 @@ class Reconstruction:
         self.metrics.pop("seconds_for_all", None)
         page = reconstruction_page(self, preview)
         record = {**self.metrics, "assumed": self.source.notes}
-        facts = {"asked": self.settings.asked(), "axis": self.source.axis, "run": self._facts()}
-        self.folder.finish(self.decided, record, page, self.device, **facts)
+        facts = {"axis": self.source.axis, "run": self._facts()}
+        self.folder.finish(self.decided, record, page, self.device, asked=self.settings, **facts)
         self._kept.drop()
 
     def _value_window(self) -> tuple[float, float] | None:

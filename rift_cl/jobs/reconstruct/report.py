@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,15 @@ from rift_cl.io.output import atomic_path
 from rift_cl.jobs.few import evenly
 from rift_cl.jobs.reconstruct.decided import in_words
 from rift_cl.jobs.reconstruct.volume import volume_path
-from rift_cl.plot import curves, figure_png, image_grid
+from rift_cl.jobs.slice_pictures import (
+    ENOUGH,
+    FRAMES,
+    UPRIGHT,
+    display_window,
+    show_slices,
+    smaller,
+)
+from rift_cl.plot import curves, figure_png, figure_svgs, image_grid
 
 if TYPE_CHECKING:
     from rift_cl.jobs.reconstruct.job import Reconstruction
@@ -26,8 +35,6 @@ _PANELS = 6
 # Values that a histogram tells apart.
 _BARS = 128
 PREVIEW_PICTURE = "preview.png"
-# The display window leaves out this share of the darkest and of the brightest samples.
-_TAIL = 0.5
 
 
 @dataclass
@@ -36,11 +43,16 @@ class Preview:
 
     Args:
         count: slices of the volume.
-        slices: those kept so far, by their number: some for the report, and the middle one.
+        slices: those kept so far, by their number: a few, and the middle one.
+        frames: more of them, made smaller, for the slider through z.
+        upright: planes along the axis, for the slider through y: rows of every slice by their
+            number, from the first slice to the last, each made smaller.
     """
 
     count: int
     slices: dict[int, NDArray[np.float32]] = field(default_factory=dict)
+    frames: dict[int, NDArray[np.float32]] = field(default_factory=dict)
+    upright: dict[int, list[NDArray[np.float32]]] = field(default_factory=dict)
     _lowest: float = np.inf
     _highest: float = -np.inf
     _sum: float = 0.0
@@ -48,7 +60,7 @@ class Preview:
 
     @property
     def panels(self) -> list[int]:
-        """Numbers of the slices that the report shows, evenly from the first to the last."""
+        """Numbers of the slices that are kept as they are, evenly from the first to the last."""
         return evenly(self.count, min(self.count, _PANELS))
 
     @property
@@ -62,8 +74,15 @@ class Preview:
         self._highest = max(self._highest, float(block.max()))
         self._sum += float(block.sum(dtype=np.float64))
         self._samples += block.size
-        for index in {*self.panels, self.count // 2} & set(range(start, start + len(block))):
+        passing = range(start, start + len(block))
+        for index in {*self.panels, self.count // 2}.intersection(passing):
             self.slices[index] = block[index - start].copy()
+        for index in evenly(self.count, min(self.count, FRAMES)):
+            if index in passing:
+                self.frames[index] = smaller(block[index - start])
+        if self.count >= ENOUGH:
+            for row in evenly(block.shape[1], min(block.shape[1], UPRIGHT)):
+                self.upright.setdefault(row, []).extend(smaller(block[:, row], axes=(1,)))
 
     def statistics(self) -> dict[str, float]:
         """Least, greatest and mean value of the whole volume."""
@@ -89,7 +108,9 @@ def planned(job: Reconstruction, seconds: float) -> dict[str, str]:
 
 def write_preview(path: Path, image: NDArray[np.float32], title: str) -> None:
     """Write a picture of one slice, for a look before the others are done."""
-    figure = image_grid([image], titles=[title], columns=1, window=_window([image]), size=6.0)
+    figure = image_grid(
+        [image], titles=[title], columns=1, window=display_window([image]), size=6.0
+    )
     with atomic_path(path) as part:
         part.write_bytes(figure_png(figure))
 
@@ -97,16 +118,23 @@ def write_preview(path: Path, image: NDArray[np.float32], title: str) -> None:
 def reconstruction_page(job: Reconstruction, preview: Preview) -> Page:
     """The report of a finished reconstruction."""
     page = Page(f"Reconstruction of {job.source.scan.path.name}", f"{job.shape[0]} slices")
-    kept = preview.panels
-    images = [preview.slices[index] for index in kept]
-    titles = [f"slice {job.rows[0] + index}" for index in kept]
-    columns = min(3, len(images))
-    figure = image_grid(images, titles=titles, columns=columns, window=_window(images), size=4.0)
-    page.figure(
-        figure_png(figure),
-        caption=f"Attenuation per {job.source.unit or 'unit of length'}.",
-        alt=f"{len(images)} reconstructed slices",
+    images = [preview.slices[index] for index in preview.panels]
+    window, unit = display_window(images), job.source.unit or "unit of length"
+    show_slices(
+        page,
+        list(preview.frames.values()),
+        labels=[f"slice {job.rows[0] + index}" for index in preview.frames],
+        window=window,
+        what=f"Attenuation per {unit}, slices across the axis",
     )
+    if preview.upright:
+        show_slices(
+            page,
+            [smaller(np.stack(rows)) for rows in preview.upright.values()],
+            labels=[f"y {row}" for row in preview.upright],
+            window=window,
+            what=f"Attenuation per {unit}, planes along the axis",
+        )
     if job.source.notes:
         page.section("What was assumed and mended")
         for note in job.source.notes:
@@ -116,12 +144,6 @@ def reconstruction_page(job: Reconstruction, preview: Preview) -> Page:
     page.section("Result")
     page.facts(_facts(job))
     return page
-
-
-def _window(images: list[NDArray[np.float32]]) -> tuple[float, float]:
-    """Black and white for some slices, less the samples that would take all the contrast."""
-    low, high = np.percentile(np.stack(images), [_TAIL, 100 - _TAIL])
-    return float(low), float(high) if high > low else float(low) + 1
 
 
 def _residuals(page: Page, residuals: Mapping[int, list[float]]) -> None:
@@ -135,10 +157,10 @@ def _residuals(page: Page, residuals: Mapping[int, list[float]]) -> None:
         for number in few
     }
     title = "residual, root mean square"
-    figure = curves(series, xlabel="step", ylabel=title, log_x=True)
+    draw = partial(curves, series, xlabel="step", ylabel=title, log_x=True)
     page.section("Steps")
     page.figure(
-        figure_png(figure),
+        figure_svgs(lambda width: draw(width=width)),
         caption="How far the projections of the slice are from the measured ones, in the unit of "
         "a line integral.",
         alt="Curves of the residual over the steps",
@@ -146,19 +168,20 @@ def _residuals(page: Page, residuals: Mapping[int, list[float]]) -> None:
 
 
 def _histogram(page: Page, images: list[NDArray[np.float32]], unit: str) -> None:
-    low, high = _window(images)
+    low, high = display_window(images)
     counts, edges = np.histogram(np.stack(images), bins=_BARS, range=(low, high))
     share = 100 * counts / max(counts.sum(), 1)
     per = f"per {unit}" if unit else "per unit of length"
-    figure = curves(
+    draw = partial(
+        curves,
         {"samples": ((edges[1:] + edges[:-1]) / 2, share)},
         xlabel=f"attenuation, {per}",
         ylabel="samples, %",
     )
     page.section("Values")
     page.figure(
-        figure_png(figure),
-        caption="How often each value occurs in the slices above.",
+        figure_svgs(lambda width: draw(width=width)),
+        caption=f"How often each value occurs in {len(images)} of the slices.",
         alt="Histogram of the values",
     )
 

@@ -255,14 +255,6 @@ class ReconstructSettings(ScanInput):
             raise InputError("--exponent is the high-pass's: add --filter high-pass")
         return Ramp(self.filter or "ram-lak", 1.0 if self.cutoff is None else self.cutoff)
 
-    def asked(self) -> dict[str, Any]:
-        """The settings that differ from the defaults."""
-        return {
-            field.name: getattr(self, field.name)
-            for field in dataclasses.fields(self)
-            if getattr(self, field.name) != field.default
-        }
-
     def decisive(self) -> dict[str, Any]:
         """The settings on which the slices depend, as text."""
         return {
