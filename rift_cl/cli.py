@@ -148,7 +148,8 @@ def _render(settings: Any, output: Output) -> None:
     _say_assumed(job.notes)
     if not ran(job, settings, output):
         return
-    print(f"frames, animation.png and report.html are in {settings.out}")
+    shown = ", ".join(filter(None, ["frames", job.film]))
+    print(f"{shown} and report.html are in {settings.out}")
 
 
 def _view(settings: Any, output: Output) -> None:

@@ -90,7 +90,7 @@ class Page:
         """Add a picture, which a tap or a key enlarges.
 
         Args:
-            picture: a PNG, JPEG or SVG file's content, or two of which the first is for wide
+            picture: a PNG, JPEG, WebP or SVG file's content, or two of which the first is for wide
                 pages and the second for those of a telephone. An SVG file begins with its width
                 and height in pixels, as those of ``rift_cl.plot.figure_svg`` do.
             caption: what the picture shows, printed below it.

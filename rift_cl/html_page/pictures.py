@@ -16,7 +16,13 @@ from io import BytesIO
 from rift_cl.errors import InputError
 from rift_cl.html_page.text import escape
 
-_KINDS = {b"\x89PNG\r\n\x1a\n": "png", b"\xff\xd8\xff": "jpeg", b"<svg ": "svg+xml"}
+_KINDS = {
+    b"\x89PNG\r\n\x1a\n": "png",
+    b"\xff\xd8\xff": "jpeg",
+    b"<svg ": "svg+xml",
+    # Of the formats in such a file a browser shows WebP alone.
+    b"RIFF": "webp",
+}
 _SVG_SIZE = re.compile(rb'<svg [^>]*?width="(\d+)" height="(\d+)"')
 # A picture of fewer samples along its longer side is enlarged to squares.
 _COARSE = 256
@@ -168,7 +174,7 @@ def _kind(content: bytes) -> str:
     for beginning, kind in _KINDS.items():
         if content.startswith(beginning):
             return kind
-    raise InputError("a picture is no PNG, JPEG or SVG file, wanted its complete content")
+    raise InputError("a picture is no PNG, JPEG, WebP or SVG file, wanted its complete content")
 
 
 def _size(content: bytes) -> tuple[int, int]:
@@ -184,4 +190,4 @@ def _size(content: bytes) -> tuple[int, int]:
         with Image.open(BytesIO(content)) as image:
             return image.size
     except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
-        raise InputError(f"a picture is no complete PNG or JPEG file ({error})") from error
+        raise InputError(f"a picture is no complete PNG, JPEG or WebP file ({error})") from error

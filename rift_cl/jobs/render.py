@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,12 @@ from rift_cl.cl.discovery import open_device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.io.capture import Capture, open_capture
+from rift_cl.io.film_file import film_writer, suffix_of
 from rift_cl.io.image import write_png
 from rift_cl.io.output import atomic_path, make_folder, write_json
 from rift_cl.io.pixels import write_pixels
 from rift_cl.io.transforms_record import transforms_of
-from rift_cl.jobs.animation import shrunk
+from rift_cl.jobs.animation import chosen_film, shrunk
 from rift_cl.jobs.camera_path import opened, resized, smooth_path
 from rift_cl.jobs.cameras.film import capture_arc, farthest_from_cameras, film, frame_of
 from rift_cl.jobs.depth_picture import LEAST_ALPHA, depth_picture, depth_window
@@ -31,6 +33,8 @@ from rift_cl.progress import Report
 from rift_cl.splat.bands import FrameMemory
 from rift_cl.splat.renderer import DepthKind, Renderer
 
+# What an earlier rendering leaves besides pictures.
+_LEFT = ("transforms.json", "key_frames.json", "film.*")
 # Frames of a film when nothing is said, and those that it is made again from.
 _FRAMES, _KEYS = 96, 13
 # Longer edge of the animation in pixels.
@@ -60,6 +64,7 @@ class Render:
         lenses = [camera.aperture for camera in self.cameras if camera.aperture is not None]
         if settings.focus is not None and not lenses:
             raise InputError("--focus is about a lens with an opening: give its --aperture as well")
+        self._kind = chosen_film(settings.film, [camera.size for camera in self.cameras])
         self.device = open_device(settings.device)
         self.folder = RunFolder(settings.out, "render", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
@@ -68,6 +73,20 @@ class Render:
     def notes(self) -> tuple[str, ...]:
         """What had to be guessed, a sentence each."""
         return () if self.settings.path is not None else self.settings.notes(self.scene)
+
+    @property
+    def film(self) -> str | None:
+        """The name of the film's file; None where nothing moves."""
+        if self._kind is None or self._kind == "apng":
+            return self._kind and "animation.png"
+        return f"film{suffix_of(self._kind)}"
+
+    def _film_file(self) -> AbstractContextManager[Callable[[NDArray[np.uint8]], object]]:
+        """What takes the frames of a film that is written as they come."""
+        if self._kind is None or self._kind == "apng":
+            return nullcontext(lambda _: None)
+        path = self.settings.out / str(self.film)
+        return film_writer(path, self._kind, self.cameras[0].size, self.settings.rate)
 
     def _film(self) -> list[Camera]:
         """Cameras round the scene or along its capture; what is not set comes from there."""
@@ -128,7 +147,7 @@ class Render:
         folder, total = self.settings.out, len(self.cameras)
         self.folder.make()
         self.folder.mark()
-        self.folder.drop("frames", "depth", "*.png", "transforms.json", "key_frames.json")
+        self.folder.drop("frames", "depth", "*.png", *_LEFT)
         make_folder(folder / "frames")
         renderer = Renderer(self.scene.drawing, device=self.device)
         splats = self.scene.splats.upload(self.device)
@@ -138,18 +157,20 @@ class Render:
             window = depth_window(renderer, splats, self.cameras)
         depth: DepthKind | None = "expected" if self.settings.depth else None
         sheet, names = Sheet(total), []
-        for number, camera in enumerate(self.cameras):
-            frame = renderer.forward(splats, camera, background=behind, depth=depth)
-            image = self.device.get(frame.image)
-            colors = in_display_light(image[..., :3], self.scene.light)
-            names.append(f"frames/{number:04}.png")
-            write_png(folder / names[-1], colors)
-            pictures = [colors]
-            if self.settings.depth:
-                alpha = np.clip(1 - self.device.get(frame.transmittance), 0, 1)
-                pictures.append(self._save_depth(number, image[..., -1], alpha, window))
-            sheet.add(number, [shrunk(picture, _MOVING) for picture in pictures])
-            yield Report(number + 1, total, "frames")
+        with self._film_file() as add:
+            for number, camera in enumerate(self.cameras):
+                frame = renderer.forward(splats, camera, background=behind, depth=depth)
+                image = self.device.get(frame.image)
+                colors = in_display_light(image[..., :3], self.scene.light)
+                names.append(f"frames/{number:04}.png")
+                write_png(folder / names[-1], colors)
+                add(shrunk(colors, max(camera.size)))
+                pictures = [colors]
+                if self.settings.depth:
+                    alpha = np.clip(1 - self.device.get(frame.transmittance), 0, 1)
+                    pictures.append(self._save_depth(number, image[..., -1], alpha, window))
+                sheet.add(number, [shrunk(picture, _MOVING) for picture in pictures])
+                yield Report(number + 1, total, "frames")
         self._finish(sheet, names, window)
 
     def _save_depth(
@@ -184,12 +205,14 @@ class Render:
             "degrees_to_photographs": farthest_from_cameras(self.cameras, bounds),
             "eps2d": self.scene.drawing.eps2d,
             "background": self.scene.background,
+            "film": self.film,
             "depth_window": list(window) if self.settings.depth else None,
         }
         contact = sheet.contact()
         write_bytes(folder / "contact.png", contact)
-        moving = sheet.moving(self.settings.rate)
-        if moving is not None:
-            write_bytes(folder / "animation.png", moving)
+        rate = self.settings.rate
+        if self._kind == "apng":
+            write_bytes(folder / str(self.film), sheet.moving(rate))
+        moving = None if self._kind is None else sheet.embedded(rate)
         page = render_page(self.scene.name, contact, moving, self.metrics)
         self.folder.finish(self.settings, self.metrics, page, self.device)

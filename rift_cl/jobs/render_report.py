@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rift_cl.html_page import Page
 from rift_cl.io.output import atomic_path
-from rift_cl.jobs.animation import animated_png
+from rift_cl.jobs.animation import animated_png, animated_webp
 from rift_cl.plot import figure_png, image_grid
 
 Codes = NDArray[np.uint8]
@@ -19,7 +19,7 @@ Codes = NDArray[np.uint8]
 # Frames on the contact sheet, in a row of it, and in the animation.
 _SHOWN, _ROW, _MOVING = 12, 4, 240
 # The report holds an animation of so many bytes or fewer.
-_EMBEDDED = 16 << 20
+_EMBEDDED = 4 << 20
 
 
 class Sheet:
@@ -56,20 +56,22 @@ class Sheet:
         columns = min(_ROW, len(self._stills))
         return figure_png(image_grid(images, titles=titles, columns=columns, window=(0.0, 1.0)))
 
-    def moving(self, rate: float) -> bytes | None:
-        """The animation as the content of a PNG file; None where nothing can move."""
-        if len(self._film) < 2 or len({frame.shape for frame in self._film}) > 1:
-            return None
+    def moving(self, rate: float) -> bytes:
+        """The animation as the content of a PNG file."""
         return animated_png(self._film, rate * self._share)
+
+    def embedded(self, rate: float) -> bytes:
+        """The animation as the content of a smaller WebP file."""
+        return animated_webp(self._film, rate * self._share)
 
 
 def render_page(
     name: str, contact: bytes, moving: bytes | None, metrics: Mapping[str, Any]
 ) -> Page:
-    """The report of a finished rendering."""
+    """The report of a finished rendering; ``moving`` is a small copy of its film."""
     page = Page(f"Pictures of {name}", f"{metrics['frames']} frames, {metrics['splats']} splats")
     if moving is not None and len(moving) <= _EMBEDDED:
-        caption = "Frames in motion, made smaller; animation.png is the same."
+        caption = f"Frames in motion, made smaller; {metrics['film']} is the film."
         page.figure(moving, caption=caption, alt="Animation of the frames")
     depth = metrics["depth_window"]
     caption = "Some frames by their numbers."

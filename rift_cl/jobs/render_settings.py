@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rift_cl.errors import InputError
+from rift_cl.jobs.animation import FilmChoice
 from rift_cl.jobs.orbit_input import OrbitInput
 
 _STEEPEST, _WIDEST = 89.0, 170.0
@@ -25,8 +26,8 @@ class RenderSettings(OrbitInput):
     """
 
     out: Path = Path("rift-render")
-    """Folder for frames, animation.png, contact.png, transforms.json, key_frames.json and
-    report.html."""
+    """Folder for frames, film.webm, film.mp4 or animation.png, contact.png, transforms.json,
+    key_frames.json and report.html."""
     path: Path | None = None
     """A transforms.json, a COLMAP model, or a fit: draw each of its views, in its order, instead of
     the film; key_frames.json of an earlier film, changed at will, with --between, for another."""
@@ -53,7 +54,11 @@ class RenderSettings(OrbitInput):
     """Width and height in pixels; when not given the views' own, or for a film the photographs'
     shape with 640 pixels along its longer edge, or 640 480."""
     rate: float = 24.0
-    """Frames of the animation in a second."""
+    """Frames of the film in a second."""
+    film: FilmChoice = "auto"
+    """The film's kind: webm (VP9), mp4 (AV1), mp4-h264 (plays on older machines; its encoder is
+    under the GPL), or apng, smaller pictures in an animated PNG. Videos want PyAV (pip install av);
+    auto is webm with it and apng without."""
     depth: bool = False
     """Write the expected depth as well: along the camera's axis, in scene units."""
     overwrite: bool = False

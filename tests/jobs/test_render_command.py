@@ -60,7 +60,7 @@ def small(*more):
 
 def test_an_orbit_leaves_frames_cameras_an_animation_and_a_report(scene, tmp_path, capsys):
     out = tmp_path / "film"
-    assert render(scene, out, *small("--background", 0, 0, 1)) == 0
+    assert render(scene, out, *small("--background", 0, 0, 1, "--film", "apng")) == 0
     assert "animation.png" in capsys.readouterr().out
     assert sorted(p.name for p in (out / "frames").iterdir()) == [f"{k:04}.png" for k in range(3)]
     for path in (out / "frames").iterdir():
@@ -185,6 +185,7 @@ def test_a_fit_in_linear_light_is_shown_as_a_display_shows_it(scene, tmp_path):
         (("--path", "nowhere", "--fov", 50), "--fov is about a film"),
         (("--eps2d", -1), "eps2d is -1"),
         (("--capture", "nowhere"), "nowhere"),
+        (("--film", "apng", "--frames", 1), "--film apng wants two frames"),
     ],
 )
 def test_what_makes_no_sense_is_named_and_leaves_nothing(scene, tmp_path, capsys, more, words):

@@ -1,0 +1,151 @@
+"""A film is written frame by frame: WebM or MP4, as browsers and telephones play them.
+
+PyAV encodes, in the wheels of which FFmpeg comes along; it is an extra. VP9 (libvpx) and AV1
+(SVT-AV1) may be used by anybody; H.264 plays on older machines too, but its encoder x264 is under
+the GPL, so that it is used where it is asked for alone. Nothing about the maker is written, and the
+same frames give the same bytes: one thread, and no version, number or date in the file.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import InputError, OutputError, RiftError
+from rift_cl.io.output import atomic_path
+
+FilmKind = Literal["webm", "mp4", "mp4-h264"]
+Codes = NDArray[np.uint8]
+
+# ITU-R BT.709 and its range from 16 to 235, in the numbers of FFmpeg.
+_BT709, _LIMITED = 1, 1
+
+
+@dataclass(frozen=True)
+class _Encoder:
+    """An encoder by FFmpeg's name, the container it goes into, and how well it is to encode."""
+
+    container: str
+    codec: str
+    options: dict[str, str]
+
+
+_ENCODERS: dict[FilmKind, _Encoder] = {
+    "webm": _Encoder(
+        "webm", "libvpx-vp9", {"crf": "24", "deadline": "good", "cpu-used": "4", "b": "0"}
+    ),
+    "mp4": _Encoder("mp4", "libsvtav1", {"crf": "28", "preset": "9", "svtav1-params": "lp=1"}),
+    "mp4-h264": _Encoder("mp4", "libx264", {"crf": "18", "preset": "medium"}),
+}
+
+
+def films_can_be_written() -> bool:
+    """Whether the extra is installed."""
+    return find_spec("av") is not None
+
+
+def suffix_of(kind: FilmKind) -> str:
+    """The ending of a film's name."""
+    return f".{_ENCODERS[kind].container}"
+
+
+def demand_films(kind: FilmKind) -> None:
+    """Make sure that films of a kind can be written.
+
+    Raises:
+        InputError: PyAV is not installed, or comes without the encoder.
+    """
+    if not films_can_be_written():
+        raise InputError(
+            f"--film {kind} is written by PyAV, which is not installed: pip install av (or "
+            "'.[film]' where the source is), or say --film apng"
+        )
+    import av
+
+    codec = _ENCODERS[kind].codec
+    try:
+        av.codec.Codec(codec, "w")
+    except ValueError as error:
+        raise InputError(
+            f"--film {kind} wants the encoder {codec}, which this PyAV does not have: pip install "
+            "--upgrade av, or choose another --film"
+        ) from error
+
+
+@contextmanager
+def film_writer(
+    path: Path, kind: FilmKind, size: tuple[int, int], rate: float
+) -> Iterator[Callable[[Codes], None]]:
+    """Give a function that takes frames; a clean exit leaves the whole film.
+
+    Args:
+        path: the file.
+        kind: container and codec; see ``demand_films``.
+        size: (height, width) of the frames in pixels; an odd last row or column is left out.
+        rate: frames in a second.
+
+    Yields:
+        A function that takes (height, width, 3) codes in display light.
+
+    Raises:
+        OutputError: the file cannot be written, or the encoder refuses frames of this size.
+    """
+    import av
+
+    # SVT-AV1 tells its settings on the standard error stream otherwise.
+    os.environ.setdefault("SVT_LOG", "1")
+    encoder = _ENCODERS[kind]
+    with atomic_path(path) as part:
+        try:
+            container = av.open(
+                str(part), "w", format=encoder.container, options={"fflags": "+bitexact"}
+            )
+            with container:
+                stream = _stream(container, encoder, size, rate)
+                yield lambda codes: container.mux(stream.encode(_frame(codes)))
+                container.mux(stream.encode())
+        except RiftError:
+            raise
+        except (av.FFmpegError, ValueError) as error:
+            raise OutputError(
+                f"{path}: {encoder.codec} writes no film of {size[1]} x {size[0]} pixels "
+                f"({error}); say --film apng, or another --size"
+            ) from error
+
+
+def _stream(container: Any, encoder: _Encoder, size: tuple[int, int], rate: float) -> Any:
+    options = {**encoder.options, "flags": "+bitexact"}
+    stream = container.add_stream(
+        encoder.codec, rate=Fraction(rate).limit_denominator(1000), options=options
+    )
+    stream.height, stream.width = _even(size[0]), _even(size[1])
+    stream.pix_fmt = "yuv420p"
+    context = stream.codec_context
+    # Quality is constant, whatever it takes; and one thread gives the same bytes every time.
+    context.bit_rate, context.thread_count = 0, 1
+    context.color_range = _LIMITED
+    context.colorspace = context.color_primaries = context.color_trc = _BT709
+    return stream
+
+
+def _frame(codes: Codes) -> Any:
+    import av
+
+    height, width = codes.shape[:2]
+    whole = np.ascontiguousarray(codes[: _even(height), : _even(width)])
+    frame = av.VideoFrame.from_ndarray(whole, format="rgb24")
+    return frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
+
+
+def _even(edge: int) -> int:
+    """Colours are kept for squares of two pixels."""
+    return edge - edge % 2
