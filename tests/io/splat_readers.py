@@ -7,11 +7,14 @@ encoders but the descriptions.
 from __future__ import annotations
 
 import gzip
+import io
 import json
 import struct
+import zipfile
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 C0 = 0.28209479177387814
 
@@ -104,6 +107,39 @@ def read_spz(content: bytes) -> dict[str, np.ndarray]:
         "colors": 0.5 + C0 * (colors / 255 - 0.5) / 0.15,
         "rest": (harmonics.reshape(count, rest, 3) - 128) / 128,
     }
+
+
+def read_sog(content: bytes) -> dict[str, np.ndarray]:
+    archive = zipfile.ZipFile(io.BytesIO(content))
+    meta = json.loads(archive.read("meta.json"))
+    assert meta["version"] == 2
+    count = meta["count"]
+
+    def pixels(part: str, number: int = 0, count: int | None = count) -> np.ndarray:
+        with Image.open(io.BytesIO(archive.read(meta[part]["files"][number]))) as image:
+            return np.asarray(image.convert("RGBA")).reshape(-1, 4)[:count].astype(np.int64)
+
+    words = pixels("means") + 256 * pixels("means", 1)
+    low, high = np.array(meta["means"]["mins"]), np.array(meta["means"]["maxs"])
+    curved = low + words[:, :3] / 65535 * np.where(high > low, high - low, 1)
+    turns, colors = pixels("quats"), pixels("sh0")
+    result = {
+        "means": np.sign(curved) * np.expm1(np.abs(curved)),
+        "log_scales": np.array(meta["scales"]["codebook"])[pixels("scales")[:, :3]],
+        "quats": whole_quats(turns[:, 3] - 252, (turns[:, :3] / 255 - 0.5) * np.sqrt(2)),
+        "opacities": colors[:, 3] / 255,
+        "colors": 0.5 + C0 * np.array(meta["sh0"]["codebook"])[colors[:, :3]],
+        "rest": np.zeros((count, 0, 3)),
+    }
+    if "shN" in meta:
+        rest = (meta["shN"]["bands"] + 1) ** 2 - 1
+        table = np.array(meta["shN"]["codebook"])[pixels("shN", 0, None)[:, :3]]
+        labels = pixels("shN", 1)
+        number = labels[:, 0] + 256 * labels[:, 1]
+        assert number.max() < meta["shN"]["count"]
+        # 64 vectors to a row, each of them `rest` pixels, so that rows follow each other.
+        result["rest"] = table.reshape(-1, rest, 3)[number]
+    return result
 
 
 def read_glb(content: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
-from splat_readers import C0, read_compressed_ply, read_glb, read_spz
+from splat_readers import C0, read_compressed_ply, read_glb, read_sog, read_spz
 
 from rift_cl.errors import InputError
 from rift_cl.io.splat_activations import opacities_of, scales_of
@@ -80,6 +82,40 @@ def test_gltf_keeps_every_bit_and_says_what_it_is() -> None:
     assert bounds["min"] == given.means.min(0).tolist()
     colors = np.clip(0.5 + C0 * given.sh[:, 0], 0, 1)
     assert np.abs(read["COLOR_0"][:, :3] / 255 - colors).max() <= 1 / 510 + 1e-6
+
+
+def test_pictures_of_sog_hold_places_rotations_and_opacities_to_their_bits() -> None:
+    given = along_curve(scene(degree=3))
+    read = read_sog(FORMATS["sog"].encode(given))
+    curved = np.sign(given.means) * np.log1p(np.abs(given.means.astype(float)))
+    steps = np.ptp(curved, axis=0) / 65535
+    again = np.sign(read["means"]) * np.log1p(np.abs(read["means"]))
+    assert np.all(np.abs(again - curved) <= steps / 2 + 1e-9)
+    assert np.abs(read["opacities"] - opacities_of(given.logit_opacities)).max() <= 1 / 510 + 1e-6
+    assert angles(unit_quats(given), read["quats"]).max() <= 4 * TURN
+
+
+def test_palettes_of_sog_are_as_fine_as_even_ones_at_least() -> None:
+    """Of 256 even levels the mean square error would be the square of their distance, by 12."""
+    given = along_curve(scene(degree=3))
+    read = read_sog(FORMATS["sog"].encode(given))
+    for found, wanted in (
+        (read["log_scales"], given.log_scales),
+        (read["colors"], 0.5 + C0 * given.sh[:, 0]),
+        # Fewer splats than vectors: each has its own.
+        (read["rest"], given.sh[:, 1:]),
+    ):
+        even = (np.ptp(wanted) / 255) ** 2 / 12
+        assert np.square(found - wanted).mean() <= even
+
+
+def test_vectors_of_sog_are_shared_by_splats_that_are_alike() -> None:
+    random = np.random.default_rng(5)
+    kinds = random.normal(0, 0.3, (300, 4, 3)).astype(np.float32)
+    given = along_curve(dataclasses.replace(scene(3000), sh=kinds[random.integers(0, 300, 3000)]))
+    read = read_sog(FORMATS["sog"].encode(given))
+    apart = read["rest"] - given.sh[:, 1:]
+    assert np.sqrt(np.square(apart).mean()) < 0.05 * 0.3
 
 
 @pytest.mark.parametrize("name", list(FORMATS))

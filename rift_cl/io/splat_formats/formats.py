@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from rift_cl.io.splat_formats.compressed_ply import encode_compressed_ply
 from rift_cl.io.splat_formats.gltf import encode_glb
 from rift_cl.io.splat_formats.plain import demand_plain
+from rift_cl.io.splat_formats.sog import encode_sog
 from rift_cl.io.splat_formats.spz import encode_spz
 from rift_cl.io.splat_ply import encode_ply
 from rift_cl.io.splat_scene import SplatScene
@@ -44,5 +45,6 @@ FORMATS = {
         ".compressed.ply", encode_compressed_ply, False, "everything, within chunks of 256 splats"
     ),
     "spz": SplatFormat(".spz", encode_spz, True, "everything, harmonics most"),
+    "sog": SplatFormat(".sog", encode_sog, False, "everything, to palettes made for the scene"),
     "glb": SplatFormat(".glb", encode_glb, True, "nothing"),
 }
