@@ -19,9 +19,12 @@ class Report:
         total: steps in all.
         what: what the steps are, in the plural, such as "slices".
         values: figures worth showing, by name.
+        work: where steps do not cost the same: what was done and what there is in all, in any
+            unit that is in proportion to the time that it takes.
     """
 
     done: int
     total: int
     what: str
     values: Mapping[str, float] = field(default_factory=dict)
+    work: tuple[float, float] | None = None

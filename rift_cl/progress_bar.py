@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Iterable
+from collections import deque
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 
 from rich.console import Console
@@ -17,24 +18,40 @@ from rift_cl.progress import Report
 _PAUSE = 5.0
 
 
-class _Pace:
-    """Steps per second since the first report of steps of a kind.
+class Pace:
+    """Steps per second since the first report of steps of a kind, and the seconds that are left.
 
-    What was done before that report may be an earlier run's, and took no time of this one.
+    What was done before that report may be an earlier run's, and took no time of this one. The
+    time left goes by the work of the later half of what was done since: steps may be slow at first,
+    and so may be a machine that had other things to do.
+
+    Args:
+        clock: seconds; those of the wall if not given.
     """
 
-    def __init__(self) -> None:
-        self._what, self._done = "", 0
-        self._first, self._begin = 0, 0.0
+    def __init__(self, clock: Callable[[], float] | None = None) -> None:
+        self._clock = clock or time.monotonic
+        self._what, self._done, self._first = "", 0, 0
+        # Work and time at the reports that still count, and at the first one.
+        self._marks: deque[tuple[float, float]] = deque()
+        self._begin = (0.0, 0.0)
 
-    def after(self, report: Report) -> float:
-        """The rate after this report; 0 while there is none to tell."""
-        now = time.monotonic()
+    def after(self, report: Report) -> tuple[float, float]:
+        """The rate after this report and the seconds left; 0 while there is none to tell."""
+        done, total = report.work or (float(report.done), float(report.total))
+        now = self._clock()
         if report.what != self._what or report.done < self._done:
-            self._what, self._first, self._begin = report.what, report.done, now
+            self._what, self._first, self._begin = report.what, report.done, (done, now)
+            self._marks = deque([self._begin])
         self._done = report.done
-        elapsed = now - self._begin
-        return (report.done - self._first) / elapsed if elapsed > 0 else 0.0
+        self._marks.append((done, now))
+        half = (self._begin[0] + done) / 2
+        while len(self._marks) > 2 and self._marks[1][0] <= half:
+            self._marks.popleft()
+        work, seconds = done - self._marks[0][0], now - self._marks[0][1]
+        elapsed = now - self._begin[1]
+        rate = (report.done - self._first) / elapsed if elapsed > 0 else 0.0
+        return rate, (total - done) * seconds / work if work > 0 else 0.0
 
 
 def show_progress(reports: Iterable[Report], *, quiet: bool) -> None:
@@ -55,33 +72,32 @@ def _draw_bar(reports: Iterable[Report]) -> None:
         TextColumn("{task.fields[pace]}"),
     )
     with Progress(*columns, console=Console(stderr=True)) as progress:
-        task, pace = progress.add_task("", pace=""), _Pace()
+        task, pace = progress.add_task("", pace=""), Pace()
         for report in reports:
             progress.update(
                 task,
                 completed=report.done,
                 total=report.total,
                 description=f"{report.what}{_figures(report)}",
-                pace=", ".join(_told(report, pace.after(report))),
+                pace=", ".join(_told(report, *pace.after(report))),
             )
 
 
 def _print_lines(reports: Iterable[Report]) -> None:
-    pace, last = _Pace(), -math.inf
+    pace, last = Pace(), -math.inf
     for report in reports:
-        rate, now = pace.after(report), time.monotonic()
+        told, now = _told(report, *pace.after(report)), time.monotonic()
         if now - last < _PAUSE and report.done < report.total:
             continue
         last = now
-        parts = [f"{report.done}/{report.total} {report.what}", *_told(report, rate)]
+        parts = [f"{report.done}/{report.total} {report.what}", *told]
         print_line(", ".join(parts) + _figures(report))
 
 
-def _told(report: Report, rate: float) -> list[str]:
+def _told(report: Report, rate: float, left: float) -> list[str]:
     """The rate and the time left, where there is a rate."""
-    left = report.total - report.done
     told = [f"{rate:.3g} {report.what}/s"] if rate else []
-    return told + ([f"{left / rate:.0f} s left"] if rate and left else [])
+    return told + ([f"{left:.0f} s left"] if left and report.done < report.total else [])
 
 
 def print_line(line: str) -> None:

@@ -133,6 +133,7 @@ class Fit(FitRun):
                 "what stands behind them was never exposed"
             )
         trainer = self._trainer(capture, pictures)
+        yield from self._read_ahead(trainer, pictures)
         yield from self._trained(trainer, pictures)
         splats = trainer.parameters.drawn
         drawn = trainer.renderer.settings
@@ -158,6 +159,18 @@ class Fit(FitRun):
         notes = [*ramp_notes(settings, len(self.seen)), *history_notes(self._history)]
         page = fit_page(capture.path.name, self.scores, self.losses, self.metrics, notes)
         self.folder.finish(decided, self.metrics, page, self.device, asked=settings, **self.decided)
+
+    def _read_ahead(self, trainer: Trainer, pictures: CapturePictures) -> Iterator[Report]:
+        """Read the photographs that the steps will ask for, so that the first are as fast as all.
+
+        Those for which there is no room are read whenever they are asked for.
+        """
+        count = min(len(pictures.views), self.settings.steps)
+        for step in range(count):
+            if not pictures.keep(trainer.view_at(step)):
+                return
+            yield Report(step + 1, count, "photographs")
+            self._heed(0)
 
     def _keep_cameras(self, capture: Capture) -> None:
         """Leave the cameras in the folder, so that an unfinished fit has them too."""

@@ -83,6 +83,11 @@ class CapturePictures:
             self._last = number, self._decoded(number)
         return self._last[1]
 
+    def keep(self, number: int) -> bool:
+        """Read a photograph now; whether there was room to keep it."""
+        self._decoded(number)
+        return number in self._kept
+
     def _decoded(self, number: int) -> Floats:
         kept = self._kept.get(number)
         if kept is None:

@@ -6,7 +6,7 @@ have gathered in checkpoints. ``rift_cl.train.strategy`` has the protocol, and c
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -40,6 +40,10 @@ class _Gathering:
     def before_step(self, step: int) -> dict[str, float]:
         """None."""
         return dict.fromkeys(("opacity_penalty", "scale_penalty"), 0.0)
+
+    def forecast(self, step: int, count: int) -> Iterator[tuple[int, int]]:
+        """As many as there are: what is split and pruned hangs on the pictures."""
+        yield self.settings.steps - step, count
 
     def state(self) -> dict[str, NDArray[Any]]:
         """The statistics since they were last cleared."""

@@ -74,7 +74,7 @@ def renew(
     alive = np.flatnonzero(opacities > settings.faint)
     if alive.size == 0:
         return parameters
-    added = max(0, min(round(len(parameters) * growth), most - len(parameters)))
+    added = grown(len(parameters), growth, most)
     chance = opacities[alive] / opacities[alive].sum()
     chosen = alive[random.choice(alive.size, faded.size + added, p=chance)]
     shared = np.bincount(chosen, minlength=len(parameters))
@@ -88,6 +88,11 @@ def renew(
             moments[name] = _extended(moments[name], added)
             moments[name][touched] = 0
     return parameters.replaced(raw, first, second)
+
+
+def grown(count: int, growth: float, most: int) -> int:
+    """Splats that a renewal adds to so many."""
+    return max(0, min(round(count * growth), most - count))
 
 
 def renew_densities(

@@ -8,7 +8,7 @@ go on with after it, and keeps ``state`` in checkpoints.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Protocol
 
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from rift_cl.splat.frame import Frame, FrameGradients
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.gathering import Densify, Halving, check_names
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.renewal import renew
+from rift_cl.train.renewal import grown, renew
 from rift_cl.train.settings import TrainSettings
 
 # A set of splats grows by no more than this at once.
@@ -46,6 +46,17 @@ class Strategy(Protocol):
             frame: what was drawn in the step.
             gradients: of its loss.
             rate: of the positions in the step.
+        """
+
+    def forecast(self, step: int, count: int) -> Iterator[tuple[int, int]]:
+        """How many splats the steps to come will have, as far as that is known.
+
+        Args:
+            step: how many steps were taken.
+            count: splats there are by now.
+
+        Yields:
+            Numbers of steps and of the splats that those have, up to the last step of the run.
         """
 
     def state(self) -> dict[str, NDArray[Any]]:
@@ -120,6 +131,16 @@ class MarkovChain:
         if step <= self.finish:
             parameters.shake(renewal.noise * rate, settings.seed)
         return parameters
+
+    def forecast(self, step: int, count: int) -> Iterator[tuple[int, int]]:
+        """Growth follows from the number of splats alone; see ``Strategy``."""
+        settings, every = self.settings, self.settings.renewal.every
+        next_one = every * (max(step, settings.renewal.first - 1) // every + 1)
+        for until in range(next_one, settings.steps, every):
+            yield until - step, count
+            step = until
+            count += grown(count, self._growth(until, count), settings.splats)
+        yield settings.steps - step, count
 
     def _growth(self, step: int, count: int) -> float:
         """The usual growth, or what a short run needs to have all its splats in time."""

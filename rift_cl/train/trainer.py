@@ -124,14 +124,15 @@ class Trainer:
         Yields:
             A report now and then, and one after the last step.
         """
-        total = self.settings.steps
+        total, worked = self.settings.steps, 0.0
         while self.parameters.step < total:
+            worked += self._work(len(self.parameters))
             value, stop = self.step(), stopped()
             done = self.parameters.step
             if done % REPORT_EVERY == 0 or done == total or stop:
                 loss = float(self.device.get(value)[0])
                 values = {"loss": loss, "splats": float(len(self.parameters))}
-                yield Report(done, total, "steps", values)
+                yield Report(done, total, "steps", values, (worked, worked + self._work_left()))
             if stop:
                 return
 
@@ -164,6 +165,16 @@ class Trainer:
         if self._band is not None and (renewed or self.parameters.step % _BAND_EVERY == 0):
             self._limit_band()
         return value
+
+    def _work(self, splats: int) -> float:
+        """What a step costs with so many splats, against one that has none."""
+        return 1 + splats / self.settings.splats
+
+    def _work_left(self) -> float:
+        """What the steps to come will cost."""
+        parameters = self.parameters
+        ahead = self.strategy.forecast(parameters.step, len(parameters))
+        return sum(steps * self._work(count) for steps, count in ahead)
 
     def camera(self, number: int) -> Camera:
         """The camera of a view, where it is believed to be by now."""
