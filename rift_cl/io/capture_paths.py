@@ -105,5 +105,31 @@ class CaptureFolder:
             )
 
 
+def mask_beside(name: str) -> str:
+    """What the mask of a photograph is called that lies beside it."""
+    return str(Path(name).with_name(f"{Path(name).stem}_mask.png"))
+
+
+def mask_of(where: str, images: CaptureFolder, name: str) -> Path | None:
+    """The mask of a photograph, found by its name; None where there is none.
+
+    Looked for, in this order, are ``masks/NAME.EXT.png`` as COLMAP calls it, ``masks/NAME.png``,
+    both beside the folder ``images``, and ``NAME_mask.png`` beside the photograph.
+
+    Args:
+        where: the place that names the photograph, for errors.
+        images: the folder that names start from.
+        name: the photograph's path from there.
+
+    Raises:
+        PathEscapeError: it is a link that leads out of the capture.
+    """
+    plain = Path(name.replace("\\", "/"))
+    inner = Path(*plain.parts[1:]) if plain.parts[0] == "images" else plain
+    names = (f"{inner}.png", str(inner.with_suffix(".png")))
+    found = CaptureFolder(images.root, "masks").optional(where, *names)
+    return found or images.optional(where, mask_beside(str(plain)))
+
+
 def _short(name: str) -> str:
     return reprlib.repr(name)

@@ -17,7 +17,7 @@ from rift_cl.errors import FileFormatError
 from rift_cl.geometry.camera import Camera
 from rift_cl.geometry.lens_distortion import lens_of
 from rift_cl.io import colmap_binary, colmap_text
-from rift_cl.io.capture_paths import CaptureFolder
+from rift_cl.io.capture_paths import CaptureFolder, mask_of
 from rift_cl.io.colmap_records import CameraRecord, ImageRecord
 from rift_cl.io.poses import view_of_quaternion
 from rift_cl.io.view import Capture, View, check_views, finite_points, located
@@ -88,9 +88,7 @@ def _view(
     if camera is None:
         raise FileFormatError(f"{where}: was taken by camera {record.camera}, which is not there")
     image = images.file(where, record.name)
-    # COLMAP's own masks keep the image's extension, others replace it.
-    names = (f"{record.name}.png", str(Path(record.name).with_suffix(".png")))
-    mask = CaptureFolder(images.root, "masks").optional(where, *names)
+    mask = mask_of(where, images, record.name)
     with located(where):
         view = view_of_quaternion(record.quaternion, record.shift)
         pinhole = Camera((camera.height, camera.width), camera.K, view)

@@ -2,12 +2,13 @@
 
 Programs that find poses decode photographs by themselves, each in its own way. Here every one is
 decoded first, by the reader that a fit will use, so that what is damaged is left out beforehand;
-and where one is of a kind that such a program may read otherwise than we do, copies of plain
-8-bit colours are made of all.
+and where one is of a kind that such a program may read otherwise than we do, or was taken with the
+camera held upright and stored sideways, copies of plain 8-bit colours, upright, are made of all.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,12 +18,12 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError, PathEscapeError, RiftError
 from rift_cl.io.boundary import check_claim, reading
-from rift_cl.io.capture_paths import CaptureFolder
+from rift_cl.io.capture_paths import CaptureFolder, mask_beside
 from rift_cl.io.display_light import to_display
 from rift_cl.io.output import check_space, writing
 from rift_cl.io.picture_header import PictureHeader, read_picture_header
 from rift_cl.io.pixels import SUFFIXES, write_pixels
-from rift_cl.io.view_image import demand_colors, read_photograph
+from rift_cl.io.view_image import demand_colors, read_photograph, upright
 from rift_cl.progress import Report
 
 # Formats that every release of COLMAP reads code for code.
@@ -47,12 +48,13 @@ class Photograph:
     def plain(self) -> bool:
         """Any program reads the same 8-bit colours from it."""
         header = self.header
-        return header.eight_bit and not header.alpha and self.path.suffix.lower() in _PLAIN
+        kind = header.eight_bit and not header.alpha and self.path.suffix.lower() in _PLAIN
+        return kind and not header.sideways
 
     @property
     def camera(self) -> tuple[object, ...]:
         """Photographs that have this in common were taken through one lens."""
-        return (*self.header.size, *self.header.taken_by)
+        return (*self.header.shown_size, *self.header.taken_by)
 
 
 def photographs_in(folder: Path) -> CaptureFolder:
@@ -63,15 +65,33 @@ def photographs_in(folder: Path) -> CaptureFolder:
 
 
 def photograph_names(place: CaptureFolder) -> list[str]:
-    """Names of the pictures in a folder, in order; folders inside it are not looked into.
+    """Names of the photographs in a folder, in order; folders inside it are not looked into.
+
+    Hidden files are none, nor are masks that lie beside their photographs (see ``mask_of``).
 
     Raises:
         InputError: there is no such folder, or it may not be read.
     """
+    names = [name for name in _file_names(place) if Path(name).suffix.lower() in SUFFIXES]
+    shown = [name for name in names if not name.startswith(".")]
+    masks = {mask_beside(name) for name in shown}
+    return [name for name in shown if name not in masks]
+
+
+def other_files(place: CaptureFolder) -> list[str]:
+    """Names of the files in a folder that are no photographs and no masks, in order.
+
+    Raises:
+        InputError: there is no such folder, or it may not be read.
+    """
+    names = photograph_names(place)
+    ours = {*names, *map(mask_beside, names)}
+    return [shown(name) for name in _file_names(place) if name not in ours]
+
+
+def _file_names(place: CaptureFolder) -> list[str]:
     with reading(place.path, "the folder"):
-        entries = [entry for entry in place.path.iterdir() if entry.suffix.lower() in SUFFIXES]
-        hidden = [entry for entry in entries if entry.name.startswith(".")]
-        return sorted(entry.name for entry in entries if entry not in hidden and entry.is_file())
+        return sorted(entry.name for entry in place.path.iterdir() if entry.is_file())
 
 
 def shown(name: str) -> str:
@@ -92,7 +112,8 @@ def with_headers(
     Raises:
         PathEscapeError: a photograph is a link that leads out of the folder.
     """
-    found = []
+    found: list[Photograph] = []
+    contents: dict[bytes, str] = {}
     for name in names:
         try:
             if not name.isprintable() or "\\" in name:
@@ -100,13 +121,28 @@ def with_headers(
             path = place.file(str(place.path), name)
             header = read_picture_header(path)
             demand_colors(path, header)
+            _demand_new(path, contents)
         except PathEscapeError:
             raise
         except RiftError as error:
-            left_out[shown(name)] = shown(str(error))
+            left_out[shown(name)] = shown(_reason(place.path / name, error))
         else:
             found.append(Photograph(name, path, header))
     return found
+
+
+def _reason(path: Path, error: RiftError) -> str:
+    """What an error says about a file, without its path."""
+    return str(error).removeprefix(f"{path}: ").replace(str(path), path.name)
+
+
+def _demand_new(path: Path, contents: dict[bytes, str]) -> None:
+    """Refuse a file that has the same bytes as an earlier one, and note what it has."""
+    with reading(path, "the photograph"):
+        digest = hashlib.sha256(path.read_bytes()).digest()
+    first = contents.setdefault(digest, path.name)
+    if first != path.name:
+        raise InputError(f"{path}: is the same photograph as {first}")
 
 
 def whole_photographs(
@@ -135,7 +171,7 @@ def whole_photographs(
         try:
             codes = _codes(photograph)
         except RiftError as error:
-            left_out[photograph.name] = str(error)
+            left_out[photograph.name] = _reason(photograph.path, error)
         else:
             whole.append(photograph)
             if copies is not None:
@@ -152,7 +188,7 @@ def _codes(photograph: Photograph) -> NDArray[np.uint8]:
     need = 4 * (header.channels + 8) * height * width
     check_claim(path, "the photograph, with a copy of it,", need, None)
     with reading(path, "the photograph"):
-        image = read_photograph(path, header, None)
+        image = upright(read_photograph(path, header, None), header.orientation)
         if header.linear:
             to_display(image[..., :3])
         if header.alpha:

@@ -149,7 +149,7 @@ def _job(
     whole: list[Photograph] = []
     yield from whole_photographs(photographs, copies, whole, left_out)
     if len(whole) < _FEWEST:
-        first = next(iter(left_out.values()), "")
+        first = next((f"{name}: {reason}" for name, reason in left_out.items()), "")
         raise InputError(
             f"{place.path}: {len(whole)} of {len(names)} photographs can be used, poses can be "
             f"found from {_FEWEST} on; the first trouble is: {first}"

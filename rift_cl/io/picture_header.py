@@ -23,7 +23,7 @@ class PictureHeader:
         linear: the colours are proportional to light; integers are display light by custom.
         eight_bit: each number is a code of 8 bits.
         orientation: how EXIF wants it shown, 1 to 8; 1 as it is stored, 5 to 8 with the axes
-            swapped. Only HEIC comes turned from its decoder, and is 1 here.
+            swapped. HEIC comes turned from its decoder, and is 1 here.
         taken_by: maker and model of the camera and its focal lengths, as EXIF has them; empty
             where it has none.
     """
@@ -35,6 +35,16 @@ class PictureHeader:
     eight_bit: bool
     orientation: int
     taken_by: tuple[str, ...]
+
+    @property
+    def sideways(self) -> bool:
+        """EXIF wants it shown with rows and columns swapped."""
+        return self.orientation >= 5
+
+    @property
+    def shown_size(self) -> tuple[int, int]:
+        """(height, width) as EXIF wants it shown."""
+        return (self.size[1], self.size[0]) if self.sideways else self.size
 
 
 def read_picture_header(path: Path) -> PictureHeader:

@@ -17,7 +17,7 @@ from rift_cl.errors import FileFormatError, InputError
 from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.camera import Camera
 from rift_cl.geometry.lens_distortion import LENS_MODELS, lens_of
-from rift_cl.io.capture_paths import CaptureFolder
+from rift_cl.io.capture_paths import CaptureFolder, mask_of
 from rift_cl.io.json_fields import Fields, read_json_object
 from rift_cl.io.picture_header import read_picture_header
 from rift_cl.io.point_cloud import read_point_cloud
@@ -41,7 +41,10 @@ def open_transforms(
     top = read_json_object(path)
     folder = CaptureFolder(path.parent, complete=photographs)
     place = folder if images is None else replace(images, complete=photographs)
-    views = [_view(place, frame, top) for frame in top.objects("frames")]
+    frames = list(top.objects("frames"))
+    # Where some masks are named, those that are not named are not meant.
+    by_name = all(frame.values.get("mask_path") is None for frame in frames)
+    views = [_view(place, frame, top, by_name) for frame in frames]
     checked = check_views(path, views)
     ply = top.text("ply_file_path")
     if ply is None:
@@ -50,7 +53,7 @@ def open_transforms(
     return Capture(checked, points, colors, path)
 
 
-def _view(folder: CaptureFolder, frame: Fields, top: Fields) -> View:
+def _view(folder: CaptureFolder, frame: Fields, top: Fields, by_name: bool) -> View:
     name = frame.text("file_path")
     if name is None:
         raise FileFormatError(f"{frame.where}: has no 'file_path', no photograph belongs to it")
@@ -67,8 +70,10 @@ def _view(folder: CaptureFolder, frame: Fields, top: Fields) -> View:
     with located(where):
         camera = Camera(size, K, view_of_opengl(pose), aperture=aperture)
         lens = lens_of(model, coefficients, K)
-    mask_file = None if mask is None else folder.file(where, mask)
-    return View(folder.name_of(image), camera, image, mask_file, lens)
+    found = None if mask is None else folder.file(where, mask)
+    if by_name:
+        found = mask_of(where, folder, folder.name_of(image))
+    return View(folder.name_of(image), camera, image, found, lens)
 
 
 def _size(fields: Fields, image: Path) -> tuple[int, int]:

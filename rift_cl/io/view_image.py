@@ -32,11 +32,12 @@ def read_view(
 ) -> Image:
     """Read the photograph of a view, without its lens, as ``camera_at(view, downscale)`` sees it.
 
-    Rows and columns are those of the file, and EXIF's orientation is not followed, because poses
-    refer to pixels as they are stored: COLMAP does not turn photographs in any release (its pull
-    request 1318 did, 1406 took it back before 3.7 came out), nor do nerfstudio
-    (``-noautorotate`` in its pull request 1261) and instant-ngp. Poses of a program that turns
-    photographs first belong to the turned copies, which are to be named in the capture.
+    Rows and columns are those of the file, because poses refer to pixels as they are stored: COLMAP
+    does not turn photographs in any release (its pull request 1318 did, 1406 took it back before
+    3.7 came out), nor do nerfstudio (``-noautorotate`` in its pull request 1261) and instant-ngp.
+    Only where the camera has the size of the photograph as EXIF wants it shown, rows and columns
+    swapped, its poses belong to the turned pixels, and EXIF's orientation is followed: so it is
+    with photographs whose poses 'rift fit' finds. A mask is turned alike if it is stored alike.
 
     Args:
         view: one of the views of a capture.
@@ -60,10 +61,13 @@ def read_view(
         raise InputError(f"read_view: light is {light!r}, wanted 'display' or 'linear'")
     camera_at(view, downscale)
     header = _checked_header(view, budget)
-    image = read_photograph(view.image, header, budget)
+    # Squares cannot tell; they are taken as they are stored.
+    turn = header.orientation if header.size != view.camera.size else 1
+    image = upright(read_photograph(view.image, header, budget), turn)
     if view.mask is not None:
+        mask = _coverage(view.mask, budget)
         image = _with_alpha(image)
-        image[..., 3] *= _coverage(view.mask, budget)
+        image[..., 3] *= mask if mask.shape == view.camera.size else upright(mask, turn)
     if downscale == 1 and view.lens is None:
         return _converted(image, linear=header.linear, wanted=light)
     image = _converted(image, linear=header.linear, wanted="linear")
@@ -83,27 +87,36 @@ def read_view(
 def _checked_header(view: View, budget: int | None) -> PictureHeader:
     """The photograph's header, once photograph and mask were found to fit the camera."""
     header = read_picture_header(view.image)
-    _demand_fit(view, view.image, header)
+    _demand_fit(view, view.image, header, header.sideways)
     # Numbers that are held for a pixel at one time: as stored, as RGBA, without the lens, a mask.
     numbers = header.channels + 4 + (0 if view.lens is None else 8)
     if view.mask is not None:
         mask = read_picture_header(view.mask)
-        _demand_fit(view, view.mask, mask)
+        _demand_fit(view, view.mask, mask, mask.size == header.size and header.sideways)
         numbers += mask.channels + 2
     need = 4 * numbers * view.camera.height * view.camera.width
     check_claim(view.image, "the view, with what it is made of,", need, budget)
     return header
 
 
-def _demand_fit(view: View, path: Path, header: PictureHeader) -> None:
+def _demand_fit(view: View, path: Path, header: PictureHeader, sideways: bool) -> None:
     demand_colors(path, header)
-    if header.size != view.camera.size:
-        turned = header.orientation >= 5 and header.size == view.camera.size[::-1]
-        advice = "; EXIF says that it is shown turned: turn its pixels, as those of the pose were"
+    size = view.camera.size
+    if header.size != size and not (sideways and header.size == size[::-1]):
         raise ShapeError(
             f"{path}: is {_size(header.size)} pixels, the camera of view {view.name!r} says "
-            f"{_size(view.camera.size)}{advice if turned else ''}"
+            f"{_size(size)}"
         )
+
+
+def upright(image: Image, orientation: int) -> Image:
+    """An image (y, x, ...) as EXIF wants it shown that says this; mirrored ones, 2 to 4, stay."""
+    if orientation < 5:
+        return image
+    # 5 is mirrored at the diagonal, 7 at the other one; 6 is turned clockwise, 8 against it.
+    turns = {5: (1, True), 6: (-1, False), 7: (-1, True), 8: (1, False)}[orientation]
+    shown = np.rot90(image, turns[0])
+    return np.ascontiguousarray(shown[::-1] if turns[1] else shown)
 
 
 def demand_colors(path: Path, header: PictureHeader) -> None:

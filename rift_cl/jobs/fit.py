@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TypeVar
 
@@ -17,11 +16,10 @@ from rift_cl.io.capture import (
     as_pinholes,
     camera_at,
     capture_name,
-    holds_bare_photographs,
     open_capture,
 )
-from rift_cl.io.photographs import demand_photographs, pose_photographs
 from rift_cl.io.splat_scene import SplatScene
+from rift_cl.jobs.bare_input import BareInput
 from rift_cl.jobs.cameras.arc import demand_places
 from rift_cl.jobs.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras
 from rift_cl.jobs.cameras.photograph_place import place_record
@@ -32,6 +30,7 @@ from rift_cl.jobs.fit_run import FitRun
 from rift_cl.jobs.fit_scores import score_record, score_views
 from rift_cl.jobs.fit_settings import FitSettings
 from rift_cl.jobs.fit_start import first_splats
+from rift_cl.jobs.photograph_size import fitting_downscale, size_words
 from rift_cl.progress import Report
 from rift_cl.splat.bands import FrameMemory
 from rift_cl.splat.orders import ModeOrders
@@ -56,17 +55,19 @@ class Fit(FitRun):
 
     def __init__(self, settings: FitSettings) -> None:
         super().__init__(settings)
-        # Poses of bare photographs are looked for when the work begins, or were found before.
-        self.bare = holds_bare_photographs(settings.capture)
-        self._posed = settings.out / "poses"
-        if self.bare and not self._posed.exists():
-            demand_photographs(settings.capture)
-        self.capture = None if self.bare else open_seen(settings.capture, pinhole=settings.pinhole)
-        self._photographs: int | None = None
+        self.source: Capture | BareInput
+        if BareInput.fits(settings.capture):
+            # Poses are looked for when the work begins, or were found before.
+            self.source = BareInput(
+                settings.capture, settings.out, frames=settings.frames, seed=settings.seed
+            )
+        else:
+            self.source = open_seen(settings.capture, pinhole=settings.pinhole)
+        self.downscale = settings.downscale or 1
         self.seen: tuple[View, ...] = ()
         self.unseen: tuple[View, ...] = ()
-        if self.capture is not None:
-            self._split(self.capture)
+        if isinstance(self.source, Capture):
+            self._split(self.source)
         self.tests = {
             capture_name(path): open_seen(path, pinhole=settings.pinhole) for path in settings.test
         }
@@ -75,20 +76,21 @@ class Fit(FitRun):
 
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""
-        settings = self.settings
-        if self.capture is None:
+        if isinstance(self.source, BareInput):
             return {
-                "capture": f"{settings.capture}, bare photographs: their poses are found first",
+                "capture": self.source.words,
                 "splats": self._splats,
                 "device": self.device.name,
             }
-        cameras = [camera_at(view, settings.downscale) for view in self.seen]
+        cameras = [camera_at(view, self.downscale) for view in self.seen]
         largest = max(camera.height * camera.width for camera in cameras)
+        masks = sum(view.mask is not None for view in self.seen)
         return {
-            "capture": str(self.capture.path),
+            "capture": str(self.source.path),
             "trained on": f"{len(self.seen)} photographs",
             "held out": f"{len(self.unseen)} photographs",
-            "largest photograph": f"{largest} pixels",
+            **({"masks": f"{masks} photographs have one"} if masks else {}),
+            "largest photograph": f"{largest} pixels, made smaller by {self.downscale}",
             "splats": self._splats,
             "device memory": f"{self._need(largest) / 2**20:.0f} MiB and the tile lists",
             "device": self.device.name,
@@ -121,10 +123,12 @@ class Fit(FitRun):
         """
         settings = self.settings
         self.folder.make()
-        capture = self.capture
-        if capture is None:
-            capture = yield from self._find_poses()
+        capture = self.source
+        if isinstance(capture, BareInput):
+            capture = yield from capture.find()
             self._split(capture)
+        for note in self._notes():
+            self.announce(f"rift: {note}")
         self._keep_cameras(capture)
         pictures = self._pictures(self.seen)
         if settings.refine_exposures and pictures.any_cut_out():
@@ -155,8 +159,10 @@ class Fit(FitRun):
             **settings.basis_facts(),
             **score_record(self.scores),
         }
-        decided = dataclasses.replace(settings, homogenise=settings.exponent_for(len(self.seen)))
-        notes = [*ramp_notes(settings, len(self.seen)), *history_notes(self._history)]
+        exponent = settings.exponent_for(len(self.seen))
+        decided = dataclasses.replace(settings, homogenise=exponent, downscale=self.downscale)
+        ramp = ramp_notes(settings, len(self.seen))
+        notes = [*self._notes(), *ramp, *history_notes(self._history)]
         page = fit_page(capture.path.name, self.scores, self.losses, self.metrics, notes)
         self.folder.finish(decided, self.metrics, page, self.device, asked=settings, **self.decided)
 
@@ -177,21 +183,24 @@ class Fit(FitRun):
         out, seen, unseen = self.settings.out, self.seen, self.unseen
         self.folder.drop(*CAMERA_FILES)
         self.decided = {"photographs": place_record([*seen, *unseen], out)}
-        save_fit_cameras(out, capture, seen, unseen, photographs=self._photographs)
+        count = self.source.photographs if isinstance(self.source, BareInput) else None
+        save_fit_cameras(out, capture, seen, unseen, photographs=count)
 
     def _split(self, capture: Capture) -> None:
         settings = self.settings
         demand_places([view.camera for view in capture.views], settings.capture)
         self.seen, self.unseen = split_views(capture.views, settings.hold_out, settings.views)
+        self.downscale = settings.downscale or fitting_downscale(self.seen, self.device)
 
-    def _find_poses(self) -> Generator[Report, None, Capture]:
-        """A capture of bare photographs; what could not be placed is said."""
-        settings = self.settings
-        found = yield from pose_photographs(settings.capture, self._posed, seed=settings.seed)
-        self._photographs = len(found.placed) + len(found.missing)
-        for name, reason in found.missing.items():
-            warnings.warn(f"{name} has no pose and is left out: {reason}", stacklevel=2)
-        return open_capture(found.model, images=settings.capture)
+    def _notes(self) -> list[str]:
+        """What was decided about the photographs, and what of them is not used."""
+        notes = list(self.source.notes) if isinstance(self.source, BareInput) else []
+        masks = sum(view.mask is not None for view in self.seen)
+        if masks:
+            notes.append(f"{masks} of {len(self.seen)} photographs have a mask: black is left out")
+        if self.settings.downscale is None and self.downscale > 1:
+            notes.append(size_words(self.seen, self.downscale))
+        return notes
 
     def _trainer(self, capture: Capture, pictures: CapturePictures) -> Trainer:
         settings, exponent = self.settings, self.settings.exponent_for(len(pictures.views))
@@ -218,7 +227,7 @@ class Fit(FitRun):
         return CapturePictures(
             self.device,
             views,
-            downscale=settings.downscale,
+            downscale=self.downscale,
             seed=settings.seed,
             light=settings.light,
             like=like,

@@ -40,8 +40,8 @@ class FitSettings(XrayOptions, BasisOptions):
     """
 
     capture: Annotated[Path, Positional]
-    """A transforms.json, a folder with one, a COLMAP model, or a folder of bare photographs; with
-    --mode xray a scan in an HDF5 or NPZ file."""
+    """A transforms.json, a folder with one, a COLMAP model, a folder of bare photographs, or a
+    video (mp4, mov, webm); with --mode xray a scan in an HDF5 or NPZ file."""
     out: Path = Path("rift-fit")
     """Folder for scene.ply, report.html, config.json, metrics.json and checkpoints; X-rays: for
     slices as well."""
@@ -83,8 +83,11 @@ class FitSettings(XrayOptions, BasisOptions):
     """Fit a gain and an offset of each photograph's colours as well."""
     light: Literal["display", "linear"] = "display"
     """Light that is fitted and scored: as a display shows it, or linear."""
-    downscale: int = 1
-    """Whole factor by which photographs are made smaller."""
+    downscale: int | None = None
+    """Whole factor by which photographs are made smaller; when not given, the least that leaves
+    none above 1.6 megapixels, or 0.6 on a processor."""
+    frames: int = 100
+    """Frames to take of a video: the sharpest, evenly spaced."""
     hold_out: int = 8
     """Every so many-th photograph is not trained on but scored; 0 for none."""
     views: int = 0
@@ -119,11 +122,19 @@ class FitSettings(XrayOptions, BasisOptions):
                 f"--sh-degree is about harmonics, in whose place --angular {self.angular} puts "
                 "lobes: say --modes, or leave it out"
             )
-        least = {"downscale": 1, "hold_out": 0, "views": 0, "checkpoint_every": 0, "solve": 0}
+        least = {
+            "downscale": 1,
+            "frames": 3,
+            "hold_out": 0,
+            "views": 0,
+            "checkpoint_every": 0,
+            "solve": 0,
+        }
         for name, bound in least.items():
-            if getattr(self, name) < bound:
+            value = getattr(self, name)
+            if value is not None and value < bound:
                 option = name.replace("_", "-")
-                raise InputError(f"--{option} is {getattr(self, name)}, wanted {bound} or more")
+                raise InputError(f"--{option} is {value}, wanted {bound} or more")
         if self.solve > _MOST_STEPS:
             raise InputError(f"--solve is {self.solve}, wanted at most {_MOST_STEPS}")
         if not (self.first_splats is None or 0 < self.first_splats <= 1):
@@ -205,7 +216,12 @@ class FitSettings(XrayOptions, BasisOptions):
             del values["homogenise_by"]
         if self.band_limit != "coverage":
             values["band_limit"] = self.band_limit == "pixels"
-        later = ("pinhole", "solve", *(field.name for field in dataclasses.fields(BasisOptions)))
+        later = (
+            "pinhole",
+            "solve",
+            "frames",
+            *(field.name for field in dataclasses.fields(BasisOptions)),
+        )
         for name in later:
             if values[name] == getattr(type(self), name):
                 del values[name]

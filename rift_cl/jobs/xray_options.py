@@ -16,7 +16,7 @@ from rift_cl.io.scans.scan_file import AngleUnit, Kind
 
 # What photographs alone know.
 _LIGHT = (
-    *("test", "light", "downscale", "sh_degree", "strategy", "absgrad", "first_splats"),
+    *("test", "light", "downscale", "frames", "sh_degree", "strategy", "absgrad", "first_splats"),
     *("refine_poses", "refine_exposures", "color_order", "activation", "angular", "modes"),
 )
 

@@ -1,4 +1,4 @@
-"""EXIF's orientation turns no photograph: poses mean rows and columns as they are stored."""
+"""EXIF's orientation turns a photograph only where its camera has the turned size."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image, ImageOps
 from view_files import K, store, view_of
 
 from rift_cl.errors import ShapeError
@@ -38,13 +39,35 @@ def test_rows_and_columns_are_those_of_the_file(
     np.testing.assert_allclose(read_image(path), codes, atol=0.02)
 
 
-def test_a_pose_of_the_turned_photograph_is_told_what_to_do(tmp_path: Path) -> None:
-    for orientation, advised in ((1, False), (6, True)):
+@pytest.mark.parametrize("suffix", TYPES)
+@pytest.mark.parametrize("orientation", [5, 6, 7, 8])
+def test_a_camera_of_the_turned_size_sees_the_turned_photograph(
+    tmp_path: Path, suffix: str, orientation: int
+) -> None:
+    """Pillow turns the same file for comparison."""
+    path, _ = photograph(tmp_path, suffix, orientation)
+    turned = View("a", Camera((WIDTH, HEIGHT), K, np.eye(4)), path, None, None)
+    with Image.open(path) as stored:
+        expected = np.asarray(ImageOps.exif_transpose(stored)) / 255
+    np.testing.assert_allclose(read_view(turned), expected, atol=0.02)
+
+
+def test_a_mask_is_turned_with_its_photograph_if_it_is_stored_alike(tmp_path: Path) -> None:
+    path, codes = photograph(tmp_path, "jpg", 6)
+    stored = store(tmp_path / "stored.png", 255 * (codes[..., :1] > 0.5).astype(np.uint8), "uint8")
+    shown = np.ascontiguousarray(np.rot90(codes, -1)[..., :1] > 0.5)
+    turned = store(tmp_path / "turned.png", 255 * shown.astype(np.uint8), "uint8")
+    for mask in (stored, turned):
+        view = View("a", Camera((WIDTH, HEIGHT), K, np.eye(4)), path, mask, None)
+        np.testing.assert_array_equal(read_view(view)[..., 3], shown[..., 0])
+
+
+def test_another_size_is_refused_whatever_exif_says(tmp_path: Path) -> None:
+    for orientation in (1, 6):
         path, _ = photograph(tmp_path, "jpg", orientation)
-        turned = View("a", Camera((WIDTH, HEIGHT), K, np.eye(4)), path, None, None)
-        with pytest.raises(ShapeError, match="is 64 x 48") as caught:
-            read_view(turned)
-        assert ("EXIF says that it is shown turned" in str(caught.value)) == advised
+        size = (WIDTH, HEIGHT) if orientation == 1 else (WIDTH, HEIGHT + 1)
+        with pytest.raises(ShapeError, match="is 64 x 48"):
+            read_view(View("a", Camera(size, K, np.eye(4)), path, None, None))
 
 
 COLMAP = """

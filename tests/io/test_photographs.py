@@ -108,7 +108,8 @@ def test_cameras_are_told_apart_by_size_and_exif(tmp_path: Path, seen: Callable)
     store(folder / "c.png", np.zeros((8, 13, 3), np.uint8), "uint8")
     for name, focal in (("d.jpg", 28), ("e.jpg", 50), ("f.jpg", 28)):
         exif = {"Make": "Acme", "Exif:FocalLengthIn35mmFilm": focal}
-        path = store(folder / name, np.zeros((8, 12, 3), np.uint8), "uint8", **exif)
+        codes = np.full((8, 12, 3), ord(name[0]), np.uint8)
+        path = store(folder / name, codes, "uint8", **exif)
         assert len(read_picture_header(path).taken_by) == 2
     run(pose_photographs(folder, tmp_path / "poses"))
     assert seen()["groups"] == [["a.png", "b.png"], ["c.png"], ["d.jpg", "f.jpg"], ["e.jpg"]]

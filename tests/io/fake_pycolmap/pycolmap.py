@@ -1,7 +1,8 @@
 """Stands for pycolmap where only the way round it is tested: places photographs in a row.
 
 FAKE_PYCOLMAP says what goes wrong: "none" (no model), "hang", "exit", "raise", or "but NAME"
-(all are placed but that one). What it was asked is written to the file FAKE_PYCOLMAP_SEEN.
+(all are placed but that one). What it was asked is written to the file FAKE_PYCOLMAP_SEEN. The
+photographs have the width and height in FAKE_PYCOLMAP_SIZE, or 12 and 8.
 """
 
 import json
@@ -68,7 +69,8 @@ class Reconstruction:
         return list(self.images)
 
     def write_binary(self, folder: str) -> None:
-        camera = struct.pack("<QIiQQ3d", 1, 7, 0, 12, 8, 20, 6, 4)
+        width, height = map(int, os.environ.get("FAKE_PYCOLMAP_SIZE", "12 8").split())
+        camera = struct.pack("<QIiQQ3d", 1, 7, 0, width, height, 20, width / 2, height / 2)
         Path(folder, "cameras.bin").write_bytes(camera)
         content = struct.pack("<Q", len(self.images))
         for number, image in self.images.items():

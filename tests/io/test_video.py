@@ -1,0 +1,122 @@
+"""Videos: the sharpest frames, evenly spaced and upright; files without frames are refused."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from photograph_files import run
+
+from rift_cl.errors import FileFormatError, InputError, OutputError
+from rift_cl.io import read_image
+from rift_cl.io.video import demand_video, holds_video, sharpest_frames
+
+HEIGHT, WIDTH = 48, 64
+# The sharp frames; in a stretch of 5 the others are one grey.
+SHARP = (2, 5, 14, 16)
+
+
+def checkers(number: int) -> np.ndarray:
+    """A chequered frame whose upper left corner is white; as bright as its number says."""
+    y, x = np.indices((HEIGHT, WIDTH))
+    codes = np.where((y // 4 + x // 4) % 2, 60, 60 + 8 * number).astype(np.uint8)
+    codes[:16, :24] = 255
+    return np.repeat(codes[..., None], 3, axis=2)
+
+
+def store_video(path: Path, frames: list[np.ndarray], audio_only: bool = False) -> Path:
+    av = pytest.importorskip("av")
+    with av.open(str(path), "w") as container:
+        if audio_only:
+            stream = container.add_stream("aac", rate=8000)
+            frame = av.AudioFrame.from_ndarray(np.zeros((1, 1024), np.float32), "fltp", "mono")
+            frame.sample_rate = 8000
+            container.mux(stream.encode(frame))
+        else:
+            stream = container.add_stream("mpeg4", rate=10)
+            stream.height, stream.width = frames[0].shape[:2]
+            stream.pix_fmt, stream.bit_rate = "yuv420p", 4_000_000
+            for codes in frames:
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(codes, "rgb24")))
+        container.mux(stream.encode())
+    return path
+
+
+@pytest.fixture
+def video(tmp_path: Path) -> Path:
+    grey = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
+    frames = [checkers(k) if k in SHARP else grey for k in range(20)]
+    return store_video(tmp_path / "walk.mp4", frames)
+
+
+def test_of_each_stretch_the_sharp_frame_is_taken(video: Path, tmp_path: Path) -> None:
+    assert holds_video(video) and not holds_video(tmp_path) and not holds_video(tmp_path / "a.mp4")
+    reports, taken = run(sharpest_frames(video, tmp_path / "frames", 4))
+    assert taken == (4, 20) and [report.done for report in reports] == [1, 2, 3, 4]
+    files = sorted((tmp_path / "frames").glob("*.jpg"))
+    assert [file.name for file in files] == [f"{k:05}.jpg" for k in (1, 2, 3, 4)]
+    for file, number in zip(files, SHARP, strict=True):
+        image = 255 * read_image(file)
+        assert np.abs(image - checkers(number)).mean() < 8
+        assert image[:12, :20].min() > 220
+
+
+def test_frames_are_taken_up_again_unless_the_video_or_the_number_changed(
+    video: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "frames"
+    run(sharpest_frames(video, folder, 4))
+    times = [file.stat().st_mtime_ns for file in sorted(folder.iterdir())]
+    assert run(sharpest_frames(video, folder, 4)) == ([], (4, 20))
+    assert [file.stat().st_mtime_ns for file in sorted(folder.iterdir())] == times
+    (folder / "00003.jpg").unlink()
+    assert len(run(sharpest_frames(video, folder, 4))[0]) == 4
+    assert run(sharpest_frames(video, folder, 100))[1] == (20, 20)
+    (folder / "notes.txt").write_text("keep")
+    with pytest.raises(OutputError, match=r"notes\.txt"):
+        run(sharpest_frames(video, folder, 4))
+
+
+@pytest.mark.parametrize(("matrix", "corner"), [((0, 1, -1, 0), "right"), ((0, -1, 1, 0), "left")])
+def test_frames_are_turned_as_the_file_says(
+    video: Path, tmp_path: Path, matrix: tuple[int, ...], corner: str
+) -> None:
+    """QuickTime's matrix a b c d: x' = a x + c y, y' = b x + d y, down and to the right."""
+    data = bytearray(video.read_bytes())
+    a, b, c, d = (65536 * value for value in matrix)
+    # Version, times, track, duration, layer, group, volume: 40 bytes before the matrix.
+    place = data.index(b"tkhd") + 4 + 40
+    data[place : place + 36] = struct.pack(">9i", a, b, 0, c, d, 0, 0, 0, 1 << 30)
+    video.write_bytes(data)
+    run(sharpest_frames(video, tmp_path / "frames", 4))
+    image = read_image(tmp_path / "frames" / "00001.jpg")
+    assert image.shape == (WIDTH, HEIGHT, 3)
+    white = image[:20, -12:] if corner == "right" else image[-20:, :12]
+    assert white.min() > 0.85
+
+
+def test_files_without_frames_are_refused_in_a_sentence(video: Path, tmp_path: Path) -> None:
+    sound = store_video(tmp_path / "sound.mp4", [], audio_only=True)
+    with pytest.raises(InputError, match=r"sound\.mp4: the video holds no pictures"):
+        demand_video(sound)
+    for name, content in (
+        ("empty.mp4", b""),
+        ("text.mov", b"no video"),
+        ("cut.mp4", video.read_bytes()[:200]),
+    ):
+        path = tmp_path / name
+        path.write_bytes(content)
+        with pytest.raises((InputError, FileFormatError), match=name.replace(".", r"\.")):
+            demand_video(path)
+    assert not (tmp_path / "frames").exists()
+
+
+def test_without_the_library_one_sentence_says_what_to_install(
+    video: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rift_cl.io.video.find_spec", lambda name: None)
+    with pytest.raises(InputError, match="pip install av") as caught:
+        demand_video(video)
+    assert "\n" not in str(caught.value)
