@@ -30,7 +30,7 @@ FLAGS = (
     *("--headless=new", "--no-sandbox", "--no-first-run", "--disable-crash-reporter"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
     *("--disable-gpu", "--enable-unsafe-swiftshader"),
-    *("--window-size=760,520", "--remote-debugging-port=0", "--remote-allow-origins=*"),
+    *("--window-size=1100,520", "--remote-debugging-port=0", "--remote-allow-origins=*"),
 )
 # The command line; a shell's background jobs ignore Ctrl-C, and so would what they start.
 RIFT = """

@@ -11,6 +11,7 @@ from rift_cl.jobs.viewing.standpoint import Standpoint
 from rift_cl.jobs.viewing.viser_camera import go, pose_of
 from rift_cl.jobs.viewing.wish import KINDS, Kind
 
+_RESET, _UPRIGHT = "reset view", "set up"
 _SMALLEST, _LARGEST, _USUAL = 64, 4096, 2048
 
 
@@ -38,9 +39,11 @@ class ViewPanel:
             initial_value=size,
             hint="longer edge of a picture in pixels, once the camera rests",
         )
-        reset = gui.add_button("reset view", hint="go back to where the page began")
-        upright = gui.add_button(
-            "set up", hint="what is up in the window now is up from now on: turn about it"
+        where = gui.add_button_group(
+            "camera",
+            (_RESET, _UPRIGHT),
+            hint="go back to where the page began; take what is up in the window for up from now "
+            "on, and turn about it",
         )
         self._up = gui.add_markdown("", visible=False)
         self._facts = gui.add_markdown("")
@@ -48,18 +51,17 @@ class ViewPanel:
         async def on_change(_: Any) -> None:
             asked()
 
-        async def on_reset(event: Any) -> None:
-            if event.client is not None:
+        async def on_where(event: Any) -> None:
+            if event.client is None:
+                return
+            if event.target.value == _RESET:
                 go(event.client, self._first)
-
-        async def on_upright(event: Any) -> None:
-            if event.client is not None:
+            else:
                 self._set_up(event.client)
 
         self._kind.on_update(on_change)
         self._size.on_update(on_change)
-        reset.on_click(on_reset)
-        upright.on_click(on_upright)
+        where.on_click(on_where)
 
     @property
     def kind(self) -> Kind:
