@@ -4,13 +4,15 @@ It opens the command's page over its WebSocket as a browser does, moves the came
 loop, and counts what comes back. Beside the pictures of a second of the clock it prints those of a
 second of the server's processor time, which others on the machine do not slow down.
 
-    python tools/bench_viewer.py FIT --capture CAPTURE --seconds 10
+    python tools/bench_viewer.py FIT --seconds 10
+    python tools/bench_viewer.py FIT --arguments="--moving rift --capture CAPTURE"
 """
 
 from __future__ import annotations
 
 import io
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -18,6 +20,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -31,6 +34,7 @@ import viser.transforms
 import zstandard
 from PIL import Image
 from tyro.conf import Positional
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 # Seconds between two messages of a browser whose camera moves, and of the warm-up.
@@ -45,8 +49,8 @@ class Settings:
 
     scene: Annotated[Path, Positional]
     """What rift view shows."""
-    arguments: tuple[str, ...] = ()
-    """More for rift view, such as --capture CAPTURE."""
+    arguments: str = "--moving rift"
+    """More for rift view."""
     seconds: float = 10.0
     """How long to count."""
     width: int = 960
@@ -58,8 +62,13 @@ class Settings:
 def main(settings: Settings) -> None:
     """Start the viewer, move the camera, print what came."""
     command = [sys.executable, "-m", "rift_cl.cli", "view", str(settings.scene), "--port", "0"]
-    command += ["--size", str(max(settings.width, settings.height)), *settings.arguments]
-    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    command += [
+        "--size",
+        str(max(settings.width, settings.height)),
+        *shlex.split(settings.arguments),
+    ]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
     try:
         assert server.stdout is not None
         url = server.stdout.readline().split()[0]
@@ -99,10 +108,16 @@ def _measure(settings: Settings, socket: ClientConnection, pid: int) -> None:
             break
     spent = _processor_seconds(pid) - (busy or 0.0)
     count = sum(sizes.values())
-    for size, number in sorted(sizes.items()):
-        print(f"{size[0]} x {size[1]}: {number} pictures")
+    every = sorted(size for size, number in sizes.items() for _ in range(number))
+    if every:
+        least, middle, most = every[0], every[len(every) // 2], every[-1]
+        print(f"sizes: {_words(least)} to {_words(most)}, median {_words(middle)}")
     print(f"{count / settings.seconds:.1f} pictures a second")
     print(f"{count / max(spent, 1e-9):.1f} pictures a second of one core's processor time")
+
+
+def _words(size: tuple[int, int]) -> str:
+    return f"{size[0]} x {size[1]}"
 
 
 def _messages(socket: ClientConnection) -> Iterator[dict[str, Any]]:
@@ -156,7 +171,8 @@ def _move(settings: Settings, socket: ClientConnection, first: dict[str, Any]) -
             "look_at": first["look_at"].tolist(),
             "up_direction": [0.0, 0.0, 1.0],
         }
-        socket.send(msgspec.msgpack.encode(message))
+        with suppress(ConnectionClosed):
+            socket.send(msgspec.msgpack.encode(message))
         time.sleep(_FRAME)
 
 

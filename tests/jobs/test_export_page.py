@@ -12,7 +12,7 @@ from rift_cl.cli import main
 from rift_cl.geometry import Camera
 from rift_cl.io.output import write_json
 from rift_cl.io.splat_scene import SplatScene
-from rift_cl.jobs.export.web_page import seen_colors
+from rift_cl.jobs.viewing.browser_splats import seen_colors
 
 pytest.importorskip("viser")
 

@@ -16,6 +16,7 @@ from rift_cl.geometry.pose import look_at
 from rift_cl.io.splat_scene import SplatScene
 from rift_cl.jobs.scene_bounds import SceneBounds
 from rift_cl.jobs.viewing import viewer as viewer_module
+from rift_cl.jobs.viewing.crop import Crop
 from rift_cl.jobs.viewing.pose import Pose
 from rift_cl.jobs.viewing.viewer import SplatViewer
 from rift_cl.jobs.viewing.wish import Wish
@@ -101,6 +102,12 @@ class FakePage:
     def show(self, client, picture, quality):
         self.sent.append((client.client_id, picture, quality))
 
+    hands_over = True
+
+    def hand_over(self, client, splats, background):
+        splats.visible = True
+        self.handed = client.client_id, tuple(background)
+
     def tell(self, facts):
         self.said = facts
 
@@ -165,6 +172,68 @@ def test_a_camera_that_moves_gets_less_and_all_when_it_rests(viewer, drawn):
     clock[0] += 1
     assert [viewer.serve(*drawn), viewer.serve(*drawn)] == [1, 0]
     assert viewer._page.sent[-1][1].shape == (80, 120, 3)
+
+
+@pytest.mark.parametrize(
+    ("pace", "width"), [(1e9, 960), (576e3 * 20 / 4, 480), (576e3, 480), (576e3 / 4, 240), (1, 96)]
+)
+def test_moving_pictures_are_half_as_large_at_least_unless_that_took_all_too_long(
+    viewer, pace, width
+):
+    viewer._pace = pace
+    small = viewer._small(replace(POSE, aspect=1.6), 960)
+    assert small == pytest.approx(width, rel=0.05)
+
+
+class Moving:
+    """Splats for browsers; keeps what was given to whom."""
+
+    def __init__(self):
+        self.given = []
+
+    def give(self, client, crop):
+        self.given.append((client.client_id, crop))
+        return SimpleNamespace(visible=False)
+
+
+def test_a_browser_draws_by_itself_while_its_camera_moves(viewer, drawn):
+    viewer._moving = moving = Moving()
+    viewer._joined(client(), POSE)
+    assert viewer.serve(*drawn) == 1 and moving.given == [(7, None)]
+    splats = viewer._clients[7].splats[0]
+    clock[0] += 1
+    viewer._moved(7, replace(POSE, position=(5.0, 0, 0)))
+    assert splats.visible and viewer._page.handed == (7, (0, 0, 1))
+    assert viewer.serve(*drawn) == 0
+    clock[0] += 1
+    # The picture is sent first, and the splats go when it is surely seen.
+    assert viewer.serve(*drawn) == 1 and splats.visible
+    clock[0] += 1
+    assert viewer.serve(*drawn) == 0 and not splats.visible
+    # A box leaves others outside.
+    viewer._page.wish = Wish(edge=120, crop=Crop((0, 0, 0), (1, 1, 1)))
+    assert viewer.serve(*drawn) == 1 and moving.given[1:] == [(7, viewer._page.wish.crop)]
+
+
+def test_a_camera_that_moves_on_while_it_is_drawn_keeps_the_browser_drawing(viewer, drawn):
+    viewer._moving = Moving()
+    viewer._joined(client(), POSE)
+    viewer.serve(*drawn)
+    clock[0] += 1
+    viewer._moved(7, replace(POSE, position=(5.0, 0, 0)))
+    clock[0] += 1
+    show = viewer._page.show
+
+    def meanwhile(*given):
+        viewer._moved(7, replace(POSE, position=(6.0, 0, 0)))
+        show(*given)
+
+    viewer._page.show = meanwhile
+    assert viewer.serve(*drawn) == 1
+    clock[0] += 0.1
+    viewer._moved(7, replace(POSE, position=(7.0, 0, 0)))
+    clock[0] += 0.15
+    assert viewer.serve(*drawn) == 0 and viewer._clients[7].splats[0].visible
 
 
 def test_splats_that_change_are_drawn_again(viewer, drawn):

@@ -4,10 +4,8 @@ viser (https://viser.studio, MIT) brings the client and writes the scene into it
 for a moment on this computer alone, guarded as that of ``rift view``. The page asks nothing of the
 network, and a content security policy in its head makes sure of it.
 
-viser draws Gaussians of one colour each. A splat's colour is the mean of what the cameras saw that
-have it in front of them, which is nearer to the photographs than the mean over all directions.
-Covariances are sent as half floats: the page's unit is a tenth of the first camera's distance, so
-that they lie where half floats are exact to a thousandth.
+viser draws Gaussians of one colour each: see ``rift_cl.jobs.viewing.browser_splats``. The page's
+unit is a tenth of the first camera's distance.
 """
 
 from __future__ import annotations
@@ -23,22 +21,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.basis.angular import SphericalHarmonics
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
-from rift_cl.io.splat_activations import opacities_of
 from rift_cl.io.splat_scene import SplatScene
-from rift_cl.jobs.export.axes import matrices_of
-from rift_cl.jobs.few import evenly
+from rift_cl.jobs.viewing.browser_splats import AWAY, browser_splats
 from rift_cl.jobs.viewing.guard import Guard
 
 Floats = NDArray[np.float64]
 
-# Cameras that colours are averaged over, and splats at a time.
-_CAMERAS, _BLOCK = 32, 8192
-# How far the first camera stands from what it looks at, in the page's units, and how near and far
-# the page draws.
-_AWAY, _NEAR, _FAR = 10.0, 0.01, 1e5
+# How near and far the page draws, in its units.
+_NEAR, _FAR = 0.01, 1e5
 # The client is packed into its page: it unpacks itself, compiles and starts workers, and no more.
 _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob: data:; worker-src blob: "
@@ -88,10 +80,8 @@ def web_page(
     Raises:
         InputError: viser is not installed.
     """
-    unit = _AWAY / max(float(np.linalg.norm(first.camera.center - first.target)), 1e-12)
-    means = scene.means.astype(np.float64) * unit
-    rotations = matrices_of(scene.quats.astype(np.float64))
-    frames = rotations * (np.exp(scene.log_scales.astype(np.float64)) * unit)[:, None, :]
+    unit = AWAY / max(float(np.linalg.norm(first.camera.center - first.target)), 1e-12)
+    gaussians = browser_splats(scene, cameras or [first.camera], unit)
     server = _server()
     try:
         server.scene.set_up_direction(_numbers(first.up))
@@ -99,13 +89,7 @@ def web_page(
         server.scene.set_background_image(
             np.rint(np.tile(255 * background, (2, 2, 1))).astype(np.uint8), format="png"
         )
-        server.scene.add_gaussian_splats(
-            "/splats",
-            centers=means,
-            covariances=frames @ np.swapaxes(frames, 1, 2),
-            rgbs=seen_colors(scene, cameras or [first.camera]),
-            opacities=opacities_of(scene.logit_opacities)[:, None],
-        )
+        server.scene.add_gaussian_splats("/splats", **gaussians)
         page: str = server.scene.as_html(dark_mode=True)
     finally:
         with contextlib.redirect_stdout(io.StringIO()):
@@ -113,25 +97,6 @@ def web_page(
     policy = f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}" />'
     page = page.replace("<head>", f"<head>{policy}{_WORKERS}", 1)
     return page.replace("<title>Viser</title>", f"<title>{escape(title)}</title>", 1)
-
-
-def seen_colors(scene: SplatScene, cameras: Sequence[Camera]) -> Floats:
-    """(N, 3) means from 0 to 1 of the colours that cameras see which have a splat before them."""
-    basis, means = SphericalHarmonics(scene.degree), scene.means.astype(np.float64)
-    chosen = [cameras[number] for number in evenly(len(cameras), _CAMERAS)]
-    colors = np.empty((len(scene), 3))
-    for start in range(0, len(scene), _BLOCK):
-        here = slice(start, start + _BLOCK)
-        total, seen = np.zeros((len(means[here]), 3)), np.zeros(len(means[here]))
-        for camera in chosen:
-            away = means[here] - camera.center
-            before = away @ camera.view[2, :3] > 0
-            color = np.einsum("nk,nkc->nc", basis.functions(None, away), scene.sh[here]) + 0.5
-            total += np.where(before[:, None], np.clip(color, 0, 1), 0)
-            seen += before
-        constant = np.clip(0.5 + basis.functions(None, [0, 0, 1])[0] * scene.sh[here, 0], 0, 1)
-        colors[here] = np.where(seen[:, None] > 0, total / np.maximum(seen, 1)[:, None], constant)
-    return colors
 
 
 def _begin(handle: Any, first: FirstView, unit: float) -> None:

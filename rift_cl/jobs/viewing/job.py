@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
 
 from rift_cl.cl.discovery import open_device
 from rift_cl.io.capture import View, open_capture
 from rift_cl.jobs.camera_path import resized
 from rift_cl.jobs.cameras.film import first_view
 from rift_cl.jobs.orbit_input import OrbitInput
+from rift_cl.jobs.scene_bounds import SceneBounds
 from rift_cl.jobs.scene_input import OpenedScene
+from rift_cl.jobs.viewing.browser_splats import MovingSplats, browser_can
 from rift_cl.jobs.viewing.photographs import photographs_of
 from rift_cl.jobs.viewing.viewer import SplatViewer
 from rift_cl.progress import Report
@@ -29,6 +34,9 @@ class ViewSettings(OrbitInput):
 
     port: int = 8080
     """Port to listen on, at 127.0.0.1 alone; 0 for any that is free."""
+    moving: Literal["browser", "rift"] = "browser"
+    """Who draws while the camera moves: the browser, where it can (splats without modes or lobes,
+    one colour each), or rift, as it does when the camera rests, in smaller pictures."""
     size: int = 960
     """Longer edge of a picture in pixels, once the camera rests."""
 
@@ -55,6 +63,7 @@ class ViewJob:
         self._viewer = SplatViewer(
             bounds,
             photographs=photographs_of(_views(settings, scene)),
+            moving=_moving(settings, scene, bounds),
             port=settings.port,
             size=settings.size,
             background=scene.background,
@@ -92,3 +101,13 @@ def _views(settings: ViewSettings, scene: OpenedScene) -> Sequence[View]:
     if settings.capture is not None:
         return open_capture(settings.capture, photographs=False).views
     return () if scene.cameras is None else scene.cameras.views
+
+
+def _moving(settings: ViewSettings, scene: OpenedScene, bounds: SceneBounds) -> MovingSplats | None:
+    """What a browser draws while its camera moves; None where it cannot, or shall not."""
+    plain = scene.light == "display" and browser_can(scene.splats)
+    if settings.moving == "rift" or not plain:
+        return None
+    first, target = first_view(bounds)
+    reach = float(np.linalg.norm(first.center - target))
+    return MovingSplats(scene.splats, bounds.cameras or [first], reach or bounds.radius)

@@ -27,9 +27,11 @@ from rift_cl.jobs.viewing.pose import Pose
 from rift_cl.jobs.viewing.standpoint import Standpoint
 from rift_cl.jobs.viewing.view_panel import ViewPanel
 from rift_cl.jobs.viewing.viser_camera import pose_of
-from rift_cl.jobs.viewing.wish import Wish
+from rift_cl.jobs.viewing.wish import KINDS, Wish
 
 _HOST = "127.0.0.1"
+# How near and far what the browser draws may be, in distances of the first view.
+_NEAR, _FAR = 1e-3, 1e4
 SMALLEST, LARGEST = 64, 4096
 
 
@@ -44,6 +46,7 @@ class ViewerPage:
         first: where the camera of a page that is opened stands.
         photographs: that may be jumped to.
         number: of the photograph at which a page opens.
+        moving: whether a browser can draw while its camera moves.
         asked: called from viser's threads when a panel is changed.
 
     Raises:
@@ -60,6 +63,7 @@ class ViewerPage:
         first: Standpoint,
         photographs: Sequence[Photograph],
         number: int,
+        moving: bool,
         asked: Callable[[], None],
     ) -> None:
         if not SMALLEST <= size <= LARGEST:
@@ -85,7 +89,7 @@ class ViewerPage:
             show_logo=False, show_share_button=False, control_width="small"
         )
         self._begin_at(first)
-        self.view = ViewPanel(self._server, size, first, asked)
+        self.view = ViewPanel(self._server, size, first, asked, moving=moving)
         self.photographs = PhotographPanel(self._server, photographs, number, bounds, asked)
         self.crop = CropPanel(self._server, bounds, asked)
         self.path = PathPanel(self._server, lambda: self.view.size)
@@ -97,6 +101,8 @@ class ViewerPage:
         camera.position = tuple(first.position.tolist())
         camera.look_at = tuple(first.target.tolist())
         camera.fov = first.fov
+        reach = float(np.linalg.norm(first.target - first.position))
+        camera.near, camera.far = _NEAR * reach, _FAR * reach
 
     @property
     def wish(self) -> Wish:
@@ -111,6 +117,11 @@ class ViewerPage:
             share=0.0 if how == "off" else photographs.share,
             photograph=None if how == "off" else photographs.chosen,
         )
+
+    @property
+    def hands_over(self) -> bool:
+        """Whether a browser may draw by itself: colours alone, and where nobody asked us to."""
+        return self.view.kind == KINDS[0] and self.view.browser_draws
 
     def watch(
         self,
@@ -142,6 +153,14 @@ class ViewerPage:
         """Send a (height, width, 3) picture in display light to one page."""
         codes = np.rint(np.clip(picture, 0, 1) * 255).astype(np.uint8)
         client.scene.set_background_image(codes, format="jpeg", jpeg_quality=quality)
+        client.flush()
+
+    def hand_over(self, client: Any, splats: Any, background: NDArray[np.float32]) -> None:
+        """Let a page draw splats by itself, before a (3,) background in display light."""
+        with client.atomic():
+            splats.visible = True
+            codes = np.rint(np.tile(255 * background, (2, 2, 1))).astype(np.uint8)
+            client.scene.set_background_image(codes, format="png")
         client.flush()
 
     def tell(self, facts: str) -> None:

@@ -25,6 +25,8 @@ Floats = NDArray[np.float32]
 class Painter:
     """Draws what is wished for, and keeps what the next picture may be made of.
 
+    ``drawn`` counts how often splats were drawn.
+
     Args:
         background: (3,) behind the splats, in their light.
         light: that the splats' colours are in.
@@ -35,6 +37,7 @@ class Painter:
         self._background, self._light = background, light
         distance = bounds.distance
         self._reach = bounds.radius if distance is None else distance
+        self.drawn = 0
         # The splats in a box, what was drawn last, and the photograph as it was seen last.
         self._kept: dict[str, tuple[Any, Any]] = {}
 
@@ -70,7 +73,7 @@ class Painter:
         crop: Crop | None,
         version: int,
     ) -> Floats:
-        device = renderer.device
+        device, self.drawn = renderer.device, self.drawn + 1
         inside = self._known("crop", (crop, version), lambda: cropped(splats, crop, device))
         if kind == KINDS[0] or renderer.settings.mode == "xray":
             behind = device.array(self._background)

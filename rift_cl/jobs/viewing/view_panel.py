@@ -11,6 +11,7 @@ from rift_cl.jobs.viewing.standpoint import Standpoint
 from rift_cl.jobs.viewing.viser_camera import go, pose_of
 from rift_cl.jobs.viewing.wish import KINDS, Kind
 
+_DRAWN_BY = ("browser", "rift")
 _RESET, _UPRIGHT = "reset view", "set up"
 _SMALLEST, _LARGEST, _USUAL = 64, 4096, 2048
 
@@ -23,10 +24,17 @@ class ViewPanel:
         size: longer edge of a picture in pixels to begin with.
         first: the standpoint that 'reset view' returns to.
         asked: called when anything is changed.
+        moving: whether a browser can draw while its camera moves.
     """
 
     def __init__(
-        self, server: Any, size: int, first: Standpoint, asked: Callable[[], None]
+        self,
+        server: Any,
+        size: int,
+        first: Standpoint,
+        asked: Callable[[], None],
+        *,
+        moving: bool,
     ) -> None:
         self._server, self._first = server, first
         gui = server.gui
@@ -38,6 +46,14 @@ class ViewPanel:
             step=1,
             initial_value=size,
             hint="longer edge of a picture in pixels, once the camera rests",
+        )
+        self._drawn_by = gui.add_dropdown(
+            "moving",
+            _DRAWN_BY,
+            initial_value=_DRAWN_BY[0] if moving else _DRAWN_BY[1],
+            visible=moving,
+            hint="while the camera moves, the browser draws splats of one colour each; rift draws "
+            "them as they were fitted, colours by direction and all, as it does at rest",
         )
         where = gui.add_button_group(
             "camera",
@@ -68,6 +84,11 @@ class ViewPanel:
         """Which of ``KINDS`` is to be shown."""
         kind = self._kind.value
         return kind if kind in KINDS else KINDS[0]
+
+    @property
+    def browser_draws(self) -> bool:
+        """Whether the browser draws while the camera moves."""
+        return bool(self._drawn_by.value == _DRAWN_BY[0])
 
     @property
     def size(self) -> int:

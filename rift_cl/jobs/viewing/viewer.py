@@ -8,6 +8,7 @@ note what is asked for, and the owner of the splats draws it when it calls ``ser
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Sequence
@@ -22,6 +23,8 @@ from rift_cl.geometry import Camera
 from rift_cl.jobs.cameras.film import first_view
 from rift_cl.jobs.fit_pictures import Light
 from rift_cl.jobs.scene_bounds import SceneBounds
+from rift_cl.jobs.viewing.browser_splats import MovingSplats
+from rift_cl.jobs.viewing.crop import Crop
 from rift_cl.jobs.viewing.page import ViewerPage
 from rift_cl.jobs.viewing.photographs import Photograph, nearest_one
 from rift_cl.jobs.viewing.picture import Painter
@@ -30,21 +33,36 @@ from rift_cl.jobs.viewing.standpoint import standpoint_of
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
 
-# A camera rests when it has not moved for so many seconds; until then a picture may take so long.
-_REST, _PICTURE = 0.2, 0.06
-# Longer edge of a picture while nobody knows how fast they are drawn, and the least there is.
-_FIRST, _LEAST = 240, 96
+# A camera rests when it has not moved for so many seconds; until then a picture should take so
+# long, and one of half the size may take so long.
+_REST, _PICTURE, _SLOW = 0.2, 0.05, 0.25
+# The least longer edge of a picture, and how many sizes there are up to the full one.
+_LEAST, _SIZES = 96, 8
 # Pictures of a fit whose page rests are so many times their own length apart.
 _BETWEEN = 4.0
 # Quality of JPEG while the camera moves and while it rests.
 _ROUGH, _SHARP = 70, 92
+# Seconds after which a browser has surely decoded and shown a picture.
+_SEEN = 0.2
 # Width divided by height of a window in which all of the first view is seen.
 _ASPECT = 4 / 3
 
 
 @dataclass
 class _Client:
-    """A page that is open: its newest pose, when that came, what it was sent, and when again."""
+    """A page that is open.
+
+    Args:
+        handle: viser's.
+        pose: the newest.
+        since: when that came.
+        rough: what the last picture was drawn for.
+        sharp: what the last one of full size was drawn for.
+        again: when a fit's next picture is due.
+        splats: what the page may draw by itself, and the box that they were cropped to.
+        alone: whether it does.
+        ends: when the picture that was sent is surely seen, so that it need not any more.
+    """
 
     handle: Any
     pose: Pose
@@ -52,6 +70,9 @@ class _Client:
     rough: Any = None
     sharp: Any = None
     again: float = 0.0
+    splats: tuple[Any, Crop | None] | None = None
+    alone: bool = False
+    ends: float = math.inf
 
 
 class SplatViewer:
@@ -60,6 +81,7 @@ class SplatViewer:
     Args:
         bounds: what the camera turns about, and which way is up.
         photographs: that may be jumped to; the page opens where one of them was taken.
+        moving: what a browser draws while its camera moves; our kernels do if not given.
         port: to listen on, at 127.0.0.1; 0 for any that is free.
         size: longer edge in pixels of a picture whose camera rests.
         background: (3,) behind the splats, in their light; black if not given.
@@ -75,6 +97,7 @@ class SplatViewer:
         bounds: SceneBounds,
         *,
         photographs: Sequence[Photograph] = (),
+        moving: MovingSplats | None = None,
         port: int = 8080,
         size: int = 960,
         background: ArrayLike | None = None,
@@ -82,7 +105,9 @@ class SplatViewer:
         title: str = "RiFT",
     ) -> None:
         behind = np.zeros(3) if background is None else background
-        self._painter = Painter(np.asarray(behind, np.float32), light, bounds)
+        self._background = np.asarray(behind, np.float32)
+        self._painter = Painter(self._background, light, bounds)
+        self._moving = moving
         self._clients: dict[int, _Client] = {}
         self._lock, self._asked = threading.Lock(), threading.Event()
         self._splats: Splats | None = None
@@ -99,6 +124,7 @@ class SplatViewer:
             first=standpoint_of(first, target, bounds.up, _ASPECT),
             photographs=photographs,
             number=nearest_one(photographs, first),
+            moving=moving is not None,
             asked=self._asked.set,
         )
         self._page.watch(self._joined, self._moved, self._left)
@@ -149,13 +175,16 @@ class SplatViewer:
     def _serve_one(self, client: _Client, splats: Splats, renderer: Renderer) -> bool:
         """Draw for one page if it wants anything that it does not have."""
         pose, since, wish = client.pose, client.since, self._page.wish
-        want = (pose, wish, self._version)
-        resting = time.monotonic() - since >= _REST
+        want, now = (pose, wish, self._version), time.monotonic()
+        resting = now - since >= _REST
+        self._lend(client, wish.crop, now)
+        if client.alone and not resting:
+            return False
         if want == client.sharp or (want == client.rough and not resting):
             return False
         # Nothing but the splats has changed: a fit shall not wait for its pictures all the time.
         waits = client.sharp is not None and want[:2] == client.sharp[:2]
-        if waits and time.monotonic() < client.again:
+        if waits and now < client.again:
             return False
         small = wish.edge if resting else self._small(pose, wish.edge)
         try:
@@ -163,17 +192,35 @@ class SplatViewer:
         except InputError:
             # What a page says is not ours to trust, and no reason to end a fit.
             return False
-        begin = time.perf_counter()
+        begin, before = time.perf_counter(), self._painter.drawn
         picture = self._painter.paint(splats, renderer, camera, wish, self._version)
         quality = _ROUGH if small < wish.edge else _SHARP
         self._page.show(client.handle, picture, quality)
         seconds = time.perf_counter() - begin
-        self._pace = camera.height * camera.width / seconds
+        if self._painter.drawn > before:
+            self._learn(camera.height * camera.width / seconds)
         client.rough = want
         if small == wish.edge:
-            client.sharp, client.again = want, time.monotonic() + _BETWEEN * seconds
+            now = time.monotonic()
+            client.sharp, client.again = want, now + _BETWEEN * seconds
+            with self._lock:
+                client.ends = now + _SEEN if client.pose is pose else math.inf
             self._page.tell(self._facts(splats, camera, seconds))
         return True
+
+    def _learn(self, pace: float) -> None:
+        """Note how many pixels were drawn in a second; one picture that had to wait says little."""
+        self._pace = pace if self._pace is None else math.sqrt(pace * self._pace)
+
+    def _lend(self, client: _Client, crop: Crop | None, now: float) -> None:
+        """Give a page the splats that it draws by itself, or hide them once our picture is seen."""
+        if self._moving is None:
+            return
+        if client.splats is None or client.splats[1] != crop:
+            client.splats, client.alone = (self._moving.give(client.handle, crop), crop), False
+        with self._lock:
+            if client.alone and now >= client.ends:
+                client.splats[0].visible = client.alone = False
 
     def _facts(self, splats: Splats, camera: Camera, seconds: float) -> str:
         """What the panel says: lines of Markdown."""
@@ -188,12 +235,18 @@ class SplatViewer:
         return "  \n".join(lines)
 
     def _small(self, pose: Pose, edge: int) -> int:
-        """The longer edge at which a picture is drawn in time, while the camera moves."""
+        """The longer edge at which a picture is drawn in time, while the camera moves.
+
+        At least half of what it is at rest, unless that took all too long; in few steps, since a
+        picture that changes its size all the time flickers.
+        """
         if self._pace is None:
-            return min(edge, _FIRST)
-        share = min(pose.aspect, 1 / pose.aspect)
-        fits = int(np.sqrt(self._pace * _PICTURE / max(share, NARROWEST)))
-        return min(edge, max(_LEAST, fits))
+            return max(_LEAST, edge // 2) if edge > _LEAST else edge
+        share = max(min(pose.aspect, 1 / pose.aspect), NARROWEST)
+        soon, late = (math.sqrt(self._pace * limit / share) for limit in (_PICTURE, _SLOW))
+        step = edge / _SIZES
+        fits = max(step * int(soon / step), min(edge / 2, late))
+        return min(edge, max(_LEAST, int(fits)))
 
     def _joined(self, handle: Any, pose: Pose) -> None:
         with self._lock:
@@ -207,6 +260,10 @@ class SplatViewer:
             client = self._clients.get(number)
             if client is not None and client.pose != pose:
                 client.pose, client.since = pose, time.monotonic()
+                client.ends = math.inf
+                if client.splats is not None and not client.alone and self._page.hands_over:
+                    client.alone = True
+                    self._page.hand_over(client.handle, client.splats[0], self._background)
         self._asked.set()
 
     def _left(self, number: int) -> None:
