@@ -29,6 +29,9 @@ _VIEWERS = 0.3
 class Export:
     """An export that is planned; nothing is written yet.
 
+    ``plain`` is the scene as it will be written but for ``turn`` (3, 3), which comes last, and
+    ``notes`` what is lost by it.
+
     Args:
         settings: what to do.
 
@@ -42,16 +45,16 @@ class Export:
         self.scene = settings.open_scene()
         self.format = self._format(settings.to or "html")
         self.path = output_path(settings, self.format.suffix)
-        self._plain, self.notes = plain_scene(self.scene.splats, self.scene.light)
-        if self._plain.degree > DEGREE:
-            kept = np.ascontiguousarray(self._plain.sh[:, : (DEGREE + 1) ** 2])
-            self._plain = dataclasses.replace(self._plain, sh=kept)
+        self.plain, self.notes = plain_scene(self.scene.splats, self.scene.light)
+        if self.plain.degree > DEGREE:
+            kept = np.ascontiguousarray(self.plain.sh[:, : (DEGREE + 1) ** 2])
+            self.plain = dataclasses.replace(self.plain, sh=kept)
             self.notes.append(f"harmonics of degree {DEGREE + 1} are left out")
         self._bounds = settings.bounds(self.scene)
         self.notes += settings.notes(self.scene)
-        self._turn = np.eye(3)
+        self.turn = np.eye(3)
         if self.format.upright:
-            self._turn = turn_between(self._bounds.up, _UP)
+            self.turn = turn_between(self._bounds.up, _UP)
             self.notes.append(
                 "the scene is turned so that up, ({:.3g}, {:.3g}, {:.3g}), is y".format(
                     *self._bounds.up
@@ -82,7 +85,7 @@ class Export:
 
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""
-        scene = self._plain
+        scene = self.plain
         facts = {
             "scene": f"{self.scene.name}, {len(self.scene.splats)} splats",
             "output": str(self.path),
@@ -95,10 +98,10 @@ class Export:
         """Do it; a report at the end."""
         for note in self.notes:
             self.announce(note)
-        content = self.format.encode(turned(self._plain, self._turn))
+        content = self.format.encode(turned(self.plain, self.turn))
         write_whole(self.path, content)
         self.result = f"{self.path}, {format_bytes(len(content))}"
-        yield Report(len(self._plain), len(self._plain), "splats")
+        yield Report(len(self.plain), len(self.plain), "splats")
 
 
 def output_path(settings: ExportSettings, suffix: str) -> Path:
