@@ -61,13 +61,7 @@ class FitRun:
             self.folder.mark(**self.decided)
             self.folder.drop("checkpoints")
         every, kept = self.settings.checkpoint_every, trainer.parameters.step
-        reports = trainer.run(lambda: self._stopping)
-        if self.settings.view:
-            from rift_cl.jobs.viewing.watched import watched
-
-            title = self.settings.capture.name
-            reports = watched(reports, trainer, pictures, title=title, announce=self.announce)
-        for report in reports:
+        for report in self._reports(trainer, pictures):
             if report.done % REPORT_EVERY == 0 or report.done == report.total:
                 self.losses.append((report.done, report.values["loss"]))
             ended = self._stopping or report.done == report.total
@@ -89,6 +83,16 @@ class FitRun:
     def _history(self) -> list[tuple[int, int]]:
         """The stages of the fit; see ``fit_checkpoints.History``."""
         return [*self.checkpoints.history, (self.settings.steps, self.settings.steps)]
+
+    def _reports(self, trainer: Trainer, pictures: Any) -> Iterator[Report]:
+        """The trainer's reports, in a browser as well if that was asked for."""
+        if not self.settings.view:
+            return trainer.run(lambda: self._stopping)
+        from rift_cl.jobs.viewing.watched import watched
+
+        title = self.settings.capture.name
+        asked = (trainer, pictures, lambda: self._stopping)
+        return watched(*asked, title=title, announce=self.announce)
 
     def _heed(self, step: int) -> None:
         """Break off if that was asked for."""

@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from viewer_wire import dialled, told, until
+from viewer_wire import Wire, dialled, told, until
 
 from rift_cl.errors import InputError
 from rift_cl.jobs.fit import Fit
@@ -144,6 +144,15 @@ class Broken:
         raise OSError("gone")
 
 
+def fitted(capture, out, announce=lambda line: None, **more):
+    """The bytes of the scene of a short fit."""
+    given = {"steps": 30, "splats": 100, "hold_out": 4, "checkpoint_every": 0}
+    job = Fit(FitSettings(capture, out, **given, **more))
+    job.announce = announce
+    list(job.run())
+    return (out / "scene.ply").read_bytes()
+
+
 @pytest.mark.parametrize("opens", [True, False])
 def test_a_fit_whose_viewer_fails_goes_on_to_the_same_bits(capture, tmp_path, monkeypatch, opens):
     def refused(*_, **__):
@@ -151,13 +160,31 @@ def test_a_fit_whose_viewer_fails_goes_on_to_the_same_bits(capture, tmp_path, mo
 
     monkeypatch.setattr(watched_module, "SplatViewer", Broken if opens else refused)
     Broken.calls, said = 0, []
-    for name in ("seen", "unseen"):
-        given = {"steps": 30, "splats": 100, "hold_out": 4, "checkpoint_every": 0}
-        job = Fit(FitSettings(capture, tmp_path / name, view=name == "seen", **given))
-        job.announce = said.append
-        list(job.run())
-    scenes = [(tmp_path / name / "scene.ply").read_bytes() for name in ("seen", "unseen")]
-    assert scenes[0] == scenes[1]
+    seen = fitted(capture, tmp_path / "seen", said.append, view=True)
+    assert seen == fitted(capture, tmp_path / "unseen")
     warnings = [line for line in said if "warning" in line]
     assert len(warnings) == 1 and "cannot be shown" in warnings[0] and "goes on" in warnings[0]
     assert (Broken.calls > 1) is opens
+
+
+def test_a_fit_that_is_looked_at_draws_and_gives_the_same_bits(capture, tmp_path, monkeypatch):
+    made, pages, said = [], [], []
+
+    class Kept(SplatViewer):
+        def __init__(self, *given, **more):
+            super().__init__(*given, **more)
+            made.append(self)
+
+    def look(line):
+        said.append(line)
+        pages.append(Wire(dialled(line.split()[0])))
+        until(lambda: made[0]._clients)
+        pages[0].socket.send(told(wxyz=(1.0, 0, 0)))
+
+    monkeypatch.setattr(watched_module, "SplatViewer", Kept)
+    seen = fitted(capture, tmp_path / "seen", look, view=True)
+    pages[0].wait(lambda m: m["type"] == "BackgroundImageMessage")
+    pages[0].wait(lambda m: m["type"] == "CameraFrustumMessage")
+    pages[0].socket.close()
+    assert len(said) == 1 and "step" in made[0].state
+    assert seen == fitted(capture, tmp_path / "unseen")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 
 from rift_cl.jobs.fit_pictures import CapturePictures
 from rift_cl.jobs.scene_bounds import bounds_of_cameras
@@ -13,23 +13,28 @@ from rift_cl.train.trainer import Trainer
 
 
 def watched(
-    reports: Iterable[Report],
     trainer: Trainer,
     pictures: CapturePictures,
+    stopped: Callable[[], bool],
     *,
     title: str,
     announce: Callable[[str], None],
 ) -> Iterator[Report]:
-    """The reports of a trainer, with a page that is drawn anew at each of them.
+    """The reports of ``trainer.run(stopped)``, with a page that is drawn between its steps.
 
     Drawing changes no bit of the fit: the trainer's own thread does it between two steps. Whatever
     goes wrong with the page is said once, and the fit goes on.
     """
     window = _Window(trainer, announce)
     window.heed(lambda: window.open(pictures, title))
+
+    def looked_at() -> bool:
+        window.heed(window.draw)
+        return stopped()
+
     try:
-        for report in reports:
-            window.heed(lambda report=report: window.draw(report))  # type: ignore[misc]
+        for report in trainer.run(looked_at):
+            window.tell(report)
             yield report
     finally:
         window.heed(window.close)
@@ -67,11 +72,16 @@ class _Window:
         )
         self._announce(f"{self._viewer.url} shows the fit")
 
-    def draw(self, report: Report) -> None:
+    def tell(self, report: Report) -> None:
+        """Say how far the fit is."""
         if self._viewer is not None:
             loss = report.values.get("loss")
             words = "" if loss is None else f", loss {loss:.4g}"
             self._viewer.state = f"step {report.done} of {report.total}{words}"
+
+    def draw(self) -> None:
+        """Draw what the page asks for; the splats are another step further."""
+        if self._viewer is not None:
             self._viewer.serve(self._trainer.parameters.drawn, self._trainer.renderer, changed=True)
 
     def close(self) -> None:
