@@ -17,12 +17,15 @@ from rift_cl.jobs.analyze_facts import Findings, Table, missing, resolution, unk
 from rift_cl.jobs.analyze_input import open_sampled
 from rift_cl.jobs.analyze_report import analysis_page
 from rift_cl.jobs.analyze_settings import AnalyzeSettings
+from rift_cl.jobs.analyze_surface import surface_missing, surface_resolution
 from rift_cl.jobs.coverage_pictures import MAP_BYTES
 from rift_cl.jobs.run_folder import RunFolder
 from rift_cl.jobs.sampled import Floats, Sampled, place_of, points_of
-from rift_cl.jobs.suggestions import angles_to_add, cameras_to_add
+from rift_cl.jobs.suggestions import angles_to_add, cameras_to_add, usual_distance
+from rift_cl.jobs.surfaces import sides_of, surface_of
 from rift_cl.jobs.views_table import csv_text, view_row
 from rift_cl.progress import Report
+from rift_cl.sampling.surface import surface_merit
 
 _STEPS = 4
 # Bytes of a view of a point: its direction, weight, pixel, cut-off and blur.
@@ -73,7 +76,7 @@ class Analysis:
         """Do it: what is missing, what limits, what to add, the pictures."""
         sampled = self.sampled
         yield Report(0, _STEPS, "steps")
-        findings = [missing(sampled), resolution(sampled, tuple(self.points))]
+        findings = self._found()
         yield Report(1, _STEPS, "steps")
         cameras, more = self._added()
         yield Report(2, _STEPS, "steps")
@@ -85,7 +88,7 @@ class Analysis:
             "seen_by": int((sampled.looks().weight[:, 0] > 0).sum()),
             "target": {"center": sampled.target.center, "diameter": sampled.target.diameter},
             "unit": sampled.unit,
-            "unknown": unknown_share(sampled),
+            "unknown": self._unknown(sampled),
             **{key: value for found in findings for key, value in found.figures.items()},
             "assumed": list(sampled.notes),
         }
@@ -94,6 +97,14 @@ class Analysis:
         self._write(cameras)
         self.folder.finish(self.settings, self.metrics, page, self.device)
         yield Report(_STEPS, _STEPS, "steps")
+
+    def _found(self) -> list[Findings]:
+        """What is missing, and what limits detail."""
+        sampled, names = self.sampled, tuple(self.points)
+        if sampled.opaque:
+            far = usual_distance(sampled)
+            return [surface_missing(sampled, far), surface_resolution(sampled, names)]
+        return [missing(sampled), resolution(sampled, names)]
 
     def _added(self) -> tuple[tuple[Camera, ...], Findings]:
         """Cameras to add, and what is to be said of them or of angles to add."""
@@ -126,18 +137,32 @@ class Analysis:
         sampled = self.sampled
         rows = [(row[0], *(round(float(n), 6) for n in row[1:4])) for row in self._rows(cameras)]
         columns = ("add", "azimuth, °", "elevation, °", f"distance, {sampled.units}")
-        before, after = unknown_share(sampled), unknown_share(sampled.with_cameras(cameras))
+        more = sampled.with_cameras(cameras)
+        before, after = self._unknown(sampled), self._unknown(more)
+        what = "the target's power would stay unknown"
+        if sampled.opaque:
+            far = usual_distance(sampled)
+            before, after = sides_of(sampled, far).unseen, sides_of(more, far).unseen
+            what = "the target's sides would be seen by no view"
         text = (
-            f"With {len(cameras)} more views like those at hand {after:.3%} of the target's power "
-            f"would stay unknown, instead of {before:.3%}."
+            f"With {len(cameras)} more views like those at hand {after:.3%} of {what}, instead of "
+            f"{before:.3%}."
         )
         names = ("azimuth", "elevation", "distance")
         figures = {
             "add": [dict(zip(names, row[1:], strict=True)) for row in rows],
-            "unknown_with_added": after,
+            "unknown_with_added": self._unknown(more),
         }
         caption = "The most useful first, each given those before it."
         return Findings(figures, ((columns, rows, caption),), (text,))
+
+    @staticmethod
+    def _unknown(sampled: Sampled) -> float:
+        """What the views leave unknown: of the target's power, or of a surface."""
+        if not sampled.opaque:
+            return unknown_share(sampled)
+        target = surface_of(sampled, usual_distance(sampled))
+        return surface_merit(sampled.looks(target.points), target)[0]
 
     def _rows(self, cameras: tuple[Camera, ...]) -> list[tuple[Any, ...]]:
         center, up = self.sampled.target.center, self.sampled.up

@@ -25,7 +25,7 @@ _ONE = (
 # So much finer than pixels, a limit is none: what is in focus to rounding.
 _ENDLESS = 1e6
 _KEYS = (*(cause.replace(" ", "_") for cause in CAUSES), "reached")
-_WHY = {
+WHY = {
     "pixel": "get nearer, take a longer lens, or smaller pixels",
     "diffraction": "open the aperture",
     "depth of field": "close the aperture, or focus where it matters",
@@ -127,10 +127,13 @@ def resolution(sampled: Sampled, names: tuple[str, ...]) -> Findings:
     """
     looks, target, units = sampled.looks(), sampled.target, sampled.units
     found, count = limits(looks, target), crowther(looks, target)
-    ends = _ENDLESS * sampled.finest
     points = [_ends(found, p, name) for p, name in enumerate(names)]
     rows = [
-        (point["point"], *(_length(point[key], ends) for key in _KEYS), point["limited_by"])
+        (
+            point["point"],
+            *(length_in_words(point[key], sampled) for key in _KEYS),
+            point["limited_by"],
+        )
         for point in points
     ]
     heads = ("point", *CAUSES, "all together", "limited by")
@@ -141,7 +144,7 @@ def resolution(sampled: Sampled, names: tuple[str, ...]) -> Findings:
     needed = crowther_views(target.diameter, 1 / target.highest)
     sentences = (
         f"The {found.cause[0]} limits detail at the {names[0]}, to a cycle of "
-        f"{1 / found.reached[0]:.3g} {units}: {_WHY[found.cause[0]]}.",
+        f"{1 / found.reached[0]:.3g} {units}: {WHY[found.cause[0]]}.",
         f"By Crowther's count {needed} views evenly round a circle tell detail of "
         f"{1 / target.highest:.3g} {units} a cycle; {count.views} of these see the target's "
         f"middle, and tell {1 / count.frequency:.3g} {units}.",
@@ -161,8 +164,9 @@ def _ends(found: Limits, p: int, name: str) -> dict[str, Any]:
     return {"point": name, **dict(zip(_KEYS, ends, strict=True)), "limited_by": found.cause[p]}
 
 
-def _length(frequency: float, endless: float) -> str:
-    return f"{1 / frequency:.3g}" if frequency < endless else "–"
+def length_in_words(frequency: float, sampled: Sampled) -> str:
+    """One cycle at which detail ends, a dash where it does not."""
+    return f"{1 / frequency:.3g}" if frequency < _ENDLESS * sampled.finest else "–"
 
 
 def unknown_share(sampled: Sampled) -> float:

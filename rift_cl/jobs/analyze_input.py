@@ -19,13 +19,16 @@ from rift_cl.jobs.cameras.arc import demand_places
 from rift_cl.jobs.fan_views import fan_cameras
 from rift_cl.jobs.sampled import Floats, Sampled, points_of
 from rift_cl.jobs.scene_bounds import SceneBounds, bounds_of_cameras
+from rift_cl.jobs.scene_depth import space_of
+from rift_cl.jobs.surfaces import trusted
 from rift_cl.sampling.target import Target
 
 # Share of the sparse points that a target holds.
 _INSIDE = 0.9
-_SEEN_THROUGH = (
-    "What views sample is counted as for a target that is seen through; of an opaque surface they "
-    "may tell more, since what shows is all there is to know."
+_SEEN_THROUGH = "What views sample is counted as for a target that is seen through."
+_OPAQUE = (
+    "The target is taken to be opaque, and a sphere to stand for its surface (--mode volume is for "
+    "what is seen through)."
 )
 # Nanometres in a millimetre.
 _NANO = 1e6
@@ -59,9 +62,24 @@ def _capture(settings: AnalyzeSettings) -> Sampled:
         unit="unit" if settings.unit is None else "mm",
         cameras=tuple(lens),
         facts={"views": len(cameras)},
-        notes=(*notes, *more, _SEEN_THROUGH),
+        notes=(*notes, *more, _SEEN_THROUGH if settings.mode == "volume" else _OPAQUE),
+        opaque=settings.mode != "volume",
     )
+    if sampled.opaque:
+        sampled = _with_space(sampled, settings, capture)
     return sampled if settings.unit is None else in_millimetres(sampled, settings.unit)
+
+
+def _with_space(sampled: Sampled, settings: AnalyzeSettings, capture: Capture) -> Sampled:
+    """The same with what stands where, as far as splats or sparse points tell it."""
+    space, known = space_of(settings.source, sampled.cameras, capture.points, settings.device)
+    if space is None:
+        return sampled
+    if not trusted(space, sampled):
+        note = f"By {known} many cameras do not see the target: they are not made use of."
+        return replace(sampled, notes=(*sampled.notes, note))
+    note = f"What stands where, and what is in the way, is known from {known}."
+    return replace(sampled, space=space, notes=(*sampled.notes, note))
 
 
 def _ball(
@@ -138,7 +156,8 @@ def in_millimetres(sampled: Sampled, unit: float) -> Sampled:
         band=band,
     )
     cameras = tuple(_scaled(camera, unit) for camera in sampled.cameras)
-    return replace(sampled, target=scaled, cameras=cameras, unit="mm")
+    space = None if sampled.space is None else sampled.space.scaled(unit)
+    return replace(sampled, target=scaled, cameras=cameras, unit="mm", space=space)
 
 
 def _scaled(camera: Camera, unit: float) -> Camera:
@@ -162,6 +181,8 @@ def _target(
 
 
 def _scan(settings: AnalyzeSettings) -> Sampled:
+    if settings.mode == "surface":
+        raise InputError(f"--mode surface is about photographs, {settings.source} is a scan")
     for name in ("center", "aperture", "focus", "unit"):
         if getattr(settings, name) is not None:
             raise InputError(f"--{name} is about the cameras of a capture, {settings.source} is a "

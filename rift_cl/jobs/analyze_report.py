@@ -25,15 +25,14 @@ def analysis_page(
     device: Device,
 ) -> Page:
     """The report of a finished analysis."""
-    target, unit = sampled.target, sampled.unit
+    target = sampled.target
     page = Page(f"What {sampled.name} sampled", findings[0].sentences[0])
     page.facts(
         {
             **sampled.facts,
             "views that see the target's middle": metrics["seen_by"],
             "target": f"{target.diameter:.4g} {sampled.units} about {place_of(target)}",
-            "power that stays unknown": f"{metrics['unknown']:.3%}, of a target whose power falls "
-            f"as 1/k^2 up to {target.highest:.3g} cycles per {unit}",
+            **_unknown(sampled, metrics["unknown"]),
         }
     )
     for note in sampled.notes:
@@ -47,9 +46,20 @@ def analysis_page(
         for columns, rows, caption in found.tables:
             page.table(columns, rows, caption=caption)
     _views(page, sampled, added, device)
-    page.section("What the views sample")
-    add_coverage(page, sampled, points, device)
+    if not sampled.opaque:
+        page.section("What the views sample")
+        add_coverage(page, sampled, points, device)
     return page
+
+
+def _unknown(sampled: Sampled, value: float) -> dict[str, str]:
+    if sampled.opaque:
+        return {"texture and sheen that stay unknown, added": f"{value:.3g} of 2"}
+    target = sampled.target
+    return {
+        "power that stays unknown": f"{value:.3%}, of a target whose power falls as 1/k^2 up to "
+        f"{target.highest:.3g} cycles per {sampled.unit}"
+    }
 
 
 def _views(page: Page, sampled: Sampled, added: Sequence[Camera], device: Device) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from tyro.conf import Positional
 
@@ -27,6 +27,9 @@ class AnalyzeSettings:
     be there), or a scan with parallel or fan-beam rays."""
     out: Path = Path("rift-analyze")
     """Folder for report.html, config.json, metrics.json and views.csv."""
+    mode: Literal["surface", "volume"] | None = None
+    """Whether the target is opaque, or seen through as by X-rays; photographs are taken to show
+    surfaces, scans volumes, when not given."""
     center: tuple[float, float, float] | None = None
     """Middle of the target, in the capture's world; where its cameras look when not given."""
     diameter: float | None = None

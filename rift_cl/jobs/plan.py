@@ -127,7 +127,7 @@ class Planning:
             "merit": found.elsewhere,
             "planned_with": {"merit": found.merit, "bound": found.bound},
             "kind": self.settings.merit,
-            "mode": self.settings.mode,
+            "mode": given.target.mode,
             "cost": found.cost,
             "baselines": {name: entry.elsewhere for name, entry in found.baselines.items()},
             "verdict": self.verdict,

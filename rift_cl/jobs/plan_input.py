@@ -19,18 +19,18 @@ from rift_cl.jobs.analyze_settings import AnalyzeSettings
 from rift_cl.jobs.keep_out_words import keep_out_of
 from rift_cl.jobs.plan_settings import PlanSettings
 from rift_cl.jobs.sampled import Floats, Sampled
+from rift_cl.jobs.surfaces import SURFACE, hidden_places, surface_of
 from rift_cl.sampling.pilot import Pilot
 from rift_cl.sampling.planning.constraints import Budget, Constraints, Ranges
 from rift_cl.sampling.planning.paths import Free, Ring, Spline, TiltedRings
 from rift_cl.sampling.planning.paths import Path as Way
+from rift_cl.sampling.planning.site import DISTANCE, Site
 from rift_cl.sampling.prior import PowerLaw, Prior, directions_for
 from rift_cl.sampling.target import Target
 
 DIAMETER = 100.0
 # What most people have: 24 megapixels of 3.9 micrometres, 50 mm, closed far enough for depth.
 USUAL = CameraChoice(CameraType("24 MP, 50 mm, f/11", 50.0, 11.0, 3.9e-3, (4000, 6000)))
-# Points of the sphere that stands for an opaque target.
-_SURFACE = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,23 @@ def plan_input(settings: PlanSettings) -> PlanInput:
     target = _target(settings, have, notes)
     choices = _choices(settings, notes)
     constraints = _constraints(settings, choices, have)
+    if have is not None and have.space is not None:
+        constraints, target = _in_sight(have, target, constraints, choices)
     return PlanInput(target, constraints, choices, have, tuple(notes))
+
+
+def _in_sight(
+    have: Sampled, target: Target, constraints: Constraints, choices: tuple[CameraChoice, ...]
+) -> tuple[Constraints, Target]:
+    """The constraints, and the sides of the target, without what views show to be in the way."""
+    site = Site(target, constraints, tuple(choice.kind for choice in choices))
+    near, far = site.limits[:, DISTANCE, 0].min(), site.limits[:, DISTANCE, 1].max()
+    shut = hidden_places(have, float(near), float(far))
+    open_sides = surface_of(have, float(math.sqrt(near * far)))
+    target = replace(target, points=open_sides.points, normals=open_sides.normals)
+    if shut is None:
+        return constraints, target
+    return replace(constraints, keepouts=(*constraints.keepouts, shut)), target
 
 
 def _have(settings: PlanSettings, path: Path) -> Sampled:
@@ -76,7 +92,7 @@ def _have(settings: PlanSettings, path: Path) -> Sampled:
         raise InputError(f"--have {path} is no capture, wanted photographs and their cameras")
     asked = AnalyzeSettings(
         source=path, center=_in_units(settings), diameter=_over(settings.diameter, settings.unit),
-        unit=settings.unit,
+        unit=settings.unit, mode="surface" if settings.opaque else "volume", device=settings.device,
     )  # fmt: skip
     asked.check()
     return open_sampled(asked)
@@ -104,11 +120,15 @@ def _target(settings: PlanSettings, have: Sampled | None, notes: list[str]) -> T
             notes.append(f"The target is taken to be {DIAMETER:g} mm across (--diameter).")
     prior = _prior(settings, diameter, notes)
     points, normals = center[None], None
-    if settings.mode == "surface":
-        ways = directions_for(3, _SURFACE // 2)
+    if settings.opaque:
+        ways = directions_for(3, SURFACE // 2)
         normals = np.concatenate([ways, -ways])
         points = center + diameter / 2 * normals
-        notes.append("A sphere stands for the target's surface; nothing of it is in the way.")
+        if have is None:
+            notes.append(
+                "The target is taken to be opaque: a sphere stands for its surface, and nothing "
+                "else is in the way (--mode volume is for what is seen through)."
+            )
     else:
         notes.append(
             "The target is taken to be seen through, so that opposite views tell the same and one "
@@ -119,7 +139,7 @@ def _target(settings: PlanSettings, have: Sampled | None, notes: list[str]) -> T
         diameter=diameter,
         points=points,
         normals=normals,
-        mode=settings.mode,
+        mode="surface" if settings.opaque else "volume",
         prior=prior,
         snr=settings.snr,
         band=settings.band,

@@ -61,8 +61,9 @@ class PlanSettings:
     merit: Literal["wiener", "logdet", "worst"] = "wiener"
     """What to make small: the unknown share of the target's power, minus the bits, or the unknown
     share in the worst direction."""
-    mode: Literal["volume", "surface"] = "volume"
-    """Whether the target is seen through, or opaque: then a sphere's surface stands for it."""
+    mode: Literal["surface", "volume"] | None = None
+    """Whether the target is opaque, so that a sphere's surface stands for it, or seen through as by
+    X-rays, so that opposite views tell the same; opaque, but with --pilot, when not given."""
     budget: float | None = None
     """Most that all views may cost; a view costs 1, or what the camera's file says."""
     snr: float = 1000.0
@@ -78,6 +79,11 @@ class PlanSettings:
     """Replace an earlier plan in the same folder."""
     dry_run: bool = False
     """Say what would be done, and stop."""
+
+    @property
+    def opaque(self) -> bool:
+        """Whether the target is planned for as a surface."""
+        return self.pilot is None if self.mode is None else self.mode == "surface"
 
     def check(self) -> None:
         """Check every number's range.

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Camera, Parallel
 from rift_cl.sampling.coverage import coverage
+from rift_cl.sampling.free_space import FreeSpace
 from rift_cl.sampling.looks import Looks
 from rift_cl.sampling.target import Target
 
@@ -35,6 +36,8 @@ class Sampled:
         weights: (V,) relative photons of the cameras; None where they are all alike.
         facts: what is known of the views, for people, by name.
         notes: what had to be assumed, a sentence each.
+        opaque: whether the target is taken for a surface, and not for what is seen through.
+        space: what stands where, as far as the views show it; None where that is not known.
     """
 
     name: str
@@ -46,6 +49,8 @@ class Sampled:
     weights: Floats | None = None
     facts: Mapping[str, object] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    opaque: bool = False
+    space: FreeSpace | None = None
 
     @property
     def views(self) -> int:

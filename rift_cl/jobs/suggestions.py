@@ -1,4 +1,4 @@
-"""Views to add to those that were taken: where they leave most unknown."""
+"""Views to add to those that were taken: where they leave most unknown, and the target shows."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from rift_cl.geometry import Camera
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.jobs.sampled import Floats, Sampled
+from rift_cl.jobs.surfaces import hidden_places, strange_places, surface_of
 from rift_cl.jobs.views_table import angles_of
 from rift_cl.sampling.planning.constraints import Constraints
 from rift_cl.sampling.planning.planner import next_views
@@ -24,22 +25,41 @@ _COVER = 0.05
 def cameras_to_add(sampled: Sampled, count: int) -> tuple[Camera, ...]:
     """Cameras like those at hand, as far away, between their elevations or 0 to 75 degrees.
 
+    Of an opaque target none stands in or behind what the views show, or where that hides the
+    target; where nothing tells what stands where, none stands far from those at hand.
+
     Raises:
         InputError: no camera fits there.
     """
     center, up = sampled.target.center, sampled.up
     angles = np.array([angles_of(camera, center, up) for camera in sampled.cameras])
     low, high = min(0.0, float(angles[:, 1].min())), max(_HIGH, float(angles[:, 1].max()))
-    distance = float(np.median(angles[:, 2]))
+    distance = usual_distance(sampled)
+    target, closed = sampled.target, None
+    if sampled.opaque:
+        target = surface_of(sampled, distance)
+        known = sampled.space is not None
+        closed = (
+            hidden_places(sampled, distance, distance)
+            if known
+            else strange_places(sampled, distance)
+        )
     constraints = Constraints(
         elevation=(math.radians(low), math.radians(high)),
         distance=distance,
+        keepouts=() if closed is None else (closed,),
         cover=_COVER,
         up=(float(up[0]), float(up[1]), float(up[2])),
     )
     alike = camera_type_of(sampled.cameras[int(np.argsort(angles[:, 2])[len(angles) // 2])])
-    found = next_views(sampled.cameras, sampled.target, count, constraints, (alike,))
+    found = next_views(sampled.cameras, target, count, constraints, (alike,), compare=False)
     return tuple(found.cameras[place] for place in found.order)
+
+
+def usual_distance(sampled: Sampled) -> float:
+    """How far off the target's middle cameras stand, in the median."""
+    away = np.array([camera.center for camera in sampled.cameras]) - sampled.target.center
+    return float(np.median(np.linalg.norm(away, axis=1)))
 
 
 def camera_type_of(camera: Camera) -> CameraType:

@@ -39,7 +39,8 @@ def ringed(tmp_path_factory):
 
 
 def analyze(source, out, *more):
-    return main(["analyze", str(source), "--out", str(out), "--quiet", *map(str, more)])
+    words = ["analyze", str(source), "--out", str(out), "--mode", "volume", "--quiet"]
+    return main([*words, *map(str, more)])
 
 
 def metrics_of(folder):

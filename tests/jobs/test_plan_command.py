@@ -30,7 +30,8 @@ CAMERA = {
 
 
 def plan(out, *more):
-    return main(["plan", "--out", str(out), "--quiet", *map(str, more)])
+    words = ["plan", "--out", str(out), "--mode", "volume", "--quiet"]
+    return main([*words, *map(str, more)])
 
 
 def metrics_of(folder):

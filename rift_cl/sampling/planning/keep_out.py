@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number, real_numbers
+from rift_cl.sampling.planning.out_of_sight import OutOfSight
 
 Floats = NDArray[np.float64]
 # Halvings by the golden section of a line of sight: to a hundred-millionth of its length.
@@ -138,15 +139,17 @@ class KeepOut:
         hides: whether it is a body: the target's centre is not seen through it either.
 
     Raises:
-        InputError: the shape is none of the three.
+        InputError: the shape is none of these, or hides though it is no body.
     """
 
-    shape: Sphere | Box | Cone
+    shape: Sphere | Box | Cone | OutOfSight
     hides: bool = False
 
     def __post_init__(self) -> None:
         """Check the kind of the shape."""
-        if not isinstance(self.shape, Sphere | Box | Cone):
+        if isinstance(self.shape, OutOfSight) and self.hides:
+            raise InputError("KeepOut: OutOfSight has no surface that could hide a target")
+        if not isinstance(self.shape, Sphere | Box | Cone | OutOfSight):
             raise InputError(f"KeepOut: shape is {self.shape!r}, wanted a Sphere, a Box or a Cone")
 
     def clearance(self, places: Floats, center: Floats) -> tuple[Floats, Floats]:

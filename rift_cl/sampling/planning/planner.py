@@ -55,6 +55,7 @@ def plan(
     fixed: Sequence[Camera] | Plan = (),
     seed: int = 0,
     kind: CoverageMerit = "wiener",
+    compare: bool = True,
 ) -> Plan:
     """Choose where to look from.
 
@@ -75,6 +76,8 @@ def plan(
         fixed: views that were taken already; the new ones go where those left most unknown.
         seed: turns the candidates; the same gives the same plan.
         kind: of the merit: ``wiener``, ``logdet`` or ``worst``.
+        compare: whether simple arrangements are tried as well, as starts and to compare with, and
+            a bound is looked for; without, the plan has neither, in a third of the time.
 
     Raises:
         InputError: an argument makes no sense, or no view keeps to the constraints.
@@ -93,10 +96,10 @@ def plan(
     taken, weights = _taken(fixed, site)
     seen = Looks.of(taken, target.points, weights) if taken else None
     objective = Objective(site, kind, seen, target)
-    simple = baselines(objective, int(views), seed)
+    simple = baselines(objective, int(views), seed) if compare else {}
     found, least = _chosen(objective, int(views), method, seed, simple)
     stations = Stations(found.kind, turned(found.table, site))
-    if len(stations) < views:
+    if compare and len(stations) < views:
         simple = baselines(objective, len(stations), seed)
     merit = objective.value(stations)
     return Plan(objective, stations, merit, min(least, merit), taken, weights, simple)
@@ -112,6 +115,7 @@ def next_views(
     method: Method = "greedy+mma",
     seed: int = 0,
     kind: CoverageMerit = "wiener",
+    compare: bool = True,
 ) -> Plan:
     """Choose further views, given those that were taken.
 
@@ -126,6 +130,7 @@ def next_views(
         method: as for ``plan``.
         seed: as for ``plan``.
         kind: as for ``plan``.
+        compare: as for ``plan``.
 
     Raises:
         InputError: nothing was taken, or as for ``plan``.
@@ -136,7 +141,15 @@ def next_views(
         constraints = taken.objective.site.constraints if constraints is None else constraints
         cameras = cameras or taken.objective.site.types
     return plan(
-        target, views, constraints, cameras, method=method, fixed=taken, seed=seed, kind=kind
+        target,
+        views,
+        constraints,
+        cameras,
+        method=method,
+        fixed=taken,
+        seed=seed,
+        kind=kind,
+        compare=compare,
     )
 
 
@@ -167,6 +180,8 @@ def _chosen(
             found = _moved(objective, found, simple)
     else:
         found = best_path(objective, views, moved=method == "greedy+mma")
+    if not simple:
+        return found, -np.inf
     whole = Stations.joined([offered, found])
     limits = Limits(views, prices(site, whole), total(site))
     places = list(range(len(offered), len(whole)))

@@ -1,0 +1,73 @@
+"""Where surfaces stand, for those who place cameras: depth by fitted splats or by sparse points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.discovery import open_device
+from rift_cl.geometry import Camera
+from rift_cl.jobs.camera_path import resized
+from rift_cl.jobs.depth_picture import depth_and_alpha
+from rift_cl.jobs.few import evenly
+from rift_cl.jobs.scene_input import OpenedScene, SceneInput
+from rift_cl.sampling.free_space import DepthMap, FreeSpace, depth_of_points
+from rift_cl.splat.renderer import Renderer
+
+# Pictures that are asked, and the longer edge of their maps.
+_PICTURES, _EDGE = 32, 96
+# Alpha above which splats are something.
+_SOLID = 0.5
+# Fewer sparse points tell nothing of surfaces.
+_POINTS = 64
+_SCENE = "scene.ply"
+
+
+def space_of(
+    source: Path,
+    cameras: Sequence[Camera],
+    points: NDArray[np.float32] | None,
+    device: str | None = None,
+) -> tuple[FreeSpace | None, str]:
+    """What stands where, and where that is known from, for people.
+
+    Args:
+        source: a capture, or the folder of a fit, whose splats tell more than sparse points.
+        cameras: of its photographs.
+        points: sparse points (P, 3), or None.
+        device: that draws the depth of splats.
+
+    Returns:
+        None for the space where neither splats nor points tell.
+
+    Raises:
+        RiftError: the scene of the fit is damaged.
+    """
+    seen = [cameras[place] for place in evenly(len(cameras), _PICTURES)]
+    seen = [camera for camera in seen if camera.model == "pinhole"]
+    if seen and source.is_dir() and (source / _SCENE).is_file():
+        return _of_splats(source, seen, device), "the depth of the fitted splats"
+    if seen and points is not None and len(points) >= _POINTS:
+        maps = [depth_of_points(camera, points) for camera in seen]
+        known = [one for one in maps if one is not None]
+        if known:
+            return FreeSpace(known), "the sparse points"
+    return None, ""
+
+
+def _of_splats(fit: Path, cameras: Sequence[Camera], device: str | None) -> FreeSpace:
+    scene = OpenedScene(SceneInput(fit, device=device))
+    renderer = Renderer(scene.drawing, device=open_device(device))
+    splats = scene.splats.upload(renderer.device)
+    maps = []
+    for camera in cameras:
+        scale = min(1.0, _EDGE / max(camera.size))
+        size = (max(1, round(camera.height * scale)), max(1, round(camera.width * scale)))
+        small = resized(Camera(camera.size, camera.K, camera.view), size)
+        depth, alpha = depth_and_alpha(renderer, splats, small)
+        shown = (alpha > _SOLID) & (depth > 0)
+        maps.append(DepthMap(small, np.where(shown, depth.astype(np.float64), np.inf)))
+    return FreeSpace(maps)
