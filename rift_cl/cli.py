@@ -164,8 +164,9 @@ def _view(settings: Any, output: Output) -> None:
 
 def _export(settings: Any, output: Output) -> None:
     from rift_cl.jobs.export.export import Export
+    from rift_cl.jobs.export.mesh import MeshExport
 
-    job = Export(settings)
+    job = MeshExport(settings) if settings.mesh else Export(settings)
     if not output.quiet:
         job.announce = lambda note: print_line(f"rift: {note}")
     if ran(job, settings, output):

@@ -65,14 +65,12 @@ class OpenedScene:
     def __init__(self, settings: SceneInput) -> None:
         path = settings.scene
         self.folder = path if path.is_dir() else None
-        if self.folder is not None and not (path / _SCENE).is_file():
-            raise InputError(f"{path}: holds no {_SCENE}; name a .ply or .splat file, or a fit")
         self.name: str = path.resolve().name
-        self.splats = SplatScene.load(path if self.folder is None else path / _SCENE)
+        self.splats = SplatScene.load(scene_file(path))
         if self.splats.mode == "xray":
             raise InputError(
                 f"{path}: is an X-ray scene, of densities and not of light; its slices lie with "
-                "its fit"
+                "its fit, and 'rift export --mesh' makes a surface of it"
             )
         if len(self.splats) == 0:
             raise InputError(f"{path}: holds no splats, there is nothing to draw")
@@ -142,6 +140,19 @@ class OpenedScene:
         if not (isinstance(found, list) and len(found) == 3):
             raise FileFormatError(f"{metrics.where}: 'background' is no red, green and blue")
         return np.array(check_color(f"{metrics.where}: 'background'", tuple(found)), np.float32)
+
+
+def scene_file(path: Path) -> Path:
+    """The file of splats itself: the path, or what a fit left in that folder.
+
+    Raises:
+        InputError: it is a folder without one.
+    """
+    if not path.is_dir():
+        return path
+    if not (path / _SCENE).is_file():
+        raise InputError(f"{path}: holds no {_SCENE}; name a .ply or .splat file, or a fit")
+    return path / _SCENE
 
 
 def in_display_light(image: NDArray[np.float32], light: Light) -> NDArray[np.float32]:

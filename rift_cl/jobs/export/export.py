@@ -18,7 +18,7 @@ from rift_cl.jobs.export.axes import turn_between, turned
 from rift_cl.jobs.export.plain_scene import plain_scene
 from rift_cl.jobs.export.settings import ExportSettings
 from rift_cl.jobs.export.web_page import FirstView, web_page
-from rift_cl.jobs.scene_input import in_display_light
+from rift_cl.jobs.scene_input import in_display_light, scene_file
 from rift_cl.progress import Report
 
 _UP = np.array([0.0, 1, 0])
@@ -114,8 +114,7 @@ def output_path(settings: ExportSettings, suffix: str) -> Path:
     if path is None:
         name = settings.scene.resolve().name
         path = Path((name if settings.scene.is_dir() else Path(name).stem) + suffix)
-    here = settings.scene / "scene.ply" if settings.scene.is_dir() else settings.scene
-    if path.exists() and here.exists() and path.samefile(here):
+    if path.exists() and path.samefile(scene_file(settings.scene)):
         raise OutputError(f"{path}: is the scene itself; name another file (--out)")
     if path.exists() and not settings.overwrite:
         raise OutputError(f"{path}: is there already; name another file (--out) or add --overwrite")

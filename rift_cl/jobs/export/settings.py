@@ -24,6 +24,13 @@ class ExportSettings(OrbitInput):
     out: Path | None = None
     """File to write; the scene's name with the format's ending, in the current folder, when not
     given."""
+    mesh: bool = False
+    """X-rays: the surface of one density as triangles, by marching cubes."""
+    level: float | None = None
+    """With --mesh: the density of the surface, per unit of length; that which parts inside and
+    outside best (Otsu's threshold) when not given."""
+    voxels: int = 256
+    """With --mesh: voxels along the longest edge, in which the surface is looked for."""
     overwrite: bool = False
     """Replace a file that is there."""
     dry_run: bool = False
