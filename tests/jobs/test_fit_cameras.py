@@ -31,7 +31,7 @@ def saved(fit, capture, **facts):
     fit.mkdir()
     seen = [view for k, view in enumerate(capture.views) if k % 3]
     unseen = capture.views[::3]
-    write_json(fit / "config.json", {"job": "fit", "photographs": place_record(seen, fit)})
+    write_json(fit / "config.json", {"job": "fit", "photographs": place_record(capture.views, fit)})
     save_fit_cameras(fit, capture, seen, unseen, **facts)
     return open_fit_cameras(fit)
 
@@ -84,13 +84,16 @@ def test_lenses_masks_and_points_come_back(tmp_path):
     colors = (np.arange(21).reshape(7, 3) / 255).astype(np.float32)
     photographs = tmp_path / "there" / "images"
     mask = tmp_path / "there" / "masks" / "one.png"
+    for file in (*(photographs / f"{k}.png" for k in range(6)), mask):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(file.name.encode())
     for number, (model, names) in enumerate(LENS_MODELS.items()):
         lens = Lens(model, tuple(0.01 * k for k in range(1, len(names) + 1)), camera.K)
         views = views_of(photographs, ring(6), lens=lens, mask=mask)
         whole = Capture(views, points, colors, tmp_path, 0.75)
         found = saved(tmp_path / f"fit{number}", whole, photographs=9)
         assert all(view.lens == lens for view in found.views), model
-        assert all(view.mask == mask for view in found.views)
+        assert all(view.mask.resolve() == mask for view in found.views)
         assert found.views[2].image == photographs / "2.png"
         np.testing.assert_array_equal(found.points, points)
         np.testing.assert_allclose(found.reopened.point_colors, colors, atol=1e-7)
@@ -120,8 +123,45 @@ def test_photographs_that_have_moved_are_asked_for_and_named(capture, tmp_path):
     assert len(cameras.views) == 8, "cameras are there without photographs"
     with pytest.raises(InputError, match=r"8 of its 8 photographs have moved.*--photographs"):
         cameras.demand_photographs(tmp_path / "fit")
+    (tmp_path / "there").mkdir()
+    (tmp_path / "new").rename(tmp_path / "there" / "images")
+    (tmp_path / "new").symlink_to(tmp_path / "there" / "images")
+    for place in ("new", "there"):
+        found = open_fit_cameras(tmp_path / "fit", photographs=tmp_path / place)
+        found.demand_photographs(tmp_path / "fit")
     again = open_fit_cameras(tmp_path / "fit", photographs=tmp_path / "new")
     again.demand_photographs(tmp_path / "fit")
+
+
+def test_a_fit_that_somebody_passed_on_leads_to_no_file_of_ours(capture, tmp_path):
+    """The folder in its configuration is believed only if it holds the very photographs."""
+    views = open_capture(capture).views
+    (tmp_path / "private").mkdir()
+    for view in views:
+        shutil.copy(view.image, tmp_path / "private" / view.name)
+    private = views_of(tmp_path / "private", [view.camera for view in views])
+    there = saved(tmp_path / "fit", Capture(private, None, None, tmp_path))
+    assert there.views[0].image == tmp_path / "private" / "0.png"
+    known = {f"{k}.png": (tmp_path / "private" / f"{k}.png").stat().st_size for k in range(7)}
+    for change in ({"bytes": known}, {"bytes": known | {"7.png": 9}}, {"bytes": 3}, {"bytes": {}}):
+        record = json.loads((tmp_path / "fit" / "config.json").read_text())
+        record["photographs"] |= change
+        write_json(tmp_path / "fit" / "config.json", record)
+        cameras = open_fit_cameras(tmp_path / "fit")
+        assert all(v.image.is_relative_to(tmp_path / "fit") for v in cameras.views)
+        with pytest.raises(InputError, match="no longer the same"):
+            cameras.demand_photographs(tmp_path / "fit")
+
+
+def test_photographs_may_be_put_into_the_fit(capture, fitted, tmp_path):
+    shutil.copytree(fitted, tmp_path / "fit")
+    config = json.loads((tmp_path / "fit" / "config.json").read_text())
+    del config["photographs"]
+    write_json(tmp_path / "fit" / "config.json", config)
+    shutil.copytree(capture, tmp_path / "fit" / "photographs")
+    cameras = open_fit_cameras(tmp_path / "fit")
+    cameras.demand_photographs(tmp_path / "fit")
+    assert cameras.views[0].image == tmp_path / "fit" / "photographs" / "0.png"
 
 
 def test_an_older_fit_and_other_folders_have_none(fitted, tmp_path):

@@ -26,7 +26,7 @@ from rift_cl.io.point_cloud import write_point_cloud
 from rift_cl.io.transforms_json import open_transforms
 from rift_cl.io.transforms_record import lens_fields, transforms_of
 from rift_cl.jobs.cameras.arc import Arc, arc_of
-from rift_cl.jobs.cameras.photograph_place import kept_place, moved_place, start_of
+from rift_cl.jobs.cameras.photograph_place import are_those, kept_places, moved_place, start_of
 from rift_cl.jobs.few import evenly
 from rift_cl.jobs.scene_bounds import bounds_of_cameras
 
@@ -82,9 +82,8 @@ class FitCameras:
         missing = [view for view in self.views if not view.image.is_file()]
         if missing:
             raise InputError(
-                f"{fit}: {len(missing)} of its {len(self.views)} photographs have moved, "
-                f"{missing[0].name!r} is not in {start_of(missing[0])}: name their folder "
-                "(--photographs)"
+                f"{fit}: {len(missing)} of its {len(self.views)} photographs have moved or are no "
+                f"longer the same, such as {missing[0].name!r}: name their folder (--photographs)"
             )
 
 
@@ -162,10 +161,23 @@ def open_fit_cameras(fit: Path, *, photographs: Path | None = None) -> FitCamera
     facts = record.values.get("capture")
     if kept.text("job") != "fit" or not isinstance(facts, dict):
         return None
-    place = kept_place(kept, fit) if photographs is None else moved_place(photographs)
-    capture = open_transforms(file.absolute(), photographs=False, images=place)
-    splits = [frame.text("split") for frame in record.objects("frames")]
+    frames = list(record.objects("frames"))
+    splits = [frame.text("split") for frame in frames]
+    if photographs is None:
+        capture = _found_again(file, kept, fit)
+    else:
+        place = moved_place(photographs, frames[0].text("file_path") or "" if frames else "")
+        capture = open_transforms(file.absolute(), photographs=False, images=place)
     return _cameras_of(capture, splits, Fields(f"{file}: capture", facts))
+
+
+def _found_again(file: Path, config: Fields, fit: Path) -> Capture:
+    """The views with their photographs where those are; beside the fit if they are nowhere."""
+    for place in kept_places(config, fit):
+        capture = open_transforms(file.absolute(), photographs=False, images=place)
+        if are_those(capture.views, config):
+            break
+    return capture
 
 
 def _cameras_of(capture: Capture, splits: Sequence[str | None], facts: Fields) -> FitCameras:
