@@ -14,11 +14,11 @@ from rift_cl.errors import InputError
 from rift_cl.io.capture import View, camera_at, capture_name
 from rift_cl.jobs.cameras.fit_cameras import FitCameras, open_fit_cameras
 from rift_cl.jobs.evaluate_report import eval_page
-from rift_cl.jobs.fit import open_seen, split_views
 from rift_cl.jobs.fit_pictures import CapturePictures
 from rift_cl.jobs.fit_scores import ViewScore, score_record, score_views
 from rift_cl.jobs.run_folder import RunFolder
 from rift_cl.jobs.scene_input import SceneInput
+from rift_cl.jobs.seen_views import open_seen, split_views
 from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
 

@@ -4,24 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from pathlib import Path
-from typing import TypeVar
-
-import numpy as np
 
 from rift_cl.errors import InputError
 from rift_cl.io.capture import (
     Capture,
     View,
-    as_pinholes,
     camera_at,
     capture_name,
-    open_capture,
 )
 from rift_cl.io.splat_scene import SplatScene
 from rift_cl.jobs.bare_input import BareInput
 from rift_cl.jobs.cameras.arc import demand_places
-from rift_cl.jobs.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras
+from rift_cl.jobs.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras, with_poses
 from rift_cl.jobs.cameras.photograph_place import place_record
 from rift_cl.jobs.few import evenly
 from rift_cl.jobs.fit_pictures import CapturePictures
@@ -31,6 +25,7 @@ from rift_cl.jobs.fit_scores import score_record, score_views
 from rift_cl.jobs.fit_settings import FitSettings
 from rift_cl.jobs.fit_start import first_splats
 from rift_cl.jobs.photograph_size import fitting_downscale, size_words
+from rift_cl.jobs.seen_views import open_seen, split_views
 from rift_cl.progress import Report
 from rift_cl.splat.bands import FrameMemory
 from rift_cl.splat.orders import ModeOrders
@@ -39,8 +34,6 @@ from rift_cl.train.trainer import Trainer
 
 # Photographs from which the noise is estimated.
 _NOISE_VIEWS = 8
-
-One = TypeVar("One")
 
 
 class Fit(FitRun):
@@ -139,6 +132,10 @@ class Fit(FitRun):
         trainer = self._trainer(capture, pictures)
         yield from self._read_ahead(trainer, pictures)
         yield from self._trained(trainer, pictures)
+        if trainer.poses is not None:
+            found = [trainer.poses.camera(number) for number in range(len(self.seen))]
+            self.seen = with_poses(self.seen, found)
+            self._keep_cameras(capture)
         splats = trainer.parameters.drawn
         drawn = trainer.renderer.settings
         SplatScene.of(splats, self.device, activation=drawn.activation, angular=drawn.angular).save(
@@ -237,34 +234,3 @@ class Fit(FitRun):
         """The pictures that are scored, by the name of their group."""
         groups = {"held out": self.unseen} if self.unseen else {}
         return groups | {name: capture.views for name, capture in self.tests.items()}
-
-
-def open_seen(path: Path, *, pinhole: bool) -> Capture:
-    """A capture, through lenses that it names or, if ``pinhole``, as if none had an opening."""
-    capture = open_capture(path)
-    return as_pinholes(capture) if pinhole else capture
-
-
-def split_views(
-    views: tuple[One, ...], hold_out: int, count: int, *, what: str = "photograph"
-) -> tuple[tuple[One, ...], tuple[One, ...]]:
-    """The views to train on, and those that are held out: every ``hold_out``-th.
-
-    Args:
-        views: all of them, in the capture's order.
-        hold_out: 0 for none.
-        count: train on so many, evenly spaced among the rest; 0 for all.
-        what: what a view is called.
-
-    Raises:
-        InputError: nothing is left to train on, or there are fewer than ``count``.
-    """
-    seen = tuple(v for k, v in enumerate(views) if not hold_out or k % hold_out)
-    unseen = tuple(v for k, v in enumerate(views) if hold_out and k % hold_out == 0)
-    if not seen:
-        raise InputError(f"--hold-out {hold_out} leaves no {what} to train on")
-    if count > len(seen):
-        raise InputError(f"--views is {count}, there are {len(seen)} {what}s to train on")
-    if count:
-        seen = tuple(seen[int(k)] for k in np.arange(count) * len(seen) / count)
-    return seen, unseen

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from rift_cl.io.splat_scene import XrayScene
 from rift_cl.io.volumes import VOLUME_NAMES, open_volume
 from rift_cl.jobs.few import evenly
-from rift_cl.jobs.fit import split_views
 from rift_cl.jobs.fit_run import FitRun
 from rift_cl.jobs.fit_scores import score_record
 from rift_cl.jobs.fit_settings import FitSettings
+from rift_cl.jobs.seen_views import split_views
 from rift_cl.jobs.xray_input import Projections, XrayInput, XrayPictures
 from rift_cl.jobs.xray_report import xray_page
 from rift_cl.jobs.xray_scores import backprojected, drawn, relative_error, score_projections

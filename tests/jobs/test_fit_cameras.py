@@ -59,6 +59,17 @@ def test_the_cameras_of_a_fit_are_those_of_its_capture(capture, fitted):
     assert cameras.arc.closed and cameras.reprojection_error is None
 
 
+def test_refined_poses_are_those_that_are_kept(capture, fitted, tmp_path):
+    words = ["--steps", "20", "--splats", "50", "--hold-out", "4", "--quiet", "--refine-poses"]
+    assert main(["fit", str(capture), "--out", str(tmp_path / "fit"), *words]) == 0
+    plain, refined = (open_fit_cameras(fit) for fit in (fitted, tmp_path / "fit"))
+    for old, new in zip(plain.seen, refined.seen, strict=True):
+        moved = np.abs(new.camera.view - old.camera.view).max()
+        assert 1e-6 < moved < 0.2 and np.array_equal(new.camera.K, old.camera.K)
+    for old, new in zip(plain.unseen, refined.unseen, strict=True):
+        np.testing.assert_array_equal(old.camera.view, new.camera.view)
+
+
 def test_viewers_of_splats_find_the_cameras_as_they_know_them(fitted):
     """INRIA's viewer makes world-to-camera of place and rotation: the same as ours."""
     entries = json.loads((fitted / "cameras.json").read_text())

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os.path
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, InputError
+from rift_cl.geometry import Camera
 from rift_cl.io.capture import Capture, View
 from rift_cl.io.inria_cameras import inria_cameras
 from rift_cl.io.json_fields import Fields, read_json_object
@@ -100,7 +101,7 @@ def save_fit_cameras(
     Args:
         fit: the folder of the fit.
         capture: all that was opened.
-        seen: its views that are trained on.
+        seen: its views that are trained on, with poses as they were refined.
         unseen: those that are held out.
         photographs: how many there are, with those that have no pose; as many as views if not
             given.
@@ -109,7 +110,8 @@ def save_fit_cameras(
         OutputError: a file cannot be written.
     """
     splits = {view.name: _SEEN for view in seen} | {view.name: _UNSEEN for view in unseen}
-    views = [view for view in capture.views if view.name in splits]
+    kept = {view.name: view for view in (*seen, *unseen)}
+    views = [kept[view.name] for view in capture.views if view.name in kept]
     cameras = [view.camera for view in views]
     bounds = bounds_of_cameras(cameras, points=capture.points)
     fields = [{"split": splits[view.name], **_files(view)} for view in views]
@@ -132,6 +134,16 @@ def save_fit_cameras(
     }
     write_json(fit / _CAMERAS, inria_cameras(views))
     write_json(fit / _TRANSFORMS, record)
+
+
+def with_poses(views: Sequence[View], cameras: Sequence[Camera]) -> tuple[View, ...]:
+    """The same views with the poses of other cameras, one for each."""
+    moved = []
+    for view, other in zip(views, cameras, strict=True):
+        own = view.camera
+        camera = Camera(own.size, own.K, other.view, own.model, own.aperture)
+        moved.append(replace(view, camera=camera))
+    return tuple(moved)
 
 
 def _files(view: View) -> dict[str, Any]:
