@@ -19,7 +19,6 @@ from typing import Any, Literal
 
 import numpy as np
 import tyro
-from numpy.typing import NDArray
 
 from one_sided.cameras import walk
 from one_sided.scene import SCENES, SUBJECT
@@ -29,7 +28,7 @@ from ornament.command import run
 from ornament.tracer import Tracer, choose_variant
 from rift_cl.errors import InputError
 from rift_cl.io import read_image
-from rift_cl.io.output import atomic_path
+from rift_cl.io.point_cloud import write_point_cloud
 from rift_cl.progress_bar import print_line, show_progress
 
 _POINTS = "points.ply"
@@ -51,7 +50,7 @@ class Settings:
     """Width and height in pixels."""
     field: float = 45.0
     """Horizontal field of view in degrees."""
-    points: int = 800
+    points: int = 2400
     """Sparse points, about so many."""
     format: Literal["png", "jpg"] = "png"
     """Of the pictures; JPEG (quality 85) is smaller, and what cameras give."""
@@ -129,24 +128,13 @@ def write_points(out: Path, record: dict[str, Any], share: float, places: Any) -
         share: points for each picture.
         places: gives what frame ``number`` sees as (height, width, 3) places.
     """
-    random, rows = np.random.default_rng((record["scene_seed"], 0x901)), []
+    random, points, colors = np.random.default_rng((record["scene_seed"], 0x901)), [], []
     for number, frame in enumerate(record["frames"]):
-        picture = np.rint(255 * read_image(out / frame["file_path"])).astype(int)
         seen = places(number).reshape(-1, 3)
         pixels = random.choice(len(seen), max(1, round(share)), replace=False)
-        rows += _rows(seen[pixels], picture.reshape(-1, 3)[pixels])
-    names = [*(f"property float {axis}" for axis in "xyz")]
-    names += [f"property uchar {color}" for color in ("red", "green", "blue")]
-    header = ["ply", "format ascii 1.0", f"element vertex {len(rows)}", *names, "end_header"]
-    with atomic_path(out / _POINTS) as part:
-        part.write_text("\n".join([*header, *rows]) + "\n", encoding="ascii")
-
-
-def _rows(places: NDArray[np.float32], colors: NDArray[np.int_]) -> list[str]:
-    return [
-        "{:.4f} {:.4f} {:.4f} {} {} {}".format(*place, *color)
-        for place, color in zip(places, colors, strict=True)
-    ]
+        points.append(seen[pixels])
+        colors.append(read_image(out / frame["file_path"]).reshape(-1, 3)[pixels])
+    write_point_cloud(out / _POINTS, np.concatenate(points), np.concatenate(colors))
 
 
 if __name__ == "__main__":

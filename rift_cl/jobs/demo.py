@@ -20,6 +20,8 @@ from rift_cl.io.image import write_png
 from rift_cl.jobs.fit import Fit
 from rift_cl.jobs.fit_report import show_fit
 from rift_cl.jobs.fit_settings import FitSettings
+from rift_cl.jobs.render import Render
+from rift_cl.jobs.render_settings import RenderSettings
 from rift_cl.jobs.run_folder import RunFolder
 from rift_cl.jobs.view_study import ViewScore, view_study
 from rift_cl.plot import WIDE, curves, figure_svg, figure_svgs, image_grid
@@ -41,6 +43,8 @@ FITS = {
         "it. Every eighth view is held out"
     ),
 }
+# The film of the wall.
+FILM, _FRAMES = "film", 48
 SCORES = ("psnr_unfiltered", "ssim_unfiltered", "psnr_filtered", "ssim_filtered")
 
 SCORING = (
@@ -57,8 +61,8 @@ class DemoSettings:
     """
 
     out: Path = Path("rift-demo")
-    """Folder for the pictures, report.html, config.json, metrics.json and the fits in ornament/ and
-    wall/."""
+    """Folder for the pictures, report.html, config.json, metrics.json, the fits in ornament/ and
+    wall/, and a film of the wall in film/."""
     size: int = 512
     """Samples along each side of the slice."""
     views: tuple[int, ...] = (2, 12, 24, 95, 512)
@@ -90,6 +94,7 @@ class DemoJob:
         # Whatever else is there under a fit's name is not lost either.
         for name in FITS:
             RunFolder(settings.out / name, "fit", overwrite=True)
+        RunFolder(settings.out / FILM, "render", overwrite=True)
         self.fits = {name: Fit(self._fit_settings(name)) for name in FITS if settings.steps}
         self.rows: list[tuple[float, ...]] = []
 
@@ -106,6 +111,16 @@ class DemoJob:
             overwrite=True,
         )
 
+    def _film_settings(self) -> RenderSettings:
+        settings = self.settings
+        return RenderSettings(
+            scene=settings.out / "wall",
+            out=settings.out / FILM,
+            frames=_FRAMES,
+            device=settings.device,
+            overwrite=True,
+        )
+
     def run(self) -> Iterator[Report]:
         """Do it; a report after every number of views, and those of the fit."""
         counts = self.settings.views
@@ -115,7 +130,7 @@ class DemoJob:
             self.rows.append(study_row(score))
             yield Report(len(scores), len(counts), "view counts")
         self.folder.make()
-        self.folder.drop("filtered_*.png", "unfiltered_*.png", *FITS)
+        self.folder.drop("filtered_*.png", "unfiltered_*.png", *FITS, FILM)
         for score in scores:
             for name in ("unfiltered", "filtered"):
                 write_png(self.settings.out / f"{name}_{score.views}.png", getattr(score, name))
@@ -126,6 +141,10 @@ class DemoJob:
             yield from fit.run()
             metrics.setdefault("fits", {})[name] = fit.metrics
             _show_regression(page, name, fit)
+        if self.fits:
+            film = Render(self._film_settings())
+            yield from film.run()
+            _show_film(page, film)
         self.folder.finish(self.settings, metrics, page, self.device)
 
 
@@ -153,6 +172,17 @@ def _show_regression(page: Page, name: str, fit: Fit) -> None:
         f"'rift view' shows the splats, which are in the folder {name}."
     )
     show_fit(page, fit.scores, fit.losses, fit.metrics)
+
+
+def _show_film(page: Page, film: Render) -> None:
+    page.section("A film of the wall")
+    if film.moving is not None:
+        page.figure(
+            film.moving,
+            caption="There and back along the way of the photographs, and nowhere else: what "
+            f"nobody saw is unknown. The film and its frames are in the folder {FILM}.",
+            alt="The wall, seen by a camera that goes to and fro before it",
+        )
 
 
 def study_row(score: ViewScore) -> tuple[float, ...]:

@@ -68,6 +68,8 @@ class Render:
         self.device = open_device(settings.device)
         self.folder = RunFolder(settings.out, "render", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
+        # A small copy of the film, for reports; None where nothing moves, or before it was drawn.
+        self.moving: bytes | None = None
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -213,6 +215,6 @@ class Render:
         rate = self.settings.rate
         if self._kind == "apng":
             write_bytes(folder / str(self.film), sheet.moving(rate))
-        moving = None if self._kind is None else sheet.embedded(rate)
-        page = render_page(self.scene.name, contact, moving, self.metrics)
+        self.moving = None if self._kind is None else sheet.embedded(rate)
+        page = render_page(self.scene.name, contact, self.moving, self.metrics)
         self.folder.finish(self.settings, self.metrics, page, self.device)

@@ -55,6 +55,7 @@ def test_demo_fits_the_sample_and_shows_both_ways(tmp_path, capsys):
     assert page.count('class="pair"') == 9
     assert main([*arguments, *NO_FIT]) == 0
     assert not (out / "ornament").exists() and not (out / "wall").exists()
+    assert not (out / "film").exists()
 
 
 def test_demo_keeps_what_else_lies_under_the_fits_name(tmp_path, capsys):
