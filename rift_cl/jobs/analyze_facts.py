@@ -22,6 +22,8 @@ _ONE = (
     "One view samples a single slice: it tells nothing of where along its line of sight anything "
     "lies, and no angle between views can be given."
 )
+# Degrees between the views that lie farthest apart, up to which they stand at one place.
+_ONE_PLACE = 2.0
 # So much finer than pixels, a limit is none: what is in focus to rounding.
 _ENDLESS = 1e6
 _KEYS = (*(cause.replace(" ", "_") for cause in CAUSES), "reached")
@@ -66,7 +68,7 @@ def missing(sampled: Sampled) -> Findings:
         "orlov": found[max(found)].satisfied,
         "tuy": None,
     }  # fmt: skip
-    sentences = [_hole(found[_DETAIL])]
+    sentences = [_hole(found[_DETAIL]), *one_place(sampled)]
     if len(looks.weight) == 1:
         sentences.append(_ONE)
     if not sampled.is_flat and all(camera.model != "ortho" for camera in sampled.cameras):
@@ -74,6 +76,29 @@ def missing(sampled: Sampled) -> Findings:
         figures["tuy"] = {"unmet": planes.unmet, "tolerance": planes.tolerance}
         sentences.append(_planes(planes.unmet, f"{planes.tolerance:.3g} {sampled.units}"))
     return Findings(figures, (_holes(found, sampled.unit),), tuple(sentences))
+
+
+def one_place(sampled: Sampled) -> tuple[str, ...]:
+    """A sentence if several views look from one and the same side; none otherwise."""
+    ways = sampled.directions()
+    if len(ways) < 2:
+        return ()
+    # Opposite views of what is seen through tell the same.
+    near = ways @ ways.T if sampled.opaque else np.abs(ways @ ways.T)
+    apart = math.degrees(math.acos(min(1.0, float(near.min()))))
+    if apart > _ONE_PLACE:
+        return ()
+    return (
+        f"All {len(ways)} views that see the target look from one place, {apart:.2g} degrees apart "
+        "at the most: they tell no more of it than one view does, and nothing of its depth.",
+    )
+
+
+def _told_by(frequency: float, sampled: Sampled) -> str:
+    """What a set's slices tell in nine tenths of all directions, if that is less than the whole."""
+    if frequency * sampled.target.diameter < 1:
+        return ", and leave more than a tenth of all directions without any detail"
+    return f", and tell {1 / frequency:.3g} {sampled.units}"
 
 
 def _holes(found: dict[int, Orlov], unit: str) -> Table:
@@ -139,19 +164,34 @@ def resolution(sampled: Sampled, names: tuple[str, ...]) -> Findings:
     heads = ("point", *CAUSES, "all together", "limited by")
     caption = (
         f"One cycle of the finest detail, in {units}: by each cause alone (of cameras, the middle "
-        "one), and by all together in nine tenths of all directions. A dash is no limit."
+        "one), and by all together in nine tenths of all directions. A dash is no limit; none is no "
+        "detail, since a cycle is longer than the target."
     )
     needed = crowther_views(target.diameter, 1 / target.highest)
     sentences = (
-        f"The {found.cause[0]} limits detail at the {names[0]}, to a cycle of "
-        f"{1 / found.reached[0]:.3g} {units}: {WHY[found.cause[0]]}.",
+        _ended(found, names[0], sampled),
         f"By Crowther's count {needed} views evenly round a circle tell detail of "
         f"{1 / target.highest:.3g} {units} a cycle; {count.views} of these see the target's "
-        f"middle, and tell {1 / count.frequency:.3g} {units}.",
+        f"middle{_told_by(count.frequency, sampled)}.",
     )
     reached = {"needed": needed, "wanted": target.highest, "frequency": count.frequency}
     record = {"limits": points, "crowther": {"views": count.views, **reached}}
     return Findings(record, ((heads, rows, caption),), sentences)
+
+
+def _ended(found: Limits, name: str, sampled: Sampled) -> str:
+    """What ends detail at the first point; within the directions seen, where many are not."""
+    units, cause = sampled.units, found.cause[0]
+    if found.reached[0] * sampled.target.diameter >= 1 or not found.within[0]:
+        return (
+            f"The {cause} limits detail at the {name}, to a cycle of {1 / found.reached[0]:.3g} "
+            f"{units}: {WHY[cause]}."
+        )
+    return (
+        f"{found.unseen[0]:.0%} of all directions of detail are not seen at the {name}: "
+        f"{WHY['number of views']}. Within those that are seen, detail ends at a cycle of "
+        f"{1 / found.within[0]:.3g} {units} in the median."
+    )
 
 
 def _ends(found: Limits, p: int, name: str) -> dict[str, Any]:
@@ -161,11 +201,19 @@ def _ends(found: Limits, p: int, name: str) -> dict[str, Any]:
         float(np.median(end[seen, p])) for end in (found.pixel, found.diffraction, found.focus)
     ]
     ends = (*parts, float(found.number[p]), float(found.reached[p]))
-    return {"point": name, **dict(zip(_KEYS, ends, strict=True)), "limited_by": found.cause[p]}
+    return {
+        "point": name,
+        **dict(zip(_KEYS, ends, strict=True)),
+        "limited_by": found.cause[p],
+        "unseen": float(found.unseen[p]),
+        "within_seen": float(found.within[p]),
+    }
 
 
 def length_in_words(frequency: float, sampled: Sampled) -> str:
-    """One cycle at which detail ends, a dash where it does not."""
+    """One cycle at which detail ends; a dash where it does not, none where nothing is told."""
+    if frequency * sampled.target.diameter < 1:
+        return "none"
     return f"{1 / frequency:.3g}" if frequency < _ENDLESS * sampled.finest else "–"
 
 

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from rift_cl.jobs.analyze_facts import WHY, Findings, length_in_words
+from rift_cl.jobs.analyze_facts import WHY, Findings, length_in_words, one_place
 from rift_cl.jobs.sampled import Sampled
 from rift_cl.jobs.surfaces import SQUARE, sides_of
 from rift_cl.sampling.surface_limits import SurfaceLimits, surface_limits
 
-# A side that looks away from all pictures by more is worth a word.
 _KEYS = ("pixel", "diffraction", "depth_of_field", "reached")
 _HEADS = ("point", "pixel", "diffraction", "depth of field", "all together", "limited by")
 
@@ -45,7 +44,7 @@ def surface_missing(sampled: Sampled, distance: float) -> Findings:
             f"A further {sides.shut:.1%} of all sides cannot be looked at, since something stands "
             "before them; they are not counted."
         )
-    return Findings(figures, (), tuple(sentences))
+    return Findings(figures, (), (*sentences, *one_place(sampled)))
 
 
 def surface_resolution(sampled: Sampled, names: tuple[str, ...]) -> Findings:

@@ -23,6 +23,7 @@ from rift_cl.sampling.planning.frequency_sets import for_planning
 from rift_cl.sampling.planning.planner import plan
 from rift_cl.sampling.planning.site import Site
 from rift_cl.sampling.planning.view_plan import Plan
+from rift_cl.sampling.planning.wrong_prior import WrongPrior, if_wrong
 
 _STEPS = 4
 
@@ -47,6 +48,7 @@ class Planning:
         self.folder = RunFolder(settings.out, "plan", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
         self.verdict = ""
+        self.wrong: tuple[WrongPrior, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -95,7 +97,8 @@ class Planning:
             kind=settings.merit,
         )
         yield Report(1, _STEPS, "steps", {"merit": found.elsewhere})
-        self.verdict = found.verdict()
+        self.wrong = if_wrong(found)
+        self.verdict = " ".join([found.verdict(), *(entry.sentence for entry in self.wrong)])
         knee = found.knee()
         yield Report(2, _STEPS, "steps", {"merit": found.elsewhere})
         sampled = self._sampled(found)
@@ -131,6 +134,7 @@ class Planning:
             "cost": found.cost,
             "baselines": {name: entry.elsewhere for name, entry in found.baselines.items()},
             "verdict": self.verdict,
+            "if_prior_is_wrong": [entry._asdict() for entry in self.wrong],
             "knee": knee.views,
             "merits": knee.merits,
             "target": {"center": given.target.center, "diameter": given.target.diameter},

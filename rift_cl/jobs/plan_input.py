@@ -20,6 +20,7 @@ from rift_cl.jobs.keep_out_words import keep_out_of
 from rift_cl.jobs.plan_settings import PlanSettings
 from rift_cl.jobs.sampled import Floats, Sampled
 from rift_cl.jobs.surfaces import SURFACE, hidden_places, surface_of
+from rift_cl.sampling.directional_prior import Trusted
 from rift_cl.sampling.pilot import Pilot
 from rift_cl.sampling.planning.constraints import Budget, Constraints, Ranges
 from rift_cl.sampling.planning.paths import Free, Ring, Spline, TiltedRings
@@ -127,7 +128,7 @@ def _target(settings: PlanSettings, have: Sampled | None, notes: list[str]) -> T
         if have is None:
             notes.append(
                 "The target is taken to be opaque: a sphere stands for its surface, and nothing "
-                "else is in the way (--mode volume is for what is seen through)."
+                "else is in the way (--mode volume is for X-rays)."
             )
     else:
         notes.append(
@@ -160,7 +161,10 @@ def _prior(settings: PlanSettings, diameter: float, notes: list[str]) -> Prior:
             f"Samples of the pilot are taken to lie {spacing:.4g} mm apart, so that the target "
             "fills it (--pilot-spacing)."
         )
-    return Pilot(volume, spacing)
+    pilot = Pilot(volume, spacing)
+    if settings.prior_trust == 1 and settings.prior_blur == 0:
+        return pilot
+    return Trusted(pilot, settings.prior_trust, math.radians(settings.prior_blur), pilot.axes)
 
 
 def _choices(settings: PlanSettings, notes: list[str]) -> tuple[CameraChoice, ...]:

@@ -58,6 +58,11 @@ class PlanSettings:
     one that falls as 1/k^2 when not given."""
     pilot_spacing: float | None = None
     """Millimetres between samples of --pilot; such that the target fills it when not given."""
+    prior_trust: float = 1.0
+    """Share of --pilot's spectrum that is believed, 0 to 1; the rest is taken to be the same in all
+    directions. 0.8 costs little where the pilot is right, and saves much where it is wrong."""
+    prior_blur: float = 0.0
+    """Degrees by which directions of --pilot's spectrum may be wrong; it is blurred by as much."""
     merit: Literal["wiener", "logdet", "worst"] = "wiener"
     """What to make small: the unknown share of the target's power, minus the bits, or the unknown
     share in the worst direction."""
@@ -118,6 +123,15 @@ class PlanSettings:
             raise InputError(f"--seed is {self.seed}, wanted 0 or more")
         if self.unit != 1 and self.have is None:
             raise InputError("--unit is about the world of --have: name a capture")
+        self._check_pilot()
+
+    def _check_pilot(self) -> None:
+        if not 0 <= self.prior_trust <= 1:
+            raise InputError(f"--prior-trust is {self.prior_trust:g}, wanted 0 to 1")
+        if not 0 <= self.prior_blur <= 90:
+            raise InputError(f"--prior-blur is {self.prior_blur:g}, wanted 0 to 90 degrees")
+        if self.pilot is None and (self.prior_trust != 1 or self.prior_blur != 0):
+            raise InputError("--prior-trust and --prior-blur are about --pilot: name a volume")
         if self.pilot_spacing is not None and self.pilot is None:
             raise InputError("--pilot-spacing is about --pilot: name a volume")
 

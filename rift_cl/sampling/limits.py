@@ -34,6 +34,8 @@ UNSEEN = "field of view"
 _CONTRAST, _DIFFRACTION, _DEFOCUS = 0.1, 0.80538, 1.08854
 # Steps in which the end is looked for, and the share of directions that a set must tell.
 _STEPS, _MOST = 256, 0.9
+# A direction is seen if it is told up to so many cycles per diameter.
+_SEEN = 8.0
 # A direction that lies in a slice to rounding.
 _LEAST = 1e-9
 
@@ -51,6 +53,8 @@ class Limits:
         first: (V, P) which of ``CAUSES`` ends the camera, -1 where nothing does.
         number: (P,) the set's, if its cameras were perfect.
         reached: (P,) the set's as it is; 0 where no camera sees the point.
+        unseen: (P,) share of directions that no view tells up to eight cycles per diameter.
+        within: (P,) what half of the other directions reach; 0 where there are none.
         cause: (P,) what ends it, one of ``CAUSES``, or ``UNSEEN``.
     """
 
@@ -61,6 +65,8 @@ class Limits:
     first: NDArray[np.intp]
     number: Floats
     reached: Floats
+    unseen: Floats
+    within: Floats
     cause: tuple[str, ...]
 
     @property
@@ -114,15 +120,18 @@ def limits(views: Views, target: Target, *, weights: ArrayLike | None = None) ->
     pixel, diffraction, focus = (np.where(seen, part, 0) for part in parts)
     camera = np.where(seen, _end(looks, np.min(parts, axis=0)), 0)
     first = np.where(seen & np.isfinite(camera), _first(looks, camera, parts[0]), -1)
-    told = [
+    perfect, told = (
         [_told(looks, target, p, ends[:, p]) for p in range(looks.points)]
         for ends in (np.where(seen, np.inf, 0), camera)
-    ]
-    number, reached = np.array(told)
+    )
+    number, reached = (np.array([_most(one) for one in found]) for found in (perfect, told))
+    held = [one[one >= _SEEN / target.diameter] for one in told]
+    unseen = np.array([1 - len(part) / len(one) for part, one in zip(held, told, strict=True)])
+    within = np.array([float(np.median(part)) if len(part) else 0.0 for part in held])
     cause = tuple(
         _cause(number[p], camera[seen[:, p], p], first[seen[:, p], p]) for p in range(looks.points)
     )
-    return Limits(pixel, diffraction, focus, camera, first, number, reached, cause)
+    return Limits(pixel, diffraction, focus, camera, first, number, reached, unseen, within, cause)
 
 
 def _focus(looks: Looks) -> Floats:
@@ -176,11 +185,16 @@ def _end(looks: Looks, first: Floats) -> Floats:
     return ends
 
 
-def _told(looks: Looks, target: Target, point: int, ends: Floats) -> float:
-    """The frequency that most directions are told up to, if the cameras' detail ends there."""
+def _most(told: Floats) -> float:
+    """The frequency that most directions are told up to."""
+    return float(np.quantile(told, 1 - _MOST))
+
+
+def _told(looks: Looks, target: Target, point: int, ends: Floats) -> Floats:
+    """(K,) the frequency that each direction is told up to, if the cameras' detail ends there."""
     units, directions = frequency_directions(target), looks.direction[:, point]
     best = np.empty(len(units))
     for part in runs(len(units), len(directions)):
         gaps = np.maximum(np.abs(units[part] @ directions.T), _LEAST)
         best[part] = np.minimum(0.5 / (target.diameter * gaps), ends).max(1)
-    return float(np.quantile(best, 1 - _MOST))
+    return best

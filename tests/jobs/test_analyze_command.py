@@ -204,3 +204,16 @@ def test_what_is_no_capture_and_no_scan_is_named(scan, tmp_path, capsys):
     assert analyze(scan.integrals, tmp_path / "out", "--aperture", 1) == 3
     assert "--aperture is about the cameras" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_of_a_narrow_wedge_the_detail_within_it_is_said_and_the_share_outside(scan):
+    sampled = open_sampled(AnalyzeSettings(scan.integrals, theta="0:30"))
+    found = resolution(sampled, ("middle", "b", "c"))
+    first = found.figures["limits"][0]
+    # Slices at 8 cycles per diameter reach asin(1 / 16) beyond the wedge, to either side.
+    seen = 30 * 149 / 150 + 2 * math.degrees(math.asin(1 / 16))
+    assert first["unseen"] == pytest.approx(1 - seen / 180, abs=0.005)
+    assert 1 / first["within_seen"] < 0.1 * sampled.target.diameter
+    assert 1 / first["reached"] > sampled.target.diameter
+    words = " ".join(found.sentences)
+    assert "Within those that are seen" in words and f"{1 / first['reached']:.3g}" not in words

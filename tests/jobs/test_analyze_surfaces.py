@@ -17,6 +17,7 @@ from rift_cl.io.output import write_json
 from rift_cl.io.point_cloud import write_point_cloud
 from rift_cl.io.splat_scene import SplatScene
 from rift_cl.io.transforms_record import transforms_of
+from rift_cl.jobs.analyze_facts import one_place
 from rift_cl.jobs.analyze_input import open_sampled
 from rift_cl.jobs.analyze_settings import AnalyzeSettings
 from rift_cl.jobs.plan_input import plan_input
@@ -158,3 +159,13 @@ def test_two_views_far_apart_tell_more_of_depth_than_two_side_by_side(tmp_path):
     words = ["analyze", str(folder), "--out", str(out), "--add", "0", "--quiet"]
     assert main([*words, "--center", "0", "0", "0", "--diameter", "1"]) == 0
     assert "nothing tells its depth" in (out / "report.html").read_text()
+
+
+@pytest.mark.parametrize("mode", ["surface", "volume"])
+def test_views_at_one_place_are_called_so(tmp_path, mode):
+    for name, cameras in (("one", arc(8, 0.5)), ("several", arc(8, 10))):
+        folder = capture(tmp_path / name, cameras)
+        sampled = open_sampled(
+            AnalyzeSettings(folder, mode=mode, center=(0.0, 0.0, 0.0), diameter=1.0)
+        )
+        assert ("one place" in " ".join(one_place(sampled))) == (name == "one")
