@@ -115,6 +115,15 @@ def test_the_crop_box_hides_what_is_outside():
     assert cropped(splats, None, device) is splats
 
 
+def test_a_box_has_twelve_edges_each_along_one_axis():
+    low, high = np.array([-1, -2, -3.0]), np.array([1, 2, 0.5])
+    edges = Crop(tuple(low), tuple(high)).edges()
+    lengths = np.abs(edges[:, 1] - edges[:, 0])
+    assert edges.shape == (12, 2, 3) and (np.count_nonzero(lengths, axis=1) == 1).all()
+    np.testing.assert_allclose(lengths.sum(axis=0), 4 * (high - low))
+    assert len({edge.tobytes() for edge in edges}) == 12
+
+
 def test_the_exported_path_is_read_back_as_the_way_that_was_played(tmp_path):
     keys = [
         Pose((1.0, 0, 0, 0), (0.0, 0, -4), 0.8, 1.5),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,13 @@ class Crop:
     def holds(self, means: Floats) -> NDArray[np.bool_]:
         """Which of the means (N, 3) lie in the box."""
         return np.asarray(((means >= self.low) & (means <= self.high)).all(axis=1))
+
+    def edges(self) -> Floats:
+        """The ends of the box's edges, (12, 2, 3)."""
+        corners = np.array(list(itertools.product(*zip(self.low, self.high, strict=True))))
+        # A corner's number has a bit for each axis along which it lies at the upper end.
+        ends = [(k, k | bit) for k in range(8) for bit in (1, 2, 4) if not k & bit]
+        return np.asarray(corners[np.array(ends)], np.float32)
 
 
 def cropped(splats: Splats, crop: Crop | None, device: Device) -> Splats:

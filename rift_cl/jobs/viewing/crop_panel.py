@@ -65,12 +65,6 @@ class CropPanel:
             self._box.remove()
             self._box = None
         if box is not None:
-            self._box = self._scene.add_box(
-                "/crop",
-                color=_COLOR,
-                dimensions=tuple(high - low for low, high in zip(box.low, box.high, strict=True)),
-                position=tuple(
-                    (low + high) / 2 for low, high in zip(box.low, box.high, strict=True)
-                ),
-                wireframe=True,
+            self._box = self._scene.add_line_segments(
+                "/crop", box.edges(), _COLOR, thickness=1.5, thickness_units="screen"
             )
