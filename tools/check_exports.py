@@ -8,9 +8,9 @@ writes every format, and reads it back: PLY with plyfile, compressed PLY, SPZ an
 splat-transform (PlayCanvas; SPZ by Adobe's and Niantic's own code) and with gsply, glTF with
 pygltflib, and the page's own scene out of the page. Printed for each: bytes; the largest errors of
 places (scene units), logarithms of scales, rotations (degrees), opacities, first harmonics as
-colours, and higher harmonics; and the PSNR of what our renderer draws of the splats that were read,
-against what it draws of the fit, from the cameras that were held out. A reader that is not
-installed is left out, and said.
+colours, and higher harmonics; and, of the views that were held out, the PSNR of what our renderer
+draws of the splats that were read, against what it draws of the fit and against the photographs. A
+reader that is not installed is left out, and said.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from rift_cl.geometry import Camera
 from rift_cl.io.splat_activations import HARMONIC_0, opacities_of
 from rift_cl.io.splat_formats.plain import along_curve, unit_quats
 from rift_cl.io.splat_scene import SplatScene
-from rift_cl.jobs.camera_path import resized
+from rift_cl.io.view_image import camera_at, read_view
 from rift_cl.jobs.export.axes import turned
 from rift_cl.jobs.export.export import Export
 from rift_cl.jobs.export.settings import ExportSettings, Target
@@ -40,6 +40,10 @@ from rift_cl.metrics import psnr
 from rift_cl.splat.renderer import Renderer
 
 Floats = NDArray[Any]
+_COLUMNS = (
+    *("format", "bytes", "reader", "place", "ln scale", "turn", "opacity", "colour", "higher"),
+    *("fit's pictures", "photographs"),
+)
 _FORMATS: tuple[Target, ...] = ("ply", "compressed-ply", "spz", "sog", "glb", "html")
 
 
@@ -63,10 +67,8 @@ class Options:
 def main(options: Options) -> None:
     """Print the table."""
     options.out.mkdir(parents=True, exist_ok=True)
-    print(
-        "| format | bytes | reader | place | ln scale | turn | opacity | colour | higher | PSNR |"
-    )
-    print("| :-- | --: | :-- | --: | --: | --: | --: | --: | --: | --: |")
+    print(f"| {' | '.join(_COLUMNS)} |")
+    print(f"| :-- | --: | :-- |{' --: |' * (len(_COLUMNS) - 3)}")
     for name in _FORMATS:
         path = options.out / f"scene.{name}"
         job = Export(ExportSettings(options.fit, to=name, out=path, overwrite=True))
@@ -96,7 +98,12 @@ class Judge:
         device, known = default_device(), job.scene.cameras
         seen = known.unseen or known.seen if known is not None else ()
         factor = job.scene.downscale
-        self._cameras = [_smaller(view.camera, factor) for view in seen[:views]]
+        self._cameras = [camera_at(view, factor) for view in seen[:views]]
+        self._truths = [
+            read_view(view, downscale=factor, light=job.scene.light)[..., :3]
+            for view in seen[:views]
+            if view.image.is_file()
+        ]
         self._draw = lambda scene: _drawn(device, job, scene, self._cameras)
         self._pictures = self._draw(job.scene.splats)
 
@@ -119,8 +126,9 @@ class Judge:
         else:
             yield f"{np.abs(found.sh[:, 1:] - wanted.sh[:, 1:]).max(initial=0):.1e}"
         pictures = self._draw(turned(found, self._turn.T))
-        scores = [psnr(a, b) for a, b in zip(pictures, self._pictures, strict=True)]
-        yield f"{np.mean(scores):.1f}" if scores else "no cameras"
+        for others in (self._pictures, self._truths):
+            scores = [psnr(a, b) for a, b in zip(pictures, others, strict=False)]
+            yield f"{np.mean(scores):.1f}" if scores else "–"
 
 
 def _turns(found: Floats, wanted: Floats) -> Floats:
@@ -136,11 +144,6 @@ def _scaled(found: SplatScene, wanted: SplatScene) -> SplatScene:
     return dataclasses.replace(
         found, means=found.means / unit, log_scales=found.log_scales - np.log(unit)
     )
-
-
-def _smaller(camera: Camera, factor: int) -> Camera:
-    height, width = camera.size
-    return resized(camera, (height // factor, width // factor))
 
 
 def _drawn(

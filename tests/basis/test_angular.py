@@ -215,3 +215,12 @@ def test_limits_of_sharpness_are_a_constant_and_nothing():
     np.testing.assert_allclose(broad, 1, atol=2e-4)
     assert not SphericalGaussians(1).functions([0, 0, 1, 20.0], away)[:, 1].any()
     assert not AnisotropicSphericalGaussians(1).functions([1, 0, 0, 0, 0, 0], away)[:, 1].any()
+
+
+@pytest.mark.parametrize("degree", range(5))
+def test_harmonics_alone_are_those_with_derivatives(degree):
+    directions = np.random.default_rng(degree).normal(size=(3, 50, 3))
+    directions[0, 0], directions[1, 1], directions[2, 2] = 0, [0, 0, -2], np.nan
+    basis = SphericalHarmonics(degree)
+    alone, values = basis.functions(None, directions), basis.slopes(None, directions).values
+    np.testing.assert_allclose(alone, values, atol=1e-14)

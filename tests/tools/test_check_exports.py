@@ -26,7 +26,7 @@ def test_each_format_comes_back_as_well_as_it_can(tool, tmp_path, capsys):
     check.main(check.Options(fit, tmp_path / "out", tmp_path / "none"))
     lines = capsys.readouterr().out.split("\n")
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
-    found = {(row[0], row[2]): row[3:8] for row in rows if len(row) == 10}
+    found = {(row[0], row[2]): row[3:8] for row in rows if len(row) == 11}
     bounds = {
         ("ply", "plyfile"): (0, 0, 0, 0, 0),
         ("glb", "pygltflib"): (0, 1e-5, 0.01, 1e-6, 0),

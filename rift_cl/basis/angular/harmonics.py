@@ -8,6 +8,7 @@ Shortley's sign.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from math import factorial, pi, sqrt
 from typing import Any
 
@@ -69,6 +70,22 @@ class SphericalHarmonics(AngularFunctions):
             slopes = np.einsum("...ki,...ij->...kj", by_unit, units.slopes)
         return Slopes(values, np.empty((*values.shape, 0)), slopes)
 
+    def functions(self, geometry: ArrayLike | None, directions: ArrayLike) -> Floats:
+        """All functions alone, many times sooner than with their derivatives; see ``slopes``."""
+        given = last_axis(directions, 3, "SphericalHarmonics: directions")
+        with np.errstate(all="ignore"):
+            x, y, z = np.moveaxis(unit_directions(given).vectors, -1, 0)
+            values = np.empty((self.n_linear, *z.shape))
+            power = np.ones(z.shape, complex)
+            for n in range(self.degree + 1):
+                for order in range(n, self.degree + 1):
+                    height, at = np.polynomial.polynomial.polyval(z, _height(order, n)), order**2
+                    values[at + order + n] = height * power.real
+                    if n:
+                        values[at + order - n] = height * power.imag
+                power = power * (x + 1j * y)
+        return np.ascontiguousarray(np.moveaxis(values, 0, -1))
+
     def start_geometry(self, axes: ArrayLike) -> Floats:
         """Harmonics have no geometry: (..., 0)."""
         return np.empty((*last_axis(axes, 3, "SphericalHarmonics: axes").shape[:-1], 0))
@@ -77,13 +94,24 @@ class SphericalHarmonics(AngularFunctions):
 def _harmonic(order: int, m: int, x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats]:
     """One function, and its derivatives (..., 3) off the sphere as well as along it."""
     n = abs(m)
-    norm = (2 * order + 1) / (4 * pi) * factorial(order - n) / factorial(order + n)
-    scale = (-1) ** n * sqrt(norm * (2 if n else 1))
     height: Callable[[Floats], Any] = np.polynomial.Legendre.basis(order).deriv(n)
     steep: Callable[[Floats], Any] = np.polynomial.Legendre.basis(order).deriv(n + 1)
-    q, slope = scale * height(z), scale * steep(z)
+    q, slope = _norm(order, n) * height(z), _norm(order, n) * steep(z)
     power, below = (x + 1j * y) ** n, n * (x + 1j * y) ** max(n - 1, 0)
     turn, by_x, by_y = (
         (power.real, below.real, -below.imag) if m >= 0 else (power.imag, below.imag, below.real)
     )
     return q * turn, np.stack([q * by_x, q * by_y, slope * turn], -1)
+
+
+def _norm(order: int, n: int) -> float:
+    """The factor of Q_ln, with its sign."""
+    norm = (2 * order + 1) / (4 * pi) * factorial(order - n) / factorial(order + n)
+    return float((-1) ** n * sqrt(norm * (2 if n else 1)))
+
+
+@cache
+def _height(order: int, n: int) -> Floats:
+    """Q_ln as a polynomial: coefficients of 1, z, z^2 and so on."""
+    plain = np.polynomial.Legendre.basis(order).deriv(n).convert(kind=np.polynomial.Polynomial)
+    return _norm(order, n) * np.asarray(plain.coef, float)

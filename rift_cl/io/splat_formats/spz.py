@@ -6,9 +6,10 @@ coefficient and channel. Axes are right, up, back (y up), as in glTF. (github.co
 ``load-spz.cc``; PyPI's ``spz`` is something else.)
 
 What it rounds: places by half a unit of the last of 24 bits, which is chosen as fine as the
-farthest splat allows; logarithms of scales, kept from -10 to 5.9, by 1/32; rotations' components by
-7e-4; opacities by 1/510; the first harmonic, kept within 3.33, by 0.013; those of degree 1, kept
-within 1, by 1/32, and higher ones by 1/16.
+farthest splat allows; logarithms of scales, kept from -10 to 5.9, by 1/32; a rotation's components
+by 7e-4; opacities by 1/510; the first harmonic, kept within 3.33, by 0.013; higher ones, kept
+within 1, by 1/64. (The format has levels 1/128 apart; Niantic's own program takes every eighth of
+degree 1 and every sixteenth above, we take every fourth: docs/export.md has what that is worth.)
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ _GZIP = b"\x1f\x8b\x08\x00\x00\x00\x00\x00\x02\xff"
 # Bits after the point of a place at most, and the largest number that 24 bits hold.
 _FINEST, _LARGEST = 20, 2**23 - 1
 _COLOR = 0.15
-# Widths of the levels of harmonics of degree 1 and of higher ones, in 1/128.
-_FIRST, _HIGHER = 8, 16
+# Every so many-th level of harmonics is used, so that they pack well.
+_STEP = 4
 
 
 def encode_spz(scene: SplatScene) -> bytes:
@@ -94,10 +95,7 @@ def _rotations(scene: SplatScene) -> bytes:
 
 
 def _harmonics(rest: Floats) -> bytes:
-    widths = np.full(rest.shape[1], _HIGHER)
-    widths[:3] = _FIRST
-    width = widths[:, None]
-    return _bytes(np.rint((128 * rest + 128) / width) * width)
+    return _bytes(np.rint((128 * rest + 128) / _STEP) * _STEP)
 
 
 def _bytes(values: Floats) -> bytes:

@@ -21,6 +21,7 @@ from rift_cl.jobs.export.web_page import FirstView, web_page
 from rift_cl.jobs.scene_input import in_display_light, scene_file
 from rift_cl.progress import Report
 
+_PAGE = ".html"
 _UP = np.array([0.0, 1, 0])
 # What viewers add to splats on the screen, in square pixels.
 _VIEWERS = 0.3
@@ -60,6 +61,11 @@ class Export:
                     *self._bounds.up
                 )
             )
+        if self.format.suffix == _PAGE and self.plain.degree:
+            self.notes.append(
+                "the page draws each splat in one colour, the mean of what the cameras saw: what "
+                "changes with the direction is lost (the other formats keep it)"
+            )
         if self.scene.drawing.eps2d != _VIEWERS:
             self.notes.append(
                 f"viewers blur by {_VIEWERS:g} square pixels, the scene was fitted with "
@@ -69,7 +75,7 @@ class Export:
     def _format(self, name: str) -> SplatFormat:
         if name == "html":
             rounds = "colours to one for all directions and 8 bits, covariances to half floats"
-            return SplatFormat(".html", self._page, False, rounds)
+            return SplatFormat(_PAGE, self._page, False, rounds)
         if name not in FORMATS:
             raise InputError(f"--to {name} is about triangles: add --mesh")
         return FORMATS[name]
