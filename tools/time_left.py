@@ -62,12 +62,14 @@ def main(asked: Asked) -> None:
 
 def _watch(job: Fit, steps: int) -> None:
     paces = {name: Pace(clock) for name, clock in _CLOCKS.items()}
+    begin = time.monotonic()
     told: list[tuple[int, float, dict[str, tuple[float, float]]]] = []
     for report in job.run():
         if report.what == "steps":
             found = {n: (clock(), paces[n].after(report)[1]) for n, clock in _CLOCKS.items()}
             told.append((report.done, report.values["splats"], found))
     end = told[-1][2]
+    print(f"reading and all steps took {end['wall'][0] - begin:.1f} s by the clock on the wall")
     print("share  splats" + "".join(f"  {name}: left, came, ratio" for name in _CLOCKS))
     for share in _SHARES:
         done, splats, found = next(row for row in told if row[0] >= share * steps)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 from collections.abc import Iterator
 
 from rift_cl.errors import InputError
@@ -19,6 +20,7 @@ from rift_cl.jobs.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras, wit
 from rift_cl.jobs.cameras.photograph_place import place_record
 from rift_cl.jobs.few import evenly
 from rift_cl.jobs.fit_pictures import CapturePictures
+from rift_cl.jobs.fit_probe import MARGIN, TRIED, probed
 from rift_cl.jobs.fit_report import fit_page, history_notes, ramp_notes
 from rift_cl.jobs.fit_run import FitRun
 from rift_cl.jobs.fit_scores import score_record, score_views
@@ -85,20 +87,47 @@ class Fit(FitRun):
             **({"masks": f"{masks} photographs have one"} if masks else {}),
             "largest photograph": f"{largest} pixels, made smaller by {self.downscale}",
             "splats": self._splats,
-            "device memory": f"{self._need(largest) / 2**20:.0f} MiB and the tile lists",
             "device": self.device.name,
+            **self._tried(self.source, largest),
         }
 
-    def _need(self, pixels: int) -> int:
-        """Bytes that a step takes on the device, but for its tile lists and their records."""
+    def _tried(self, capture: Capture, pixels: int) -> dict[str, str]:
+        """Memory and time, from a few steps that leave no trace."""
+        settings = self.settings
+        pictures, reading = self._timed_reading()
+        count = min(settings.splats, TRIED)
+        trainer = self._trainer(capture, pictures, dataclasses.replace(settings, splats=count))
+        probe, frame = probed(trainer, count), self._frame(pixels)
+        first = round(len(trainer.parameters) * settings.splats / count)
+        ahead = trainer.strategy.forecast(0, first)
+        seconds = reading * len(self.seen) + probe.steps(ahead)
+        lists = min(probe.lists(frame, self.drawing.tile), self.device.budget)
+        return {
+            "device memory": f"{self._need(frame) / 2**20:.0f} MiB, and about "
+            f"{lists / 2**20:.0f} MiB of tile lists",
+            "time": f"about {seconds:.2g} s, {MARGIN}, from a few steps",
+        }
+
+    def _timed_reading(self) -> tuple[CapturePictures, float]:
+        """The photographs, and the seconds that it takes to read one."""
+        begin = time.perf_counter()
+        self._pictures(self.seen[:1])
+        reading = time.perf_counter() - begin
+        return self._pictures(self.seen), reading
+
+    def _frame(self, pixels: int) -> FrameMemory:
+        """What a frame of so many pixels takes on the device, but for its tile lists."""
         count, parameters, basis = self.settings.splats, self.training.numbers, self.training.basis
         channels = 3 if basis.color_order else 0
         modes = None if basis.plain else ModeOrders(basis.order, basis.color_order, channels)
-        frame = FrameMemory(
+        return FrameMemory(
             count, parameters, pixels, 3, gradient=True, absgrad=self.drawing.absgrad, modes=modes
         )
-        # Besides what a frame takes there are Adam's two moments of every parameter.
-        return frame.fixed + 8 * parameters * count
+
+    @staticmethod
+    def _need(frame: FrameMemory) -> int:
+        """Bytes of a step: besides what a frame takes there are Adam's two moments of all."""
+        return frame.fixed + 8 * frame.parameters * frame.splats
 
     @property
     def _splats(self) -> str:
@@ -199,8 +228,11 @@ class Fit(FitRun):
             notes.append(size_words(self.seen, self.downscale))
         return notes
 
-    def _trainer(self, capture: Capture, pictures: CapturePictures) -> Trainer:
-        settings, exponent = self.settings, self.settings.exponent_for(len(pictures.views))
+    def _trainer(
+        self, capture: Capture, pictures: CapturePictures, given: FitSettings | None = None
+    ) -> Trainer:
+        settings = given or self.settings
+        exponent = settings.exponent_for(len(pictures.views))
         ramp = dataclasses.replace(self.training.homogenisation, exponent=exponent)
         training = dataclasses.replace(self.training, homogenisation=ramp)
         first = first_splats(

@@ -107,7 +107,7 @@ class FitSettings(XrayOptions, BasisOptions):
     overwrite: bool = False
     """Replace an earlier fit in the same folder."""
     dry_run: bool = False
-    """Say what would be done, and stop."""
+    """Take a few steps, say what would be done, the time and the memory, and stop."""
 
     def check(self) -> None:
         """Check what neither the trainer nor the rasterizer will.

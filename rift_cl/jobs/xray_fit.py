@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rift_cl.io.splat_scene import XrayScene
 from rift_cl.io.volumes import VOLUME_NAMES, open_volume
 from rift_cl.jobs.few import evenly
+from rift_cl.jobs.fit_probe import MARGIN, TRIED, probed
 from rift_cl.jobs.fit_run import FitRun
 from rift_cl.jobs.fit_scores import score_record
 from rift_cl.jobs.fit_settings import FitSettings
@@ -58,6 +59,11 @@ class XrayFit(FitRun):
         """What would be done, by name."""
         scan, rows = self.input.scan, self.input.rows
         bins, settings = scan.shape[2], self.settings
+        seen = self.input.read().of(self.seen)
+        tried = min(settings.splats, TRIED)
+        few = dataclasses.replace(settings, splats=tried)
+        trainer = self._trainer(seen, XrayPictures(self.device, seen), few)
+        seconds = settings.steps * probed(trainer, tried).step(settings.splats)
         words = settings.basis_words(colored=False)
         return {
             "scan": f"{scan.path} ({scan.source}, {scan.kind})",
@@ -69,6 +75,8 @@ class XrayFit(FitRun):
             f"{(rows[1] - rows[0], bins, bins)} (z, y, x)",
             "host memory": f"{self.input.need / 2**20:.0f} MiB",
             "device": self.device.name,
+            "time": f"about {seconds:.2g} s, {MARGIN}, from a few steps"
+            + (", and that of the solves" if settings.solve else ""),
         }
 
     def run(self) -> Iterator[Report]:
@@ -109,8 +117,10 @@ class XrayFit(FitRun):
         }
         self._leave(splats, volume, whole)
 
-    def _trainer(self, seen: Projections, pictures: XrayPictures) -> XrayTrainer:
-        settings, training, rows = self.settings, self.training, seen.values.shape[1]
+    def _trainer(
+        self, seen: Projections, pictures: XrayPictures, given: FitSettings | None = None
+    ) -> XrayTrainer:
+        settings, training, rows = given or self.settings, self.training, seen.values.shape[1]
         volume = np.maximum(backprojected(self.device, seen, "hann"), 0)
         # Without what was negative there is too much of it: as much as the projections say.
         mass = np.maximum(seen.values.sum(axis=2, dtype=float).mean(axis=0), 0)

@@ -86,6 +86,7 @@ class Trainer:
         self.pictures = pictures
         self.parameters = parameters
         self.settings = settings
+        self.flat = flat
         settings.solve.demand_heed(self.solves)
         self.device: Device = parameters.device
         self.schedule = Schedule(settings, scene_extent(pictures.cameras))
@@ -175,6 +176,11 @@ class Trainer:
         parameters = self.parameters
         ahead = self.strategy.forecast(parameters.step, len(parameters))
         return sum(steps * self._work(count) for steps, count in ahead)
+
+    def alike(self, parameters: Parameters) -> Trainer:
+        """A fit of the same pictures by the same settings that begins with other splats."""
+        drawing = self.renderer.settings
+        return type(self)(self.pictures, parameters, self.settings, drawing, flat=self.flat)
 
     def camera(self, number: int) -> Camera:
         """The camera of a view, where it is believed to be by now."""
