@@ -164,8 +164,8 @@ def resolution(sampled: Sampled, names: tuple[str, ...]) -> Findings:
     heads = ("point", *CAUSES, "all together", "limited by")
     caption = (
         f"One cycle of the finest detail, in {units}: by each cause alone (of cameras, the middle "
-        "one), and by all together in nine tenths of all directions. A dash is no limit; none is no "
-        "detail, since a cycle is longer than the target."
+        "one), and by all together in nine tenths of all directions. A dash is no limit; none is "
+        "no detail, since a cycle is longer than the target."
     )
     needed = crowther_views(target.diameter, 1 / target.highest)
     sentences = (

@@ -77,7 +77,18 @@ class BareInput:
         self.photographs = len(found.placed) + len(found.missing)
         if found.missing:
             self.notes.append(_left_out(found.missing, self.photographs))
-        return open_capture(found.model, images=self.folder)
+        capture = open_capture(found.model, images=self.folder)
+        self.notes.append(_placed(capture, self.photographs))
+        return capture
+
+
+def _placed(capture: Capture, count: int) -> str:
+    """How many photographs have a pose, and how well the poses agree with them."""
+    placed = f"{len(capture.views)} of {count} photographs have a pose"
+    error = capture.reprojection_error
+    if error is None:
+        return placed
+    return f"{placed}; their sparse points are seen {error:.2g} pixels off, on average"
 
 
 def _left_out(missing: Mapping[str, str], count: int) -> str:

@@ -19,6 +19,7 @@ from rift_cl.jobs.cameras.film import (
     frame_of,
 )
 from rift_cl.jobs.cameras.focus import focus_among
+from rift_cl.jobs.cameras.route import route_through
 from rift_cl.jobs.scene_bounds import bounds_of_cameras
 
 MIDDLE, UP = np.array([1.0, -2, 0.5]), np.array([0.0, 0, 1])
@@ -85,6 +86,19 @@ def test_every_frame_is_as_near_to_a_photograph_as_photographs_are_to_each_other
     for frame, number in zip(path, nearest, strict=True):
         turn = frame.view[2, :3] @ cameras[number].view[2, :3]
         assert np.degrees(np.arccos(min(1, turn))) < 25
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("count", [2, 3, 7, 60])
+def test_no_place_of_a_route_is_farther_from_a_camera_than_its_longest_hop(seed, count):
+    random = np.random.default_rng((seed, count))
+    angles = random.uniform((-80, -20), (80, 50), (count, 2)).T
+    cameras = from_angles(*angles, random.uniform(3, 6, count), aside=0.3, seed=seed)
+    route = route_through(cameras, MIDDLE, about=True)
+    apart = np.linalg.norm(route.places[:, None] - places(cameras), axis=2)
+    assert apart.min(axis=1).max() <= route.longest
+    away = np.linalg.norm(route.places - MIDDLE, axis=1)
+    assert away.min() > 2, "the way keeps its distance from the subject"
 
 
 @pytest.mark.parametrize("make", [handheld, horseshoe])

@@ -62,8 +62,12 @@ def test_what_is_odd_in_a_folder_is_said_in_two_lines(photographs, tmp_path, pos
     assert said[1] == (
         "rift: 1 of 5 photographs is left out: IMG_1.png (is the same photograph as IMG_1 (1).png)"
     )
-    assert said[2] == "rift: 1 of 3 photographs have a mask: black is left out"
-    assert len(said) == 3
+    assert said[2] == (
+        "rift: 4 of 5 photographs have a pose; their sparse points are seen 0.5 pixels off, on "
+        "average"
+    )
+    assert said[3] == "rift: 1 of 3 photographs have a mask: black is left out"
+    assert len(said) == 4
 
 
 def test_a_video_is_fitted_by_its_frames(tmp_path, posed, capsys):
