@@ -9,6 +9,7 @@ import base64
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from urllib.parse import quote
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.html_page import pictures
@@ -44,6 +45,10 @@ class Page:
     def paragraph(self, text: str) -> None:
         """Add a paragraph of plain text."""
         self._blocks.append(f"<p>{escape(text)}</p>")
+
+    def link(self, text: str, file: str) -> None:
+        """Add a paragraph that leads to a file beside the page."""
+        self._blocks.append(f'<p><a href="{quote(file)}">{escape(text)}</a></p>')
 
     def code(self, text: str) -> None:
         """Add text in a fixed-width type, line breaks kept."""

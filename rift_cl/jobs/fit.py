@@ -18,6 +18,7 @@ from rift_cl.jobs.bare_input import BareInput
 from rift_cl.jobs.cameras.arc import demand_places
 from rift_cl.jobs.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras, with_poses
 from rift_cl.jobs.cameras.photograph_place import place_record
+from rift_cl.jobs.export.fit_page import leave_page
 from rift_cl.jobs.few import evenly
 from rift_cl.jobs.fit_pictures import CapturePictures
 from rift_cl.jobs.fit_probe import MARGIN, TRIED, probed
@@ -189,7 +190,8 @@ class Fit(FitRun):
         decided = dataclasses.replace(settings, homogenise=exponent, downscale=self.downscale)
         ramp = ramp_notes(settings, len(self.seen))
         notes = [*self._notes(), *ramp, *history_notes(self._history)]
-        page = fit_page(capture.path.name, self.scores, self.losses, self.metrics, notes)
+        scene = leave_page(settings.out, pictures, self.announce)
+        page = fit_page(capture.path.name, self.scores, self.losses, self.metrics, notes, scene)
         self.folder.finish(decided, self.metrics, page, self.device, asked=settings, **self.decided)
 
     def _read_ahead(self, trainer: Trainer, pictures: CapturePictures) -> Iterator[Report]:

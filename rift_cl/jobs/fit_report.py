@@ -45,10 +45,22 @@ def fit_page(
     losses: Sequence[tuple[int, float]],
     metrics: Mapping[str, Any],
     notes: Sequence[str] = (),
+    scene: str | None = None,
 ) -> Page:
-    """The report of a finished fit; ``notes`` are sentences about what it decided by itself."""
+    """The report of a finished fit.
+
+    Args:
+        name: of the capture.
+        groups: scores of pictures by the name of their group.
+        losses: step and loss.
+        metrics: all figures.
+        notes: sentences about what it decided by itself.
+        scene: a page beside the report that draws the scene, if there is one.
+    """
     basis = f", {metrics['basis']}" if "basis" in metrics else ""
     page = Page(f"Splats fitted to {name}", f"{metrics['splats']} splats{basis}")
+    if scene is not None:
+        page.link("Walk round the scene in this browser", scene)
     show_fit(page, groups, losses, metrics)
     if notes:
         page.section("What was decided")
