@@ -26,6 +26,8 @@ _NAMES = {
     "ring": "a ring",
     "arc": "a single arc",
     "fibonacci": "evenly spread",
+    "zigzag": "a zigzag",
+    "quantiles": "by the root of the power",
     "random": "random",
 }
 

@@ -92,7 +92,7 @@ def test_its_lens_is_in_the_file_and_in_the_table_for_the_tripod(planned):
 
 def test_the_report_compares_and_says_what_planning_is_worth(planned, capsys):
     found, page = metrics_of(planned), (planned / "report.html").read_text()
-    assert set(found["baselines"]) <= {"ring", "arc", "fibonacci", "random"}
+    assert set(found["baselines"]) <= {"ring", "arc", "fibonacci", "zigzag", "random"}
     own = found["planned_with"]
     assert 0 < own["bound"] <= own["merit"] < 1 and len(found["merits"]) == 9
     assert found["merits"][-1] == pytest.approx(found["merit"], rel=1e-6)

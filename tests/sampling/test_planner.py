@@ -43,7 +43,7 @@ def test_a_plan_in_a_sector_beats_rings_arcs_and_even_views():
     assert keeps(found)
     assert keeps(greedy)
     assert found.merit < greedy.merit
-    assert set(found.baselines) == {"ring", "arc", "fibonacci", "random"}
+    assert set(found.baselines) == {"ring", "arc", "fibonacci", "zigzag", "random"}
     for baseline in found.baselines.values():
         assert len(baseline.cameras) == 12
         assert permitted(found.objective.site, baseline.stations)

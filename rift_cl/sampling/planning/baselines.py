@@ -1,4 +1,4 @@
-"""What people do without a plan: rings, arcs, even and random directions.
+"""What people do without a plan: rings, arcs, zigzags, even and random directions.
 
 Each keeps to the same constraints and costs no more than the plan may; each gets the camera type
 and settings with which even directions do best, and the elevation or arc at which it does best.
@@ -17,6 +17,7 @@ from rift_cl.geometry import Camera
 from rift_cl.sampling.planning.candidates import allowed, settings_of, spread
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.paths import Free, Spline
+from rift_cl.sampling.planning.simple_ways import edge_ways, quantiles_of_power
 from rift_cl.sampling.planning.site import AZIMUTH, ELEVATION, EXPOSURE, Site
 from rift_cl.sampling.planning.spending import paid
 from rift_cl.sampling.planning.stations import Stations
@@ -54,7 +55,9 @@ class _Lens(NamedTuple):
 
 
 def baselines(objective: Objective, views: int, seed: int = 0) -> dict[str, Baseline]:
-    """The best ring, the best arc, even directions (Fibonacci) and random ones, by name.
+    """The best ring, arc and zigzag, even directions (Fibonacci) and random ones, by name.
+
+    For a flat target also views at quantiles of the root of its power.
 
     Args:
         objective: what is to be small, and where.
@@ -76,6 +79,8 @@ def baselines(objective: Objective, views: int, seed: int = 0) -> dict[str, Base
     if isinstance(path, Free):
         even = _even(site, lens, 0)
         found["fibonacci"] = _best(objective, [("a Fibonacci sphere", even)] if even else [])
+        found["zigzag"] = _best(objective, _zigzags(site, lens))
+        found["quantiles"] = _best(objective, _quantiles(site, lens))
         found["random"] = _random(objective, lens, seed)
     return {name: baseline for name, baseline in found.items() if baseline is not None}
 
@@ -150,6 +155,25 @@ def _arcs(site: Site, lens: _Lens) -> list[tuple[str, Stations]]:
             if stations is not None:
                 found.append((f"an arc from azimuth, elevation {a} to {b} degrees", stations))
     return found
+
+
+def _zigzags(site: Site, lens: _Lens) -> list[tuple[str, Stations]]:
+    found = []
+    for described, angles in edge_ways(site.constraints):
+        stations = _along(site, lens, angles, ends=not site.constraints.full_circle)
+        if stations is not None:
+            found.append((described, stations))
+    return found
+
+
+def _quantiles(site: Site, lens: _Lens) -> list[tuple[str, Stations]]:
+    angles = quantiles_of_power(site.target, site.constraints, lens.views)
+    if angles is None:
+        return []
+    stations = _stations(lens, angles)
+    if not allowed(site, stations).all():
+        return []
+    return [("views by the root of the power", stations)]
 
 
 def _even(site: Site, lens: _Lens, seed: int) -> Stations | None:
