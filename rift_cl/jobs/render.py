@@ -123,8 +123,8 @@ class Render:
             return str(self.settings.path)
         if arc is None or arc.closed:
             return f"orbit at {np.linalg.norm(self.cameras[0].center - bounds.center):.4g}"
-        first, last = arc.azimuth
-        return f"there and back along {len(bounds.cameras)} cameras, {last - first:.0f} degrees"
+        farthest = farthest_from_cameras(self.cameras, bounds)
+        return f"there and back along the photographs, at most {farthest:.0f} degrees from one"
 
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""

@@ -136,6 +136,55 @@ def test_a_film_is_smooth_and_closes(make):
     np.testing.assert_allclose(places(path)[1:48], places(path)[:48:-1], atol=1e-9)
 
 
+def strip(azimuths, elevation=10.0):
+    return from_angles(azimuths, np.full(len(azimuths), elevation), np.full(len(azimuths), 4.0))
+
+
+def with_strays():
+    return strip([*np.linspace(-40, 40, 21), 170])
+
+
+def front_and_back():
+    return strip(np.concatenate([np.linspace(-20, 20, 11), np.linspace(160, 200, 11)]))
+
+
+def two_fronts():
+    return strip(np.concatenate([np.linspace(-20, 20, 11), np.linspace(100, 140, 11)]))
+
+
+def with_views_from_above():
+    """From one side, and three photographs from overhead that are at every azimuth."""
+    return strip(np.linspace(-50, 50, 21)) + strip([0.0, 120, 240], 84.0)
+
+
+@pytest.mark.parametrize("make", [with_strays, front_and_back, two_fronts, with_views_from_above])
+def test_a_film_leads_over_no_gap(make):
+    bounds, path = filmed(make())
+    assert not capture_arc(bounds).closed
+    assert farthest_from_cameras(path, bounds) < 10
+    shown = np.degrees(np.arccos(np.clip(ways(path) @ ways(path).T, -1, 1))).max()
+    assert shown > 25, "the larger group is shown, and not one camera of it"
+
+
+def ways(cameras):
+    """Unit vectors from the middle."""
+    ways = places(cameras) - MIDDLE
+    return ways / np.linalg.norm(ways, axis=1, keepdims=True)
+
+
+def test_photographs_twice_from_each_place_are_one_route():
+    azimuths = np.repeat(np.linspace(-60, 60, 9), 2) + np.tile([0, 0.01], 9)
+    _, path = filmed(strip(azimuths))
+    shown = np.degrees(np.arccos(np.clip(ways(path) @ ways(path).T, -1, 1))).max()
+    assert shown > 70
+
+
+def test_a_half_sphere_seen_from_everywhere_is_closed():
+    random = np.random.default_rng(5)
+    angles = random.uniform(0, 360, 60), np.degrees(np.arcsin(random.uniform(0.05, 1, 60)))
+    assert capture_arc(bounds_of_cameras(from_angles(*angles, np.full(60, 4.0)))).closed
+
+
 def test_a_ring_gives_the_orbit_that_it_always_gave():
     bounds = bounds_of_cameras(ring(12))
     size, fov = (480, 640), 45.0

@@ -33,7 +33,8 @@ class Arc:
         elevation: least and largest, in degrees above the horizon.
         distances: from the focus in scene units: the least, the median, the largest.
         inward: the cameras looked at the focus, and not past it or side by side.
-        closed: they did so from all round, with no gap wider than that of five of them.
+        closed: they did so from all round: at their median elevation, no place is farther from one
+            of them than in a ring of five.
     """
 
     front: Floats
@@ -66,8 +67,8 @@ def arc_of(cameras: Sequence[Camera], focus: Floats, up: Floats) -> Arc:
     ways = np.array([camera.center for camera in cameras]) - focus
     distances = np.linalg.norm(ways, axis=1)
     least, median, most = np.quantile(distances, (0, 0.5, 1)).tolist()
-    rises = np.clip(ways @ up / np.where(distances > 0, distances, 1), -1, 1)
-    elevations = np.degrees(np.arcsin(rises))
+    units = ways / np.where(distances > 0, distances, 1)[:, None]
+    elevations = np.degrees(np.arcsin(np.clip(units @ up, -1, 1)))
     first = across(up)
     second = np.cross(up, first)
     angles = np.sort(np.degrees(np.arctan2(ways @ second, ways @ first)) % 360)
@@ -82,8 +83,21 @@ def arc_of(cameras: Sequence[Camera], focus: Floats, up: Floats) -> Arc:
         elevation=(float(elevations.min()), float(elevations.max())),
         distances=(least, median, most),
         inward=inward,
-        closed=inward and bool(gaps[widest] <= _WIDEST_GAP),
+        closed=inward and bool(gaps[widest] <= _WIDEST_GAP) and _all_round(units, up, elevations),
     )
+
+
+def _all_round(units: Floats, up: Floats, elevations: Floats) -> bool:
+    """Whether cameras are near to every place of the orbit at their median elevation.
+
+    A few that look down from above are at every azimuth, but not where an orbit would go.
+    """
+    first = across(up)
+    turn, rise = np.radians(np.arange(360))[:, None], np.radians(np.median(elevations))
+    flat = np.cos(turn) * first + np.sin(turn) * np.cross(up, first)
+    orbit = np.cos(rise) * flat + np.sin(rise) * up
+    nearest = (orbit @ units.T).max(axis=1)
+    return bool(nearest.min() >= np.cos(np.radians(_WIDEST_GAP / 2)))
 
 
 def across(up: Floats) -> Floats:

@@ -2,8 +2,10 @@
 
 The cameras are the knots of a graph; the route is the one between the two that lie farthest apart
 in it whose hops have the least sum of squares, so that many short hops are preferred to a long one.
-Rounded with a Gaussian, it still keeps to the cameras: the rounding is lessened until no place is
-farther from the nearest of them than the longest hop.
+No hop leads over a gap that is wide beside the others, and wide as seen from the focus: of cameras
+that such gaps part, the route keeps to the largest group. Rounded with a Gaussian, it still keeps
+to the cameras: the rounding is lessened until no place is farther from the nearest of them than the
+longest hop.
 """
 
 from __future__ import annotations
@@ -25,6 +27,9 @@ _MOST = 400
 _PLACES, _ROUNDED, _SHARP = 600, 0.08, 0.005
 # Hops shorter than this share of the longest distance count as it: cameras in one place.
 _SAME = 1e-4
+# A gap is so many times as wide as the usual distance to the next camera, and so many degrees as
+# seen from the focus: half of the widest gap in a ring.
+_WIDER, _GAP = 3.0, 36.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +65,12 @@ def route_through(cameras: Sequence[Camera], focus: Floats, *, about: bool) -> R
     """
     few = [cameras[k] for k in evenly(len(cameras), _MOST)]
     centers = np.array([camera.center for camera in few])
+    distances = np.linalg.norm(centers[:, None] - centers, axis=2)
+    gaps = _gaps(distances, centers - focus)
+    group = _largest_group(gaps)
+    few, centers = [few[k] for k in group], centers[group]
     targets = np.array([looked_at(camera, focus) for camera in few])
-    order = _order(np.linalg.norm(centers[:, None] - centers, axis=2))
+    order = _order(distances[np.ix_(group, group)], gaps[np.ix_(group, group)])
     if len(order) == 1:
         return Route(centers[order], targets[order], 0.0)
     knots, aims = centers[order], targets[order]
@@ -91,14 +100,37 @@ def looked_at(camera: Camera, focus: Floats) -> Floats:
     return np.asarray(center + depth * forward)
 
 
-def _order(distances: Floats) -> list[int]:
-    """Numbers of the cameras along the route, from one end to the other."""
+def _gaps(distances: Floats, ways: Floats) -> NDArray[np.bool_]:
+    """Between which cameras (V, V) there is a gap that nobody looked from.
+
+    Args:
+        distances: (V, V) between cameras.
+        ways: (V, 3) from the focus to them.
+    """
+    units = ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-300)
+    apart = np.degrees(np.arccos(np.clip(units @ units.T, -1, 1)))
+    # Those in one place tell nothing of how far it is to the next.
+    beside = distances + np.where(distances > _SAME * distances.max(), 0, np.inf)
+    usual = np.median(beside.min(axis=1))
+    return np.asarray((distances > _WIDER * usual) & (apart > _GAP))
+
+
+def _largest_group(gaps: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Numbers of the most cameras that no gap parts, in order."""
+    from scipy.sparse.csgraph import connected_components
+
+    _, labels = connected_components(~gaps, directed=False)
+    return np.flatnonzero(labels == np.bincount(labels).argmax())
+
+
+def _order(distances: Floats, gaps: NDArray[np.bool_]) -> list[int]:
+    """Numbers of the cameras along the route, from one end to the other, over no gap."""
     from scipy.sparse.csgraph import dijkstra
 
     largest = float(distances.max())
     if largest == 0:
         return [0]
-    costs = np.maximum(distances / largest, _SAME) ** 2
+    costs = np.where(gaps, np.inf, np.maximum(distances / largest, _SAME) ** 2)
     # Whoever is farthest from any camera is an end; whoever is farthest from that, the other.
     start = int(dijkstra(costs, indices=0).argmax())
     far, before = dijkstra(costs, indices=start, return_predecessors=True)
