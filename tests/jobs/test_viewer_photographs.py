@@ -9,13 +9,14 @@ import pytest
 from viewer_wire import Wire, dialled, until
 
 import rift_cl as rift
+from rift_cl.geometry import Aperture
 from rift_cl.geometry.pose import look_at
 from rift_cl.io.capture import open_capture
 from rift_cl.jobs.camera_path import pinhole
 from rift_cl.jobs.cameras.film import first_view
 from rift_cl.jobs.scene_bounds import SceneBounds, bounds_of_cameras
 from rift_cl.jobs.viewing.crop import Crop, cropped
-from rift_cl.jobs.viewing.key_frames import path_file, way_through
+from rift_cl.jobs.viewing.key_frames import KeyFrame, path_file, way_through
 from rift_cl.jobs.viewing.photographs import (
     Photograph,
     compared,
@@ -23,9 +24,11 @@ from rift_cl.jobs.viewing.photographs import (
     seen_by,
     taken_from,
 )
+from rift_cl.jobs.viewing.picture import Painter
 from rift_cl.jobs.viewing.pose import Pose
 from rift_cl.jobs.viewing.standpoint import standpoint_of
 from rift_cl.jobs.viewing.viewer import SplatViewer
+from rift_cl.jobs.viewing.wish import Wish
 from rift_cl.splat.splats import Splats
 
 HERE, UP = [3.0, 0, 0.5], np.array([0.0, 0, 1])
@@ -126,19 +129,20 @@ def test_a_box_has_twelve_edges_each_along_one_axis():
 
 def test_the_exported_path_is_read_back_as_the_way_that_was_played(tmp_path):
     keys = [
-        Pose((1.0, 0, 0, 0), (0.0, 0, -4), 0.8, 1.5),
-        Pose((0.9, 0, 0.1, 0), (1.0, 0, -4), 0.6, 1.4),
-        Pose((0.8, 0, 0.2, 0), (2.0, 1, -3), 0.7, 1.5),
+        KeyFrame(Pose((1.0, 0, 0, 0), (0.0, 0, -4), 0.8, 1.5), Aperture(0.1, 2.0)),
+        KeyFrame(Pose((0.9, 0, 0.1, 0), (1.0, 0, -4), 0.6, 1.4), Aperture(0.1, 3.0)),
+        KeyFrame(Pose((0.8, 0, 0.2, 0), (2.0, 1, -3), 0.7, 1.5)),
     ]
     way = way_through(keys, 3, 300)
     assert len(way) == 9 and {camera.size for camera in way} == {(200, 300)}
-    np.testing.assert_allclose(way[4].center, keys[1].position, atol=1e-12)
+    np.testing.assert_allclose(way[4].center, keys[1].pose.position, atol=1e-12)
     (tmp_path / "path.json").write_bytes(path_file(way))
     views = open_capture(tmp_path / "path.json", photographs=False).views
     for view, camera in zip(views, way, strict=True):
         assert view.camera.size == camera.size
         np.testing.assert_allclose(view.camera.view, camera.view, atol=1e-6)
         np.testing.assert_allclose(view.camera.K, camera.K, rtol=1e-9)
+        assert view.camera.aperture == camera.aperture
 
 
 @pytest.fixture
@@ -202,3 +206,31 @@ def test_key_frames_become_a_file_to_render(shown):
         assert file["filename"] == "path.json" and file["size_bytes"] > 1000
         page.press("key frames", "clear")
         until(lambda: not viewer._page.path.cameras())
+
+
+def test_the_lens_is_that_of_the_photograph_until_it_is_set(shown):
+    viewer, _ = shown
+    lens = viewer._page.lens
+    assert viewer._page.wish.aperture is None and viewer._page.hands_over is False
+    lens.take(Aperture(0.05, 2.0))
+    found = viewer._page.wish.aperture
+    assert found.radius == pytest.approx(0.05, rel=0.01) and found.focus == pytest.approx(2.0)
+    with dialled(viewer.url) as socket:
+        page = Wire(socket)
+        until(lambda: viewer._clients)
+        page.press("photograph", "next")
+        until(lambda: viewer._page.wish.aperture is None)
+
+
+def test_a_photograph_that_is_gone_is_said_and_the_picture_drawn(capture, tmp_path):
+    moved = tmp_path / "transforms.json"
+    moved.write_bytes((capture / "transforms.json").read_bytes())
+    photographs = photographs_of(open_capture(moved, photographs=False).views)
+    device = rift.default_device()
+    given = {"means": [[0.0, 0, 0]], "quats": [[1.0, 0, 0, 0]], "scales": np.ones((1, 3))}
+    splats = Splats.upload(device, opacities=[0.5], colors=np.ones((1, 3)), **given)
+    camera = photographs[0].camera
+    painter = Painter(np.zeros(3, np.float32), "display", bounds_of_cameras([camera]))
+    wish = Wish(comparison="wipe", share=0.5, photograph=photographs[0])
+    picture = painter.paint(splats, rift.Renderer(device=device), camera, wish, 0)
+    assert picture.shape == (*camera.size, 3) and photographs[0].name in painter.trouble

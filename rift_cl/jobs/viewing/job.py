@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from rift_cl.cl.discovery import open_device
-from rift_cl.io.capture import View, open_capture
+from rift_cl.io.capture import View, as_pinholes, open_capture
 from rift_cl.jobs.camera_path import resized
 from rift_cl.jobs.cameras.film import first_view
 from rift_cl.jobs.orbit_input import OrbitInput
@@ -99,8 +99,13 @@ class ViewJob:
 def _views(settings: ViewSettings, scene: OpenedScene) -> Sequence[View]:
     """The photographs of --capture, or of the fit."""
     if settings.capture is not None:
-        return open_capture(settings.capture, photographs=False).views
-    return () if scene.cameras is None else scene.cameras.views
+        capture = open_capture(settings.capture, photographs=False)
+    elif scene.cameras is not None:
+        capture = scene.cameras.reopened
+    else:
+        return ()
+    # Where lenses were taken for pinholes, what is out of focus is so in the splats.
+    return (as_pinholes(capture) if scene.pinhole else capture).views
 
 
 def _moving(settings: ViewSettings, scene: OpenedScene, bounds: SceneBounds) -> MovingSplats | None:

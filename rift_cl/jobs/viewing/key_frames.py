@@ -4,15 +4,29 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from rift_cl.geometry import Camera
+from rift_cl.geometry import Aperture, Camera
 from rift_cl.io.output import json_text
 from rift_cl.io.transforms_record import transforms_of
 from rift_cl.jobs.camera_path import smooth_path
 from rift_cl.jobs.viewing.pose import Pose
 
 
-def way_through(keys: Sequence[Pose], between: int, edge: int) -> list[Camera]:
+@dataclass(frozen=True)
+class KeyFrame:
+    """Where a page's camera was, and its lens; None for a pinhole."""
+
+    pose: Pose
+    aperture: Aperture | None = None
+
+    def camera(self, aspect: float, edge: int) -> Camera:
+        """The camera of a picture with this width by height, and so many pixels along an edge."""
+        seen = dataclasses.replace(self.pose, aspect=aspect).camera(edge)
+        return Camera(seen.size, seen.K, seen.view, seen.model, self.aperture)
+
+
+def way_through(keys: Sequence[KeyFrame], between: int, edge: int) -> list[Camera]:
     """The cameras of a way.
 
     Args:
@@ -23,8 +37,7 @@ def way_through(keys: Sequence[Pose], between: int, edge: int) -> list[Camera]:
     Raises:
         InputError: a pose makes no sense.
     """
-    shape = keys[0].aspect
-    cameras = [dataclasses.replace(key, aspect=shape).camera(edge) for key in keys]
+    cameras = [key.camera(keys[0].pose.aspect, edge) for key in keys]
     return smooth_path(cameras, between)
 
 

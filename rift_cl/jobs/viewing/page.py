@@ -20,6 +20,7 @@ from rift_cl.errors import InputError
 from rift_cl.jobs.scene_bounds import SceneBounds
 from rift_cl.jobs.viewing.crop_panel import CropPanel
 from rift_cl.jobs.viewing.guard import Guard
+from rift_cl.jobs.viewing.lens_panel import LensPanel
 from rift_cl.jobs.viewing.path_panel import PathPanel
 from rift_cl.jobs.viewing.photograph_panel import PhotographPanel
 from rift_cl.jobs.viewing.photographs import Photograph
@@ -90,9 +91,13 @@ class ViewerPage:
         )
         self._begin_at(first)
         self.view = ViewPanel(self._server, size, first, asked, moving=moving)
-        self.photographs = PhotographPanel(self._server, photographs, number, bounds, asked)
+        reach = float(np.linalg.norm(first.target - first.position))
+        opening = photographs[number].camera.aperture if photographs else None
+        self.lens = LensPanel(self._server, reach, opening, asked)
+        given = (self._server, photographs, number, bounds, self.lens)
+        self.photographs = PhotographPanel(*given, asked)
         self.crop = CropPanel(self._server, bounds, asked)
-        self.path = PathPanel(self._server, lambda: self.view.size)
+        self.path = PathPanel(self._server, self.lens, lambda: self.view.size)
 
     def _begin_at(self, first: Standpoint) -> None:
         """Where the camera of a page that is opened stands."""
@@ -112,6 +117,7 @@ class ViewerPage:
         return Wish(
             kind=self.view.kind,
             edge=self.view.size,
+            aperture=self.lens.aperture,
             crop=self.crop.box,
             comparison=how,
             share=0.0 if how == "off" else photographs.share,
@@ -120,8 +126,9 @@ class ViewerPage:
 
     @property
     def hands_over(self) -> bool:
-        """Whether a browser may draw by itself: colours alone, and where nobody asked us to."""
-        return self.view.kind == KINDS[0] and self.view.browser_draws
+        """Whether a browser may draw by itself: colours of pinholes, if nobody asked us to."""
+        plain = self.view.kind == KINDS[0] and self.lens.aperture is None
+        return plain and self.view.browser_draws
 
     def watch(
         self,

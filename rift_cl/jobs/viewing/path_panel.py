@@ -10,8 +10,8 @@ import numpy as np
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
-from rift_cl.jobs.viewing.key_frames import path_file, way_through
-from rift_cl.jobs.viewing.pose import Pose
+from rift_cl.jobs.viewing.key_frames import KeyFrame, path_file, way_through
+from rift_cl.jobs.viewing.lens_panel import LensPanel
 from rift_cl.jobs.viewing.standpoint import Standpoint
 from rift_cl.jobs.viewing.viser_camera import go, pose_of
 
@@ -24,11 +24,13 @@ class PathPanel:
 
     Args:
         server: viser's.
+        lens: of a key frame, and of what is played.
         size: gives the longer edge of an exported picture in pixels.
     """
 
-    def __init__(self, server: Any, size: Callable[[], int]) -> None:
-        self._size, self._keys, self._stop = size, list[Pose](), threading.Event()
+    def __init__(self, server: Any, lens: LensPanel, size: Callable[[], int]) -> None:
+        self._lens, self._size = lens, size
+        self._keys, self._stop = list[KeyFrame](), threading.Event()
         with server.gui.add_folder("path", expand_by_default=False):
             gui = server.gui
             self._count = gui.add_markdown("")
@@ -69,7 +71,7 @@ class PathPanel:
         if what == "add":
             pose = pose_of(client.camera)
             if pose is not None and len(self._keys) < _MOST_KEYS:
-                self._keys.append(pose)
+                self._keys.append(KeyFrame(pose, self._lens.aperture))
         elif what == "clear":
             self._keys.clear()
         elif self._keys:
@@ -92,6 +94,8 @@ class PathPanel:
             _, down, forward = camera.view[:3, :3]
             fov = 2 * np.arctan(camera.height / 2 / camera.intrinsics[1])
             target = camera.center + reach * forward
+            if camera.aperture != self._lens.aperture:
+                self._lens.take(camera.aperture)
             go(client, Standpoint(camera.center, target, -down, float(fov)))
             if stopped.wait(1 / _RATE):
                 break

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rift_cl.jobs.scene_bounds import SceneBounds
+from rift_cl.jobs.viewing.lens_panel import LensPanel
 from rift_cl.jobs.viewing.photographs import COMPARISONS, Comparison, Photograph
 from rift_cl.jobs.viewing.standpoint import standpoint_of
 from rift_cl.jobs.viewing.viser_camera import go, wxyz_of
@@ -26,6 +27,7 @@ class PhotographPanel:
         photographs: in the order in which they are stepped through.
         number: of the photograph that the page opens at.
         bounds: of the scene.
+        lens: is set to what a photograph was taken through.
         asked: called when anything is changed.
     """
 
@@ -35,8 +37,10 @@ class PhotographPanel:
         photographs: Sequence[Photograph],
         number: int,
         bounds: SceneBounds,
+        lens: LensPanel,
         asked: Callable[[], None],
     ) -> None:
+        self._lens = lens
         self._photographs, self._bounds, self._asked = photographs, bounds, asked
         self._number = number
         if photographs:
@@ -100,6 +104,7 @@ class PhotographPanel:
         aspect = client.camera.aspect
         camera, bounds = self._photographs[number].camera, self._bounds
         go(client, standpoint_of(camera, bounds.center, bounds.up, aspect))
+        self._lens.take(camera.aperture)
         self._asked()
 
     def _frustum(self, scene: Any, number: int) -> Any:

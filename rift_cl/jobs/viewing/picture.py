@@ -25,7 +25,7 @@ Floats = NDArray[np.float32]
 class Painter:
     """Draws what is wished for, and keeps what the next picture may be made of.
 
-    ``drawn`` counts how often splats were drawn.
+    ``drawn`` counts how often splats were drawn; ``trouble`` says what the last picture lacks.
 
     Args:
         background: (3,) behind the splats, in their light.
@@ -37,7 +37,7 @@ class Painter:
         self._background, self._light = background, light
         distance = bounds.distance
         self._reach = bounds.radius if distance is None else distance
-        self.drawn = 0
+        self.drawn, self.trouble = 0, ""
         # The splats in a box, what was drawn last, and the photograph as it was seen last.
         self._kept: dict[str, tuple[Any, Any]] = {}
 
@@ -53,13 +53,15 @@ class Painter:
             wish: what the page asks for.
             version: changes whenever the splats do.
         """
-        key = (camera, wish.kind, wish.crop, version)
+        lensed = Camera(camera.size, camera.K, camera.view, camera.model, wish.aperture)
+        key = (lensed, wish.kind, wish.crop, version)
         drawn = self._known("drawn", key, lambda: self._drawn(splats, renderer, *key))
-        photograph = wish.photograph
+        photograph, self.trouble = wish.photograph, ""
         if photograph is None or not taken_from(photograph, camera, self._reach):
             return np.asarray(drawn)
         seen = self._known("seen", (photograph, camera), lambda: _seen(photograph, camera))
-        if seen is None:
+        if isinstance(seen, RiftError):
+            self.trouble = str(seen)
             return np.asarray(drawn)
         image, known = seen
         return compared(drawn, image, known, wish.comparison, wish.share)
@@ -90,8 +92,8 @@ class Painter:
 
 
 def _seen(photograph: Photograph, camera: Camera) -> Any:
-    """A photograph from the page's camera; None where it is gone."""
+    """A photograph from the page's camera, or why it cannot be had."""
     try:
         return seen_by(photograph, camera)
-    except RiftError:
-        return None
+    except RiftError as error:
+        return error

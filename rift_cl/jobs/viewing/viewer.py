@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, RiftError
 from rift_cl.geometry import Camera
 from rift_cl.jobs.cameras.film import first_view
 from rift_cl.jobs.fit_pictures import Light
@@ -193,7 +193,13 @@ class SplatViewer:
             # What a page says is not ours to trust, and no reason to end a fit.
             return False
         begin, before = time.perf_counter(), self._painter.drawn
-        picture = self._painter.paint(splats, renderer, camera, wish, self._version)
+        try:
+            picture = self._painter.paint(splats, renderer, camera, wish, self._version)
+        except RiftError as error:
+            # Too large for the memory, say: the panel can be set to something else.
+            self._page.tell(f"this cannot be drawn: {error}")
+            client.rough = client.sharp = want
+            return False
         quality = _ROUGH if small < wish.edge else _SHARP
         self._page.show(client.handle, picture, quality)
         seconds = time.perf_counter() - begin
@@ -230,7 +236,7 @@ class SplatViewer:
             f"{len(splats)} splats, {megabytes:.1f} MiB",
             f"{camera.width} x {camera.height} pixels in {1000 * seconds:.0f} ms",
             f"{1 / max(seconds, 1e-6):.3g} pictures a second",
-            *filter(None, [self.state]),
+            *filter(None, [self.state, self._painter.trouble]),
         ]
         return "  \n".join(lines)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from rift_cl.geometry import Aperture
 from rift_cl.jobs.viewing.crop import Crop
 from rift_cl.jobs.viewing.photographs import Comparison, Photograph
 
@@ -19,6 +20,7 @@ class Wish:
     Args:
         kind: of picture.
         edge: longer edge of a picture whose camera rests, in pixels.
+        aperture: that it is drawn through; None for a pinhole.
         crop: the box outside of which nothing is drawn, or None.
         comparison: with a photograph.
         share: of the photograph.
@@ -27,6 +29,7 @@ class Wish:
 
     kind: Kind = "colour"
     edge: int = 960
+    aperture: Aperture | None = None
     crop: Crop | None = None
     comparison: Comparison = "off"
     share: float = 0.0
