@@ -15,7 +15,7 @@ from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import write_json, writing
 from rift_cl.progress import Report
 
-INSTALL = "pip install 'rift-cl[capture]'"
+INSTALL = "pip install pycolmap"
 
 # Modules come from where they come from here, not from the folder that we happen to be in.
 _CODE = "import sys; sys.path[:] = sys.argv[2:]; from rift_cl.io import colmap_steps as steps; "

@@ -56,6 +56,9 @@ def _alike(one: Any, other: Any) -> bool:
 
 
 def _words(value: Any) -> str:
+    if isinstance(value, Path):
+        # A report is passed on: whose folder it was stands in config.json alone.
+        return value.name or str(value)
     if value is None or value == ():
         return "not given"
     if isinstance(value, bool):

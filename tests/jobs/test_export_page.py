@@ -126,5 +126,5 @@ def test_colours_are_those_that_cameras_before_a_splat_see():
 def test_without_viser_there_is_a_sentence(fit, tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(__import__("sys").modules, "viser", None)
     assert main(["export", str(fit), "--out", str(tmp_path / "p.html")]) == 3
-    assert "pip install 'rift-cl[view]'" in " ".join(capsys.readouterr().err.split())
+    assert "pip install 'viser>=1.1,<1.2'" in " ".join(capsys.readouterr().err.split())
     assert not any(tmp_path.iterdir())

@@ -285,7 +285,7 @@ def test_without_viser_one_sentence_says_what_to_install(scene_file, monkeypatch
     monkeypatch.setitem(sys.modules, "viser", None)
     assert main(["view", scene_file, "--port", "0"]) == 3
     error = capsys.readouterr().err
-    assert "pip install 'rift-cl[view]'" in error and len(error.strip().splitlines()) == 1
+    assert "pip install 'viser>=1.1,<1.2'" in error and len(error.strip().splitlines()) == 1
 
 
 def test_a_port_in_use_and_numbers_without_sense_are_named(scene_file, capsys):

@@ -155,7 +155,7 @@ def test_missing_torch_is_one_sentence_that_says_what_to_do(tool, case, monkeypa
     skipped: dict[str, str] = {}
     lined = race.line_up(trainers.TRAINERS, case.device, case, skipped)
     assert [entry.name for entry in lined] == ["rift_cl"]
-    assert "pip install 'rift-cl[torch]'" in skipped["torch trainer"]
+    assert "pip install 'torch>=2.4,<2.14'" in skipped["torch trainer"]
 
 
 def test_torch_trains_the_same_splats_where_nothing_is_random(tool, case):

@@ -86,11 +86,11 @@ def test_what_is_there_is_not_made_again(figure, plan, rows, monkeypatch):
 def test_without_the_renderer_it_says_what_to_install(figure, plan, rows, monkeypatch, capsys):
     monkeypatch.setattr(figure, "find_spec", lambda name: None)
     *_, last = figure.compute(plan, None, {})
-    assert not rows and "rift-cl[render]" in last["missing"]
-    assert "rift-cl[render]" in capsys.readouterr().err
+    assert not rows and "pip install mitsuba" in last["missing"]
+    assert "pip install mitsuba" in capsys.readouterr().err
     page = Page("page")
     figure.show(page, last)
-    assert "rift-cl[render]" in page.html()
+    assert "pip install mitsuba" in page.html()
     figure.show(Page("nothing"), {"rows": [], "missing": None})
 
 

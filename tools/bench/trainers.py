@@ -90,7 +90,7 @@ class TorchTiles(TrainerContender):
         try:
             self._torch = import_module("torch")
         except ImportError as error:
-            raise MissingTorchError("torch is missing: pip install 'rift-cl[torch]'") from error
+            raise MissingTorchError("torch is missing: pip install 'torch>=2.4,<2.14'") from error
         # Of a trainer of ours: the order of views, and the extent of the scene.
         self._ours = case.trainer()
         self._trainer = import_module("bench.torch_trainer").TorchTrainer(

@@ -46,7 +46,7 @@ SETS = {
     SURFACE: "planned, as a surface",
 }
 ON_RING, OFF_RING = "on_ring", "off_ring"
-MISSING = "Mitsuba, which renders the views, is not installed: pip install 'rift-cl[render]'"
+MISSING = "Mitsuba, which renders the views, is not installed: pip install mitsuba"
 # The ring's elevation in degrees, the distance of all, in radii of the ball, and the field of view.
 _RISE, _DISTANCE, _FIELD = 12.0, 5.5, 45.0
 # Degrees that cameras may rise, the ball with its hairs, and points on it above the base.

@@ -51,7 +51,7 @@ def choose_variant(asked: str) -> tuple[str, str]:
         InputError: mitsuba is not installed, or the variant that was asked for does not work.
     """
     if find_spec("mitsuba") is None:
-        raise InputError("mitsuba is not installed: pip install 'rift-cl[render]'")
+        raise InputError("mitsuba is not installed: pip install mitsuba")
     if asked == SLOW:
         return SLOW, "as asked"
     wanted = FAST if asked == "auto" else asked

@@ -115,7 +115,7 @@ def _server() -> Any:
         viser = importlib.import_module("viser")
     except ImportError as error:
         raise InputError(
-            "a page wants viser, which is not installed: pip install 'rift-cl[view]'"
+            "a page wants viser, which is not installed: pip install 'viser>=1.1,<1.2'"
         ) from error
     guard = Guard()
     with contextlib.redirect_stdout(io.StringIO()), guard.before_viser():

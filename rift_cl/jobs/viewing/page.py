@@ -186,7 +186,7 @@ def _viser() -> Any:
         return importlib.import_module("viser")
     except ImportError as error:
         raise InputError(
-            f"showing splats in a browser needs viser ({error}): pip install 'rift-cl[view]'"
+            f"showing splats in a browser needs viser ({error}): pip install 'viser>=1.1,<1.2'"
         ) from error
 
 
