@@ -11,7 +11,7 @@ from tyro.conf import Positional
 
 from rift_cl.cl.discovery import open_device
 from rift_cl.errors import InputError
-from rift_cl.io.capture import View, camera_at, capture_name
+from rift_cl.io.capture import View, camera_at, capture_name, holds_bare_photographs
 from rift_cl.jobs.cameras.fit_cameras import FitCameras, open_fit_cameras
 from rift_cl.jobs.evaluate_report import eval_page
 from rift_cl.jobs.fit_pictures import CapturePictures
@@ -82,6 +82,18 @@ class Evaluation:
         self.metrics: dict[str, Any] = {}
 
     def _scored(self, path: Path) -> tuple[View, ...]:
+        """The views of a capture that are scored.
+
+        Raises:
+            RiftError: it cannot be read, or is the fit's own, whose photographs the fit knows.
+        """
+        fit, scene = self.scene.folder, self.settings.scene
+        inside = fit is not None and path.resolve().is_relative_to(fit.resolve())
+        if self.cameras is not None and (inside or holds_bare_photographs(path)):
+            raise InputError(
+                f"{path}: is no capture with photographs; to score what the fit held out, name "
+                f"the fit alone: rift eval {scene}"
+            )
         views = open_seen(path, pinhole=self.scene.pinhole).views
         every = self.settings.hold_out
         return views[::every] if every else views

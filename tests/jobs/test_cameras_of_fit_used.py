@@ -73,6 +73,17 @@ def test_a_capture_that_is_named_has_the_baselines_of_the_fit(home, tmp_path):
     assert "nearest_psnr" not in metrics_of(tmp_path / "all")["scores"]["photographs"]
 
 
+def test_who_names_the_photographs_or_the_fit_is_told_that_the_fit_knows_them(
+    home, tmp_path, capsys
+):
+    bare = tmp_path / "bare"
+    bare.mkdir()
+    shutil.copy(home / "photographs" / "0.png", bare)
+    for name in (bare, home / "fit", home / "fit" / "poses"):
+        assert run("eval", home / "fit", name, "--out", tmp_path / "scores") == 3
+        assert f"name the fit alone: rift eval {home / 'fit'}" in capsys.readouterr().err
+
+
 def test_photographs_that_have_moved_are_named(home, alone, tmp_path, capsys):
     assert run("eval", alone, "--out", tmp_path / "scores") == 3
     error = capsys.readouterr().err
