@@ -51,7 +51,9 @@ class OrbitInput(SceneInput):
 
     def notes(self, scene: OpenedScene) -> tuple[str, ...]:
         """What had to be guessed of a fit's cameras, a sentence each."""
-        if scene.folder is None or scene.cameras is not None or self.capture is not None:
+        known = scene.cameras is not None or self.capture is not None
+        # A scan's views are no cameras that anybody held.
+        if scene.folder is None or known or scene.splats.mode == "xray":
             return ()
         return (
             f"{self.scene} holds no cameras, since an older version fitted it: the way of the "

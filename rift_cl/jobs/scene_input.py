@@ -42,13 +42,16 @@ class SceneInput:
     device: str | None = None
     """Device to use: its number, cpu, gpu, or a part of its name; see 'rift devices'."""
 
-    def open_scene(self) -> OpenedScene:
+    def open_scene(self, *, densities: bool = False) -> OpenedScene:
         """Read the scene.
+
+        Args:
+            densities: whether it may be one of X-rays.
 
         Raises:
             RiftError: there is none, it is damaged, or a number makes no sense.
         """
-        return OpenedScene(self)
+        return OpenedScene(self, densities=densities)
 
 
 class OpenedScene:
@@ -56,26 +59,29 @@ class OpenedScene:
 
     Args:
         settings: where the scene is.
+        densities: whether it may be one of X-rays.
 
     Raises:
         InputError: there is no scene, a number makes no sense, or the scene is empty.
         FileFormatError: the scene, or what a fit wrote beside it, is damaged.
     """
 
-    def __init__(self, settings: SceneInput) -> None:
+    def __init__(self, settings: SceneInput, *, densities: bool = False) -> None:
         path = settings.scene
         self.folder = path if path.is_dir() else None
         self.name: str = path.resolve().name
         self.splats = SplatScene.load(scene_file(path))
-        if self.splats.mode == "xray":
+        if self.splats.mode == "xray" and not densities:
             raise InputError(
                 f"{path}: is an X-ray scene, of densities and not of light; its slices lie with "
-                "its fit, and 'rift export --mesh' makes a surface of it"
+                "its fit, 'rift view' shows it, and 'rift export --mesh' makes a surface of it"
             )
         if len(self.splats) == 0:
             raise InputError(f"{path}: holds no splats, there is nothing to draw")
         eps2d = self._fitted("eps2d") if settings.eps2d is None else settings.eps2d
-        drawing = SplatSettings(activation=self.splats.activation, angular=self.splats.angular)
+        drawing = SplatSettings(
+            mode=self.splats.mode, activation=self.splats.activation, angular=self.splats.angular
+        )
         self.drawing = drawing if eps2d is None else replace(drawing, eps2d=eps2d)
         self.light: Light = self._light()
         self.background: NDArray[np.float32] = self._background(settings)

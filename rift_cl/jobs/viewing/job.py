@@ -52,7 +52,7 @@ class ViewJob:
     """
 
     def __init__(self, settings: ViewSettings) -> None:
-        scene = settings.open_scene()
+        scene = settings.open_scene(densities=True)
         self.notes = settings.notes(scene)
         bounds = settings.bounds(scene)
         device = open_device(settings.device)

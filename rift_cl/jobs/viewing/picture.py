@@ -21,6 +21,9 @@ from rift_cl.splat.splats import Splats
 
 Floats = NDArray[np.float32]
 
+# Share of the line integrals of X-rays that is darker than white.
+_WHITE = 0.995
+
 
 class Painter:
     """Draws what is wished for, and keeps what the next picture may be made of.
@@ -77,7 +80,11 @@ class Painter:
     ) -> Floats:
         device, self.drawn = renderer.device, self.drawn + 1
         inside = self._known("crop", (crop, version), lambda: cropped(splats, crop, device))
-        if kind == KINDS[0] or renderer.settings.mode == "xray":
+        if renderer.settings.mode == "xray":
+            integrals = device.get(renderer.forward(inside, camera).image)[..., :3]
+            most = self._known("most", version, lambda: _most(integrals))
+            return np.asarray(np.clip(integrals / most, 0, 1))
+        if kind == KINDS[0]:
             behind = device.array(self._background)
             frame = renderer.forward(inside, camera, background=behind)
             return in_display_light(device.get(frame.image)[..., :3], self._light)
@@ -89,6 +96,11 @@ class Painter:
         if what not in self._kept or self._kept[what][0] != key:
             self._kept[what] = key, make()
         return self._kept[what][1]
+
+
+def _most(integrals: Floats) -> float:
+    """The line integral that is drawn white: nearly the largest, or 1 where there are none."""
+    return float(np.quantile(integrals, _WHITE)) or 1.0
 
 
 def _seen(photograph: Photograph, camera: Camera) -> Any:
