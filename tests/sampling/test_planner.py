@@ -47,8 +47,12 @@ def test_a_plan_in_a_sector_beats_rings_arcs_and_even_views():
     for baseline in found.baselines.values():
         assert len(baseline.cameras) == 12
         assert permitted(found.objective.site, baseline.stations)
-        assert greedy.merit < baseline.merit
-    assert "Planning pays (isotropic target, constrained cameras)" in found.verdict()
+        assert found.merit < baseline.merit
+    # A zigzag along the edge may beat the greedy choice, from which the polish begins as well.
+    for name in ("ring", "arc", "fibonacci", "random"):
+        assert greedy.merit < found.baselines[name].merit
+    # Not much is left over the best of them, the edge of the sector.
+    assert "Planning gains little (isotropic target, constrained cameras)" in found.verdict()
 
 
 @pytest.mark.parametrize("snr", [30.0, 1000.0])
@@ -91,7 +95,10 @@ def test_a_known_direction_of_detail_is_looked_at():
     target = Target.flat(60.0, snr=30.0, prior=prior, frequencies=half_disc(6 / 60, 300))
     found = plan(target, 6, Constraints(elevation=(0, 0)))
     assert np.abs(found.directions[:, 1]).min() > 0.6
-    assert found.merit < 0.6 * min(b.merit for b in found.baselines.values())
+    blind = [b.merit for name, b in found.baselines.items() if name != "quantiles"]
+    assert found.merit < 0.6 * min(blind)
+    # Those who know the power come near without a plan.
+    assert found.merit < found.baselines["quantiles"].merit < 1.1 * found.merit
     assert "anisotropic target, free cameras" in found.verdict()
 
 
