@@ -8,8 +8,9 @@ from pathlib import Path
 from rift_cl.errors import InputError
 from rift_cl.io.boundary import reading
 from rift_cl.io.colmap_model import MODEL_FOLDERS, find_model, open_model
-from rift_cl.io.photograph_folder import photograph_names, photographs_in
+from rift_cl.io.photograph_folder import other_files, photograph_names, photographs_in
 from rift_cl.io.transforms_json import open_transforms
+from rift_cl.io.video import is_video
 from rift_cl.io.view import Capture, View, as_pinholes, camera_at
 from rift_cl.io.view_image import read_view
 
@@ -72,6 +73,9 @@ def open_capture(
         raise InputError(f"{path}: holds no COLMAP model, to which images= could belong")
     bare = photograph_names(photographs_in(path))
     hint = f"; the poses of its {len(bare)} bare photographs can be found by 'rift fit'"
+    video = next((name for name in other_files(photographs_in(path)) if is_video(name)), None)
+    if not bare and video is not None:
+        bare, hint = [video], f"; 'rift fit' takes the video {video} itself"
     raise InputError(
         f"{path}: holds no capture; looked for {' and '.join(_TRANSFORMS)}, and for cameras "
         f"and images, .bin or .txt, of a COLMAP model in {', '.join(MODEL_FOLDERS)}"

@@ -33,10 +33,14 @@ _JUDGED = 480
 _JPEG = {"Compression": "jpeg:95", "jpeg:subsampling": "4:4:4"}
 
 
+def is_video(name: str) -> bool:
+    """Whether a file has the name of a video."""
+    return Path(name).suffix.lower() in VIDEOS
+
+
 def holds_video(path: str | os.PathLike[str]) -> bool:
     """Whether a path is a file that has the name of a video."""
-    path = Path(path)
-    return path.suffix.lower() in VIDEOS and path.is_file()
+    return is_video(os.fspath(path)) and Path(path).is_file()
 
 
 def demand_video(path: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 from photograph_files import NAMES, run
 from view_files import store
 
-from rift_cl.errors import PathEscapeError
+from rift_cl.errors import InputError, PathEscapeError
 from rift_cl.io import open_capture, pose_photographs, read_view
 from rift_cl.io.photograph_folder import other_files, photograph_names, photographs_in
 
@@ -103,3 +103,9 @@ def test_phones_that_are_held_upright_give_upright_views(
         image = read_view(view)
         assert image.shape == (8, 12, 3)
         assert image[:4, 6:].min() == 1 and image[4:, :6].max() < 0.2
+
+
+def test_a_folder_that_holds_a_video_alone_says_how_to_name_it(tmp_path: Path) -> None:
+    (tmp_path / "walk.MOV").write_bytes(b"video")
+    with pytest.raises(InputError, match=r"holds no capture.*takes the video walk\.MOV itself"):
+        open_capture(tmp_path)
