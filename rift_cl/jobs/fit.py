@@ -21,7 +21,7 @@ from rift_cl.jobs.cameras.photograph_place import place_record
 from rift_cl.jobs.export.fit_page import leave_page
 from rift_cl.jobs.few import evenly
 from rift_cl.jobs.fit_pictures import CapturePictures
-from rift_cl.jobs.fit_probe import MARGIN, TRIED, probed
+from rift_cl.jobs.fit_probe import TRIED, probed, time_words
 from rift_cl.jobs.fit_report import fit_page, history_notes, ramp_notes
 from rift_cl.jobs.fit_run import FitRun
 from rift_cl.jobs.fit_scores import score_record, score_views
@@ -106,7 +106,7 @@ class Fit(FitRun):
         return {
             "device memory": f"{self._need(frame) / 2**20:.0f} MiB, and about "
             f"{lists / 2**20:.0f} MiB of tile lists",
-            "time": f"about {seconds:.2g} s, {MARGIN}, from a few steps",
+            "time": time_words(seconds),
         }
 
     def _timed_reading(self) -> tuple[CapturePictures, float]:

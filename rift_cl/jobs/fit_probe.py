@@ -23,8 +23,6 @@ from rift_cl.train.trainer import Trainer
 _WARM, _TIMED = 2, 5
 # Most splats that are tried.
 TRIED = 20_000
-# What the time may be out by: steps change their pace as splats find their sizes.
-MARGIN = "give or take a half"
 # Views whose tile lists are counted.
 _VIEWS = 4
 
@@ -73,6 +71,11 @@ def probed(trainer: Trainer, most: int, clock: Callable[[], float] = time.perf_c
     if first >= many:
         return Probe((many, many), (slow, slow), each)
     return Probe((first, many), (_seconds(trainer, clock), slow), each)
+
+
+def time_words(seconds: float) -> str:
+    """A time in words; steps change their pace as splats find their sizes, and so it is rough."""
+    return f"about {float(f'{seconds:.2g}'):g} s, give or take a half, from a few steps"
 
 
 def _late(trainer: Trainer, most: int) -> Trainer:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rift_cl.io.splat_scene import XrayScene
 from rift_cl.io.volumes import VOLUME_NAMES, open_volume
 from rift_cl.jobs.few import evenly
-from rift_cl.jobs.fit_probe import MARGIN, TRIED, probed
+from rift_cl.jobs.fit_probe import TRIED, probed, time_words
 from rift_cl.jobs.fit_run import FitRun
 from rift_cl.jobs.fit_scores import score_record
 from rift_cl.jobs.fit_settings import FitSettings
@@ -75,8 +75,7 @@ class XrayFit(FitRun):
             f"{(rows[1] - rows[0], bins, bins)} (z, y, x)",
             "host memory": f"{self.input.need / 2**20:.0f} MiB",
             "device": self.device.name,
-            "time": f"about {seconds:.2g} s, {MARGIN}, from a few steps"
-            + (", and that of the solves" if settings.solve else ""),
+            "time": time_words(seconds) + (", and that of the solves" if settings.solve else ""),
         }
 
     def run(self) -> Iterator[Report]:

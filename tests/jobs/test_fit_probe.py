@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from rift_cl.jobs.fit import Fit
-from rift_cl.jobs.fit_probe import Probe, probed
+from rift_cl.jobs.fit_probe import Probe, probed, time_words
 from rift_cl.jobs.fit_settings import FitSettings
 
 
@@ -45,6 +45,11 @@ def test_what_joins_late_is_tried_too(capture, tmp_path, more):
     before = trainer.state()
     assert probed(trainer, 200).seconds[1] > 0
     assert trainer.state().keys() == before.keys()
+
+
+def test_times_are_said_in_two_figures():
+    told = [time_words(seconds).split(",")[0] for seconds in (0.123, 4.56, 98.7, 1234.0)]
+    assert told == ["about 0.12 s", "about 4.6 s", "about 99 s", "about 1200 s"]
 
 
 def test_a_dry_run_leaves_the_fit_as_it_would_be(capture, tmp_path):
