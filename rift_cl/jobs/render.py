@@ -139,6 +139,7 @@ class Render:
             "up": "({:.3g}, {:.3g}, {:.3g})".format(*bounds.up),
             "cameras": self._way(),
             "frames": f"{len(self.cameras)}, at most {largest[1]} x {largest[0]} pixels",
+            "film": self.film or "none, since frames differ in size or there is one alone",
             "eps2d": f"{self.scene.drawing.eps2d:g}",
             "device memory": f"{format_bytes(memory.fixed)} and the tile lists",
             "device": self.device.name,
