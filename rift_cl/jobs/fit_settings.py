@@ -85,7 +85,7 @@ class FitSettings(XrayOptions, BasisOptions):
     """Light that is fitted and scored: as a display shows it, or linear."""
     downscale: int | None = None
     """Whole factor by which photographs are made smaller; when not given, the least that leaves
-    none above 1.6 megapixels, or 0.6 on a processor."""
+    none above 1.6 megapixels, or 0.7 on a processor."""
     frames: int = 100
     """Frames to take of a video: the sharpest, evenly spaced."""
     hold_out: int = 8
