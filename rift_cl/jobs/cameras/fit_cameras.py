@@ -8,16 +8,15 @@ photographer's disk.
 
 from __future__ import annotations
 
-import os.path
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import FileFormatError, InputError
+from rift_cl.errors import FileFormatError, InputError, RiftError
 from rift_cl.geometry import Camera
 from rift_cl.io.capture import Capture, View
 from rift_cl.io.inria_cameras import inria_cameras
@@ -27,7 +26,13 @@ from rift_cl.io.point_cloud import write_point_cloud
 from rift_cl.io.transforms_json import open_transforms
 from rift_cl.io.transforms_record import lens_fields, transforms_of
 from rift_cl.jobs.cameras.arc import Arc, arc_of
-from rift_cl.jobs.cameras.photograph_place import are_those, kept_places, moved_place, start_of
+from rift_cl.jobs.cameras.photograph_place import (
+    are_those,
+    kept_places,
+    moved_place,
+    names_of_masks,
+    own_place,
+)
 from rift_cl.jobs.few import evenly
 from rift_cl.jobs.scene_bounds import bounds_of_cameras
 
@@ -114,7 +119,11 @@ def save_fit_cameras(
     views = [kept[view.name] for view in capture.views if view.name in kept]
     cameras = [view.camera for view in views]
     bounds = bounds_of_cameras(cameras, points=capture.points)
-    fields = [{"split": splits[view.name], **_files(view)} for view in views]
+    masks = names_of_masks(views)
+    fields = [
+        {"split": splits[view.name], **mask, **lens_fields(view.lens)}
+        for view, mask in zip(views, masks, strict=True)
+    ]
     record = transforms_of(cameras, [view.name for view in views], fields)
     if capture.points is not None:
         count = len(capture.points)
@@ -144,14 +153,6 @@ def with_poses(views: Sequence[View], cameras: Sequence[Camera]) -> tuple[View, 
         camera = Camera(own.size, own.K, other.view, own.model, own.aperture)
         moved.append(replace(view, camera=camera))
     return tuple(moved)
-
-
-def _files(view: View) -> dict[str, Any]:
-    """What a frame says of the lens and of the mask."""
-    mask = {}
-    if view.mask is not None:
-        mask = {"mask_path": Path(os.path.relpath(view.mask, start_of(view))).as_posix()}
-    return mask | lens_fields(view.lens)
 
 
 def open_fit_cameras(fit: Path, *, photographs: Path | None = None) -> FitCameras | None:
@@ -184,12 +185,17 @@ def open_fit_cameras(fit: Path, *, photographs: Path | None = None) -> FitCamera
 
 
 def _found_again(file: Path, config: Fields, fit: Path) -> Capture:
-    """The views with their photographs where those are; beside the fit if they are nowhere."""
+    """The views with their photographs where those are; in the fit if they are nowhere."""
     for place in kept_places(config, fit):
-        capture = open_transforms(file.absolute(), photographs=False, images=place)
-        if are_those(capture.views, config):
-            break
-    return capture
+        # A place that is closed to us, or that no path leads to, is one where they are not.
+        with suppress(RiftError, OSError):
+            capture = open_transforms(file.absolute(), photographs=False, images=place)
+            if are_those(capture.views, config):
+                return capture
+    with suppress(RiftError, OSError):
+        place = own_place(config, fit)
+        return open_transforms(file.absolute(), photographs=False, images=place)
+    return open_transforms(file.absolute(), photographs=False)
 
 
 def _cameras_of(capture: Capture, splits: Sequence[str | None], facts: Fields) -> FitCameras:

@@ -12,15 +12,16 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
-from rift_cl.io.capture_paths import CaptureFolder
+from rift_cl.errors import RiftError
+from rift_cl.io.capture_paths import CaptureFolder, mask_of
 from rift_cl.io.json_fields import Fields
 from rift_cl.io.view import View
 
-# Where photographs are that were put beside a fit before it was passed on.
-_BESIDE = "photographs"
+# Where photographs are that were put into a fit before it was passed on.
+_OWN = "photographs"
 
 
 def place_record(views: Sequence[View], fit: Path) -> dict[str, Any]:
@@ -30,27 +31,32 @@ def place_record(views: Sequence[View], fit: Path) -> dict[str, Any]:
         views: one or more of one capture.
         fit: the folder of the fit.
     """
-    start = start_of(views[0])
-    files = [file for view in views for file in (view.image, view.mask) if file is not None]
-    root = Path(os.path.commonpath([start, *(file.parent for file in files)]))
-    record = {
-        "folder": str(root),
-        "below": start.relative_to(root).as_posix(),
-        "bytes": _sizes(views),
-    }
+    place = _place_of(views)
+    record = {"folder": str(place.root), "below": place.below, "bytes": _sizes(views)}
     # To another drive of Windows there is no way.
     with suppress(ValueError):
-        record["from_fit"] = Path(os.path.relpath(root, fit.absolute())).as_posix()
+        record["from_fit"] = Path(os.path.relpath(place.root, fit.absolute())).as_posix()
     return record
 
 
-def start_of(view: View) -> Path:
-    """The folder that the name of a view starts from."""
-    return view.image.parents[len(Path(view.name).parts) - 1]
+def names_of_masks(views: Sequence[View]) -> list[dict[str, str]]:
+    """What each frame says of its mask: nothing where all of them are found by their names.
+
+    COLMAP's masks lie beside the folder that the names of photographs start from, where a path
+    inside the fit's folder would not lead.
+    """
+    place = _place_of(views)
+    if all(_is_by_name(view, place) for view in views):
+        return [{} for _ in views]
+    masks = [(view.mask, _start_of(view)) for view in views]
+    return [
+        {} if mask is None else {"mask_path": Path(os.path.relpath(mask, start)).as_posix()}
+        for mask, start in masks
+    ]
 
 
 def kept_places(config: Fields, fit: Path) -> Iterator[CaptureFolder]:
-    """Where the photographs of a fit may be, for ``are_those`` to tell; last, beside the fit.
+    """Where the photographs of a fit may be, for ``are_those`` to tell.
 
     Args:
         config: what ``config.json`` holds.
@@ -63,9 +69,17 @@ def kept_places(config: Fields, fit: Path) -> Iterator[CaptureFolder]:
     below = record.text("below") or ""
     for name, start in (("folder", Path()), ("from_fit", fit)):
         way = record.text(name)
-        if way is not None and "\0" not in way:
+        if way is not None and "\0" not in way and not _is_of_another_machine(way):
             yield CaptureFolder(_absolute(start / way), below)
-    yield CaptureFolder(_absolute(fit), f"{_BESIDE}/{below}")
+
+
+def own_place(config: Fields, fit: Path) -> CaptureFolder:
+    """Where photographs are that were put into a fit; arguments and errors as above."""
+    below, folder = _record(config).text("below") or "", _absolute(fit)
+    # A link that leads out of the fit is followed no more than a name that does.
+    if (folder / _OWN).is_symlink():
+        return CaptureFolder(folder, f"{_OWN}/{below}")
+    return CaptureFolder(folder / _OWN, below)
 
 
 def are_those(views: Sequence[View], config: Fields) -> bool:
@@ -87,8 +101,36 @@ def moved_place(folder: Path, name: str) -> CaptureFolder:
         name: of one of them.
     """
     root = _absolute(folder)
-    below = "images" if not (root / name).is_file() and (root / "images").is_dir() else ""
-    return CaptureFolder(root, below)
+    if (root / name).is_file():
+        # Masks lie beside ``images``.
+        beside = root.name == "images"
+        return CaptureFolder(root.parent, root.name) if beside else CaptureFolder(root)
+    return CaptureFolder(root, "images" if (root / "images").is_dir() else "")
+
+
+def _place_of(views: Sequence[View]) -> CaptureFolder:
+    """The folder that holds all photographs and masks of one or more views of one capture."""
+    start = _start_of(views[0])
+    files = [file for view in views for file in (view.image, view.mask) if file is not None]
+    root = Path(os.path.commonpath([start, *(file.parent for file in files)]))
+    return CaptureFolder(root, start.relative_to(root).as_posix())
+
+
+def _start_of(view: View) -> Path:
+    """The folder that the name of a view starts from."""
+    return view.image.parents[len(Path(view.name).parts) - 1]
+
+
+def _is_by_name(view: View, place: CaptureFolder) -> bool:
+    """Whether the mask of a view, or that it has none, is found without being named."""
+    with suppress(RiftError):
+        return view.mask == mask_of(view.name, place, view.name)
+    return False
+
+
+def _is_of_another_machine(way: str) -> bool:
+    """Whether Windows would ask another machine for it, and say there who asks."""
+    return PureWindowsPath(way).drive.startswith("\\\\")
 
 
 def _record(config: Fields) -> Fields:
@@ -105,7 +147,7 @@ def _sizes(views: Sequence[View]) -> dict[str, int | None]:
     found = {}
     for view in views:
         for file in filter(None, (view.image, view.mask)):
-            found[Path(os.path.relpath(file, start_of(view))).as_posix()] = _size(file)
+            found[Path(os.path.relpath(file, _start_of(view))).as_posix()] = _size(file)
     return found
 
 
