@@ -138,16 +138,19 @@ class Analysis:
         rows = [(row[0], *(round(float(n), 6) for n in row[1:4])) for row in self._rows(cameras)]
         columns = ("add", "azimuth, °", "elevation, °", f"distance, {sampled.units}")
         more = sampled.with_cameras(cameras)
-        before, after = self._unknown(sampled), self._unknown(more)
-        what = "the target's power would stay unknown"
+        start = f"With {len(cameras)} more views like those at hand"
         if sampled.opaque:
             far = usual_distance(sampled)
-            before, after = sides_of(sampled, far).unseen, sides_of(more, far).unseen
-            what = "the target's sides would be seen by no view"
-        text = (
-            f"With {len(cameras)} more views like those at hand {after:.3%} of {what}, instead of "
-            f"{before:.3%}."
-        )
+            gaps = [sides_of(one, far).gap for one in (more, sampled)]
+            text = (
+                f"{start} the side that is farthest from all views would lie {gaps[0]:.3g} degrees "
+                f"from the nearest, instead of {gaps[1]:.3g}."
+            )
+        else:
+            text = (
+                f"{start} {self._unknown(more):.3%} of the target's power would stay unknown, "
+                f"instead of {self._unknown(sampled):.3%}."
+            )
         names = ("azimuth", "elevation", "distance")
         figures = {
             "add": [dict(zip(names, row[1:], strict=True)) for row in rows],

@@ -54,7 +54,7 @@ def analysis_page(
 
 def _unknown(sampled: Sampled, value: float) -> dict[str, str]:
     if sampled.opaque:
-        return {"texture and sheen that stay unknown, added": f"{value:.3g} of 2"}
+        return {}
     target = sampled.target
     return {
         "power that stays unknown": f"{value:.3%}, of a target whose power falls as 1/k^2 up to "

@@ -1,4 +1,8 @@
-"""What views of an opaque target miss, and what limits their detail: figures and sentences."""
+"""What views of an opaque target miss, and what limits their detail: figures and sentences.
+
+Sentences are of verdicts that hold against errors of held-out photographs (``verdicts``); the rest
+are figures in metrics.json.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ import numpy as np
 from rift_cl.jobs.analyze_facts import WHY, Findings, length_in_words, one_place
 from rift_cl.jobs.sampled import Sampled
 from rift_cl.jobs.surfaces import SQUARE, sides_of
+from rift_cl.jobs.verdicts import said
 from rift_cl.sampling.surface_limits import SurfaceLimits, surface_limits
 
 _KEYS = ("pixel", "diffraction", "depth_of_field", "reached")
@@ -26,14 +31,20 @@ def surface_missing(sampled: Sampled, distance: float) -> Findings:
     sides = sides_of(sampled, distance)
     figures = {
         "mode": "surface",
+        "largest_gap_degrees": sides.gap,
         "unseen_sides": sides.unseen,
         "sides_seen_once": sides.seen_once,
         "shut_sides": None if sampled.space is None else sides.shut,
     }
-    sentences = [
-        f"{sides.unseen:.1%} of the target's sides are seen by no view within {SQUARE:.0f} degrees "
-        f"of straight on, {sides.seen_once:.1%} by one alone."
-    ]
+    way = "({:.2f}, {:.2f}, {:.2f})".format(*(sides.farthest + 0.0))
+    sentences = said(
+        {
+            "angle": f"The side of the target that is farthest from all views, {way}, lies "
+            f"{sides.gap:.3g} degrees from the nearest of them.",
+            "sides": f"{sides.unseen:.1%} of the target's sides are seen by no view within "
+            f"{SQUARE:.0f} degrees of straight on, {sides.seen_once:.1%} by one alone.",
+        }
+    )
     if sampled.space is None:
         sentences.append(
             "What stands in the way is not known: analyse the folder of a fit, or a COLMAP model "
@@ -61,23 +72,25 @@ def surface_resolution(sampled: Sampled, names: tuple[str, ...]) -> Findings:
             point["point"],
             *(length_in_words(point[key], sampled) for key in _KEYS),
             point["limited_by"],
-            _depth(point["depth"]),
         )
         for point in points
     ]
     caption = (
         f"One cycle of the finest detail, in {units}, as the middle one of the cameras tells it; a "
-        "dash is no limit. Depth is what a pixel of parallax is worth between the two views that "
-        "lie farthest apart."
+        "dash is no limit."
     )
     first = points[0]
-    sentences = [
-        f"The {first['limited_by']} limits detail at the {names[0]}, to a cycle of "
-        f"{length_in_words(first['reached'], sampled)} {units}: {WHY[first['limited_by']]}.",
-        _parallax(first["parallax_degrees"], first["depth"], units),
-    ]
-    table = ((*_HEADS, f"depth, {units}"), rows, caption)
-    return Findings({"limits": points}, (table,), tuple(sentences))
+    sentences = said(
+        {
+            "pixel": f"The {first['limited_by']} limits detail at the {names[0]}, to a cycle of "
+            f"{length_in_words(first['reached'], sampled)} {units}: {WHY[first['limited_by']]}.",
+            "parallax": f"The views that see it lie up to {first['parallax_degrees']:.3g} degrees "
+            f"apart, so that a pixel of parallax is {first['depth']:.3g} {units} of depth.",
+        }
+    )
+    if not np.isfinite(first["depth"]):
+        sentences.append("No two views see it from different sides: nothing tells its depth.")
+    return Findings({"limits": points}, ((_HEADS, rows, caption),), tuple(sentences))
 
 
 def _ends(found: SurfaceLimits, p: int, name: str) -> dict[str, Any]:
@@ -89,16 +102,3 @@ def _ends(found: SurfaceLimits, p: int, name: str) -> dict[str, Any]:
         "parallax_degrees": math.degrees(found.parallax[p]),
         "depth": float(found.depth[p]),
     }
-
-
-def _depth(depth: float) -> str:
-    return f"{depth:.3g}" if np.isfinite(depth) else "not told"
-
-
-def _parallax(degrees: float, depth: float, units: str) -> str:
-    if not np.isfinite(depth):
-        return "No two views see it from different sides: nothing tells its depth."
-    return (
-        f"The views that see it lie up to {degrees:.3g} degrees apart (a right angle counts at "
-        f"most), so that a pixel of parallax is {depth:.3g} {units} of depth."
-    )

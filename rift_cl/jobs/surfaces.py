@@ -29,7 +29,7 @@ ASTRAY = 15.0
 _TRUSTED = 0.8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sides:
     """Shares of all sides of a target.
 
@@ -37,11 +37,15 @@ class Sides:
         shut: from which it cannot be looked at, since something stands in the way.
         unseen: of the others, those that no view sees within ``SQUARE`` degrees.
         seen_once: of the others, those that a single view sees.
+        gap: degrees from the side that lies farthest from all views to the nearest of them.
+        farthest: (3,) the direction of that side.
     """
 
     shut: float
     unseen: float
     seen_once: float
+    gap: float
+    farthest: Floats
 
 
 def trusted(space: FreeSpace | None, sampled: Sampled) -> bool:
@@ -106,8 +110,15 @@ def sides_of(sampled: Sampled, distance: float) -> Sides:
     looks = sampled.looks(target.center + target.diameter / 2 * ways)
     square = np.einsum("vpd,pd->vp", looks.direction, ways) >= math.cos(math.radians(SQUARE))
     count = (square & (looks.weight > 0)).sum(axis=0)
-    whole = len(_ways(sampled, _SIDES))
-    return Sides(1 - len(ways) / whole, float(np.mean(count == 0)), float(np.mean(count == 1)))
+    nearest = (ways @ sampled.directions().T).max(axis=1)
+    worst = int(np.argmin(nearest))
+    return Sides(
+        shut=1 - len(ways) / len(_ways(sampled, _SIDES)),
+        unseen=float(np.mean(count == 0)),
+        seen_once=float(np.mean(count == 1)),
+        gap=math.degrees(math.acos(min(1.0, float(nearest[worst])))),
+        farthest=ways[worst],
+    )
 
 
 def _ways(sampled: Sampled, count: int) -> Floats:

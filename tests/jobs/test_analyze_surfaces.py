@@ -76,6 +76,8 @@ def test_no_camera_is_suggested_behind_a_wall_that_sparse_points_show(walled, tm
     # Fur is resolved however few the views are.
     assert {point["limited_by"] for point in found["limits"]} == {"pixel"}
     assert "number of views" not in page and "the sparse points" in page
+    # What did not hold against held-out photographs is not said.
+    assert "farthest from all views" in page and "a pixel of parallax is" not in page
 
 
 def test_fitted_splats_tell_what_is_in_the_way_as_well(tmp_path):
