@@ -56,13 +56,13 @@ def _command(name: str, earlier: Any = None) -> Callable[..., Callable[[], int]]
 
 def _earlier(name: str, arguments: Sequence[str]) -> Any:
     """The settings of the run that ``--config`` names, which options change; else None."""
-    if name != "reconstruct":
+    if name not in ("fit", "reconstruct"):
         return None
-    from rift_cl.jobs.reconstruct.settings import ReconstructSettings
     from rift_cl.jobs.saved_settings import named_config, saved_settings
 
-    path = named_config(arguments)
-    return None if path is None else saved_settings(path, name, ReconstructSettings)
+    path, (_, home, settings) = named_config(arguments), _COMMANDS[name]
+    found = getattr(import_module(f"rift_cl.jobs.{home}"), settings)
+    return None if path is None else saved_settings(path, name, found)
 
 
 def _devices(settings: Any, output: Output) -> None:

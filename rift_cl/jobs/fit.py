@@ -161,6 +161,11 @@ class Fit(FitRun):
             )
         trainer = self._trainer(capture, pictures)
         yield from self._read_ahead(trainer, pictures)
+        self.settled = dataclasses.replace(
+            settings,
+            homogenise=settings.exponent_for(len(self.seen)),
+            downscale=self.downscale,
+        )
         yield from self._trained(trainer, pictures)
         if trainer.poses is not None:
             found = [trainer.poses.camera(number) for number in range(len(self.seen))]
@@ -186,13 +191,13 @@ class Fit(FitRun):
             **settings.basis_facts(),
             **score_record(self.scores),
         }
-        exponent = settings.exponent_for(len(self.seen))
-        decided = dataclasses.replace(settings, homogenise=exponent, downscale=self.downscale)
         ramp = ramp_notes(settings, len(self.seen))
         notes = [*self._notes(), *ramp, *history_notes(self._history)]
         scene = leave_page(settings.out, pictures, self.announce)
         page = fit_page(capture.path.name, self.scores, self.losses, self.metrics, notes, scene)
-        self.folder.finish(decided, self.metrics, page, self.device, asked=settings, **self.decided)
+        self.folder.finish(
+            self.settled, self.metrics, page, self.device, asked=settings, **self.decided
+        )
 
     def _read_ahead(self, trainer: Trainer, pictures: CapturePictures) -> Iterator[Report]:
         """Read the photographs that the steps will ask for, so that the first are as fast as all.

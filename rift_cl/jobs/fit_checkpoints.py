@@ -29,7 +29,8 @@ class FitCheckpoints:
 
     Args:
         folder: where they are.
-        decisive: what decides the fit's result; JSON.
+        decisive: what decides the fit's result, as it was asked for; JSON. In ``decided`` is the
+            same with what the fit decided by itself.
         device: the device's name, on which the bits depend as well.
     """
 
@@ -41,6 +42,7 @@ class FitCheckpoints:
             "device": device,
         }
         self.history: History = []
+        self.decided: dict[str, Any] = decisive
 
     def save(self, trainer: Trainer, losses: Losses) -> None:
         """Write one.
@@ -51,7 +53,7 @@ class FitCheckpoints:
         arrays = trainer.state()
         if losses:
             arrays["losses"] = np.array(losses, float)
-        facts = {**self._facts, "history": self.history}
+        facts = {**self._facts, "decided": self.decided, "history": self.history}
         save_checkpoint(self.folder, Checkpoint(trainer.parameters.step, arrays, facts))
 
     def restore(self, trainer: Trainer) -> Losses:
@@ -71,6 +73,10 @@ class FitCheckpoints:
             return []
         self._compare(found.facts)
         self.history = self._stages(found)
+        self._facts["settings"] = {
+            **found.facts["settings"],
+            "steps": self._facts["settings"]["steps"],
+        }
         arrays = dict(found.arrays)
         losses = arrays.pop("losses", np.empty((0, 2)))
         trainer.restore(arrays)
@@ -79,7 +85,11 @@ class FitCheckpoints:
     def _compare(self, facts: Any) -> None:
         before, now = facts.get("settings", {}), self._facts["settings"]
         names = (before.keys() | now.keys()) - {"steps"}
-        differing = sorted(k for k in names if before.get(k) != now.get(k))
+        # What was left open may be said now, if it is what was decided then.
+        open_then = {k: v for k, v in facts.get("decided", {}).items() if before.get(k) is None}
+        differing = sorted(
+            k for k in names if now.get(k) not in (before.get(k), open_then.get(k, before.get(k)))
+        )
         if differing:
             name = differing[0]
             raise CheckpointError(

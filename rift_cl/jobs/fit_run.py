@@ -32,6 +32,8 @@ class FitRun:
     def __init__(self, settings: FitSettings) -> None:
         settings.check()
         self.settings = settings
+        # With a value for all that was left open, once it is decided.
+        self.settled = settings
         self.training, self.drawing = settings.training(), settings.drawing()
         self.folder = RunFolder(
             settings.out, "fit", overwrite=settings.overwrite, resume=settings.resume
@@ -54,6 +56,7 @@ class FitRun:
 
     def _trained(self, trainer: Trainer, pictures: Any) -> Iterator[Report]:
         """Train, with a checkpoint now and then, at the end, and when broken off."""
+        self.checkpoints.decided = self.settled.decisive()
         if self.settings.resume:
             self.losses = self.checkpoints.restore(trainer)
             self._demand_a_beginning(trainer)

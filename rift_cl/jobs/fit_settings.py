@@ -27,7 +27,7 @@ _POSE_RATE, _EXPOSURE_RATE = 1e-3, 1e-2
 _MOST_STEPS = 2**62
 # What may differ between a run and the one that goes on with it: it changes no bit of the result.
 _FREE = (
-    *("out", "resume", "overwrite", "dry_run", "checkpoint_every", "view", "device"),
+    *("out", "resume", "overwrite", "dry_run", "checkpoint_every", "view", "device", "config"),
     *("memory", "format"),
 )
 
@@ -100,6 +100,9 @@ class FitSettings(XrayOptions, BasisOptions):
     """Go on from the last checkpoint in the same folder, to the same bits. With more --steps than
     before a fit, finished or not, is trained on: from there with the learning rates, densification
     and final phase that a fit of so many steps has, so that rates rise again before they fall."""
+    config: Path | None = None
+    """config.json of an earlier fit, whose settings, with every value that was decided there, are
+    taken where nothing else is given."""
     view: bool = False
     """Show the fit in a browser while it runs, on this machine alone."""
     device: str | None = None
@@ -239,7 +242,7 @@ class FitSettings(XrayOptions, BasisOptions):
         words = ["rift", "fit", str(self.capture)]
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if field.name in ("capture", "overwrite", "resume") or value == field.default:
+            if field.name in ("capture", "config", "overwrite", "resume") or value == field.default:
                 continue
             words.append("--" + field.name.replace("_", "-"))
             if not isinstance(value, bool):

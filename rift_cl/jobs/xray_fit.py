@@ -94,6 +94,13 @@ class XrayFit(FitRun):
         pictures = XrayPictures(self.device, seen)
         trainer = self._trainer(seen, pictures)
         first = self._start_error(trainer, seen)
+        self.settled = dataclasses.replace(
+            self.settings,
+            homogenise=self.settings.exponent,
+            center=whole.center,
+            rows=self.input.rows,
+            pitch=self.input.pitch,
+        )
         yield from self._trained(trainer, pictures)
         splats, volume = trainer.parameters.drawn, backprojected(self.device, seen)
         if self.unseen:
@@ -168,14 +175,7 @@ class XrayFit(FitRun):
         self.folder.drop(*(set(VOLUME_NAMES.values()) - {path.name}))
         shown = (slices, density * volume)
         page = xray_page(source.scan.path.name, shown, self.scores, self.losses, self.metrics)
-        decided = dataclasses.replace(
-            settings,
-            homogenise=settings.exponent,
-            center=whole.center,
-            rows=source.rows,
-            pitch=pitch,
-        )
-        self.folder.finish(decided, self.metrics, page, self.device, asked=settings)
+        self.folder.finish(self.settled, self.metrics, page, self.device, asked=settings)
 
     def _voxels(self, splats: Splats, whole: Projections) -> Floats:
         """The splats on the grid; plain ones to the last bits of fits from before modes."""

@@ -213,3 +213,19 @@ def test_the_report_says_what_was_decided_and_folds_defaults_away(capture, tmp_p
     page = (tmp_path / "asked" / "report.html").read_text()
     assert "was off" not in page
     assert ">homogenise</th><td>0.5</td><td>asked for</td>" in page
+
+
+def test_a_config_repeats_a_fit_and_trains_it_on(capture, tmp_path, capsys):
+    out, again = tmp_path / "fit", tmp_path / "again"
+    assert fit(capture, out, "--absgrad", "--strategy", "default") == 0
+    config = str(out / "config.json")
+    assert main(["fit", "--config", config, "--out", str(again), "--quiet"]) == 0
+    assert digest(again) == digest(out)
+    # What was decided then is now said, and is the same.
+    assert main(["fit", "--config", config, "--resume", "--steps", "80", "--quiet"]) == 0
+    assert metrics_of(out)["history"] == [[60, 60], [80, 80]]
+    more = ["--absgrad", "--strategy", "default", "--resume", "--steps", "90"]
+    assert fit(capture, out, *more) == 0, "as it was asked for at first, it goes on as well"
+    more = ["--homogenise", "0.5", "--resume", "--steps", "100"]
+    assert main(["fit", "--config", config, *more]) == 3
+    assert "had homogenise None, now it is 0.5" in capsys.readouterr().err
