@@ -36,6 +36,7 @@ from rift_cl.io.view_image import camera_at, read_view
 from rift_cl.jobs.export.axes import turned
 from rift_cl.jobs.export.export import Export
 from rift_cl.jobs.export.settings import ExportSettings, Target
+from rift_cl.jobs.scene_input import in_display_light
 from rift_cl.metrics import psnr
 from rift_cl.splat.renderer import Renderer
 
@@ -100,12 +101,14 @@ class Judge:
         factor = job.scene.downscale
         self._cameras = [camera_at(view, factor) for view in seen[:views]]
         self._truths = [
-            read_view(view, downscale=factor, light=job.scene.light)[..., :3]
+            read_view(view, downscale=factor)[..., :3]
             for view in seen[:views]
             if view.image.is_file()
         ]
         self._draw = lambda scene: _drawn(device, job, scene, self._cameras)
-        self._pictures = self._draw(job.scene.splats)
+        # Exports are in display light, whatever the fit is in.
+        light = job.scene.light
+        self._pictures = [in_display_light(one, light) for one in self._draw(job.scene.splats)]
 
     def cells(self, found: SplatScene) -> Iterator[str]:
         """The largest errors, and the PSNR."""

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from test_view_in_browser import CHROMIUM, PATIENCE, Page, stop, until
+from browser import CHROMIUM, Page, stop, until
 
 from rift_cl.cli import main
 from rift_cl.geometry import Camera
@@ -18,6 +18,8 @@ pytest.importorskip("viser")
 
 C0 = 0.28209479177387814
 SIZE, FOCAL = (300, 400), 300.0
+# Seconds until the page must show what it should.
+PATIENCE = 90
 
 
 def view_from(distance: float) -> np.ndarray:
