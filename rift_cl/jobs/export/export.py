@@ -64,7 +64,8 @@ class Export:
         if self.format.suffix == _PAGE and self.plain.degree:
             self.notes.append(
                 "the page draws each splat in one colour, the mean of what the cameras saw: what "
-                "changes with the direction is lost (the other formats keep it)"
+                "changes with the direction is lost (other formats keep it; a fit with "
+                "--sh-degree 0 loses nothing by it)"
             )
         if self.scene.drawing.eps2d != _VIEWERS:
             self.notes.append(

@@ -119,7 +119,10 @@ def _harmonics(scene: SplatScene, given: Floats, light: Light, notes: list[str])
         f"{error:.3f} of 1 (root mean square)"
     )
     if light == "linear":
-        notes.append("viewers blend in display light: the edges of splats look different")
+        notes.append(
+            "viewers blend in display light: pictures come out darker wherever splats are seen "
+            "through (fit in display light what is to be shown elsewhere)"
+        )
     return sh
 
 
