@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from heic_file import HEIC
+from photograph_files import run
+from view_files import store
 
 from rift_cl.errors import FileFormatError, InputError, ResourceLimitError
-from rift_cl.io import demand_photographs, read_image
+from rift_cl.io import (
+    demand_photographs,
+    open_capture,
+    pose_photographs,
+    read_image,
+    read_view,
+)
 from rift_cl.io.picture_header import read_picture_header
 
 
@@ -62,3 +71,25 @@ def test_without_the_library_one_sentence_says_what_to_install(
             act()
         assert "\n" not in str(caught.value) and photograph.name in str(caught.value)
     assert len(list(photograph.parent.iterdir())) == 3
+
+
+def test_poses_are_found_for_heic_beside_jpeg(
+    photograph: Path, tmp_path: Path, seen: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As upright copies, since COLMAP reads no HEIC; the fit reads the photographs themselves."""
+    pytest.importorskip("pi_heif")
+    monkeypatch.setenv("FAKE_PYCOLMAP_SIZE", "48 64")
+    folder = tmp_path / "bare"
+    folder.mkdir()
+    for number in range(3):
+        # A box of ISO 14496-12 that nobody reads, so that no two files are the same.
+        content = HEIC + b"\0\0\0\x09free" + bytes([number])
+        (folder / f"IMG_{number}.HEIC").write_bytes(content)
+    store(folder / "IMG_3.jpg", np.zeros((64, 48, 3), np.uint8), "uint8")
+    _, posed = run(pose_photographs(folder, tmp_path / "poses"))
+    names = [f"IMG_{number}.HEIC" for number in range(3)]
+    assert posed.placed == (*names, "IMG_3.jpg") and not posed.missing
+    assert seen()["names"] == [f"{name}.png" for name in posed.placed]
+    assert [len(group) for group in seen()["groups"]] == [3, 1]
+    for view in open_capture(posed.model, images=folder).views[:3]:
+        np.testing.assert_allclose(read_view(view), read_image(view.image), atol=1e-6)
