@@ -33,8 +33,8 @@ from rift_cl.progress import Report
 from rift_cl.splat.bands import FrameMemory
 from rift_cl.splat.renderer import DepthKind, Renderer
 
-# What an earlier rendering leaves besides pictures.
-_LEFT = ("transforms.json", "key_frames.json", "film.*")
+# What an earlier rendering leaves.
+_LEFT = ("frames", "depth", "*.png", "transforms.json", "key_frames.json", "film.*")
 # Frames of a film when nothing is said, and those that it is made again from.
 _FRAMES, _KEYS = 96, 13
 # Longer edge of the animation in pixels.
@@ -67,6 +67,9 @@ class Render:
         self._kind = chosen_film(settings.film, [camera.size for camera in self.cameras])
         self.device = open_device(settings.device)
         self.folder = RunFolder(settings.out, "render", overwrite=settings.overwrite)
+        for name, read in (("path", settings.path), ("capture", settings.capture)):
+            if read is not None:
+                self.folder.demand_kept(name, read, *_LEFT)
         self.metrics: dict[str, Any] = {}
         # A small copy of the film, for reports; None where nothing moves, or before it was drawn.
         self.moving: bytes | None = None
@@ -150,7 +153,7 @@ class Render:
         folder, total = self.settings.out, len(self.cameras)
         self.folder.make()
         self.folder.mark()
-        self.folder.drop("frames", "depth", "*.png", *_LEFT)
+        self.folder.drop(*_LEFT)
         make_folder(folder / "frames")
         renderer = Renderer(self.scene.drawing, device=self.device)
         splats = self.scene.splats.upload(self.device)

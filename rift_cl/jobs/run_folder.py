@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import platform
 import shutil
 from collections.abc import Mapping
 from datetime import datetime, timezone
+from fnmatch import fnmatch
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from rift_cl import __version__
 from rift_cl.cl.device import Device
-from rift_cl.errors import OutputError
+from rift_cl.errors import InputError, OutputError
 from rift_cl.html_page import Page
 from rift_cl.io.output import make_folder, write_json, write_text, writing
 from rift_cl.jobs.settings_table import changed, show_settings
@@ -87,6 +89,27 @@ class RunFolder:
             for entry in self.path.glob(pattern):
                 with writing(entry):
                     shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+
+    def demand_kept(self, name: str, file: Path, *patterns: str) -> None:
+        """Make sure that what is read is not what ``drop`` removes.
+
+        Args:
+            name: the option that names it.
+            file: what is read, a file or a folder.
+            *patterns: what is given to ``drop``.
+
+        Raises:
+            InputError: it is this folder, or would be removed with these names.
+        """
+        read, own = (Path(os.path.realpath(path)) for path in (file, self.path))
+        if not read.is_relative_to(own):
+            return
+        inner = read.relative_to(own).parts
+        if not inner or any(fnmatch(inner[0], pattern) for pattern in patterns):
+            raise InputError(
+                f"--{name} {file} lies in --out, where it would be replaced: copy it to another "
+                "folder, or name another --out"
+            )
 
     def finish(
         self,

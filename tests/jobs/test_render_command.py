@@ -151,6 +151,22 @@ def test_what_an_earlier_rendering_left_is_gone_after_another(scene, tmp_path, c
     assert len(list((tmp_path / "film" / "frames").iterdir())) == 1
 
 
+def test_what_a_rendering_is_made_from_is_not_removed_by_it(scene, tmp_path, capsys):
+    """Key frames are changed where a film left them; a film in their place would lose them."""
+    film = tmp_path / "film"
+    assert render(scene, film, *small()) == 0
+    keys = film / "key_frames.json"
+    changed = keys.read_text().replace("\n", "\n ")
+    keys.write_text(changed)
+    for option, read in (("--path", keys), ("--path", film), ("--capture", film)):
+        assert render(scene, film, option, read, "--overwrite") == 3
+        assert f"{option} {read} lies in --out" in capsys.readouterr().err
+    assert keys.read_text() == changed and (film / "frames" / "0002.png").is_file()
+    keys.rename(film / "mine.json")
+    assert render(scene, film, "--path", film / "mine.json", "--overwrite") == 0
+    assert (film / "mine.json").read_text() == changed
+
+
 def test_a_fit_in_linear_light_is_shown_as_a_display_shows_it(scene, tmp_path):
     for light in ("display", "linear"):
         fit = tmp_path / light
