@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.io.capture import open_capture
@@ -33,21 +34,25 @@ class OrbitInput(SceneInput):
             RiftError: the capture cannot be read, or its cameras all stand in one place, or --up
                 has no direction.
         """
-        bounds, own = bounds_of_splats(scene.splats), scene.cameras
+        bounds, own, up = bounds_of_splats(scene.splats), scene.cameras, self._direction_up()
         if self.capture is not None:
             capture = open_capture(self.capture, photographs=False)
             cameras = [view.camera for view in capture.views]
             demand_places(cameras, self.capture)
-            bounds = bounds_of_cameras(cameras, bounds, capture.points)
-        elif own is not None:
-            bounds = bounds_of_cameras([view.camera for view in own.views], bounds)
-            bounds = replace(bounds, center=own.focus, up=own.up)
+            return bounds_of_cameras(cameras, bounds, capture.points, up=up)
+        if own is not None:
+            cameras, up = [view.camera for view in own.views], own.up if up is None else up
+            return bounds_of_cameras(cameras, bounds, center=own.focus, up=up)
+        return bounds if up is None else replace(bounds, up=up)
+
+    def _direction_up(self) -> NDArray[np.float64] | None:
+        """The unit vector (3,) that --up asks for, or None."""
         if self.up is None:
-            return bounds
+            return None
         length = float(np.linalg.norm(self.up))
         if not 0 < length < math.inf:
             raise InputError(f"--up is {' '.join(map(str, self.up))}, wanted a direction")
-        return replace(bounds, up=np.array(self.up) / length)
+        return np.array(self.up) / length
 
     def notes(self, scene: OpenedScene) -> tuple[str, ...]:
         """What had to be guessed of a fit's cameras, a sentence each."""

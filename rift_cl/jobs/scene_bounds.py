@@ -77,6 +77,9 @@ def bounds_of_cameras(
     cameras: Sequence[Camera],
     splats: SceneBounds | None = None,
     points: NDArray[np.float32] | None = None,
+    *,
+    center: Floats | None = None,
+    up: Floats | None = None,
 ) -> SceneBounds:
     """Where cameras look, how far off they stand, and their common up.
 
@@ -84,10 +87,12 @@ def bounds_of_cameras(
         cameras: of the capture that the splats were fitted to.
         splats: where the splats lie: their radius, and their up where cameras have none.
         points: (P, 3) sparse points of the scene, or None.
+        center: (3,) what they look at; found from their axes and the points if not given.
+        up: (3,) unit vector; theirs in common if not given.
     """
-    center = focus_among(cameras, points)
+    center = focus_among(cameras, points) if center is None else center
     ways = np.array([camera.center for camera in cameras]) - center
-    up = common_up(cameras)
+    up = common_up(cameras) if up is None else up
     if up is None:
         up = _upward() if splats is None else splats.up
     distances = np.linalg.norm(ways, axis=1)

@@ -7,13 +7,16 @@ import shutil
 
 import numpy as np
 import pytest
-from test_start import MIDDLE_OF_RING
+from test_start import MIDDLE_OF_RING, ring
 
 from rift_cl.cli import main
+from rift_cl.geometry import Camera
 from rift_cl.io.capture import open_capture
 from rift_cl.io.output import write_json
+from rift_cl.io.transforms_record import transforms_of
 from rift_cl.jobs.analyze_input import open_sampled
 from rift_cl.jobs.analyze_settings import AnalyzeSettings
+from rift_cl.jobs.render_settings import RenderSettings
 
 FIT = ("--steps", "30", "--splats", "150", "--hold-out", "4", "--quiet")
 
@@ -105,6 +108,29 @@ def test_a_film_needs_no_photographs(alone, tmp_path):
         out = tmp_path / words[0].strip("-")
         assert run("render", alone, "--out", out, *words, "--size", 40, 30) == 0
     assert len(open_capture(tmp_path / "path").views) == 8
+
+
+def test_distance_and_elevation_are_about_the_focus_and_up_that_are_used(alone, tmp_path):
+    """Cameras with the picture's top down; what up is, is said; and a focus that the fit found."""
+    turned = []
+    for camera in ring(8):
+        turned.append(Camera(camera.size, camera.K, np.diag([-1.0, -1, 1, 1]) @ camera.view))
+    names = [f"{k}.png" for k in range(8)]
+    write_json(tmp_path / "transforms.json", transforms_of(turned, names))
+    scene = alone / "scene.ply"
+    settings = RenderSettings(scene=scene, capture=tmp_path, up=(0, 0, 2))
+    bounds = settings.bounds(settings.open_scene())
+    assert bounds.elevation == pytest.approx(np.degrees(np.arctan(0.3)), abs=1e-6)
+    record = json.loads((alone / "transforms.json").read_text())
+    focus = np.add(MIDDLE_OF_RING, (0, 0, -1.0))
+    record["capture"] |= {"focus": focus.tolist(), "up": [0, 0, -1]}
+    write_json(alone / "transforms.json", record)
+    for up, sign in ((None, -1), ((0, 0, 1), 1)):
+        settings = RenderSettings(scene=alone, up=up)
+        bounds = settings.bounds(settings.open_scene())
+        np.testing.assert_array_equal(bounds.center, focus)
+        assert bounds.distance == pytest.approx(np.hypot(5, 2.5), abs=1e-6)
+        assert bounds.elevation == pytest.approx(sign * np.degrees(np.arctan(0.5)), abs=1e-6)
 
 
 def test_analysis_and_plans_take_a_fit_for_its_capture(alone, tmp_path):
