@@ -214,11 +214,10 @@ class Render:
             "film": self.film,
             "depth_window": list(window) if self.settings.depth else None,
         }
-        contact = sheet.contact()
-        write_bytes(folder / "contact.png", contact)
+        write_bytes(folder / "contact.png", sheet.contact())
         rate = self.settings.rate
         if self._kind == "apng":
             write_bytes(folder / str(self.film), sheet.moving(rate))
         self.moving = None if self._kind is None else sheet.embedded(rate)
-        page = render_page(self.scene.name, contact, self.moving, self.metrics)
+        page = render_page(self.scene.name, sheet, self.moving, self.metrics)
         self.folder.finish(self.settings, self.metrics, page, self.device)

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from rift_cl.html_page import Page
 from rift_cl.io.output import atomic_path
 from rift_cl.jobs.animation import animated_png, animated_webp
-from rift_cl.plot import figure_png, image_grid
+from rift_cl.plot import figure_png, image_grid, jpeg
 
 Codes = NDArray[np.uint8]
 
 # Frames on the contact sheet, in a row of it, and in the animation.
 _SHOWN, _ROW, _MOVING = 12, 4, 240
+# Pixels along the longer side of a frame in the report.
+_PANEL = 640
 # The report holds an animation of so many bytes or fewer.
 _EMBEDDED = 4 << 20
 
@@ -56,6 +58,14 @@ class Sheet:
         columns = min(_ROW, len(self._stills))
         return figure_png(image_grid(images, titles=titles, columns=columns, window=(0.0, 1.0)))
 
+    def panels(self) -> tuple[list[bytes], list[str]]:
+        """The frames that are shown as JPEG files, each with its depth after it, and titles."""
+        cells, titles = [], []
+        for name, pictures in self._stills:
+            cells += [jpeg(picture / 255, side=_PANEL) for picture in pictures]
+            titles += [name, f"{name}, depth"][: len(pictures)]
+        return cells, titles
+
     def moving(self, rate: float) -> bytes:
         """The animation as the content of a PNG file."""
         return animated_png(self._film, rate * self._share)
@@ -65,9 +75,7 @@ class Sheet:
         return animated_webp(self._film, rate * self._share)
 
 
-def render_page(
-    name: str, contact: bytes, moving: bytes | None, metrics: Mapping[str, Any]
-) -> Page:
+def render_page(name: str, sheet: Sheet, moving: bytes | None, metrics: Mapping[str, Any]) -> Page:
     """The report of a finished rendering; ``moving`` is a small copy of its film."""
     page = Page(f"Pictures of {name}", f"{metrics['frames']} frames, {metrics['splats']} splats")
     if moving is not None and len(moving) <= _EMBEDDED:
@@ -76,8 +84,9 @@ def render_page(
     depth = metrics["depth_window"]
     caption = "Some frames by their numbers."
     if depth is not None:
-        caption += f" Depth below: bright at {depth[0]:.4g}, dark at {depth[1]:.4g} scene units."
-    page.figure(contact, caption=caption, alt="Contact sheet of the frames")
+        caption += f" Depth beside: bright at {depth[0]:.4g}, dark at {depth[1]:.4g} scene units."
+    cells, titles = sheet.panels()
+    page.panels(cells, titles=titles, columns=_ROW, caption=caption, alt="Frame")
     facts = {"middle": metrics["center"], "up": metrics["up"]}
     page.section("Scene")
     page.facts(

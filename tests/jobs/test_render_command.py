@@ -71,7 +71,7 @@ def test_an_orbit_leaves_frames_cameras_an_animation_and_a_report(scene, tmp_pat
     with Image.open(out / "animation.png") as moving:
         assert (moving.n_frames, moving.size) == (3, (48, 32))
     page = (out / "report.html").read_text()
-    assert page.count("<img") == 2 and "ball.ply" in page
+    assert page.count("<img") == 1 + 3 and "ball.ply" in page
     metrics = json.loads((out / "metrics.json").read_text())
     np.testing.assert_allclose(metrics["center"], MIDDLE, atol=0.15)
     assert not (out / "depth").exists() and metrics["depth_window"] is None
