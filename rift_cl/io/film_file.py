@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
@@ -20,7 +21,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import InputError, OutputError, RiftError
+from rift_cl.errors import InputError, OutputError
 from rift_cl.io.output import atomic_path
 
 FilmKind = Literal["webm", "mp4", "mp4-h264"]
@@ -103,23 +104,37 @@ def film_writer(
 
     # SVT-AV1 tells its settings on the standard error stream otherwise.
     os.environ.setdefault("SVT_LOG", "1")
-    encoder = _ENCODERS[kind]
-    with atomic_path(path) as part:
-        try:
-            container = av.open(
-                str(part), "w", format=encoder.container, options={"fflags": "+bitexact"}
-            )
-            with container:
-                stream = _stream(container, encoder, size, rate)
-                yield lambda codes: container.mux(stream.encode(_frame(codes)))
-                container.mux(stream.encode())
-        except RiftError:
-            raise
-        except (av.FFmpegError, ValueError) as error:
-            raise OutputError(
-                f"{path}: {encoder.codec} writes no film of {size[1]} x {size[0]} pixels "
-                f"({error}); say --film apng, or another --size"
-            ) from error
+    encoder, options = _ENCODERS[kind], {"fflags": "+bitexact"}
+    refused = partial(_encoding, path, encoder, size)
+    with atomic_path(path) as part, ExitStack() as until_the_end:
+        with refused():
+            container = av.open(str(part), "w", format=encoder.container, options=options)
+            until_the_end.enter_context(container)
+            stream = _stream(container, encoder, size, rate)
+
+        def add(codes: Codes) -> None:
+            with refused():
+                container.mux(stream.encode(_frame(codes)))
+
+        # What goes wrong between the frames is not the encoder's doing.
+        yield add
+        with refused():
+            container.mux(stream.encode())
+            container.close()
+
+
+@contextmanager
+def _encoding(path: Path, encoder: _Encoder, size: tuple[int, int]) -> Iterator[None]:
+    """Turn what an encoder raises into an error that names the film."""
+    import av
+
+    try:
+        yield
+    except (av.FFmpegError, ValueError) as error:
+        raise OutputError(
+            f"{path}: {encoder.codec} writes no film of {size[1]} x {size[0]} pixels "
+            f"({error}); say --film apng, or another --size"
+        ) from error
 
 
 def _stream(container: Any, encoder: _Encoder, size: tuple[int, int], rate: float) -> Any:

@@ -100,6 +100,15 @@ def test_a_film_that_fails_leaves_nothing(av, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("error", [ValueError, InputError])
+def test_what_fails_between_frames_is_not_the_encoders_refusal(av, tmp_path, error):
+    film = film_writer(tmp_path / "film", "webm", SIZE, 24)
+    with pytest.raises(error, match=r"^a defect$"), film as add:
+        add(frames(1)[0])
+        raise error("a defect")
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_kind_of_a_film_by_what_there_is(monkeypatch):
     alike, one, apart = [SIZE, SIZE], [SIZE], [SIZE, (5, 5)]
     assert chosen_film("auto", one) is None and chosen_film("auto", apart) is None
