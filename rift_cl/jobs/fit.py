@@ -152,7 +152,6 @@ class Fit(FitRun):
             self._split(capture)
         for note in self._notes():
             self.announce(f"rift: {note}")
-        self._keep_cameras(capture)
         pictures = self._pictures(self.seen)
         if settings.refine_exposures and pictures.any_cut_out():
             raise InputError(
@@ -166,11 +165,12 @@ class Fit(FitRun):
             homogenise=settings.exponent_for(len(self.seen)),
             downscale=self.downscale,
         )
+        self.decided = {"photographs": place_record([*self.seen, *self.unseen], settings.out)}
+        self._begin(trainer)
+        self._keep_cameras(capture, trainer)
         yield from self._trained(trainer, pictures)
         if trainer.poses is not None:
-            found = [trainer.poses.camera(number) for number in range(len(self.seen))]
-            self.seen = with_poses(self.seen, found)
-            self._keep_cameras(capture)
+            self._keep_cameras(capture, trainer)
         splats = trainer.parameters.drawn
         drawn = trainer.renderer.settings
         SplatScene.of(splats, self.device, activation=drawn.activation, angular=drawn.angular).save(
@@ -211,19 +211,21 @@ class Fit(FitRun):
             yield Report(step + 1, count, "photographs")
             self._heed(0)
 
-    def _keep_cameras(self, capture: Capture) -> None:
-        """Leave the cameras in the folder, so that an unfinished fit has them too."""
-        out, seen, unseen = self.settings.out, self.seen, self.unseen
+    def _keep_cameras(self, capture: Capture, trainer: Trainer) -> None:
+        """Leave the cameras in the folder as they are known, so that an unfinished fit has them."""
+        out, seen = self.settings.out, self.seen
+        if trainer.poses is not None:
+            seen = with_poses(seen, [trainer.poses.camera(number) for number in range(len(seen))])
         self.folder.drop(*CAMERA_FILES)
-        self.decided = {"photographs": place_record([*seen, *unseen], out)}
         count = self.source.photographs if isinstance(self.source, BareInput) else None
-        save_fit_cameras(out, capture, seen, unseen, photographs=count)
+        save_fit_cameras(out, capture, seen, self.unseen, photographs=count)
 
     def _split(self, capture: Capture) -> None:
         settings = self.settings
         demand_places([view.camera for view in capture.views], settings.capture)
         self.seen, self.unseen = split_views(capture.views, settings.hold_out, settings.views)
-        self.downscale = settings.downscale or fitting_downscale(self.seen, self.device)
+        decided = self.checkpoints.decided.get("downscale")
+        self.downscale = decided or fitting_downscale(self.seen, self.device)
 
     def _notes(self) -> list[str]:
         """What was decided about the photographs, and what of them is not used."""

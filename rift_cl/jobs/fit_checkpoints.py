@@ -30,7 +30,8 @@ class FitCheckpoints:
     Args:
         folder: where they are.
         decisive: what decides the fit's result, as it was asked for; JSON. In ``decided`` is the
-            same with what the fit decided by itself.
+            same with what the fit decided by itself, or the one that goes on: on another device
+            it might decide otherwise.
         device: the device's name, on which the bits depend as well.
     """
 
@@ -41,8 +42,32 @@ class FitCheckpoints:
             "rift_cl": __version__,
             "device": device,
         }
+        self._found: Checkpoint | None = None
         self.history: History = []
         self.decided: dict[str, Any] = decisive
+
+    def find(self) -> bool:
+        """Read the newest whole checkpoint, and make sure that it can be gone on with.
+
+        Returns:
+            Whether there is one.
+
+        Raises:
+            CheckpointError: it belongs to a fit with other settings or has more steps than are
+                asked for, or all are damaged.
+        """
+        found, problems = newest_checkpoint(self.folder)
+        for problem in problems:
+            warnings.warn(f"{problem}: going on from the one before", stacklevel=2)
+        if found is None:
+            return False
+        self._compare(found.facts)
+        self.history = self._stages(found)
+        before = found.facts["settings"]
+        self.decided = found.facts.get("decided", before)
+        self._facts["settings"] = {**before, "steps": self._facts["settings"]["steps"]}
+        self._found = found
+        return True
 
     def save(self, trainer: Trainer, losses: Losses) -> None:
         """Write one.
@@ -57,26 +82,14 @@ class FitCheckpoints:
         save_checkpoint(self.folder, Checkpoint(trainer.parameters.step, arrays, facts))
 
     def restore(self, trainer: Trainer) -> Losses:
-        """Bring a trainer to the newest whole checkpoint; one that has not begun if there is none.
+        """Bring a trainer to the checkpoint that was found; one that has not begun if none was.
 
         Returns:
             The losses up to there.
-
-        Raises:
-            CheckpointError: it belongs to a fit with other settings or has more steps than are
-                asked for, or all are damaged.
         """
-        found, problems = newest_checkpoint(self.folder)
-        for problem in problems:
-            warnings.warn(f"{problem}: going on from the one before", stacklevel=2)
+        found, self._found = self._found, None
         if found is None:
             return []
-        self._compare(found.facts)
-        self.history = self._stages(found)
-        self._facts["settings"] = {
-            **found.facts["settings"],
-            "steps": self._facts["settings"]["steps"],
-        }
         arrays = dict(found.arrays)
         losses = arrays.pop("losses", np.empty((0, 2)))
         trainer.restore(arrays)
@@ -85,6 +98,9 @@ class FitCheckpoints:
     def _compare(self, facts: Any) -> None:
         before, now = facts.get("settings", {}), self._facts["settings"]
         names = (before.keys() | now.keys()) - {"steps"}
+        # Once it was 1 where nobody said; what was decided then holds.
+        if now["downscale"] is None:
+            names -= {"downscale"}
         # What was left open may be said now, if it is what was decided then.
         open_then = {k: v for k, v in facts.get("decided", {}).items() if before.get(k) is None}
         differing = sorted(

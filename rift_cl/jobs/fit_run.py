@@ -26,7 +26,7 @@ class FitRun:
         settings: what to do.
 
     Raises:
-        RiftError: a setting makes no sense, or the folder is in use.
+        RiftError: a setting makes no sense, the folder is in use, or the fit in it cannot go on.
     """
 
     def __init__(self, settings: FitSettings) -> None:
@@ -42,6 +42,8 @@ class FitRun:
         self.checkpoints = FitCheckpoints(
             settings.out / "checkpoints", settings.decisive(), self.device.name
         )
+        if settings.resume and not self.checkpoints.find():
+            self._demand_a_beginning()
         self.losses: list[tuple[int, float]] = []
         self.scores: dict[str, list[ViewScore]] = {}
         self.metrics: dict[str, Any] = {}
@@ -54,15 +56,17 @@ class FitRun:
         """Break off after the step that is being taken; ``run`` then keeps a checkpoint."""
         self._stopping = True
 
-    def _trained(self, trainer: Trainer, pictures: Any) -> Iterator[Report]:
-        """Train, with a checkpoint now and then, at the end, and when broken off."""
+    def _begin(self, trainer: Trainer) -> None:
+        """Bring the trainer to where the fit goes on, or make the folder that of a new one."""
         self.checkpoints.decided = self.settled.decisive()
         if self.settings.resume:
             self.losses = self.checkpoints.restore(trainer)
-            self._demand_a_beginning(trainer)
         else:
             self.folder.mark(**self.decided)
             self.folder.drop("checkpoints")
+
+    def _trained(self, trainer: Trainer, pictures: Any) -> Iterator[Report]:
+        """Train, with a checkpoint now and then, at the end, and when broken off."""
         every, kept = self.settings.checkpoint_every, trainer.parameters.step
         for report in self._reports(trainer, pictures):
             if report.done % REPORT_EVERY == 0 or report.done == report.total:
@@ -74,9 +78,9 @@ class FitRun:
             yield report
             self._heed(report.done)
 
-    def _demand_a_beginning(self, trainer: Trainer) -> None:
+    def _demand_a_beginning(self) -> None:
         """Refuse to replace a finished fit that kept no checkpoint by one that begins anew."""
-        if self.folder.is_complete and not trainer.parameters.step:
+        if self.folder.is_complete:
             raise CheckpointError(
                 f"{self.settings.out}: this fit is finished and kept no checkpoint, so that it "
                 "cannot be trained on: begin anew with --overwrite"

@@ -101,6 +101,7 @@ class XrayFit(FitRun):
             rows=self.input.rows,
             pitch=self.input.pitch,
         )
+        self._begin(trainer)
         yield from self._trained(trainer, pictures)
         splats, volume = trainer.parameters.drawn, backprojected(self.device, seen)
         if self.unseen:

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from rift_cl.cli import main
-from rift_cl.errors import StoppedError
+from rift_cl.errors import CheckpointError, StoppedError
 from rift_cl.io.checkpoint import newest_checkpoint
 from rift_cl.jobs.fit import Fit
 from rift_cl.jobs.fit_settings import FitSettings
@@ -40,6 +40,12 @@ def fit(capture, out, *more):
 
 def digest(folder):
     return hashlib.sha256((folder / "scene.ply").read_bytes()).hexdigest()
+
+
+def contents(folder):
+    """A digest of every file."""
+    files = [path for path in sorted(folder.rglob("*")) if path.is_file()]
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
 def newest(folder):
@@ -77,9 +83,30 @@ def test_a_fit_that_was_broken_off_goes_on_to_the_same_bits(capture, tmp_path, v
 
 def test_other_settings_cannot_go_on(capture, tmp_path, capsys):
     broken_off(settings(capture, tmp_path / "fit"), 25)
-    status = fit(capture, tmp_path / "fit", "--resume", "--steps", "150", "--seed", "8")
-    assert status == 3
-    assert "had seed 0, now it is 8" in capsys.readouterr().err
+    before = contents(tmp_path / "fit")
+    for name, value, words in (("seed", 8, "0, now it is 8"), ("hold-out", 3, "4, now it is 3")):
+        other = ("--resume", "--steps", "150", f"--{name}", str(value))
+        assert fit(capture, tmp_path / "fit", *other) == 3
+        assert f"had {name.replace('-', '_')} {words}" in capsys.readouterr().err
+        assert contents(tmp_path / "fit") == before
+
+
+def test_the_size_that_was_decided_is_that_of_what_goes_on(capture, tmp_path, monkeypatch):
+    """Another device would decide otherwise, and fits of old began without a choice."""
+    small = {True: 400, False: 400}
+    monkeypatch.setattr("rift_cl.jobs.photograph_size.MOST_PIXELS", small)
+    whole, cut, asked = (tmp_path / name for name in ("whole", "cut", "asked"))
+    job, _ = run(settings(capture, whole, steps=75))
+    broken_off(settings(capture, cut, steps=75), 25)
+    broken_off(settings(capture, asked, steps=75, downscale=1), 25)
+    monkeypatch.undo()
+    other = Fit(settings(capture, cut, steps=75, resume=True))
+    assert other.downscale == job.downscale > 1
+    list(other.run())
+    assert digest(cut) == digest(whole)
+    assert Fit(settings(capture, asked, steps=75, resume=True)).downscale == 1
+    with pytest.raises(CheckpointError, match="had downscale 1, now it is 2"):
+        Fit(settings(capture, asked, steps=75, resume=True, downscale=2))
 
 
 def test_resuming_what_never_began_begins(capture, tmp_path):
@@ -167,6 +194,15 @@ def test_a_finished_fit_is_trained_on_to_the_same_bits(capture, tmp_path, more):
     assert bool(more) == any(name.startswith("poses.") for name in state.arrays)
 
 
+def test_what_goes_on_begins_with_the_poses_that_were_refined(capture, tmp_path):
+    out = tmp_path / "fit"
+    run(settings(capture, out, steps=50, **VARIANTS["default"]))
+    before = (out / "transforms.json").read_bytes()
+    job = Fit(settings(capture, out, steps=75, resume=True, **VARIANTS["default"]))
+    next(report for report in job.run() if report.what == "steps")
+    assert (out / "transforms.json").read_bytes() == before
+
+
 def test_the_second_part_may_be_broken_off_as_well(capture, tmp_path):
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     for out in (whole, cut):
@@ -190,13 +226,15 @@ def test_a_fit_that_was_broken_off_may_become_longer(capture, tmp_path):
 def test_fewer_steps_and_no_checkpoints_are_told(capture, tmp_path, capsys):
     out = tmp_path / "fit"
     assert fit(capture, out) == 0
-    before = digest(out)
+    before = contents(out)
     assert fit(capture, out, "--resume", "--steps", "50") == 3
     assert "has 60 steps, --steps is 50" in capsys.readouterr().err
+    assert contents(out) == before
     assert fit(capture, out, "--overwrite", "--checkpoint-every", "0") == 0
-    assert fit(capture, out, "--resume", "--steps", "90") == 3
+    before = contents(out)
+    assert fit(capture, out, "--resume", "--steps", "90", "--hold-out", "3") == 3
     assert "kept no checkpoint" in capsys.readouterr().err
-    assert digest(out) == before
+    assert contents(out) == before
 
 
 def test_the_report_says_what_was_decided_and_folds_defaults_away(capture, tmp_path):
