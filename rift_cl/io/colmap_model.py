@@ -19,6 +19,7 @@ from rift_cl.geometry.lens_distortion import lens_of
 from rift_cl.io import colmap_binary, colmap_text
 from rift_cl.io.capture_paths import CaptureFolder, mask_of
 from rift_cl.io.colmap_records import CameraRecord, ImageRecord
+from rift_cl.io.pose_record import is_upright
 from rift_cl.io.poses import view_of_quaternion
 from rift_cl.io.view import Capture, View, check_views, finite_points, located
 
@@ -59,6 +60,8 @@ def open_model(
     records = sorted(reader.read_images(path), key=lambda record: record.name)
     images = replace(images or _images_folder(folder), complete=photographs)
     views = [_view(path, images, cameras, record) for record in records]
+    if is_upright(model):
+        views = [replace(view, upright=True) for view in views]
     checked = check_views(path, views)
     points, colors, error = _points(model / f"points3D{suffix}", reader)
     return Capture(checked, points, colors, model, error)

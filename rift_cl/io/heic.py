@@ -7,6 +7,8 @@ and columns are upright already; what EXIF says besides about the orientation do
 
 from __future__ import annotations
 
+import warnings
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -52,13 +54,16 @@ def opened_heic(path: Path) -> Any:
 
 
 def heic_taken_by(picture: Any) -> tuple[str, ...]:
-    """Maker and model of the camera and its focal lengths, as EXIF has them."""
+    """Maker and model of the camera and its focal lengths, as far as EXIF can be read."""
     from PIL.Image import Exif
 
-    facts = Exif()
-    facts.load(picture.info.get("exif") or b"")
-    more = facts.get_ifd(_EXIF)
-    values = [*(facts.get(number) for number in (_MAKE, _MODEL)), *map(more.get, _FOCALS)]
+    facts, values = Exif(), []
+    # Pixels do not hang on EXIF, so that nothing that is wrong with it may cost them.
+    with warnings.catch_warnings(), suppress(Exception):
+        warnings.simplefilter("ignore")
+        facts.load(picture.info.get("exif") or b"")
+        more = facts.get_ifd(_EXIF)
+        values = [*(facts.get(number) for number in (_MAKE, _MODEL)), *map(more.get, _FOCALS)]
     return tuple(str(value) for value in values if value is not None)
 
 

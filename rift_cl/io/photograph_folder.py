@@ -2,8 +2,8 @@
 
 Programs that find poses decode photographs by themselves, each in its own way. Here every one is
 decoded first, by the reader that a fit will use, so that what is damaged is left out beforehand;
-and where one is of a kind that such a program may read otherwise than we do, or was taken with the
-camera held upright and stored sideways, copies of plain 8-bit colours, upright, are made of all.
+and where one is of a kind that such a program may read otherwise than we do, or EXIF wants it
+turned before it is shown, copies of plain 8-bit colours, upright, are made of all.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError, PathEscapeError, RiftError
 from rift_cl.io.boundary import check_claim, reading
-from rift_cl.io.capture_paths import CaptureFolder, mask_beside
+from rift_cl.io.capture_paths import CaptureFolder, mask_beside, mask_of
 from rift_cl.io.display_light import to_display
 from rift_cl.io.output import check_space, writing
 from rift_cl.io.picture_header import PictureHeader, read_picture_header
@@ -49,7 +49,7 @@ class Photograph:
         """Any program reads the same 8-bit colours from it."""
         header = self.header
         kind = header.eight_bit and not header.alpha and self.path.suffix.lower() in _PLAIN
-        return kind and not header.sideways
+        return kind and header.orientation == 1
 
     @property
     def camera(self) -> tuple[object, ...]:
@@ -102,7 +102,7 @@ def shown(name: str) -> str:
 def with_headers(
     place: CaptureFolder, names: Sequence[str], left_out: dict[str, str]
 ) -> list[Photograph]:
-    """Read the headers of photographs.
+    """Read the headers of photographs, one of each that there are several copies of.
 
     Args:
         place: their folder.
@@ -113,7 +113,7 @@ def with_headers(
         PathEscapeError: a photograph is a link that leads out of the folder.
     """
     found: list[Photograph] = []
-    contents: dict[bytes, str] = {}
+    contents: dict[bytes, list[str]] = {}
     for name in names:
         try:
             if not name.isprintable() or "\\" in name:
@@ -121,14 +121,23 @@ def with_headers(
             path = place.file(str(place.path), name)
             header = read_picture_header(path)
             demand_colors(path, header)
-            _demand_new(path, contents)
+            contents.setdefault(_digest(path), []).append(name)
         except PathEscapeError:
             raise
         except RiftError as error:
             left_out[shown(name)] = shown(_reason(place.path / name, error))
         else:
             found.append(Photograph(name, path, header))
-    return found
+    kept = {_kept(place, copies): copies for copies in contents.values()}
+    for name, copies in kept.items():
+        reason = f"is the same photograph as {name}"
+        left_out.update((copy, reason) for copy in copies if copy != name)
+    return [one for one in found if one.name in kept]
+
+
+def _kept(place: CaptureFolder, copies: Sequence[str]) -> str:
+    """The name of the one that has a mask, or else the shortest: what a copy adds to it goes."""
+    return min(copies, key=lambda name: (mask_of(str(place.path), place, name) is None, len(name)))
 
 
 def _reason(path: Path, error: RiftError) -> str:
@@ -136,13 +145,10 @@ def _reason(path: Path, error: RiftError) -> str:
     return str(error).removeprefix(f"{path}: ").replace(str(path), path.name)
 
 
-def _demand_new(path: Path, contents: dict[bytes, str]) -> None:
-    """Refuse a file that has the same bytes as an earlier one, and note what it has."""
+def _digest(path: Path) -> bytes:
+    """Of the bytes of a file."""
     with reading(path, "the photograph"):
-        digest = hashlib.sha256(path.read_bytes()).digest()
-    first = contents.setdefault(digest, path.name)
-    if first != path.name:
-        raise InputError(f"{path}: is the same photograph as {first}")
+        return hashlib.sha256(path.read_bytes()).digest()
 
 
 def whole_photographs(

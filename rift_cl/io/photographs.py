@@ -28,11 +28,11 @@ from rift_cl.io.photograph_folder import (
     with_headers,
 )
 from rift_cl.io.pixels import HEIC, SUFFIXES
+from rift_cl.io.pose_record import POSE_RECORD
 from rift_cl.progress import Report
 
 # Fewer do not tell where the scene is from where the lens is.
 _FEWEST = 3
-_RECORD = "poses.json"
 _MODEL = ("cameras.bin", "images.bin", "points3D.bin")
 _EXTRA = ("frames.bin", "rigs.bin", "colmap.log")
 _LEFT_OVER = ("database.db", "database.db-shm", "database.db-wal", "job.json", "result.json")
@@ -135,8 +135,8 @@ def pose_photographs(
         with writing(part):
             _clean(part)
         missing = dict(sorted(left_out.items()))
-        record = order | {"pycolmap": version, "placed": placed, "missing": missing}
-        write_json(part / _RECORD, record)
+        found = {"upright": True, "pycolmap": version, "placed": placed, "missing": missing}
+        write_json(part / POSE_RECORD, order | found)
     return PosedPhotographs(work, tuple(placed), missing)
 
 
@@ -174,10 +174,10 @@ def _stamps(place: CaptureFolder, names: Sequence[str]) -> list[list[Any]]:
 
 def _earlier(work: Path, order: Mapping[str, Any]) -> PosedPhotographs | None:
     """The finished work of an earlier run for the same photographs, or None."""
-    if not all((work / name).is_file() for name in (*_MODEL, _RECORD)):
+    if not all((work / name).is_file() for name in (*_MODEL, POSE_RECORD)):
         return None
     try:
-        record = read_json_object(work / _RECORD).values
+        record = read_json_object(work / POSE_RECORD).values
     except RiftError:
         return None
     placed, missing = record.get("placed"), record.get("missing")
@@ -196,5 +196,5 @@ def _clean(part: Path) -> None:
 
 
 def _strange(names: list[str]) -> str | None:
-    ours = {*_MODEL, *_EXTRA, *_LEFT_OVER, *_FOLDERS, _RECORD, f"{_RECORD}.part"}
+    ours = {*_MODEL, *_EXTRA, *_LEFT_OVER, *_FOLDERS, POSE_RECORD, f"{POSE_RECORD}.part"}
     return next((name for name in names if name not in ours), None)

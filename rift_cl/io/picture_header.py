@@ -22,8 +22,8 @@ class PictureHeader:
         alpha: the last of them is alpha.
         linear: the colours are proportional to light; integers are display light by custom.
         eight_bit: each number is a code of 8 bits.
-        orientation: how EXIF wants it shown, 1 to 8; 1 as it is stored, 5 to 8 with the axes
-            swapped. HEIC comes turned from its decoder, and is 1 here.
+        orientation: how EXIF wants it shown: 1 as it is stored, 3 turned by half, 2 and 4 mirrored,
+            5 to 8 with the axes swapped. HEIC comes turned from its decoder, and is 1 here.
         taken_by: maker and model of the camera and its focal lengths, as EXIF has them; empty
             where it has none.
     """
@@ -75,6 +75,7 @@ def _heic_header(path: Path) -> PictureHeader:
 def _header(path: Path, format: str) -> PictureHeader:
     with opened_image(path, format) as source:
         spec = source.spec()
+        orientation = int(spec.get_int_attribute("Orientation", 1))
         taken_by = (spec.getattribute(name) for name in _TAKEN_BY)
         return PictureHeader(
             size=(int(spec.height), int(spec.width)),
@@ -82,6 +83,6 @@ def _header(path: Path, format: str) -> PictureHeader:
             alpha=spec.alpha_channel >= 0,
             linear=str(spec.format) in ("half", "float", "double"),
             eight_bit=str(spec.format) == "uint8",
-            orientation=int(spec.get_int_attribute("Orientation", 1)),
+            orientation=orientation if 1 <= orientation <= 8 else 1,
             taken_by=tuple(str(value) for value in taken_by if value is not None),
         )

@@ -73,7 +73,7 @@ def _view(folder: CaptureFolder, frame: Fields, top: Fields, by_name: bool) -> V
     found = None if mask is None else folder.file(where, mask)
     if by_name:
         found = mask_of(where, folder, folder.name_of(image))
-    return View(folder.name_of(image), camera, image, found, lens)
+    return View(folder.name_of(image), camera, image, found, lens, own.flag("upright"))
 
 
 def _size(fields: Fields, image: Path) -> tuple[int, int]:

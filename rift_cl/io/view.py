@@ -26,6 +26,8 @@ class View:
         image: the photograph.
         mask: an image of the same size, white where the photograph counts; or None.
         lens: what the photograph was distorted by; None where it is a pinhole's already.
+        upright: the camera's pixels are those of the photograph as EXIF wants it shown, and not as
+            it is stored.
     """
 
     name: str
@@ -33,6 +35,7 @@ class View:
     image: Path
     mask: Path | None
     lens: Lens | None
+    upright: bool = False
 
 
 @dataclass(frozen=True, eq=False)

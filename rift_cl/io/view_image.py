@@ -23,6 +23,17 @@ from rift_cl.io.view import View, camera_at
 Image = NDArray[np.float32]
 LightKind = Literal["display", "linear"]
 
+# By EXIF's orientation: quarter turns against the clock, and whether rows are then reversed.
+_SHOWN = {
+    1: (0, False),
+    2: (2, True),
+    3: (2, False),
+    4: (0, True),
+    5: (1, True),
+    6: (-1, False),
+    7: (-1, True),
+    8: (1, False),
+}
 # The code 1 of 8 bits, with room for rounding.
 _ONE_CODE = 1.01 / 255
 
@@ -35,9 +46,9 @@ def read_view(
     Rows and columns are those of the file, because poses refer to pixels as they are stored: COLMAP
     does not turn photographs in any release (its pull request 1318 did, 1406 took it back before
     3.7 came out), nor do nerfstudio (``-noautorotate`` in its pull request 1261) and instant-ngp.
-    Only where the camera has the size of the photograph as EXIF wants it shown, rows and columns
-    swapped, its poses belong to the turned pixels, and EXIF's orientation is followed: so it is
-    with photographs whose poses 'rift fit' finds. A mask is turned alike if it is stored alike.
+    EXIF's orientation is followed where the view says that its camera belongs to the photograph as
+    it is shown (``View.upright``), as those that 'rift fit' finds do, or has that size, rows and
+    columns swapped. A mask of the stored photograph's size is turned with it, another is not.
 
     Args:
         view: one of the views of a capture.
@@ -61,13 +72,12 @@ def read_view(
         raise InputError(f"read_view: light is {light!r}, wanted 'display' or 'linear'")
     camera_at(view, downscale)
     header = _checked_header(view, budget)
-    # Squares cannot tell; they are taken as they are stored.
-    turn = header.orientation if header.size != view.camera.size else 1
+    turn = header.orientation if view.upright or header.size != view.camera.size else 1
     image = upright(read_photograph(view.image, header, budget), turn)
     if view.mask is not None:
         mask = _coverage(view.mask, budget)
         image = _with_alpha(image)
-        image[..., 3] *= mask if mask.shape == view.camera.size else upright(mask, turn)
+        image[..., 3] *= upright(mask, turn) if mask.shape == header.size else mask
     if downscale == 1 and view.lens is None:
         return _converted(image, linear=header.linear, wanted=light)
     image = _converted(image, linear=header.linear, wanted="linear")
@@ -87,36 +97,34 @@ def read_view(
 def _checked_header(view: View, budget: int | None) -> PictureHeader:
     """The photograph's header, once photograph and mask were found to fit the camera."""
     header = read_picture_header(view.image)
-    _demand_fit(view, view.image, header, header.sideways)
+    size = view.camera.size
+    fits = size == header.shown_size or (size == header.size and not view.upright)
+    _demand_fit(view, view.image, header, fits)
     # Numbers that are held for a pixel at one time: as stored, as RGBA, without the lens, a mask.
     numbers = header.channels + 4 + (0 if view.lens is None else 8)
     if view.mask is not None:
         mask = read_picture_header(view.mask)
-        _demand_fit(view, view.mask, mask, mask.size == header.size and header.sideways)
+        _demand_fit(view, view.mask, mask, mask.size in (size, header.size))
         numbers += mask.channels + 2
     need = 4 * numbers * view.camera.height * view.camera.width
     check_claim(view.image, "the view, with what it is made of,", need, budget)
     return header
 
 
-def _demand_fit(view: View, path: Path, header: PictureHeader, sideways: bool) -> None:
+def _demand_fit(view: View, path: Path, header: PictureHeader, fits: bool) -> None:
     demand_colors(path, header)
-    size = view.camera.size
-    if header.size != size and not (sideways and header.size == size[::-1]):
+    if not fits:
         raise ShapeError(
             f"{path}: is {_size(header.size)} pixels, the camera of view {view.name!r} says "
-            f"{_size(size)}"
+            f"{_size(view.camera.size)}"
         )
 
 
 def upright(image: Image, orientation: int) -> Image:
-    """An image (y, x, ...) as EXIF wants it shown that says this; mirrored ones, 2 to 4, stay."""
-    if orientation < 5:
-        return image
-    # 5 is mirrored at the diagonal, 7 at the other one; 6 is turned clockwise, 8 against it.
-    turns = {5: (1, True), 6: (-1, False), 7: (-1, True), 8: (1, False)}[orientation]
-    shown = np.rot90(image, turns[0])
-    return np.ascontiguousarray(shown[::-1] if turns[1] else shown)
+    """An image (y, x, ...) as it is shown where EXIF says this of its orientation, 1 to 8."""
+    turns, flipped = _SHOWN[orientation]
+    shown = np.rot90(image, turns)
+    return np.ascontiguousarray(shown[::-1] if flipped else shown)
 
 
 def demand_colors(path: Path, header: PictureHeader) -> None:

@@ -60,6 +60,16 @@ def test_damage_and_size_are_named(photograph: Path) -> None:
             read_image(photograph)
 
 
+@pytest.mark.parametrize("damage", [b"MM\0*\0\0", b"no EXIF", b"II*\0\xff\xff\xff\x7f", b"MM\0+"])
+def test_damaged_exif_costs_no_pixels(photograph: Path, damage: bytes) -> None:
+    pytest.importorskip("pi_heif")
+    photograph.write_bytes(HEIC.replace(b"MM\0*\0\0\0\x08", damage.ljust(8, b"\xee")[:8]))
+    assert read_picture_header(photograph).taken_by == ()
+    pixels = read_image(photograph)
+    photograph.write_bytes(HEIC)
+    np.testing.assert_array_equal(pixels, read_image(photograph))
+
+
 def test_without_the_library_one_sentence_says_what_to_install(
     photograph: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -11,11 +11,14 @@ import capture_files as made
 import numpy as np
 import pytest
 from photograph_files import NAMES, run
+from PIL import Image, ImageOps
 from view_files import store
 
 from rift_cl.errors import InputError, PathEscapeError
-from rift_cl.io import open_capture, pose_photographs, read_view
+from rift_cl.io import open_capture, pose_photographs, read_image, read_view
 from rift_cl.io.photograph_folder import other_files, photograph_names, photographs_in
+from rift_cl.io.transforms_json import open_transforms
+from rift_cl.jobs.cameras.fit_cameras import save_fit_cameras
 
 ODD = [".DS_Store", "._a b.png", "IMG_1.AAE", "IMG_1.MOV", "Thumbs.db", "notes.txt"]
 
@@ -39,9 +42,20 @@ def test_damaged_ones_and_duplicates_are_left_out_and_named(
     for name in ODD:
         (folder / name).write_bytes(b"odd")
     _, posed = run(pose_photographs(folder, tmp_path / "poses"))
-    assert set(posed.placed) == {*NAMES, "c (1).png"} - {"c.PNG"}
-    assert set(posed.missing) == {"c.PNG", "d.jpg"}
-    assert "is the same photograph as c (1).png" in posed.missing["c.PNG"]
+    assert posed.placed == tuple(NAMES)
+    assert set(posed.missing) == {"c (1).png", "d.jpg"}
+    assert posed.missing["c (1).png"] == "is the same photograph as c.PNG"
+
+
+def test_of_copies_one_with_a_mask_is_kept(folder: Path, tmp_path: Path, seen: Callable) -> None:
+    for name in ("c (1).png", "c (2).png", "b.png"):
+        shutil.copy(folder / "c.PNG", folder / name)
+    made.photographs(folder, ["c (1)_mask.png"])
+    _, posed = run(pose_photographs(folder, tmp_path / "poses"))
+    assert set(posed.missing) == {"c.PNG", "c (2).png", "b.png"}
+    assert set(posed.missing.values()) == {"is the same photograph as c (1).png"}
+    masks = {view.name: view.mask for view in open_capture(posed.model, images=folder).views}
+    assert masks["c (1).png"] == folder / "c (1)_mask.png"
 
 
 @pytest.mark.parametrize(
@@ -87,9 +101,7 @@ def test_a_mask_that_leads_out_of_the_capture_is_refused(tmp_path: Path) -> None
         open_capture(path)
 
 
-def test_phones_that_are_held_upright_give_upright_views(
-    tmp_path: Path, seen: Callable, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_phones_that_are_held_upright_give_upright_views(tmp_path: Path, seen: Callable) -> None:
     """Stored 8 wide and 12 high, shown 12 wide and 8 high, as the stand-in's camera is."""
     folder, codes = tmp_path / "bare", np.zeros((12, 8, 3), np.uint8)
     codes[:6, :4] = 255
@@ -109,3 +121,27 @@ def test_a_folder_that_holds_a_video_alone_says_how_to_name_it(tmp_path: Path) -
     (tmp_path / "walk.MOV").write_bytes(b"video")
     with pytest.raises(InputError, match=r"holds no capture.*takes the video walk\.MOV itself"):
         open_capture(tmp_path)
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_squares_are_posed_and_read_as_they_are_shown(
+    tmp_path: Path, seen: Callable, monkeypatch: pytest.MonkeyPatch, orientation: int
+) -> None:
+    """What the program that finds poses sees is what is read with them; also from a fit's files."""
+    monkeypatch.setenv("FAKE_PYCOLMAP_SIZE", "12 12")
+    monkeypatch.setattr("rift_cl.io.photographs._FOLDERS", ("models",))
+    folder, fit = tmp_path / "bare", tmp_path / "fit"
+    folder.mkdir()
+    for number in range(4):
+        codes = np.random.default_rng(number).integers(0, 256, (12, 12, 3)).astype(np.uint8)
+        store(folder / f"{number}.png", codes, "uint8", Orientation=orientation)
+    _, posed = run(pose_photographs(folder, fit / "poses"))
+    given = Path(seen()["images"].replace("poses.part", "poses"))
+    capture = open_capture(posed.model, images=folder)
+    save_fit_cameras(fit, capture, capture.views, ())
+    reopened = open_transforms(fit / "transforms.json", images=photographs_in(folder))
+    for name, *views in zip(seen()["names"], capture.views, reopened.views, strict=True):
+        with Image.open(views[0].image) as stored:
+            shown = np.asarray(ImageOps.exif_transpose(stored)) / np.float32(255)
+        for image in (read_image(given / name), *map(read_view, views)):
+            np.testing.assert_allclose(image, shown, atol=1e-6)

@@ -39,6 +39,29 @@ def test_rows_and_columns_are_those_of_the_file(
     np.testing.assert_allclose(read_image(path), codes, atol=0.02)
 
 
+@pytest.mark.parametrize("orientation", range(2, 9))
+def test_a_view_that_is_upright_sees_a_square_as_pillow_turns_it(
+    tmp_path: Path, orientation: int
+) -> None:
+    codes = np.zeros((WIDTH, WIDTH, 3), np.uint8)
+    codes[:16, :32] = 255
+    path = store(tmp_path / "a.png", codes, "uint8", Orientation=orientation)
+    mask = store(tmp_path / "mask.png", codes[..., :1], "uint8")
+    camera = Camera((WIDTH, WIDTH), K, np.eye(4))
+    with Image.open(path) as stored:
+        expected = np.asarray(ImageOps.exif_transpose(stored)) / 255
+    assert not np.array_equal(expected, codes / 255)
+    shown = read_view(View("a", camera, path, mask, None, upright=True))
+    np.testing.assert_array_equal(shown, expected[..., [0, 1, 2, 0]])
+    np.testing.assert_array_equal(read_view(View("a", camera, path, None, None)), codes / 255)
+
+
+def test_a_view_that_is_upright_has_no_camera_of_the_stored_size(tmp_path: Path) -> None:
+    path, _ = photograph(tmp_path, "png", 6)
+    with pytest.raises(ShapeError, match="is 64 x 48"):
+        read_view(View("a", Camera((HEIGHT, WIDTH), K, np.eye(4)), path, None, None, upright=True))
+
+
 @pytest.mark.parametrize("suffix", TYPES)
 @pytest.mark.parametrize("orientation", [5, 6, 7, 8])
 def test_a_camera_of_the_turned_size_sees_the_turned_photograph(

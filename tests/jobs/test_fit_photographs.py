@@ -60,7 +60,7 @@ def test_what_is_odd_in_a_folder_is_said_in_two_lines(photographs, tmp_path, pos
         "Thumbs.db and 1 more"
     )
     assert said[1] == (
-        "rift: 1 of 5 photographs is left out: IMG_1.png (is the same photograph as IMG_1 (1).png)"
+        "rift: 1 of 5 photographs is left out: IMG_1 (1).png (is the same photograph as IMG_1.png)"
     )
     assert said[2] == (
         "rift: 4 of 5 photographs have a pose; their sparse points are seen 0.5 pixels off, on "

@@ -121,7 +121,7 @@ def save_fit_cameras(
     bounds = bounds_of_cameras(cameras, points=capture.points)
     masks = names_of_masks(views)
     fields = [
-        {"split": splits[view.name], **mask, **lens_fields(view.lens)}
+        {"split": splits[view.name], **_turned(view), **mask, **lens_fields(view.lens)}
         for view, mask in zip(views, masks, strict=True)
     ]
     record = transforms_of(cameras, [view.name for view in views], fields)
@@ -153,6 +153,11 @@ def with_poses(views: Sequence[View], cameras: Sequence[Camera]) -> tuple[View, 
         camera = Camera(own.size, own.K, other.view, own.model, own.aperture)
         moved.append(replace(view, camera=camera))
     return tuple(moved)
+
+
+def _turned(view: View) -> dict[str, bool]:
+    """What a frame says of its photograph where that is not as it is stored."""
+    return {"upright": True} if view.upright else {}
 
 
 def open_fit_cameras(fit: Path, *, photographs: Path | None = None) -> FitCameras | None:
