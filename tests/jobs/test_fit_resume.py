@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from rift_cl.cli import main
-from rift_cl.errors import CheckpointError, StoppedError
+from rift_cl.errors import StoppedError
 from rift_cl.io.checkpoint import newest_checkpoint
 from rift_cl.jobs.fit import Fit
 from rift_cl.jobs.fit_settings import FitSettings
@@ -89,24 +89,6 @@ def test_other_settings_cannot_go_on(capture, tmp_path, capsys):
         assert fit(capture, tmp_path / "fit", *other) == 3
         assert f"had {name.replace('-', '_')} {words}" in capsys.readouterr().err
         assert contents(tmp_path / "fit") == before
-
-
-def test_the_size_that_was_decided_is_that_of_what_goes_on(capture, tmp_path, monkeypatch):
-    """Another device would decide otherwise, and fits of old began without a choice."""
-    small = {True: 400, False: 400}
-    monkeypatch.setattr("rift_cl.jobs.photograph_size.MOST_PIXELS", small)
-    whole, cut, asked = (tmp_path / name for name in ("whole", "cut", "asked"))
-    job, _ = run(settings(capture, whole, steps=75))
-    broken_off(settings(capture, cut, steps=75), 25)
-    broken_off(settings(capture, asked, steps=75, downscale=1), 25)
-    monkeypatch.undo()
-    other = Fit(settings(capture, cut, steps=75, resume=True))
-    assert other.downscale == job.downscale > 1
-    list(other.run())
-    assert digest(cut) == digest(whole)
-    assert Fit(settings(capture, asked, steps=75, resume=True)).downscale == 1
-    with pytest.raises(CheckpointError, match="had downscale 1, now it is 2"):
-        Fit(settings(capture, asked, steps=75, resume=True, downscale=2))
 
 
 def test_resuming_what_never_began_begins(capture, tmp_path):
@@ -192,15 +174,6 @@ def test_a_finished_fit_is_trained_on_to_the_same_bits(capture, tmp_path, more):
     state, _ = newest_checkpoint(tmp_path / "once" / "checkpoints")
     assert state.step == 100
     assert bool(more) == any(name.startswith("poses.") for name in state.arrays)
-
-
-def test_what_goes_on_begins_with_the_poses_that_were_refined(capture, tmp_path):
-    out = tmp_path / "fit"
-    run(settings(capture, out, steps=50, **VARIANTS["default"]))
-    before = (out / "transforms.json").read_bytes()
-    job = Fit(settings(capture, out, steps=75, resume=True, **VARIANTS["default"]))
-    next(report for report in job.run() if report.what == "steps")
-    assert (out / "transforms.json").read_bytes() == before
 
 
 def test_the_second_part_may_be_broken_off_as_well(capture, tmp_path):
