@@ -193,6 +193,13 @@ def test_what_the_panels_are_set_to_is_what_is_wished_for(shown):
         assert (wish.comparison, wish.share, wish.edge) == ("wipe", 0.25, 300)
         assert wish.photograph in photographs
         assert (wish.crop.low[0], wish.crop.high[0]) == (-0.5, 0.25)
+        # Nonsense is as if it were not said.
+        page.press("x", (1, 2, 3))
+        page.press("share", float("nan"))
+        page.press("aperture", float("inf"))
+        until(lambda: viewer._page.wish.share != 0.25)
+        wish = viewer._page.wish
+        assert (wish.crop, wish.share, wish.aperture) == (None, 0.0, None)
 
 
 def test_key_frames_become_a_file_to_render(shown):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from rift_cl.jobs.scene_bounds import SceneBounds
 from rift_cl.jobs.viewing.crop import Crop
 
@@ -44,8 +46,11 @@ class CropPanel:
         """The box; None where nothing is cropped."""
         if not self._on.value:
             return None
-        lows, highs = zip(*(sorted(side.value) for side in self._sides), strict=True)
-        return Crop(lows, highs)
+        pairs = [sorted(side.value) for side in self._sides]
+        # A page may say anything.
+        if any(len(pair) != 2 or not np.isfinite(pair).all() for pair in pairs):
+            return None
+        return Crop(tuple(low for low, _ in pairs), tuple(high for _, high in pairs))
 
     def _side(self, gui: Any, axis: str, middle: float, radius: float) -> Any:
         """The two bounds along one axis, in scene units."""

@@ -62,7 +62,7 @@ class PhotographPanel:
     @property
     def share(self) -> float:
         """Of the photograph in the comparison, 0 to 1."""
-        return float(np.clip(self._share.value, 0, 1))
+        return float(np.clip(np.nan_to_num(self._share.value), 0, 1))
 
     def _fill(self, gui: Any) -> None:
         """Put everything into the panel."""

@@ -12,6 +12,7 @@ import math
 import threading
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +31,7 @@ from rift_cl.jobs.viewing.photographs import Photograph, nearest_one
 from rift_cl.jobs.viewing.picture import Painter
 from rift_cl.jobs.viewing.pose import NARROWEST, Pose
 from rift_cl.jobs.viewing.standpoint import standpoint_of
+from rift_cl.jobs.viewing.wish import Wish
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
 
@@ -114,7 +116,7 @@ class SplatViewer:
         self._version = 0
         # Pixels in a second, as the last picture was drawn and sent.
         self._pace: float | None = None
-        self.state = ""
+        self.state, self._wish = "", Wish(edge=size)
         first, target = first_view(bounds)
         self._page = ViewerPage(
             port=port,
@@ -174,7 +176,10 @@ class SplatViewer:
 
     def _serve_one(self, client: _Client, splats: Splats, renderer: Renderer) -> bool:
         """Draw for one page if it wants anything that it does not have."""
-        pose, since, wish = client.pose, client.since, self._page.wish
+        # A page may set its panels to anything; what makes no sense is as if it were not said.
+        with suppress(Exception):
+            self._wish = self._page.wish
+        pose, since, wish = client.pose, client.since, self._wish
         want, now = (pose, wish, self._version), time.monotonic()
         resting = now - since >= _REST
         self._lend(client, wish.crop, now)
