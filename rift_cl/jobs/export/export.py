@@ -65,7 +65,7 @@ class Export:
             self.notes.append(
                 "the page draws each splat in one colour, the mean of what the cameras saw: what "
                 "changes with the direction is lost (other formats keep it; a fit with "
-                "--sh-degree 0 loses nothing by it)"
+                "--sh-degree 0 has nothing to lose by it)"
             )
         if self.scene.drawing.eps2d != _VIEWERS:
             self.notes.append(
