@@ -39,8 +39,9 @@ Method = Literal["greedy", "greedy+mma"]
 _MOST_VIEWS = 100_000
 # Frequencies that hold a target's power, below which a plan is not to be trusted.
 _FEW = 6
-# Starts that are moved; none that is so much worse than the best, as a share, comes to win.
-_MOVED, _HOPELESS = 3, 0.1
+# Starts that are moved, and for how many steps until the best of them alone goes on; none that is
+# so much worse than the best, as a share, comes to win.
+_MOVED, _TRIED, _HOPELESS = 3, 10, 0.1
 # By which part the merit may grow so that no two views stand at one place: 0.02 dB.
 _PARTING = 5e-3
 
@@ -189,7 +190,7 @@ def _chosen(
 
 
 def _moved(objective: Objective, chosen: Stations, simple: Mapping[str, Baseline]) -> Stations:
-    """The best of what was chosen and of simple arrangements, after each was polished."""
+    """The best of what was chosen and of simple arrangements, polished."""
     site, spacing = objective.site, FreeLayout(objective.site, chosen).trust
     starts = [chosen, *(baseline.stations for baseline in simple.values())]
     values = [objective.value(start) for start in starts]
@@ -197,8 +198,10 @@ def _moved(objective: Objective, chosen: Stations, simple: Mapping[str, Baseline
     least = values[order[0]]
     found = [starts[order[0]]]
     for start in (starts[n] for n in order if values[n] <= least + _HOPELESS * abs(least)):
-        found.append(polish(objective, FreeLayout(site, parted(site, start, spacing))))
+        found.append(polish(objective, FreeLayout(site, parted(site, start, spacing)), _TRIED))
     best = min(found, key=objective.value)
+    moved = polish(objective, FreeLayout(site, parted(site, best, spacing)))
+    best = min((best, moved), key=objective.value)
     # In a corner of what is allowed views may meet again: a little apart they are worth as much.
     value = objective.value(best)
     for share in (1, 0.25, 0.05):
