@@ -31,7 +31,8 @@ def test_the_ink_of_a_drawing_is_named_twice_and_used_by_name():
         assert color in style and color not in body
     used = set(re.findall(r"var\((--c\d)\)", body))
     assert used and all(style.count(f"{name}:") == 2 for name in used)
-    assert "#ffffff" not in svg and "http://www.w3.org/1999/xlink" in svg
+    assert "svg { --c0" in style and "fill: var(--c0); }" in style, "or black stays black"
+    assert "#000000" not in svg and "#ffffff" not in svg and "http://www.w3.org/1999/xlink" in svg
     ElementTree.fromstring(svg)
 
 

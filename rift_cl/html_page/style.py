@@ -91,7 +91,7 @@ dd { margin: 0; font-variant-numeric: tabular-nums; }
   main { padding: 2rem 1rem 3rem; }
   dl { grid-template-columns: 1fr; gap: 0; } dd { margin-bottom: 0.6rem; }
   th, td { padding-right: 0.75rem; }
-  tbody th, td { overflow-wrap: anywhere; }
+  tbody th, td:not(.number) { overflow-wrap: anywhere; min-width: 5.5rem; }
   .panels { grid-template-columns: repeat(var(--narrow), minmax(0, 1fr)); gap: 0.75rem; }
   .zoom:checked + .stage .drawing { width: max(100%, 46rem); }
   .adapts .zoom:checked + .stage .drawing { width: 100%; } }

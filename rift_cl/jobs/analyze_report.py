@@ -37,6 +37,7 @@ def analysis_page(
     )
     for note in sampled.notes:
         page.paragraph(note)
+    _views(page, sampled, added, device)
     for heading, found in zip(_HEADINGS, findings, strict=True):
         if not found.sentences:
             continue
@@ -45,7 +46,6 @@ def analysis_page(
             page.paragraph(sentence)
         for columns, rows, caption in found.tables:
             page.table(columns, rows, caption=caption)
-    _views(page, sampled, added, device)
     if not sampled.opaque:
         page.section("What the views sample")
         add_coverage(page, sampled, points, device)

@@ -44,12 +44,12 @@ def plan_page(
     more = f" besides {len(found.fixed)} taken" if found.fixed else ""
     noun = "view" if len(found) == 1 else "views"
     page = Page(f"Plan of {len(found)} {noun}{more}", metrics["verdict"])
+    _cameras(page, given, found, sampled)
     page.section("What planning is worth")
     page.table(*worth_table(metrics), caption=caption_of(metrics))
     page.paragraph(metrics["verdict"])
     page.paragraph(bound_words(metrics))
     _assumed(page, given)
-    _cameras(page, given, found, sampled)
     _gains(page, found, knee, merit_name(metrics))
     _coverage(page, sampled, device)
     return page

@@ -89,6 +89,7 @@ def figure_svg(figure: Figure) -> bytes:
     figure.savefig(buffer, format="svg", metadata={"Date": None}, transparent=True)
     text = buffer.getvalue().decode("utf-8")
     text = _numbered(re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL))
+    text = text.replace(": #000000", f": {INK}")
     for place, color in enumerate(_DARK):
         text = text.replace(f": {color}", f": var(--c{place})")
     wide, high = (round(length * figure.dpi) for length in figure.get_size_inches())
@@ -102,7 +103,11 @@ def figure_svg(figure: Figure) -> bytes:
         " ".join(f"--c{place}: {color};" for place, color in enumerate(colors))
         for colors in (_DARK, _DARK.values())
     )
-    style = f"svg {{ {light} }} @media (prefers-color-scheme: dark) {{ svg {{ {dark} }} }}"
+    # What matplotlib leaves black has no fill of its own.
+    style = (
+        f"svg {{ {light} fill: var(--c0); }} "
+        f"@media (prefers-color-scheme: dark) {{ svg {{ {dark} }} }}"
+    )
     return f"{head}<style>{style}</style>{body}".encode()
 
 
