@@ -58,9 +58,18 @@ class OrbitInput(SceneInput):
         """What had to be guessed of a fit's cameras, a sentence each."""
         known = scene.cameras is not None or self.capture is not None
         # A scan's views are no cameras that anybody held.
-        if scene.folder is None or known or scene.splats.mode == "xray":
+        if known or scene.splats.mode == "xray":
             return ()
+        if scene.folder is None:
+            return () if scene.fit is None else (self._without_fit(scene.fit),)
         return (
             f"{self.scene} holds no cameras, since an older version fitted it: the way of the "
             "camera and what is up are guessed from the splats (name its capture with --capture).",
+        )
+
+    def _without_fit(self, fit: Path) -> str:
+        return (
+            f"{self.scene} is taken without the fit that it lies in: the way of the camera and "
+            "what is up are guessed from the splats, background and drawing are the usual ones "
+            f"(name the folder instead: {fit})."
         )

@@ -20,11 +20,12 @@ from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.display_light import to_display, to_linear
 from rift_cl.io.json_fields import Fields, read_json_object
 from rift_cl.io.splat_scene import SplatScene
-from rift_cl.jobs.cameras.fit_cameras import FitCameras, open_fit_cameras
+from rift_cl.jobs.cameras.fit_cameras import CAMERA_FILES, FitCameras, open_fit_cameras
 from rift_cl.jobs.fit_pictures import Light
 from rift_cl.splat.settings import SplatSettings
 
 _SCENE, _CONFIG, _METRICS = "scene.ply", "config.json", "metrics.json"
+_OF_FIT = (_CONFIG, *CAMERA_FILES[:1])
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class OpenedScene:
 
     def __init__(self, settings: SceneInput, *, densities: bool = False) -> None:
         path = settings.scene
-        self.folder = path if path.is_dir() else None
+        self.path, self.folder = path, path if path.is_dir() else None
         self.name: str = path.resolve().name
         self.splats = SplatScene.load(scene_file(path))
         if self.splats.mode == "xray" and not densities:
@@ -85,6 +86,13 @@ class OpenedScene:
         self.drawing = drawing if eps2d is None else replace(drawing, eps2d=eps2d)
         self.light: Light = self._light()
         self.background: NDArray[np.float32] = self._background(settings)
+
+    @property
+    def fit(self) -> Path | None:
+        """The folder of the fit that the file of a scene lies in; None where it lies in none."""
+        folder = self.path.parent
+        is_fit = self.path.name == _SCENE and all((folder / name).is_file() for name in _OF_FIT)
+        return folder if is_fit else None
 
     @property
     def downscale(self) -> int:

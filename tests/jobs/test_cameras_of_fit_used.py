@@ -110,6 +110,19 @@ def test_a_film_needs_no_photographs(alone, tmp_path):
     assert len(open_capture(tmp_path / "path").views) == 8
 
 
+def test_a_scene_that_is_named_without_its_fit_is_said_to_be(home, older, tmp_path, capsys):
+    small = ("--frames", 2, "--size", 40, 30)
+    scene = home / "fit" / "scene.ply"
+    words = f"{scene} is taken without the fit that it lies in"
+    assert run("render", scene, "--out", tmp_path / "film", *small) == 0
+    said = capsys.readouterr().err
+    assert words in said and f"name the folder instead: {home / 'fit'}" in said
+    for number, more in enumerate(((home / "fit",), (scene, "--capture", home / "photographs"))):
+        assert run("render", *more, "--out", tmp_path / f"film{number}", *small) == 0
+    assert run("render", older / "scene.ply", "--out", tmp_path / "alone", *small) == 0
+    assert "taken without" not in capsys.readouterr().err
+
+
 def test_distance_and_elevation_are_about_the_focus_and_up_that_are_used(alone, tmp_path):
     """Cameras with the picture's top down; what up is, is said; and a focus that the fit found."""
     turned = []
