@@ -49,7 +49,7 @@ class OrbitInput(SceneInput):
         """The unit vector (3,) that --up asks for, or None."""
         if self.up is None:
             return None
-        length = float(np.linalg.norm(self.up))
+        length = math.hypot(*self.up)
         if not 0 < length < math.inf:
             raise InputError(f"--up is {' '.join(map(str, self.up))}, wanted a direction")
         return np.array(self.up) / length

@@ -189,6 +189,8 @@ def test_an_older_fit_and_other_folders_have_none(fitted, tmp_path):
     ("change", "words"),
     [
         ({"up": [0, 0, 0]}, "'up' is no direction"),
+        ({"up": [1e308, 1e308, 1e308]}, r"transforms.json: capture: 'up' is no direction"),
+        ({"focus": [1e200, 0, 0]}, r"transforms.json: capture: 'focus' is farther off than 1e\+15"),
         ({"up": [0, 1]}, "'up' is not three numbers"),
         ({"focus": ["x", 0, 0]}, "wanted a number"),
         ({"focus": None}, "'focus' is not three numbers"),
@@ -202,6 +204,15 @@ def test_a_damaged_file_of_cameras_is_named(fitted, tmp_path, change, words):
     (fit / "transforms.json").write_text(json.dumps(record))
     with pytest.raises(FileFormatError, match=words):
         open_fit_cameras(fit)
+
+
+def test_a_long_way_up_is_a_direction(fitted, tmp_path):
+    fit = tmp_path / "fit"
+    shutil.copytree(fitted, fit)
+    record = json.loads((fit / "transforms.json").read_text())
+    record["capture"]["up"] = [0, 1e200, 0]
+    (fit / "transforms.json").write_text(json.dumps(record))
+    assert open_fit_cameras(fit).up.tolist() == [0, 1, 0]
 
 
 def test_cameras_in_one_place_tell_no_depth_and_nothing_is_written(capture, tmp_path, capsys):

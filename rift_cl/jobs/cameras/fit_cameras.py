@@ -8,6 +8,7 @@ photographer's disk.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -42,6 +43,8 @@ CAMERA_FILES = ("transforms.json", "cameras.json", "sparse_pc.ply")
 _TRANSFORMS, _CAMERAS, _POINTS = CAMERA_FILES
 # More sparse points are thinned out evenly: 15 MB of them tell as much.
 _MOST_POINTS = 1 << 20
+# The squares of larger coordinates would not be numbers in float32.
+_FARTHEST = 1e15
 _SEEN, _UNSEEN = "train", "test"
 
 
@@ -209,9 +212,11 @@ def _cameras_of(capture: Capture, splits: Sequence[str | None], facts: Fields) -
     if not seen:
         raise FileFormatError(f"{facts.where}: no frame says that it was trained on")
     up, focus = _vector(facts, "up"), _vector(facts, "focus")
-    length = float(np.linalg.norm(up))
-    if not length > 0:
+    length = math.hypot(*up)
+    if not 0 < length < math.inf:
         raise FileFormatError(f"{facts.where}: 'up' is no direction")
+    if np.abs(focus).max() > _FARTHEST:
+        raise FileFormatError(f"{facts.where}: 'focus' is farther off than {_FARTHEST:g} units")
     count = len(capture.views)
     return FitCameras(
         seen=seen,
