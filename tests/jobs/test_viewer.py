@@ -17,6 +17,7 @@ from rift_cl.io.splat_scene import SplatScene
 from rift_cl.jobs.scene_bounds import SceneBounds
 from rift_cl.jobs.viewing import viewer as viewer_module
 from rift_cl.jobs.viewing.crop import Crop
+from rift_cl.jobs.viewing.pace import Pace
 from rift_cl.jobs.viewing.pose import Pose
 from rift_cl.jobs.viewing.viewer import SplatViewer
 from rift_cl.jobs.viewing.wish import Wish
@@ -165,7 +166,7 @@ def test_a_page_gets_its_picture_once(viewer, drawn):
 def test_a_camera_that_moves_gets_less_and_all_when_it_rests(viewer, drawn):
     viewer._joined(client(), POSE)
     viewer.serve(*drawn)
-    viewer._pace = 60_000.0
+    viewer._pace.pixels = 60_000.0
     viewer._moved(7, replace(POSE, position=(5.0, 0, 0)))
     assert [viewer.serve(*drawn), viewer.serve(*drawn)] == [1, 0]
     assert max(viewer._page.sent[-1][1].shape) < 120
@@ -175,13 +176,13 @@ def test_a_camera_that_moves_gets_less_and_all_when_it_rests(viewer, drawn):
 
 
 @pytest.mark.parametrize(
-    ("pace", "width"), [(1e9, 960), (576e3 * 20 / 4, 480), (576e3, 480), (576e3 / 4, 240), (1, 96)]
+    ("pixels", "width"),
+    [(1e9, 960), (576e3 * 20 / 4, 480), (576e3, 480), (576e3 / 4, 240), (1, 96)],
 )
-def test_moving_pictures_are_half_as_large_at_least_unless_that_took_all_too_long(
-    viewer, pace, width
-):
-    viewer._pace = pace
-    small = viewer._small(replace(POSE, aspect=1.6), 960)
+def test_moving_pictures_are_half_as_large_at_least_unless_that_took_all_too_long(pixels, width):
+    pace = Pace()
+    pace.pixels = pixels
+    small = pace.edge(replace(POSE, aspect=1.6), 960)
     assert small == pytest.approx(width, rel=0.05)
 
 

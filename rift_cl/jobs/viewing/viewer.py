@@ -26,20 +26,18 @@ from rift_cl.jobs.fit_pictures import Light
 from rift_cl.jobs.scene_bounds import SceneBounds
 from rift_cl.jobs.viewing.browser_splats import MovingSplats
 from rift_cl.jobs.viewing.crop import Crop
+from rift_cl.jobs.viewing.pace import Pace
 from rift_cl.jobs.viewing.page import ViewerPage
 from rift_cl.jobs.viewing.photographs import Photograph, nearest_one
 from rift_cl.jobs.viewing.picture import Painter
-from rift_cl.jobs.viewing.pose import NARROWEST, Pose
+from rift_cl.jobs.viewing.pose import Pose
 from rift_cl.jobs.viewing.standpoint import standpoint_of
 from rift_cl.jobs.viewing.wish import Wish
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
 
-# A camera rests when it has not moved for so many seconds; until then a picture should take so
-# long, and one of half the size may take so long.
-_REST, _PICTURE, _SLOW = 0.2, 0.05, 0.25
-# The least longer edge of a picture, and how many sizes there are up to the full one.
-_LEAST, _SIZES = 96, 8
+# Seconds without a move after which a camera rests.
+_REST = 0.2
 # Pictures of a fit whose page rests are so many times their own length apart.
 _BETWEEN = 4.0
 # Quality of JPEG while the camera moves and while it rests.
@@ -114,8 +112,7 @@ class SplatViewer:
         self._lock, self._asked = threading.Lock(), threading.Event()
         self._splats: Splats | None = None
         self._version = 0
-        # Pixels in a second, as the last picture was drawn and sent.
-        self._pace: float | None = None
+        self._pace = Pace()
         self.state, self._wish = "", Wish(edge=size)
         first, target = first_view(bounds)
         self._page = ViewerPage(
@@ -191,7 +188,7 @@ class SplatViewer:
         waits = client.sharp is not None and want[:2] == client.sharp[:2]
         if waits and now < client.again:
             return False
-        small = wish.edge if resting else self._small(pose, wish.edge)
+        small = wish.edge if resting else self._pace.edge(pose, wish.edge)
         try:
             camera = pose.camera(small)
         except InputError:
@@ -209,7 +206,7 @@ class SplatViewer:
         self._page.show(client.handle, picture, quality)
         seconds = time.perf_counter() - begin
         if self._painter.drawn > before:
-            self._learn(camera.height * camera.width / seconds)
+            self._pace.learn(camera.height * camera.width, seconds)
         client.rough = want
         if small == wish.edge:
             now = time.monotonic()
@@ -218,10 +215,6 @@ class SplatViewer:
                 client.ends = now + _SEEN if client.pose is pose else math.inf
             self._page.tell(self._facts(splats, camera, seconds))
         return True
-
-    def _learn(self, pace: float) -> None:
-        """Note how many pixels were drawn in a second; one picture that had to wait says little."""
-        self._pace = pace if self._pace is None else math.sqrt(pace * self._pace)
 
     def _lend(self, client: _Client, crop: Crop | None, now: float) -> None:
         """Give a page the splats that it draws by itself, or hide them once our picture is seen."""
@@ -244,20 +237,6 @@ class SplatViewer:
             *filter(None, [self.state, self._painter.trouble]),
         ]
         return "  \n".join(lines)
-
-    def _small(self, pose: Pose, edge: int) -> int:
-        """The longer edge at which a picture is drawn in time, while the camera moves.
-
-        At least half of what it is at rest, unless that took all too long; in few steps, since a
-        picture that changes its size all the time flickers.
-        """
-        if self._pace is None:
-            return max(_LEAST, edge // 2) if edge > _LEAST else edge
-        share = max(min(pose.aspect, 1 / pose.aspect), NARROWEST)
-        soon, late = (math.sqrt(self._pace * limit / share) for limit in (_PICTURE, _SLOW))
-        step = edge / _SIZES
-        fits = max(step * int(soon / step), min(edge / 2, late))
-        return min(edge, max(_LEAST, int(fits)))
 
     def _joined(self, handle: Any, pose: Pose) -> None:
         with self._lock:
