@@ -130,6 +130,11 @@ def _target(settings: PlanSettings, have: Sampled | None, notes: list[str]) -> T
                 "The target is taken to be opaque: a sphere stands for its surface, and nothing "
                 "else is in the way (--mode volume is for X-rays)."
             )
+        elif have.space is None:
+            notes.append(
+                "What stands in the way is not known: name places to keep out of (--keep-out), or "
+                "give the folder of a fit."
+            )
     else:
         notes.append(
             "The target is taken to be seen through, so that opposite views tell the same and one "

@@ -101,6 +101,15 @@ def test_where_nothing_tells_what_stands_where_suggestions_stay_near(tmp_path):
         assert (sampled.directions() @ way).max() > math.cos(math.radians(ASTRAY + 3))
 
 
+def test_a_plan_besides_such_views_says_that_nothing_is_known(tmp_path, walled):
+    bare = capture(tmp_path / "bare", arc())
+    for folder, known in ((bare, False), (walled, True)):
+        settings = PlanSettings(have=folder, unit=100.0, diameter=120.0, distance=(380.0, 450.0))
+        given = plan_input(settings)
+        assert any("not known" in note for note in given.notes) != known
+        assert len(given.constraints.keepouts) == known
+
+
 def test_depth_that_contradicts_the_cameras_is_not_made_use_of(tmp_path):
     cameras = arc()
     near = np.concatenate([0.2 * c.center + 0.02 * np.eye(3) for c in cameras for _ in range(9)])
