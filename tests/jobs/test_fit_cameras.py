@@ -189,7 +189,7 @@ def test_an_older_fit_and_other_folders_have_none(fitted, tmp_path):
     ("change", "words"),
     [
         ({"up": [0, 0, 0]}, "'up' is no direction"),
-        ({"up": [1e308, 1e308, 1e308]}, r"transforms.json: capture: 'up' is no direction"),
+        ({"up": [1.7e308, 1.7e308, 1.7e308]}, r"transforms.json: capture: 'up' is no direction"),
         ({"focus": [1e200, 0, 0]}, r"transforms.json: capture: 'focus' is farther off than 1e\+15"),
         ({"up": [0, 1]}, "'up' is not three numbers"),
         ({"focus": ["x", 0, 0]}, "wanted a number"),
