@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from rift_cl.errors import ShapeError
 from rift_cl.plot.figure import Reals, real_values
 
-# Bytes that the pictures of one slider may take, and samples along a side of the largest.
+# Bytes that the pictures of one slider may take, and pixels along a side of the largest.
 BUDGET, _SIDE = 2 << 20, 640
 _QUALITY = 88
 # Sizes that are tried until the pictures fit, each this share of the one before.
