@@ -41,7 +41,6 @@ def curves(
         title: a text above the axes.
         mark: a position along x that is shown by a dashed line and its value.
         width: of the figure in pixels; letters keep their size.
-        width: of the figure in pixels; letters keep their size.
 
     Raises:
         ShapeError: there is no curve, or x and y of one are not (n,) with one n of 1 or more.

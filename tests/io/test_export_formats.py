@@ -10,6 +10,7 @@ from splat_readers import C0, read_compressed_ply, read_glb, read_sog, read_spz
 
 from rift_cl.errors import InputError
 from rift_cl.io.splat_activations import opacities_of, scales_of
+from rift_cl.io.splat_formats import palettes
 from rift_cl.io.splat_formats.formats import FORMATS
 from rift_cl.io.splat_formats.plain import along_curve, unit_quats
 from rift_cl.io.splat_formats.spz import encode_spz, fraction_bits
@@ -116,6 +117,26 @@ def test_vectors_of_sog_are_shared_by_splats_that_are_alike() -> None:
     read = read_sog(FORMATS["sog"].encode(given))
     apart = read["rest"] - given.sh[:, 1:]
     assert np.sqrt(np.square(apart).mean()) < 0.05 * 0.3
+
+
+def test_each_vector_has_the_nearest_entry_of_its_group_however_few_share_it() -> None:
+    """Groups of single vectors, far from all others, once took more entries than there are."""
+    random, count = np.random.default_rng(0), 16
+    far = random.normal(size=(4, 3))
+    far *= 1000 / np.linalg.norm(far, axis=1, keepdims=True)
+    vectors = np.concatenate([random.normal(size=(1000, 3)), far]).astype(np.float32)
+    palette, labels = palettes.vector_palette(vectors, count)
+    assert len(palette) <= count
+    group = palettes._nearest(vectors, palettes._clustered(vectors, round(count**0.5)))
+    assert np.bincount(group).min() == 1
+    taken: set[int] = set()
+    for number in range(group.max() + 1):
+        own, here = np.unique(labels[group == number]), vectors[group == number]
+        assert taken.isdisjoint(own)
+        taken.update(own)
+        apart = np.linalg.norm(here[:, None] - palette[own], axis=2)
+        found = apart[range(len(here)), np.searchsorted(own, labels[group == number])]
+        np.testing.assert_allclose(found, apart.min(axis=1), rtol=1e-3)
 
 
 @pytest.mark.parametrize("name", list(FORMATS))

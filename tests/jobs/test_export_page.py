@@ -130,3 +130,11 @@ def test_without_viser_there_is_a_sentence(fit, tmp_path, monkeypatch, capsys):
     assert main(["export", str(fit), "--out", str(tmp_path / "p.html")]) == 3
     assert "pip install 'viser>=1.1,<1.2'" in " ".join(capsys.readouterr().err.split())
     assert not any(tmp_path.iterdir())
+
+
+def test_a_page_that_cannot_be_kept_from_the_network_is_not_written(fit, monkeypatch, capsys):
+    monkeypatch.setattr("viser.SceneApi.as_html", lambda *_, **__: "<html><HEAD></HEAD></html>")
+    path = fit.parent / "open.html"
+    assert main(["export", str(fit), "--out", str(path), "--quiet"]) == 3
+    assert "cannot be kept from the network" in capsys.readouterr().err
+    assert not path.exists()

@@ -10,7 +10,7 @@ from rift_cl.io.splat_scene import SplatScene
 
 
 def test_each_format_comes_back_as_well_as_it_can(tool, tmp_path, capsys):
-    for name in ("gsply", "imagecodecs", "pygltflib", "plyfile", "viser"):
+    for name in ("gsply", "imagecodecs", "pygltflib", "plyfile", "viser", "zstandard", "msgspec"):
         pytest.importorskip(name)
     check, random = tool("check_exports"), np.random.default_rng(0)
     fit = tmp_path / "fit"

@@ -66,8 +66,7 @@ def vector_palette(vectors: Floats, count: int) -> tuple[Floats, NDArray[np.intp
     few = vectors[:: -(-len(vectors) // _SAMPLE)]
     coarse = _clustered(few, max(1, round(count**0.5)))
     group = _nearest(vectors, coarse)
-    members = np.bincount(group, minlength=len(coarse))
-    shares = np.minimum(members, np.maximum(1, members * count // len(vectors)) * (members > 0))
+    shares = _shares(np.bincount(group, minlength=len(coarse)), count)
     palettes, labels, start = [], np.empty(len(vectors), np.intp), 0
     for number in np.flatnonzero(shares):
         here = np.flatnonzero(group == number)
@@ -75,7 +74,16 @@ def vector_palette(vectors: Floats, count: int) -> tuple[Floats, NDArray[np.intp
         labels[here] = start + _nearest(vectors[here], part)
         palettes.append(part)
         start += len(part)
-    return np.concatenate(palettes)[:count], np.minimum(labels, count - 1)
+    return np.concatenate(palettes), labels
+
+
+def _shares(members: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+    """How many entries each group gets by the number of its vectors, one at least, of ``count``."""
+    shares = np.maximum(members * count // members.sum(), members > 0)
+    # What the smallest get beyond their due, the largest go without.
+    while shares.sum() > count:
+        shares[shares.argmax()] -= 1
+    return shares
 
 
 def _clustered(vectors: Floats, count: int) -> Floats:

@@ -78,7 +78,7 @@ def web_page(
         background: (3,) behind the splats, in display light.
 
     Raises:
-        InputError: viser is not installed.
+        InputError: viser is not installed, or its page cannot be guarded.
     """
     unit = AWAY / max(float(np.linalg.norm(first.camera.center - first.target)), 1e-12)
     gaussians = browser_splats(scene, cameras or [first.camera], unit)
@@ -95,7 +95,13 @@ def web_page(
         with contextlib.redirect_stdout(io.StringIO()):
             server.stop()
     policy = f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}" />'
-    page = page.replace("<head>", f"<head>{policy}{_WORKERS}", 1)
+    head, found, rest = page.partition("<head>")
+    if not found:
+        raise InputError(
+            "viser writes a page that cannot be kept from the network, for it has no <head>: "
+            "pip install 'viser>=1.1,<1.2'"
+        )
+    page = f"{head}{found}{policy}{_WORKERS}{rest}"
     return page.replace("<title>Viser</title>", f"<title>{escape(title)}</title>", 1)
 
 
