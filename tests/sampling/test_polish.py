@@ -10,7 +10,7 @@ from rift_cl.sampling.planning.candidates import spread
 from rift_cl.sampling.planning.constraints import Constraints
 from rift_cl.sampling.planning.free_layout import FreeLayout
 from rift_cl.sampling.planning.objective import Objective
-from rift_cl.sampling.planning.polish import STEPS, polish
+from rift_cl.sampling.planning.polish import polish
 from rift_cl.sampling.planning.site import Site, default_types
 from rift_cl.sampling.planning.stations import Stations
 from rift_cl.sampling.target import Target, half_ball
@@ -45,11 +45,9 @@ def test_the_start_that_is_best_after_its_polish_wins_not_the_best_before(monkey
         number, polished = divmod(float(stations.table[0, 0]), 1)
         return (after if polished else before)[int(number)]
 
-    def move(_, layout, steps=STEPS):
+    def move(_, layout, steps=60):
         moved.append(float(layout.begin.table[0, 0]))
-        # The best goes on, to no avail.
-        further = 0.0 if steps == STEPS else 0.5
-        return planner.Stations(layout.begin.kind, layout.begin.table + further)
+        return planner.Stations(layout.begin.kind, layout.begin.table + 0.5)
 
     monkeypatch.setattr(Objective, "value", worth)
     monkeypatch.setattr(planner, "polish", move)
@@ -57,4 +55,5 @@ def test_the_start_that_is_best_after_its_polish_wins_not_the_best_before(monkey
     chosen = starts.pop("first").stations
     found = planner._moved(objective, chosen, starts)
     assert float(found.table[0, 0]) == pytest.approx(1.5)
-    assert moved == [0, 1, 1.5]
+    # The better one is then moved to its end.
+    assert moved == [0, 1, 1]

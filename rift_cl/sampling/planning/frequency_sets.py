@@ -51,6 +51,23 @@ def for_judging(target: Target, planned: Target) -> Target:
     return replace(target, frequencies=k)
 
 
+def for_choosing(target: Target, planned: Target) -> Target:
+    """The target at frequencies that were neither planned with nor judged at; as ``for_judging``.
+
+    Between plans that were fitted to the first, and arrangements that were not, the last may not
+    choose, if they are to judge.
+    """
+    if not _open(target):
+        return planned
+    count = _JUDGED * len(target.k)
+    if target.is_flat:
+        return replace(target, frequencies=half_disc(target.highest, count + len(target.k)))
+    return replace(
+        target,
+        frequencies=half_ball(target.highest, len(planned.k) + 2 * count)[len(planned.k) + count :],
+    )
+
+
 def _open(target: Target) -> bool:
     """Whether the choice of frequencies is ours."""
     if target.mode == "surface":

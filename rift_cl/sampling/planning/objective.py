@@ -18,7 +18,7 @@ from rift_cl.reference.coverage import LooksGradient, coverage, coverage_grad
 from rift_cl.sampling import criteria
 from rift_cl.sampling.looks import Looks
 from rift_cl.sampling.merit import CoverageMerit
-from rift_cl.sampling.planning.frequency_sets import for_judging
+from rift_cl.sampling.planning.frequency_sets import for_choosing, for_judging
 from rift_cl.sampling.planning.site import (
     DISTANCE,
     ELEVATION,
@@ -71,6 +71,13 @@ class Objective:
         target = self.site.target
         judged = for_judging(target if self.asked is None else self.asked, target)
         return self if judged is target else self._at(judged)
+
+    @cached_property
+    def aside(self) -> Objective:
+        """The same at a third set of frequencies, to choose with between what was optimised."""
+        target = self.site.target
+        chosen = for_choosing(target if self.asked is None else self.asked, target)
+        return self if chosen is target else self._at(chosen)
 
     def _at(self, target: Target) -> Objective:
         return replace(self, site=replace(self.site, target=target), asked=None)

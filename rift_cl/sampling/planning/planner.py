@@ -195,13 +195,14 @@ def _moved(objective: Objective, chosen: Stations, simple: Mapping[str, Baseline
     starts = [chosen, *(baseline.stations for baseline in simple.values())]
     values = [objective.value(start) for start in starts]
     order = sorted(range(len(starts)), key=values.__getitem__)[:_MOVED]
-    least = values[order[0]]
-    found = [starts[order[0]]]
-    for start in (starts[n] for n in order if values[n] <= least + _HOPELESS * abs(least)):
-        found.append(polish(objective, FreeLayout(site, parted(site, start, spacing)), _TRIED))
-    best = min(found, key=objective.value)
-    moved = polish(objective, FreeLayout(site, parted(site, best, spacing)))
-    best = min((best, moved), key=objective.value)
+    first, worst = starts[order[0]], (1 + _HOPELESS * np.sign(values[order[0]])) * values[order[0]]
+    layouts = [
+        FreeLayout(site, parted(site, starts[n], spacing)) for n in order if values[n] <= worst
+    ]
+    tried = [polish(objective, layout, _TRIED) for layout in layouts]
+    winner = layouts[int(np.argmin([objective.value(views) for views in tried]))]
+    # From its start again: who begins anew where it came to is let too far from there.
+    best = min((first, *tried, polish(objective, winner)), key=objective.aside.value)
     # In a corner of what is allowed views may meet again: a little apart they are worth as much.
     value = objective.value(best)
     for share in (1, 0.25, 0.05):
