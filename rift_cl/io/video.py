@@ -30,6 +30,8 @@ VIDEOS = (".mp4", ".mov", ".m4v", ".webm", ".mkv", ".avi")
 _RECORD = "frames.json"
 # Sharpness is judged on pictures so wide: finer than that it is noise.
 _JUDGED = 480
+# Curves of high dynamic range, by their numbers in ITU-T H.273.
+_HDR = {16: "PQ", 18: "HLG"}
 _JPEG = {"Compression": "jpeg:95", "jpeg:subsampling": "4:4:4"}
 
 
@@ -52,6 +54,29 @@ def demand_video(path: Path) -> None:
     """
     with _stream(path):
         pass
+
+
+def video_notes(path: Path) -> list[str]:
+    """What of a video is taken otherwise than a player shows it, a sentence each.
+
+    Raises:
+        RiftError: see ``demand_video``.
+    """
+    with _stream(path) as (_, stream):
+        curve = _HDR.get(int(stream.codec_context.color_trc))
+        aspect = stream.sample_aspect_ratio or 1
+    notes = []
+    if curve:
+        notes.append(
+            f"the video has high dynamic range ({curve}), which is not undone: colours come out "
+            "pale, so that a recording without it (SDR) serves better"
+        )
+    if aspect != 1:
+        notes.append(
+            f"the video's pixels are {float(aspect):.3g} times as wide as high and are taken for "
+            "squares, which poses suffer from: make them square first"
+        )
+    return notes
 
 
 def sharpest_frames(

@@ -13,7 +13,7 @@ from rift_cl.io.capture import Capture, holds_bare_photographs, open_capture
 from rift_cl.io.colmap_process import demand_pycolmap
 from rift_cl.io.photograph_folder import other_files, photographs_in
 from rift_cl.io.photographs import demand_photographs, pose_photographs
-from rift_cl.io.video import demand_video, holds_video, sharpest_frames
+from rift_cl.io.video import demand_video, holds_video, sharpest_frames, video_notes
 from rift_cl.progress import Report
 
 # Names that a sentence lists.
@@ -68,6 +68,7 @@ class BareInput:
         if self._video:
             taken, total = yield from sharpest_frames(self.source, self.folder, self._frames)
             self.notes.append(f"{taken} of the video's {total} frames are taken, the sharpest")
+            self.notes += video_notes(self.source)
         elif others := other_files(photographs_in(self.folder)):
             count = f"{len(others)} files that are no photographs are"
             if len(others) == 1:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from photograph_files import run
 
 from rift_cl.errors import FileFormatError, InputError, OutputError
 from rift_cl.io import read_image
-from rift_cl.io.video import demand_video, holds_video, sharpest_frames
+from rift_cl.io.video import demand_video, holds_video, sharpest_frames, video_notes
 
 HEIGHT, WIDTH = 48, 64
 # The sharp frames; in a stretch of 5 the others are one grey.
@@ -26,7 +27,9 @@ def checkers(number: int) -> np.ndarray:
     return np.repeat(codes[..., None], 3, axis=2)
 
 
-def store_video(path: Path, frames: list[np.ndarray], audio_only: bool = False) -> Path:
+def store_video(
+    path: Path, frames: list[np.ndarray], audio_only: bool = False, **tags: object
+) -> Path:
     av = pytest.importorskip("av")
     with av.open(str(path), "w") as container:
         if audio_only:
@@ -38,6 +41,8 @@ def store_video(path: Path, frames: list[np.ndarray], audio_only: bool = False) 
             stream = container.add_stream("mpeg4", rate=10)
             stream.height, stream.width = frames[0].shape[:2]
             stream.pix_fmt, stream.bit_rate = "yuv420p", 4_000_000
+            for name, value in tags.items():
+                setattr(stream.codec_context, name, value)
             for codes in frames:
                 container.mux(stream.encode(av.VideoFrame.from_ndarray(codes, "rgb24")))
         container.mux(stream.encode())
@@ -120,3 +125,18 @@ def test_without_the_library_one_sentence_says_what_to_install(
     with pytest.raises(InputError, match="pip install av") as caught:
         demand_video(video)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("curve, name", [(1, None), (16, "PQ"), (18, "HLG")])
+def test_high_dynamic_range_is_said(tmp_path: Path, curve: int, name: str | None) -> None:
+    tags = {"color_trc": curve, "color_primaries": 9, "colorspace": 9}
+    notes = video_notes(store_video(tmp_path / "a.mp4", [checkers(2)], **tags))
+    assert len(notes) == (name is not None)
+    assert all(f"high dynamic range ({name})" in note for note in notes)
+
+
+def test_pixels_that_are_not_square_are_said(tmp_path: Path) -> None:
+    (note,) = video_notes(
+        store_video(tmp_path / "a.mp4", [checkers(2)], sample_aspect_ratio=Fraction(4, 3))
+    )
+    assert "1.33 times as wide as high" in note

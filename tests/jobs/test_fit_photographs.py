@@ -71,13 +71,16 @@ def test_what_is_odd_in_a_folder_is_said_in_two_lines(photographs, tmp_path, pos
 
 
 def test_a_video_is_fitted_by_its_frames(tmp_path, posed, capsys):
-    video = store_video(tmp_path / "walk.mp4", frames(12))
+    tags = {"color_trc": 18, "color_primaries": 9, "colorspace": 9}
+    video = store_video(tmp_path / "walk.mp4", frames(12), **tags)
     out = tmp_path / "fit"
     arguments = ["fit", str(video), "--out", str(out), "--frames", "6", *SHORT]
     assert main([*arguments, "--dry-run"]) == 0
     assert not out.exists() and "6 sharp frames" in capsys.readouterr().out
     assert main(arguments) == 0
-    assert "6 of the video's 12 frames are taken, the sharpest" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "6 of the video's 12 frames are taken, the sharpest" in said
+    assert "high dynamic range (HLG)" in said
     assert len(list((out / "frames").glob("*.jpg"))) == 6
     kept = json.loads((out / "transforms.json").read_text())
     assert kept["frames"][0]["file_path"] == "00001.jpg"

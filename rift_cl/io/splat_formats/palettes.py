@@ -79,7 +79,7 @@ def vector_palette(vectors: Floats, count: int) -> tuple[Floats, NDArray[np.intp
 
 def _shares(members: NDArray[np.intp], count: int) -> NDArray[np.intp]:
     """How many entries each group gets by the number of its vectors, one at least, of ``count``."""
-    shares = np.maximum(members * count // members.sum(), members > 0)
+    shares: NDArray[np.intp] = np.maximum(members * count // members.sum(), members > 0)
     # What the smallest get beyond their due, the largest go without.
     while shares.sum() > count:
         shares[shares.argmax()] -= 1
