@@ -78,7 +78,7 @@ def test_the_small_case_is_computed_and_drawn_and_gone_on_with(tool, monkeypatch
     assert len(results) == 2
     case = results[-1]["volume"][0]
     assert case["psnr"]["planned"] > case["psnr"]["arc at 60"]
-    assert set(case["merit"]) == {"planned", "ring", "arc", "fibonacci", "random"}
+    assert set(case["merit"]) == {"planned", "ring", "arc", "fibonacci", "zigzag", "random"}
     page = Page("page")
     figure.show(page, results[-1])
     assert page.html().count("<table") == 2
