@@ -175,6 +175,18 @@ def test_a_camera_that_moves_gets_less_and_all_when_it_rests(viewer, drawn):
     assert viewer._page.sent[-1][1].shape == (80, 120, 3)
 
 
+def test_a_camera_that_comes_back_to_where_it_rested_gets_its_picture_again(viewer, drawn):
+    viewer._joined(client(), POSE)
+    viewer.serve(*drawn)
+    viewer._pace.pixels = 60_000.0
+    viewer._moved(7, replace(POSE, position=(5.0, 0, 0)))
+    viewer.serve(*drawn)
+    viewer._moved(7, POSE)
+    clock[0] += 1
+    assert viewer.serve(*drawn) == 1
+    assert viewer._page.sent[-1][1].shape == (80, 120, 3)
+
+
 @pytest.mark.parametrize(
     ("pixels", "width"),
     [(1e9, 960), (576e3 * 20 / 4, 480), (576e3, 480), (576e3 / 4, 240), (1, 96)],
@@ -214,6 +226,18 @@ def test_a_browser_draws_by_itself_while_its_camera_moves(viewer, drawn):
     # A box leaves others outside.
     viewer._page.wish = Wish(edge=120, crop=Crop((0, 0, 0), (1, 1, 1)))
     assert viewer.serve(*drawn) == 1 and moving.given[1:] == [(7, viewer._page.wish.crop)]
+
+
+def test_a_browser_hands_back_where_its_camera_rested_before(viewer, drawn):
+    viewer._moving = Moving()
+    viewer._joined(client(), POSE)
+    viewer.serve(*drawn)
+    viewer._moved(7, replace(POSE, position=(5.0, 0, 0)))
+    viewer._moved(7, POSE)
+    clock[0] += 1
+    assert viewer.serve(*drawn) == 1
+    clock[0] += 1
+    assert viewer.serve(*drawn) == 0 and not viewer._clients[7].splats[0].visible
 
 
 def test_a_camera_that_moves_on_while_it_is_drawn_keeps_the_browser_drawing(viewer, drawn):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -15,8 +17,10 @@ from rift_cl.io.capture import open_capture
 from rift_cl.jobs.camera_path import pinhole
 from rift_cl.jobs.cameras.film import first_view
 from rift_cl.jobs.scene_bounds import SceneBounds, bounds_of_cameras
+from rift_cl.jobs.viewing import path_panel
 from rift_cl.jobs.viewing.crop import Crop, cropped
 from rift_cl.jobs.viewing.key_frames import KeyFrame, path_file, way_through
+from rift_cl.jobs.viewing.path_panel import PathPanel
 from rift_cl.jobs.viewing.photographs import (
     Photograph,
     compared,
@@ -225,3 +229,19 @@ def test_the_lens_is_that_of_the_photograph_until_it_is_set(shown):
         until(lambda: viewer._clients)
         page.press("photograph", "next")
         until(lambda: viewer._page.wish.aperture is None)
+
+
+@pytest.mark.parametrize("end", ["stop", "leave"])
+def test_a_way_is_played_no_further_once_nobody_sees_it(monkeypatch, end):
+    keys = [KeyFrame(Pose((1.0, 0, 0, 0), (float(x), 0, -4), 0.8, 1.5)) for x in range(200)]
+    panel, shown = PathPanel(MagicMock(), SimpleNamespace(aperture=None), lambda: 60), []
+
+    def step(client, there):
+        shown.append(there)
+        if len(shown) == 3:
+            panel.stop() if end == "stop" else panel.leave(client)
+
+    monkeypatch.setattr(path_panel, "go", step)
+    camera = SimpleNamespace(look_at=np.zeros(3), position=np.ones(3))
+    panel._play(way_through(keys, 0, 60), SimpleNamespace(camera=camera))
+    assert len(shown) == 3

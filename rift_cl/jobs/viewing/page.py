@@ -76,10 +76,10 @@ class ViewerPage:
             self._server = viser.ViserServer(host=_HOST, port=port, label=title, verbose=False)
         # viser takes the next port that is free, which is not what was asked for.
         if port and self._server.get_port() != port:
-            self.close()
+            self._end()
             raise _taken(port)
         if not guard.asked:
-            self.close()
+            self._end()
             raise InputError("this viser cannot be guarded: pip install 'viser>=1.1,<1.2'")
         self.url = f"http://{_HOST}:{self._server.get_port()}/{guard.token}"
         # What a page sends may make viser's callbacks fail: its own loss, and nobody's concern.
@@ -151,6 +151,7 @@ class ViewerPage:
                 client.camera.on_update(on_move)
 
         async def on_leave(client: Any) -> None:
+            self.path.leave(client)
             left(client.client_id)
 
         self._server.on_client_connect(on_join)
@@ -175,7 +176,11 @@ class ViewerPage:
         self.view.tell(facts)
 
     def close(self) -> None:
-        """Stop serving."""
+        """Stop serving, and playing first, for which the end of this program would wait."""
+        self.path.stop()
+        self._end()
+
+    def _end(self) -> None:
         with contextlib.redirect_stdout(io.StringIO()):
             self._server.stop()
 

@@ -31,6 +31,7 @@ class PathPanel:
     def __init__(self, server: Any, lens: LensPanel, size: Callable[[], int]) -> None:
         self._lens, self._size = lens, size
         self._keys, self._stop = list[KeyFrame](), threading.Event()
+        self._player: Any = None
         with server.gui.add_folder("path", expand_by_default=False):
             gui = server.gui
             self._count = gui.add_markdown("")
@@ -67,6 +68,15 @@ class PathPanel:
         except InputError:
             return []
 
+    def stop(self) -> None:
+        """Play no further."""
+        self._stop.set()
+
+    def leave(self, client: Any) -> None:
+        """Play no further for a page that is gone."""
+        if client is self._player:
+            self.stop()
+
     def _edit(self, what: str, client: Any) -> None:
         if what == "add":
             pose = pose_of(client.camera)
@@ -79,7 +89,7 @@ class PathPanel:
         self._tell()
 
     def _run(self, what: str, client: Any) -> None:
-        self._stop.set()
+        self.stop()
         cameras = self.cameras()
         if what == "export" and cameras:
             client.send_file_download("path.json", path_file(cameras), save_immediately=True)
@@ -89,6 +99,7 @@ class PathPanel:
     def _play(self, cameras: list[Camera], client: Any) -> None:
         """Lead a page's camera along the way."""
         self._stop = stopped = threading.Event()
+        self._player = client
         reach = float(np.linalg.norm(client.camera.look_at - client.camera.position)) or 1.0
         for camera in cameras:
             _, down, forward = camera.view[:3, :3]

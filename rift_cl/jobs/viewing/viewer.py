@@ -1,9 +1,10 @@
 """A window in the browser onto splats that somebody owns: ``rift view``, or a fit in progress.
 
-viser (https://viser.studio) serves the page and tells where its camera is; every picture is drawn
-by our own kernels and sent as the page's background, so that the browser shows what ``Renderer``
-draws. A trainer changes its splats in place, so nothing is ever drawn from viser's threads: they
-note what is asked for, and the owner of the splats draws it when it calls ``serve``.
+viser (https://viser.studio) serves the page and tells where its camera is. Where a camera rests,
+the picture is drawn by our own kernels and sent as the page's background, so that the browser shows
+what ``Renderer`` draws; while it moves, a browser may draw plain splats by itself. A trainer
+changes its splats in place, so nothing is ever drawn from viser's threads: they note what is asked
+for, and the owner of the splats draws it when it calls ``serve``.
 """
 
 from __future__ import annotations
@@ -207,7 +208,7 @@ class SplatViewer:
         seconds = time.perf_counter() - begin
         if self._painter.drawn > before:
             self._pace.learn(camera.height * camera.width, seconds)
-        client.rough = want
+        client.rough, client.sharp = want, None
         if small == wish.edge:
             now = time.monotonic()
             client.sharp, client.again = want, now + _BETWEEN * seconds
@@ -252,7 +253,7 @@ class SplatViewer:
                 client.pose, client.since = pose, time.monotonic()
                 client.ends = math.inf
                 if client.splats is not None and not client.alone and self._page.hands_over:
-                    client.alone = True
+                    client.alone, client.sharp = True, None
                     self._page.hand_over(client.handle, client.splats[0], self._background)
         self._asked.set()
 
