@@ -101,3 +101,12 @@ def test_no_other_machine_is_asked_for_photographs(tmp_path, way):
     """Windows would tell it who asks."""
     config = Fields("config.json", {"photographs": {"folder": way, "from_fit": way}})
     assert not list(kept_places(config, tmp_path))
+
+
+def test_a_folder_of_photographs_that_no_path_leads_to_is_named(masked, tmp_path, capsys):
+    far = ("--photographs", "x" * 5000, "--out", tmp_path / "scores")
+    assert run("eval", masked / "fit", *far) == 3
+    error = capsys.readouterr().err
+    assert (
+        "the folder of photographs cannot be read (" in error and not (tmp_path / "scores").exists()
+    )

@@ -16,6 +16,7 @@ from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from rift_cl.errors import RiftError
+from rift_cl.io.boundary import reading
 from rift_cl.io.capture_paths import CaptureFolder, mask_of
 from rift_cl.io.json_fields import Fields
 from rift_cl.io.view import View
@@ -99,13 +100,17 @@ def moved_place(folder: Path, name: str) -> CaptureFolder:
     Args:
         folder: what somebody says.
         name: of one of them.
+
+    Raises:
+        RiftError: nobody may look there, or no path leads there.
     """
     root = _absolute(folder)
-    if (root / name).is_file():
-        # Masks lie beside ``images``.
-        beside = root.name == "images"
-        return CaptureFolder(root.parent, root.name) if beside else CaptureFolder(root)
-    return CaptureFolder(root, "images" if (root / "images").is_dir() else "")
+    with reading(folder, "the folder of photographs"):
+        is_there, has_images = (root / name).is_file(), (root / "images").is_dir()
+    if is_there and root.name == "images":
+        # Masks lie beside it.
+        return CaptureFolder(root.parent, root.name)
+    return CaptureFolder(root, "images" if has_images and not is_there else "")
 
 
 def _place_of(views: Sequence[View]) -> CaptureFolder:
