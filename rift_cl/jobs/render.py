@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +24,13 @@ from rift_cl.io.transforms_record import transforms_of
 from rift_cl.jobs.animation import chosen_film, shrunk
 from rift_cl.jobs.camera_path import opened, resized, smooth_path
 from rift_cl.jobs.cameras.film import capture_arc, farthest_from_cameras, film, frame_of
+from rift_cl.jobs.cameras.subject import subject_of
 from rift_cl.jobs.depth_picture import LEAST_ALPHA, depth_picture, depth_window
 from rift_cl.jobs.few import evenly
 from rift_cl.jobs.render_report import Sheet, render_page, write_bytes
 from rift_cl.jobs.render_settings import MOST_FRAMES, RenderSettings
 from rift_cl.jobs.run_folder import RunFolder
+from rift_cl.jobs.scene_depth import depth_maps
 from rift_cl.jobs.scene_input import in_display_light
 from rift_cl.progress import Report
 from rift_cl.splat.bands import FrameMemory
@@ -56,6 +59,7 @@ class Render:
         self.settings = settings
         self.scene = settings.open_scene()
         self.bounds = settings.bounds(self.scene)
+        self.device = open_device(settings.device)
         cameras = self._path() if settings.path is not None else self._film()
         self.cameras = [
             opened(camera, settings.aperture, settings.focus, self.bounds.center)
@@ -65,7 +69,6 @@ class Render:
         if settings.focus is not None and not lenses:
             raise InputError("--focus is about a lens with an opening: give its --aperture as well")
         self._kind = chosen_film(settings.film, [camera.size for camera in self.cameras])
-        self.device = open_device(settings.device)
         self.folder = RunFolder(settings.out, "render", overwrite=settings.overwrite)
         for name, read in (("path", settings.path), ("capture", settings.capture)):
             if read is not None:
@@ -104,7 +107,16 @@ class Render:
             fov=fov,
             elevation=settings.elevation,
             distance=settings.distance,
+            subject=self.subject,
         )
+
+    @cached_property
+    def subject(self) -> NDArray[np.float64] | None:
+        """What a capture from one side is of, (3,); None for others."""
+        arc = capture_arc(self.bounds)
+        if arc is None or arc.closed or not arc.inward:
+            return None
+        return subject_of(depth_maps(self.scene, self.bounds.cameras, self.device))
 
     def _path(self) -> list[Camera]:
         settings = self.settings

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import open_device
 from rift_cl.geometry import Camera
 from rift_cl.jobs.camera_path import resized
@@ -46,28 +47,40 @@ def space_of(
     Raises:
         RiftError: the scene of the fit is damaged.
     """
-    seen = [cameras[place] for place in evenly(len(cameras), _PICTURES)]
-    seen = [camera for camera in seen if camera.model == "pinhole"]
+    seen = _few(cameras)
     if seen and source.is_dir() and (source / _SCENE).is_file():
-        return _of_splats(source, seen, device), "the depth of the fitted splats"
+        scene = OpenedScene(SceneInput(source, device=device))
+        maps = depth_maps(scene, seen, open_device(device))
+        return FreeSpace(maps), "the depth of the fitted splats"
     if seen and points is not None and len(points) >= _POINTS:
-        maps = [depth_of_points(camera, points) for camera in seen]
-        known = [one for one in maps if one is not None]
+        known = [one for one in (depth_of_points(c, points) for c in seen) if one is not None]
         if known:
             return FreeSpace(known), "the sparse points"
     return None, ""
 
 
-def _of_splats(fit: Path, cameras: Sequence[Camera], device: str | None) -> FreeSpace:
-    scene = OpenedScene(SceneInput(fit, device=device))
-    renderer = Renderer(scene.drawing, device=open_device(device))
-    splats = scene.splats.upload(renderer.device)
+def depth_maps(scene: OpenedScene, cameras: Sequence[Camera], device: Device) -> list[DepthMap]:
+    """How far off the splats are in some of the pictures, which are made small; evenly chosen.
+
+    Args:
+        scene: the splats.
+        cameras: of the pictures; those that are no pinholes are left out.
+        device: that draws.
+    """
+    renderer = Renderer(scene.drawing, device=device)
+    splats = scene.splats.upload(device)
     maps = []
-    for camera in cameras:
+    for camera in _few(cameras):
         scale = min(1.0, _EDGE / max(camera.size))
         size = (max(1, round(camera.height * scale)), max(1, round(camera.width * scale)))
         small = resized(Camera(camera.size, camera.K, camera.view), size)
         depth, alpha = depth_and_alpha(renderer, splats, small)
         shown = (alpha > _SOLID) & (depth > 0)
         maps.append(DepthMap(small, np.where(shown, depth.astype(np.float64), np.inf)))
-    return FreeSpace(maps)
+    return maps
+
+
+def _few(cameras: Sequence[Camera]) -> list[Camera]:
+    """The pinholes among some of the cameras, evenly chosen."""
+    few = [cameras[place] for place in evenly(len(cameras), _PICTURES)]
+    return [camera for camera in few if camera.model == "pinhole"]

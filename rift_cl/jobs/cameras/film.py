@@ -37,6 +37,7 @@ def film(
     fov: float,
     elevation: float | None = None,
     distance: float | None = None,
+    subject: Floats | None = None,
 ) -> list[Camera]:
     """The cameras of a film; the last is one step before the first, so that it closes.
 
@@ -47,6 +48,8 @@ def film(
         fov: vertical field of view in degrees.
         elevation: above the horizon in degrees; that of the cameras if not given.
         distance: from the middle in scene units; that of the cameras if not given.
+        subject: (3,) what a film from one side looks at, if cameras stand about something; what
+            their axes pass nearest to if not given.
     """
     arc = capture_arc(bounds)
     if arc is None or arc.closed:
@@ -64,7 +67,8 @@ def film(
     places, targets = route.at(shares)
     if arc.inward:
         # Some looked past the subject; all of them together tell where it is.
-        targets = np.broadcast_to(bounds.center, targets.shape)
+        aim = bounds.center if subject is None else subject
+        targets = np.broadcast_to(aim, targets.shape)
     if elevation is not None or distance is not None:
         places = np.array([_moved(at, bounds, elevation, distance) for at in places])
     return [
