@@ -194,7 +194,8 @@ class Fit(FitRun):
         ramp = ramp_notes(settings, len(self.seen))
         notes = [*self._notes(), *ramp, *history_notes(self._history)]
         scene = leave_page(settings.out, pictures, self.announce)
-        page = fit_page(capture.path.name, self.scores, self.losses, self.metrics, notes, scene)
+        name = capture_name(settings.capture)
+        page = fit_page(name, self.scores, self.losses, self.metrics, notes, scene)
         self.folder.finish(
             self.settled, self.metrics, page, self.device, asked=settings, **self.decided
         )
