@@ -58,7 +58,8 @@ class Export:
             self.turn = turn_between(self._bounds.up, _UP)
             self.notes.append(
                 "the scene is turned so that up, ({:.3g}, {:.3g}, {:.3g}), is y".format(
-                    *self._bounds.up
+                    # Rounding leaves a little beside an axis; 0 is added against a minus sign.
+                    *(self._bounds.up.round(4) + 0.0)
                 )
             )
         if self.format.suffix == _PAGE and self.plain.degree:
