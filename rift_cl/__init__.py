@@ -21,10 +21,10 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from rift_cl import basis, metrics, phantom
     from rift_cl.cl import Device, default_device, devices, open_device
+    from rift_cl.commands.reconstruct.reconstruct_scan import reconstruct_scan
     from rift_cl.errors import RiftError
     from rift_cl.geometry import Aperture, Camera, CameraType, FanBeam, Grid, Parallel
     from rift_cl.io import SplatScene, open_lens, open_scan
-    from rift_cl.jobs.reconstruct.reconstruct_scan import reconstruct_scan
     from rift_cl.operators import (
         FastProjector,
         HighPass,
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     )
     from rift_cl.reconstruct import AxisEstimate, backproject, cgls, fbp, find_center, sirt, tv
     from rift_cl.sampling import Constraints, Looks, Plan, Target, next_views, plan
-    from rift_cl.sampling.coverage import coverage
-    from rift_cl.sampling.merit import merit
+    from rift_cl.sampling.coverage.device import coverage
+    from rift_cl.sampling.criteria.merit import merit
     from rift_cl.splat import Renderer, Splats, SplatSettings
 
 _HOMES = {

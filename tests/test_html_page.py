@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.html_page import Compared, Page
+from rift_cl.report.html_page import Compared, Page
 
 
 def picture(kind="PNG", size=(6, 4)):

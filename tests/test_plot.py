@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from matplotlib import image as matplotlib_image
 
-from rift_cl import plot
 from rift_cl.errors import DTypeError, InputError, NonFiniteError, ShapeError
+from rift_cl.report import plot
 
 STEPS = np.arange(1.0, 6.0)
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from rift_cl import plot
 from rift_cl.errors import ShapeError
-from rift_cl.plot.figure import COLORS, INK, LINE, SOFT
+from rift_cl.report import plot
+from rift_cl.report.plot.figure import COLORS, INK, LINE, SOFT
 
 STEPS = np.arange(10.0)
 RANDOM = np.random.default_rng(0)

@@ -9,9 +9,9 @@ import sys
 
 import pytest
 
-from rift_cl import progress_bar
+from rift_cl.commands import progress_bar
+from rift_cl.commands.progress_bar import show_progress
 from rift_cl.progress import Report
-from rift_cl.progress_bar import show_progress
 
 
 @pytest.fixture

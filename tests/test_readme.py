@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rift_cl.cli import main
+from rift_cl.commands.cli import main
 
 ROOT = Path(__file__).parents[1]
 SUFFIXES = (".py", ".md")

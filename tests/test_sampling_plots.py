@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
-from rift_cl.plot import (
+from rift_cl.report.plot import (
     FrequencySlice,
     Stands,
     camera_plot,
@@ -18,8 +18,8 @@ from rift_cl.plot import (
     figure_png,
     frequency_maps,
 )
-from rift_cl.plot.camera_plot import axis_names, upright_frame
-from rift_cl.plot.direction_map import flattened, unflattened
+from rift_cl.report.plot.camera_plot import axis_names, upright_frame
+from rift_cl.report.plot.direction_map import flattened, unflattened
 from rift_cl.sampling.planning.constraints import Constraints
 
 UP = (0.0, 0.0, 1.0)

@@ -30,7 +30,7 @@ import tyro
 import rift_cl as rift
 from bench.surroundings import surroundings
 from rift_cl.cl.discovery import default_device
-from rift_cl.console_table import print_table
+from rift_cl.commands.console_table import print_table
 from rift_cl.phantom.projection import project
 
 _HERE = Path(__file__).resolve().parents[1]
@@ -116,7 +116,15 @@ def run(checkout: Path, scan: Path, out: Path, arguments: tuple[str, ...]) -> di
     Returns:
         Seconds of the processor and on the clock, and the axis that was used.
     """
-    command = [sys.executable, "-m", "rift_cl.cli", "reconstruct", str(scan), "--out", str(out)]
+    command = [
+        sys.executable,
+        "-m",
+        "rift_cl.commands.cli",
+        "reconstruct",
+        str(scan),
+        "--out",
+        str(out),
+    ]
     environment = {**os.environ, "PYTHONPATH": str(checkout)}
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(

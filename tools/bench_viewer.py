@@ -61,7 +61,15 @@ class Settings:
 
 def main(settings: Settings) -> None:
     """Start the viewer, move the camera, print what came."""
-    command = [sys.executable, "-m", "rift_cl.cli", "view", str(settings.scene), "--port", "0"]
+    command = [
+        sys.executable,
+        "-m",
+        "rift_cl.commands.cli",
+        "view",
+        str(settings.scene),
+        "--port",
+        "0",
+    ]
     command += [
         "--size",
         str(max(settings.width, settings.height)),

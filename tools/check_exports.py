@@ -28,15 +28,15 @@ from numpy.typing import NDArray
 from export_readers import readers
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
+from rift_cl.commands.export.axes import turned
+from rift_cl.commands.export.export import Export
+from rift_cl.commands.export.settings import ExportSettings, Target
+from rift_cl.commands.inputs.scene_input import in_display_light
 from rift_cl.geometry import Camera
-from rift_cl.io.splat_activations import HARMONIC_0, opacities_of
-from rift_cl.io.splat_formats.plain import along_curve, unit_quats
-from rift_cl.io.splat_scene import SplatScene
-from rift_cl.io.view_image import camera_at, read_view
-from rift_cl.jobs.export.axes import turned
-from rift_cl.jobs.export.export import Export
-from rift_cl.jobs.export.settings import ExportSettings, Target
-from rift_cl.jobs.scene_input import in_display_light
+from rift_cl.io.captures.view_image import camera_at, read_view
+from rift_cl.io.scenes.formats.plain import along_curve, unit_quats
+from rift_cl.io.scenes.splat_activations import HARMONIC_0, opacities_of
+from rift_cl.io.scenes.splat_scene import SplatScene
 from rift_cl.metrics import psnr
 from rift_cl.splat.renderer import Renderer
 

@@ -6,7 +6,7 @@ A fit's folder says which photographs were trained on and how well each held-out
 What the analyzer would say of each of those from the trained views alone is set beside its error,
 and the rank correlation (Spearman) is printed for every scene: nan where it says much the same of
 all its views. A verdict that says nothing of the
-errors, or the opposite, is withheld (``HELD`` in ``rift_cl.jobs.verdicts``).
+errors, or the opposite, is withheld (``HELD`` in ``rift_cl.commands.analyze.verdicts``).
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr
 from tyro.conf import Positional
 
-from rift_cl.jobs.analyze_input import open_sampled
-from rift_cl.jobs.analyze_settings import AnalyzeSettings
-from rift_cl.jobs.cameras.fit_cameras import open_fit_cameras
-from rift_cl.jobs.verdicts import HELD, foretold
+from rift_cl.commands.analyze.input import open_sampled
+from rift_cl.commands.analyze.settings import AnalyzeSettings
+from rift_cl.commands.analyze.verdicts import HELD, foretold
+from rift_cl.commands.cameras.fit_cameras import open_fit_cameras
 
 # A verdict holds where its worst scene has this rank correlation at least; a scene in which it says
 # much the same of all views, with a spread below this share of its mean, tells nothing of it.

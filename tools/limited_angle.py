@@ -28,10 +28,10 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 import rift_cl as rift
-from rift_cl.console_table import print_table
+from rift_cl.commands.console_table import print_table
 from rift_cl.geometry import FanBeam
 from rift_cl.io import open_scan
-from rift_cl.io.image import read_image, write_png
+from rift_cl.io.images.image import read_image, write_png
 from rift_cl.reconstruct import (
     DirectionWeights,
     FewLevels,
@@ -40,7 +40,7 @@ from rift_cl.reconstruct import (
     material_lengths,
     rebin_fan,
 )
-from rift_cl.reconstruct.fan_rebin import covered_rays
+from rift_cl.reconstruct.direct.fan_rebin import covered_rays
 
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]

@@ -26,10 +26,10 @@ from ornament.cameras import Shot, shots_at, transforms
 from ornament.capture_folder import render_capture
 from ornament.command import run
 from ornament.tracer import Tracer, choose_variant
+from rift_cl.commands.progress_bar import print_line, show_progress
 from rift_cl.errors import InputError
 from rift_cl.io import read_image
-from rift_cl.io.point_cloud import write_point_cloud
-from rift_cl.progress_bar import print_line, show_progress
+from rift_cl.io.captures.point_cloud import write_point_cloud
 
 _POINTS = "points.ply"
 

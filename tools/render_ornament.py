@@ -32,8 +32,8 @@ from ornament.cameras import (
 from ornament.capture_folder import render_capture
 from ornament.command import run
 from ornament.tracer import BACKGROUND, Tracer, choose_variant
+from rift_cl.commands.progress_bar import print_line, show_progress
 from rift_cl.errors import InputError
-from rift_cl.progress_bar import print_line, show_progress
 
 _SIZE = (224, 168)
 # Nearer than this a camera stands among the hairs, further away behind the lights.

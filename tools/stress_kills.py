@@ -75,7 +75,7 @@ def main(options: Options) -> int:
 
 
 def _started(options: Options, out: Path) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "rift_cl.cli", "fit", str(options.capture)]
+    command = [sys.executable, "-m", "rift_cl.commands.cli", "fit", str(options.capture)]
     command += ["--out", str(out), "--steps", str(options.steps), "--splats", str(options.splats)]
     command += ["--checkpoint-every", str(options.every), "--resume", "--quiet"]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL)

@@ -88,9 +88,9 @@ def _wrapped(sentence: str, width: int) -> list[str]:
 
 def tried(case: Case) -> Outcome:
     """Open a file, reconstruct what it holds, and hold it against the truth."""
+    from rift_cl.commands.inputs.scan_input import ScanInput, read_attenuation
     from rift_cl.errors import RiftError
-    from rift_cl.jobs.scan_input import ScanInput, read_attenuation
-    from rift_cl.reconstruct.padding import is_truncated
+    from rift_cl.reconstruct.direct.padding import is_truncated
 
     with tempfile.TemporaryDirectory(prefix="rift-cl-scans-") as folder:
         path = case.write(Path(folder))

@@ -19,9 +19,9 @@ from typing import Annotated, Literal
 import tyro
 from tyro.conf import Positional
 
-from rift_cl.jobs.fit import Fit
-from rift_cl.jobs.fit_settings import FitSettings
-from rift_cl.progress_bar import Pace
+from rift_cl.commands.fit_photos.job import Fit
+from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.progress_bar import Pace
 
 _SHARES = (0.1, 0.25, 0.5, 0.75)
 _CLOCKS = {"wall": time.monotonic, "processor": time.process_time}

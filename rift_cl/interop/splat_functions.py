@@ -51,7 +51,7 @@ class Drawer:
 
 
 class Project(torch.autograd.Function):
-    """Splats to the screens of V views; see ``kernels/splat_project.cl``.
+    """Splats to the screens of V views; see ``kernels/splat/splat_project.cl``.
 
     Gives means2d (V, N, 2), conics (V, N, 3), weights (V, N), depths (V, N), and, with nothing
     flowing through, extents (V, N, 2), boxes (V, N, 4) int32 and culls (V, N) uint8.

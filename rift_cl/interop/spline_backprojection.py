@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.operators.projector import Projector
+from rift_cl.operators.projector.phase_projector import Projector
 
 
 def backproject_spline(

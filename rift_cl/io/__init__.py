@@ -10,7 +10,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rift_cl.io.capture import (
+    from rift_cl.io.captures.capture import (
         Capture,
         View,
         camera_at,
@@ -18,13 +18,17 @@ if TYPE_CHECKING:
         open_capture,
         read_view,
     )
-    from rift_cl.io.image import read_image, write_png
-    from rift_cl.io.lens_file import open_lens
+    from rift_cl.io.captures.photographs import (
+        PosedPhotographs,
+        demand_photographs,
+        pose_photographs,
+    )
+    from rift_cl.io.images.image import read_image, write_png
+    from rift_cl.io.lenses.lens_file import open_lens
     from rift_cl.io.output import atomic_path, make_folder, write_json, write_text
-    from rift_cl.io.photographs import PosedPhotographs, demand_photographs, pose_photographs
     from rift_cl.io.scans.formats import open_scan
     from rift_cl.io.scans.scan_file import ScanFile, ScanRows
-    from rift_cl.io.splat_scene import SplatScene
+    from rift_cl.io.scenes.splat_scene import SplatScene
     from rift_cl.io.volumes import VolumeWriter, open_volume, read_volume, suggested_window
 
 _HOMES = {

@@ -37,7 +37,7 @@ class ScreenPolynomials(NamedTuple):
 
     @property
     def table(self) -> Floats:
-        """(N, W), as ``kernels/hermite_project.cl`` says."""
+        """(N, W), as ``kernels/splat/hermite_project.cl`` says."""
         lower = self.whitening[:, [0, 1, 1], [0, 0, 1]]
         return np.concatenate([lower, self.shape, self.color.reshape(len(lower), -1)], axis=1)
 

@@ -3,16 +3,16 @@
 ``coverage`` and ``merit`` are in modules of these names, and in ``rift_cl`` itself.
 """
 
-from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.pilot import Pilot
 from rift_cl.sampling.planning.baselines import Baseline
 from rift_cl.sampling.planning.constraints import Budget, Constraints, Ranges
 from rift_cl.sampling.planning.keep_out import Box, Cone, KeepOut, Sphere
 from rift_cl.sampling.planning.paths import Free, Ring, Spline, TiltedRings
 from rift_cl.sampling.planning.planner import next_views, plan
 from rift_cl.sampling.planning.view_plan import Knee, Plan
-from rift_cl.sampling.prior import PowerLaw, Spectrum
-from rift_cl.sampling.target import Target
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.pilot import Pilot
+from rift_cl.sampling.targets.prior import PowerLaw, Spectrum
+from rift_cl.sampling.targets.target import Target
 
 __all__ = [
     "Baseline",

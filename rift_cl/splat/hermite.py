@@ -1,6 +1,6 @@
 """Splats with Hermite modes: to the screen, and from the screen's moments back.
 
-The drivers of ``kernels/hermite_project.cl`` and its gradient, which say what is computed;
+The drivers of ``kernels/splat/hermite_project.cl`` and its gradient, which say what is computed;
 ``rift_cl.reference.hermite_projection`` is their twin. A mode of order (i, j, k) is
 He~_i(x) He~_j(y) He~_k(z), He~_n = He_n / sqrt(n!), in the splat's own coordinates. Modes stand in
 graded order: by i + j + k, and within one of these (1,0,0), (0,1,0), (0,0,1); (2,0,0), (1,1,0),
@@ -127,7 +127,7 @@ def project_modes_grad(
         settings: as given to ``project``.
         projected: what it returned.
         modes: what ``project_modes`` returned.
-        moments: (N, P) sums of the raster's records: see ``kernels/hermite_project_grad.cl``.
+        moments: (N, P) sums of the raster's records: see ``kernels/splat/hermite_project_grad.cl``.
         channels: D, of the image.
 
     Raises:

@@ -1,6 +1,6 @@
 """Splats to the screen, and gradients from the screen to splats and camera.
 
-The drivers of ``kernels/splat_project.cl`` and its gradient, which say what is computed;
+The drivers of ``kernels/splat/splat_project.cl`` and its gradient, which say what is computed;
 ``rift_cl.reference.splat_projection`` is their twin.
 """
 
@@ -84,7 +84,7 @@ def project_grad(
         settings: as given to ``project``.
         projected: what it returned.
         sums: (N, 6 + D), with ``absgrad`` (N, 8 + D), what ``sum_slots`` returned: see
-            ``kernels/splat_project_grad.cl``.
+            ``kernels/splat/splat_project_grad.cl``.
         with_camera: leave the parts of the camera's gradient as well.
         depth_channel: the last of the D channels is the splats' depth.
         first_moments: numbers 1 and 2 are the first moments of dL/dsigma; otherwise they are the

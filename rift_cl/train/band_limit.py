@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Camera
-from rift_cl.train.start import field_diameter, focus_of
+from rift_cl.train.start.points import field_diameter, focus_of
 
 if TYPE_CHECKING:
     from rift_cl.train.parameters import Parameters
@@ -84,7 +84,7 @@ def _level(size: Sequence[int]) -> float:
 
 
 def camera_table(cameras: Sequence[Camera]) -> NDArray[np.float32]:
-    """What ``kernels/splat_band.cl`` reads of cameras, (V, 20).
+    """What ``kernels/train/splat_band.cl`` reads of cameras, (V, 20).
 
     An orthographic camera resolves the same at every depth: its third row gives every point the
     depth one.

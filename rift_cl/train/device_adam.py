@@ -1,4 +1,4 @@
-"""Adam on the device, for arrays of many splats; ``kernels/adam.cl`` says what a step is."""
+"""Adam on the device, for arrays of many splats; ``kernels/train/adam.cl`` says what a step is."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from rift_cl.cl.device import Device
 
 _BETA1, _BETA2, _EPSILON = 0.9, 0.999, 1e-15
-# Parameters that one work-item of a CPU goes through; kernels/adam.cl has the same.
+# Parameters that one work-item of a CPU goes through; kernels/train/adam.cl has the same.
 _CPU_RUN = 4096
 
 

@@ -184,7 +184,7 @@ class Parameters:
         """Let no splat be finer than what the cameras resolve where it is now.
 
         Args:
-            cameras: (V, 20) device array, as ``kernels/splat_band.cl`` says.
+            cameras: (V, 20) device array, as ``kernels/train/splat_band.cl`` says.
             near: cameras do not see what is nearer.
             unseen: the length for splats that no camera sees.
             detail: of the pictures, where coverage sets the limit; None for pixels alone.
@@ -200,7 +200,7 @@ class Parameters:
         self.activate()
 
     def shake(self, amount: float, seed: int) -> None:
-        """Move faint splats at random; ``kernels/splat_noise.cl`` says how."""
+        """Move faint splats at random; ``kernels/train/splat_noise.cl`` says how."""
         drawn, count = self.drawn, len(self)
         self.device.launch(
             "splat_noise",

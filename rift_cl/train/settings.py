@@ -8,9 +8,9 @@ from typing import Literal, get_args
 from rift_cl.errors import InputError
 from rift_cl.splat.orders import count_of
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
-from rift_cl.train.homogenisation import Homogenisation
+from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.ranges import check_choice, check_number, check_whole
-from rift_cl.train.solve_settings import SolveSettings
+from rift_cl.train.xray.solve_settings import SolveSettings
 
 LossKind = Literal["l1", "l2"]
 StrategyName = Literal["mcmc", "default"]

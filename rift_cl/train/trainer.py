@@ -2,7 +2,7 @@
 
 A step draws a view, takes the gradient of the loss, and moves the splats by Adam, and the view's
 pose and exposure if they are fitted too. Between steps the set of splats changes
-(``rift_cl.train.strategy``); in the last part of the run, the finish, nothing walks at random any
+(``rift_cl.train.strategy.mcmc``); in the last part of the run, the finish, nothing walks at random any
 more and all rates fade, so that the picture settles.
 
 What a run does depends on its settings, its pictures and the device alone: the order of the views
@@ -25,17 +25,17 @@ from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.band_limit import BandLimiter
-from rift_cl.train.coverage_weight import weight_of
-from rift_cl.train.exposures import Exposures
-from rift_cl.train.homogenised_loss import HomogenisedLoss
-from rift_cl.train.joining import Joining
+from rift_cl.train.coefficient_schedule import Joining
+from rift_cl.train.loss.coverage_weight import weight_of
+from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.poses import Poses
 from rift_cl.train.run_state import flattened, grouped
 from rift_cl.train.schedule import Schedule
 from rift_cl.train.settings import TrainSettings
-from rift_cl.train.start import scene_extent
-from rift_cl.train.strategy import strategy_of
+from rift_cl.train.start.points import scene_extent
+from rift_cl.train.strategy.mcmc import strategy_of
+from rift_cl.train.views.exposures import Exposures
+from rift_cl.train.views.poses import Poses
 
 # Steps between two reports; the loss comes to the host for each.
 REPORT_EVERY = 25

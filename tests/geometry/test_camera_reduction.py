@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.geometry.camera_reduction import Reduction, reduce_camera
-from rift_cl.geometry.gaussian_lens import gaussian_lens
-from rift_cl.geometry.lens_prescription import LensPrescription
-from rift_cl.geometry.real_rays import Rays, trace
-from rift_cl.io.lens_file import open_lens
+from rift_cl.io.lenses.lens_file import open_lens
+from rift_cl.optics.camera_reduction import Reduction, reduce_camera
+from rift_cl.optics.gaussian_lens import gaussian_lens
+from rift_cl.optics.lens_prescription import LensPrescription
+from rift_cl.optics.real_rays import Rays, trace
 from rift_cl.sample.stock_lenses import STOCK_LENSES, stock_lens
 
 PIXEL, SIZE = 1.85e-3, (3036, 4024)

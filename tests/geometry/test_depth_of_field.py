@@ -9,7 +9,7 @@ import pytest
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Aperture
-from rift_cl.geometry.depth_of_field import (
+from rift_cl.optics.depth_of_field import (
     BEST_APERTURE,
     BEST_CUTOFF,
     SAFE_APERTURE,
@@ -20,8 +20,8 @@ from rift_cl.geometry.depth_of_field import (
     sharp_range,
     worst_depth_cutoff,
 )
-from rift_cl.geometry.optics import defocus_mtf, diffraction_mtf, incoherent_cutoff
-from rift_cl.geometry.pupil import defocused_otf
+from rift_cl.optics.pupil import defocused_otf
+from rift_cl.optics.transfer import defocus_mtf, diffraction_mtf, incoherent_cutoff
 
 GREEN = 550e-6
 

@@ -8,10 +8,10 @@ from fractions import Fraction
 import pytest
 
 from rift_cl.errors import InputError
-from rift_cl.geometry.gaussian_lens import GaussianLens, gaussian_lens
-from rift_cl.geometry.glass import Glass
-from rift_cl.geometry.lens_prescription import LensPrescription, Surface
-from rift_cl.io.lens_file import open_lens
+from rift_cl.io.lenses.lens_file import open_lens
+from rift_cl.optics.gaussian_lens import GaussianLens, gaussian_lens
+from rift_cl.optics.glass import Glass
+from rift_cl.optics.lens_prescription import LensPrescription, Surface
 from rift_cl.sample.stock_lenses import STOCK_LENSES, stock_lens
 
 # Computed with optiland 0.6.3 (its paraxial module) from the same published prescriptions, in the

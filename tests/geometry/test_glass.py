@@ -7,7 +7,7 @@ import math
 import pytest
 
 from rift_cl.errors import InputError
-from rift_cl.geometry.glass import LINE_C, LINE_D, LINE_F, Glass, glass
+from rift_cl.optics.glass import LINE_C, LINE_D, LINE_F, Glass, glass
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,7 @@ def test_glasses_have_the_index_and_abbe_number_of_their_data_sheet(
 
 def test_every_glass_of_the_catalogue_is_one() -> None:
     """The index falls with the wavelength over the visible band."""
-    from rift_cl.geometry.glass import _catalogue
+    from rift_cl.optics.glass import _catalogue
 
     assert len(_catalogue()) >= 80
     for name, medium in _catalogue().items():

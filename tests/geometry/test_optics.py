@@ -9,7 +9,13 @@ import pytest
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Aperture
-from rift_cl.geometry.optics import (
+from rift_cl.optics.pupil import (
+    annular_mtf,
+    defocus_waves,
+    defocused_otf,
+    numerical_otf,
+)
+from rift_cl.optics.transfer import (
     coherent_cutoff,
     defocus_mtf,
     diffraction_mtf,
@@ -17,12 +23,6 @@ from rift_cl.geometry.optics import (
     pixel_mtf,
     polychromatic_mtf,
     system_mtf,
-)
-from rift_cl.geometry.pupil import (
-    annular_mtf,
-    defocus_waves,
-    defocused_otf,
-    numerical_otf,
 )
 from rift_cl.reference.coverage import optical_transfer
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from rift_cl.errors import InputError
-from rift_cl.geometry import real_rays
-from rift_cl.geometry.gaussian_lens import gaussian_lens
-from rift_cl.geometry.glass import Glass
-from rift_cl.geometry.lens_prescription import LensPrescription, Surface
-from rift_cl.geometry.real_rays import chief_ray, pupil_rays, trace
-from rift_cl.io.lens_file import open_lens
+from rift_cl.io.lenses.lens_file import open_lens
+from rift_cl.optics import real_rays
+from rift_cl.optics.gaussian_lens import gaussian_lens
+from rift_cl.optics.glass import Glass
+from rift_cl.optics.lens_prescription import LensPrescription, Surface
+from rift_cl.optics.real_rays import chief_ray, pupil_rays, trace
 from rift_cl.sample.stock_lenses import STOCK_LENSES, stock_lens
 
 # optiland 0.6.3, trace_generic on the axis: height in the prescribed image plane and direction

@@ -12,8 +12,8 @@ import capture_files as made
 import pytest
 from photograph_files import NAMES
 
-from rift_cl.geometry.lens_prescription import LensPrescription
-from rift_cl.io.lens_file import open_lens
+from rift_cl.io.lenses.lens_file import open_lens
+from rift_cl.optics.lens_prescription import LensPrescription
 from rift_cl.sample.stock_lenses import stock_lens
 
 

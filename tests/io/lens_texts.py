@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from rift_cl.geometry.lens_prescription import LensPrescription
+from rift_cl.optics.lens_prescription import LensPrescription
 from rift_cl.sample.stock_lenses import stock_lens
 
 # The Cooke triplet as Zemax writes it, with lines that say nothing about rays.

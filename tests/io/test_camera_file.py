@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from rift_cl.errors import RiftError
-from rift_cl.io.camera_file import read_cameras
+from rift_cl.io.captures.camera_file import read_cameras
 from rift_cl.sample.stock_lenses import stock_lens
 
 CAMERA = {"name": "a", "focal_length": 50, "f_number": 8, "pixel_um": 5, "size": [60, 40]}

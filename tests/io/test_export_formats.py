@@ -9,12 +9,12 @@ import pytest
 from splat_readers import C0, read_compressed_ply, read_glb, read_sog, read_spz
 
 from rift_cl.errors import InputError
-from rift_cl.io.splat_activations import opacities_of, scales_of
-from rift_cl.io.splat_formats import palettes
-from rift_cl.io.splat_formats.formats import FORMATS
-from rift_cl.io.splat_formats.plain import along_curve, unit_quats
-from rift_cl.io.splat_formats.spz import encode_spz, fraction_bits
-from rift_cl.io.splat_scene import SplatScene, XrayScene
+from rift_cl.io.scenes.formats import palettes
+from rift_cl.io.scenes.formats.formats import FORMATS
+from rift_cl.io.scenes.formats.plain import along_curve, unit_quats
+from rift_cl.io.scenes.formats.spz import encode_spz, fraction_bits
+from rift_cl.io.scenes.splat_activations import opacities_of, scales_of
+from rift_cl.io.scenes.splat_scene import SplatScene, XrayScene
 
 # Of a rotation's smaller components, by 10 bits: half a step, as an angle of the whole rotation.
 TURN = 4e-3

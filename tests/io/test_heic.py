@@ -19,7 +19,7 @@ from rift_cl.io import (
     read_image,
     read_view,
 )
-from rift_cl.io.picture_header import read_picture_header
+from rift_cl.io.images.picture_header import read_picture_header
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def test_without_the_library_one_sentence_says_what_to_install(
 ) -> None:
     for number in (2, 3):
         photograph.with_name(f"IMG_000{number}.HEIC").write_bytes(HEIC)
-    monkeypatch.setattr("rift_cl.io.heic.find_spec", lambda name: None)
+    monkeypatch.setattr("rift_cl.io.images.heic.find_spec", lambda name: None)
     for act in (lambda: read_image(photograph), lambda: demand_photographs(photograph.parent)):
         with pytest.raises(InputError, match="pip install pi-heif") as caught:
             act()

@@ -22,7 +22,7 @@ from rift_cl.errors import (
     ShapeError,
 )
 from rift_cl.io import read_image, write_png
-from rift_cl.io.pixels import write_pixels
+from rift_cl.io.images.pixels import write_pixels
 
 RANDOM = np.random.default_rng(3)
 

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from lens_texts import TRIPLET, changed, zemax
 
 from rift_cl.errors import FileFormatError, InputError, ResourceLimitError, RiftError
-from rift_cl.geometry.gaussian_lens import gaussian_lens
-from rift_cl.geometry.lens_prescription import LensPrescription
-from rift_cl.io.lens_file import open_lens
+from rift_cl.io.lenses.lens_file import open_lens
+from rift_cl.optics.gaussian_lens import gaussian_lens
+from rift_cl.optics.lens_prescription import LensPrescription
 from rift_cl.sample.stock_lenses import stock_lens
 
 

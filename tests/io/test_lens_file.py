@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from lens_texts import changed, zemax
 
-from rift_cl.geometry.gaussian_lens import gaussian_lens
-from rift_cl.geometry.lens_prescription import LensPrescription
-from rift_cl.io.lens_file import open_lens
+from rift_cl.io.lenses.lens_file import open_lens
+from rift_cl.optics.gaussian_lens import gaussian_lens
+from rift_cl.optics.lens_prescription import LensPrescription
 from rift_cl.sample.stock_lenses import STOCK_LENSES, stock_lens
 
 

@@ -14,11 +14,11 @@ from photograph_files import NAMES, run
 from PIL import Image, ImageOps
 from view_files import store
 
+from rift_cl.commands.cameras.fit_cameras import save_fit_cameras
 from rift_cl.errors import InputError, PathEscapeError
 from rift_cl.io import open_capture, pose_photographs, read_image, read_view
-from rift_cl.io.photograph_folder import other_files, photograph_names, photographs_in
-from rift_cl.io.transforms_json import open_transforms
-from rift_cl.jobs.cameras.fit_cameras import save_fit_cameras
+from rift_cl.io.captures.photograph_folder import other_files, photograph_names, photographs_in
+from rift_cl.io.captures.transforms_json import open_transforms
 
 ODD = [".DS_Store", "._a b.png", "IMG_1.AAE", "IMG_1.MOV", "Thumbs.db", "notes.txt"]
 
@@ -129,7 +129,7 @@ def test_squares_are_posed_and_read_as_they_are_shown(
 ) -> None:
     """What the program that finds poses sees is what is read with them; also from a fit's files."""
     monkeypatch.setenv("FAKE_PYCOLMAP_SIZE", "12 12")
-    monkeypatch.setattr("rift_cl.io.photographs._FOLDERS", ("models",))
+    monkeypatch.setattr("rift_cl.io.captures.photographs._FOLDERS", ("models",))
     folder, fit = tmp_path / "bare", tmp_path / "fit"
     folder.mkdir()
     for number in range(4):

@@ -26,7 +26,7 @@ from rift_cl.io import (
     pose_photographs,
     read_image,
 )
-from rift_cl.io.picture_header import read_picture_header
+from rift_cl.io.images.picture_header import read_picture_header
 from rift_cl.progress import Report
 
 
@@ -126,7 +126,7 @@ def test_other_kinds_of_picture_are_seen_as_copies_of_8_bits(
     half = np.full((8, 12, 4), 0.5, np.float32)
     store(folder / "d.png", half, "uint8", **{"oiio:UnassociatedAlpha": 1})
     keep = lambda path, **_: shutil.copytree(path, kept)  # noqa: E731
-    monkeypatch.setattr("rift_cl.io.photographs.shutil.rmtree", _first(keep, "copies"))
+    monkeypatch.setattr("rift_cl.io.captures.photographs.shutil.rmtree", _first(keep, "copies"))
     _, posed = run(pose_photographs(folder, tmp_path / "poses"))
     assert posed.placed == ("a.png", "b.exr", "c.tif", "d.png")
     assert seen()["names"] == [f"{name}.png" for name in posed.placed]

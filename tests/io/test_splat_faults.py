@@ -108,7 +108,7 @@ def test_a_disk_that_loses_bytes_in_silence(
     tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     short = {f".{ending}": lambda scene: (100, iter([bytes(99)]))}
-    monkeypatch.setattr("rift_cl.io.splat_scene._ENCODERS", short)
+    monkeypatch.setattr("rift_cl.io.scenes.splat_scene._ENCODERS", short)
     with pytest.raises(OutputError, match="shorter"):
         made.scene().save(tmp_path / f"a.{ending}")
     assert left(tmp_path) == []

@@ -18,7 +18,7 @@ from rift_cl.errors import (
     RiftError,
     ShapeError,
 )
-from rift_cl.io.splat_scene import XrayScene
+from rift_cl.io.scenes.splat_scene import XrayScene
 from rift_cl.splat.orders import count_of
 from rift_cl.splat.splats import Splats
 

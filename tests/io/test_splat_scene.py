@@ -10,7 +10,7 @@ from splat_files import sigmoid
 
 import rift_cl as rift
 from rift_cl.errors import DTypeError, InputError, NonFiniteError, ShapeError
-from rift_cl.io.splat_scene import XrayScene
+from rift_cl.io.scenes.splat_scene import XrayScene
 from rift_cl.splat.splats import Splats
 
 

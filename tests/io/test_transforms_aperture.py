@@ -11,8 +11,8 @@ import pytest
 from rift_cl.errors import FileFormatError, InputError, NonFiniteError
 from rift_cl.geometry import Aperture
 from rift_cl.io import open_capture, write_json
-from rift_cl.io.transforms_record import transforms_of
-from rift_cl.io.view import as_pinholes, camera_at
+from rift_cl.io.captures.transforms_record import transforms_of
+from rift_cl.io.captures.view import as_pinholes, camera_at
 
 
 def apertures(path: Path) -> list[Aperture | None]:

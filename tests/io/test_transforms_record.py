@@ -14,7 +14,7 @@ from rift_cl.errors import FileFormatError, InputError, PathEscapeError
 from rift_cl.geometry import Camera
 from rift_cl.geometry.aperture import Aperture
 from rift_cl.io import open_capture, write_json
-from rift_cl.io.transforms_record import transforms_of
+from rift_cl.io.captures.transforms_record import transforms_of
 
 NAMES = ["0.png", "deep/1.png", "2"]
 

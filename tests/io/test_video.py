@@ -12,7 +12,7 @@ from photograph_files import run
 
 from rift_cl.errors import FileFormatError, InputError, OutputError
 from rift_cl.io import read_image
-from rift_cl.io.video import demand_video, holds_video, sharpest_frames, video_notes
+from rift_cl.io.captures.video import demand_video, holds_video, sharpest_frames, video_notes
 
 HEIGHT, WIDTH = 48, 64
 # The sharp frames; in a stretch of 5 the others are one grey.
@@ -121,7 +121,7 @@ def test_files_without_frames_are_refused_in_a_sentence(video: Path, tmp_path: P
 def test_without_the_library_one_sentence_says_what_to_install(
     video: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rift_cl.io.video.find_spec", lambda name: None)
+    monkeypatch.setattr("rift_cl.io.captures.video.find_spec", lambda name: None)
     with pytest.raises(InputError, match="pip install av") as caught:
         demand_video(video)
     assert "\n" not in str(caught.value)

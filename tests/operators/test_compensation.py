@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from rift_cl import Parallel, Ramp
 from rift_cl.errors import InputError
 from rift_cl.operators import ViewFilter
-from rift_cl.operators.compensation import COMPENSATIONS, LEVEL, Compensation, _Neighbours
-from rift_cl.operators.directions import Directions
+from rift_cl.operators.filters.compensation import COMPENSATIONS, LEVEL, Compensation, _Neighbours
+from rift_cl.operators.filters.directions import Directions
 from rift_cl.reference import filter_rows, response_taps
 
 KINDS = tuple(COMPENSATIONS)

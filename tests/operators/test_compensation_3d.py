@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rift_cl.errors import InputError
-from rift_cl.operators.compensation import COMPENSATIONS, Compensation
-from rift_cl.operators.compensation_3d import central_planes, radial_lines
+from rift_cl.operators.filters.compensation import COMPENSATIONS, Compensation
+from rift_cl.operators.filters.compensation_3d import central_planes, radial_lines
 
 KINDS = tuple(COMPENSATIONS)
 DIAMETER = 20.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rift_cl.operators.directions import Directions
-from rift_cl.operators.directions_3d import Lines
+from rift_cl.operators.filters.directions import Directions
+from rift_cl.operators.filters.directions_3d import Lines
 
 LEANING = np.random.default_rng(1).standard_normal((40, 3)) * (3, 1, 0.6)
 ACROSS = LEANING * (1, 1, 0)

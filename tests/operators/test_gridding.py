@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rift_cl import Grid, Parallel
-from rift_cl.operators.gridding import choose, kaiser_bessel, spectrum
-from rift_cl.operators.ray_geometry import fixed_steps, rays, tile_visits
+from rift_cl.operators.fourier.gridding import choose, kaiser_bessel, spectrum
+from rift_cl.operators.projector.ray_geometry import fixed_steps, rays, tile_visits
 
 
 def test_the_kernel_has_the_spectrum_that_is_divided_out():

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from rift_cl import Grid, Parallel, Projector, dot_test
 from rift_cl.errors import InputError
-from rift_cl.operators.footprint import FOOTPRINTS
+from rift_cl.operators.projector.footprint import FOOTPRINTS
 from rift_cl.reference import phase_table, radon
 
 ROUNDING = 1e-6

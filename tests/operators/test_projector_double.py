@@ -14,7 +14,7 @@ import pytest
 import rift_cl as rift
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.errors import DeviceError, DTypeError, NonFiniteError, ResourceLimitError
-from rift_cl.operators.footprint import FOOTPRINTS
+from rift_cl.operators.projector.footprint import FOOTPRINTS
 
 GRID = rift.Grid((12, 15))
 SCAN = rift.Parallel(np.linspace(0, np.pi, 8, endpoint=False), bins=21)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from rift_cl import Grid, Parallel, Projector, fbp, metrics, phantom, sirt
-from rift_cl.operators.footprint import FOOTPRINTS
+from rift_cl.operators.projector.footprint import FOOTPRINTS
 
 HALF = np.linspace(0, np.pi, 192, endpoint=False)
 TIES = [0, np.pi / 4, np.pi / 2, 3 * np.pi / 4, np.pi, 1e-9, np.pi / 2 - 1e-9]

@@ -14,7 +14,8 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.errors import ResourceLimitError
-from rift_cl.operators import LinearOperator, ViewFilter, projector
+from rift_cl.operators import LinearOperator, ViewFilter
+from rift_cl.operators.projector import phase_projector as projector
 from rift_cl.reconstruct import FilteredBackprojection
 
 

@@ -8,9 +8,10 @@ import pytest
 import rift_cl as rift
 from rift_cl import Parallel, Ramp, dot_test
 from rift_cl.errors import InputError, ResourceLimitError
-from rift_cl.operators import ViewFilter, row_transform
-from rift_cl.operators.row_convolution import SHORT_ROW, RowConvolution
-from rift_cl.operators.row_transform import RowTransform, transform_length
+from rift_cl.operators import ViewFilter
+from rift_cl.operators.filters.row_convolution import SHORT_ROW, RowConvolution
+from rift_cl.operators.fourier import row_transform
+from rift_cl.operators.fourier.row_transform import RowTransform, transform_length
 from rift_cl.reference import filter_rows, ramp_taps
 
 PITCH = 0.7

@@ -7,10 +7,10 @@ from functools import cache
 import numpy as np
 
 from rift_cl import Grid, LinearOperator, Parallel, Projector
-from rift_cl.reconstruct.conjugate_gradients import Cgls
-from rift_cl.reconstruct.fista import Fista
-from rift_cl.reconstruct.pdhg import Pdhg
-from rift_cl.reconstruct.simultaneous_iteration import Sirt
+from rift_cl.reconstruct.solvers.conjugate_gradients import Cgls
+from rift_cl.reconstruct.solvers.fista import Fista
+from rift_cl.reconstruct.solvers.pdhg import Pdhg
+from rift_cl.reconstruct.solvers.simultaneous_iteration import Sirt
 from rift_cl.reference import phase_table
 
 GRID = Grid((22, 25), spacing=(1.0, 0.8))

@@ -13,7 +13,7 @@ from rift_cl import Grid, Parallel, Projector, fbp, phantom
 from rift_cl.errors import InputError
 from rift_cl.metrics import disc, psnr
 from rift_cl.operators import Ramp, ViewFilter
-from rift_cl.operators.compensation import COMPENSATIONS, Compensation
+from rift_cl.operators.filters.compensation import COMPENSATIONS, Compensation
 from rift_cl.reconstruct import FilteredBackprojection
 
 RANDOM = np.random.default_rng(11)

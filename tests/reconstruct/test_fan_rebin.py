@@ -6,7 +6,7 @@ import pytest
 import rift_cl as rift
 from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.geometry.fan import FanBeam
-from rift_cl.reconstruct.fan_rebin import covered_rays, rebin_fan
+from rift_cl.reconstruct.direct.fan_rebin import covered_rays, rebin_fan
 
 BINS = 200
 # Value, half-axes, middle and turn of ellipses.

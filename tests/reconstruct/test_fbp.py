@@ -15,7 +15,7 @@ from rift_cl import Grid, Parallel, Projector, backproject, fbp, phantom
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.operators import Ramp, ViewFilter
 from rift_cl.reconstruct import FilteredBackprojection
-from rift_cl.reconstruct.view_weights import view_weights
+from rift_cl.reconstruct.direct.view_weights import view_weights
 from rift_cl.reference import filter_rows, radon, ramp_taps
 
 LEVEL = 1.7

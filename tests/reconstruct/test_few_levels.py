@@ -19,8 +19,8 @@ from rift_cl.reconstruct import (
     material_lengths,
     rebin_fan,
 )
-from rift_cl.reconstruct.fan_rebin import covered_rays
-from rift_cl.reconstruct.total_variation import TotalVariation
+from rift_cl.reconstruct.direct.fan_rebin import covered_rays
+from rift_cl.reconstruct.solvers.total_variation import TotalVariation
 from rift_cl.reference import total_variation as twin
 from rift_cl.reference.level_pull import level_penalty, level_pull
 
@@ -159,7 +159,7 @@ def test_bounds_zero_and_much_are_nonnegativity(device):
 def test_a_resumed_run_gives_the_same_bits(device, dtype, monkeypatch):
     if dtype == "float64" and not device.traits.fp64:
         pytest.skip("a device without float64")
-    monkeypatch.setattr("rift_cl.reconstruct.few_levels._SETTLED", 2)
+    monkeypatch.setattr("rift_cl.reconstruct.solvers.few_levels._SETTLED", 2)
     A, _, _, y = problem(device, noise=0.1, dtype=dtype)
     given = {"pull": 1e-2, "direction_weights": WEDGE, "support": RANDOM.random(A.domain)}
     whole, first = (FewLevels(A, y, 0.05, **given) for _ in range(2))

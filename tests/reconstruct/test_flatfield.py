@@ -5,7 +5,7 @@ import pytest
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.reconstruct import attenuation
-from rift_cl.reconstruct.flatfield import attenuation_without_flats
+from rift_cl.reconstruct.preprocess.flatfield import attenuation_without_flats
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from scipy.ndimage import gaussian_filter1d
 import rift_cl as rift
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.metrics import disc, psnr
-from rift_cl.reconstruct.offset_axis import widened
+from rift_cl.reconstruct.direct.offset_axis import widened
 from rift_cl.reconstruct.preprocess.half_acquisition import stitched
 
 SIZE, BINS, VIEWS, CENTER = 160, 92, 480, 11.3

@@ -6,7 +6,7 @@ import pytest
 import rift_cl as rift
 from rift_cl.errors import InputError
 from rift_cl.metrics import psnr
-from rift_cl.reconstruct.offset_axis import (
+from rift_cl.reconstruct.direct.offset_axis import (
     is_full_turn,
     is_offset,
     offset_weights,

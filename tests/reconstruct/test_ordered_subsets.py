@@ -9,8 +9,8 @@ from solver_cases import GRID, SCAN, Matrix, finished, problem
 from rift_cl import FastProjector, Grid, Parallel, Projector, phantom
 from rift_cl.errors import CheckpointError, InputError
 from rift_cl.reconstruct import OrderedSubsets, SeenRays, Sirt, sirt
-from rift_cl.reconstruct.view_subsets import restricted, view_subsets
-from rift_cl.reconstruct.weighted_rays import WeightedRays
+from rift_cl.reconstruct.solvers.view_subsets import restricted, view_subsets
+from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays
 
 RANDOM = np.random.default_rng(4)
 

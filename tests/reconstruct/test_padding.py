@@ -5,7 +5,7 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.errors import InputError
-from rift_cl.reconstruct.padding import extended, is_truncated
+from rift_cl.reconstruct.direct.padding import extended, is_truncated
 
 SIZE, BINS, VIEWS = 160, 80, 240
 ANGLES = np.arange(VIEWS) * np.pi / VIEWS

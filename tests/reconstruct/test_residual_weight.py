@@ -7,10 +7,10 @@ import pytest
 from solver_cases import dense, finished, problem, soft_disc
 
 from rift_cl import Grid, Parallel, Projector, phantom
-from rift_cl.reconstruct.conjugate_gradients import Cgls, cgls
-from rift_cl.reconstruct.data_term import DataTerm
-from rift_cl.reconstruct.residual_weight import mean_power
-from rift_cl.reconstruct.simultaneous_iteration import Sirt
+from rift_cl.reconstruct.solvers.conjugate_gradients import Cgls, cgls
+from rift_cl.reconstruct.solvers.data_term import DataTerm
+from rift_cl.reconstruct.solvers.residual_weight import mean_power
+from rift_cl.reconstruct.solvers.simultaneous_iteration import Sirt
 
 RANDOM = np.random.default_rng(8)
 

@@ -9,7 +9,7 @@ import rift_cl as rift
 from rift_cl import FastProjector, Grid, Parallel, Projector
 from rift_cl.metrics import psnr
 from rift_cl.phantom import shepp_logan, shepp_logan_sinogram
-from rift_cl.reconstruct.simultaneous_iteration import inverse_sums
+from rift_cl.reconstruct.solvers.simultaneous_iteration import inverse_sums
 
 HALF = np.linspace(0, np.pi, 100, endpoint=False)
 SCENES = {

@@ -9,10 +9,10 @@ from solver_cases import GRID, METHODS, SCAN, Matrix, finished, problem
 from rift_cl import Grid, Parallel, Projector
 from rift_cl.errors import CheckpointError, DTypeError, InputError, NonFiniteError, ShapeError
 from rift_cl.operators import Ramp, ViewFilter
-from rift_cl.reconstruct.conjugate_gradients import Cgls, cgls
-from rift_cl.reconstruct.fista import Fista
-from rift_cl.reconstruct.simultaneous_iteration import sirt
-from rift_cl.reconstruct.tv_reconstruction import tv
+from rift_cl.reconstruct.solvers.conjugate_gradients import Cgls, cgls
+from rift_cl.reconstruct.solvers.fista import Fista
+from rift_cl.reconstruct.solvers.simultaneous_iteration import sirt
+from rift_cl.reconstruct.solvers.tv_reconstruction import tv
 
 every_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 FUNCTIONS = {

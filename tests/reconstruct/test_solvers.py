@@ -9,11 +9,11 @@ from solver_cases import GRID, METHODS, SCAN, Matrix, dense, finished, problem
 
 from rift_cl import Grid, Projector
 from rift_cl.operators import Ramp, ViewFilter
-from rift_cl.reconstruct.conjugate_gradients import cgls
-from rift_cl.reconstruct.fista import Fista
-from rift_cl.reconstruct.pdhg import Pdhg
-from rift_cl.reconstruct.simultaneous_iteration import Sirt, sirt
-from rift_cl.reconstruct.tv_reconstruction import tv
+from rift_cl.reconstruct.solvers.conjugate_gradients import cgls
+from rift_cl.reconstruct.solvers.fista import Fista
+from rift_cl.reconstruct.solvers.pdhg import Pdhg
+from rift_cl.reconstruct.solvers.simultaneous_iteration import Sirt, sirt
+from rift_cl.reconstruct.solvers.tv_reconstruction import tv
 from rift_cl.reference import total_variation as twin
 
 RANDOM = np.random.default_rng(8)

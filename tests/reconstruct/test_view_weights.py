@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rift_cl.errors import InputError
-from rift_cl.operators.compensation import COMPENSATIONS
-from rift_cl.reconstruct.view_weights import view_gains, view_weights
+from rift_cl.operators.filters.compensation import COMPENSATIONS
+from rift_cl.reconstruct.direct.view_weights import view_gains, view_weights
 
 WAYS = (None, "voronoi")
 EVEN = np.linspace(0, np.pi, 12, endpoint=False)

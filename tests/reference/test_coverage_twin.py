@@ -9,8 +9,8 @@ import pytest
 from looks_of_all_kinds import random_looks
 
 from rift_cl.reference.coverage import coverage, coverage_grad, optical_transfer
-from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.target import half_ball
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.target import half_ball
 
 STEP = 1e-6
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from rift_cl.geometry import Aperture, Camera
 from rift_cl.geometry.pose import look_at
-from rift_cl.sampling.looks import Looks
+from rift_cl.sampling.targets.observations import Looks
 
 
 def random_looks(views: int, points: int, *, diameter: float = 1.0, seed: int = 0) -> Looks:

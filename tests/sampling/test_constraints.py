@@ -8,9 +8,9 @@ import pytest
 from rift_cl.errors import InputError
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.sampling.planning.constraints import Budget, Constraints, Ranges
+from rift_cl.sampling.planning.design_space import DISTANCE, FOCAL, Site, default_types
 from rift_cl.sampling.planning.paths import Spline, TiltedRings
-from rift_cl.sampling.planning.site import DISTANCE, FOCAL, Site, default_types
-from rift_cl.sampling.target import Target
+from rift_cl.sampling.targets.target import Target
 
 TARGET = Target((1, 2, 3), 10.0)
 LENS = CameraType("lens", 5.0, 8.0, 0.01, (300, 400))

@@ -12,10 +12,10 @@ import rift_cl as rift
 from rift_cl.errors import InputError, ResourceLimitError, ShapeError
 from rift_cl.geometry import Parallel
 from rift_cl.reference import coverage as twin
-from rift_cl.sampling.coverage import coverage, coverage_grad
-from rift_cl.sampling.coverage_cube import coverage_cube, cube_axis
-from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.target import Target
+from rift_cl.sampling.coverage.cube import coverage_cube, cube_axis
+from rift_cl.sampling.coverage.device import coverage, coverage_grad
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.target import Target
 
 DIAMETER = 3.0
 POINTS = [[0.1, 0, 0], [-0.5, 0.2, 0.4]]

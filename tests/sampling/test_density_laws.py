@@ -8,7 +8,7 @@ from looks_of_all_kinds import ring_directions
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
-from rift_cl.sampling.density import (
+from rift_cl.sampling.coverage.density import (
     density,
     half_sphere,
     mean_density,
@@ -17,8 +17,8 @@ from rift_cl.sampling.density import (
     sphere_density,
     window_width,
 )
-from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.target import Target
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.target import Target
 
 VIEWS = 512
 RADII = np.geomspace(2, 32, 9)

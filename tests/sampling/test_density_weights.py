@@ -8,9 +8,9 @@ import pytest
 from rift_cl import Parallel
 from rift_cl.errors import InputError, RiftError, ShapeError
 from rift_cl.geometry.pose import look_at
-from rift_cl.operators.compensation import COMPENSATIONS, Compensation
-from rift_cl.operators.compensation_3d import central_planes
-from rift_cl.sampling.density_weights import KINDS, density_weights
+from rift_cl.operators.filters.compensation import COMPENSATIONS, Compensation
+from rift_cl.operators.filters.compensation_3d import central_planes
+from rift_cl.sampling.coverage.density_weights import KINDS, density_weights
 
 DIAMETER = 40.0
 K = np.array([0.0, 0.01, 0.05, 0.2, 0.5])

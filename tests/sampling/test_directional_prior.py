@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from rift_cl.errors import InputError
-from rift_cl.sampling.directional_prior import Trusted, anisotropy, turned
-from rift_cl.sampling.pilot import Pilot
 from rift_cl.sampling.planning.constraints import Constraints
 from rift_cl.sampling.planning.planner import plan
 from rift_cl.sampling.planning.wrong_prior import if_wrong
-from rift_cl.sampling.prior import PowerLaw, Spectrum
-from rift_cl.sampling.target import Target, half_ball, half_disc
+from rift_cl.sampling.targets.directional_prior import Trusted, anisotropy, turned
+from rift_cl.sampling.targets.pilot import Pilot
+from rift_cl.sampling.targets.prior import PowerLaw, Spectrum
+from rift_cl.sampling.targets.target import Target, half_ball, half_disc
 
 LEVEL = Constraints(elevation=(0, 0))
 

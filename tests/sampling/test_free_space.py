@@ -5,7 +5,11 @@ import pytest
 from walls import WALL, arc, depth_of_ball, looking, points_before_a_wall
 
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.sampling.free_space import (
+from rift_cl.sampling.planning.constraints import Constraints
+from rift_cl.sampling.planning.keep_out import KeepOut
+from rift_cl.sampling.planning.out_of_sight import out_of_sight
+from rift_cl.sampling.planning.planner import next_views
+from rift_cl.sampling.targets.free_space import (
     BEHIND,
     FREE,
     UNSEEN,
@@ -13,12 +17,8 @@ from rift_cl.sampling.free_space import (
     FreeSpace,
     depth_of_points,
 )
-from rift_cl.sampling.planning.constraints import Constraints
-from rift_cl.sampling.planning.keep_out import KeepOut
-from rift_cl.sampling.planning.out_of_sight import out_of_sight
-from rift_cl.sampling.planning.planner import next_views
-from rift_cl.sampling.prior import directions_for
-from rift_cl.sampling.target import Target
+from rift_cl.sampling.targets.prior import directions_for
+from rift_cl.sampling.targets.target import Target
 
 ORIGIN = np.zeros(3)
 

@@ -6,16 +6,16 @@ import math
 import numpy as np
 import pytest
 
-from rift_cl.sampling.looks import Looks
 from rift_cl.sampling.planning.candidates import candidates, spread
 from rift_cl.sampling.planning.constraints import Constraints
+from rift_cl.sampling.planning.design_space import Site, default_types
 from rift_cl.sampling.planning.greedy import Limits, bound, choose
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.pool import pool_of
-from rift_cl.sampling.planning.site import Site, default_types
-from rift_cl.sampling.planning.stations import Stations
-from rift_cl.sampling.prior import directions_for
-from rift_cl.sampling.target import Target, half_ball
+from rift_cl.sampling.planning.view_table import Stations
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.prior import directions_for
+from rift_cl.sampling.targets.target import Target, half_ball
 
 VOLUME = Target((0, 0, 0), 10.0, snr=30.0, frequencies=half_ball(0.5, 120))
 NORMALS = directions_for(3, 7)

@@ -8,12 +8,12 @@ from looks_of_all_kinds import ring_of_cameras
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Aperture
-from rift_cl.geometry.pupil import defocused_otf
+from rift_cl.optics.pupil import defocused_otf
 from rift_cl.reference.coverage import optical_transfer
-from rift_cl.sampling.density import half_sphere
-from rift_cl.sampling.limits import limits
-from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.target import Target
+from rift_cl.sampling.coverage.density import half_sphere
+from rift_cl.sampling.criteria.limits import limits
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.target import Target
 
 # Small enough that 60 views are never too few.
 SMALL = Target((0, 0, 0), 0.01)

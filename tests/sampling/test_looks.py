@@ -9,7 +9,7 @@ from looks_of_all_kinds import ring_of_cameras
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Aperture, Camera, Parallel
 from rift_cl.geometry.pose import look_at
-from rift_cl.sampling.looks import Looks
+from rift_cl.sampling.targets.observations import Looks
 
 VIEW = look_at((0, 0, -10), (0, 0, 0), (0, -1, 0))
 K = [[100, 0, 20], [0, 100, 15], [0, 0, 1]]

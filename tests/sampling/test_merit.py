@@ -10,12 +10,12 @@ from rift_cl.geometry import Camera, Parallel
 from rift_cl.geometry.pose import look_at
 from rift_cl.reference.coverage import coverage
 from rift_cl.sampling import merit as merit_file
-from rift_cl.sampling.exact import exact
-from rift_cl.sampling.kriging import kriging
-from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.merit import merit, merit_of_coverage
-from rift_cl.sampling.prior import directions_for
-from rift_cl.sampling.target import Target, half_ball
+from rift_cl.sampling.criteria.exact import exact
+from rift_cl.sampling.criteria.kriging import kriging
+from rift_cl.sampling.criteria.merit import merit, merit_of_coverage
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.prior import directions_for
+from rift_cl.sampling.targets.target import Target, half_ball
 
 KINDS = ("wiener", "logdet", "worst")
 POINTS = ((0.1, 0, 0), (-0.1, 0.2, 0.05))

@@ -5,11 +5,11 @@ import pytest
 from scattered_cameras import cameras
 
 from rift_cl.errors import InputError, NonFiniteError, RiftError, ShapeError
-from rift_cl.sampling.exact import exact
-from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.merit import merit, merit_of_coverage
-from rift_cl.sampling.prior import PowerLaw
-from rift_cl.sampling.target import Target, half_ball
+from rift_cl.sampling.criteria.exact import exact
+from rift_cl.sampling.criteria.merit import merit, merit_of_coverage
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.prior import PowerLaw
+from rift_cl.sampling.targets.target import Target, half_ball
 
 KINDS = ("wiener", "logdet", "worst")
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from rift_cl.geometry.camera_type import CameraType
-from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.merit import merit
+from rift_cl.sampling.criteria.merit import merit
 from rift_cl.sampling.planning.constraints import Constraints, Ranges
+from rift_cl.sampling.planning.design_space import COLUMNS, Site
 from rift_cl.sampling.planning.objective import Objective
-from rift_cl.sampling.planning.site import COLUMNS, Site
-from rift_cl.sampling.planning.stations import Stations
-from rift_cl.sampling.target import Target, half_ball
+from rift_cl.sampling.planning.view_table import Stations
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.target import Target, half_ball
 
 WIDE = CameraType("wide", 8.0, 4.0, 0.01, (300, 400))
 LONG = CameraType("long", 50.0, 8.0, 0.01, (300, 300), pupil_magnification=0.8)

@@ -9,14 +9,14 @@ import pytest
 from rift_cl.errors import InputError
 from rift_cl.sampling.planning.constraints import Constraints
 from rift_cl.sampling.planning.curves import curves_of
+from rift_cl.sampling.planning.design_space import Site, default_types
 from rift_cl.sampling.planning.keep_out import Cone, KeepOut, Sphere
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.path_layout import PathLayout
 from rift_cl.sampling.planning.paths import Free, Ring, Spline, TiltedRings
 from rift_cl.sampling.planning.planner import plan
-from rift_cl.sampling.planning.polish import permitted
-from rift_cl.sampling.planning.site import Site, default_types
-from rift_cl.sampling.target import Target, half_ball
+from rift_cl.sampling.planning.refine import permitted
+from rift_cl.sampling.targets.target import Target, half_ball
 
 TARGET = Target((0, 0, 0), 10.0, snr=30.0, frequencies=half_ball(0.6, 200))
 SECTOR = {"elevation": (0.1, 1.0), "azimuth": (-1.0, 1.0)}

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from rift_cl.geometry.camera_type import CameraType
-from rift_cl.sampling.merit import merit
+from rift_cl.sampling.criteria.merit import merit
 from rift_cl.sampling.planning.constraints import Budget, Constraints, Ranges
 from rift_cl.sampling.planning.keep_out import Box, Cone, KeepOut, Sphere
 from rift_cl.sampling.planning.planner import next_views, plan
-from rift_cl.sampling.planning.polish import permitted
-from rift_cl.sampling.prior import PowerLaw, Spectrum
-from rift_cl.sampling.target import Target, half_ball, half_disc
+from rift_cl.sampling.planning.refine import permitted
+from rift_cl.sampling.targets.prior import PowerLaw, Spectrum
+from rift_cl.sampling.targets.target import Target, half_ball, half_disc
 
 CENTER = np.array([5.0, -6.0, 7.0])
 TARGET = Target(CENTER, 60.0, snr=30.0, frequencies=half_ball(6 / 60, 300))

@@ -8,12 +8,12 @@ import pytest
 from rift_cl.sampling.planning import planner
 from rift_cl.sampling.planning.candidates import spread
 from rift_cl.sampling.planning.constraints import Constraints
+from rift_cl.sampling.planning.design_space import Site, default_types
 from rift_cl.sampling.planning.free_layout import FreeLayout
 from rift_cl.sampling.planning.objective import Objective
-from rift_cl.sampling.planning.polish import polish
-from rift_cl.sampling.planning.site import Site, default_types
-from rift_cl.sampling.planning.stations import Stations
-from rift_cl.sampling.target import Target, half_ball
+from rift_cl.sampling.planning.refine import polish
+from rift_cl.sampling.planning.view_table import Stations
+from rift_cl.sampling.targets.target import Target, half_ball
 
 TARGET = Target(np.zeros(3), 60.0, snr=1000.0, frequencies=half_ball(16 / 60, 3000))
 BAND = Constraints(elevation=(0, math.radians(75)))

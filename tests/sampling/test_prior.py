@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rift_cl.errors import InputError, NonFiniteError, RiftError, ShapeError
-from rift_cl.sampling.pilot import Pilot
-from rift_cl.sampling.prior import PowerLaw, Spectrum, checked_power, directions_for
+from rift_cl.sampling.targets.pilot import Pilot
+from rift_cl.sampling.targets.prior import PowerLaw, Spectrum, checked_power, directions_for
 
 D = 2.0
 

@@ -7,15 +7,15 @@ import pytest
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.reference.splat_projection import spherical_harmonics
-from rift_cl.sampling.looks import Looks
+from rift_cl.sampling.criteria.appearance import sheen_error, shown, variances
 from rift_cl.sampling.planning.candidates import candidates, looked_at
 from rift_cl.sampling.planning.constraints import Constraints
+from rift_cl.sampling.planning.design_space import Site, default_types
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.planner import plan
 from rift_cl.sampling.planning.pool import pool_of
-from rift_cl.sampling.planning.site import Site, default_types
-from rift_cl.sampling.sheen import sheen_error, shown, variances
-from rift_cl.sampling.target import Target
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.target import Target
 
 UP = np.array([[0, 0, 1.0]])
 LOW = Constraints(elevation=(0.0, radians(35)), distance=4.0)

@@ -8,8 +8,8 @@ import pytest
 from rift_cl.sampling.planning.constraints import Constraints
 from rift_cl.sampling.planning.planner import plan
 from rift_cl.sampling.planning.simple_ways import edge_ways, quantiles_of_power
-from rift_cl.sampling.prior import PowerLaw, Spectrum
-from rift_cl.sampling.target import Target, half_ball, half_disc
+from rift_cl.sampling.targets.prior import PowerLaw, Spectrum
+from rift_cl.sampling.targets.target import Target, half_ball, half_disc
 
 LEVEL = Constraints(elevation=(0, 0))
 SECTOR = Constraints(elevation=(0, math.radians(40)), azimuth=(0, math.radians(60)))

@@ -8,7 +8,7 @@ import pytest
 from rift_cl import phantom
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Grid
-from rift_cl.sampling.slice_theorem import slice_comparison, transform
+from rift_cl.sampling.coverage.slice_theorem import slice_comparison, transform
 
 FLAT = Grid((96, 110), (1.1, 1.0), (3.0, -7.0))
 SOLID = Grid((26, 30, 28), (1.0, 0.9, 1.1), (1.0, 2.0, -3.0))

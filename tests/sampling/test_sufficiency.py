@@ -10,17 +10,17 @@ from looks_of_all_kinds import ring_directions, ring_of_cameras
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
-from rift_cl.sampling.density import half_sphere
-from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.orlov import orlov
-from rift_cl.sampling.sufficiency import (
+from rift_cl.sampling.coverage.density import half_sphere
+from rift_cl.sampling.criteria.orlov import orlov
+from rift_cl.sampling.criteria.sufficiency import (
     crowther,
     crowther_resolution,
     crowther_views,
     sufficiency,
 )
-from rift_cl.sampling.target import Target
-from rift_cl.sampling.tuy import tuy
+from rift_cl.sampling.criteria.tuy import tuy
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.target import Target
 
 SPACE = Target((0, 0, 0), 1.0)
 

@@ -7,12 +7,12 @@ from scipy.spatial.transform import Rotation
 
 from rift_cl.errors import InputError
 from rift_cl.reference.splat_projection import spherical_harmonics
-from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.merit import merit
-from rift_cl.sampling.prior import directions_for
-from rift_cl.sampling.sheen import variances
-from rift_cl.sampling.surface import surface_merit, texture_coverage
-from rift_cl.sampling.target import Target
+from rift_cl.sampling.criteria.appearance import variances
+from rift_cl.sampling.criteria.merit import merit
+from rift_cl.sampling.criteria.surface import surface_merit, texture_coverage
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.prior import directions_for
+from rift_cl.sampling.targets.target import Target
 
 POINTS = np.array([[0.2, 0, 0.1], [-0.1, 0.2, 0.05], [0, 0, -0.3]])
 NORMALS = np.array([[1, 0, 0.5], [-0.3, 1, 0.2], [0.1, 0, -1]])

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
-from rift_cl.sampling.target import Target, half_ball, half_disc
+from rift_cl.sampling.targets.target import Target, half_ball, half_disc
 
 
 def test_what_is_not_given_has_a_default():

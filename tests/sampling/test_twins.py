@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
+from rift_cl.sampling.planning.coincident import parted
 from rift_cl.sampling.planning.constraints import Constraints
+from rift_cl.sampling.planning.design_space import AZIMUTH, DISTANCE, ELEVATION, Site, default_types
 from rift_cl.sampling.planning.keep_out import Cone, KeepOut
-from rift_cl.sampling.planning.polish import permitted
-from rift_cl.sampling.planning.site import AZIMUTH, DISTANCE, ELEVATION, Site, default_types
-from rift_cl.sampling.planning.stations import Stations
-from rift_cl.sampling.planning.twins import parted
-from rift_cl.sampling.target import Target, half_ball
+from rift_cl.sampling.planning.refine import permitted
+from rift_cl.sampling.planning.view_table import Stations
+from rift_cl.sampling.targets.target import Target, half_ball
 
 TARGET = Target((0, 0, 0), 10.0, frequencies=half_ball(0.5, 50))
 SPACING = 0.4

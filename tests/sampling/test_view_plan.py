@@ -8,10 +8,10 @@ import pytest
 
 from rift_cl.errors import InputError
 from rift_cl.geometry.camera_type import CameraType
-from rift_cl.sampling.merit import merit
+from rift_cl.sampling.criteria.merit import merit
 from rift_cl.sampling.planning.constraints import Constraints
 from rift_cl.sampling.planning.planner import next_views, plan
-from rift_cl.sampling.target import Target, half_ball
+from rift_cl.sampling.targets.target import Target, half_ball
 
 CENTER = np.array([5.0, -6.0, 7.0])
 TARGET = Target(CENTER, 60.0, snr=30.0, frequencies=half_ball(6 / 60, 300))

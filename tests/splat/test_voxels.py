@@ -17,7 +17,7 @@ from rift_cl.basis.indices import graded
 from rift_cl.reference.voxels import edge, graded_tensors
 from rift_cl.splat import Renderer, Splats, SplatSettings
 from rift_cl.splat.orders import count_of
-from rift_cl.train.xray_voxels import Footprints
+from rift_cl.train.xray.voxels import Footprints
 
 ORDERS = (0, 1, 2, 4, 8)
 # Neither symmetric nor even, and no whole number of bricks.

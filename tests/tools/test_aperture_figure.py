@@ -9,9 +9,9 @@ import pytest
 from rift_cl import open_device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Aperture, Camera
-from rift_cl.html_page import Page
 from rift_cl.io import open_capture
-from rift_cl.io.display_light import to_linear
+from rift_cl.io.images.display_light import to_linear
+from rift_cl.report.html_page import Page
 from rift_cl.splat import Renderer, Splats, SplatSettings
 
 

@@ -116,8 +116,11 @@ def test_each_blocking_call_is_seen_with_its_place_and_the_driver_left_as_it_was
     import pyopencl as cl
 
     before = cl.enqueue_copy, cl.CommandQueue.finish
-    device, loss = rift.default_device(), importlib.import_module("rift_cl.train.homogenised_loss")
-    settings = importlib.import_module("rift_cl.train.homogenisation").Homogenisation(0.5)
+    device, loss = (
+        rift.default_device(),
+        importlib.import_module("rift_cl.train.loss.homogenised_loss"),
+    )
+    settings = importlib.import_module("rift_cl.train.loss.homogenisation").Homogenisation(0.5)
     image = np.zeros((16, 16, 3), np.float32)
     with tool("bench.waits").each_wait() as log:
         watching = loss.HomogenisedLoss(device, settings, ssim_weight=0.0, kind="l1", noise=0.01)
@@ -128,7 +131,7 @@ def test_each_blocking_call_is_seen_with_its_place_and_the_driver_left_as_it_was
     assert [wait.bytes for wait in found if wait.kind == "to the device"] == [image.nbytes] * 2
     (read,) = (wait for wait in found if wait.kind == "to the host")
     assert read.bytes == 4 and read.function == "watch"
-    assert read.place.startswith("rift_cl/train/homogenised_loss.py:")
+    assert read.place.startswith("rift_cl/train/loss/homogenised_loss.py:")
     assert log[-1].kind == "finish"
     assert (cl.enqueue_copy, cl.CommandQueue.finish) == before
 

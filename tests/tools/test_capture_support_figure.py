@@ -10,9 +10,9 @@ import pytest
 from test_start import ring
 
 from rift_cl import open_device
-from rift_cl.html_page import Page
+from rift_cl.io.captures.transforms_record import transforms_of
 from rift_cl.io.output import write_json
-from rift_cl.io.transforms_record import transforms_of
+from rift_cl.report.html_page import Page
 
 TOOLS = Path(__file__).parents[2] / "tools"
 

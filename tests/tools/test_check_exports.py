@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rift_cl.io.output import write_json
-from rift_cl.io.splat_scene import SplatScene
+from rift_cl.io.scenes.splat_scene import SplatScene
 
 
 def test_each_format_comes_back_as_well_as_it_can(tool, tmp_path, capsys):

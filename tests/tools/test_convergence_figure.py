@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rift_cl import default_device
-from rift_cl.html_page import Page
+from rift_cl.report.html_page import Page
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rift_cl.html_page import Page
+from rift_cl.report.html_page import Page
 from rift_cl.sample.stock_lenses import STOCK_LENSES
 
 

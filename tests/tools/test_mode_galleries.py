@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from rift_cl.html_page import Page
+from rift_cl.report.html_page import Page
 
 
 class _Quick:

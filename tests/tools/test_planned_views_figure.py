@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rift_cl.html_page import Page
+from rift_cl.report.html_page import Page
 
 TOOLS = Path(__file__).parents[2] / "tools"
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rift_cl import open_device
-from rift_cl.html_page import Page
+from rift_cl.report.html_page import Page
 
 PLAN = SimpleNamespace(full=False)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rift_cl.cli import main
+from rift_cl.commands.cli import main
 from rift_cl.errors import InputError
 from rift_cl.io.scans import contract
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from rift_cl.jobs.xray_input import Projections, XrayPictures
+from rift_cl.commands.fit_xray.input import Projections, XrayPictures
 from rift_cl.splat.orders import count_of
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.start import start_splats
+from rift_cl.train.start.points import start_splats
 
 SIZE, COUNT = 20, 6
 DRAWING = SplatSettings(mode="xray")

@@ -10,8 +10,8 @@ import rift_cl as rift
 from rift_cl.splat.orders import count_of
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
-from rift_cl.train.additive import Additive
 from rift_cl.train.parameters import Parameters
+from rift_cl.train.xray.additive import Additive
 
 VIEWS = 3
 

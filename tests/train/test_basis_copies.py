@@ -8,11 +8,11 @@ from numpy.polynomial.hermite_e import hermegauss
 from test_basis_parameters import COUNT, with_modes
 
 from rift_cl.basis.indices import graded
-from rift_cl.train.densify import densify
 from rift_cl.train.parameters import MORE, Parameters
-from rift_cl.train.quaternions import rotated
-from rift_cl.train.renewal import renew, renew_densities
 from rift_cl.train.settings import Densification, Renewal
+from rift_cl.train.strategy.densify import densify
+from rift_cl.train.strategy.relocation import renew, renew_densities
+from rift_cl.train.views.quaternions import rotated
 
 
 def test_splats_that_share_a_place_have_the_depth_of_the_one_before(device):

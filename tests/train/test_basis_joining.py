@@ -14,9 +14,9 @@ from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.settings import Renewal
-from rift_cl.train.start import random_points, start_splats
+from rift_cl.train.start.points import random_points, start_splats
 from rift_cl.train.trainer import Trainer
-from rift_cl.train.xray_trainer import XrayTrainer, xray_settings
+from rift_cl.train.xray.trainer import XrayTrainer, xray_settings
 
 STEPS = 30
 BOTH = BasisSettings("hermite", 1, 1, first=0, ridge=0)
@@ -166,7 +166,7 @@ class Row:
     light = "display"
 
     def __init__(self, device):
-        from rift_cl.jobs.xray_input import Projections
+        from rift_cl.commands.fit_xray.input import Projections
 
         angles = np.arange(8) * np.pi / 8
         values = np.random.default_rng(1).random((8, 1, 12)).astype(np.float32)

@@ -8,9 +8,9 @@ from test_start import ring
 
 from rift_cl.errors import InputError
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
-from rift_cl.train.lobe_start import lobe_axes
 from rift_cl.train.settings import Densification, Rates, TrainSettings
-from rift_cl.train.start import focus_of
+from rift_cl.train.start.lobes import lobe_axes
+from rift_cl.train.start.points import focus_of
 
 NAN = float("nan")
 

@@ -13,11 +13,11 @@ from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.pose import look_at
 from rift_cl.reference.coverage import coverage
 from rift_cl.reference.spectrum import spectrally_filtered
-from rift_cl.sampling.looks import Looks
-from rift_cl.train.coverage_weight import CoverageWeight
-from rift_cl.train.homogenisation import Homogenisation
-from rift_cl.train.homogenised_loss import HomogenisedLoss
-from rift_cl.train.start import field_diameter, focus_of
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.train.loss.coverage_weight import CoverageWeight
+from rift_cl.train.loss.homogenisation import Homogenisation
+from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
+from rift_cl.train.start.points import field_diameter, focus_of
 
 EDGE = 256
 

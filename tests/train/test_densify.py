@@ -7,9 +7,9 @@ import pytest
 from test_parameters import raw_values
 
 from rift_cl.reference.splat_projection import covariances
-from rift_cl.train.densify import densify, reset_opacities
 from rift_cl.train.parameters import GROUPS, Parameters
 from rift_cl.train.settings import Densification
+from rift_cl.train.strategy.densify import densify, reset_opacities
 
 COUNT = 60
 SMALL, LARGE = np.log(0.005), np.log(0.05)

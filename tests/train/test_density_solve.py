@@ -9,15 +9,15 @@ import pytest
 from density_scenes import COUNT, DRAWING, SIZE, cameras_of, pictures_of, projections, scene
 
 from rift_cl.basis.indices import graded
+from rift_cl.commands.fit_xray.input import XrayPictures
 from rift_cl.errors import InputError, NonFiniteError
-from rift_cl.jobs.xray_input import XrayPictures
 from rift_cl.splat.renderer import Renderer
-from rift_cl.train.additive import Additive
-from rift_cl.train.density_solve import DensityProblem, solve_densities
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.settings import TrainSettings
-from rift_cl.train.solve_settings import SolveSettings
 from rift_cl.train.trainer import Trainer
+from rift_cl.train.xray.additive import Additive
+from rift_cl.train.xray.density_solve import DensityProblem, solve_densities
+from rift_cl.train.xray.solve_settings import SolveSettings
 
 EXACT = SolveSettings(every=1, iterations=40, ridge=1e-7)
 

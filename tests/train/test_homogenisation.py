@@ -7,9 +7,9 @@ import pytest
 
 from rift_cl.errors import InputError
 from rift_cl.reference.spectrum import spectrally_filtered
-from rift_cl.train.homogenisation import Homogenisation, noise_of
-from rift_cl.train.homogenised_loss import HomogenisedLoss
-from rift_cl.train.image_loss import ImageLoss
+from rift_cl.train.loss.homogenisation import Homogenisation, noise_of
+from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
+from rift_cl.train.loss.image_loss import ImageLoss
 
 SIZE = (24, 30)
 

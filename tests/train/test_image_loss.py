@@ -10,7 +10,7 @@ import rift_cl as rift
 from rift_cl import metrics
 from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
 from rift_cl.reference import image_loss as twin
-from rift_cl.train.image_loss import ImageLoss
+from rift_cl.train.loss.image_loss import ImageLoss
 
 # Of the second, a strip of 256 floats leaves two.
 SIZES = [(11, 11), (12, 86), (13, 200), (97, 143)]

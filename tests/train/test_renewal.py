@@ -8,8 +8,8 @@ from test_parameters import raw_values
 from rift_cl.geometry import Camera
 from rift_cl.splat.renderer import Renderer
 from rift_cl.train.parameters import GROUPS, Parameters
-from rift_cl.train.renewal import renew
 from rift_cl.train.settings import Renewal
+from rift_cl.train.strategy.relocation import renew
 
 
 def parameters_of(device, count=200, faded=40):

@@ -14,7 +14,7 @@ from rift_cl.reference.training import screen_statistics
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.screen_statistics import ScreenStatistics
+from rift_cl.train.strategy.screen_statistics import ScreenStatistics
 
 COUNT, SIZE = 300, (90, 160)
 

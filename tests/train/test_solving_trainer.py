@@ -12,9 +12,9 @@ from rift_cl.basis.indices import graded
 from rift_cl.train.basis_settings import BasisSettings
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.settings import TrainSettings
-from rift_cl.train.solve_settings import SolveSettings
-from rift_cl.train.start import start_splats
-from rift_cl.train.xray_trainer import XrayTrainer, xray_settings
+from rift_cl.train.start.points import start_splats
+from rift_cl.train.xray.solve_settings import SolveSettings
+from rift_cl.train.xray.trainer import XrayTrainer, xray_settings
 
 STEPS = 24
 

@@ -7,7 +7,7 @@ import pytest
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
-from rift_cl.train.start import focus_of, random_points, scene_extent, start_splats
+from rift_cl.train.start.points import focus_of, random_points, scene_extent, start_splats
 
 MIDDLE_OF_RING = np.array([0.3, -0.2, 0.1])
 

@@ -11,12 +11,12 @@ from test_trainer import Ball
 from rift_cl.errors import CheckpointError, InputError
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
-from rift_cl.train.gathering import Densify
-from rift_cl.train.image_loss import ImageLoss
+from rift_cl.train.loss.image_loss import ImageLoss
 from rift_cl.train.parameters import GROUPS, Parameters
 from rift_cl.train.settings import Densification, Renewal, TrainSettings
-from rift_cl.train.start import random_points, scene_extent, start_splats
-from rift_cl.train.strategy import strategy_of
+from rift_cl.train.start.points import random_points, scene_extent, start_splats
+from rift_cl.train.strategy.default import Densify
+from rift_cl.train.strategy.mcmc import strategy_of
 
 RATES = {"means": 1e-3, "quats": 1e-3, "log_scales": 5e-3, "logits": 5e-2, "sh": 2.5e-3}
 MCMC = TrainSettings(

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from test_trainer import Ball
 
+from rift_cl.commands.progress_bar import Pace
 from rift_cl.progress import Report
-from rift_cl.progress_bar import Pace
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.settings import Renewal, TrainSettings
-from rift_cl.train.start import start_splats
-from rift_cl.train.strategy import MarkovChain
+from rift_cl.train.start.points import start_splats
+from rift_cl.train.strategy.mcmc import MarkovChain
 from rift_cl.train.trainer import Trainer
 
 

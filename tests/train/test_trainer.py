@@ -14,7 +14,7 @@ from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import GROUPS, Parameters
 from rift_cl.train.schedule import Schedule
 from rift_cl.train.settings import Renewal, TrainSettings
-from rift_cl.train.start import hull_points, random_points, start_splats
+from rift_cl.train.start.points import hull_points, random_points, start_splats
 from rift_cl.train.trainer import Trainer
 
 MIDDLE = np.array([0.3, -0.2, 0.1])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
-from rift_cl.train.variable_projection import mean_curvature, solve
+from rift_cl.train.xray.variable_projection import mean_curvature, solve
 
 SHAPE, PICTURES = (5, 3), (4, 6, 2)
 

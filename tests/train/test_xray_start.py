@@ -11,13 +11,13 @@ import rift_cl as rift
 from rift_cl.errors import InputError
 from rift_cl.reference.splat_projection import covariances
 from rift_cl.splat import Renderer, Splats, SplatSettings
-from rift_cl.train.gathering import Halving
 from rift_cl.train.parameters import GROUPS, Parameters
-from rift_cl.train.renewal import renew, renew_densities
 from rift_cl.train.settings import Renewal, TrainSettings
-from rift_cl.train.strategy import strategy_of
-from rift_cl.train.xray_start import density_splats
-from rift_cl.train.xray_voxels import Footprints
+from rift_cl.train.start.xray import density_splats
+from rift_cl.train.strategy.default import Halving
+from rift_cl.train.strategy.mcmc import strategy_of
+from rift_cl.train.strategy.relocation import renew, renew_densities
+from rift_cl.train.xray.voxels import Footprints
 
 RENEWAL = Renewal(faint=0.05)
 

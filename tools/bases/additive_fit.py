@@ -1,7 +1,7 @@
 """A fit of additive splats: geometry by Adam, all coefficients by ridge least squares inside it.
 
 Each step places the splats, solves for the coefficients by a few conjugate gradients from the last
-ones (``rift_cl.train.variable_projection``) or exactly (``bases.exact``), and moves means,
+ones (``rift_cl.train.xray.variable_projection``) or exactly (``bases.exact``), and moves means,
 rotations and scales along the gradient at those coefficients. Bases differ in nothing but their
 modes and the number of splats that a budget buys: they start from the first of the same places, at
 a size that fills the gaps.
@@ -21,8 +21,8 @@ from bases.exact import solved
 from bases.mode_sets import ModeSet, seen_gram
 from rift_cl.geometry import Camera
 from rift_cl.splat.renderer import Renderer
-from rift_cl.train.host_adam import HostAdam
-from rift_cl.train.variable_projection import mean_curvature, solve
+from rift_cl.train.views.host_adam import HostAdam
+from rift_cl.train.xray.variable_projection import mean_curvature, solve
 
 # Steps of means in widths of the first splats, of quaternions, of logarithms of scales.
 RATES = (0.08, 0.03, 0.04)

@@ -20,7 +20,7 @@ from bases.plan import Plan
 from bases.statistics import distinct, paired, sentence, spread, values
 from bench.table import Table
 from rift_cl import Device
-from rift_cl.plot import curves
+from rift_cl.report.plot import curves
 
 NAME = "angular_dense"
 TITLE = "View-dependent colour: lobes from dense samples"

@@ -20,7 +20,7 @@ from bases.statistics import distinct, paired, sentence, spread, values
 from bench.table import Table
 from rift_cl import Device
 from rift_cl.basis.angular import HGLobe, LGLobe, SphericalHarmonics
-from rift_cl.plot import curves
+from rift_cl.report.plot import curves
 
 NAME = "angular_fixed"
 TITLE = "View-dependent colour: a fixed chart in place of spherical harmonics"

@@ -15,7 +15,7 @@ import numpy as np
 from bases.additive_fit import EXACT, at_time
 from bases.statistics import Difference, chosen, distinct, sentence, spread, values
 from bench.table import Table
-from rift_cl.plot import curves
+from rift_cl.report.plot import curves
 
 BASELINE = "Gaussian"
 

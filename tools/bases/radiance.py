@@ -21,9 +21,9 @@ from bases.plan import Plan
 from bases.statistics import distinct, paired, sentence, spread, values
 from bench.table import Table
 from rift_cl import Device
-from rift_cl.jobs.fit import Fit
-from rift_cl.jobs.fit_settings import FitSettings
-from rift_cl.plot import curves
+from rift_cl.commands.fit_photos.job import Fit
+from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.report.plot import curves
 from rift_cl.sample import ornament
 from rift_cl.train.trainer import REPORT_EVERY
 

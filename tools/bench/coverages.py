@@ -19,10 +19,10 @@ from bench.costs import Cost
 from bench.operations import Task
 from rift_cl.geometry import Aperture, Camera
 from rift_cl.geometry.pose import look_at
-from rift_cl.sampling.coverage import coverage, coverage_grad
-from rift_cl.sampling.density import half_sphere
-from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.target import Target
+from rift_cl.sampling.coverage.density import half_sphere
+from rift_cl.sampling.coverage.device import coverage, coverage_grad
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.target import Target
 
 # Numbers of a view, and beyond how many u = n . k, in cycles per diameter, a slab is over.
 _ROW, _REACH = 8, 1.625

@@ -23,7 +23,7 @@ _NOISE = 0.01
 # Slices are worth their turns: a round of large ones takes seconds.
 _LEAST_ROUNDS = 3
 # Imported while a version has its turn, by its name.
-_FORMULA = "rift_cl.reconstruct.filtered_backprojection"
+_FORMULA = "rift_cl.reconstruct.direct.filtered_backprojection"
 
 
 class _Contender(NamedTuple):

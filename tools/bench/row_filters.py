@@ -17,8 +17,8 @@ from bench.costs import Cost
 from bench.operations import Task
 from bench.transform_work import transform_bytes, transform_flops
 from rift_cl.operators import Ramp, ViewFilter
-from rift_cl.operators.row_convolution import SHORT_ROW
-from rift_cl.operators.row_transform import transform_length
+from rift_cl.operators.filters.row_convolution import SHORT_ROW
+from rift_cl.operators.fourier.row_transform import transform_length
 
 
 def _samples(case: Any) -> float:

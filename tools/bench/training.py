@@ -14,14 +14,14 @@ import numpy as np
 from bench.costs import Cost
 from bench.row_filters import ROW_COSTS
 from bench.transform_work import transform_bytes, transform_flops
-from rift_cl.operators.spectrum import padded_length
+from rift_cl.operators.fourier.spectrum import padded_length
 from rift_cl.train.band_limit import Detail, camera_table
-from rift_cl.train.exposures import Exposures
-from rift_cl.train.homogenisation import Homogenisation
-from rift_cl.train.homogenised_loss import HomogenisedLoss
-from rift_cl.train.image_loss import ImageLoss
+from rift_cl.train.loss.homogenisation import Homogenisation
+from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
+from rift_cl.train.loss.image_loss import ImageLoss
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.screen_statistics import ScreenStatistics
+from rift_cl.train.strategy.screen_statistics import ScreenStatistics
+from rift_cl.train.views.exposures import Exposures
 
 if TYPE_CHECKING:
     from bench.splats import SplatCase

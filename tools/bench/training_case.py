@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 import rift_cl as rift
 from bench.case import Floats
 from bench.splats import SplatCase
+from rift_cl.commands.fit_photos.pictures import CapturePictures
+from rift_cl.commands.fit_photos.start import first_splats
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
-from rift_cl.io.capture import open_capture
-from rift_cl.jobs.fit_pictures import CapturePictures
-from rift_cl.jobs.fit_start import first_splats
+from rift_cl.io.captures.capture import open_capture
 from rift_cl.sample import ornament
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats

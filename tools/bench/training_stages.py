@@ -22,10 +22,10 @@ from bench.operations import each_launch
 from bench.timing import summary, timed
 from bench.training_case import VIEWS, TrainingCase
 from bench.waits import Wait, each_wait
-from rift_cl.train.homogenisation import Homogenisation
+from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.renewal import renew
 from rift_cl.train.settings import Rates, Renewal
+from rift_cl.train.strategy.relocation import renew
 from rift_cl.train.trainer import Pictures, Trainer
 
 _STAGES = {

@@ -28,13 +28,13 @@ from figures.aperture_spectra import spectra
 from figures.images import decode, encode
 from figures.plan import EPS2D, Plan
 from rift_cl import Device
-from rift_cl.html_page import Page
+from rift_cl.commands.fit_photos.job import Fit
+from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.progress_bar import show_progress
 from rift_cl.io import open_capture, read_view
-from rift_cl.jobs.fit import Fit
-from rift_cl.jobs.fit_settings import FitSettings
 from rift_cl.metrics import psnr
-from rift_cl.plot import curves, figure_png, image_grid
-from rift_cl.progress_bar import show_progress
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import curves, figure_png, image_grid
 
 NAME = "aperture_filter"
 TITLE = "Through an aperture: defocus of splats, and the aperture as a filter"

@@ -20,7 +20,7 @@ from figures.images import encode
 from figures.spectra import radial_power, ring_edges
 from rift_cl.geometry import Camera
 from rift_cl.io import open_capture
-from rift_cl.io.display_light import to_linear
+from rift_cl.io.images.display_light import to_linear
 
 Floats = NDArray[np.float64]
 

@@ -18,15 +18,15 @@ from numpy.typing import NDArray
 from figures.images import decode, encode
 from figures.plan import Plan
 from rift_cl import Device
-from rift_cl.html_page import Page
-from rift_cl.io.capture import capture_name, holds_capture
-from rift_cl.jobs.analyze_facts import missing, resolution
-from rift_cl.jobs.analyze_input import open_sampled
-from rift_cl.jobs.analyze_settings import AnalyzeSettings
-from rift_cl.jobs.coverage_pictures import LEAST, PLANES, near_band, plane_density
-from rift_cl.jobs.sampled import Sampled
-from rift_cl.plot import FrequencySlice, curves, figure_png, frequency_maps
-from rift_cl.sampling.density import half_sphere, window_width
+from rift_cl.commands.analyze.facts import missing, resolution
+from rift_cl.commands.analyze.input import open_sampled
+from rift_cl.commands.analyze.settings import AnalyzeSettings
+from rift_cl.commands.inputs.view_set import Sampled
+from rift_cl.commands.pictures.coverage_pictures import LEAST, PLANES, near_band, plane_density
+from rift_cl.io.captures.capture import capture_name, holds_capture
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import FrequencySlice, curves, figure_png, frequency_maps
+from rift_cl.sampling.coverage.density import half_sphere, window_width
 
 NAME = "capture_support"
 TITLE = "What real captures sample"

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from figures.images import decode, encode
 from figures.plan import Plan
 from rift_cl import Device, Grid, Parallel, Projector, fbp
-from rift_cl.html_page import Page
 from rift_cl.metrics import disc, psnr
-from rift_cl.operators.compensation import Compensation
-from rift_cl.plot import curves, figure_png, image_grid
+from rift_cl.operators.filters.compensation import Compensation
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import curves, figure_png, image_grid
 
 NAME = "compensation"
 TITLE = "Density compensation on irregular angles"

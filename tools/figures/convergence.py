@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 from figures.images import decode, encode
 from figures.plan import Plan
 from rift_cl import Device, Grid, Parallel, Projector, metrics, phantom
-from rift_cl.html_page import Page
-from rift_cl.plot import curves, figure_png, image_grid
 from rift_cl.progress import Report
-from rift_cl.reconstruct.conjugate_gradients import Cgls
-from rift_cl.reconstruct.fista import Fista
-from rift_cl.reconstruct.pdhg import Pdhg
-from rift_cl.reconstruct.simultaneous_iteration import Sirt
-from rift_cl.reconstruct.solver import Solver
+from rift_cl.reconstruct.solvers.conjugate_gradients import Cgls
+from rift_cl.reconstruct.solvers.fista import Fista
+from rift_cl.reconstruct.solvers.pdhg import Pdhg
+from rift_cl.reconstruct.solvers.simultaneous_iteration import Sirt
+from rift_cl.reconstruct.solvers.solver import Solver
 from rift_cl.reference.radon import radon
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import curves, figure_png, image_grid
 
 NAME = "convergence"
 TITLE = "Convergence with and without ramp preconditioning"

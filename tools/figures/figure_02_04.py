@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from figures.images import decode, encode
 from figures.plan import Plan
 from rift_cl import Device, Grid, Parallel, Projector, backproject
-from rift_cl.html_page import Page
 from rift_cl.phantom import shepp_logan
-from rift_cl.plot import FrequencySlice, curves, figure_png, frequency_maps, image_grid
-from rift_cl.sampling.coverage_cube import cube_axis
-from rift_cl.sampling.density import density, half_sphere, mean_density, power_slope
-from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.slice_theorem import slice_comparison
-from rift_cl.sampling.target import Target
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import FrequencySlice, curves, figure_png, frequency_maps, image_grid
+from rift_cl.sampling.coverage.cube import cube_axis
+from rift_cl.sampling.coverage.density import density, half_sphere, mean_density, power_slope
+from rift_cl.sampling.coverage.slice_theorem import slice_comparison
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.target import Target
 
 NAME = "figure_02_04"
 TITLE = "Figures 2 to 4: slices of the spectrum, and how densely they lie"

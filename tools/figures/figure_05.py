@@ -10,10 +10,10 @@ import numpy as np
 from figures.images import decode, encode
 from figures.plan import Plan
 from rift_cl import Device
-from rift_cl.html_page import Page
-from rift_cl.jobs.demo import COLUMNS, SCORING, study_panels, study_row
-from rift_cl.jobs.view_study import ViewScore, view_study
-from rift_cl.plot import figure_png
+from rift_cl.commands.demo import COLUMNS, SCORING, study_panels, study_row
+from rift_cl.commands.view_study import ViewScore, view_study
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import figure_png
 
 NAME = "figure_05"
 TITLE = "Figure 5: integration with and without the filter"

@@ -7,10 +7,10 @@ from typing import Any
 
 from figures.plan import Plan
 from rift_cl import Device
-from rift_cl.html_page import Page
-from rift_cl.jobs.demo import COLUMNS, SCORES, SCORING, study_curves
-from rift_cl.jobs.view_study import view_study
-from rift_cl.plot import figure_png
+from rift_cl.commands.demo import COLUMNS, SCORES, SCORING, study_curves
+from rift_cl.commands.view_study import view_study
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import figure_png
 
 NAME = "figure_06"
 TITLE = "Figure 6: PSNR and SSIM against the number of projections"

@@ -21,13 +21,13 @@ from figures.plan import Plan
 from rift_cl import Camera, Device
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.pose import look_at
-from rift_cl.html_page import Page
-from rift_cl.plot import FrequencySlice, curves, figure_png, frequency_maps
-from rift_cl.sampling.coverage_cube import cube_axis
-from rift_cl.sampling.density import density, half_circle, ring_density
-from rift_cl.sampling.limits import limits
-from rift_cl.sampling.sufficiency import crowther
-from rift_cl.sampling.target import Target
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import FrequencySlice, curves, figure_png, frequency_maps
+from rift_cl.sampling.coverage.cube import cube_axis
+from rift_cl.sampling.coverage.density import density, half_circle, ring_density
+from rift_cl.sampling.criteria.limits import limits
+from rift_cl.sampling.criteria.sufficiency import crowther
+from rift_cl.sampling.targets.target import Target
 
 NAME = "figure_07"
 TITLE = "Figure 7: fewer and further, more and nearer"

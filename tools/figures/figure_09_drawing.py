@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rift_cl.plot.figure import INK, LINE, POINTS, SOFT, new_figure
+from rift_cl.report.plot.figure import INK, LINE, POINTS, SOFT, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

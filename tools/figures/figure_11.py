@@ -8,8 +8,8 @@ from typing import Any
 from figures.fits import FIXED, HELD_OUT, OFF_PATH, SETS, Fitted, fitted
 from figures.plan import Plan
 from rift_cl import Device
-from rift_cl.html_page import Page
-from rift_cl.plot import curves, figure_png
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import curves, figure_png
 
 NAME = "figure_11"
 TITLE = "Figure 11, regression: PSNR and SSIM against the number of input views"

@@ -13,10 +13,10 @@ from figures.fits import FIXED, OFF_PATH, Fitted, fitted
 from figures.images import decode, encode
 from figures.plan import Plan
 from rift_cl import Device, Renderer
-from rift_cl.html_page import Page
+from rift_cl.commands.inputs.scene_input import SceneInput
 from rift_cl.io import open_capture, read_view
-from rift_cl.jobs.scene_input import SceneInput
-from rift_cl.plot import figure_png, image_grid
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import figure_png, image_grid
 
 NAME = "figure_12"
 TITLE = "Figure 12: the ornament from few views and from many"

@@ -13,7 +13,7 @@ from figures.plan import Plan
 from rift_cl import Device
 from rift_cl.basis import Hermite, Laguerre
 from rift_cl.basis.indices import laguerre_place
-from rift_cl.html_page import Page
+from rift_cl.report.html_page import Page
 
 NAME = "figure_13"
 TITLE = "Figure 13: Laguerre-Gaussian modes"

@@ -13,7 +13,7 @@ from figures.plan import Plan
 from rift_cl import Device
 from rift_cl.basis import Hermite
 from rift_cl.basis.indices import place
-from rift_cl.html_page import Page
+from rift_cl.report.html_page import Page
 
 NAME = "figure_14"
 TITLE = "Figure 14: Hermite-Gaussian modes"

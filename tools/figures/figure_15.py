@@ -17,7 +17,7 @@ from figures.plan import Plan
 from rift_cl import Device
 from rift_cl.basis import AngularBasis, HGLobe, LGLobe, SphericalHarmonics
 from rift_cl.basis.indices import laguerre_place, laguerre_rows, place, rows
-from rift_cl.html_page import Page
+from rift_cl.report.html_page import Page
 
 NAME = "figure_15"
 TITLE = "Figure 15: spherical harmonics, and lobes on the sphere"

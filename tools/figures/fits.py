@@ -9,9 +9,9 @@ from typing import Any
 
 from figures.plan import EPS2D, Plan
 from figures.view_choice import choose_views, fixed_views, write_capture
-from rift_cl.jobs.fit import Fit
-from rift_cl.jobs.fit_settings import FitSettings
-from rift_cl.progress_bar import show_progress
+from rift_cl.commands.fit_photos.job import Fit
+from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.progress_bar import show_progress
 
 # The sets of pictures that are scored, in the order in which a fit gets them.
 HELD_OUT, FIXED, OFF_PATH = "held_out", "fixed", "off_path"

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from figures.random_objects import RADIUS, mean_power, random_objects
 from rift_cl import Projector
-from rift_cl.sampling.prior import PowerLaw, Prior, Spectrum
-from rift_cl.sampling.target import Target, half_disc
+from rift_cl.sampling.targets.prior import PowerLaw, Prior, Spectrum
+from rift_cl.sampling.targets.target import Target, half_disc
 
 KINDS = {"isotropic": 1.0, "anisotropic": 8.0}
 SIZE, NOISE = 96, 0.25
@@ -41,7 +41,7 @@ class Objects:
         array = np.fft.fftshift(self.power)
         known = Spectrum(array, 1 / SIZE)
         prior: Prior = PowerLaw(_slope(array)) if kind == "isotropic" else known
-        # Power at one cycle per diameter, over the noise's there: see ``rift_cl.sampling.exact``.
+        # Power at one cycle per diameter, over the noise's there: see ``rift_cl.sampling.criteria.exact``.
         first = array[SIZE // 2, SIZE // 2] / known.power(np.zeros((1, 3)), diameter)[0]
         self.target = Target.flat(
             diameter,

@@ -23,15 +23,15 @@ from figures.plan import Plan
 from figures.random_objects import RADIUS
 from figures.score_scatter import score_scatter
 from rift_cl import Device, Grid, Parallel, Projector, cgls
-from rift_cl.html_page import Page
 from rift_cl.metrics import disc
-from rift_cl.plot import figure_png
 from rift_cl.reference.coverage import coverage
-from rift_cl.sampling.exact import exact
-from rift_cl.sampling.kriging import kriging
-from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.merit import CoverageMerit, merit_of_coverage
-from rift_cl.sampling.target import Target
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import figure_png
+from rift_cl.sampling.criteria.exact import exact
+from rift_cl.sampling.criteria.kriging import kriging
+from rift_cl.sampling.criteria.merit import CoverageMerit, merit_of_coverage
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.target import Target
 
 NAME = "merit_study"
 TITLE = "A merit of views against the errors of reconstructions"

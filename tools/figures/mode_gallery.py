@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from figures.images import decode, encode
-from rift_cl.html_page import Page
-from rift_cl.plot import figure_png, image_grid
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import figure_png, image_grid
 
 Floats = NDArray[np.float64]
 # Negative and positive amplitudes, of Okabe and Ito's palette.

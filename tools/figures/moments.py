@@ -10,14 +10,14 @@ import numpy as np
 
 from figures.spectra import error_spectrum, ring_edges
 from rift_cl import Device
+from rift_cl.commands.fit_photos.pictures import CapturePictures
+from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.start import first_splats
+from rift_cl.commands.pictures.evenly_spaced import evenly
+from rift_cl.commands.progress_bar import show_progress
 from rift_cl.io import open_capture
-from rift_cl.jobs.few import evenly
-from rift_cl.jobs.fit_pictures import CapturePictures
-from rift_cl.jobs.fit_settings import FitSettings
-from rift_cl.jobs.fit_start import first_splats
 from rift_cl.metrics import psnr
-from rift_cl.progress_bar import show_progress
-from rift_cl.train.homogenisation import noise_of
+from rift_cl.train.loss.homogenisation import noise_of
 from rift_cl.train.trainer import Trainer
 
 # Shares of the steps after which the pictures are looked at.

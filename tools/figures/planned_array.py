@@ -17,8 +17,8 @@ from figures.planned_sector import directions
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.sampling.planning.constraints import Constraints, Ranges
 from rift_cl.sampling.planning.planner import plan
-from rift_cl.sampling.prior import PowerLaw
-from rift_cl.sampling.target import Target
+from rift_cl.sampling.targets.prior import PowerLaw
+from rift_cl.sampling.targets.target import Target
 
 # Millimetres. The long lens has a third of the ball's outline in its picture.
 WIDE = CameraType("wide", 12.0, 5.6, 0.012, (480, 480))

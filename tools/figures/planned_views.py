@@ -18,8 +18,8 @@ from figures.planned_array import VIEWS as ARRAY_VIEWS
 from figures.planned_flat import METHODS, PILOT, flat_case
 from figures.planned_sector import ARCS, SIZE, TWICE, VIEWS, arc_name, directions, volume_case
 from rift_cl import Device
-from rift_cl.html_page import Page
-from rift_cl.plot import Stands, camera_plot, figure_png
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import Stands, camera_plot, figure_png
 
 NAME = "planned_views"
 TITLE = "Planned views against what is done without a plan"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rift_cl.plot.figure import COLORS, INK, LINE, POINTS, SOFT, new_figure
+from rift_cl.report.plot.figure import COLORS, INK, LINE, POINTS, SOFT, new_figure
 
 
 def score_scatter(

@@ -13,8 +13,8 @@ from figures.fits import FIXED, OFF_PATH, fit_settings, fitted
 from figures.moments import watched
 from figures.plan import Plan
 from rift_cl import Device
-from rift_cl.html_page import Page
-from rift_cl.plot import curves, figure_png
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import curves, figure_png
 
 NAME = "spectral_bias"
 TITLE = "Spectral bias: fits with and without homogenisation"

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
+from rift_cl.io.captures.poses import view_of_opengl
+from rift_cl.io.captures.view import located
 from rift_cl.io.json_fields import Fields, read_json_object
-from rift_cl.io.poses import view_of_opengl
-from rift_cl.io.view import located
 
 # What the built-in cameras look at, a little above the ball's centre.
 TARGET = (0.0, 0.0, 0.07)

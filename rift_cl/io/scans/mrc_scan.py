@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import DTypeError, FileFormatError, InputError
 from rift_cl.io.boundary import check_claim, reading
-from rift_cl.io.capture_paths import CaptureFolder
+from rift_cl.io.captures.capture_paths import CaptureFolder
 from rift_cl.io.number_list import text_numbers
 from rift_cl.io.scans.angle_list import AngleList, even_turn, file_angles
 from rift_cl.io.scans.axes import axes_of

@@ -16,7 +16,7 @@ import numpy as np
 
 from rift_cl.errors import FileFormatError, PathEscapeError
 from rift_cl.io.boundary import reading
-from rift_cl.io.capture_paths import CaptureFolder
+from rift_cl.io.captures.capture_paths import CaptureFolder
 from rift_cl.io.scans.frame_words import CALIBRATION, FILLERS, WORDS, FrameKind, words_of
 
 SUFFIXES = (".tif", ".tiff")

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import DTypeError, FileFormatError, ShapeError
 from rift_cl.io.boundary import check_claim, reading
-from rift_cl.io.pixels import first_line, image_format, opened_image
+from rift_cl.io.images.pixels import first_line, image_format, opened_image
 from rift_cl.io.scans.frame_stack import FrameStack
 from rift_cl.io.scans.scan_file import Frames, Part, ScanRows
 from rift_cl.io.scans.tiff_chain import TiffChain

@@ -20,7 +20,7 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import open_device
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
-from rift_cl.reconstruct.offset_axis import is_full_turn, offset_weights
+from rift_cl.reconstruct.direct.offset_axis import is_full_turn, offset_weights
 from rift_cl.reconstruct.preprocess.sinc_interpolation import resampled
 
 Floats = NDArray[np.float64]

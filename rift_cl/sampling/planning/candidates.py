@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
+from rift_cl.sampling.planning.budget import affordable
 from rift_cl.sampling.planning.constraints import Constraints
-from rift_cl.sampling.planning.objective import Objective
-from rift_cl.sampling.planning.site import (
+from rift_cl.sampling.planning.design_space import (
     AZIMUTH,
     COLUMNS,
     DISTANCE,
@@ -26,9 +26,9 @@ from rift_cl.sampling.planning.site import (
     FOCUS,
     Site,
 )
-from rift_cl.sampling.planning.spending import affordable
-from rift_cl.sampling.planning.stations import Stations
-from rift_cl.sampling.target import Target
+from rift_cl.sampling.planning.objective import Objective
+from rift_cl.sampling.planning.view_table import Stations
+from rift_cl.sampling.targets.target import Target
 
 Floats = NDArray[np.float64]
 # Directions, at least and for each view; and candidates of all types and settings.

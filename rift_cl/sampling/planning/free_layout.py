@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.sampling.planning.site import (
+from rift_cl.sampling.planning.design_space import (
     AZIMUTH,
     COLUMNS,
     DISTANCE,
@@ -20,7 +20,7 @@ from rift_cl.sampling.planning.site import (
     FOCUS,
     Site,
 )
-from rift_cl.sampling.planning.stations import Stations
+from rift_cl.sampling.planning.view_table import Stations
 
 Floats = NDArray[np.float64]
 # Azimuths turn in steps that grow towards the poles, up to this much.

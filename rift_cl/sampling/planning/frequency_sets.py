@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rift_cl.sampling.target import Target, half_ball, half_disc
+from rift_cl.sampling.targets.target import Target, half_ball, half_disc
 
 # How many more than a target has by itself to plan with, and to judge with.
 _FINER, _JUDGED = 4, 5

@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.reference.coverage import LooksGradient, coverage, coverage_grad
-from rift_cl.sampling import criteria
-from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.merit import CoverageMerit
-from rift_cl.sampling.planning.frequency_sets import for_choosing, for_judging
-from rift_cl.sampling.planning.site import (
+from rift_cl.sampling.criteria import functionals as criteria
+from rift_cl.sampling.criteria.merit import CoverageMerit
+from rift_cl.sampling.criteria.surface import surface_merit
+from rift_cl.sampling.planning.design_space import (
     DISTANCE,
     ELEVATION,
     EXPOSURE,
@@ -28,10 +27,11 @@ from rift_cl.sampling.planning.site import (
     FOCUS,
     Site,
 )
-from rift_cl.sampling.planning.stations import Stations
-from rift_cl.sampling.prior import checked_power
-from rift_cl.sampling.surface import surface_merit
-from rift_cl.sampling.target import Target
+from rift_cl.sampling.planning.frequency_sets import for_choosing, for_judging
+from rift_cl.sampling.planning.view_table import Stations
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.prior import checked_power
+from rift_cl.sampling.targets.target import Target
 
 Floats = NDArray[np.float64]
 

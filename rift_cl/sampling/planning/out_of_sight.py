@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.sampling.free_space import FreeSpace
-from rift_cl.sampling.prior import directions_for
+from rift_cl.sampling.targets.free_space import FreeSpace
+from rift_cl.sampling.targets.prior import directions_for
 
 Floats = NDArray[np.float64]
 # Directions all round that are asked, and shells between the nearest and the farthest distance.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.sampling.planning.curve import Curve
-from rift_cl.sampling.planning.site import (
+from rift_cl.sampling.planning.design_space import (
     AZIMUTH,
     COLUMNS,
     DISTANCE,
@@ -22,7 +22,7 @@ from rift_cl.sampling.planning.site import (
     FOCUS,
     Site,
 )
-from rift_cl.sampling.planning.stations import Stations
+from rift_cl.sampling.planning.view_table import Stations
 
 Floats = NDArray[np.float64]
 # Step of the differences with which a path's shape is derived; the merit's own derivative is exact.

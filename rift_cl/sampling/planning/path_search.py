@@ -8,13 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
+from rift_cl.sampling.planning.budget import paid
 from rift_cl.sampling.planning.candidates import settings_of
 from rift_cl.sampling.planning.curve import Curve
 from rift_cl.sampling.planning.curves import curves_of
-from rift_cl.sampling.planning.objective import Objective
-from rift_cl.sampling.planning.path_layout import PathLayout
-from rift_cl.sampling.planning.polish import permitted, polish
-from rift_cl.sampling.planning.site import (
+from rift_cl.sampling.planning.design_space import (
     DISTANCE,
     EXPOSURE,
     F_NUMBER,
@@ -22,8 +20,10 @@ from rift_cl.sampling.planning.site import (
     FOCUS,
     Site,
 )
-from rift_cl.sampling.planning.spending import paid
-from rift_cl.sampling.planning.stations import Stations
+from rift_cl.sampling.planning.objective import Objective
+from rift_cl.sampling.planning.path_layout import PathLayout
+from rift_cl.sampling.planning.refine import permitted, polish
+from rift_cl.sampling.planning.view_table import Stations
 
 Floats = NDArray[np.float64]
 # Paths that are moved after the best start of each; settings that are tried with each start.

@@ -13,26 +13,26 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.numbers import one_number
-from rift_cl.sampling.looks import Looks
-from rift_cl.sampling.merit import CoverageMerit
+from rift_cl.sampling.criteria.merit import CoverageMerit
 from rift_cl.sampling.planning.baselines import Baseline, baselines
+from rift_cl.sampling.planning.budget import prices, require_paid, total
 from rift_cl.sampling.planning.candidates import candidates, looked_at, most_candidates
+from rift_cl.sampling.planning.coincident import parted
 from rift_cl.sampling.planning.constraints import Constraints
+from rift_cl.sampling.planning.design_space import Site, default_types
 from rift_cl.sampling.planning.free_layout import FreeLayout
 from rift_cl.sampling.planning.frequency_sets import for_planning
 from rift_cl.sampling.planning.greedy import Limits, bound, choose
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.path_search import best_path
 from rift_cl.sampling.planning.paths import Free
-from rift_cl.sampling.planning.polish import polish
 from rift_cl.sampling.planning.pool import pool_of
-from rift_cl.sampling.planning.site import Site, default_types
-from rift_cl.sampling.planning.spending import prices, require_paid, total
-from rift_cl.sampling.planning.stations import Stations, turned
-from rift_cl.sampling.planning.twins import parted
+from rift_cl.sampling.planning.refine import polish
 from rift_cl.sampling.planning.view_plan import Plan
-from rift_cl.sampling.prior import checked_power
-from rift_cl.sampling.target import Target
+from rift_cl.sampling.planning.view_table import Stations, turned
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.prior import checked_power
+from rift_cl.sampling.targets.target import Target
 
 Floats = NDArray[np.float64]
 Method = Literal["greedy", "greedy+mma"]
@@ -162,7 +162,7 @@ def _warn_of_few_frequencies(target: Target) -> None:
         warnings.warn(
             f"the target's power lies in about {count:.0f} of its {len(power)} frequencies, and "
             "views would be fitted to those: lower its band to where power is above noise, or "
-            "give more frequencies (rift_cl.sampling.target.half_ball)",
+            "give more frequencies (rift_cl.sampling.targets.target.half_ball)",
             stacklevel=3,
         )
 

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from rift_cl.reference.coverage import coverage
-from rift_cl.sampling.looks import Looks
 from rift_cl.sampling.planning.objective import Objective, some
-from rift_cl.sampling.planning.stations import Stations
 from rift_cl.sampling.planning.surface_pool import SurfacePool
+from rift_cl.sampling.planning.view_table import Stations
+from rift_cl.sampling.targets.observations import Looks
 
 Floats = NDArray[np.float64]
 _MIXING = 25

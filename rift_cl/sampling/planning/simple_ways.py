@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.sampling.planning.constraints import Constraints
-from rift_cl.sampling.prior import checked_power
-from rift_cl.sampling.target import Target
+from rift_cl.sampling.targets.prior import checked_power
+from rift_cl.sampling.targets.target import Target
 
 Floats = NDArray[np.float64]
 # Teeth of zigzags that are tried; points laid along a way, and angles; radii of power.

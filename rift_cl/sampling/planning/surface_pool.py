@@ -13,14 +13,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.sampling import criteria
-from rift_cl.sampling.looks import Looks
+from rift_cl.sampling.criteria import functionals as criteria
+from rift_cl.sampling.criteria.appearance import covariance, light_of, shown, wanted_of
+from rift_cl.sampling.criteria.surface import texture_coverage
 from rift_cl.sampling.planning.objective import Objective, joined, some
-from rift_cl.sampling.planning.stations import Stations
-from rift_cl.sampling.prior import checked_power
-from rift_cl.sampling.sheen import covariance, light_of, shown, wanted_of
-from rift_cl.sampling.surface import texture_coverage
-from rift_cl.sampling.target import half_disc
+from rift_cl.sampling.planning.view_table import Stations
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.prior import checked_power
+from rift_cl.sampling.targets.target import half_disc
 
 Floats = NDArray[np.float64]
 # Steps towards the best mixture of all candidates, and for how many of them that is not too long.

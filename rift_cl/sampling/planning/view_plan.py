@@ -15,15 +15,15 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.numbers import one_number
-from rift_cl.sampling.directional_prior import anisotropy
 from rift_cl.sampling.planning.baselines import Baseline
+from rift_cl.sampling.planning.budget import cost
+from rift_cl.sampling.planning.design_space import AZIMUTH, DISTANCE, ELEVATION, EXPOSURE, FOCUS
 from rift_cl.sampling.planning.greedy import Choice, Limits, choose
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.paths import Free
 from rift_cl.sampling.planning.pool import pool_of
-from rift_cl.sampling.planning.site import AZIMUTH, DISTANCE, ELEVATION, EXPOSURE, FOCUS
-from rift_cl.sampling.planning.spending import cost
-from rift_cl.sampling.planning.stations import Stations
+from rift_cl.sampling.planning.view_table import Stations
+from rift_cl.sampling.targets.directional_prior import anisotropy
 
 Floats = NDArray[np.float64]
 # Gains below the first, as a share, are called none, and below the second little: in mean squared

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rift_cl.sampling.directional_prior import turned
 from rift_cl.sampling.planning.view_plan import Plan
+from rift_cl.sampling.targets.directional_prior import turned
 
 # Turns, in degrees, that are tried.
 TURNS = (45, 90)

@@ -1,0 +1,250 @@
+"""What is analysed: a capture or a scan is opened, and its target found or assumed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from rift_cl.commands.analyze.settings import AnalyzeSettings
+from rift_cl.commands.cameras.arc import demand_places
+from rift_cl.commands.center.axis_search import find_axis
+from rift_cl.commands.inputs.fan_views import fan_cameras
+from rift_cl.commands.inputs.scene_bounds import SceneBounds, bounds_of_cameras
+from rift_cl.commands.inputs.scene_depth import space_of
+from rift_cl.commands.inputs.surfaces import trusted
+from rift_cl.commands.inputs.view_set import Floats, Sampled, points_of
+from rift_cl.errors import InputError
+from rift_cl.geometry import Camera, Parallel
+from rift_cl.geometry.aperture import Aperture
+from rift_cl.io.captures.capture import Capture, capture_name, holds_capture, open_capture
+from rift_cl.io.scans.formats import open_scan
+from rift_cl.io.scans.scan_file import ScanFile
+from rift_cl.sampling.targets.target import Target
+
+# Share of the sparse points that a target holds.
+_INSIDE = 0.9
+_SEEN_THROUGH = "What views sample is counted as for a target that is seen through."
+_OPAQUE = (
+    "The target is taken to be opaque, and a sphere to stand for its surface (--mode volume is for "
+    "what is seen through)."
+)
+# Nanometres in a millimetre.
+_NANO = 1e6
+
+
+def open_sampled(settings: AnalyzeSettings) -> Sampled:
+    """The views of a capture or of a scan, and their target.
+
+    Raises:
+        RiftError: the file cannot be read, or an option does not belong to it.
+    """
+    path = settings.source
+    return _capture(settings) if holds_capture(path) else _scan(settings)
+
+
+def _capture(settings: AnalyzeSettings) -> Sampled:
+    for name in ("dataset", "theta", "image_key", "axes", "angle_unit"):
+        if getattr(settings, name) is not None:
+            option = name.replace("_", "-")
+            raise InputError(f"--{option} is about a scan, {settings.source} is a capture")
+    capture = open_capture(settings.source, photographs=False)
+    cameras = [view.camera for view in capture.views]
+    demand_places(cameras, settings.source)
+    bounds = bounds_of_cameras(cameras, points=capture.points)
+    center, diameter, notes = _ball(settings, capture, cameras, bounds)
+    lens, more = _with_lens(settings, cameras, center)
+    sampled = Sampled(
+        name=capture_name(settings.source),
+        target=_target(settings, center, diameter, bounds.up, flat=False),
+        up=bounds.up,
+        unit="unit" if settings.unit is None else "mm",
+        cameras=tuple(lens),
+        facts={"views": len(cameras)},
+        notes=(*notes, *more, _SEEN_THROUGH if settings.mode == "volume" else _OPAQUE),
+        opaque=settings.mode != "volume",
+    )
+    if sampled.opaque:
+        sampled = _with_space(sampled, settings, capture)
+    return sampled if settings.unit is None else in_millimetres(sampled, settings.unit)
+
+
+def _with_space(sampled: Sampled, settings: AnalyzeSettings, capture: Capture) -> Sampled:
+    """The same with what stands where, as far as splats or sparse points tell it."""
+    space, known = space_of(settings.source, sampled.cameras, capture.points, settings.device)
+    if space is None:
+        return sampled
+    if not trusted(space, sampled):
+        note = f"By {known} many cameras do not see the target: they are not made use of."
+        return replace(sampled, notes=(*sampled.notes, note))
+    note = f"What stands where, and what is in the way, is known from {known}."
+    return replace(sampled, space=space, notes=(*sampled.notes, note))
+
+
+def _ball(
+    settings: AnalyzeSettings, capture: Capture, cameras: list[Camera], bounds: SceneBounds
+) -> tuple[Floats, float, list[str]]:
+    """The target's middle and diameter, and what had to be assumed for them."""
+    notes = []
+    center = bounds.center
+    if settings.center is not None:
+        center = np.array(settings.center)
+    else:
+        notes.append("The target's middle is taken to be where the cameras look (--center).")
+        if len(cameras) == 1:
+            notes.append("One camera does not tell how far off that is: name it with --center.")
+    if settings.diameter is not None:
+        return center, settings.diameter, notes
+    diameter, why = shown_diameter(cameras, center), "what the pictures show of it"
+    if capture.points is not None:
+        away = np.linalg.norm(capture.points - center, axis=1)
+        extent = 2 * float(np.quantile(away, _INSIDE))
+        if 0 < extent < diameter:
+            diameter, why = extent, f"what holds {_INSIDE:.0%} of the sparse points"
+    shown = f"{diameter:.4g}" if settings.unit is None else f"{diameter * settings.unit:.4g} mm"
+    notes.append(f"The target's diameter, {shown}, is taken to be {why} (--diameter).")
+    return center, diameter, notes
+
+
+def shown_diameter(cameras: list[Camera], center: Floats) -> float:
+    """Diameter of the largest ball about a point that the shorter edge of most pictures shows."""
+    shown = []
+    for camera in cameras:
+        fx, fy = camera.intrinsics[:2]
+        distance = float(np.linalg.norm(camera.center - center))
+        edge = min(camera.width / fx, camera.height / fy) / 2
+        # Those of an orthographic camera are lengths, the others' are tangents.
+        half = edge if camera.model == "ortho" else distance * edge / np.hypot(1, edge)
+        shown.append(2 * half)
+    return float(np.median(shown))
+
+
+def _with_lens(
+    settings: AnalyzeSettings, cameras: list[Camera], center: Floats
+) -> tuple[list[Camera], list[str]]:
+    """The cameras with the opening that options give to those without one."""
+    wavelength = 0.0 if settings.unit is None else settings.wavelength / _NANO / settings.unit
+    notes, made = [], []
+    for camera in cameras:
+        lens = camera.aperture
+        if lens is None and settings.aperture is not None:
+            depth = float(camera.view[2, :3] @ center + camera.view[2, 3])
+            lens = Aperture(settings.aperture, settings.focus or max(depth, 1e-9), wavelength)
+        elif lens is not None and not lens.wavelength:
+            lens = replace(lens, wavelength=wavelength)
+        made.append(Camera(camera.size, camera.K, camera.view, camera.model, lens))
+    if all(camera.aperture is None for camera in made):
+        notes.append(
+            "The cameras are taken as pinholes, sharp everywhere: give the radius of the lens's "
+            "opening (--aperture) to count depth of field and diffraction."
+        )
+    elif not wavelength and not any(c.aperture and c.aperture.wavelength for c in made):
+        notes.append("Diffraction is left out: it wants millimetres per unit (--unit).")
+    return made, notes
+
+
+def in_millimetres(sampled: Sampled, unit: float) -> Sampled:
+    """The same views with lengths in millimetres, of which a unit of the world has so many."""
+    target = sampled.target
+    band = None if target.band is None else target.band / unit
+    scaled = replace(
+        target,
+        center=target.center * unit,
+        diameter=target.diameter * unit,
+        points=target.points * unit,
+        band=band,
+    )
+    cameras = tuple(_scaled(camera, unit) for camera in sampled.cameras)
+    space = None if sampled.space is None else sampled.space.scaled(unit)
+    return replace(sampled, target=scaled, cameras=cameras, unit="mm", space=space)
+
+
+def _scaled(camera: Camera, unit: float) -> Camera:
+    view, K = camera.view.copy(), camera.K.copy()
+    view[:3, 3] *= unit
+    if camera.model == "ortho":
+        K[:2, :2] /= unit
+    lens = camera.aperture
+    if lens is not None:
+        lens = Aperture(lens.radius * unit, lens.focus * unit, lens.wavelength * unit)
+    return Camera(camera.size, K, view, camera.model, lens)
+
+
+def _target(
+    settings: AnalyzeSettings, center: Floats, diameter: float, up: Floats, *, flat: bool
+) -> Target:
+    points = np.array(list(points_of(center, diameter, up, flat=flat).values()))
+    if flat:
+        return Target.flat(diameter, center, points=points, band=settings.band)
+    return Target(center=center, diameter=diameter, points=points, band=settings.band)
+
+
+def _scan(settings: AnalyzeSettings) -> Sampled:
+    if settings.mode == "surface":
+        raise InputError(f"--mode surface is about photographs, {settings.source} is a scan")
+    for name in ("center", "aperture", "focus", "unit"):
+        if getattr(settings, name) is not None:
+            raise InputError(f"--{name} is about the cameras of a capture, {settings.source} is a "
+                             "scan")  # fmt: skip
+    file = _opened(settings, values=False)
+    up = np.array([0.0, 0, 1])
+    pitch, unit = (file.pitch, file.unit or "unit") if file.pitch else (1.0, "bin")
+    notes = list(file.notes)
+    if file.pitch is None:
+        notes.append("The file gives no pitch of the detector: lengths are in bins.")
+    cameras, scan, edge = _rays(settings, file, pitch, notes)
+    diameter = edge * file.shape[2] if settings.diameter is None else settings.diameter
+    if settings.diameter is None:
+        notes.append(
+            f"The target's diameter, {diameter:.4g} {unit}, is taken to be what the detector shows "
+            "(--diameter)."
+        )
+    # What a scan can tell ends at half a cycle a bin.
+    wanted = replace(settings, band=settings.band or 0.5 / edge)
+    return Sampled(
+        name=Path(file.path).name,
+        target=_target(wanted, np.zeros(3), diameter, up, flat=True),
+        up=up,
+        unit=unit,
+        cameras=cameras,
+        scan=scan,
+        facts={"projections": file.shape[0], "rows": file.shape[1], "bins": file.shape[2]},
+        notes=tuple(notes),
+    )
+
+
+def _opened(settings: AnalyzeSettings, *, values: bool) -> ScanFile:
+    return open_scan(
+        settings.source,
+        dataset=settings.dataset,
+        theta=settings.theta,
+        image_key=settings.image_key,
+        axes=settings.axes,
+        angle_unit=settings.angle_unit,
+        values=values,
+    )
+
+
+def _rays(
+    settings: AnalyzeSettings, file: ScanFile, pitch: float, notes: list[str]
+) -> tuple[tuple[Camera, ...], Parallel | None, float]:
+    """Cameras of a fan beam or parallel rays, and the edge of a bin at the axis."""
+    if file.fan is not None:
+        edge = file.fan.pitch / file.fan.magnification
+        return fan_cameras(file.fan, file.angles, file.shape[2]), None, edge
+    return (), Parallel(file.angles, file.shape[2], pitch, _axis(settings, notes)), pitch
+
+
+def _axis(settings: AnalyzeSettings, notes: list[str]) -> float | None:
+    """Bin of the rotation axis, None for the middle: a file is analysed even if it hides it."""
+    try:
+        found = find_axis(_opened(settings, values=True))
+    except InputError as error:
+        notes.append(
+            "The rotation axis is taken to be seen in the middle of the detector, as it was not "
+            f"found: {error}"
+        )
+        return None
+    notes.append(f"The rotation axis was found {found.in_words()}.")
+    return found.center

@@ -1,0 +1,88 @@
+"""What ``rift analyze`` shows: figures first, then the pictures that they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rift_cl.cl.device import Device
+from rift_cl.commands.analyze.facts import Findings
+from rift_cl.commands.inputs.view_set import Floats, Sampled, place_of
+from rift_cl.commands.pictures.coverage_pictures import (
+    add_coverage,
+    camera_figure,
+    direction_figure,
+)
+from rift_cl.geometry import Camera
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import figure_svg
+
+_HEADINGS = ("What is missing", "What limits detail", "What to add")
+
+
+def analysis_page(
+    sampled: Sampled,
+    points: Mapping[str, Floats],
+    findings: Sequence[Findings],
+    metrics: Mapping[str, Any],
+    added: Sequence[Camera],
+    device: Device,
+) -> Page:
+    """The report of a finished analysis."""
+    target = sampled.target
+    page = Page(f"What {sampled.name} sampled", findings[0].sentences[0])
+    page.facts(
+        {
+            **sampled.facts,
+            "views that see the target's middle": metrics["seen_by"],
+            "target": f"{target.diameter:.4g} {sampled.units} about {place_of(target)}",
+            **_unknown(sampled, metrics["unknown"]),
+        }
+    )
+    for note in sampled.notes:
+        page.paragraph(note)
+    _views(page, sampled, added, device)
+    for heading, found in zip(_HEADINGS, findings, strict=True):
+        if not found.sentences:
+            continue
+        page.section(heading)
+        for sentence in found.sentences:
+            page.paragraph(sentence)
+        for columns, rows, caption in found.tables:
+            page.table(columns, rows, caption=caption)
+    if not sampled.opaque:
+        page.section("What the views sample")
+        add_coverage(page, sampled, points, device)
+    return page
+
+
+def _unknown(sampled: Sampled, value: float) -> dict[str, str]:
+    if sampled.opaque:
+        return {}
+    target = sampled.target
+    return {
+        "power that stays unknown": f"{value:.3%}, of a target whose power falls as 1/k^2 up to "
+        f"{target.highest:.3g} cycles per {sampled.unit}"
+    }
+
+
+def _views(page: Page, sampled: Sampled, added: Sequence[Camera], device: Device) -> None:
+    if sampled.cameras:
+        page.section("Where the cameras stand")
+        groups = {"at hand": sampled.cameras, "to add": tuple(added)}
+        page.figure(
+            figure_svg(camera_figure(groups, sampled)),
+            caption="The target is the grey disc; lines point where the cameras look.",
+            alt="Cameras from above and from the side",
+        )
+    if sampled.is_flat:
+        return
+    page.section("Directions")
+    page.figure(
+        figure_svg(direction_figure(sampled, device, added)),
+        caption="The upper hemisphere, up in the middle; opposite directions count as one, so "
+        "that a view from below is shown above. Left, lines of sight. Right, how many views see "
+        "detail along each direction, at 8 cycles per diameter; hatched is what lies on no view's "
+        "slice.",
+        alt="Hemispheres of lines of sight and of directions of detail",
+    )

@@ -1,0 +1,104 @@
+"""Views to add to those that were taken: where they leave most unknown, and the target shows."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rift_cl.commands.inputs.surfaces import hidden_places, strange_places, surface_of
+from rift_cl.commands.inputs.view_set import Floats, Sampled
+from rift_cl.commands.pictures.views_table import angles_of
+from rift_cl.geometry import Camera
+from rift_cl.geometry.camera_type import CameraType
+from rift_cl.sampling.planning.constraints import Constraints
+from rift_cl.sampling.planning.planner import next_views
+
+# As high as people get a camera above a target, in degrees.
+_HIGH = 75.0
+# A pinhole of CameraType's: so small that everything is sharp.
+_PINHOLE = 1e4
+# Share of the target's outline in the picture; those who took the others chose theirs.
+_COVER = 0.05
+
+
+def cameras_to_add(sampled: Sampled, count: int) -> tuple[Camera, ...]:
+    """Cameras like those at hand, as far away, between their elevations or 0 to 75 degrees.
+
+    Of an opaque target none stands in or behind what the views show, or where that hides the
+    target; where nothing tells what stands where, none stands far from those at hand.
+
+    Raises:
+        InputError: no camera fits there.
+    """
+    center, up = sampled.target.center, sampled.up
+    angles = np.array([angles_of(camera, center, up) for camera in sampled.cameras])
+    low, high = min(0.0, float(angles[:, 1].min())), max(_HIGH, float(angles[:, 1].max()))
+    distance = usual_distance(sampled)
+    target, closed = sampled.target, None
+    if sampled.opaque:
+        target = surface_of(sampled, distance)
+        known = sampled.space is not None
+        closed = (
+            hidden_places(sampled, distance, distance)
+            if known
+            else strange_places(sampled, distance)
+        )
+    constraints = Constraints(
+        elevation=(math.radians(low), math.radians(high)),
+        distance=distance,
+        keepouts=() if closed is None else (closed,),
+        cover=_COVER,
+        up=(float(up[0]), float(up[1]), float(up[2])),
+    )
+    alike = camera_type_of(sampled.cameras[int(np.argsort(angles[:, 2])[len(angles) // 2])])
+    found = next_views(sampled.cameras, target, count, constraints, (alike,), compare=False)
+    return tuple(found.cameras[place] for place in found.order)
+
+
+def usual_distance(sampled: Sampled) -> float:
+    """How far off the target's middle cameras stand, in the median."""
+    away = np.array([camera.center for camera in sampled.cameras]) - sampled.target.center
+    return float(np.median(np.linalg.norm(away, axis=1)))
+
+
+def camera_type_of(camera: Camera) -> CameraType:
+    """What a camera is, but for its scale: the same field of view, pixels and opening.
+
+    A pinhole's picture says nothing of the size of its sensor; a small one is taken, which is in
+    focus wherever it looks.
+    """
+    lens, far = camera.aperture, float(np.linalg.norm(camera.center)) + 1.0
+    image = 1e-3 * (lens.radius if lens is not None else far)
+    return CameraType(
+        "as at hand",
+        focal_length=image,
+        f_number=_PINHOLE if lens is None else image / (2 * lens.radius),
+        pixel=image / camera.intrinsics[0],
+        size=camera.size,
+        wavelength=0.0 if lens is None else lens.wavelength,
+    )
+
+
+def angles_to_add(angles: Floats, count: int) -> tuple[float, list[float]]:
+    """The largest gap between directions of a scan, and the middles of the largest ones.
+
+    Args:
+        angles: radians; half a turn on, a direction is the same.
+        count: how many to add, one after the other.
+
+    Returns:
+        The gap and the angles to add, in degrees from 0 to 180.
+    """
+    known = np.mod(angles, np.pi).tolist()
+    added: list[float] = []
+    largest = 0.0
+    for step in range(max(count, 1)):
+        order = sorted(known)
+        gaps = np.diff([*order, order[0] + np.pi])
+        place = int(gaps.argmax())
+        largest = largest if step else float(gaps[place])
+        middle = (order[place] + gaps[place] / 2) % np.pi
+        known.append(middle)
+        added.append(math.degrees(middle))
+    return math.degrees(largest), added[:count]

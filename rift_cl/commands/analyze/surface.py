@@ -1,0 +1,104 @@
+"""What views of an opaque target miss, and what limits their detail: figures and sentences.
+
+Sentences are of verdicts that hold against errors of held-out photographs (``verdicts``); the rest
+are figures in metrics.json.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from rift_cl.commands.analyze.facts import WHY, Findings, length_in_words, one_place
+from rift_cl.commands.analyze.verdicts import said
+from rift_cl.commands.inputs.surfaces import SQUARE, sides_of
+from rift_cl.commands.inputs.view_set import Sampled
+from rift_cl.sampling.criteria.surface_limits import SurfaceLimits, surface_limits
+
+_KEYS = ("pixel", "diffraction", "depth_of_field", "reached")
+_HEADS = ("point", "pixel", "diffraction", "depth of field", "all together", "limited by")
+
+
+def surface_missing(sampled: Sampled, distance: float) -> Findings:
+    """Which sides of the target no view shows, and which cannot be looked at.
+
+    Args:
+        sampled: the views.
+        distance: of cameras from the target's middle.
+    """
+    sides = sides_of(sampled, distance)
+    figures = {
+        "mode": "surface",
+        "largest_gap_degrees": sides.gap,
+        "unseen_sides": sides.unseen,
+        "sides_seen_once": sides.seen_once,
+        "shut_sides": None if sampled.space is None else sides.shut,
+    }
+    way = "({:.2f}, {:.2f}, {:.2f})".format(*(sides.farthest + 0.0))
+    sentences = said(
+        {
+            "angle": f"The side of the target that is farthest from all views, {way}, lies "
+            f"{sides.gap:.3g} degrees from the nearest of them.",
+            "sides": f"{sides.unseen:.1%} of the target's sides are seen by no view within "
+            f"{SQUARE:.0f} degrees of straight on, {sides.seen_once:.1%} by one alone.",
+        }
+    )
+    if sampled.space is None:
+        sentences.append(
+            "What stands in the way is not known: analyse the folder of a fit, or a COLMAP model "
+            "with its points."
+        )
+    elif sides.shut > 0:
+        sentences.append(
+            f"A further {sides.shut:.1%} of all sides cannot be looked at, since something stands "
+            "before them; they are not counted."
+        )
+    return Findings(figures, (), (*sentences, *one_place(sampled)))
+
+
+def surface_resolution(sampled: Sampled, names: tuple[str, ...]) -> Findings:
+    """What ends detail at each point of the target, and how well parallax tells its depth.
+
+    Args:
+        sampled: the views.
+        names: of the target's points.
+    """
+    found, units = surface_limits(sampled.looks(), sampled.target), sampled.units
+    points = [_ends(found, p, name) for p, name in enumerate(names)]
+    rows = [
+        (
+            point["point"],
+            *(length_in_words(point[key], sampled) for key in _KEYS),
+            point["limited_by"],
+        )
+        for point in points
+    ]
+    caption = (
+        f"One cycle of the finest detail, in {units}, as the middle one of the cameras tells it; a "
+        "dash is no limit."
+    )
+    first = points[0]
+    sentences = said(
+        {
+            "pixel": f"The {first['limited_by']} limits detail at the {names[0]}, to a cycle of "
+            f"{length_in_words(first['reached'], sampled)} {units}: {WHY[first['limited_by']]}.",
+            "parallax": f"The views that see it lie up to {first['parallax_degrees']:.3g} degrees "
+            f"apart, so that a pixel of parallax is {first['depth']:.3g} {units} of depth.",
+        }
+    )
+    if not np.isfinite(first["depth"]):
+        sentences.append("No two views see it from different sides: nothing tells its depth.")
+    return Findings({"limits": points}, ((_HEADS, rows, caption),), tuple(sentences))
+
+
+def _ends(found: SurfaceLimits, p: int, name: str) -> dict[str, Any]:
+    ends = (found.pixel[p], found.diffraction[p], found.focus[p], found.reached[p])
+    return {
+        "point": name,
+        **dict(zip(_KEYS, map(float, ends), strict=True)),
+        "limited_by": found.cause[p],
+        "parallax_degrees": math.degrees(found.parallax[p]),
+        "depth": float(found.depth[p]),
+    }

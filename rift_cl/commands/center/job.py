@@ -1,0 +1,152 @@
+"""``rift center``: where the rotation axis is, with the pictures to believe it by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.commands.center.axis_search import find_axis
+from rift_cl.commands.inputs.scan_input import ScanInput, read_attenuation
+from rift_cl.commands.run_folder.run_folder import RunFolder
+from rift_cl.errors import InputError
+from rift_cl.geometry import Grid, Parallel
+from rift_cl.operators import Projector
+from rift_cl.progress import Report
+from rift_cl.reconstruct import AxisEstimate, fbp
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import curves, figure_svgs, framed
+
+# Centres of the slider in bins from the best one, and those of the contact sheet among them.
+_SLIDER = (-8.0, -6, -4, -3, -2, -1.5, -1, -0.5, 0, 0.5, 1, 1.5, 2, 3, 4, 6, 8)
+_SHEET = (-8.0, -4, -2, -1, 0, 1, 2, 4, 8)
+# Percentiles of the best slice that are shown black and white, in percent.
+_WINDOW = (0.5, 99.5)
+
+
+@dataclass(frozen=True)
+class CenterSettings(ScanInput):
+    """Find the centre of rotation of a parallel-beam scan.
+
+    Example: rift center scan.h5 --out center
+    """
+
+    out: Path = Path("rift-center")
+    """Folder for the pictures, the score curve and report.html."""
+    row: int | None = None
+    """Detector row that the pictures show; the middle one when not given. The axis is searched in
+    several rows, whichever this is."""
+    span: tuple[float, float] | None = None
+    """First and last detector bin between which to search; when not given, the middle 60 % of the
+    detector for half turns and all of it for full turns."""
+
+
+class CenterJob:
+    """A search that is planned: the input is open, nothing is written yet.
+
+    Args:
+        settings: what to do.
+
+    Raises:
+        RiftError: anything about the settings, the file, the device or the folder is wrong.
+    """
+
+    def __init__(self, settings: CenterSettings) -> None:
+        self.settings = settings
+        self.device = settings.open_device()
+        self.scan = settings.open_scan()
+        self.folder = RunFolder(settings.out, "center", overwrite=True)
+        self.row = self.scan.shape[1] // 2 if settings.row is None else settings.row
+        if not 0 <= self.row < self.scan.shape[1]:
+            raise InputError(f"--row is {self.row}, {self.scan.path} has {self.scan.shape[1]} rows")
+        self.metrics: dict[str, Any] = {}
+
+    def run(self) -> Iterator[Report]:
+        """Do it: the search, then a slice for each centre of the slider."""
+        total = 1 + len(_SLIDER)
+        yield Report(0, total, "steps")
+        found = find_axis(self.scan, self.device, span=self.settings.span)
+        self.metrics = {**found.record(), "row": self.row}
+        middle = (self.scan.shape[1] - 1) / 2
+        here = found.center + found.tilt * (self.row - middle)
+        sinogram = read_attenuation(self.scan, self.row, self.row + 1).projections[:, 0]
+        slices = {}
+        for step, offset in enumerate(_SLIDER, start=1):
+            yield Report(step, total, "steps", {"center": found.center})
+            slices[offset] = self._slice(sinogram, here + offset)
+        self.folder.make()
+        page = self._page(found, here, slices)
+        self.folder.finish(self.settings, self.metrics, page, self.device)
+        yield Report(total, total, "steps", {"center": found.center})
+
+    def _slice(self, sinogram: NDArray[np.float32], center: float) -> NDArray[np.float32]:
+        bins = self.scan.shape[2]
+        geometry = Parallel(self.scan.angles, bins, center=center)
+        A = Projector(Grid((bins, bins)), geometry, device=self.device)
+        return _middle(np.asarray(fbp(A, sinogram)))
+
+    def _page(
+        self, found: AxisEstimate, here: float, slices: dict[float, NDArray[np.float32]]
+    ) -> Page:
+        page = Page(f"Centre of rotation of {self.scan.path.name}", found.in_words())
+        black, white = (float(level) for level in np.percentile(slices[0.0], _WINDOW))
+        white = white if white > black else black + 1
+        files, _ = framed(list(slices.values()), window=(black, white))
+        page.slider(
+            files,
+            labels=[f"bin {here + offset:.2f}" for offset in slices],
+            start=_SLIDER.index(0.0),
+            caption=f"The middle of the slice at row {self.row} for the chosen centre; a wrong one "
+            "shows arcs and doubled edges.",
+            alt="Slice with the centre at",
+        )
+        page.facts(_facts(found))
+        by_offset = dict(zip(slices, files, strict=True))
+        page.panels(
+            [by_offset[offset] for offset in _SHEET],
+            titles=[f"{here + offset:.2f}" for offset in _SHEET],
+            columns=3,
+            caption="The same side by side, about the best one, which is in the middle.",
+            alt="Slice with the centre at",
+        )
+        draw = partial(
+            curves,
+            {"all rows": (found.scores[0], found.scores[1])},
+            xlabel="centre at the middle row, bins",
+            ylabel="log-likelihood",
+            mark=round(found.center, 2),
+        )
+        page.figure(
+            figure_svgs(lambda width: draw(width=width)),
+            caption=f"How likely each centre is by the {found.by}, all rows together; 0 is what "
+            "data without any sign of the axis would give.",
+            alt="Curve of the log-likelihood against the centre",
+        )
+        page.table(
+            ["row", "centre, bins", "standard error"],
+            [list(row) for row in zip(found.rows, found.centers, found.errors, strict=True)],
+            caption="The rows that were looked at",
+        )
+        return page
+
+
+def _facts(found: AxisEstimate) -> dict[str, object]:
+    low, high = found.interval
+    return {
+        "centre, bins": f"{found.center:.2f}, at the middle row",
+        "95 % interval": f"{low:.2f} to {high:.2f}",
+        "tilt, bins per row": found.tilt,
+        "spread between rows, bins": found.spread,
+        "found by": found.by,
+    }
+
+
+def _middle(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The central half of an image, where a wrong centre shows first."""
+    ny, nx = (max(n // 4, 0) for n in image.shape)
+    return image[ny : image.shape[0] - ny, nx : image.shape[1] - nx]

@@ -1,0 +1,198 @@
+"""``rift eval``: how good a scene is, by pictures that somebody took of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from tyro.conf import Positional
+
+from rift_cl.cl.discovery import open_device
+from rift_cl.commands.cameras.fit_cameras import FitCameras, open_fit_cameras
+from rift_cl.commands.evaluate.report import eval_page
+from rift_cl.commands.fit_photos.pictures import CapturePictures
+from rift_cl.commands.fit_photos.scores import ViewScore, score_record, score_views
+from rift_cl.commands.fit_photos.view_split import open_seen, split_views
+from rift_cl.commands.inputs.scene_input import SceneInput
+from rift_cl.commands.run_folder.run_folder import RunFolder
+from rift_cl.errors import InputError
+from rift_cl.io.captures.capture import View, camera_at, capture_name, holds_bare_photographs
+from rift_cl.progress import Report
+from rift_cl.splat.renderer import Renderer
+
+
+@dataclass(frozen=True)
+class EvalSettings(SceneInput):
+    """Score a scene by the photographs that its fit held out, or by captures of it.
+
+    Example: rift eval fit --out scores
+    """
+
+    captures: Annotated[tuple[Path, ...], Positional] = ()
+    """Captures to score: each a transforms.json, a folder with one, or a COLMAP model; the
+    photographs that the fit held out when not given."""
+    out: Path = Path("rift-eval")
+    """Folder for report.html, config.json and metrics.json."""
+    train: Path | None = None
+    """The capture that was trained on: for the scores of its nearest pictures, and the angles;
+    what the fit was trained on when not given."""
+    photographs: Path | None = None
+    """Folder of the fit's own photographs, if they have moved."""
+    hold_out: int = 0
+    """Score every so many-th photograph of each capture, and take those of --train for unseen, as
+    'rift fit' does; 0 scores all of them."""
+    downscale: int | None = None
+    """Whole factor by which photographs are made smaller; that of the fit, or 1, when not given."""
+    overwrite: bool = False
+    """Replace an earlier evaluation in the same folder."""
+    dry_run: bool = False
+    """Say what would be done, and stop."""
+
+
+class Evaluation:
+    """An evaluation that is planned; nothing is written yet.
+
+    Args:
+        settings: what to do.
+
+    Raises:
+        RiftError: the scene or a capture cannot be read, or a setting makes no sense.
+    """
+
+    def __init__(self, settings: EvalSettings) -> None:
+        self.settings = settings
+        if settings.hold_out < 0:
+            raise InputError(f"--hold-out is {settings.hold_out}, wanted 0 or more")
+        self.scene = settings.open_scene()
+        chosen = settings.downscale
+        self.downscale = self.scene.downscale if chosen is None else chosen
+        self.cameras = self._cameras()
+        self.groups = {capture_name(path): self._scored(path) for path in settings.captures}
+        if not self.groups:
+            self.groups = {"held out": self._held_out()}
+        elif len(self.groups) < len(settings.captures):
+            raise InputError("two captures have the same name: rename one folder")
+        self.seen = self._seen()
+        for view in [*self.seen, *(v for views in self.groups.values() for v in views)]:
+            camera_at(view, self.downscale)
+        self.device = open_device(settings.device)
+        self.folder = RunFolder(settings.out, "eval", overwrite=settings.overwrite)
+        self.metrics: dict[str, Any] = {}
+
+    def _scored(self, path: Path) -> tuple[View, ...]:
+        """The views of a capture that are scored.
+
+        Raises:
+            RiftError: it cannot be read, or is the fit's own, whose photographs the fit knows.
+        """
+        fit, scene = self.scene.folder, self.settings.scene
+        inside = fit is not None and path.resolve().is_relative_to(fit.resolve())
+        if self.cameras is not None and (inside or holds_bare_photographs(path)):
+            raise InputError(
+                f"{path}: is no capture with photographs; to score what the fit held out, name "
+                f"the fit alone: rift eval {scene}"
+            )
+        views = open_seen(path, pinhole=self.scene.pinhole).views
+        every = self.settings.hold_out
+        return views[::every] if every else views
+
+    def _seen(self) -> tuple[View, ...]:
+        """What was trained on; empty where nobody says, or where it is what is scored."""
+        if self.settings.train is None:
+            return self._trained()
+        views = open_seen(self.settings.train, pinhole=self.scene.pinhole).views
+        seen, _ = split_views(views, self.settings.hold_out, 0)
+        both = self._in_both(seen)
+        if both is not None:
+            raise InputError(
+                f"{both} is a photograph of --train, which is its own nearest: leave --train out, "
+                "or hold the scored ones out (--hold-out)"
+            )
+        return seen
+
+    def _cameras(self) -> FitCameras | None:
+        """Those of the fit, whose photographs may have moved."""
+        folder, moved = self.scene.folder, self.settings.photographs
+        if folder is None or moved is None:
+            return self.scene.cameras
+        return open_fit_cameras(folder, photographs=moved)
+
+    def _held_out(self) -> tuple[View, ...]:
+        """The photographs that the fit held out."""
+        where, cameras = self.settings.scene, self.cameras
+        if self.settings.hold_out:
+            raise InputError("--hold-out is about captures: the fit knows what it held out")
+        if cameras is None or self.scene.folder is None:
+            why = "is no fit's folder" if self.scene.folder is None else "is of an older version"
+            raise InputError(
+                f"there is no capture to score: name one or more after the scene, since {where} "
+                f"{why} and holds no cameras"
+            )
+        if not cameras.unseen:
+            raise InputError(
+                f"{where} held no photographs out: name a capture to score after the scene"
+            )
+        cameras.demand_photographs(where)
+        return cameras.unseen
+
+    def _trained(self) -> tuple[View, ...]:
+        """What the fit was trained on; empty where those photographs are gone, or are scored."""
+        cameras = self.cameras
+        if cameras is None or not all(view.image.is_file() for view in cameras.seen):
+            return ()
+        return () if self._in_both(cameras.seen) else cameras.seen
+
+    def _in_both(self, seen: tuple[View, ...]) -> str | None:
+        """A photograph that is scored and was trained on, with its capture's name."""
+        files = {view.image.resolve() for view in seen}
+        scored = ((view, name) for name, views in self.groups.items() for view in views)
+        names = (f"{view.name} of {name}" for view, name in scored if view.image.resolve() in files)
+        return next(names, None)
+
+    def plan(self) -> dict[str, str]:
+        """What would be done, by name."""
+        scored = {f"score {name}": f"{len(views)} views" for name, views in self.groups.items()}
+        trained = f"{len(self.seen)} views" if self.seen else "not named: no baselines"
+        return {
+            "scene": f"{self.scene.name}, {len(self.scene.splats)} splats",
+            **scored,
+            "trained on": trained,
+            "downscale": str(self.downscale),
+            "eps2d": f"{self.scene.drawing.eps2d:g}",
+            "device": self.device.name,
+        }
+
+    def run(self) -> Iterator[Report]:
+        """Do it; a report for each picture."""
+        renderer = Renderer(self.scene.drawing, device=self.device)
+        splats = self.scene.splats.upload(self.device)
+        seen = self._pictures(self.seen) if self.seen else None
+        self.folder.make()
+        groups: dict[str, list[ViewScore]] = {}
+        for name, views in self.groups.items():
+            unseen = self._pictures(views, seen)
+            groups[name] = []
+            for score in score_views(renderer, splats, unseen, seen):
+                groups[name].append(score)
+                yield Report(len(groups[name]), len(views), f"views of {name}")
+        self.metrics = {
+            "splats": len(self.scene.splats),
+            "eps2d": self.scene.drawing.eps2d,
+            "downscale": self.downscale,
+            **score_record(groups),
+        }
+        page = eval_page(self.scene.name, groups, self.metrics)
+        self.folder.finish(self.settings, self.metrics, page, self.device)
+
+    def _pictures(
+        self, views: tuple[View, ...], like: CapturePictures | None = None
+    ) -> CapturePictures:
+        light = self.scene.light
+        pictures = CapturePictures(
+            self.device, views, downscale=self.downscale, light=light, like=like
+        )
+        if self.settings.background is not None:
+            pictures.behind = self.scene.background
+        return pictures

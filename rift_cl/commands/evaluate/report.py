@@ -1,0 +1,54 @@
+"""What ``rift eval`` shows: scores, the best and the worst pictures beside the truth, errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import compress
+from typing import Any
+
+from rift_cl.commands.fit_photos.report import COLUMNS, SCORING, score_rows, show_views
+from rift_cl.commands.fit_photos.scores import ViewScore
+from rift_cl.report.html_page import Page
+
+_TRAINED = ("degrees away", "nearest PSNR", "blend PSNR")
+
+
+def eval_page(
+    name: str, groups: Mapping[str, Sequence[ViewScore]], metrics: Mapping[str, Any]
+) -> Page:
+    """The report of a finished evaluation."""
+    page = Page(f"Scores of {name}", f"{metrics['splats']} splats, eps2d {metrics['eps2d']:g}")
+    for group, scores in groups.items():
+        page.section(f"Pictures: {group}")
+        show_views(page, scores, "scene")
+    page.section("Scores")
+    page.table(*score_table(metrics), caption=SCORING)
+    for group, scores in groups.items():
+        trained = any("nearest_psnr" in score.values for score in scores)
+        front = any("fit_psnr_foreground" in score.values for score in scores)
+        columns = ["picture", "PSNR", *(["PSNR foreground"] if front else []), "SSIM"]
+        columns += _TRAINED if trained else []
+        rows = [_row(score, front, trained) for score in scores]
+        page.table(columns, rows, caption=group)
+    return page
+
+
+def score_table(metrics: Mapping[str, Any]) -> tuple[Sequence[str], list[tuple[Any, ...]]]:
+    """Columns and rows of mean scores; without the baselines' where there are none."""
+    rows = score_rows(metrics)
+    known = [not all(_unknown(row[place]) for row in rows) for place in range(len(COLUMNS))]
+    return list(compress(COLUMNS, known)), [tuple(compress(row, known)) for row in rows]
+
+
+def _unknown(cell: Any) -> bool:
+    return isinstance(cell, float) and math.isnan(cell)
+
+
+def _row(score: ViewScore, front: bool, trained: bool) -> tuple[Any, ...]:
+    values = score.values
+    middle = (values.get("fit_psnr_foreground"),) if front else ()
+    cells = (score.name, values["fit_psnr"], *middle, values["fit_ssim"])
+    if not trained:
+        return cells
+    return (*cells, score.angle, values.get("nearest_psnr"), values.get("blend_psnr"))

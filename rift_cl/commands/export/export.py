@@ -1,0 +1,140 @@
+"""``rift export``: one file out of a scene, and a sentence for each thing that it cannot hold."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from rift_cl.cl.budget import format_bytes
+from rift_cl.commands.cameras.film import first_view
+from rift_cl.commands.export.axes import turn_between, turned
+from rift_cl.commands.export.plain_scene import plain_scene
+from rift_cl.commands.export.settings import ExportSettings
+from rift_cl.commands.export.web_page import FirstView, web_page
+from rift_cl.commands.inputs.scene_input import in_display_light, scene_file
+from rift_cl.errors import InputError, OutputError
+from rift_cl.io.output import atomic_path, check_space
+from rift_cl.io.scenes.formats.formats import DEGREE, FORMATS, SplatFormat
+from rift_cl.io.scenes.splat_scene import SplatScene
+from rift_cl.progress import Report
+
+_PAGE = ".html"
+_UP = np.array([0.0, 1, 0])
+# What viewers add to splats on the screen, in square pixels.
+_VIEWERS = 0.3
+
+
+class Export:
+    """An export that is planned; nothing is written yet.
+
+    ``plain`` is the scene as it will be written but for ``turn`` (3, 3), which comes last, and
+    ``notes`` what is lost by it.
+
+    Args:
+        settings: what to do.
+
+    Raises:
+        RiftError: the scene cannot be read, the format cannot hold it, or the file is there.
+    """
+
+    def __init__(self, settings: ExportSettings) -> None:
+        self.settings = settings
+        self.announce: Callable[[str], None] = lambda sentence: None
+        self.scene = settings.open_scene()
+        self.format = self._format(settings.to or "html")
+        self.path = output_path(settings, self.format.suffix)
+        self.plain, self.notes = plain_scene(self.scene.splats, self.scene.light)
+        if self.plain.degree > DEGREE:
+            kept = np.ascontiguousarray(self.plain.sh[:, : (DEGREE + 1) ** 2])
+            self.plain = dataclasses.replace(self.plain, sh=kept)
+            self.notes.append(f"harmonics of degree {DEGREE + 1} are left out")
+        self._bounds = settings.bounds(self.scene)
+        self.notes += settings.notes(self.scene)
+        self.turn = np.eye(3)
+        if self.format.upright:
+            self.turn = turn_between(self._bounds.up, _UP)
+            self.notes.append(
+                "the scene is turned so that up, ({:.3g}, {:.3g}, {:.3g}), is y".format(
+                    # Rounding leaves a little beside an axis; 0 is added against a minus sign.
+                    *(self._bounds.up.round(4) + 0.0)
+                )
+            )
+        if self.format.suffix == _PAGE and self.plain.degree:
+            self.notes.append(
+                "the page draws each splat in one colour, the mean of what the cameras saw: what "
+                "changes with the direction is lost (other formats keep it; a fit with "
+                "--sh-degree 0 has nothing to lose by it)"
+            )
+        if self.scene.drawing.eps2d != _VIEWERS:
+            self.notes.append(
+                f"viewers blur by {_VIEWERS:g} square pixels, the scene was fitted with "
+                f"{self.scene.drawing.eps2d:g}: pictures smaller than the photographs look softer"
+            )
+
+    def _format(self, name: str) -> SplatFormat:
+        if name == "html":
+            rounds = "colours to one for all directions and 8 bits, covariances to half floats"
+            return SplatFormat(_PAGE, self._page, False, rounds)
+        if name not in FORMATS:
+            raise InputError(f"--to {name} is about triangles: add --mesh")
+        return FORMATS[name]
+
+    def _page(self, scene: SplatScene) -> bytes:
+        """A page that begins at a photograph's view, where the cameras are known."""
+        camera, target = first_view(self._bounds)
+        first = FirstView(camera, target, self._bounds.up)
+        behind = in_display_light(self.scene.background, self.scene.light)
+        return web_page(
+            scene, first, self._bounds.cameras, title=self.scene.name, background=behind
+        ).encode()
+
+    def plan(self) -> dict[str, str]:
+        """What would be done, by name."""
+        scene = self.plain
+        facts = {
+            "scene": f"{self.scene.name}, {len(self.scene.splats)} splats",
+            "output": str(self.path),
+            "splats": f"{len(scene)}, harmonics of degree {scene.degree}",
+            "rounded": self.format.rounds,
+        }
+        return facts | {f"note {n}": note for n, note in enumerate(self.notes, 1)}
+
+    def run(self) -> Iterator[Report]:
+        """Do it; a report at the end."""
+        for note in self.notes:
+            self.announce(note)
+        content = self.format.encode(turned(self.plain, self.turn))
+        write_whole(self.path, content)
+        self.result = f"{self.path}, {format_bytes(len(content))}"
+        yield Report(len(self.plain), len(self.plain), "splats")
+
+
+def output_path(settings: ExportSettings, suffix: str) -> Path:
+    """Where the file goes.
+
+    Raises:
+        OutputError: a file is there already, or it is the scene itself.
+    """
+    path = settings.out
+    if path is None:
+        name = settings.scene.resolve().name
+        path = Path((name if settings.scene.is_dir() else Path(name).stem) + suffix)
+    if path.exists() and path.samefile(scene_file(settings.scene)):
+        raise OutputError(f"{path}: is the scene itself; name another file (--out)")
+    if path.exists() and not settings.overwrite:
+        raise OutputError(f"{path}: is there already; name another file (--out) or add --overwrite")
+    return path
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file that appears complete or not at all.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    check_space(path, len(content))
+    with atomic_path(path) as part:
+        part.write_bytes(content)

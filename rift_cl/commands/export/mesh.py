@@ -1,0 +1,150 @@
+"""``rift export --mesh``: the surface of one density in an X-ray scene, as triangles.
+
+The splats are summed on a grid, whose samples are means over voxels, and the surface is found by
+marching cubes (Lewiner et al. 2003, scikit-image). The grid ends in empty voxels, so that the
+surface is closed; where no density is named, it is the one that parts the voxels best (Otsu 1979).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.budget import format_bytes
+from rift_cl.cl.discovery import open_device
+from rift_cl.commands.export.export import output_path, write_whole
+from rift_cl.commands.export.settings import ExportSettings
+from rift_cl.commands.inputs.scene_input import scene_file
+from rift_cl.errors import InputError
+from rift_cl.geometry import Grid
+from rift_cl.io.scenes.mesh_files import MESH_FORMATS
+from rift_cl.io.scenes.splat_activations import scales_of
+from rift_cl.io.scenes.splat_scene import SplatScene
+from rift_cl.progress import Report
+from rift_cl.splat.voxels import voxelise
+
+# Splats below this share of the strongest density say nothing of where the object is; the others
+# reach so many standard deviations.
+_FAINT, _REACH = 1e-3, 3.0
+_FEWEST, _MOST = 8, 2048
+# The axis of rotation, z, is glTF's y.
+_UPRIGHT = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+
+
+class MeshExport:
+    """A surface that is planned; nothing is written yet.
+
+    Args:
+        settings: what to do.
+
+    Raises:
+        RiftError: the scene cannot be read, has no densities, or the file is there.
+    """
+
+    def __init__(self, settings: ExportSettings) -> None:
+        self.settings = settings
+        self.announce: Callable[[str], None] = lambda sentence: None
+        self._name = settings.to or "ply"
+        if self._name not in MESH_FORMATS:
+            raise InputError(f"--to {self._name} holds no triangles: take ply, stl, obj or glb")
+        if not _FEWEST <= settings.voxels <= _MOST:
+            raise InputError(f"--voxels is {settings.voxels}, wanted {_FEWEST} to {_MOST}")
+        path = scene_file(settings.scene)
+        self.scene = SplatScene.load(path)
+        if self.scene.mode != "xray":
+            raise InputError(
+                f"{path}: is a scene of photographs, whose opacities are no densities: --mesh is "
+                "about scenes of 'rift fit --mode xray'"
+            )
+        if not len(self.scene):
+            raise InputError(f"{path}: holds no splats, there is no surface")
+        self.grid = _grid(self.scene, settings.voxels)
+        self.path = output_path(settings, f".{self._name}")
+        self.device = open_device(settings.device)
+
+    def plan(self) -> dict[str, str]:
+        """What would be done, by name."""
+        level = self.settings.level
+        return {
+            "scene": f"{self.settings.scene}, {len(self.scene)} splats",
+            "output": str(self.path),
+            "voxels": f"{self.grid.shape} (z, y, x), {self.grid.spacing[0]:.4g} wide",
+            "density": "that which parts the voxels best" if level is None else f"{level:g}",
+            "device": self.device.name,
+        }
+
+    def run(self) -> Iterator[Report]:
+        """Do it; a report as each step is done.
+
+        Raises:
+            InputError: nowhere is the density so high, or so low.
+        """
+        # The variance of a voxel's box along each axis: samples are means over voxels.
+        dilation = self.grid.spacing[0] ** 2 / 12
+        splats = self.scene.upload(self.device)
+        volume = self.device.get(voxelise(self.device, splats, self.grid, dilation=dilation))
+        yield Report(1, 3, "steps: voxels")
+        level = self._level(volume)
+        vertices, triangles = surface(volume, self.grid, level)
+        yield Report(2, 3, "steps: surface")
+        if self._name == "glb":
+            vertices = (vertices @ _UPRIGHT.T).astype(np.float32)
+            self.announce("the scene is turned so that the axis of rotation, z, is y")
+        content = MESH_FORMATS[self._name](vertices, triangles)
+        write_whole(self.path, content)
+        self.result = (
+            f"{self.path}, {len(triangles)} triangles at density {level:.6g}, "
+            f"{format_bytes(len(content))}"
+        )
+        yield Report(3, 3, "steps: file")
+
+    def _level(self, volume: NDArray[np.float32]) -> float:
+        from skimage.filters import threshold_otsu
+
+        low, high = float(volume.min()), float(volume.max())
+        level = self.settings.level
+        if level is None:
+            level = float(threshold_otsu(volume)) if low < high else low
+        if not max(low, 0) < level < high:
+            raise InputError(
+                f"--level is {level:g}, but densities go from {low:.4g} to {high:.4g}: there is no "
+                "surface"
+            )
+        return level
+
+
+def surface(
+    volume: NDArray[np.float32], grid: Grid, level: float
+) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    """(V, 3) places (x, y, z) of a density's surface, and (T, 3) triangles of them.
+
+    The corners of a triangle go counter-clockwise as they are seen from where the density is less.
+
+    Args:
+        volume: (z, y, x) densities.
+        grid: where they are.
+        level: positive, and less than the greatest.
+    """
+    from skimage.measure import marching_cubes
+
+    vertices, triangles, _, _ = marching_cubes(np.pad(volume, 1), level, spacing=grid.spacing)
+    first = [grid.coordinates(axis)[0] - grid.spacing[axis] for axis in range(3)]
+    # In (z, y, x) its triangles are seen clockwise; (x, y, z) is a reflection of that.
+    places = (vertices + first)[:, ::-1]
+    return np.ascontiguousarray(places, np.float32), triangles.astype(np.uint32)
+
+
+def _grid(scene: SplatScene, voxels: int) -> Grid:
+    """The box of all splats that are not faint, with so many voxels along its longest edge."""
+    densities = scene.logit_opacities.astype(np.float64)
+    strong = densities >= densities.max() + np.log(_FAINT)
+    reach = _REACH * scales_of(scene.log_scales[strong]).max(axis=1, keepdims=True)
+    means = scene.means[strong].astype(np.float64)
+    low, high = (means - reach).min(axis=0), (means + reach).max(axis=0)
+    spacing = float((high - low).max()) / voxels
+    if not 0 < spacing < np.inf:
+        raise InputError("the splats of the scene have no size, there is no surface")
+    shape = np.maximum(np.ceil((high - low) / spacing), 1).astype(int)[::-1]
+    return Grid(shape.tolist(), spacing, ((low + high) / 2)[::-1].tolist())

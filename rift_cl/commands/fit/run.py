@@ -1,0 +1,111 @@
+"""What every fit does, whatever it looks at: it trains, can be stopped gently, and goes on later.
+
+``Fit`` (photographs) and ``XrayFit`` (projections) add what they read, how they score, and what
+they leave behind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from rift_cl.cl.discovery import open_device
+from rift_cl.commands.fit.checkpoints import FitCheckpoints
+from rift_cl.commands.fit_photos.scores import ViewScore
+from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.run_folder.run_folder import RunFolder
+from rift_cl.errors import CheckpointError, StoppedError
+from rift_cl.progress import Report
+from rift_cl.train.trainer import REPORT_EVERY, Trainer
+
+
+class FitRun:
+    """A fit that is planned; nothing is written yet.
+
+    Args:
+        settings: what to do.
+
+    Raises:
+        RiftError: a setting makes no sense, the folder is in use, or the fit in it cannot go on.
+    """
+
+    def __init__(self, settings: FitSettings) -> None:
+        settings.check()
+        self.settings = settings
+        # With a value for all that was left open, once it is decided.
+        self.settled = settings
+        self.training, self.drawing = settings.training(), settings.drawing()
+        self.folder = RunFolder(
+            settings.out, "fit", overwrite=settings.overwrite, resume=settings.resume
+        )
+        self.device = open_device(settings.device, settings.budget())
+        self.checkpoints = FitCheckpoints(
+            settings.out / "checkpoints", settings.decisive(), self.device.name
+        )
+        if settings.resume and not self.checkpoints.find():
+            self._demand_a_beginning()
+        self.losses: list[tuple[int, float]] = []
+        self.scores: dict[str, list[ViewScore]] = {}
+        self.metrics: dict[str, Any] = {}
+        # What config.json holds besides the settings, from when the training begins.
+        self.decided: dict[str, Any] = {}
+        self.announce: Callable[[str], None] = lambda line: None
+        self._stopping = False
+
+    def stop(self) -> None:
+        """Break off after the step that is being taken; ``run`` then keeps a checkpoint."""
+        self._stopping = True
+
+    def _begin(self, trainer: Trainer) -> None:
+        """Bring the trainer to where the fit goes on, or make the folder that of a new one."""
+        self.checkpoints.decided = self.settled.decisive()
+        if self.settings.resume:
+            self.losses = self.checkpoints.restore(trainer)
+        else:
+            self.folder.mark(**self.decided)
+            self.folder.drop("checkpoints")
+
+    def _trained(self, trainer: Trainer, pictures: Any) -> Iterator[Report]:
+        """Train, with a checkpoint now and then, at the end, and when broken off."""
+        every, kept = self.settings.checkpoint_every, trainer.parameters.step
+        for report in self._reports(trainer, pictures):
+            if report.done % REPORT_EVERY == 0 or report.done == report.total:
+                self.losses.append((report.done, report.values["loss"]))
+            ended = self._stopping or report.done == report.total
+            if every and (ended or report.done >= kept + every):
+                kept = report.done
+                self.checkpoints.save(trainer, self.losses)
+            yield report
+            self._heed(report.done)
+
+    def _demand_a_beginning(self) -> None:
+        """Refuse to replace a finished fit that kept no checkpoint by one that begins anew."""
+        if self.folder.is_complete:
+            raise CheckpointError(
+                f"{self.settings.out}: this fit is finished and kept no checkpoint, so that it "
+                "cannot be trained on: begin anew with --overwrite"
+            )
+
+    @property
+    def _history(self) -> list[tuple[int, int]]:
+        """The stages of the fit; see ``fit_checkpoints.History``."""
+        return [*self.checkpoints.history, (self.settings.steps, self.settings.steps)]
+
+    def _reports(self, trainer: Trainer, pictures: Any) -> Iterator[Report]:
+        """The trainer's reports, in a browser as well if that was asked for."""
+        if not self.settings.view:
+            return trainer.run(lambda: self._stopping)
+        from rift_cl.commands.view.watched import watched
+
+        title = self.settings.capture.name
+        asked = (trainer, pictures, lambda: self._stopping)
+        return watched(*asked, title=title, announce=self.announce)
+
+    def _heed(self, step: int) -> None:
+        """Break off if that was asked for."""
+        if not self._stopping:
+            return
+        where = f"interrupted after step {step} of {self.settings.steps}"
+        if not self.settings.checkpoint_every:
+            raise StoppedError(f"{where}; nothing was kept, since --checkpoint-every is 0")
+        raise StoppedError(f"{where}; to go on: {self.settings.command()}")

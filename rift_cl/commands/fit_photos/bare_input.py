@@ -1,0 +1,105 @@
+"""What ``rift fit`` takes that nobody has posed: a folder of photographs, or a video.
+
+Poses are found first, and of a video the frames; both are kept in the folder of the fit, so that a
+fit that goes on has the very same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from pathlib import Path
+
+from rift_cl.io.captures.capture import Capture, holds_bare_photographs, open_capture
+from rift_cl.io.captures.colmap_process import demand_pycolmap
+from rift_cl.io.captures.photograph_folder import other_files, photographs_in
+from rift_cl.io.captures.photographs import demand_photographs, pose_photographs
+from rift_cl.io.captures.video import demand_video, holds_video, sharpest_frames, video_notes
+from rift_cl.progress import Report
+
+# Names that a sentence lists.
+_LISTED = 4
+
+
+class BareInput:
+    """Photographs that nobody has posed; nothing is read yet.
+
+    Args:
+        source: their folder, or a video.
+        out: the folder of the fit.
+        frames: how many frames are taken of a video.
+        seed: of all that the search for poses draws by chance.
+
+    Raises:
+        InputError: there are too few photographs, or a library is missing that is wanted.
+    """
+
+    def __init__(self, source: Path, out: Path, *, frames: int, seed: int) -> None:
+        self.source, self._frames, self._seed = source, frames, seed
+        self._video = holds_video(source)
+        self.folder = out / "frames" if self._video else source
+        self._posed = out / "poses"
+        # What was said of the input, a sentence each.
+        self.notes: list[str] = []
+        self.photographs = 0
+        if self._video:
+            demand_video(source)
+            if not self._posed.exists():
+                demand_pycolmap()
+        elif not self._posed.exists():
+            demand_photographs(source)
+
+    @staticmethod
+    def fits(source: Path) -> bool:
+        """Whether a path is a video or a folder of photographs without poses."""
+        return holds_video(source) or holds_bare_photographs(source)
+
+    @property
+    def words(self) -> str:
+        """What it is, for people."""
+        what = f"a video: {self._frames} sharp frames and" if self._video else "bare photographs:"
+        return f"{self.source}, {what} their poses are found first"
+
+    def find(self) -> Generator[Report, None, Capture]:
+        """Find the poses.
+
+        Raises:
+            RiftError: see ``pose_photographs`` and ``sharpest_frames``.
+        """
+        if self._video:
+            taken, total = yield from sharpest_frames(self.source, self.folder, self._frames)
+            self.notes.append(f"{taken} of the video's {total} frames are taken, the sharpest")
+            self.notes += video_notes(self.source)
+        elif others := other_files(photographs_in(self.folder)):
+            count = f"{len(others)} files that are no photographs are"
+            if len(others) == 1:
+                count = "a file that is no photograph is"
+            self.notes.append(f"{count} left alone: {listed(others)}")
+        found = yield from pose_photographs(self.folder, self._posed, seed=self._seed)
+        self.photographs = len(found.placed) + len(found.missing)
+        if found.missing:
+            self.notes.append(_left_out(found.missing, self.photographs))
+        capture = open_capture(found.model, images=self.folder)
+        self.notes.append(_placed(capture, self.photographs))
+        return capture
+
+
+def _placed(capture: Capture, count: int) -> str:
+    """How many photographs have a pose, and how well the poses agree with them."""
+    placed = f"{len(capture.views)} of {count} photographs have a pose"
+    error = capture.reprojection_error
+    if error is None:
+        return placed
+    return f"{placed}; their sparse points are seen {error:.2g} pixels off, on average"
+
+
+def _left_out(missing: Mapping[str, str], count: int) -> str:
+    """Which photographs have no pose, and why."""
+    reasons = [f"{name} ({reason})" for name, reason in missing.items()]
+    verb = "is" if len(missing) == 1 else "are"
+    return f"{len(missing)} of {count} photographs {verb} left out: {listed(reasons)}"
+
+
+def listed(words: Sequence[str]) -> str:
+    """A few words in a row, and how many more there are."""
+    more = len(words) - _LISTED
+    return ", ".join(words[:_LISTED]) + (f" and {more} more" if more > 0 else "")

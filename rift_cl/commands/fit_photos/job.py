@@ -1,0 +1,278 @@
+"""``rift fit``: posed photographs become splats, and a report that says how good they are."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Iterator
+
+from rift_cl.commands.cameras.arc import demand_places
+from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras, with_poses
+from rift_cl.commands.cameras.photograph_place import place_record
+from rift_cl.commands.export.fit_page import leave_page
+from rift_cl.commands.fit.probe import TRIED, probed, time_words
+from rift_cl.commands.fit.run import FitRun
+from rift_cl.commands.fit_photos.bare_input import BareInput
+from rift_cl.commands.fit_photos.photograph_size import fitting_downscale, size_words
+from rift_cl.commands.fit_photos.pictures import CapturePictures
+from rift_cl.commands.fit_photos.report import fit_page, history_notes, ramp_notes
+from rift_cl.commands.fit_photos.scores import score_record, score_views
+from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.start import first_splats
+from rift_cl.commands.fit_photos.view_split import open_seen, split_views
+from rift_cl.commands.pictures.evenly_spaced import evenly
+from rift_cl.errors import InputError
+from rift_cl.io.captures.capture import (
+    Capture,
+    View,
+    camera_at,
+    capture_name,
+)
+from rift_cl.io.scenes.splat_scene import SplatScene
+from rift_cl.progress import Report
+from rift_cl.splat.bands import FrameMemory
+from rift_cl.splat.orders import ModeOrders
+from rift_cl.train.loss.homogenisation import noise_of
+from rift_cl.train.trainer import Trainer
+
+# Photographs from which the noise is estimated.
+_NOISE_VIEWS = 8
+
+
+class Fit(FitRun):
+    """A fit to photographs that is planned; nothing is written yet.
+
+    Args:
+        settings: what to do.
+
+    Raises:
+        RiftError: the capture cannot be read, or a setting makes no sense.
+    """
+
+    def __init__(self, settings: FitSettings) -> None:
+        super().__init__(settings)
+        self.source: Capture | BareInput
+        if BareInput.fits(settings.capture):
+            # Poses are looked for when the work begins, or were found before.
+            self.source = BareInput(
+                settings.capture, settings.out, frames=settings.frames, seed=settings.seed
+            )
+        else:
+            self.source = open_seen(settings.capture, pinhole=settings.pinhole)
+        self.downscale = settings.downscale or 1
+        self.seen: tuple[View, ...] = ()
+        self.unseen: tuple[View, ...] = ()
+        if isinstance(self.source, Capture):
+            self._split(self.source)
+        self.tests = {
+            capture_name(path): open_seen(path, pinhole=settings.pinhole) for path in settings.test
+        }
+        if len(self.tests) < len(settings.test):
+            raise InputError("--test names two captures of the same name: rename one folder")
+
+    def plan(self) -> dict[str, str]:
+        """What would be done, by name."""
+        if isinstance(self.source, BareInput):
+            return {
+                "capture": self.source.words,
+                "splats": self._splats,
+                "device": self.device.name,
+            }
+        cameras = [camera_at(view, self.downscale) for view in self.seen]
+        largest = max(camera.height * camera.width for camera in cameras)
+        masks = sum(view.mask is not None for view in self.seen)
+        return {
+            "capture": str(self.source.path),
+            "trained on": f"{len(self.seen)} photographs",
+            "held out": f"{len(self.unseen)} photographs",
+            **({"masks": f"{masks} photographs have one"} if masks else {}),
+            "largest photograph": f"{largest} pixels, made smaller by {self.downscale}",
+            "splats": self._splats,
+            "device": self.device.name,
+            **self._tried(self.source, largest),
+        }
+
+    def _tried(self, capture: Capture, pixels: int) -> dict[str, str]:
+        """Memory and time, from a few steps that leave no trace."""
+        settings = self.settings
+        pictures, reading = self._timed_reading()
+        count = min(settings.splats, TRIED)
+        trainer = self._trainer(capture, pictures, dataclasses.replace(settings, splats=count))
+        probe, frame = probed(trainer, count), self._frame(pixels)
+        first = round(len(trainer.parameters) * settings.splats / count)
+        ahead = trainer.strategy.forecast(0, first)
+        seconds = reading * len(self.seen) + probe.steps(ahead)
+        lists = min(probe.lists(frame, self.drawing.tile), self.device.budget)
+        return {
+            "device memory": f"{self._need(frame) / 2**20:.0f} MiB, and about "
+            f"{lists / 2**20:.0f} MiB of tile lists",
+            "time": time_words(seconds),
+        }
+
+    def _timed_reading(self) -> tuple[CapturePictures, float]:
+        """The photographs, and the seconds that it takes to read one."""
+        begin = time.perf_counter()
+        self._pictures(self.seen[:1])
+        reading = time.perf_counter() - begin
+        return self._pictures(self.seen), reading
+
+    def _frame(self, pixels: int) -> FrameMemory:
+        """What a frame of so many pixels takes on the device, but for its tile lists."""
+        count, parameters, basis = self.settings.splats, self.training.numbers, self.training.basis
+        channels = 3 if basis.color_order else 0
+        modes = None if basis.plain else ModeOrders(basis.order, basis.color_order, channels)
+        return FrameMemory(
+            count, parameters, pixels, 3, gradient=True, absgrad=self.drawing.absgrad, modes=modes
+        )
+
+    @staticmethod
+    def _need(frame: FrameMemory) -> int:
+        """Bytes of a step: besides what a frame takes there are Adam's two moments of all."""
+        return frame.fixed + 8 * frame.parameters * frame.splats
+
+    @property
+    def _splats(self) -> str:
+        """How many splats, and what they are."""
+        settings, words = self.settings, [f"at most {self.settings.splats}"]
+        if settings.angular == "sh":
+            words.append(f"harmonics of degree {settings.sh_degree}")
+        return ", ".join([*words, *filter(None, [settings.basis_words()])])
+
+    def run(self) -> Iterator[Report]:
+        """Do it; a report now and then.
+
+        Raises:
+            StoppedError: ``stop`` was called; a checkpoint was kept.
+        """
+        settings = self.settings
+        self.folder.make()
+        capture = self.source
+        if isinstance(capture, BareInput):
+            capture = yield from capture.find()
+            self._split(capture)
+        for note in self._notes():
+            self.announce(f"rift: {note}")
+        pictures = self._pictures(self.seen)
+        if settings.refine_exposures and pictures.any_cut_out():
+            raise InputError(
+                "--refine-exposures wants photographs of a whole scene: these are cut out, and "
+                "what stands behind them was never exposed"
+            )
+        trainer = self._trainer(capture, pictures)
+        yield from self._read_ahead(trainer, pictures)
+        self.settled = dataclasses.replace(
+            settings,
+            homogenise=settings.exponent_for(len(self.seen)),
+            downscale=self.downscale,
+        )
+        self.decided = {"photographs": place_record([*self.seen, *self.unseen], settings.out)}
+        self._begin(trainer)
+        self._keep_cameras(capture, trainer)
+        yield from self._trained(trainer, pictures)
+        if trainer.poses is not None:
+            self._keep_cameras(capture, trainer)
+        splats = trainer.parameters.drawn
+        drawn = trainer.renderer.settings
+        SplatScene.of(splats, self.device, activation=drawn.activation, angular=drawn.angular).save(
+            settings.out / "scene.ply"
+        )
+        for name, views in self._scored().items():
+            self.scores[name] = []
+            unseen = self._pictures(views, pictures)
+            for score in score_views(trainer.renderer, splats, unseen, pictures):
+                self.scores[name].append(score)
+                yield Report(len(self.scores[name]), len(views), f"views of {name}")
+                self._heed(trainer.parameters.step)
+        self.metrics = {
+            "splats": len(splats),
+            "loss": self.losses[-1][1],
+            "history": self._history,
+            "background": pictures.behind.tolist(),
+            **settings.basis_facts(),
+            **score_record(self.scores),
+        }
+        ramp = ramp_notes(settings, len(self.seen))
+        notes = [*self._notes(), *ramp, *history_notes(self._history)]
+        scene = leave_page(settings.out, pictures, self.announce)
+        name = capture_name(settings.capture)
+        page = fit_page(name, self.scores, self.losses, self.metrics, notes, scene)
+        self.folder.finish(
+            self.settled, self.metrics, page, self.device, asked=settings, **self.decided
+        )
+
+    def _read_ahead(self, trainer: Trainer, pictures: CapturePictures) -> Iterator[Report]:
+        """Read the photographs that the steps will ask for, so that the first are as fast as all.
+
+        Those for which there is no room are read whenever they are asked for.
+        """
+        count = min(len(pictures.views), self.settings.steps)
+        for step in range(count):
+            if not pictures.keep(trainer.view_at(step)):
+                return
+            yield Report(step + 1, count, "photographs")
+            self._heed(0)
+
+    def _keep_cameras(self, capture: Capture, trainer: Trainer) -> None:
+        """Leave the cameras in the folder as they are known, so that an unfinished fit has them."""
+        out, seen = self.settings.out, self.seen
+        if trainer.poses is not None:
+            seen = with_poses(seen, [trainer.poses.camera(number) for number in range(len(seen))])
+        self.folder.drop(*CAMERA_FILES)
+        count = self.source.photographs if isinstance(self.source, BareInput) else None
+        save_fit_cameras(out, capture, seen, self.unseen, photographs=count)
+
+    def _split(self, capture: Capture) -> None:
+        settings = self.settings
+        demand_places([view.camera for view in capture.views], settings.capture)
+        self.seen, self.unseen = split_views(capture.views, settings.hold_out, settings.views)
+        decided = self.checkpoints.decided.get("downscale")
+        self.downscale = decided or fitting_downscale(self.seen, self.device)
+
+    def _notes(self) -> list[str]:
+        """What was decided about the photographs, and what of them is not used."""
+        notes = list(self.source.notes) if isinstance(self.source, BareInput) else []
+        masks = sum(view.mask is not None for view in self.seen)
+        if masks:
+            notes.append(f"{masks} of {len(self.seen)} photographs have a mask: black is left out")
+        if self.settings.downscale is None and self.downscale > 1:
+            notes.append(size_words(self.seen, self.downscale))
+        return notes
+
+    def _trainer(
+        self, capture: Capture, pictures: CapturePictures, given: FitSettings | None = None
+    ) -> Trainer:
+        settings = given or self.settings
+        exponent = settings.exponent_for(len(pictures.views))
+        ramp = dataclasses.replace(self.training.homogenisation, exponent=exponent)
+        training = dataclasses.replace(self.training, homogenisation=ramp)
+        first = first_splats(
+            self.device,
+            *(capture, pictures),
+            count=settings.splats,
+            guessed=settings.first_count,
+            seed=settings.seed,
+        )
+        if settings.asks_for_noise(exponent):
+            count = len(pictures.views)
+            few = evenly(count, _NOISE_VIEWS)
+            noise = noise_of([pictures.image(number)[..., :3] for number in few])
+            training = dataclasses.replace(training, noise=noise)
+        return Trainer(pictures, first, training, self.drawing)
+
+    def _pictures(
+        self, views: tuple[View, ...], like: CapturePictures | None = None
+    ) -> CapturePictures:
+        settings = self.settings
+        return CapturePictures(
+            self.device,
+            views,
+            downscale=self.downscale,
+            seed=settings.seed,
+            light=settings.light,
+            like=like,
+        )
+
+    def _scored(self) -> dict[str, tuple[View, ...]]:
+        """The pictures that are scored, by the name of their group."""
+        groups = {"held out": self.unseen} if self.unseen else {}
+        return groups | {name: capture.views for name, capture in self.tests.items()}

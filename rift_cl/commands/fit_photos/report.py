@@ -1,0 +1,141 @@
+"""What ``rift fit`` shows: pictures it never saw beside the truth, errors, scores, the loss."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from rift_cl.commands.fit_photos.scores import ViewScore
+from rift_cl.commands.fit_photos.settings import ENOUGH_VIEWS, FitSettings
+from rift_cl.commands.pictures.evenly_spaced import evenly
+from rift_cl.report.html_page import Compared, Page
+from rift_cl.report.plot import curves, figure_svgs, jpeg
+
+_SHOWN = 3
+# Errors are shown this much brighter.
+ERROR_GAIN = 5.0
+
+SCORING = (
+    "PSNR in dB (peak 1) and SSIM in display light, means over the pictures. The foreground is "
+    "what differs from the background by more than two codes, or what alpha says. 'nearest' and "
+    "'blend' are the nearest training picture and the mean of the two nearest: what no fit scores."
+)
+COLUMNS = ("pictures", "score", "fit", "nearest", "blend")
+
+
+def score_rows(metrics: Mapping[str, Any]) -> list[tuple[Any, ...]]:
+    """The table of mean scores: a row for each group of pictures and kind of score."""
+    rows = []
+    for group, values in metrics["scores"].items():
+        for kind, label in (
+            ("psnr", "PSNR"), ("psnr_foreground", "PSNR foreground"), ("ssim", "SSIM")
+        ):  # fmt: skip
+            if f"fit_{kind}" in values:
+                cells = (values.get(f"{name}_{kind}", float("nan")) for name in COLUMNS[2:])
+                rows.append((group, label, *cells))
+    return rows
+
+
+def fit_page(
+    name: str,
+    groups: Mapping[str, Sequence[ViewScore]],
+    losses: Sequence[tuple[int, float]],
+    metrics: Mapping[str, Any],
+    notes: Sequence[str] = (),
+    scene: str | None = None,
+) -> Page:
+    """The report of a finished fit.
+
+    Args:
+        name: of the capture.
+        groups: scores of pictures by the name of their group.
+        losses: step and loss.
+        metrics: all figures.
+        notes: sentences about what it decided by itself.
+        scene: a page beside the report that draws the scene, if there is one.
+    """
+    basis = f", {metrics['basis']}" if "basis" in metrics else ""
+    page = Page(f"Splats fitted to {name}", f"{metrics['splats']} splats{basis}")
+    if scene is not None:
+        page.link("Walk round the scene in this browser", scene)
+    show_fit(page, groups, losses, metrics)
+    if notes:
+        page.section("What was decided")
+        for note in notes:
+            page.paragraph(note)
+    return page
+
+
+def history_notes(history: Sequence[tuple[int, int]]) -> list[str]:
+    """A sentence about the stages of a fit that was trained on."""
+    if len(history) < 2:
+        return []
+    stages = [f"to step {until} by the schedules of a fit of {steps}" for until, steps in history]
+    return [f"It was trained {', then '.join(stages)}."]
+
+
+def ramp_notes(settings: FitSettings, views: int) -> list[str]:
+    """A sentence about the ramp, where its exponent was not asked for."""
+    exponent = settings.exponent_for(views)
+    if settings.homogenise is not None or exponent == settings.exponent:
+        return []
+    return [
+        f"The ramp that weighs the residual's frequencies was off: with {views} photographs, fewer "
+        f"than {ENOUGH_VIEWS}, it was never found to help. --homogenise {settings.exponent:g} "
+        "turns it on."
+    ]
+
+
+def show_fit(
+    page: Page,
+    groups: Mapping[str, Sequence[ViewScore]],
+    losses: Sequence[tuple[int, float]],
+    metrics: Mapping[str, Any],
+) -> None:
+    """Add to a page: wipes between photographs and fit, errors, scores, the loss."""
+    for group, scores in groups.items():
+        page.section(f"Pictures: {group}")
+        show_views(page, scores, "fit")
+    if metrics["scores"]:
+        page.section("Scores")
+        page.table(COLUMNS, score_rows(metrics), caption=SCORING)
+    for group, scores in groups.items():
+        rows = [_row(score) for score in scores]
+        columns = ("picture", "degrees away", "PSNR", "SSIM", "blend PSNR")
+        caption = f"{group}: degrees away from the nearest picture that was trained on."
+        page.table(columns, rows, caption=caption)
+    page.section("Training")
+    steps, values = zip(*losses, strict=True)
+    draw = partial(curves, {"loss": (steps, values)}, xlabel="step", ylabel="loss")
+    figure = figure_svgs(lambda width: draw(width=width))
+    page.figure(figure, caption="Of the pictures as they came.", alt="Loss by step")
+
+
+def _row(score: ViewScore) -> tuple[Any, ...]:
+    values = score.values
+    blend = values.get("blend_psnr", float("nan"))
+    return (score.name, score.angle, values["fit_psnr"], values["fit_ssim"], blend)
+
+
+def show_views(page: Page, scores: Sequence[ViewScore], what: str) -> None:
+    """Add wipes between truth and picture, and errors, of the best, middle and worst by PSNR."""
+    order = sorted(scores, key=lambda score: -score.values["fit_psnr"])
+    cells: list[bytes | Compared] = []
+    titles = []
+    for place in evenly(len(order), _SHOWN):
+        score = order[place]
+        error = np.clip(np.abs(score.image - score.truth) * ERROR_GAIN, 0, 1)
+        pair = (jpeg(score.truth), jpeg(score.image))
+        cells += [Compared(*pair, names=("photograph", what)), jpeg(error)]
+        titles += [f"{score.name}, {score.values['fit_psnr']:.1f} dB", "error"]
+    page.panels(
+        cells,
+        titles=titles,
+        columns=2,
+        caption="The best, the middle and the worst by PSNR. Left of the line the photograph, "
+        f"right of it the {what}; draw the line aside. Errors are {ERROR_GAIN:g} times brighter.",
+        alt=f"Photograph and {what}",
+    )

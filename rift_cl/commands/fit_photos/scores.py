@@ -1,0 +1,133 @@
+"""How good a fit is: scores on pictures it never saw, beside what no fit at all would score.
+
+A dense ring of cameras makes blending of neighbours look good, so that two baselines stand beside
+every score: the nearest training picture as it is, and the mean of the two nearest. Nearest is by
+angle as seen from where the cameras look; that angle is in the table too. The foreground is what
+differs from the background by more than two codes, or what alpha says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.commands.fit_photos.pictures import CapturePictures
+from rift_cl.geometry import Camera
+from rift_cl.metrics import psnr, ssim
+from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.splats import Splats
+from rift_cl.train.start.points import focus_of
+
+Floats = NDArray[np.float32]
+Masks = tuple[NDArray[np.bool_] | None, NDArray[np.bool_] | None]
+
+
+@dataclass(frozen=True)
+class ViewScore:
+    """Scores of one picture.
+
+    Args:
+        name: of the picture.
+        angle: to the nearest training picture, in degrees.
+        values: PSNR in dB and SSIM by name, of the whole picture and of its foreground.
+        truth: (height, width, 3) what it should be.
+        image: (height, width, 3) what was drawn.
+    """
+
+    name: str
+    angle: float
+    values: dict[str, float]
+    truth: Floats
+    image: Floats
+
+
+def score_views(
+    renderer: Renderer, splats: Splats, unseen: CapturePictures, seen: CapturePictures | None
+) -> Iterator[ViewScore]:
+    """Draw and score every picture of ``unseen``.
+
+    ``seen`` are the ones that were trained on; where nobody knows them there are no angles and no
+    baselines.
+    """
+    behind, focus = unseen.behind, focus_of((seen or unseen).cameras)
+    for number, camera in enumerate(unseen.cameras):
+        frame = renderer.forward(splats, camera, background=renderer.device.array(behind))
+        image = unseen.shown(renderer.device.get(frame.image))
+        truth = unseen.shown(unseen.over(number, behind))
+        masks = unseen.counted(number), unseen.foreground(number)
+        values, angle = scores_of(image, truth, masks, "fit"), float("nan")
+        if seen is not None:
+            angles = _angles(seen.cameras, camera, focus)
+            angle = float(angles.min())
+            for name, blend in _baselines(seen, angles, truth.shape, behind).items():
+                values |= scores_of(blend, truth, masks, name)
+        yield ViewScore(unseen.views[number].name, angle, values, truth, image)
+
+
+def scores_of(image: Floats, truth: Floats, masks: Masks, name: str) -> dict[str, float]:
+    """PSNR and SSIM of the whole picture and of the foreground, where there is one.
+
+    Args:
+        image: (height, width, C) what is scored.
+        truth: what it should be.
+        masks: the pixels that count at all, and the foreground; None where it is all of them, or
+            where nobody can tell.
+        name: goes before the scores' names.
+    """
+    counted, foreground = masks
+    if counted is not None:
+        image = np.where(counted[..., None], image, truth)
+    channels = range(truth.shape[2])
+    values = {
+        f"{name}_psnr": psnr(image, truth, mask=_of_samples(counted, truth)),
+        f"{name}_ssim": float(np.mean([ssim(image[..., c], truth[..., c]) for c in channels])),
+    }
+    if foreground is not None and foreground.any() and not foreground.all():
+        values[f"{name}_psnr_foreground"] = psnr(image, truth, mask=_of_samples(foreground, truth))
+    return values
+
+
+def _of_samples(mask: NDArray[np.bool_] | None, truth: Floats) -> NDArray[np.bool_] | None:
+    return None if mask is None else np.repeat(mask[..., None], truth.shape[2], axis=2)
+
+
+def mean_scores(scores: Sequence[ViewScore]) -> dict[str, float]:
+    """The mean of every score over the pictures that have it."""
+    names = dict.fromkeys(name for score in scores for name in score.values)
+    return {
+        name: float(np.mean([s.values[name] for s in scores if name in s.values])) for name in names
+    }
+
+
+def score_record(groups: Mapping[str, Sequence[ViewScore]]) -> dict[str, Any]:
+    """The mean scores of each group of pictures, and those of every picture; JSON."""
+    return {
+        "scores": {name: mean_scores(scores) for name, scores in groups.items()},
+        "views": {
+            name: [{"name": s.name, "angle": s.angle, **s.values} for s in scores]
+            for name, scores in groups.items()
+        },
+    }
+
+
+def _angles(cameras: Sequence[Camera], camera: Camera, focus: NDArray[np.float64]) -> Floats:
+    """Degrees between a camera and others, as seen from where they look."""
+    ways = np.array([other.center for other in cameras]) - focus
+    way = camera.center - focus
+    across = np.linalg.norm(np.cross(ways, way), axis=1)
+    return np.asarray(np.degrees(np.arctan2(across, ways @ way)), np.float32)
+
+
+def _baselines(
+    seen: CapturePictures, angles: Floats, shape: tuple[int, ...], behind: Floats
+) -> dict[str, Floats]:
+    """The nearest training picture, and the mean of the two nearest, where their sizes agree."""
+    nearest = np.argsort(angles, kind="stable")[:2].tolist()
+    pictures = [seen.shown(seen.over(number, behind)) for number in nearest]
+    if any(picture.shape != shape for picture in pictures):
+        return {}
+    return {"nearest": pictures[0], "blend": np.mean(pictures, axis=0, dtype=np.float32)}

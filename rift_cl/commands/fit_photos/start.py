@@ -1,0 +1,58 @@
+"""Where the splats of a fit begin: at the capture's points, in the visual hull, or at random."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rift_cl.cl.device import Device
+from rift_cl.commands.fit_photos.pictures import CapturePictures
+from rift_cl.commands.pictures.evenly_spaced import evenly
+from rift_cl.io.captures.capture import Capture
+from rift_cl.train.parameters import Parameters
+from rift_cl.train.start.points import hull_points, random_points, start_splats
+
+# A fit begins with no more random splats than this share of all it may have.
+_FIRST_SHARE = 0.5
+# Photographs that carve the visual hull.
+_HULL_VIEWS = 50
+
+
+def first_splats(
+    device: Device,
+    capture: Capture,
+    pictures: CapturePictures,
+    *,
+    count: int,
+    guessed: int,
+    seed: int,
+) -> Parameters:
+    """At most ``count`` splats at the capture's points, or ``guessed`` if it has none."""
+    points, colors = capture.points, capture.point_colors
+    if points is None or len(points) == 0:
+        points, colors = _guessed(pictures, guessed, seed), None
+    elif len(points) > count:
+        random = np.random.default_rng((seed, 0x901))
+        kept = np.sort(random.choice(len(points), count, replace=False))
+        points, colors = points[kept], None if colors is None else colors[kept]
+    raw = start_splats(
+        np.asarray(points, float),
+        None if colors is None else np.asarray(colors, float),
+        seed=seed,
+    )
+    return Parameters.of(device, raw)
+
+
+def _guessed(pictures: CapturePictures, count: int, seed: int) -> Any:
+    """Points in the visual hull, or where the cameras look if there is no background."""
+    views = len(pictures.cameras)
+    few = evenly(views, _HULL_VIEWS)
+    fronts = [pictures.foreground(number) for number in few]
+    masks = [front for front in fronts if front is not None]
+    if len(masks) == len(few):
+        cameras = [pictures.cameras[number] for number in few]
+        points = hull_points(cameras, masks, count, seed)
+        if points is not None:
+            return points
+    return random_points(pictures.cameras, max(1, int(count * _FIRST_SHARE)), seed)

@@ -1,0 +1,191 @@
+"""``rift fit --mode xray``: the projections of a parallel beam become Gaussian densities."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.commands.fit.probe import TRIED, probed, time_words
+from rift_cl.commands.fit.run import FitRun
+from rift_cl.commands.fit_photos.scores import score_record
+from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.view_split import split_views
+from rift_cl.commands.fit_xray.input import Projections, XrayInput, XrayPictures
+from rift_cl.commands.fit_xray.report import xray_page
+from rift_cl.commands.fit_xray.scores import backprojected, drawn, relative_error, score_projections
+from rift_cl.commands.pictures.evenly_spaced import evenly
+from rift_cl.io.scenes.splat_scene import XrayScene
+from rift_cl.io.volumes import VOLUME_NAMES, open_volume
+from rift_cl.progress import Report
+from rift_cl.splat.splats import Splats
+from rift_cl.splat.voxels import voxelise
+from rift_cl.train.loss.homogenisation import noise_of
+from rift_cl.train.parameters import Parameters
+from rift_cl.train.start.xray import density_splats
+from rift_cl.train.xray.trainer import XrayTrainer
+from rift_cl.train.xray.voxels import Footprints
+
+# Standard deviations of splats at the start, as a share of the gaps between them.
+_SIZE = 0.8
+# Rows from which the noise is estimated, and projections that tell how good the start is.
+_FEW = 8
+
+Floats = NDArray[np.float32]
+
+
+class XrayFit(FitRun):
+    """A fit to projections that is planned; nothing is written yet.
+
+    Args:
+        settings: what to do.
+
+    Raises:
+        RiftError: the scan cannot be read, or a setting makes no sense.
+    """
+
+    def __init__(self, settings: FitSettings) -> None:
+        super().__init__(settings)
+        self.input = XrayInput(settings, self.device)
+        numbers = tuple(range(self.input.scan.shape[0]))
+        self.seen, self.unseen = split_views(
+            numbers, settings.hold_out, settings.views, what="projection"
+        )
+
+    def plan(self) -> dict[str, str]:
+        """What would be done, by name."""
+        scan, rows = self.input.scan, self.input.rows
+        bins, settings = scan.shape[2], self.settings
+        seen = self.input.read().of(self.seen)
+        tried = min(settings.splats, TRIED)
+        few = dataclasses.replace(settings, splats=tried)
+        trainer = self._trainer(seen, XrayPictures(self.device, seen), few)
+        seconds = settings.steps * probed(trainer, tried).step(settings.splats)
+        words = settings.basis_words(colored=False)
+        return {
+            "scan": f"{scan.path} ({scan.source}, {scan.kind})",
+            "trained on": f"{len(self.seen)} projections",
+            "held out": f"{len(self.unseen)} projections",
+            "rows": f"{rows[0]} to {rows[1] - 1}, {bins} bins each",
+            "splats": ", ".join(filter(None, [str(settings.splats), words])),
+            "output": f"scene.ply and {VOLUME_NAMES[settings.format]}, "
+            f"{(rows[1] - rows[0], bins, bins)} (z, y, x)",
+            "host memory": f"{self.input.need / 2**20:.0f} MiB",
+            "device": self.device.name,
+            "time": time_words(seconds) + (", and that of the solves" if settings.solve else ""),
+        }
+
+    def run(self) -> Iterator[Report]:
+        """Do it; a report now and then.
+
+        Raises:
+            StoppedError: ``stop`` was called; a checkpoint was kept.
+        """
+        if not self.settings.resume:
+            yield Report(0, self.settings.steps, "steps")
+        for note in self.input.scan.notes:
+            self.announce(note)
+        whole = self.input.read()
+        self.folder.make()
+        seen = whole.of(self.seen)
+        pictures = XrayPictures(self.device, seen)
+        trainer = self._trainer(seen, pictures)
+        first = self._start_error(trainer, seen)
+        self.settled = dataclasses.replace(
+            self.settings,
+            homogenise=self.settings.exponent,
+            center=whole.center,
+            rows=self.input.rows,
+            pitch=self.input.pitch,
+        )
+        self._begin(trainer)
+        yield from self._trained(trainer, pictures)
+        splats, volume = trainer.parameters.drawn, backprojected(self.device, seen)
+        if self.unseen:
+            self.scores["held out"] = []
+            unseen = whole.of(self.unseen)
+            for score in score_projections(trainer.renderer, splats, unseen, seen, volume):
+                self.scores["held out"].append(score)
+                done = len(self.scores["held out"])
+                yield Report(done, len(self.unseen), "projections held out")
+                self._heed(trainer.parameters.step)
+        self.metrics = {
+            "splats": len(splats),
+            "loss": self.losses[-1][1],
+            "history": self._history,
+            "center": whole.center,
+            "scale": whole.scale,
+            "start_error": first,
+            **self.settings.basis_facts(colored=False),
+            **score_record(self.scores),
+        }
+        self._leave(splats, volume, whole)
+
+    def _trainer(
+        self, seen: Projections, pictures: XrayPictures, given: FitSettings | None = None
+    ) -> XrayTrainer:
+        settings, training, rows = given or self.settings, self.training, seen.values.shape[1]
+        volume = np.maximum(backprojected(self.device, seen, "hann"), 0)
+        # Without what was negative there is too much of it: as much as the projections say.
+        mass = np.maximum(seen.values.sum(axis=2, dtype=float).mean(axis=0), 0)
+        volume *= (mass / np.maximum(volume.sum(axis=(1, 2)), 1e-12))[:, None, None]
+        raw = density_splats(
+            volume,
+            seen.grid,
+            settings.splats,
+            seed=settings.seed,
+            dilation=settings.eps2d,
+            size=_SIZE,
+        )
+        first = Parameters.of(self.device, raw, density=True)
+        asked = settings.asks_for_noise(settings.exponent)
+        if asked and min(len(self.seen), seen.values.shape[2]) >= _FEW:
+            few = evenly(rows, _FEW)
+            noise = noise_of([seen.values[:, row, :, None] for row in few])
+            training = dataclasses.replace(training, noise=noise)
+        return XrayTrainer(pictures, first, training, self.drawing, flat=rows == 1)
+
+    def _start_error(self, trainer: XrayTrainer, seen: Projections) -> float:
+        """The relative error of a few training projections before the first step."""
+        few = evenly(len(self.seen), _FEW)
+        splats, cameras = trainer.parameters.drawn, trainer.pictures.cameras
+        images = [drawn(trainer.renderer, splats, cameras[number]) for number in few]
+        return relative_error(np.stack(images), seen.values[few])
+
+    def _leave(self, splats: Splats, volume: Floats, whole: Projections) -> None:
+        """Write splats, slices and report, in the scan's units."""
+        settings, source, pitch = self.settings, self.input, self.input.pitch
+        density = whole.scale / pitch
+        scene = XrayScene.of(splats, self.device)
+        # Modes are shares of the peak, in units of the splats' axes: no unit changes them.
+        dataclasses.replace(
+            scene,
+            means=scene.means * np.float32(pitch),
+            log_scales=scene.log_scales + np.float32(log(pitch)),
+            logit_opacities=scene.logit_opacities + np.float32(log(density)),
+        ).save(settings.out / "scene.ply")
+        slices = density * self._voxels(splats, whole)
+        path, spacing = settings.out / VOLUME_NAMES[settings.format], (pitch,) * 3
+        with open_volume(
+            path, slices.shape, format=settings.format, spacing=spacing, unit=source.unit
+        ) as writer:
+            writer.write(0, slices)
+        self.folder.drop(*(set(VOLUME_NAMES.values()) - {path.name}))
+        shown = (slices, density * volume)
+        page = xray_page(source.scan.path.name, shown, self.scores, self.losses, self.metrics)
+        self.folder.finish(self.settled, self.metrics, page, self.device, asked=settings)
+
+    def _voxels(self, splats: Splats, whole: Projections) -> Floats:
+        """The splats on the grid; plain ones to the last bits of fits from before modes."""
+        if splats.shape_modes is not None:
+            volume = voxelise(self.device, splats, whole.grid, dilation=self.drawing.eps2d)
+            return np.asarray(self.device.get(volume))
+        names = ("means", "quats", "scales", "opacities")
+        means, quats, scales, peaks = (
+            self.device.get(getattr(splats, name)).astype(float) for name in names
+        )
+        footprints = Footprints(whole.grid, means, quats, scales, dilation=self.drawing.eps2d)
+        return footprints.sums(peaks).astype(np.float32)

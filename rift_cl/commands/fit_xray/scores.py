@@ -1,0 +1,88 @@
+"""How good a fit to X-rays is: projections that it never saw, beside what needs no fit.
+
+Two baselines: the filtered backprojection of the training views, projected again, and the mean of
+the two training views nearest in angle. The peak of PSNR is the largest value of the scan's
+projections; the relative error is the norm of the difference over that of the truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.device import Device
+from rift_cl.commands.fit_photos.scores import ViewScore
+from rift_cl.commands.fit_xray.input import Projections
+from rift_cl.geometry import Camera
+from rift_cl.metrics import psnr
+from rift_cl.operators import Projector
+from rift_cl.reconstruct import fbp
+from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.splats import Splats
+
+SCORING = (
+    "Line integrals of projections that were not trained on, means over them. PSNR in dB, its peak "
+    "the scan's largest line integral; the error is relative, in L2. 'fbp' is the filtered "
+    "backprojection of the training views, projected again, 'blend' the mean of the two training "
+    "views nearest in angle."
+)
+COLUMNS = ("pictures", "score", "fit", "fbp", "blend")
+
+Floats = NDArray[np.float32]
+
+
+def score_rows(metrics: Mapping[str, Any]) -> list[tuple[Any, ...]]:
+    """The table of mean scores."""
+    return [
+        (group, label, *(values[f"{name}_{kind}"] for name in COLUMNS[2:]))
+        for group, values in metrics["scores"].items()
+        for kind, label in (("psnr", "PSNR"), ("error", "error"))
+    ]
+
+
+def backprojected(device: Device, seen: Projections, filter: str = "ram-lak") -> Floats:
+    """The filtered backprojection of some views, zero where not every view sees."""
+    A = Projector(seen.grid, seen.geometry, device=device)
+    volume = np.asarray(fbp(A, seen.values, filter))
+    y, x = np.meshgrid(*(seen.grid.coordinates(axis) for axis in (1, 2)), indexing="ij")
+    return np.where(np.hypot(x, y) <= seen.reach, volume, 0).astype(np.float32)
+
+
+def drawn(renderer: Renderer, splats: Splats, camera: Camera) -> Floats:
+    """What a view measures of splats, (rows, bins)."""
+    return np.asarray(renderer.device.get(renderer.forward(splats, camera).image)[..., 0])
+
+
+def score_projections(
+    renderer: Renderer, splats: Splats, unseen: Projections, seen: Projections, volume: Floats
+) -> Iterator[ViewScore]:
+    """Draw and score every view of ``unseen``; ``volume`` is the reconstruction of ``seen``."""
+    A = Projector(unseen.grid, unseen.geometry, device=renderer.device)
+    again = np.asarray(A(volume))
+    peak = float(max(unseen.values.max(), seen.values.max()))
+    for number, camera in enumerate(unseen.cameras()):
+        truth, angle = unseen.values[number], unseen.angles[number]
+        turned = np.mod(seen.angles - angle + np.pi, 2 * np.pi) - np.pi
+        nearest = np.argsort(np.abs(turned), kind="stable")[:2]
+        images = {
+            "fit": drawn(renderer, splats, camera),
+            "fbp": again[number],
+            "blend": seen.values[nearest].mean(axis=0),
+        }
+        values = {}
+        for name, image in images.items():
+            values[f"{name}_psnr"] = psnr(image, truth, peak=peak)
+            values[f"{name}_error"] = relative_error(image, truth)
+        degrees = float(np.degrees(np.abs(turned[nearest[0]])))
+        name = f"{np.degrees(angle):.2f} degrees"
+        yield ViewScore(name, degrees, values, truth * unseen.scale, images["fit"] * unseen.scale)
+
+
+def relative_error(image: Floats, truth: Floats) -> float:
+    """Norm of the difference over that of the truth; infinity where the truth is nothing."""
+    norm = float(np.linalg.norm(truth.astype(float)))
+    away = float(np.linalg.norm(image.astype(float) - truth))
+    return away / norm if norm else float("inf")

@@ -1,0 +1,75 @@
+"""A scene and what a camera turns about in it, as the commands take them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.commands.cameras.arc import demand_places
+from rift_cl.commands.inputs.scene_bounds import SceneBounds, bounds_of_cameras, bounds_of_splats
+from rift_cl.commands.inputs.scene_input import OpenedScene, SceneInput
+from rift_cl.errors import InputError
+from rift_cl.io.captures.capture import open_capture
+
+
+@dataclass(frozen=True)
+class OrbitInput(SceneInput):
+    """Where a scene is, what a camera turns about, and which way is up."""
+
+    capture: Path | None = None
+    """A capture of the same scene (its photographs need not be there): look from where its cameras
+    did, upright and as far off. The fit's own cameras when not given."""
+    up: tuple[float, float, float] | None = None
+    """Which way is up; as the cameras of --capture or of the fit were held, or from the scene's
+    shape, when not given."""
+
+    def bounds(self, scene: OpenedScene) -> SceneBounds:
+        """Where the scene lies, and the cameras that it was seen by.
+
+        Raises:
+            RiftError: the capture cannot be read, or its cameras all stand in one place, or --up
+                has no direction.
+        """
+        bounds, own, up = bounds_of_splats(scene.splats), scene.cameras, self._direction_up()
+        if self.capture is not None:
+            capture = open_capture(self.capture, photographs=False)
+            cameras = [view.camera for view in capture.views]
+            demand_places(cameras, self.capture)
+            return bounds_of_cameras(cameras, bounds, capture.points, up=up)
+        if own is not None:
+            cameras, up = [view.camera for view in own.views], own.up if up is None else up
+            return bounds_of_cameras(cameras, bounds, center=own.focus, up=up)
+        return bounds if up is None else replace(bounds, up=up)
+
+    def _direction_up(self) -> NDArray[np.float64] | None:
+        """The unit vector (3,) that --up asks for, or None."""
+        if self.up is None:
+            return None
+        length = math.hypot(*self.up)
+        if not 0 < length < math.inf:
+            raise InputError(f"--up is {' '.join(map(str, self.up))}, wanted a direction")
+        return np.array(self.up) / length
+
+    def notes(self, scene: OpenedScene) -> tuple[str, ...]:
+        """What had to be guessed of a fit's cameras, a sentence each."""
+        known = scene.cameras is not None or self.capture is not None
+        # A scan's views are no cameras that anybody held.
+        if known or scene.splats.mode == "xray":
+            return ()
+        if scene.folder is None:
+            return () if scene.fit is None else (self._without_fit(scene.fit),)
+        return (
+            f"{self.scene} holds no cameras, since an older version fitted it: the way of the "
+            "camera and what is up are guessed from the splats (name its capture with --capture).",
+        )
+
+    def _without_fit(self, fit: Path) -> str:
+        return (
+            f"{self.scene} is taken without the fit that it lies in: the way of the camera and "
+            "what is up are guessed from the splats, background and drawing are the usual ones "
+            f"(name the folder instead: {fit})."
+        )

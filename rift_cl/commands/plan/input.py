@@ -1,0 +1,214 @@
+"""What is planned for: the target, the cameras to choose among, and what they have to keep to."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from rift_cl.commands.analyze.input import open_sampled
+from rift_cl.commands.analyze.settings import AnalyzeSettings
+from rift_cl.commands.inputs.surfaces import SURFACE, hidden_places, surface_of
+from rift_cl.commands.inputs.view_set import Floats, Sampled
+from rift_cl.commands.plan.keep_out_words import keep_out_of
+from rift_cl.commands.plan.settings import PlanSettings
+from rift_cl.errors import InputError
+from rift_cl.geometry.camera_type import CameraType
+from rift_cl.io.captures.camera_file import CameraChoice, read_cameras, with_lens
+from rift_cl.io.captures.capture import holds_capture
+from rift_cl.io.lenses.lens_file import open_lens
+from rift_cl.io.volumes import read_volume
+from rift_cl.sampling.planning.constraints import Budget, Constraints, Ranges
+from rift_cl.sampling.planning.design_space import DISTANCE, Site
+from rift_cl.sampling.planning.paths import Free, Ring, Spline, TiltedRings
+from rift_cl.sampling.planning.paths import Path as Way
+from rift_cl.sampling.targets.directional_prior import Trusted
+from rift_cl.sampling.targets.pilot import Pilot
+from rift_cl.sampling.targets.prior import PowerLaw, Prior, directions_for
+from rift_cl.sampling.targets.target import Target
+
+DIAMETER = 100.0
+# What most people have: 24 megapixels of 3.9 micrometres, 50 mm, closed far enough for depth.
+USUAL = CameraChoice(CameraType("24 MP, 50 mm, f/11", 50.0, 11.0, 3.9e-3, (4000, 6000)))
+
+
+@dataclass(frozen=True, eq=False)
+class PlanInput:
+    """What a plan is made of; lengths in millimetres.
+
+    Args:
+        target: what is looked at.
+        constraints: what the views have to keep to.
+        choices: cameras that may be used.
+        have: views that are taken already, or None.
+        notes: what had to be assumed, a sentence each.
+    """
+
+    target: Target
+    constraints: Constraints
+    choices: tuple[CameraChoice, ...]
+    have: Sampled | None
+    notes: tuple[str, ...]
+
+    @property
+    def types(self) -> tuple[CameraType, ...]:
+        """The cameras that may be used."""
+        return tuple(choice.kind for choice in self.choices)
+
+
+def plan_input(settings: PlanSettings) -> PlanInput:
+    """Read what the settings name, and fill in what they leave out.
+
+    Raises:
+        RiftError: a file cannot be read, or constraints or a camera make no sense.
+    """
+    notes: list[str] = []
+    have = None if settings.have is None else _have(settings, settings.have)
+    target = _target(settings, have, notes)
+    choices = _choices(settings, notes)
+    constraints = _constraints(settings, choices, have)
+    if have is not None and have.space is not None:
+        constraints, target = _in_sight(have, target, constraints, choices)
+    return PlanInput(target, constraints, choices, have, tuple(notes))
+
+
+def _in_sight(
+    have: Sampled, target: Target, constraints: Constraints, choices: tuple[CameraChoice, ...]
+) -> tuple[Constraints, Target]:
+    """The constraints, and the sides of the target, without what views show to be in the way."""
+    site = Site(target, constraints, tuple(choice.kind for choice in choices))
+    near, far = site.limits[:, DISTANCE, 0].min(), site.limits[:, DISTANCE, 1].max()
+    shut = hidden_places(have, float(near), float(far))
+    open_sides = surface_of(have, float(math.sqrt(near * far)))
+    target = replace(target, points=open_sides.points, normals=open_sides.normals)
+    if shut is None:
+        return constraints, target
+    return replace(constraints, keepouts=(*constraints.keepouts, shut)), target
+
+
+def _have(settings: PlanSettings, path: Path) -> Sampled:
+    if not holds_capture(path):
+        raise InputError(f"--have {path} is no capture, wanted photographs and their cameras")
+    asked = AnalyzeSettings(
+        source=path, center=_in_units(settings), diameter=_over(settings.diameter, settings.unit),
+        unit=settings.unit, mode="surface" if settings.opaque else "volume", device=settings.device,
+    )  # fmt: skip
+    asked.check()
+    return open_sampled(asked)
+
+
+def _in_units(settings: PlanSettings) -> tuple[float, float, float] | None:
+    if settings.center is None:
+        return None
+    x, y, z = (value / settings.unit for value in settings.center)
+    return x, y, z
+
+
+def _over(length: float | None, unit: float) -> float | None:
+    return None if length is None else length / unit
+
+
+def _target(settings: PlanSettings, have: Sampled | None, notes: list[str]) -> Target:
+    if have is not None:
+        center, diameter = have.target.center, have.target.diameter
+        notes.extend(have.notes)
+    else:
+        center = np.array(settings.center or (0.0, 0.0, 0.0))
+        diameter = settings.diameter or DIAMETER
+        if settings.diameter is None:
+            notes.append(f"The target is taken to be {DIAMETER:g} mm across (--diameter).")
+    prior = _prior(settings, diameter, notes)
+    points, normals = center[None], None
+    if settings.opaque:
+        ways = directions_for(3, SURFACE // 2)
+        normals = np.concatenate([ways, -ways])
+        points = center + diameter / 2 * normals
+        if have is None:
+            notes.append(
+                "The target is taken to be opaque: a sphere stands for its surface, and nothing "
+                "else is in the way (--mode volume is for X-rays)."
+            )
+        elif have.space is None:
+            notes.append(
+                "What stands in the way is not known: name places to keep out of (--keep-out), or "
+                "give the folder of a fit."
+            )
+    else:
+        notes.append(
+            "The target is taken to be seen through, so that opposite views tell the same and one "
+            "side may go unseen; an opaque one wants --mode surface."
+        )
+    return Target(
+        center=center,
+        diameter=diameter,
+        points=points,
+        normals=normals,
+        mode="surface" if settings.opaque else "volume",
+        prior=prior,
+        snr=settings.snr,
+        band=settings.band,
+    )
+
+
+def _prior(settings: PlanSettings, diameter: float, notes: list[str]) -> Prior:
+    if settings.pilot is None:
+        notes.append(
+            "The target's power is taken to fall as 1/k^2, alike in all directions (--pilot)."
+        )
+        return PowerLaw(2.0)
+    volume = read_volume(settings.pilot)
+    spacing = settings.pilot_spacing
+    if spacing is None:
+        spacing = diameter / max(volume.shape)
+        notes.append(
+            f"Samples of the pilot are taken to lie {spacing:.4g} mm apart, so that the target "
+            "fills it (--pilot-spacing)."
+        )
+    pilot = Pilot(volume, spacing)
+    if settings.prior_trust == 1 and settings.prior_blur == 0:
+        return pilot
+    return Trusted(pilot, settings.prior_trust, math.radians(settings.prior_blur), pilot.axes)
+
+
+def _choices(settings: PlanSettings, notes: list[str]) -> tuple[CameraChoice, ...]:
+    choices = [choice for path in settings.camera for choice in read_cameras(path)]
+    if not choices:
+        choices = [USUAL]
+        notes.append(
+            f"The camera is taken to be one with {USUAL.kind.name}, pixels of "
+            f"{USUAL.kind.pixel * 1e3:g} micrometres (--camera)."
+        )
+    if settings.lens is not None:
+        lens = open_lens(settings.lens)
+        choices = [replace(c, kind=_named(c, with_lens(c.kind, lens))) for c in choices]
+    return tuple(choices)
+
+
+def _named(choice: CameraChoice, made: CameraType) -> CameraType:
+    return replace(made, name=f"{choice.kind.name} with {made.name}")
+
+
+def _constraints(
+    settings: PlanSettings, choices: tuple[CameraChoice, ...], have: Sampled | None
+) -> Constraints:
+    budget = None
+    if settings.budget is not None:
+        budget = Budget(settings.budget, {choice.kind.name: choice.cost for choice in choices})
+    ways: dict[str, Way] = {"free": Free(), "ring": Ring(), "spline": Spline()}
+    way = ways[settings.path] if settings.path in ways else TiltedRings(settings.rings)
+    up: Floats = np.array([0.0, 0, 1]) if have is None else have.up
+    low, high = (math.radians(angle) for angle in settings.elevation)
+    first, last = (math.radians(angle) for angle in settings.azimuth)
+    return Constraints(
+        elevation=(low, high),
+        azimuth=(first, last),
+        distance=settings.distance,
+        keepouts=tuple(keep_out_of(text) for text in settings.keep_out),
+        cover=settings.cover,
+        path=way,
+        budget=budget,
+        ranges={c.kind.name: Ranges(**c.ranges) for c in choices if c.ranges},
+        up=(float(up[0]), float(up[1]), float(up[2])),
+    )

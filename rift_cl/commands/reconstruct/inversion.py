@@ -1,0 +1,261 @@
+"""The methods of ``rift reconstruct``: from the projections of a slab to its slices.
+
+Formulas take a slab at once. Methods that take steps go through it slice by slice: each slice then
+has its own steps, so that no result depends on how much memory there was for a slab.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.budget import plan_chunks
+from rift_cl.cl.device import Device
+from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.commands.reconstruct.slice_input import SliceInput
+from rift_cl.commands.reconstruct.slice_window import Window
+from rift_cl.operators import (
+    FastProjector,
+    LinearOperator,
+    ParallelProjector,
+    cheapest_projector,
+)
+from rift_cl.progress import Report
+from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp
+from rift_cl.reconstruct.solvers import poisson_weights
+from rift_cl.reconstruct.solvers.direction_weights import DirectionWeights
+from rift_cl.reconstruct.solvers.disc_prior import find_disc, material_lengths
+from rift_cl.reconstruct.solvers.few_levels import FewLevels
+from rift_cl.reconstruct.solvers.measured_rays import SeenRays
+from rift_cl.reconstruct.solvers.ordered_subsets import OrderedSubsets
+from rift_cl.reconstruct.solvers.solver import Solver
+
+Floats = NDArray[np.float32]
+# Images and sinograms, float32, that a slice needs on host and device at a time: a formula's are
+# counts, line integrals, two temporaries and the filtered ones; a method's are its state as well.
+# The next slab is read and the last one written at the same time: an image and two sinograms more.
+_ARRAYS = {
+    "fbp": (3, 8),
+    "backproject": (3, 8),
+    "sirt": (6, 11),
+    "cgls": (6, 12),
+    "tv": (17, 12),
+    "levels": (20, 13),
+}
+# Directions that no view looks along, in one piece, from which on angles count as limited.
+_LIMITED = np.pi / 6
+# Copies of what is read before it is binned.
+_READ = 2
+# Slices between two reports of progress; of those that take steps, each of which is reported.
+_SLAB, _ITERATIVE_SLAB = 16, 4
+# Steps that are timed, after a first one that builds the kernels.
+_TIMED_STEPS = 3
+# The usual weight of the total variation, as a share of what would level features of a few bins.
+_VARIATION = 0.1
+
+
+@dataclass
+class Inversion:
+    """A method at work on the slices of one scan.
+
+    Args:
+        settings: the method and its options.
+        source: the scan; located.
+        device: where to work.
+        residuals: root mean square of the residual after each step, by detector row.
+    """
+
+    settings: ReconstructSettings
+    source: SliceInput
+    device: Device
+    residuals: dict[int, list[float]] = field(default_factory=dict)
+    _projectors: dict[int, ParallelProjector] = field(default_factory=dict)
+
+    @property
+    def window(self) -> Window:
+        """Where the slices lie."""
+        return Window.of(self.settings, self.source)
+
+    @property
+    def need(self) -> int:
+        """Bytes that a slice takes, on host and device together, besides the projector's own."""
+        A = self.projector(1)
+        images, sinograms = _ARRAYS[self.settings.method]
+        views, bins = len(A.scan.angles), max(A.scan.bins, self.source.scan.shape[2])
+        views = max(views, self.source.scan.shape[0])
+        # What is binned is read as it is.
+        fine = (self.settings.binning**2 - 1) * _READ * self.source.scan.shape[0] * bins
+        return 4 * (images * int(np.prod(A.grid.shape[-2:])) + sinograms * views * bins + fine)
+
+    def projector(self, slices: int) -> ParallelProjector:
+        """The projector of so many slices, kept for the next slab of the same size."""
+        count = 0 if self.settings.iterative else slices
+        if count not in self._projectors:
+            self._projectors[count] = self._projector(slices)
+        return self._projectors[count]
+
+    def slabs(self, runs: list[slice]) -> list[slice]:
+        """Cut runs of slices into slabs that fit the budget.
+
+        Raises:
+            ResourceLimitError: not even one slice does.
+        """
+        scratch = self.projector(1).scratch
+        most = _ITERATIVE_SLAB if self.settings.iterative else _SLAB
+        cut = []
+        for run in runs:
+            count, budget = run.stop - run.start, self.device.budget
+            for chunk in plan_chunks(count, self.need, scratch, budget, what="slice"):
+                first, stop = run.start + chunk.start, run.start + chunk.stop
+                cut += [slice(at, min(at + most, stop)) for at in range(first, stop, most)]
+        return cut
+
+    def slices(self, first: int, projections: Floats) -> Generator[Report, None, Floats]:
+        """Reconstruct a slab; a report after every step of every slice.
+
+        Args:
+            first: detector row of the first slice, for ``residuals``.
+            projections: (angle, row, bin) as ``SliceInput.read`` gives them.
+
+        Returns:
+            (row, y, x), attenuation per unit of length.
+        """
+        if not self.settings.iterative:
+            return self._formula(projections)
+        _, part = self.window.around(self._width())
+        slab = np.empty((projections.shape[1], *self.window.shape), np.float32)
+        for row in range(projections.shape[1]):
+            solver, level = self._solver(np.ascontiguousarray(projections[:, row]))
+            curve = self.residuals.setdefault(first + row, [])
+            for report in solver.run(self.settings.most_steps):
+                curve.append(report.values["residual"])
+                yield Report(report.done, self.settings.most_steps, "steps", report.values)
+            slab[row] = level * self.device.get(solver.image)[part]
+        return slab
+
+    def figures(self) -> dict[str, float]:
+        """What came out of the steps, over all slices."""
+        curves = [curve for curve in self.residuals.values() if curve]
+        if not curves:
+            return {}
+        return {
+            "steps": float(np.mean([len(curve) for curve in curves])),
+            "residual": float(np.sqrt(np.mean([curve[-1] ** 2 for curve in curves]))),
+        }
+
+    def seconds(self, projections: Floats) -> float:
+        """How long a slice takes, from a first one or from its first steps."""
+        if not self.settings.iterative:
+            # Twice: the first time builds the kernels.
+            for _ in range(2):
+                begin = time.perf_counter()
+                self._formula(projections)
+            return time.perf_counter() - begin
+        solver, _ = self._solver(np.ascontiguousarray(projections[:, 0]))
+        moments = [time.perf_counter() for _ in solver.run(1 + _TIMED_STEPS)]
+        each = (moments[-1] - moments[0]) / max(len(moments) - 1, 1)
+        # Steps that end early in the slices that are done do so in the others.
+        return each * self.figures().get("steps", self.settings.most_steps)
+
+    def _formula(self, projections: Floats) -> Floats:
+        prepared, _ = self.source.for_formula(projections)
+        A = self.projector(projections.shape[1])
+        if self.settings.method == "backproject":
+            return np.asarray(backproject(A, prepared))
+        settings = self.settings
+        return np.asarray(fbp(A, prepared, settings.view_filter(), settings.compensate))
+
+    def _solver(self, sinogram: Floats) -> tuple[Solver, float]:
+        """The method at its beginning, and the attenuation that its image is in units of."""
+        settings = self.settings
+        if settings.method == "levels":
+            return self._few_levels(sinogram)
+        A, options = self._seen_rays(sinogram)
+        options["noise"] = settings.noise
+        if settings.method == "sirt" and settings.subsets not in (None, 1):
+            subsets, nonnegative = settings.subsets, settings.nonnegative
+            return OrderedSubsets(A, sinogram, subsets, nonnegative=nonnegative, **options), 1.0
+        options["precondition"] = settings.precondition
+        if settings.method == "cgls":
+            return Cgls(A, sinogram, **options), 1.0
+        options["nonnegative"] = settings.nonnegative
+        if settings.method == "sirt":
+            return Sirt(A, sinogram, **options), 1.0
+        weight = usual_weight(sinogram) if settings.weight is None else settings.weight
+        return Pdhg(A, sinogram, weight, **options), 1.0
+
+    def _few_levels(self, sinogram: Floats) -> tuple[Solver, float]:
+        """One material in a disc of it: lengths of material are solved for, from 0 to 1."""
+        A, seen = self.projector(1), self.source.seen
+        disc = find_disc(sinogram, A.scan, seen=seen)
+        material = material_lengths(sinogram, A.scan, disc, seen=seen)
+        lengths = np.asarray(material.lengths, np.float32)
+        weight = self.settings.weight
+        solver = FewLevels(
+            A,
+            lengths,
+            usual_weight(lengths) if weight is None else weight,
+            support=disc.coverage(A.grid),
+            weights=None if seen is None else seen.astype(np.float32),
+            direction_weights=_direction_weights(A.scan.angles),
+        )
+        return solver, material.attenuation
+
+    def _seen_rays(self, sinogram: Floats) -> tuple[LinearOperator, dict[str, Any]]:
+        """The projector of the rays that were measured, and the solver's weights of them."""
+        whole, seen = self.projector(1), self.source.seen
+        if self.settings.weights is None:
+            return (whole if seen is None else SeenRays(whole, seen)), {}
+        weights = poisson_weights(sinogram).weights
+        if seen is not None:
+            weights[~seen] = 0
+        return whole, {"weights": weights}
+
+    def _projector(self, slices: int) -> ParallelProjector:
+        settings, device = self.settings, self.device
+        if settings.iterative:
+            grid, scan = self.window.around(self._width())[0], self.source.geometry
+        else:
+            grid, scan = self.window.grid(slices), self.source.formula_geometry()
+        if settings.error is not None:
+            # A whole lobe of the bins' spectrum, as cheapest_projector takes for solvers.
+            lobes: Any = 1 if settings.iterative else "image"
+            return FastProjector(grid, scan, settings.error, lobes=lobes, device=device)
+        return cheapest_projector(
+            grid,
+            scan,
+            iterative=settings.iterative,
+            footprint=settings.footprint,
+            device=device,
+        )
+
+    def _width(self) -> float:
+        """What the rays meet: twice the way from the axis to the farther end of the detector."""
+        scan = self.source.geometry
+        reach = max(scan.center + 0.5, scan.bins - 0.5 - scan.center) + self.source.pad
+        return float(2 * reach * scan.pitch)
+
+
+def _direction_weights(angles: NDArray[np.float64]) -> DirectionWeights | None:
+    """Less weight along directions that no view looks across; None where views go all round."""
+    directions = np.sort(np.mod(angles, np.pi))
+    gap = np.diff(directions, append=directions[0] + np.pi).max()
+    return DirectionWeights.of(angles) if gap > _LIMITED else None
+
+
+def usual_weight(sinogram: Floats) -> float:
+    """A weight of the total variation that suits most slices, in the solver's unit.
+
+    A disc of radius R and value u adds ``2 pi R u`` to the variation and, lowered by d,
+    ``views * 4/3 * 2 R * (d R)^2`` or so to the data term: the weight that lowers features of a
+    given number of bins by a given share goes with u, the views and the distance of bins. The
+    greatest line integrals over half of the detector's width stand for u.
+    """
+    views, bins = sinogram.shape
+    strong = float(np.percentile(np.abs(sinogram), 99))
+    return float(_VARIATION * views * strong / (bins / 2))

@@ -1,0 +1,330 @@
+"""``rift reconstruct``: a scan goes in, quantitative slices come out.
+
+Rows are read, corrected, reconstructed and kept a slab at a time, as many together as the memory
+budget allows, so that the size of a scan is bounded by the disk alone, and that a run which was
+cut off goes on where it was.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.device import Device
+from rift_cl.commands.reconstruct.clean_rows import LoadedRows
+from rift_cl.commands.reconstruct.decided import decided_settings
+from rift_cl.commands.reconstruct.inversion import Inversion
+from rift_cl.commands.reconstruct.kept_slabs import (
+    SlabFolder,
+    demand_same,
+    finished_run,
+    run_folder,
+)
+from rift_cl.commands.reconstruct.overlap import Behind, ahead
+from rift_cl.commands.reconstruct.report import (
+    PREVIEW_PICTURE,
+    Preview,
+    planned,
+    reconstruction_page,
+    write_preview,
+)
+from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.commands.reconstruct.slice_input import SliceInput
+from rift_cl.commands.reconstruct.volume import demand_place, open_slices, volume_path
+from rift_cl.errors import StoppedError
+from rift_cl.io.volumes import VOLUME_NAMES, suggested_window
+from rift_cl.progress import Report
+from rift_cl.reconstruct import Attenuation
+
+# Slices from which a run by a formula is worth a look before it goes on.
+_PREVIEW_FROM = 8
+
+# What decides the slices and is found on the way.
+_FOUND = ("axis", "tilt of the axis", "volume")
+Floats = NDArray[np.float32]
+
+
+class Reconstruction:
+    """A reconstruction that is planned: the input is open, nothing is written yet.
+
+    Args:
+        settings: what to do.
+
+    Raises:
+        RiftError: anything about the settings, the file, the device or the folder is wrong.
+    """
+
+    def __init__(self, settings: ReconstructSettings) -> None:
+        settings.check()
+        self.settings = settings
+        self.device: Device = settings.open_device()
+        self.source = SliceInput(settings, self.device)
+        self.inversion = Inversion(settings, self.source, self.device)
+        # Made now, so that a part that is not inside the slice is told before any work.
+        self._kept = SlabFolder(settings.out / "slabs", self.shape)
+        self.folder = run_folder(settings, self._kept)
+        self.metrics: dict[str, Any] = {}
+        self.announce: Callable[[str], None] = lambda line: None
+        # Whether the slabs that are there are this run's, and whether it found them there.
+        self._ours, self._gone_on = False, False
+        # What the integers of the volume stand for.
+        self._values: tuple[float, float] | None = None
+        # Whether this run has left a picture of the middle slice.
+        self._shown = False
+        self._begin = time.perf_counter()
+
+    @property
+    def rows(self) -> tuple[int, int]:
+        """First detector row, and the one after the last."""
+        return self.source.rows
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Shape of the volume, (z, y, x); of a full turn's, once the axis is known."""
+        return self.rows[1] - self.rows[0], *self.inversion.window.shape
+
+    @property
+    def result(self) -> str:
+        """What there is when it is done, and where."""
+        if self.settings.preview:
+            return (
+                f"{self.settings.out / PREVIEW_PICTURE} shows the middle slice; all "
+                f"{self.shape[0]} would take about {self.metrics['seconds_for_all']:.3g} s"
+            )
+        return f"slices and report.html are in {self.settings.out}"
+
+    @property
+    def decided(self) -> ReconstructSettings:
+        """The settings with all that was decided; of a run whose axis is known."""
+        return decided_settings(self.source, self.inversion, self._values)
+
+    @cached_property
+    def slabs(self) -> list[slice]:
+        """Slices that are worked on together, counted from the first row that was asked for."""
+        return self.inversion.slabs([slice(0, self.shape[0])])
+
+    def plan(self) -> dict[str, str]:
+        """What would be done, for ``--dry-run``; one slice is reconstructed to tell the time."""
+        self.source.locate()
+        return planned(self, self._seconds_per_slice() * self.shape[0])
+
+    def run(self) -> Iterator[Report]:
+        """Do it; a report after every slab, or after every step.
+
+        Raises:
+            StoppedError: it was broken off, and what was done is kept.
+        """
+        self._begin = time.perf_counter()
+        if self._finished_before():
+            self.announce(f"{self.settings.out}: the reconstruction is complete already")
+            return
+        if not self.settings.resume:
+            yield Report(0, self._total, self._what)
+        self._settle()
+        self.folder.make()
+        try:
+            if self.settings.preview:
+                yield from self._look()
+                return
+            demand_place(self.settings, self.source, self.inversion.window)
+            if not self._gone_on:
+                self._ours = True
+                self._kept.begin(self._facts())
+            yield from self._work()
+        except BaseException as error:
+            if not self._keep_what_is_done():
+                self.folder.discard()
+            elif isinstance(error, KeyboardInterrupt):
+                raise StoppedError(
+                    f"interrupted; {self._kept.done} of {self.shape[0]} slices are kept: the same "
+                    "command with --resume goes on"
+                ) from None
+            raise
+        self._finish()
+
+    def _settle(self) -> None:
+        """Find the axis, and whether there is something to go on with; nothing is written.
+
+        Raises:
+            InputError: the axis cannot be found, or a part that is wanted is not in the slice.
+            CheckpointError: what there is to go on with belongs to another run.
+        """
+        going_on = self.settings.resume and self._kept.begun
+        axis = self._kept.axis() if going_on and self.settings.center is None else None
+        if axis is not None:
+            self.source.center, self.source.tilt = axis
+        self.source.locate()
+        if going_on and not self.settings.preview:
+            self._kept.go_on(self._facts())
+            self._ours = self._gone_on = True
+        self._kept.shape = self.shape
+        if self._gone_on:
+            self.source.notes.append(
+                f"Gone on after {self._kept.done} of {self.shape[0]} slices; steps, seconds and "
+                "dead pixels are those of the rest."
+            )
+        for note in self.source.notes:
+            self.announce(note)
+
+    def _finished_before(self) -> bool:
+        """Whether ``--resume`` met a run that had come to its end.
+
+        Raises:
+            CheckpointError: that run would have made other slices.
+        """
+        before = finished_run(self.settings) if self.settings.resume else None
+        if before is None or self._kept.begun:
+            return False
+        now = {**self._facts(), **{name: before.get(name) for name in _FOUND}}
+        demand_same(self.settings.out, "the finished run", before, now)
+        return True
+
+    def _facts(self) -> dict[str, str]:
+        """What decides the slices."""
+        return {**self.settings.decisive(), **self.source.identity(), "volume": str(self.shape)}
+
+    @property
+    def _what(self) -> str:
+        return "steps" if self.settings.iterative else "slices"
+
+    @property
+    def _total(self) -> int:
+        return self.shape[0] * self.settings.most_steps
+
+    @property
+    def _looks_first(self) -> bool:
+        count = self.shape[0]
+        return count >= _PREVIEW_FROM or (self.settings.iterative and count > 1)
+
+    def _work(self) -> Iterator[Report]:
+        """Every slice that is missing; first, of a long run, the middle one to look at."""
+        # Less those of the row that the axis was looked for in.
+        self.source.clean.zingers = 0
+        if not self._gone_on and self._looks_first:
+            yield from self._look()
+        done = self._kept.done
+        if self._gone_on:
+            # Where it goes on, so that nobody takes what was done before for this run's pace.
+            yield Report(done * self.settings.most_steps, self._total, self._what)
+        values = {} if self.source.center is None else {"center": self.source.center}
+        slabs = self.inversion.slabs(self._kept.missing())
+        with Behind() as behind, ahead(slabs, self._load) as load:
+            for slab, loaded in load:
+                integrals = self.source.projections(loaded)
+                slices = yield from self._slab(slab, integrals, done)
+                behind.do(self._kept.save, slab.start, slices)
+                done += slab.stop - slab.start
+                yield Report(done * self.settings.most_steps, self._total, self._what, values)
+
+    def _look(self) -> Iterator[Report]:
+        """Reconstruct the middle slice and show it; alone, tell how long the others would take."""
+        middle = self.shape[0] // 2
+        slab = slice(middle, middle + 1)
+        image = yield from self._slab(slab, self.source.projections(self._load(slab)), 0)
+        path = self._show(image[0])
+        if not self.settings.preview:
+            self._kept.save(middle, image)
+            self.announce(f"{path} shows the middle slice")
+            yield Report(self.settings.most_steps, self._total, self._what)
+            return
+        # Not the time that it took, in which kernels were built.
+        seconds = self._seconds_per_slice() * self.shape[0]
+        self.metrics["seconds_for_all"] = seconds
+        self.announce(f"{path} shows the middle slice; all take about {seconds:.3g} s")
+        yield Report(self._total, self._total, self._what, {"seconds for all": seconds})
+
+    def _show(self, image: Floats) -> Path:
+        """Leave the middle slice as a picture."""
+        path = self.settings.out / PREVIEW_PICTURE
+        number = self.rows[0] + self.shape[0] // 2
+        write_preview(path, image, f"slice {number}")
+        self._shown = True
+        return path
+
+    def _load(self, slab: slice) -> LoadedRows:
+        first = self.rows[0]
+        return self.source.clean.load(first + slab.start, first + slab.stop)
+
+    def _slab(
+        self, slab: slice, integrals: Attenuation, before: int
+    ) -> Generator[Report, None, Floats]:
+        found = {"dead_pixels": integrals.dead, "starved_samples": integrals.starved}
+        self.metrics.update({name: self.metrics.get(name, 0) + n for name, n in found.items()})
+        steps = self.inversion.slices(self.rows[0] + slab.start, integrals.projections)
+        done = before * self.settings.most_steps
+        while True:
+            try:
+                report = next(steps)
+            except StopIteration as end:
+                slices: Floats = end.value
+                return slices
+            yield Report(done + report.done, self._total, self._what, report.values)
+
+    def _finish(self) -> None:
+        """Make the volume of the slabs, and the report."""
+        preview = Preview(self.shape[0])
+        self._values = self._value_window()
+        window = self.inversion.window
+        with open_slices(self.settings, self.source, window, self._values) as volume:
+            for start, slab in self._kept.slabs():
+                volume.write(start, slab)
+                preview.take(start, slab)
+        if self._values is not None:
+            below, above = volume.clipped
+            self.metrics |= {"clipped_below": below, "clipped_above": above}
+        # From here on the slices are this run's, and an earlier configuration no longer theirs.
+        self.folder.mark()
+        self.folder.drop(*set(VOLUME_NAMES.values()) - {volume_path(self.settings).name})
+        if not self._shown:
+            self._show(preview.middle)
+        if self.source.center is not None:
+            self.metrics = {"center": self.source.center, **self.metrics}
+        if self.settings.zingers is not None:
+            self.metrics["zingers"] = self.source.clean.zingers
+        self.metrics.update(self.inversion.figures())
+        self.metrics.update(preview.statistics())
+        self.metrics["seconds"] = time.perf_counter() - self._begin
+        self.metrics.pop("seconds_for_all", None)
+        page = reconstruction_page(self, preview)
+        record = {**self.metrics, "assumed": self.source.notes}
+        facts = {"axis": self.source.axis, "run": self._facts()}
+        self.folder.finish(self.decided, record, page, self.device, asked=self.settings, **facts)
+        self._kept.drop()
+
+    def _value_window(self) -> tuple[float, float] | None:
+        """What the integers of the volume stand for, from a few slices where it was not said."""
+        if self.settings.dtype == "float32" or self.settings.window is not None:
+            return self.settings.window
+        wanted = Preview(self.shape[0]).panels
+        slabs = self._kept.slabs(wanted)
+        images = [
+            slab[n - start] for start, slab in slabs for n in wanted if 0 <= n - start < len(slab)
+        ]
+        low, high = suggested_window(images)
+        self.source.notes.append(
+            f"Samples are {self.settings.dtype} from {low:g} to {high:g}, a window chosen from "
+            f"{len(images)} slices (--window)."
+        )
+        return low, high
+
+    def _keep_what_is_done(self) -> bool:
+        """After a failure: whether slices are kept; else the traces of the run are removed."""
+        if not self._ours:
+            return False
+        if self._gone_on or self._kept.done:
+            return True
+        self._kept.drop()
+        return False
+
+    def _seconds_per_slice(self) -> float:
+        first = self.rows[0]
+        begin = time.perf_counter()
+        integrals = self.source.read(first, first + 1)
+        reading = time.perf_counter() - begin
+        return reading + self.inversion.seconds(integrals.projections)

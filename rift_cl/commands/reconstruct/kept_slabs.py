@@ -1,0 +1,188 @@
+"""Slices that are done stay: what a reconstruction keeps, so that it can be gone on with.
+
+Every slab is a file of its own, ``slabs/00016-00032.npy``, beside ``slabs/run.json`` which says of
+what run they are. They become the volume when all are there, and go then. What was kept is known
+by the slices and not by the slabs, which differ with the memory that is free.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.commands.reconstruct.report import PREVIEW_PICTURE
+from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.commands.reconstruct.volume import volume_path
+from rift_cl.commands.run_folder.run_folder import RunFolder
+from rift_cl.errors import CheckpointError, OutputError
+from rift_cl.io.output import atomic_path, check_space, make_folder, write_json, writing
+
+Floats = NDArray[np.float32]
+_SLAB = re.compile(r"(\d{5,})-(\d{5,})\.npy")
+_RUN = "run.json"
+
+
+class SlabFolder:
+    """The slabs of one run.
+
+    Args:
+        path: the folder; made by ``begin``.
+        shape: (z, y, x) of the volume.
+    """
+
+    def __init__(self, path: Path, shape: tuple[int, int, int]) -> None:
+        self.path, self.shape = path, shape
+
+    @property
+    def begun(self) -> bool:
+        """Whether an earlier run left something to go on with."""
+        return (self.path / _RUN).is_file()
+
+    def begin(self, run: Mapping[str, Any]) -> None:
+        """Begin anew: drop what an earlier run left.
+
+        Args:
+            run: what decides the slices; text by name.
+        """
+        self.drop()
+        make_folder(self.path)
+        # The slabs stay until the volume that is made of them is complete.
+        check_space(self.path / _RUN, 2 * 4 * int(np.prod(self.shape)))
+        write_json(self.path / _RUN, dict(run))
+
+    def axis(self) -> tuple[float, float] | None:
+        """Bin and tilt of the rotation axis of the run that was cut off, if it had one."""
+        recorded = self._recorded()
+        try:
+            return float(recorded["axis"]), float(recorded["tilt of the axis"])
+        except (KeyError, TypeError, ValueError):
+            return None
+
+    def go_on(self, run: Mapping[str, Any]) -> None:
+        """Make sure that what is there belongs to this run.
+
+        Reads nothing but the record, and changes nothing.
+
+        Raises:
+            CheckpointError: it does not; the sentence names what differs.
+        """
+        demand_same(self.path, "the run that was cut off", self._recorded(), run)
+
+    def _recorded(self) -> dict[str, Any]:
+        try:
+            record = json.loads((self.path / _RUN).read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise CheckpointError(
+                f"{self.path}: its {_RUN} cannot be read ({error}): begin anew with --overwrite"
+            ) from error
+        return record if isinstance(record, dict) else {}
+
+    @property
+    def done(self) -> int:
+        """How many slices are there."""
+        return int(self.shape[0] - sum(run.stop - run.start for run in self.missing()))
+
+    def missing(self) -> list[slice]:
+        """Runs of slices that are not there yet, in order."""
+        there = np.zeros(self.shape[0], np.bool_)
+        for start, stop, _ in self._files():
+            there[start:stop] = True
+        edges = np.flatnonzero(np.diff(np.pad(~there, 1).astype(np.int8)))
+        return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+    def save(self, start: int, slices: Floats) -> None:
+        """Keep a slab."""
+        stop = start + len(slices)
+        with atomic_path(self.path / f"{start:05d}-{stop:05d}.npy") as part, part.open("wb") as out:
+            np.save(out, np.ascontiguousarray(slices, np.float32), allow_pickle=False)
+
+    def slabs(self, numbers: Collection[int] | None = None) -> Iterator[tuple[int, Floats]]:
+        """Slabs and the numbers of their first slices, in order.
+
+        Args:
+            numbers: slices that are wanted; slabs without any of them are left out.
+
+        Raises:
+            CheckpointError: one is damaged.
+        """
+        for start, stop, path in self._files():
+            if numbers is not None and not any(start <= number < stop for number in numbers):
+                continue
+            try:
+                slab = np.load(path, allow_pickle=False)
+            except (OSError, ValueError, EOFError) as error:
+                raise CheckpointError(
+                    f"{path}: is damaged ({error}); remove it and go on with --resume"
+                ) from error
+            if slab.shape != (stop - start, *self.shape[1:]) or slab.dtype != np.float32:
+                raise CheckpointError(
+                    f"{path}: holds {slab.dtype} {slab.shape}, wanted float32 "
+                    f"{(stop - start, *self.shape[1:])}; remove it and go on with --resume"
+                )
+            yield start, slab
+
+    def drop(self) -> None:
+        """Remove the folder."""
+        if self.path.is_dir():
+            with writing(self.path):
+                shutil.rmtree(self.path)
+
+    def _files(self) -> list[tuple[int, int, Path]]:
+        if not self.path.is_dir():
+            return []
+        named = [(_SLAB.fullmatch(path.name), path) for path in sorted(self.path.iterdir())]
+        found = [(int(name[1]), int(name[2]), path) for name, path in named if name]
+        return [entry for entry in found if 0 <= entry[0] < entry[1] <= self.shape[0]]
+
+
+def demand_same(path: Path, what: str, before: Mapping[str, Any], run: Mapping[str, Any]) -> None:
+    """Make sure that two runs make the same slices.
+
+    Raises:
+        CheckpointError: they do not; the sentence names what differs.
+    """
+    differs = sorted(name for name in {*before, *run} if before.get(name) != run.get(name))
+    if differs:
+        name = differs[0]
+        raise CheckpointError(
+            f"{path}: {what} had {name} {before.get(name)}, this one has {run.get(name)}: repeat "
+            "its options, or begin anew with --overwrite"
+        )
+
+
+def finished_run(settings: ReconstructSettings) -> dict[str, Any] | None:
+    """What decided the slices of the finished run in the folder; None where there is none.
+
+    One whose volume is not there in the settings' format does not count.
+    """
+    try:
+        config = json.loads((settings.out / "config.json").read_text(encoding="utf-8"))
+        finished = config["complete"] and volume_path(settings).exists()
+        return dict(config["run"]) if finished else None
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
+
+
+def run_folder(settings: ReconstructSettings, kept: SlabFolder) -> RunFolder:
+    """The folder of a run, if it may be used.
+
+    Raises:
+        OutputError: it holds something that would be lost.
+    """
+    out, begun = settings.out, kept.begun
+    if begun and not (settings.resume or settings.overwrite or settings.dry_run):
+        raise OutputError(
+            f"{out}: holds a reconstruction that was cut off: --resume goes on with it, "
+            "--overwrite begins anew"
+        )
+    # A preview alone is there to be followed by the slices.
+    alone = out.is_dir() and {p.name for p in out.iterdir()} <= {PREVIEW_PICTURE, "config.json"}
+    there = begun or (settings.resume and finished_run(settings) is not None)
+    return RunFolder(out, "reconstruct", overwrite=settings.overwrite or alone, resume=there)

@@ -1,0 +1,204 @@
+"""What ``rift reconstruct`` shows: a few slices, their histogram of values, the run's figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.budget import format_bytes
+from rift_cl.commands.pictures.evenly_spaced import evenly
+from rift_cl.commands.pictures.slice_pictures import (
+    ENOUGH,
+    FRAMES,
+    UPRIGHT,
+    display_window,
+    show_slices,
+    smaller,
+)
+from rift_cl.commands.reconstruct.decided import in_words
+from rift_cl.commands.reconstruct.volume import volume_path
+from rift_cl.io.output import atomic_path
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import curves, figure_png, figure_svgs, image_grid
+
+if TYPE_CHECKING:
+    from rift_cl.commands.reconstruct.job import Reconstruction
+
+_PANELS = 6
+# Values that a histogram tells apart.
+_BARS = 128
+PREVIEW_PICTURE = "preview.png"
+
+
+@dataclass
+class Preview:
+    """Collects a few slices and the statistics of all of them as they pass.
+
+    Args:
+        count: slices of the volume.
+        slices: those kept so far, by their number: a few, and the middle one.
+        frames: more of them, made smaller, for the slider through z.
+        upright: planes along the axis, for the slider through y: rows of every slice by their
+            number, from the first slice to the last, each made smaller.
+    """
+
+    count: int
+    slices: dict[int, NDArray[np.float32]] = field(default_factory=dict)
+    frames: dict[int, NDArray[np.float32]] = field(default_factory=dict)
+    upright: dict[int, list[NDArray[np.float32]]] = field(default_factory=dict)
+    _lowest: float = np.inf
+    _highest: float = -np.inf
+    _sum: float = 0.0
+    _samples: int = 0
+
+    @property
+    def panels(self) -> list[int]:
+        """Numbers of the slices that are kept as they are, evenly from the first to the last."""
+        return evenly(self.count, min(self.count, _PANELS))
+
+    @property
+    def middle(self) -> NDArray[np.float32]:
+        """The middle slice."""
+        return self.slices[self.count // 2]
+
+    def take(self, start: int, block: NDArray[np.float32]) -> None:
+        """Look at a block of slices, the first of which is number ``start``."""
+        self._lowest = min(self._lowest, float(block.min()))
+        self._highest = max(self._highest, float(block.max()))
+        self._sum += float(block.sum(dtype=np.float64))
+        self._samples += block.size
+        passing = range(start, start + len(block))
+        for index in {*self.panels, self.count // 2}.intersection(passing):
+            self.slices[index] = block[index - start].copy()
+        for index in evenly(self.count, min(self.count, FRAMES)):
+            if index in passing:
+                self.frames[index] = smaller(block[index - start])
+        if self.count >= ENOUGH:
+            for row in evenly(block.shape[1], min(block.shape[1], UPRIGHT)):
+                self.upright.setdefault(row, []).extend(smaller(block[:, row], axes=(1,)))
+
+    def statistics(self) -> dict[str, float]:
+        """Least, greatest and mean value of the whole volume."""
+        mean = self._sum / self._samples
+        return {"minimum": self._lowest, "maximum": self._highest, "mean": mean}
+
+
+def planned(job: Reconstruction, seconds: float) -> dict[str, str]:
+    """What would be done, in words; ``seconds`` is what it would take."""
+    scan, device = job.source.scan, job.device
+    return {
+        "scan": f"{scan.path} ({scan.source}, {scan.kind})",
+        "projections": f"{scan.shape} (angle, row, bin)",
+        "volume": f"{job.shape} (z, y, x), {format_bytes(4 * math.prod(job.shape))}",
+        "method": job.settings.method,
+        "assumed": " ".join(job.source.notes) or "nothing",
+        "slabs": f"{len(job.slabs)} of at most {max(s.stop - s.start for s in job.slabs)}",
+        "device": f"{device.name}, budget {format_bytes(device.budget)}",
+        "output": str(volume_path(job.settings)),
+        "time": f"about {seconds:.3g} s, from one slice",
+    }
+
+
+def write_preview(path: Path, image: NDArray[np.float32], title: str) -> None:
+    """Write a picture of one slice, for a look before the others are done."""
+    figure = image_grid(
+        [image], titles=[title], columns=1, window=display_window([image]), size=6.0
+    )
+    with atomic_path(path) as part:
+        part.write_bytes(figure_png(figure))
+
+
+def reconstruction_page(job: Reconstruction, preview: Preview) -> Page:
+    """The report of a finished reconstruction."""
+    page = Page(f"Reconstruction of {job.source.scan.path.name}", f"{job.shape[0]} slices")
+    images = [preview.slices[index] for index in preview.panels]
+    window, unit = display_window(images), job.source.unit or "unit of length"
+    show_slices(
+        page,
+        list(preview.frames.values()),
+        labels=[f"slice {job.rows[0] + index}" for index in preview.frames],
+        window=window,
+        what=f"Attenuation per {unit}, slices across the axis",
+    )
+    if preview.upright:
+        show_slices(
+            page,
+            [smaller(np.stack(rows)) for rows in preview.upright.values()],
+            labels=[f"y {row}" for row in preview.upright],
+            window=window,
+            what=f"Attenuation per {unit}, planes along the axis",
+        )
+    if job.source.notes:
+        page.section("What was assumed and mended")
+        for note in job.source.notes:
+            page.paragraph(note)
+    _residuals(page, job.inversion.residuals)
+    _histogram(page, images, job.source.unit)
+    page.section("Result")
+    page.facts(_facts(job))
+    return page
+
+
+def _residuals(page: Page, residuals: Mapping[int, list[float]]) -> None:
+    """Curves of the residual, where the method took steps."""
+    curves_of = {number: curve for number, curve in sorted(residuals.items()) if curve}
+    if not curves_of:
+        return
+    few = [list(curves_of)[k] for k in evenly(len(curves_of), min(len(curves_of), _PANELS))]
+    series = {
+        f"slice {number}": (np.arange(1, len(curves_of[number]) + 1), curves_of[number])
+        for number in few
+    }
+    title = "residual, root mean square"
+    draw = partial(curves, series, xlabel="step", ylabel=title, log_x=True)
+    page.section("Steps")
+    page.figure(
+        figure_svgs(lambda width: draw(width=width)),
+        caption="How far the projections of the slice are from the measured ones, in the unit of "
+        "a line integral.",
+        alt="Curves of the residual over the steps",
+    )
+
+
+def _histogram(page: Page, images: list[NDArray[np.float32]], unit: str) -> None:
+    low, high = display_window(images)
+    counts, edges = np.histogram(np.stack(images), bins=_BARS, range=(low, high))
+    share = 100 * counts / max(counts.sum(), 1)
+    per = f"per {unit}" if unit else "per unit of length"
+    draw = partial(
+        curves,
+        {"samples": ((edges[1:] + edges[:-1]) / 2, share)},
+        xlabel=f"attenuation, {per}",
+        ylabel="samples, %",
+    )
+    page.section("Values")
+    page.figure(
+        figure_svgs(lambda width: draw(width=width)),
+        caption=f"How often each value occurs in {len(images)} of the slices.",
+        alt="Histogram of the values",
+    )
+
+
+def _axis(job: Reconstruction) -> str:
+    axis = job.source.axis
+    return f"bin {axis['center']:.2f}, by {axis['by']}"
+
+
+def _facts(job: Reconstruction) -> dict[str, Any]:
+    scan, window = job.source.scan, job.inversion.window
+    return {
+        "projections": f"{scan.shape} (angle, row, bin)",
+        "volume": f"{job.shape} (z, y, x)",
+        "file": f"{scan.source}, {scan.kind}",
+        "method": in_words(job.decided),
+        "axis": _axis(job),
+        "spacing": f"{window.pixel:g} {job.source.unit}",
+        **job.metrics,
+    }

@@ -1,0 +1,274 @@
+"""From a scan in a file to projections that a method can take: what is mended, and what assumed.
+
+Clean line integrals (``clean_rows``) go through these steps, each of which is said in ``notes``:
+fan to parallel, offset axis, continuation beyond the detector.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.device import Device
+from rift_cl.commands.center.axis_search import find_axis
+from rift_cl.commands.inputs.scan_input import (
+    check_center,
+    chosen_rows,
+    scan_identity,
+)
+from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
+from rift_cl.commands.reconstruct.clean_rows import Alignment, CleanRows, LoadedRows
+from rift_cl.commands.reconstruct.notes import notes_of
+from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.errors import InputError
+from rift_cl.geometry import Parallel
+from rift_cl.geometry.length_units import length_unit
+from rift_cl.io.number_list import read_numbers
+from rift_cl.reconstruct import Attenuation
+from rift_cl.reconstruct.axis import AxisEstimate
+from rift_cl.reconstruct.direct.fan_rebin import covered_rays, rebin_fan
+from rift_cl.reconstruct.direct.offset_axis import (
+    is_full_turn,
+    is_offset,
+    widened,
+)
+from rift_cl.reconstruct.direct.padding import extended, is_truncated
+from rift_cl.reconstruct.preprocess import binned_center, stitched
+
+Floats = NDArray[np.float32]
+# A tilt is turned where it is so many times its standard error, and moves the axis by so many bins
+# between the middle row and the first.
+_SURE_TILT, _TILT_MATTERS = 4.0, 0.25
+# The detector is continued by this share of its width on each side.
+_PAD_SHARE = 2
+
+
+class SliceInput:
+    """The projections of some rows, as parallel ones about a known axis.
+
+    Args:
+        settings: where the scan is and what is to be done with it.
+        device: where the rotation axis is looked for.
+
+    Raises:
+        RiftError: the scan cannot be read, or an option does not fit it.
+    """
+
+    def __init__(self, settings: ReconstructSettings, device: Device) -> None:
+        self.settings, self.device = settings, device
+        # The scan as the file has it, and as it is worked on.
+        self.file = settings.open_scan(fan=True)
+        check_center(settings.center, self.file)
+        binning = settings.binning
+        self.scan = binned_file(self.file, binning)
+        self.rows = self._binned_rows()
+        pitch = (self.file.pitch or 1.0) if settings.pitch is None else settings.pitch
+        self.fan = self.scan.fan
+        if self.fan is not None:
+            if settings.tilt:
+                raise InputError(
+                    f"{self.file.path}: --tilt is for parallel rays, these are a fan's"
+                )
+            if settings.pitch is not None:
+                self.fan = dataclasses.replace(self.fan, pitch=settings.pitch * binning)
+            if settings.center is not None:
+                center = binned_center(settings.center, binning)
+                self.fan = dataclasses.replace(self.fan, center=center)
+        unit = self.file.unit or ("bin" if pitch == 1.0 else "")
+        self.unit = unit if settings.unit is None else settings.unit
+        self._pitch = pitch * binning
+        # Bin of the rotation axis on the detector as the file has it, at its middle row.
+        self.center = settings.center
+        # That of each row, where each has its own.
+        self.centers = self._row_centers()
+        if self.centers is not None:
+            self.center = float(self.centers.mean())
+        # Degrees by which the axis leans, and by which projections are turned.
+        self.tilt = settings.tilt or 0.0
+        # What the search for the axis found, where there was one.
+        self.estimate: AxisEstimate | None = None
+        # The axis as the configuration records it: the bin, and how it was found.
+        self.axis: dict[str, Any] = {}
+        self.pad = 0
+        # (angle, bin) whether a ray was measured, where some were not.
+        self.seen: NDArray[np.bool_] | None = None
+        self.notes: list[str] = [*self.file.notes]
+        # The geometry of a full turn whose opposite views are stitched; None where none are.
+        self.stitched: Parallel | None = None
+        # Made now, so that a bad pitch or center is told before any work.
+        self.geometry = self._parallel()
+        # Whether a full turn's axis is so far off the middle that slices reach beyond the detector.
+        self.offset = self._sees_farther()
+        length = length_unit(self.unit)
+        pixel = None if length is None else self._pitch * length.metres
+        self.clean = CleanRows(self.scan, settings, pixel, device)
+
+    @property
+    def pitch(self) -> float:
+        """Distance between parallel rays, at the rotation axis."""
+        return self.geometry.pitch
+
+    @property
+    def detector_pitch(self) -> float:
+        """Distance between bins of the detector as the file has it."""
+        pitch = self._pitch if self.fan is None else self.fan.pitch
+        return pitch / self.settings.binning
+
+    @property
+    def bins(self) -> int:
+        """Bins between the farther end of the detector and its mirror image, or the detector's."""
+        scan = self.geometry
+        if not self.offset:
+            return scan.bins
+        return scan.bins + int(np.ceil(abs(scan.bins - 1 - 2 * scan.center)))
+
+    @property
+    def settled(self) -> bool:
+        """Whether the axis is known, or nothing has to look for it."""
+        return self.fan is not None or self.center is not None
+
+    @property
+    def most_bins(self) -> int:
+        """The most that ``bins`` may come to once the axis is known."""
+        may_grow = not self.settled and is_full_turn(self.scan.angles)
+        return 2 * self.bins if may_grow else self.bins
+
+    def locate(self) -> None:
+        """Find the axis, and whether it is offset and the object wider than the detector.
+
+        The axis is that of the whole scan; the object's width is judged by the middle row.
+
+        Raises:
+            InputError: the axis cannot be found.
+        """
+        middle = sum(self.rows) // 2
+        row = self.clean.read(middle, middle + 1).projections
+        if not self.settled:
+            self.estimate = find_axis(self.file, self.device)
+            self.center = self.estimate.center
+            if self.settings.tilt is None:
+                self.tilt = _tilt_worth_turning(self.estimate, self.file.shape[1])
+        self.geometry = self._parallel()
+        self.axis = self._axis_record()
+        self.clean.alignment = self._alignment()
+        self.offset = self._sees_farther()
+        if self.offset and self.settings.half_acquisition == "stitched":
+            self.stitched, self.offset = self.geometry, False
+            self.geometry = stitched(np.zeros((*row.shape[::2],), np.float32), self.stitched)[1]
+        wanted = self.settings.pad == "auto" and is_truncated(row) and not self.offset
+        if wanted or self.settings.pad == "on":
+            self.pad = max(1, self.scan.shape[2] // _PAD_SHARE)
+        self.notes += notes_of(self)
+
+    def identity(self) -> dict[str, str]:
+        """The file and the axis, which decide the slices besides the settings."""
+        axis = {"axis": repr(self.center), "tilt of the axis": repr(self.tilt)}
+        if self.centers is not None:
+            axis["axes of the rows"] = str(self.centers.tolist())
+        return {**scan_identity(self.file), **axis}
+
+    def read(self, start: int, stop: int) -> Attenuation:
+        """Parallel projections of some rows of the file, before a formula's weights and margins."""
+        return self.projections(self.clean.load(start, stop))
+
+    def projections(self, loaded: LoadedRows) -> Attenuation:
+        """The same of rows that were loaded before."""
+        integrals = self.clean.clean(loaded)
+        if self.stitched is not None:
+            wide, _ = stitched(integrals.projections, self.stitched, device=self.device)
+            return dataclasses.replace(integrals, projections=wide)
+        if self.fan is None:
+            return integrals
+        parallel, _ = rebin_fan(
+            integrals.projections, self.scan.angles, self.fan, whole=not self.settings.iterative
+        )
+        return dataclasses.replace(integrals, projections=parallel)
+
+    def for_formula(self, projections: Floats) -> tuple[Floats, Parallel]:
+        """Projections as a backprojection wants them, and their geometry."""
+        scan = self.geometry
+        if self.offset:
+            projections, scan = widened(projections, scan)
+        if self.pad:
+            projections, scan = extended(projections, scan, bins=self.pad)
+        return np.ascontiguousarray(projections), scan
+
+    def formula_geometry(self) -> Parallel:
+        """What ``for_formula`` would say of the geometry."""
+        return self.for_formula(np.zeros((1, 1, self.geometry.bins), np.float32))[1]
+
+    def _parallel(self) -> Parallel:
+        if self.fan is not None:
+            whole = not self.settings.iterative
+            bins = self.scan.shape[2]
+            scan, rays = covered_rays(self.scan.angles, bins, self.fan, whole=whole)
+            self.seen = None if rays.all() else rays
+            return scan
+        binning = self.settings.binning
+        center = None if self.center is None else binned_center(self.center, binning)
+        return Parallel(self.scan.angles, self.scan.shape[2], self._pitch, center)
+
+    def _binned_rows(self) -> tuple[int, int]:
+        """The rows that are asked for, of the scan as it is worked on."""
+        block = row_binning(self.file, self.settings.binning)
+        first, stop = (row // block for row in chosen_rows(self.settings.rows, self.file))
+        if first == stop:
+            raise InputError(
+                f"--rows has fewer rows than --binning {self.settings.binning} makes one of"
+            )
+        return first, stop
+
+    def _row_centers(self) -> NDArray[np.float64] | None:
+        """Bins of the axis in the rows of the file, where a list of them is given."""
+        path = self.settings.centers
+        if path is None:
+            return None
+        if self.file.fan is not None:
+            raise InputError(f"{self.file.path}: --centers is for parallel rays, not a fan's")
+        centers = read_numbers(path, "rotation axes")
+        rows, bins = self.file.shape[1:]
+        if centers.size != rows or not (np.abs(centers - (bins - 1) / 2) < bins).all():
+            raise InputError(
+                f"{path}: holds {centers.size} rotation axes, wanted one for each of the {rows} "
+                f"rows of {self.file.path}, bins from 0 to {bins - 1}"
+            )
+        return centers
+
+    def _alignment(self) -> Alignment | None:
+        """How projections are turned, where the axis leans."""
+        tilt = math.radians(self.tilt)
+        if self.fan is not None or (not tilt and self.centers is None):
+            return None
+        block = row_binning(self.file, self.settings.binning)
+        if self.centers is not None:
+            rows = self.centers[: self.scan.shape[1] * block].reshape(-1, block).mean(axis=1)
+            centers = np.array([binned_center(row, self.settings.binning) for row in rows])
+            return Alignment(self.geometry.center, 0.0, centers=centers)
+        pivot = binned_center((self.file.shape[1] - 1) / 2, block)
+        return Alignment(self.geometry.center, pivot, tilt)
+
+    def _sees_farther(self) -> bool:
+        return self.fan is None and is_offset(self.geometry)
+
+    def _axis_record(self) -> dict[str, Any]:
+        if self.settings.center is not None:
+            return {"center": self.settings.center, "by": "--center"}
+        if self.centers is not None:
+            return {"center": self.center, "by": "--centers", "rows": list(self.centers)}
+        if self.fan is not None:
+            assert self.file.fan is not None
+            return {"center": self.file.fan.center, "by": "the file"}
+        if self.estimate is None:
+            return {"center": self.center, "by": "search"}
+        return self.estimate.record()
+
+
+def _tilt_worth_turning(estimate: AxisEstimate, rows: int) -> float:
+    """The tilt that was found, in degrees, where it is sure and moves the axis; else 0."""
+    sure = abs(estimate.tilt) > _SURE_TILT * estimate.tilt_error
+    moves = abs(estimate.tilt) * (rows - 1) / 2 >= _TILT_MATTERS
+    return math.degrees(math.atan(estimate.tilt)) if sure and moves else 0.0

@@ -1,0 +1,235 @@
+"""``rift render``: pictures of a scene, in a film or from a capture's cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.budget import format_bytes
+from rift_cl.cl.discovery import open_device
+from rift_cl.commands.cameras.film import capture_arc, farthest_from_cameras, film, frame_of
+from rift_cl.commands.cameras.subject import subject_of
+from rift_cl.commands.inputs.scene_depth import depth_maps
+from rift_cl.commands.inputs.scene_input import in_display_light
+from rift_cl.commands.pictures.depth_picture import LEAST_ALPHA, depth_picture, depth_window
+from rift_cl.commands.pictures.evenly_spaced import evenly
+from rift_cl.commands.render.animation import chosen_film, shrunk
+from rift_cl.commands.render.camera_path import opened, resized, smooth_path
+from rift_cl.commands.render.report import Sheet, render_page, write_bytes
+from rift_cl.commands.render.settings import MOST_FRAMES, RenderSettings
+from rift_cl.commands.run_folder.run_folder import RunFolder
+from rift_cl.errors import InputError
+from rift_cl.geometry import Camera
+from rift_cl.io.captures.capture import Capture, open_capture
+from rift_cl.io.captures.transforms_record import transforms_of
+from rift_cl.io.images.film_file import film_writer, suffix_of
+from rift_cl.io.images.image import write_png
+from rift_cl.io.images.pixels import write_pixels
+from rift_cl.io.output import atomic_path, make_folder, write_json
+from rift_cl.progress import Report
+from rift_cl.splat.bands import FrameMemory
+from rift_cl.splat.renderer import DepthKind, Renderer
+
+# What an earlier rendering leaves.
+_LEFT = ("frames", "depth", "*.png", "transforms.json", "key_frames.json", "film.*")
+# Frames of a film when nothing is said, and those that it is made again from.
+_FRAMES, _KEYS = 96, 13
+# Longer edge of the animation in pixels.
+_MOVING = 360
+
+
+class Render:
+    """A rendering that is planned; nothing is written yet.
+
+    Args:
+        settings: what to do.
+
+    Raises:
+        RiftError: the scene or the capture cannot be read, or a setting makes no sense.
+    """
+
+    def __init__(self, settings: RenderSettings) -> None:
+        settings.check()
+        self.settings = settings
+        self.scene = settings.open_scene()
+        self.bounds = settings.bounds(self.scene)
+        self.device = open_device(settings.device)
+        cameras = self._path() if settings.path is not None else self._film()
+        self.cameras = [
+            opened(camera, settings.aperture, settings.focus, self.bounds.center)
+            for camera in cameras
+        ]
+        lenses = [camera.aperture for camera in self.cameras if camera.aperture is not None]
+        if settings.focus is not None and not lenses:
+            raise InputError("--focus is about a lens with an opening: give its --aperture as well")
+        self._kind = chosen_film(settings.film, [camera.size for camera in self.cameras])
+        self.folder = RunFolder(settings.out, "render", overwrite=settings.overwrite)
+        for name, read in (("path", settings.path), ("capture", settings.capture)):
+            if read is not None:
+                self.folder.demand_kept(name, read, *_LEFT)
+        self.metrics: dict[str, Any] = {}
+        # A small copy of the film, for reports; None where nothing moves, or before it was drawn.
+        self.moving: bytes | None = None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What had to be guessed, a sentence each."""
+        return () if self.settings.path is not None else self.settings.notes(self.scene)
+
+    @property
+    def film(self) -> str | None:
+        """The name of the film's file; None where nothing moves."""
+        if self._kind is None or self._kind == "apng":
+            return self._kind and "animation.png"
+        return f"film{suffix_of(self._kind)}"
+
+    def _film_file(self) -> AbstractContextManager[Callable[[NDArray[np.uint8]], object]]:
+        """What takes the frames of a film that is written as they come."""
+        if self._kind is None or self._kind == "apng":
+            return nullcontext(lambda _: None)
+        path = self.settings.out / str(self.film)
+        return film_writer(path, self._kind, self.cameras[0].size, self.settings.rate)
+
+    def _film(self) -> list[Camera]:
+        """Cameras round the scene or along its capture; what is not set comes from there."""
+        settings, asked = self.settings, self.settings.size
+        size, fov = frame_of(self.bounds, asked and (asked[1], asked[0]), settings.fov)
+        return film(
+            self.bounds,
+            frames=settings.frames or _FRAMES,
+            size=size,
+            fov=fov,
+            elevation=settings.elevation,
+            distance=settings.distance,
+            subject=self.subject,
+        )
+
+    @cached_property
+    def subject(self) -> NDArray[np.float64] | None:
+        """What a capture from one side is of, (3,); None for others."""
+        arc = capture_arc(self.bounds)
+        if arc is None or arc.closed or not arc.inward:
+            return None
+        return subject_of(depth_maps(self.scene, self.bounds.cameras, self.device))
+
+    def _path(self) -> list[Camera]:
+        settings = self.settings
+        cameras = [view.camera for view in self._named().views]
+        if settings.size is not None:
+            cameras = [resized(camera, settings.size[::-1]) for camera in cameras]
+        if len(cameras) + settings.between * (len(cameras) - 1) > MOST_FRAMES:
+            raise InputError(f"--between {settings.between} makes more than {MOST_FRAMES} frames")
+        return smooth_path(cameras, settings.between) if settings.between else cameras
+
+    def _named(self) -> Capture:
+        """The capture whose views are drawn; its photographs need not be there."""
+        return open_capture(Path(self.settings.path or ""), photographs=False)
+
+    def _way(self) -> str:
+        """The way of the film's camera, in words."""
+        arc, bounds = capture_arc(self.bounds), self.bounds
+        if self.settings.path is not None:
+            return str(self.settings.path)
+        if arc is None or arc.closed:
+            return f"orbit at {np.linalg.norm(self.cameras[0].center - bounds.center):.4g}"
+        farthest = farthest_from_cameras(self.cameras, bounds)
+        return f"there and back along the photographs, at most {farthest:.0f} degrees from one"
+
+    def plan(self) -> dict[str, str]:
+        """What would be done, by name."""
+        bounds, scene = self.bounds, self.scene.splats
+        largest = max((camera.size for camera in self.cameras), key=lambda size: size[0] * size[1])
+        channels = 3 + self.settings.depth
+        memory = FrameMemory.of(scene, largest, channels, self.scene.drawing)
+        return {
+            "scene": f"{self.scene.name}, {len(scene)} splats",
+            "middle": "({:.4g}, {:.4g}, {:.4g})".format(*bounds.center),
+            "radius": f"{bounds.radius:.4g}",
+            "up": "({:.3g}, {:.3g}, {:.3g})".format(*bounds.up),
+            "cameras": self._way(),
+            "frames": f"{len(self.cameras)}, at most {largest[1]} x {largest[0]} pixels",
+            "film": self.film or "none, since frames differ in size or there is one alone",
+            "eps2d": f"{self.scene.drawing.eps2d:g}",
+            "device memory": f"{format_bytes(memory.fixed)} and the tile lists",
+            "device": self.device.name,
+        }
+
+    def run(self) -> Iterator[Report]:
+        """Do it; a report for each frame."""
+        folder, total = self.settings.out, len(self.cameras)
+        self.folder.make()
+        self.folder.mark()
+        self.folder.drop(*_LEFT)
+        make_folder(folder / "frames")
+        renderer = Renderer(self.scene.drawing, device=self.device)
+        splats = self.scene.splats.upload(self.device)
+        behind = self.device.array(self.scene.background)
+        window = (0.0, 0.0)
+        if self.settings.depth:
+            window = depth_window(renderer, splats, self.cameras)
+        depth: DepthKind | None = "expected" if self.settings.depth else None
+        sheet, names = Sheet(total), []
+        with self._film_file() as add:
+            for number, camera in enumerate(self.cameras):
+                frame = renderer.forward(splats, camera, background=behind, depth=depth)
+                image = self.device.get(frame.image)
+                colors = in_display_light(image[..., :3], self.scene.light)
+                names.append(f"frames/{number:04}.png")
+                write_png(folder / names[-1], colors)
+                add(shrunk(colors, max(camera.size)))
+                pictures = [colors]
+                if self.settings.depth:
+                    alpha = np.clip(1 - self.device.get(frame.transmittance), 0, 1)
+                    pictures.append(self._save_depth(number, image[..., -1], alpha, window))
+                sheet.add(number, [shrunk(picture, _MOVING) for picture in pictures])
+                yield Report(number + 1, total, "frames")
+        self._finish(sheet, names, window)
+
+    def _save_depth(
+        self,
+        number: int,
+        depth: NDArray[np.float32],
+        alpha: NDArray[np.float32],
+        window: tuple[float, float],
+    ) -> NDArray[np.float32]:
+        """Depth as an OpenEXR of float32, 0 where nothing is; gives back its picture."""
+        folder = make_folder(self.settings.out / "depth")
+        kept = np.where(alpha > LEAST_ALPHA, depth, 0).astype(np.float32)
+        with atomic_path(folder / f"{number:04}.exr") as part:
+            write_pixels(part, kept[..., None], format="openexr", attributes={})
+        picture = depth_picture(kept, alpha, window)
+        write_png(folder / f"{number:04}.png", picture)
+        return picture
+
+    def _finish(self, sheet: Sheet, names: list[str], window: tuple[float, float]) -> None:
+        folder, bounds = self.settings.out, self.bounds
+        write_json(folder / "transforms.json", transforms_of(self.cameras, names))
+        if self.settings.path is None:
+            keys = evenly(len(names), _KEYS)
+            chosen = [self.cameras[k] for k in keys], [names[k] for k in keys]
+            write_json(folder / "key_frames.json", transforms_of(*chosen))
+        self.metrics = {
+            "frames": len(self.cameras),
+            "splats": len(self.scene.splats),
+            "center": bounds.center,
+            "radius": bounds.radius,
+            "up": bounds.up,
+            "degrees_to_photographs": farthest_from_cameras(self.cameras, bounds),
+            "eps2d": self.scene.drawing.eps2d,
+            "background": self.scene.background,
+            "film": self.film,
+            "depth_window": list(window) if self.settings.depth else None,
+        }
+        write_bytes(folder / "contact.png", sheet.contact())
+        rate = self.settings.rate
+        if self._kind == "apng":
+            write_bytes(folder / str(self.film), sheet.moving(rate))
+        self.moving = None if self._kind is None else sheet.embedded(rate)
+        page = render_page(self.scene.name, sheet, self.moving, self.metrics)
+        self.folder.finish(self.settings, self.metrics, page, self.device)

@@ -1,0 +1,172 @@
+"""The folder that a long command leaves behind: what was asked, what came out, what to look at.
+
+``config.json`` holds the settings, the device and the version, so that the run can be repeated;
+``metrics.json`` holds its figures; ``report.html`` shows both, and the pictures, in one file.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import platform
+import shutil
+from collections.abc import Mapping
+from datetime import datetime, timezone
+from fnmatch import fnmatch
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from rift_cl import __version__
+from rift_cl.cl.device import Device
+from rift_cl.commands.run_folder.settings_table import changed, show_settings
+from rift_cl.errors import InputError, OutputError
+from rift_cl.io.output import make_folder, write_json, write_text, writing
+from rift_cl.report.html_page import Page
+
+_CONFIG = "config.json"
+
+
+class RunFolder:
+    """A run's folder.
+
+    Args:
+        path: the folder; made when it is not there.
+        job: the command's name.
+        overwrite: whether an earlier run of the same command may be replaced.
+        resume: whether one that is there is gone on with.
+
+    Raises:
+        OutputError: the folder cannot be made, or holds something that would be lost.
+    """
+
+    def __init__(
+        self, path: Path, job: str, *, overwrite: bool = False, resume: bool = False
+    ) -> None:
+        self.path = path
+        self._job = job
+        above = next(parent for parent in path.absolute().parents if parent.exists())
+        if not above.is_dir():
+            raise OutputError(f"{path}: {above} is no folder; name another place (--out)")
+        with writing(path):
+            used = path.exists() and (not path.is_dir() or any(path.iterdir()))
+        if used and _record_of(path).get("job") != job:
+            raise OutputError(f"{path}: holds other things already; name another folder (--out)")
+        if used and not (overwrite or resume):
+            raise OutputError(
+                f"{path}: holds an earlier run; name another folder (--out) or add --overwrite"
+            )
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether it holds a run that came to its end."""
+        return _record_of(self.path).get("complete") is True
+
+    def make(self) -> None:
+        """Make the folder, and mark it as ours if no earlier run did: the first thing written."""
+        make_folder(self.path)
+        if not (self.path / _CONFIG).exists():
+            self.mark()
+
+    def mark(self, **decided: Any) -> None:
+        """Say that the folder is this command's, and that its run is not finished.
+
+        Args:
+            **decided: what the configuration is to hold already, by name.
+        """
+        write_json(self.path / _CONFIG, {"job": self._job, "complete": False, **decided})
+
+    def discard(self) -> None:
+        """Remove the folder if a failed run left nothing in it but the mark."""
+        if self.path.is_dir() and [entry.name for entry in self.path.iterdir()] == [_CONFIG]:
+            (self.path / _CONFIG).unlink()
+            self.path.rmdir()
+
+    def drop(self, *patterns: str) -> None:
+        """Remove what an earlier run left under names that this one does not write again."""
+        for pattern in patterns:
+            for entry in self.path.glob(pattern):
+                with writing(entry):
+                    shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+
+    def demand_kept(self, name: str, file: Path, *patterns: str) -> None:
+        """Make sure that what is read is not what ``drop`` removes.
+
+        Args:
+            name: the option that names it.
+            file: what is read, a file or a folder.
+            *patterns: what is given to ``drop``.
+
+        Raises:
+            InputError: it is this folder, or would be removed with these names.
+        """
+        read, own = (Path(os.path.realpath(path)) for path in (file, self.path))
+        if not read.is_relative_to(own):
+            return
+        inner = read.relative_to(own).parts
+        if not inner or any(fnmatch(inner[0], pattern) for pattern in patterns):
+            raise InputError(
+                f"--{name} {file} lies in --out, where it would be replaced: copy it to another "
+                "folder, or name another --out"
+            )
+
+    def finish(
+        self,
+        settings: Any,
+        metrics: Mapping[str, Any],
+        page: Page,
+        device: Device,
+        *,
+        asked: Any = None,
+        **decided: Any,
+    ) -> None:
+        """Write the report, the metrics and, last, the configuration.
+
+        Args:
+            settings: those that would repeat the run.
+            metrics: its figures.
+            page: the report, to which settings and environment are added.
+            device: where it ran.
+            asked: the settings that were given, where ``settings`` holds what was decided too.
+            **decided: what else the configuration is to hold, by name.
+        """
+        given = {} if asked is None else {"asked": changed(asked)}
+        config = {
+            "job": self._job,
+            "complete": True,
+            "rift_cl": __version__,
+            "settings": dataclasses.asdict(settings),
+            **given,
+            **decided,
+            "environment": environment(device),
+        }
+        show_settings(page, settings, asked)
+        with page.folded("Environment"):
+            page.facts(environment(device))
+        write_text(self.path / "report.html", page.html())
+        write_json(self.path / "metrics.json", metrics)
+        write_json(self.path / _CONFIG, config)
+
+
+def environment(device: Device) -> dict[str, str]:
+    """The facts on which the figures of a run may depend."""
+    return {
+        "device": device.name,
+        "platform": device.platform,
+        "driver": device.driver,
+        "python": platform.python_version(),
+        **{name: version(name) for name in ("numpy", "scipy", "pyopencl")},
+        "system": f"{platform.system()} {platform.machine()}",
+        "rift_cl": __version__,
+        "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+    }
+
+
+def _record_of(path: Path) -> dict[str, Any]:
+    """What a folder says of the run that it holds; nothing where it holds none."""
+    try:
+        record = json.loads((path / _CONFIG).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return record if isinstance(record, dict) else {}

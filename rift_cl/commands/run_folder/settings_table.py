@@ -1,0 +1,70 @@
+"""The settings of a run in its report: what was asked for and decided, defaults folded away."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from rift_cl.report.html_page import Page
+
+
+def show_settings(page: Page, settings: Any, asked: Any = None) -> None:
+    """Add a table of settings to a report.
+
+    Args:
+        page: the report.
+        settings: those that would repeat the run, a dataclass.
+        asked: those that were given, of the same class: what differs was decided by the run. If
+            None, nothing was.
+    """
+    rows: list[tuple[str, str, str]] = []
+    defaults: dict[str, str] = {}
+    for field in dataclasses.fields(settings):
+        name, value = field.name.replace("_", "-"), getattr(settings, field.name)
+        given = value if asked is None else getattr(asked, field.name)
+        if _alike(value, given) and _alike(value, _default(field)):
+            defaults[name] = _words(value)
+        else:
+            source = "asked for" if _alike(value, given) else "decided"
+            rows.append((name, _words(value), source))
+    page.section("Settings")
+    if rows:
+        page.table(("setting", "value", "how it was chosen"), rows)
+    if defaults:
+        with page.folded(f"{len(defaults)} settings at their defaults"):
+            page.facts(defaults)
+
+
+def changed(settings: Any) -> dict[str, Any]:
+    """The settings that differ from their defaults, by name."""
+    values = {field: getattr(settings, field.name) for field in dataclasses.fields(settings)}
+    return {field.name: value for field, value in values.items() if value != _default(field)}
+
+
+def _default(field: dataclasses.Field[Any]) -> Any:
+    if field.default_factory is not dataclasses.MISSING:
+        return field.default_factory()
+    return field.default
+
+
+def _alike(one: Any, other: Any) -> bool:
+    """Whether two values mean the same."""
+    if isinstance(one, Path) and isinstance(other, Path):
+        return one.absolute() == other.absolute()
+    return bool(one == other)
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, Path):
+        # A report is passed on: whose folder it was stands in config.json alone.
+        return value.name or str(value)
+    if value is None or value == ():
+        return "not given"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, (tuple, list)):
+        return ", ".join(_words(entry) for entry in value)
+    return str(value)

@@ -1,0 +1,122 @@
+"""How a command is run: its errors become sentences and exit statuses, its progress goes to stderr.
+
+Exit statuses: 0 ok, 2 usage (an unknown option, or no number where one is wanted), 3 input (a file
+or a value that cannot be used), 4 device, 5 output, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import tyro
+
+from rift_cl.commands.console_table import print_table
+from rift_cl.commands.progress_bar import print_line, show_progress
+from rift_cl.errors import RiftError
+from rift_cl.progress import Report
+
+_INPUT, _OUTPUT, _INTERRUPTED = 3, 5, 130
+
+
+@dataclass(frozen=True)
+class Output:
+    """How a command talks."""
+
+    quiet: bool = False
+    """Show no progress."""
+    debug: bool = False
+    """Show the traceback of an error."""
+
+
+def exit_status(run: Callable[[], int]) -> int:
+    """Run a command line; what ends it from outside becomes a sentence and an exit status."""
+    try:
+        status = run()
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except KeyboardInterrupt:
+        return _say("rift: interrupted; no file is half-written", _INTERRUPTED)
+    except BrokenPipeError:
+        # Whoever read the output has seen enough; the interpreter must not try to flush the rest.
+        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115 - kept open until the end
+        return 0
+    except OSError as error:
+        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115 - kept open until the end
+        return _say(f"rift: the output cannot be written ({error.strerror})", _OUTPUT)
+    return status
+
+
+def told(run: Callable[[], int]) -> int:
+    """Run something; an error of ours becomes one sentence and an exit status."""
+    try:
+        return run()
+    except RiftError as error:
+        return _say(f"rift: {error}", error.exit_status)
+
+
+def command(
+    run: Callable[[Any, Output], None], settings: type, default: Any = None
+) -> Callable[..., Callable[[], int]]:
+    """A command for tyro: it takes settings and gives back what is to be run.
+
+    Args:
+        run: what to do with them.
+        settings: their class.
+        default: settings to begin with, where nothing else is given; the class's own if None.
+    """
+
+    def prepared(settings: Any, output: Any = Output()) -> Callable[[], int]:
+        return lambda: _guarded(run, settings, output)
+
+    if default is not None:
+        prepared.__defaults__ = (default, Output())
+    prepared.__annotations__ = {
+        "settings": Annotated[settings, tyro.conf.arg(name="")],
+        "output": Annotated[Output, tyro.conf.arg(name="")],
+    }
+    prepared.__doc__ = settings.__doc__
+    return prepared
+
+
+def watch(reports: Iterable[Report], output: Output) -> None:
+    """Run a generator of reports to its end and show where it stands, if that is wanted."""
+    show_progress(reports, quiet=output.quiet)
+
+
+def ran(job: Any, settings: Any, output: Output) -> bool:
+    """Run a job, or say what it would do; whether it was run."""
+    if settings.dry_run:
+        print_table(("what", "plan"), job.plan().items())
+        return False
+    watch(job.run(), output)
+    return True
+
+
+def _guarded(run: Callable[[Any, Output], None], settings: Any, output: Output) -> int:
+    """Run a command; an error becomes one sentence and an exit status."""
+    try:
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            run(settings, output)
+    except RiftError as error:
+        if output.debug:
+            traceback.print_exc()
+        return _say(f"rift: {error}", error.exit_status)
+    except MemoryError as error:
+        return _say(f"rift: there is too little memory for this ({error}): ask for less", _INPUT)
+    return 0
+
+
+def _say(sentence: str, status: int) -> int:
+    print_line(sentence)
+    return status
+
+
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    print_line(f"rift: warning: {message}")

@@ -1,0 +1,36 @@
+"""What a page's panels ask for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from rift_cl.commands.view.crop import Crop
+from rift_cl.commands.view.photographs import Comparison, Photograph
+from rift_cl.geometry import Aperture
+
+Kind = Literal["colour", "depth"]
+KINDS: tuple[Kind, ...] = ("colour", "depth")
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What is to be drawn.
+
+    Args:
+        kind: of picture.
+        edge: longer edge of a picture whose camera rests, in pixels.
+        aperture: that it is drawn through; None for a pinhole.
+        crop: the box outside of which nothing is drawn, or None.
+        comparison: with a photograph.
+        share: of the photograph.
+        photograph: that is compared with, or None.
+    """
+
+    kind: Kind = "colour"
+    edge: int = 960
+    aperture: Aperture | None = None
+    crop: Crop | None = None
+    comparison: Comparison = "off"
+    share: float = 0.0
+    photograph: Photograph | None = None

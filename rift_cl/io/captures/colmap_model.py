@@ -1,0 +1,114 @@
+"""Views from a COLMAP model: where its files lie, and cameras made of their records.
+
+Poses are world-to-camera with OpenCV's axes and pixel centres are at one half, as everywhere here,
+so that nothing has to be turned round.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import FileFormatError
+from rift_cl.geometry.camera import Camera
+from rift_cl.geometry.lens_distortion import lens_of
+from rift_cl.io.captures import colmap_binary, colmap_text
+from rift_cl.io.captures.capture_paths import CaptureFolder, mask_of
+from rift_cl.io.captures.colmap_records import CameraRecord, ImageRecord
+from rift_cl.io.captures.pose_record import is_upright
+from rift_cl.io.captures.poses import view_of_quaternion
+from rift_cl.io.captures.view import Capture, View, check_views, finite_points, located
+
+MODEL_FOLDERS = ("sparse/0", "sparse", ".")
+_READERS: dict[str, ModuleType] = {".bin": colmap_binary, ".txt": colmap_text}
+
+
+def find_model(folder: Path) -> tuple[Path, str] | None:
+    """Folder of the COLMAP model that belongs to a capture's folder, and suffix of its files."""
+    for name in MODEL_FOLDERS:
+        for suffix in _READERS:
+            files = (folder / name / (part + suffix) for part in ("cameras", "images"))
+            if all(file.is_file() for file in files):
+                return folder / name, suffix
+    return None
+
+
+def open_model(
+    folder: Path,
+    model: Path,
+    suffix: str,
+    images: CaptureFolder | None = None,
+    *,
+    photographs: bool = True,
+) -> Capture:
+    """Read the views of a COLMAP model; see ``open_capture``.
+
+    Args:
+        folder: the folder that was asked for.
+        model: the folder of the model, which may be the same.
+        suffix: the suffix of its files, ``.bin`` or ``.txt``.
+        images: where the photographs are; looked for from ``folder`` on when not given.
+        photographs: whether they have to be there.
+    """
+    reader = _READERS[suffix]
+    cameras = _numbered(model / f"cameras{suffix}", reader.read_cameras(model / f"cameras{suffix}"))
+    path = model / f"images{suffix}"
+    records = sorted(reader.read_images(path), key=lambda record: record.name)
+    images = replace(images or _images_folder(folder), complete=photographs)
+    views = [_view(path, images, cameras, record) for record in records]
+    if is_upright(model):
+        views = [replace(view, upright=True) for view in views]
+    checked = check_views(path, views)
+    points, colors, error = _points(model / f"points3D{suffix}", reader)
+    return Capture(checked, points, colors, model, error)
+
+
+def _images_folder(folder: Path) -> CaptureFolder:
+    """The folder ``images`` beside the model or above it, or else the folder itself."""
+    above = [folder, folder.parent]
+    if folder.parent.name == "sparse":
+        above.append(folder.parent.parent)
+    found = next((place for place in above if (place / "images").is_dir()), None)
+    return CaptureFolder(folder) if found is None else CaptureFolder(found, "images")
+
+
+def _numbered(path: Path, records: list[CameraRecord]) -> dict[int, CameraRecord]:
+    cameras = {record.number: record for record in records}
+    if len(cameras) < len(records):
+        raise FileFormatError(f"{path}: two cameras have the same number")
+    return cameras
+
+
+def _view(
+    path: Path, images: CaptureFolder, cameras: dict[int, CameraRecord], record: ImageRecord
+) -> View:
+    where = f"{path}: image {record.name[:80]!r}"
+    camera = cameras.get(record.camera)
+    if camera is None:
+        raise FileFormatError(f"{where}: was taken by camera {record.camera}, which is not there")
+    image = images.file(where, record.name)
+    mask = mask_of(where, images, record.name)
+    with located(where):
+        view = view_of_quaternion(record.quaternion, record.shift)
+        pinhole = Camera((camera.height, camera.width), camera.K, view)
+        lens = lens_of(camera.model, camera.coefficients, camera.K)
+    return View(record.name, pinhole, image, mask, lens)
+
+
+def _points(
+    path: Path, reader: ModuleType
+) -> tuple[NDArray[np.float32] | None, NDArray[np.float32] | None, float | None]:
+    """Sparse points, their colours, and the mean of the errors that are not -1, unknown."""
+    if not path.is_file():
+        return None, None, None
+    records = reader.read_points(path)
+    points = finite_points(str(path), records.positions)
+    if points is None:
+        return None, None, None
+    known = records.errors[np.isfinite(records.errors) & (records.errors >= 0)]
+    error = float(known.mean()) if known.size else None
+    return points, np.asarray(records.colors, np.float32).reshape(-1, 3) / np.float32(255), error

@@ -1,0 +1,155 @@
+"""Views from a transforms.json: the flavours of NeRF's synthetic scenes, instant-ngp, nerfstudio.
+
+Intrinsics stand once for all frames or in each of them, where they take precedence. Poses are
+camera-to-world with OpenGL's axes. A lens with an opening has 'aperture_radius', 'focus_distance'
+(without it the focus is at infinity) and 'wavelength', in the poses' unit. Fields that say nothing
+about where and through what lens a photograph was taken are left alone.
+"""
+
+from __future__ import annotations
+
+import math
+import reprlib
+from dataclasses import replace
+from pathlib import Path
+
+from rift_cl.errors import FileFormatError, InputError
+from rift_cl.geometry.aperture import Aperture
+from rift_cl.geometry.camera import Camera
+from rift_cl.geometry.lens_distortion import LENS_MODELS, lens_of
+from rift_cl.io.captures.capture_paths import CaptureFolder, mask_of
+from rift_cl.io.captures.point_cloud import read_point_cloud
+from rift_cl.io.captures.poses import view_of_opengl
+from rift_cl.io.captures.view import Capture, View, check_views, located
+from rift_cl.io.images.picture_header import read_picture_header
+from rift_cl.io.json_fields import Fields, read_json_object
+
+_COEFFICIENTS = tuple(dict.fromkeys(name for names in LENS_MODELS.values() for name in names))
+_MODELS = ("SIMPLE_PINHOLE", "PINHOLE", *LENS_MODELS)
+
+
+def open_transforms(
+    path: Path, *, photographs: bool = True, images: CaptureFolder | None = None
+) -> Capture:
+    """Read the views of a transforms.json; see ``open_capture``.
+
+    Args:
+        path: the file.
+        photographs: whether they have to be there.
+        images: where the photographs are, if not beside the file.
+    """
+    top = read_json_object(path)
+    folder = CaptureFolder(path.parent, complete=photographs)
+    place = folder if images is None else replace(images, complete=photographs)
+    frames = list(top.objects("frames"))
+    # Where some masks are named, those that are not named are not meant.
+    by_name = all(frame.values.get("mask_path") is None for frame in frames)
+    views = [_view(place, frame, top, by_name) for frame in frames]
+    checked = check_views(path, views)
+    ply = top.text("ply_file_path")
+    if ply is None:
+        return Capture(checked, None, None, path)
+    points, colors = read_point_cloud(folder.file(f"{path}: 'ply_file_path'", ply))
+    return Capture(checked, points, colors, path)
+
+
+def _view(folder: CaptureFolder, frame: Fields, top: Fields, by_name: bool) -> View:
+    name = frame.text("file_path")
+    if name is None:
+        raise FileFormatError(f"{frame.where}: has no 'file_path', no photograph belongs to it")
+    where = f"{frame.where} ({reprlib.repr(name)})"
+    own = Fields(where, frame.values)
+    fields = own.within(top)
+    image = folder.image(where, name)
+    mask = own.text("mask_path")
+    size = _size(fields, image)
+    K = _intrinsics(own, fields, size)
+    pose = own.pose("transform_matrix")
+    model, coefficients = _distortion(fields)
+    aperture = _aperture(fields)
+    with located(where):
+        camera = Camera(size, K, view_of_opengl(pose), aperture=aperture)
+        lens = lens_of(model, coefficients, K)
+    found = None if mask is None else folder.file(where, mask)
+    if by_name:
+        found = mask_of(where, folder, folder.name_of(image))
+    return View(folder.name_of(image), camera, image, found, lens, own.flag("upright"))
+
+
+def _size(fields: Fields, image: Path) -> tuple[int, int]:
+    height, width = fields.whole("h"), fields.whole("w")
+    if (height is None or width is None) and not image.exists():
+        raise InputError(
+            f"{fields.where}: has no 'w' and 'h', and the image {image} that would tell is not "
+            "there"
+        )
+    if height is None or width is None:
+        with located(fields.where):
+            header = read_picture_header(image)
+        height, width = height or header.size[0], width or header.size[1]
+    return height, width
+
+
+def _intrinsics(own: Fields, fields: Fields, size: tuple[int, int]) -> list[list[float]]:
+    fx, fy = _focal(own, fields, "x", size[1]), _focal(own, fields, "y", size[0])
+    if fx is None:
+        raise FileFormatError(
+            f"{fields.where}: has neither 'fl_x' nor 'camera_angle_x', the focal length is wanted"
+        )
+    cx, cy = fields.number("cx"), fields.number("cy")
+    center = (size[1] / 2 if cx is None else cx, size[0] / 2 if cy is None else cy)
+    return [[fx, 0, center[0]], [0, fx if fy is None else fy, center[1]], [0, 0, 1]]
+
+
+def _focal(own: Fields, fields: Fields, axis: str, extent: int) -> float | None:
+    """Focal length in pixels; the frame's own fields come before those of the file."""
+    for source in (own, fields):
+        focal, angle = source.number(f"fl_{axis}"), source.number(f"camera_angle_{axis}")
+        if focal is not None:
+            return focal
+        if angle is not None:
+            if not 0 < angle < math.pi:
+                raise InputError(
+                    f"{own.where}: 'camera_angle_{axis}' is {angle:g}, wanted radians between 0 "
+                    "and pi"
+                )
+            return extent / 2 / math.tan(angle / 2)
+    return None
+
+
+def _aperture(fields: Fields) -> Aperture | None:
+    """The opening of the lens; None for a pinhole, whose radius is 0 or not there."""
+    radius = fields.number("aperture_radius") or 0.0
+    focus, wavelength = fields.number("focus_distance"), fields.number("wavelength") or 0.0
+    for name, value, fits, wanted in (
+        ("aperture_radius", radius, radius >= 0, "a length, 0 for a pinhole"),
+        ("focus_distance", focus, focus is None or focus > 0, "a positive distance"),
+        ("wavelength", wavelength, wavelength >= 0, "a length, 0 for no diffraction"),
+    ):
+        if radius and not fits:
+            raise InputError(f"{fields.where}: {name!r} is {value:g}, wanted {wanted}")
+    return Aperture(radius, math.inf if focus is None else focus, wavelength) if radius else None
+
+
+def _distortion(fields: Fields) -> tuple[str, list[float]]:
+    """The camera model by its name in COLMAP, and its coefficients."""
+    found = {name: fields.number(name) or 0.0 for name in _COEFFICIENTS}
+    model = fields.text("camera_model")
+    if model is None:
+        model = "OPENCV_FISHEYE" if fields.flag("is_fisheye") else "OPENCV"
+    if model not in _MODELS:
+        raise FileFormatError(
+            f"{fields.where}: 'camera_model' is {reprlib.repr(model)}, known are "
+            f"{', '.join(_MODELS)}"
+        )
+    # OpenCV's five numbers are written under the name of COLMAP's four.
+    takes = (*LENS_MODELS.get(model, ()), *(("k3",) if model == "OPENCV" else ()))
+    extra = [name for name, value in found.items() if value and name not in takes]
+    if extra:
+        raise FileFormatError(
+            f"{fields.where}: {extra[0]!r} is {found[extra[0]]:g}, which the camera model {model} "
+            "does not have; name the model that it belongs to in 'camera_model'"
+        )
+    if model == "OPENCV" and found["k3"]:
+        model = "FULL_OPENCV"
+    return model, [found[name] for name in LENS_MODELS.get(model, ())]

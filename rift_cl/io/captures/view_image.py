@@ -1,0 +1,201 @@
+"""The pixels of a view: as a pinhole would have seen them, at the size that is asked for.
+
+Photographs are averaged and resampled in linear light with alpha multiplied in, because that is
+what light and coverage do; what comes out has straight alpha.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import FileFormatError, InputError, NonFiniteError, ShapeError
+from rift_cl.io.boundary import check_claim
+from rift_cl.io.captures.view import View, camera_at
+from rift_cl.io.images.display_light import to_display, to_linear
+from rift_cl.io.images.picture_header import PictureHeader, read_picture_header
+from rift_cl.io.images.pixels import read_pixels
+from rift_cl.io.images.resample import shrunk, undistorted
+
+Image = NDArray[np.float32]
+LightKind = Literal["display", "linear"]
+
+# By EXIF's orientation: quarter turns against the clock, and whether rows are then reversed.
+_SHOWN = {
+    1: (0, False),
+    2: (2, True),
+    3: (2, False),
+    4: (0, True),
+    5: (1, True),
+    6: (-1, False),
+    7: (-1, True),
+    8: (1, False),
+}
+# The code 1 of 8 bits, with room for rounding.
+_ONE_CODE = 1.01 / 255
+
+
+def read_view(
+    view: View, *, downscale: int = 1, light: LightKind = "display", budget: int | None = None
+) -> Image:
+    """Read the photograph of a view, without its lens, as ``camera_at(view, downscale)`` sees it.
+
+    Rows and columns are those of the file, because poses refer to pixels as they are stored: COLMAP
+    does not turn photographs in any release (its pull request 1318 did, 1406 took it back before
+    3.7 came out), nor do nerfstudio (``-noautorotate`` in its pull request 1261) and instant-ngp.
+    EXIF's orientation is followed where the view says that its camera belongs to the photograph as
+    it is shown (``View.upright``), as those that 'rift fit' finds do, or has that size, rows and
+    columns swapped. A mask of the stored photograph's size is turned with it, another is not.
+
+    Args:
+        view: one of the views of a capture.
+        downscale: whole factor to make the image smaller by; areas are averaged.
+        light: "display" for sRGB codes in [0, 1], "linear" for numbers proportional to light.
+            OpenEXR, HDR and floating TIFF count as linear on disk, everything else as display.
+        budget: bytes that the reading may take; 60 % of the free memory when not given.
+
+    Returns:
+        float32 (y, x, 3), or (y, x, 4) with straight alpha where the photograph has alpha, a
+        mask or a lens. Alpha is 0 where a mask is black and where the photograph does not reach.
+
+    Raises:
+        InputError: an image is missing, or an argument makes no sense.
+        FileFormatError: an image is damaged, or has no meaning as a photograph or mask.
+        ShapeError: its size is not that of the camera.
+        NonFiniteError: it holds NaN or infinity.
+        ResourceLimitError: it is larger than the budget; nothing was allocated.
+    """
+    if light not in ("display", "linear"):
+        raise InputError(f"read_view: light is {light!r}, wanted 'display' or 'linear'")
+    camera_at(view, downscale)
+    header = _checked_header(view, budget)
+    turn = header.orientation if view.upright or header.size != view.camera.size else 1
+    image = upright(read_photograph(view.image, header, budget), turn)
+    if view.mask is not None:
+        mask = _coverage(view.mask, budget)
+        image = _with_alpha(image)
+        image[..., 3] *= upright(mask, turn) if mask.shape == header.size else mask
+    if downscale == 1 and view.lens is None:
+        return _converted(image, linear=header.linear, wanted=light)
+    image = _converted(image, linear=header.linear, wanted="linear")
+    if view.lens is not None:
+        image = _with_alpha(image)
+    with_alpha = image.shape[2] == 4
+    if with_alpha:
+        image[..., :3] *= image[..., 3:]
+    if view.lens is not None:
+        image = undistorted(image, view.lens)
+    image = shrunk(image, int(downscale))
+    if with_alpha:
+        _divide_by_alpha(image)
+    return _converted(image, linear=True, wanted=light)
+
+
+def _checked_header(view: View, budget: int | None) -> PictureHeader:
+    """The photograph's header, once photograph and mask were found to fit the camera."""
+    header = read_picture_header(view.image)
+    size = view.camera.size
+    fits = size == header.shown_size or (size == header.size and not view.upright)
+    _demand_fit(view, view.image, header, fits)
+    # Numbers that are held for a pixel at one time: as stored, as RGBA, without the lens, a mask.
+    numbers = header.channels + 4 + (0 if view.lens is None else 8)
+    if view.mask is not None:
+        mask = read_picture_header(view.mask)
+        _demand_fit(view, view.mask, mask, mask.size in (size, header.size))
+        numbers += mask.channels + 2
+    need = 4 * numbers * view.camera.height * view.camera.width
+    check_claim(view.image, "the view, with what it is made of,", need, budget)
+    return header
+
+
+def _demand_fit(view: View, path: Path, header: PictureHeader, fits: bool) -> None:
+    demand_colors(path, header)
+    if not fits:
+        raise ShapeError(
+            f"{path}: is {_size(header.size)} pixels, the camera of view {view.name!r} says "
+            f"{_size(view.camera.size)}"
+        )
+
+
+def upright(image: Image, orientation: int) -> Image:
+    """An image (y, x, ...) as it is shown where EXIF says this of its orientation, 1 to 8."""
+    turns, flipped = _SHOWN[orientation]
+    shown = np.rot90(image, turns)
+    return np.ascontiguousarray(shown[::-1] if flipped else shown)
+
+
+def demand_colors(path: Path, header: PictureHeader) -> None:
+    """Refuse a picture that is neither grey nor RGB.
+
+    Raises:
+        FileFormatError: it has another number of channels.
+    """
+    if header.channels - header.alpha not in (1, 3):
+        raise FileFormatError(
+            f"{path}: has {header.channels} channels, wanted grey or RGB, with alpha or without"
+        )
+
+
+def _size(size: tuple[int, int]) -> str:
+    return f"{size[1]} x {size[0]} (width x height)"
+
+
+def read_photograph(path: Path, header: PictureHeader, budget: int | None) -> Image:
+    """A photograph as RGB or RGBA with straight alpha, in the light that it is stored in.
+
+    Raises:
+        FileFormatError: it is damaged.
+        NonFiniteError: it holds NaN or infinity.
+        ResourceLimitError: it is larger than the budget.
+    """
+    image = read_pixels(path, budget=budget)
+    if header.linear and not np.isfinite(image).all():
+        raise NonFiniteError(f"{path}: the image holds NaN or infinity")
+    if header.channels <= 2:
+        image = np.take(image, [0, 0, 0, 1][: 3 + header.alpha], axis=2)
+    if header.alpha:
+        np.clip(image[..., 3], 0, 1, out=image[..., 3])
+    return image
+
+
+def _coverage(path: Path, budget: int | None) -> Image:
+    """A mask (y, x): how much of each pixel counts, from 0 to 1."""
+    header = read_picture_header(path)
+    codes = read_pixels(path, budget=budget)
+    if not np.isfinite(codes).all():
+        raise NonFiniteError(f"{path}: the mask holds NaN or infinity")
+    if not header.linear and 0 < codes.max() <= _ONE_CODE:
+        raise FileFormatError(
+            f"{path}: the mask has no code above 1, so that all of it is black; write 255 where "
+            "the photograph counts"
+        )
+    colors = codes[..., :-1] if header.alpha else codes
+    mask: Image = colors.mean(axis=-1, dtype=np.float32)
+    if header.alpha:
+        mask *= codes[..., -1]
+    return np.clip(mask, 0, 1)
+
+
+def _with_alpha(image: Image) -> Image:
+    if image.shape[2] == 4:
+        return image
+    full = np.ones((*image.shape[:2], 4), np.float32)
+    full[..., :3] = image
+    return full
+
+
+def _divide_by_alpha(image: Image) -> None:
+    alpha = image[..., 3:]
+    np.divide(image[..., :3], alpha, out=image[..., :3], where=alpha > 0)
+
+
+def _converted(image: Image, *, linear: bool, wanted: LightKind) -> Image:
+    colors = image[..., :3]
+    if linear and wanted == "display":
+        to_display(colors)
+    elif not linear and wanted == "linear":
+        to_linear(colors)
+    return image

@@ -1,0 +1,88 @@
+"""What a picture says about itself before a pixel of it is decoded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from rift_cl.io.boundary import reading
+from rift_cl.io.images.heic import heic_taken_by, opened_heic
+from rift_cl.io.images.pixels import HEIC, image_format, opened_image
+
+_TAKEN_BY = ("Make", "Model", "Exif:FocalLength", "Exif:FocalLengthIn35mmFilm")
+
+
+@dataclass(frozen=True)
+class PictureHeader:
+    """The header of a picture.
+
+    Args:
+        size: (height, width) in pixels.
+        channels: numbers in a pixel.
+        alpha: the last of them is alpha.
+        linear: the colours are proportional to light; integers are display light by custom.
+        eight_bit: each number is a code of 8 bits.
+        orientation: how EXIF wants it shown: 1 as it is stored, 3 turned by half, 2 and 4 mirrored,
+            5 to 8 with the axes swapped. HEIC comes turned from its decoder, and is 1 here.
+        taken_by: maker and model of the camera and its focal lengths, as EXIF has them; empty
+            where it has none.
+    """
+
+    size: tuple[int, int]
+    channels: int
+    alpha: bool
+    linear: bool
+    eight_bit: bool
+    orientation: int
+    taken_by: tuple[str, ...]
+
+    @property
+    def sideways(self) -> bool:
+        """EXIF wants it shown with rows and columns swapped."""
+        return self.orientation >= 5
+
+    @property
+    def shown_size(self) -> tuple[int, int]:
+        """(height, width) as EXIF wants it shown."""
+        return (self.size[1], self.size[0]) if self.sideways else self.size
+
+
+def read_picture_header(path: Path) -> PictureHeader:
+    """Read the header of a PNG, OpenEXR, TIFF, JPEG, HDR or HEIC.
+
+    Raises:
+        InputError: there is no such file, or pi-heif is wanted and not installed.
+        FileFormatError: the file is damaged, or is none of these.
+    """
+    with reading(path, "the image"):
+        format = image_format(path)
+        return _heic_header(path) if format == HEIC else _header(path, format)
+
+
+def _heic_header(path: Path) -> PictureHeader:
+    picture = opened_heic(path)
+    return PictureHeader(
+        size=picture.size[::-1],
+        channels=len(picture.mode),
+        alpha=picture.mode.endswith("A"),
+        linear=False,
+        eight_bit=True,
+        orientation=1,
+        taken_by=heic_taken_by(picture),
+    )
+
+
+def _header(path: Path, format: str) -> PictureHeader:
+    with opened_image(path, format) as source:
+        spec = source.spec()
+        orientation = int(spec.get_int_attribute("Orientation", 1))
+        taken_by = (spec.getattribute(name) for name in _TAKEN_BY)
+        return PictureHeader(
+            size=(int(spec.height), int(spec.width)),
+            channels=int(spec.nchannels),
+            alpha=spec.alpha_channel >= 0,
+            linear=str(spec.format) in ("half", "float", "double"),
+            eight_bit=str(spec.format) == "uint8",
+            orientation=orientation if 1 <= orientation <= 8 else 1,
+            taken_by=tuple(str(value) for value in taken_by if value is not None),
+        )

@@ -1,0 +1,50 @@
+"""The formats by the names that commands know them by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rift_cl.io.scenes.formats.compressed_ply import encode_compressed_ply
+from rift_cl.io.scenes.formats.gltf import encode_glb
+from rift_cl.io.scenes.formats.plain import demand_plain
+from rift_cl.io.scenes.formats.sog import encode_sog
+from rift_cl.io.scenes.formats.spz import encode_spz
+from rift_cl.io.scenes.splat_ply import encode_ply
+from rift_cl.io.scenes.splat_scene import SplatScene
+
+# Harmonics that every format holds and viewers know.
+DEGREE = 3
+
+
+@dataclass(frozen=True)
+class SplatFormat:
+    """A format.
+
+    Args:
+        suffix: of its files' names.
+        encode: from a scene of plain splats to the bytes of a file.
+        upright: whether its files have y up; the others keep the axes of the scene.
+        rounds: what of a splat is not kept to the bit.
+    """
+
+    suffix: str
+    encode: Callable[[SplatScene], bytes]
+    upright: bool
+    rounds: str
+
+
+def _plain_ply(scene: SplatScene) -> bytes:
+    demand_plain(scene, DEGREE)
+    return b"".join(encode_ply(scene)[1])
+
+
+FORMATS = {
+    "ply": SplatFormat(".ply", _plain_ply, False, "nothing"),
+    "compressed-ply": SplatFormat(
+        ".compressed.ply", encode_compressed_ply, False, "everything, within chunks of 256 splats"
+    ),
+    "spz": SplatFormat(".spz", encode_spz, True, "everything, harmonics most"),
+    "sog": SplatFormat(".sog", encode_sog, False, "everything, to palettes made for the scene"),
+    "glb": SplatFormat(".glb", encode_glb, True, "nothing"),
+}

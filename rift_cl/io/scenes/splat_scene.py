@@ -1,0 +1,246 @@
+"""Splats on the host, as files hold them: before the activations that a rasterizer needs.
+
+A trainer works on logarithms of scales and logits of opacities, and its files keep them, so that
+a scene that was saved and loaded is the same to the bit. ``upload`` makes what is drawn of it.
+
+Splats of X-rays have densities in the place of opacities. They are a scene of another kind, and a
+property of another name in the file, so that no viewer takes the one for the other.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.device import Device
+from rift_cl.cl.memory import as_host_array, as_real_array, check_finite
+from rift_cl.errors import FileFormatError, InputError, OutputError, ShapeError
+from rift_cl.io.boundary import reading
+from rift_cl.io.output import atomic_path, check_space
+from rift_cl.io.scenes.splat_activations import (
+    demand_range,
+    drawn_strengths,
+    kept_strengths,
+    log_scales_of,
+    scales_of,
+)
+from rift_cl.io.scenes.splat_basis import SceneBasis
+from rift_cl.io.scenes.splat_file import encode_splat, read_splat
+from rift_cl.io.scenes.splat_ply import COEFFICIENTS, encode_ply, read_ply, scene_shapes
+from rift_cl.splat.settings import Activation, Angular, SplatMode
+from rift_cl.splat.splats import Splats
+
+_ENCODERS = {".ply": encode_ply, ".splat": encode_splat}
+_PLY_STARTS = (b"ply\n", b"ply\r")
+
+
+@dataclass(frozen=True, eq=False)
+class SplatScene:
+    """N splats in host memory; arrays of any real type become float32, float32 is not copied.
+
+    Args:
+        means: (N, 3) positions in world coordinates.
+        log_scales: (N, 3) logarithms of the standard deviations along the rotated axes.
+        quats: (N, 4) rotations as quaternions (w, x, y, z) of any length.
+        logit_opacities: (N,) logits of the opacities.
+        sh: (N, K, 3) coefficients of spherical harmonics, K = 1, 4, 9, 16 or 25; of lobes, where
+            there are some, any K up to 36.
+        shape_modes: (N, K - 1) Hermite modes of the shape, or None; see ``rift_cl.splat.splats``.
+        color_modes: (N, K - 1, 3) those of the colour, or None.
+        lobes: (N, G) geometry of the lobes that colours vary in, or None.
+        activation: that densities are drawn with; see ``SplatSettings``.
+        angular: what colours vary in; see ``SplatSettings``.
+
+    Raises:
+        ShapeError: an array does not fit the others.
+        DTypeError: an array does not hold real numbers.
+        NonFiniteError: an array holds NaN or infinity.
+        InputError: a choice is unknown, or not for scenes of this mode.
+    """
+
+    means: NDArray[np.float32]
+    log_scales: NDArray[np.float32]
+    quats: NDArray[np.float32]
+    logit_opacities: NDArray[np.float32]
+    sh: NDArray[np.float32]
+    shape_modes: NDArray[np.float32] | None = None
+    color_modes: NDArray[np.float32] | None = None
+    lobes: NDArray[np.float32] | None = None
+    activation: Activation = "clamp"
+    angular: Angular = "sh"
+    mode: ClassVar[SplatMode] = "light"
+
+    def __post_init__(self) -> None:
+        """Bring the arrays into their normal form and check that they fit each other."""
+        means, sh = (
+            as_real_array(getattr(self, n), name=f"SplatScene: {n}") for n in ("means", "sh")
+        )
+        count, basis = means.shape[0] if means.ndim else 0, SceneBasis.of(self)
+        lobed = self.angular != "sh"
+        if sh.ndim != 3 or not (lobed or sh.shape[1] in COEFFICIENTS):
+            words = "K of the lobes" if lobed else "K = 1, 4, 9, 16 or 25"
+            raise ShapeError(
+                f"SplatScene: sh has shape {sh.shape}, wanted ({count}, K, 3) with {words}"
+            )
+        if lobed != (self.lobes is not None):
+            raise ShapeError(
+                f"SplatScene: angular is {self.angular!r} {'without' if lobed else 'with'} lobes, "
+                "wanted both, or harmonics ('sh') and none"
+            )
+        for name, shape in scene_shapes(count, sh.shape[1], basis).items():
+            array = as_host_array(
+                getattr(self, name), shape, name=f"SplatScene: {name}", wants="the scene"
+            )
+            object.__setattr__(self, name, array)
+
+    def __len__(self) -> int:
+        """Number of splats."""
+        return len(self.means)
+
+    @property
+    def degree(self) -> int:
+        """Degree of the spherical harmonics, 0 to 4; 0 where lobes are in their place."""
+        return 0 if self.lobes is not None else COEFFICIENTS.index(self.sh.shape[1])
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *, budget: int | None = None) -> SplatScene:
+        """Read a .ply file of 3D Gaussian splatting, whatever its name is, or a .splat file.
+
+        A PLY file may be text or binary of either byte order, with its properties in any order,
+        of any scalar type, and with others between them, which are left out. A .splat file has
+        no signature and is known by its name.
+
+        Args:
+            path: the file.
+            budget: bytes that the splats may take; 60 % of the free memory when not given.
+
+        Returns:
+            An ``XrayScene`` where the file holds densities.
+
+        Raises:
+            InputError: there is no such file.
+            FileFormatError: the file is damaged, or holds no splats.
+            NonFiniteError: it holds NaN or infinity.
+            ResourceLimitError: the splats are larger than the budget; nothing was allocated.
+        """
+        path = Path(path)
+        with reading(path, "the scene"):
+            mode, basis, arrays = _read(path, budget=budget)
+            for name, array in arrays.items():
+                check_finite(array, name=f"{path}: {name}")
+        kind: type[SplatScene] = XrayScene if mode == "xray" else SplatScene
+        return kind(**arrays, activation=basis.activation, angular=basis.angular)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a file that appears complete or not at all.
+
+        Args:
+            path: ends in .ply, which keeps every bit, or in .splat: 32 bytes for each splat, with
+                rounded opacities, rotations and colours, and without the higher harmonics.
+
+        Raises:
+            InputError: the ending is another, or a .splat file cannot hold the scene: one that is
+                empty, or of X-rays, or has modes, lobes or an activation.
+            OutputError: the file cannot be written.
+        """
+        path = Path(path)
+        if path.suffix.lower() not in _ENCODERS:
+            raise InputError(f"{path}: splats are written as .ply or .splat: end the name so")
+        if self.mode == "xray" and path.suffix.lower() == ".splat":
+            raise InputError(f"{path}: a .splat file holds opacities, not densities: save a .ply")
+        basis = SceneBasis.of(self)
+        if path.suffix.lower() == ".splat" and not basis.plain:
+            raise InputError(f"{path}: a .splat file holds no {basis.words}: save a .ply")
+        size, blocks = _ENCODERS[path.suffix.lower()](self)
+        check_space(path, size)
+        with atomic_path(path) as part:
+            with part.open("wb") as file:
+                for block in blocks:
+                    file.write(block)
+            if part.stat().st_size != size:
+                raise OutputError(f"{path}: is shorter than its splats; the disk lost some")
+
+    def upload(self, device: Device) -> Splats:
+        """Copy what is drawn to a device: scales, opacities, and the rest as it is."""
+        return Splats.upload(
+            device,
+            means=self.means,
+            quats=self.quats,
+            scales=scales_of(self.log_scales),
+            opacities=drawn_strengths(self.logit_opacities, self.mode, self.activation),
+            sh=self.sh,
+            shape_modes=self.shape_modes,
+            color_modes=self.color_modes,
+            lobes=self.lobes,
+        )
+
+    @classmethod
+    def of(
+        cls,
+        splats: Splats,
+        device: Device,
+        *,
+        activation: Activation = "clamp",
+        angular: Angular = "sh",
+    ) -> SplatScene:
+        """Copy splats back from a device.
+
+        A scale of 0 and opacities of 0 and 1, whose logarithms and logits are not finite, become
+        the float32 numbers nearest to them.
+
+        Args:
+            splats: with rotations, scales and coefficients of colours.
+            device: where they are.
+            activation: that they are drawn with.
+            angular: what their colours vary in.
+
+        Raises:
+            InputError: the splats have covariances, own colours or no harmonics, or a scale or
+                an opacity that no file can hold.
+            NonFiniteError: an array holds NaN, or positions, rotations or harmonics infinity.
+        """
+        if splats.quats is None or splats.sh is None or splats.colors is not None:
+            raise InputError("SplatScene: wants splats with quats, scales and sh, and no colors")
+        scales = device.get(splats.scales)
+        demand_range("scales", scales, np.inf)
+        more = {name: getattr(splats, name) for name in ("shape_modes", "color_modes", "lobes")}
+        return cls(
+            means=device.get(splats.means),
+            log_scales=log_scales_of(scales),
+            quats=device.get(splats.quats),
+            logit_opacities=kept_strengths(device.get(splats.opacities), cls.mode, activation),
+            sh=device.get(splats.sh),
+            **{name: None if array is None else device.get(array) for name, array in more.items()},
+            activation=activation,
+            angular=angular,
+        )
+
+
+class XrayScene(SplatScene):
+    """Splats of an X-ray scan; see ``SplatScene``.
+
+    ``logit_opacities`` are natural logarithms of the densities at the splats' peaks, per length;
+    they are drawn with ``SplatSettings(mode="xray")``.
+    """
+
+    mode: ClassVar[SplatMode] = "xray"
+
+
+def _read(
+    path: Path, *, budget: int | None
+) -> tuple[SplatMode, SceneBasis, dict[str, NDArray[np.float32]]]:
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is not a file")
+    with path.open("rb") as file:
+        start = file.read(4)
+        file.seek(0)
+        if start in _PLY_STARTS:
+            return read_ply(path, file, budget=budget)
+        if path.suffix.lower() == ".splat":
+            return "light", SceneBasis(), read_splat(path, file, budget=budget)
+    raise FileFormatError(f"{path}: is no PLY file, and no .splat file by its name")

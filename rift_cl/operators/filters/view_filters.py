@@ -1,0 +1,235 @@
+"""Filters along the detector: the ramp and its windows, a tunable high-pass, any response.
+
+A filter is designed on the host as a convolution kernel in real space and applied on the device
+without wrap-around; each view may have a response of its own. The ramp is built from its exact
+samples in real space (Ramachandran and Lakshminarayanan 1971; Kak and Slaney, Principles of
+Computerized Tomographic Imaging, eq. 3.61), so that its value at frequency zero, and with it the
+level of a reconstruction, is right.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from rift_cl.cl.budget import plan_chunks
+from rift_cl.cl.device import Device
+from rift_cl.cl.discovery import default_device
+from rift_cl.cl.memory import check_finite
+from rift_cl.errors import InputError, ShapeError
+from rift_cl.geometry import Parallel
+from rift_cl.operators.filters.row_convolution import SHORT_ROW, RowConvolution
+from rift_cl.operators.fourier.row_transform import RowTransform
+from rift_cl.operators.linear import LinearOperator, Piece
+
+Floats = NDArray[np.float64]
+Gains = ArrayLike | Callable[[Floats], ArrayLike]
+
+# Windows over u = frequency / (cutoff * Nyquist), 0 <= u <= 1.
+WINDOWS: dict[str, Callable[[Floats], Floats]] = {
+    "ram-lak": np.ones_like,
+    "shepp-logan": lambda u: np.sinc(u / 2),
+    "cosine": lambda u: np.cos(np.pi * u / 2),
+    "hamming": lambda u: 0.54 + 0.46 * np.cos(np.pi * u),
+    "hann": lambda u: 0.5 + 0.5 * np.cos(np.pi * u),
+}
+HIGH_PASS = "high-pass"
+# A response that is no ramp is sampled this many times finer than the detector can tell apart.
+_OVERSAMPLING = 16
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """The ramp |f| under a window: what makes filtered backprojection quantitative.
+
+    Args:
+        window: ``ram-lak`` (none), ``shepp-logan``, ``cosine``, ``hamming`` or ``hann``.
+        cutoff: where the window ends, as a fraction of the detector's Nyquist frequency.
+    """
+
+    window: str = "ram-lak"
+    cutoff: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check the window's name and cutoff."""
+        if self.window not in WINDOWS:
+            names = ", ".join([*WINDOWS, HIGH_PASS])
+            raise InputError(f"filter is {self.window!r}, wanted one of {names}")
+        if not 0 < self.cutoff <= 1:
+            raise InputError(f"cutoff is {self.cutoff}, wanted a fraction of Nyquist, 0 < c <= 1")
+
+    def taps(self, bins: int, pitch: float) -> Floats:
+        """Convolution kernel h[-(bins-1)] .. h[bins-1], in 1 / length^2."""
+        length = 1 << (2 * bins).bit_length()
+        n = np.abs(np.fft.fftfreq(length, 1 / length))
+        exact = np.where(n % 2 == 1, -1 / (np.pi * np.maximum(n, 1)) ** 2, 0.0)
+        exact[0] = 0.25
+        u = 2 * np.fft.rfftfreq(length) / self.cutoff
+        window = np.where(u <= 1, WINDOWS[self.window](np.minimum(u, 1)), 0.0)
+        kernel = np.fft.irfft(np.fft.rfft(exact) * window, length)[:bins] / pitch**2
+        return np.concatenate([kernel[:0:-1], kernel])
+
+
+@dataclass(frozen=True)
+class HighPass:
+    """The tunable high-pass |f|^exponent: 1 is the ramp, 0 passes everything alike.
+
+    Between the two it takes away a part of the low-frequency bias that an orbit's views have.
+    The response is scaled to meet the ramp at the Nyquist frequency, where both pass the most.
+
+    Args:
+        exponent: 0 or more.
+    """
+
+    exponent: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check the exponent."""
+        if not 0 <= self.exponent < np.inf:
+            raise InputError(f"exponent is {self.exponent}, wanted a number >= 0")
+
+    def taps(self, bins: int, pitch: float) -> Floats:
+        """Convolution kernel h[-(bins-1)] .. h[bins-1], in 1 / length^2."""
+        nyquist = 0.5 / pitch
+        return Response(lambda f: nyquist * (f / nyquist) ** self.exponent).taps(bins, pitch)
+
+
+@dataclass(frozen=True)
+class Response:
+    """Any response that depends on the magnitude of frequency alone.
+
+    Args:
+        function: the response (1 / length, as the ramp's is) at frequencies given in cycles per
+            unit of length, an array of them at a time, from 0 to the detector's Nyquist.
+    """
+
+    function: Callable[[Floats], ArrayLike]
+
+    def taps(self, bins: int, pitch: float) -> Floats:
+        """Convolution kernel h[-(bins-1)] .. h[bins-1]: the cosine transform of the response."""
+        from scipy.fft import dct
+
+        count = _OVERSAMPLING * bins
+        width = 0.5 / pitch / count
+        frequencies: Floats = (np.arange(count, dtype=np.float64) + 0.5) * width
+        values = np.asarray(self.function(frequencies))
+        real = values.dtype.kind in "fiub" and values.shape == frequencies.shape
+        if not real or not np.isfinite(values).all():
+            raise InputError("filter response must give one finite number for each frequency")
+        kernel = width * dct(values.astype(np.float64), type=2)[:bins]
+        return np.concatenate([kernel[:0:-1], kernel])
+
+
+Filter = Ramp | HighPass | Response
+
+
+def as_filter(filter: str | Filter | Callable[[Floats], ArrayLike]) -> Filter:
+    """A filter from its name, itself, or a response function.
+
+    Raises:
+        InputError: it is none of these, or the name is unknown.
+    """
+    if isinstance(filter, (Ramp, HighPass, Response)):
+        return filter
+    if isinstance(filter, str):
+        return HighPass() if filter == HIGH_PASS else Ramp(filter)
+    if callable(filter):
+        return Response(filter)
+    raise InputError(f"filter is {filter!r}, wanted a name, a filter or a function of frequency")
+
+
+class ViewFilter(LinearOperator):
+    """A filter along the detector, applied to every row of every view.
+
+    Args:
+        scan: the scan whose views are filtered.
+        filter: the filter.
+        rows: detector rows in a view, None for a sinogram of (angles, bins).
+        gains: what the response is multiplied by in each view, (angles,); 1 if not given. Or a
+            function that takes frequencies, (n,) from 0 to the detector's Nyquist in cycles per
+            unit of length, to gains of (angles, n); what it gives at zero is the gain of the
+            filter's exact value there.
+        device: where to work; the default device if not given.
+        dtype: float32 or float64.
+
+    Domain and range are (angles, bins) or (angles, rows, bins). The operator is its own adjoint.
+    A filter that all views share is applied in real space to short rows; long rows, and those
+    whose views have responses of their own, take the way through the Fourier domain.
+
+    Raises:
+        InputError: gains have another shape or are not finite.
+    """
+
+    def __init__(
+        self,
+        scan: Parallel,
+        filter: Filter,
+        *,
+        rows: int | None = None,
+        gains: Gains | None = None,
+        device: Device | None = None,
+        dtype: DTypeLike = np.float32,
+    ) -> None:
+        shape = (len(scan.angles), *(() if rows is None else (rows,)), scan.bins)
+        super().__init__(shape, shape, device or default_device(), dtype)
+        if rows is not None and rows < 1:
+            raise ShapeError(f"rows is {rows}, wanted at least 1 detector row")
+        factors, taps = _factors_and_taps(scan, filter, gains)
+        self._gains = self.device.array(factors, self.dtype)
+        self._convolve: RowConvolution | RowTransform
+        taps *= scan.pitch
+        if len(taps) == 1 and scan.bins <= SHORT_ROW:
+            self._convolve = RowConvolution(self.device, taps, self.dtype)
+        else:
+            self._convolve = RowTransform(self.device, taps, math.prod(shape[:-1]), self.dtype)
+
+    def _apply(self, x: Any, out: Any) -> None:
+        self._convolve(x, out, self._gains, x.shape[1] if len(x.shape) == 3 else 1)
+
+    def _apply_adjoint(self, y: Any, out: Any) -> None:
+        self._apply(y, out)
+
+    @property
+    def scratch(self) -> int:
+        """Bytes needed besides the views that go in and come out."""
+        return self._convolve.scratch
+
+    def _pieces(self, budget: int) -> Iterable[Piece]:
+        if len(self.domain) == 2:
+            return super()._pieces(budget)
+        each = 2 * self.dtype.itemsize * self.domain[0] * self.domain[2]
+        runs = plan_chunks(self.domain[1], each, self.scratch, budget, what="row of every view")
+        return [((slice(None), run), (slice(None), run)) for run in runs]
+
+
+def _factors_and_taps(scan: Parallel, filter: Filter, gains: Gains | None) -> tuple[Floats, Floats]:
+    """A factor for each view, and halves of kernels: one for all views, or one for each."""
+    views, bins = len(scan.angles), scan.bins
+    if not callable(gains):
+        factors = np.ones(views) if gains is None else np.asarray(gains, dtype=np.float64)
+        if factors.shape != (views,):
+            raise ShapeError(f"gains has shape {factors.shape}, wanted one for each of {views}")
+        check_finite(factors, name="gains")
+        return factors, filter.taps(bins, scan.pitch)[None, bins - 1 :].copy()
+    # Twice as fine as the object's size asks for; the filter's own taps reach as far, so that its
+    # value at zero is right.
+    half = 2 << (bins - 1).bit_length()
+    kernel = filter.taps(half, scan.pitch)
+    response = np.fft.rfft(np.concatenate([kernel[half - 1 :], [0], kernel[: half - 1]])).real
+    frequencies = np.arange(half + 1) / (2 * half * scan.pitch)
+    factors = np.asarray(gains(frequencies), dtype=np.float64)
+    if factors.shape != (views, half + 1):
+        raise ShapeError(
+            f"gains gives shape {factors.shape}, wanted one for each of {views} views and "
+            f"{half + 1} frequencies"
+        )
+    check_finite(factors, name="gains")
+    taps = np.empty((views, bins))
+    for view in range(views):
+        taps[view] = np.fft.irfft(response * factors[view], 2 * half)[:bins]
+    return np.ones(views), taps

@@ -1,0 +1,59 @@
+"""Fourier transforms that a CPU makes inside of other kernels, a few columns at a time.
+
+A core of a CPU waits for memory in a transform that goes over whole planes pass by pass. Here a
+kernel fills a block of columns, transforms it (kernels/include/fft_block.h), makes something of it
+and empties it, all in its caches. GPUs take ``ColumnTransform``.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from rift_cl.cl.device import Device
+from rift_cl.operators.fourier.column_transform import turns
+
+# Columns of a block: a line of the cache. Items for each unit, so that none waits long for the
+# last.
+BLOCK = 16
+_ITEMS_PER_UNIT = 4
+
+
+class BlockTransform:
+    """Transforms of one length, in kernels that include ``fft_block.h``.
+
+    Args:
+        device: a CPU.
+        length: a product of twos and threes.
+        dtype: of what is transformed.
+    """
+
+    def __init__(self, device: Device, length: int, dtype: DTypeLike = np.float32) -> None:
+        self.device, self.length, self._dtype = device, length, np.dtype(dtype)
+        self._items = _ITEMS_PER_UNIT * device.traits.compute_units
+
+    @cached_property
+    def _turns(self) -> Any:
+        return self.device.array(turns(self.length, self.length), self._dtype)
+
+    @cached_property
+    def _scratch(self) -> Any:
+        return self.device.empty((self._items, 2, 2, self.length, BLOCK), self._dtype)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that are kept on the device: two blocks of every item, and the table of turns."""
+        return self._dtype.itemsize * self.length * (4 * BLOCK * self._items + 2)
+
+    def launch(self, kernel: str, columns: int, *arguments: Any, **macros: Any) -> None:
+        """Enqueue a kernel for so many columns, with what transforms need behind its arguments."""
+        blocks = -(-columns // BLOCK)
+        items = min(self._items, blocks)
+        transform = (self._scratch, self._turns, self.length, blocks, items)
+        double = int(self._dtype == np.float64)
+        self.device.launch(
+            kernel, (items,), *arguments, *transform, BLOCK=BLOCK, DOUBLE=double, **macros
+        )

@@ -1,0 +1,252 @@
+"""The X-ray transform of a parallel scan by the Fourier slice theorem, with an error that is named.
+
+The transform of a view is the image's spectrum along a ray (R. N. Bracewell, Australian J. Physics
+9, 198, 1956). So a projection is a transform of the padded image, a reading of its rays between the
+grid's points, and a transform of each ray; backprojection is the same steps transposed, in reverse,
+with the same numbers. That costs N^2 log N for the transforms and a constant for each sample of a
+view, where every pixel of every view costs ``Projector`` something.
+
+``rift_cl/reference/band_limited.py`` has the matrix that this approximates.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rift_cl.cl.device import Device
+from rift_cl.errors import InputError
+from rift_cl.geometry import Grid, Parallel
+from rift_cl.geometry.numbers import one_number
+from rift_cl.operators.fourier.block_transform import BLOCK
+from rift_cl.operators.fourier.gridding import LOG2_ROWS, choose
+from rift_cl.operators.fourier.padded_spectrum import PaddedSpectrum, in_steps
+from rift_cl.operators.projector.parallel_projector import ParallelProjector
+from rift_cl.operators.projector.ray_geometry import IMAGE, rays
+from rift_cl.operators.projector.ray_tables import RayTables
+
+_MOST_LOBES = 8
+# Slices that a CPU spreads at once (kernels/fourier/rays_spread_stack_cpu.cl), and the bytes of rays
+# and grids that they may take.
+_TOGETHER, _TOGETHER_BYTES = 4, 512 << 20
+
+
+class FastProjector(ParallelProjector):
+    """Line integrals of an image, or of every slice of a volume, with an error that is named.
+
+    It approximates the transform with the footprint ``strip`` of ``Projector``, which counts the
+    area that pixel and bin share. The spectrum of that never ends: that of the bins, repeated,
+    under the sinc of the bin and those of the pixel's two edges. Here it ends where the image has
+    no more to show: along either axis at 0.55 cycles per sample of the image, of which 1/2 can be
+    told apart (0.71 where bins are finer than samples), or at 0.85 as far as that lies below the
+    detector's own Nyquist frequency. What lies beyond would fold back into the image. By that the
+    two projectors differ on sharp data; reconstructions are as good.
+
+    Args:
+        grid: where the image lives, (ny, nx) or (nz, ny, nx).
+        scan: how it is looked at.
+        error: what the result may differ by from that transform's, the norm of the difference
+            over the norm of the result: for data as rough as white noise or smoother, on a detector
+            that sees the image. Rougher data (a checkerboard, a lone corner pixel) may differ by a
+            little more, and float32 rounds at 1e-6.
+        lobes: ``image``, or how many lobes of the bin's sinc are kept, folded or not. 0: nothing
+            beyond the detector's Nyquist frequency; edges ring. 3: nearly the values that
+            phase tables give.
+        device: where to work; the default device if not given.
+
+    Bins further from the image's shadow than a pixel's own and eight bins are taken for zero.
+
+    Raises:
+        InputError: the error is smaller than this method allows, or bins are very much finer than
+            samples.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        scan: Parallel,
+        error: float = 1e-3,
+        *,
+        lobes: int | str = IMAGE,
+        device: Device | None = None,
+    ) -> None:
+        if not 0 < one_number(error) <= 0.1:
+            raise InputError(f"error is {error!r}, wanted a number from 1e-6 to 0.1")
+        if lobes != IMAGE and one_number(lobes) not in range(_MOST_LOBES + 1):
+            raise InputError(
+                f"lobes is {lobes!r}, wanted a whole number from 0 to {_MOST_LOBES}, or {IMAGE!r}"
+            )
+        super().__init__(grid, scan, device)
+        self.error, self.lobes = float(error), IMAGE if lobes == IMAGE else int(lobes)
+        self._rays = found = rays(grid.slice(), scan, lobes)
+        self._samples = in_steps(int(found.ends.max()))
+        spread = int(found.ends.sum())
+        self.gridding = choose((grid.shape[-2], grid.shape[-1]), spread, float(error))
+        self._columns = BLOCK * -(-len(scan.angles) // (2 * BLOCK))
+        self._spectrum = PaddedSpectrum(
+            self.device, grid.slice(), scan, self.gridding, found.length
+        )
+        self._together = min(self._slices_together(), grid.slices)
+
+    def prepare(self) -> None:
+        """Make the tables now, which is otherwise left to the first application."""
+        _ = self._tables.nbytes
+
+    @property
+    def samples(self) -> tuple[int, ...]:
+        """Samples that are kept of each view's transform, zero frequency included."""
+        kept = np.empty_like(self._rays.ends)
+        kept[self._rays.order] = self._rays.ends
+        return tuple(kept.tolist())
+
+    @property
+    def period(self) -> int:
+        """Bins after which a view's continuation repeats itself."""
+        return self._rays.length
+
+    @cached_property
+    def _tables(self) -> RayTables:
+        return RayTables(self.device, self._rays, self.gridding, self._columns, self._samples)
+
+    def _apply(self, x: Any, out: Any) -> None:
+        for k in range(x.shape[0] if len(x.shape) == 3 else 1):
+            grid = self._spectrum.of(x, k)
+            values = self._read(grid)
+            del grid
+            self._views_of(values, out, k)
+
+    def _apply_adjoint(self, y: Any, out: Any) -> None:
+        slices = out.shape[0] if len(out.shape) == 3 else 1
+        for first in range(0, slices, self._together):
+            run = range(first, min(first + self._together, slices))
+            values = [self._rays_of(y, k) for k in run]
+            grids = self._spread(values)
+            del values
+            for k in run:
+                self._spectrum.crop(grids.pop(0), out, k)
+
+    def _rays_of(self, views: Any, k: int) -> Any:
+        """Transforms of the views of slice k, as rays (2, n, samples)."""
+        found, tables, device = self._rays, self._tables, self.device
+        count, length, columns = len(found.order), found.length, self._columns
+        values = device.empty((2, count, self._samples))
+        if tables.blocks is not None:
+            where = (tables.order, tables.starts, *tables.factors, tables.ends)
+            sizes = (count, *self._slice_sizes(views, k), found.window, self._samples, columns)
+            tables.blocks.launch("rays_of_views_cpu", columns, views, values, *where, *sizes)
+            return values
+        fields, spare = self._planes(length, columns)
+        arguments = self._view_arguments(views, k)
+        device.launch(
+            "rays_pack_gpu", (*self._blocks(columns, length), 2), views, fields, *arguments
+        )
+        fields, spare = tables.views(fields, spare)
+        size = (*self._blocks(columns, self._samples), 2)
+        arrays = (fields, values, *tables.factors, tables.ends)
+        device.launch("rays_weigh_gpu", size, *arrays, count, self._samples, length, columns)
+        return values
+
+    def _views_of(self, values: Any, views: Any, k: int) -> None:
+        """The transpose of ``_rays_of``."""
+        found, tables, device = self._rays, self._tables, self.device
+        count, length, columns = len(found.order), found.length, self._columns
+        fields, spare = self._planes(length, columns)
+        blocks = self._blocks(columns, length // 2 + 1)
+        sizes = (count, self._samples, length, columns)
+        factors = tables.factors
+        device.launch("rays_unweigh", blocks, values, fields, *factors, *sizes, RUN=self._run)
+        fields, spare = tables.views(fields, spare, inverse=True)
+        size = (*self._blocks(columns, found.window), 2)
+        arguments = self._view_arguments(views, k)
+        device.launch("rays_unpack", size, fields, views, *arguments, RUN=self._run)
+
+    def _view_arguments(self, views: Any, k: int) -> tuple[Any, ...]:
+        found, tables = self._rays, self._tables
+        sizes = (len(found.order), *self._slice_sizes(views, k))
+        return (tables.order, tables.starts, *sizes, found.window, found.length, self._columns)
+
+    def _slice_sizes(self, views: Any, k: int) -> tuple[int, int, int]:
+        """Slice k, of how many, and its bins."""
+        return k, views.shape[1] if len(views.shape) == 3 else 1, self.scan.bins
+
+    def _spread(self, values: list[Any]) -> list[Any]:
+        """Rays of some slices to grids of frequencies, as ``crop`` takes them."""
+        tables, (rows, edge) = self._tables, self.gridding.edges
+        across, tiles = self._spectrum.across, len(tables.tiles) - 1
+        grids = [self._spectrum.empty_grid() for _ in values]
+        macros = {**self._macros, "TILE": tables.tile}
+        kernel, arrays = "rays_spread", [*values, *grids]
+        if len(values) > 1:
+            kernel, macros["SLICES"] = "rays_spread_stack_cpu", len(values)
+            spare = [values[0]] * (_TOGETHER - len(values))
+            arrays = [*values, *spare, *grids, *([grids[0]] * len(spare))]
+        self.device.launch(
+            kernel,
+            (tiles,),
+            *(*arrays, tables.kernel, tables.steps, tables.inverses, tables.ends),
+            *(tables.visits, tables.tiles, *values[0].shape[1:], tiles),
+            *(-(-(edge // 2 + 1) // tables.tile), self._spectrum.width, rows, across),
+            **macros,
+        )
+        return grids
+
+    def _read(self, grid: Any) -> Any:
+        """The transpose of ``_spread``."""
+        tables, (rows, edge) = self._tables, self.gridding.edges
+        values = self.device.empty((2, len(self._rays.order), self._samples))
+        count, samples = values.shape[1:]
+        width = self.gridding.width
+        self.device.launch(
+            "spectrum_mirror", (rows, 2 * width), grid, rows, self._spectrum.across, edge
+        )
+        cpu = self.device.traits.is_cpu
+        run = 64 if cpu else 1
+        arguments = (grid, values, tables.kernel, tables.steps, tables.ends)
+        sizes = (count, samples, rows, self._spectrum.across, edge)
+        runs = -(-samples // run)
+        size = (count, runs) if cpu else (runs, count)
+        self.device.launch("rays_read", size, *arguments, *sizes, RUN=run, **self._macros)
+        return values
+
+    def _planes(self, rows: int, columns: int) -> tuple[Any, Any]:
+        shape = (2, rows, columns)
+        return self.device.empty(shape), self.device.empty(shape)
+
+    @property
+    def _macros(self) -> dict[str, int]:
+        return {"WIDTH": self.gridding.width, "LOG2_ROWS": LOG2_ROWS}
+
+    @property
+    def _run(self) -> int:
+        """Rows of a block of columns that a work-item goes through."""
+        return 256 if self.device.traits.is_cpu else 1
+
+    def _blocks(self, columns: int, rows: int) -> tuple[int, int]:
+        return columns // self.device.traits.macros["LANES"], -(-rows // self._run)
+
+    @property
+    def scratch(self) -> int:
+        """Bytes needed besides the arrays that go in and come out."""
+        found = self._rays
+        fields = 2 * found.length * self._columns
+        grid, transform = self._spectrum.entries, self._spectrum.scratch_entries
+        more = self._together - 1
+        spreading = self._together * (self._ray_entries + grid)
+        transforming = more * max(self._ray_entries, grid) + max(
+            2 * fields + self._ray_entries, transform
+        )
+        most = max(spreading, transforming)
+        return 4 * most + self._tables.nbytes + self._spectrum.nbytes
+
+    @property
+    def _ray_entries(self) -> int:
+        """Numbers of a slice's rays."""
+        return 2 * len(self._rays.order) * self._samples
+
+    def _slices_together(self) -> int:
+        """How many slices are spread at once, which no result depends on."""
+        each = 4 * (self._ray_entries + self._spectrum.entries)
+        most = min(_TOGETHER_BYTES, self.device.budget // 4)
+        return _TOGETHER if self.device.traits.is_cpu and _TOGETHER * each <= most else 1

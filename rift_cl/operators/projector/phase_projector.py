@@ -1,0 +1,229 @@
+"""The X-ray transform of a parallel scan and its exact adjoint, by phase tables.
+
+Forward: image -> padded planes (by rows, by columns) -> phase tables -> bins. Adjoint: the same
+steps transposed, in reverse, with the same numbers. ``kernels/include/phase_table.h`` derives the
+method; ``rift_cl/reference/radon.py`` has the matrix that it approximates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from rift_cl.cl.device import Device
+from rift_cl.geometry import Grid, Parallel
+from rift_cl.operators.projector.footprint import check_footprint
+from rift_cl.operators.projector.parallel_projector import ParallelProjector
+from rift_cl.operators.projector.phase_table import LOG2_PHASES, PhaseTable, phase_table
+
+# Tables of a run of views together: on a CPU they should stay in its caches.
+_TABLE_BYTES = {"cpu": 4 << 20, "gpu": 64 << 20}
+_FEWEST_VIEWS = 16
+# A CPU reads tables the more often from its cache the more rows it takes in a run.
+_ROW_RUNS, _ITEMS_PER_UNIT = (64, 32, 16), 8
+# Slices that are worked on together, which bounds the scratch memory of any volume.
+_SLAB = 16
+
+
+class Projector(ParallelProjector):
+    """Line integrals of an image, or of every slice of a volume.
+
+    Args:
+        grid: where the image lives, (ny, nx) or (nz, ny, nx).
+        scan: how it is looked at.
+        footprint: what a pixel leaves on the detector. ``strip``: the area that the pixel shares
+            with the strip of rays that a bin collects. Every view then holds the whole mass, and
+            ``fbp(A, A(x))`` of a uniform object is flat. ``joseph``: rays through the bins'
+            centres interpolate linearly between the pixels of each row or column they cross
+            (Joseph 1982); the result is flat to about 1 %, and worse where bins are wider than
+            samples, since rays miss what lies between them. ``linear``: the pixel is spread by
+            linear interpolation over the two bins about its centre (pixel-driven); where bins are
+            finer than its shadow the hat widens to that shadow. Its projections of a uniform
+            object ripple in views near 45 and 135 degrees, and ``fbp(A, A(x))`` varies by
+            several per cent; reconstructions of measured data do not suffer.
+        device: where to work; the default device if not given.
+        dtype: ``float32``, or ``float64`` where the device has it: for an adjoint that is matched
+            to 1e-15 and for solvers that run far. Both types read one geometry, in which a step
+            from row to row is exact to 2^-33 of a column: projections are off by 2e-9 (smooth
+            images) to 6e-8 (white noise) at 512 x 512, in proportion to its edge. And both blend
+            8 phases to a column, whose error, near 1 % on white noise, float64 leaves as it is.
+
+    Raises:
+        InputError: the footprint or the type is unknown.
+        DeviceError: the device has no float64.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        scan: Parallel,
+        footprint: str = "strip",
+        device: Device | None = None,
+        dtype: DTypeLike = np.float32,
+    ) -> None:
+        super().__init__(grid, scan, device, dtype)
+        self.footprint = check_footprint(footprint)
+        lanes = self.device.traits.macros["LANES"]
+        blocks = 32 // self.dtype.itemsize if lanes > 1 else 1
+        self._segment = lanes * blocks
+        self._table_bytes = _TABLE_BYTES["cpu" if self.device.traits.is_cpu else "gpu"]
+        self._precision = {"DOUBLE": int(self.dtype == np.float64)}
+        self._macros = {"BLOCKS": blocks, "LOG2_PHASES": LOG2_PHASES, **self._precision}
+        self._resampling = {"STRIP": int(footprint == "strip"), **self._macros}
+
+    @cached_property
+    def _walks(self) -> tuple[_Walk, _Walk]:
+        plane, scan = self.grid.slice(), self.scan
+        by_rows, by_columns = (
+            phase_table(plane, scan, self.footprint, along_x=along_x, segment=self._segment)
+            for along_x in (True, False)
+        )
+        return _Walk(self.device, by_rows, self.dtype), _Walk(self.device, by_columns, self.dtype)
+
+    def _description(self) -> str:
+        return f"{super()._description()}, footprint {self.footprint}"
+
+    def _apply(self, x: Any, out: Any) -> None:
+        for slab in _slabs(x):
+            for transpose, walk in enumerate(self._walks):
+                if walk.count:
+                    plane = self._split(walk, x, slab, transpose)
+                    for run in self._runs(walk, slab):
+                        self._project(walk, plane, out, slab, run)
+
+    def _split(self, walk: _Walk, image: Any, slab: _Slab, transpose: int) -> Any:
+        table, margin = walk.table, self._segment
+        shape = (slab.slices, table.rows, table.width + 2 * margin)
+        plane = self.device.zeros(shape, self.dtype)
+        tiles = (*self._tiles(table.width, table.rows), slab.slices)
+        arguments = (image, plane, slab.first, table.rows, table.width, margin)
+        macros = {"TRANSPOSE": transpose, **self._precision}
+        self.device.launch("plane_split", tiles, *arguments, **macros)
+        return plane
+
+    def _project(self, walk: _Walk, plane: Any, out: Any, slab: _Slab, run: _Run) -> None:
+        table, (first, count) = walk.table, run
+        entries = self.device.empty((slab.slices, count, table.entries), self.dtype)
+        segments = table.columns // self._segment
+        work = (count, segments) if self.device.traits.is_cpu else (segments, count)
+        self.device.launch(
+            "radon_project",
+            (*work, slab.slices),
+            *(entries, plane, walk.geometry, walk.orders, walk.starts, walk.views),
+            *(first, table.columns, table.rows, table.width),
+            **self._macros,
+        )
+        bins = 64 if self.device.traits.is_cpu else 1
+        self.device.launch(
+            f"{walk.resample}_adjoint",
+            (-(-self.scan.bins // bins), count, slab.slices),
+            *(out, entries, walk.geometry, walk.footprints, walk.views),
+            *(first, slab.first, slab.total, self.scan.bins, table.columns),
+            BINS=bins,
+            **self._resampling,
+        )
+
+    def _apply_adjoint(self, y: Any, out: Any) -> None:
+        for slab in _slabs(out):
+            planes = [self._backproject(walk, y, slab) for walk in self._walks]
+            ny, nx = self.grid.shape[-2:]
+            tiles = (*self._tiles(nx, ny), slab.slices)
+            pitches = [walk.table.padded for walk in self._walks]
+            arguments = (*planes, out, slab.first, ny, nx, *pitches)
+            self.device.launch("plane_merge", tiles, *arguments, **self._precision)
+
+    def _backproject(self, walk: _Walk, y: Any, slab: _Slab) -> Any:
+        table = walk.table
+        shape = (slab.slices, table.rows, table.padded)
+        plane = (self.device.empty if walk.count else self.device.zeros)(shape, self.dtype)
+        rows = self._row_run(slab.slices, table)
+        for first, count in self._runs(walk, slab):
+            entries = self.device.empty((slab.slices, count, table.entries), self.dtype)
+            self.device.launch(
+                walk.resample,
+                (table.columns // self.device.traits.macros["LANES"], count, slab.slices),
+                *(y, entries, walk.geometry, walk.footprints, walk.views),
+                *(first, slab.first, slab.total, self.scan.bins, table.columns),
+                **self._resampling,
+            )
+            self.device.launch(
+                "radon_backproject",
+                (table.padded // self._segment, -(-table.rows // rows), slab.slices),
+                *(entries, plane, walk.geometry),
+                *(first, count, table.columns, table.rows, table.padded, int(first > 0)),
+                ROWS=rows,
+                **self._macros,
+            )
+        return plane
+
+    def _row_run(self, slices: int, table: PhaseTable) -> int:
+        """Rows that one work-item backprojects onto: many, but work for every compute unit."""
+        traits = self.device.traits
+        if not traits.is_cpu:
+            return 1
+        runs = table.padded // self._segment * slices
+        wanted = -(-_ITEMS_PER_UNIT * traits.compute_units // runs)
+        return next((n for n in _ROW_RUNS if n * wanted <= table.rows), _ROW_RUNS[-1])
+
+    def _tiles(self, width: int, rows: int) -> tuple[int, int]:
+        tile = 16 if self.device.traits.is_cpu else 1
+        return -(-width // tile), -(-rows // tile)
+
+    def _runs(self, walk: _Walk, slab: _Slab) -> Iterator[_Run]:
+        """Runs of views whose tables fit the table memory, but no fewer than a cache's worth."""
+        each = self.dtype.itemsize * walk.table.entries * slab.slices
+        most = max(_FEWEST_VIEWS, self._table_bytes // each)
+        for first in range(0, walk.count, most):
+            yield _Run(first, min(most, walk.count - first))
+
+    @property
+    def scratch(self) -> int:
+        """Bytes needed besides the arrays that go in and come out."""
+        slices = min(_SLAB, self.grid.slices)
+        planes = [walk.table.rows * (walk.table.width + 2 * self._segment) for walk in self._walks]
+        tables = max(walk.table.entries for walk in self._walks) * _FEWEST_VIEWS
+        records = sum(walk.nbytes for walk in self._walks)
+        numbers = slices * (sum(planes) + tables)
+        return self.dtype.itemsize * numbers + self._table_bytes + records
+
+
+class _Walk:
+    """A phase table and the device's copy of its records."""
+
+    def __init__(self, device: Device, table: PhaseTable, dtype: np.dtype[Any]) -> None:
+        self.table = table
+        self.count = len(table.views)
+        by_edges = table.footprints.by_edges
+        self.resample = "radon_resample_edges" if by_edges else "radon_resample"
+        self.views = device.array(table.views)
+        self.geometry = device.array(table.geometry)
+        self.footprints = device.array(table.footprints.records, dtype)
+        self.orders = device.array(table.orders)
+        self.starts = device.array(table.starts)
+        arrays = (self.views, self.geometry, self.footprints, self.orders, self.starts)
+        self.nbytes: int = sum(array.nbytes for array in arrays)
+
+
+class _Slab(NamedTuple):
+    """Slices that are worked on together: ``slices`` of ``total``, from ``first``."""
+
+    first: int
+    slices: int
+    total: int
+
+
+class _Run(NamedTuple):
+    """Views whose tables exist at the same time."""
+
+    first: int
+    views: int
+
+
+def _slabs(image: Any) -> Iterator[_Slab]:
+    total = image.shape[0] if len(image.shape) == 3 else 1
+    for first in range(0, total, _SLAB):
+        yield _Slab(first, min(_SLAB, total - first), total)

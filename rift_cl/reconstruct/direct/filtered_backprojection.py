@@ -1,0 +1,161 @@
+"""Reconstruction by integration: filtered and unfiltered backprojection.
+
+With p_j the view at angle j and h the ramp, the image is
+``f(x, y) = sum over j of w_j (p_j * h)(x cos a_j + y sin a_j)``, w_j the share of the half-circle
+that view j stands for (Kak and Slaney, section 3.3). Without h the result is the image convolved
+with 1 / r: low frequencies are counted once for every view, which is the bias that the RiFT paper
+shows in its Figures 4 and 5.
+
+Where directions are few or lie unevenly, what a view stands for depends on frequency as well, and
+each view gets a filter of its own (rift_cl/operators/filters/compensation.py).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rift_cl.errors import InputError
+from rift_cl.geometry.numbers import one_number
+from rift_cl.operators.filters.compensation import Compensation
+from rift_cl.operators.filters.view_filters import Filter, Gains, ViewFilter, as_filter
+from rift_cl.operators.linear import LinearOperator, Piece
+from rift_cl.operators.projector.parallel_projector import ParallelProjector
+from rift_cl.reconstruct.direct.view_weights import view_gains
+
+Floats = NDArray[np.float64]
+FilterLike = str | Filter | Callable[[Floats], ArrayLike]
+
+
+class FilteredBackprojection(LinearOperator):
+    """Filtered backprojection as an operator from sinograms to images.
+
+    Args:
+        A: the projector whose geometry to use.
+        filter: a name (``ram-lak``, ``shepp-logan``, ``cosine``, ``hamming``, ``hann``,
+            ``high-pass``), a filter, or a function of frequency.
+        compensate: what each view stands for. ``uniform``: every view the same. ``voronoi``: half
+            the gaps to its neighbours. None: as ``voronoi`` where no gap is a hole, else as
+            ``uniform``. ``capped-voronoi``, ``pipe-menon`` and ``exact`` depend on frequency, and
+            are the ones for random, clustered and limited angles; on even angles they are the
+            plain ramp.
+        diameter: of the object, for these three, in the grid's unit of length; that of the
+            circle in the grid that the detector sees if not given.
+
+    Raises:
+        InputError: a name is unknown, or the diameter no length.
+    """
+
+    def __init__(
+        self,
+        A: ParallelProjector,
+        filter: FilterLike = "ram-lak",
+        *,
+        compensate: str | None = None,
+        diameter: float | None = None,
+    ) -> None:
+        super().__init__(A.range, A.domain, A.device, A.dtype)
+        self._A = A
+        size = object_diameter(A) if diameter is None else one_number(diameter)
+        if not size > 0:
+            raise InputError(f"diameter is {diameter!r}, wanted the object's, a positive length")
+        self._filter = ViewFilter(
+            A.scan,
+            as_filter(filter),
+            rows=A.range[1] if len(A.range) == 3 else None,
+            gains=_scaled(view_gains(A.scan.angles, compensate, size), _unspread(A)),
+            device=A.device,
+            dtype=A.dtype,
+        )
+
+    def _apply(self, x: Any, out: Any) -> None:
+        filtered = self.device.empty(x.shape, self.dtype)
+        self._filter._apply(x, filtered)
+        self._A._apply_adjoint(filtered, out)
+
+    def _apply_adjoint(self, y: Any, out: Any) -> None:
+        projected = self.device.empty(out.shape, self.dtype)
+        self._A._apply(y, projected)
+        self._filter._apply_adjoint(projected, out)
+
+    @property
+    def scratch(self) -> int:
+        """The filtered sinogram, besides what filter and projector need."""
+        views = self.dtype.itemsize * math.prod(self.domain)
+        return views + self._filter.scratch + self._A.scratch
+
+    def _pieces(self, budget: int) -> Iterable[Piece]:
+        # The sinogram and the filtered one.
+        pieces = self._A.pieces(budget, sinograms=2, fixed=self._filter.scratch)
+        return [(inside, outside) for outside, inside in pieces]
+
+
+def fbp(
+    A: ParallelProjector,
+    y: Any,
+    filter: FilterLike = "ram-lak",
+    compensate: str | None = None,
+    *,
+    diameter: float | None = None,
+    out: Any = None,
+) -> Any:
+    """Reconstruct by filtered backprojection.
+
+    Args:
+        A: the projector that describes grid and scan.
+        y: sinogram (angles, bins) or projection stack (angles, rows, bins); line integrals in
+            the image's unit times the grid's unit of length.
+        filter: a name (``ram-lak``, ``shepp-logan``, ``cosine``, ``hamming``, ``hann``,
+            ``high-pass``), a filter, or a function of frequency.
+        compensate: what each view stands for, see ``FilteredBackprojection``.
+        diameter: of the object, see there.
+        out: where to put the result.
+
+    Returns:
+        The image or volume, in the image's unit, on the side (host or device) where ``y`` is.
+
+    Raises:
+        InputError: ``y`` does not fit, is not finite, or a name is unknown.
+    """
+    _check_projector(A)
+    operator = FilteredBackprojection(A, filter, compensate=compensate, diameter=diameter)
+    return operator(y, out, name="y")
+
+
+def backproject(A: ParallelProjector, y: Any, *, out: Any = None) -> Any:
+    """Backproject without a filter, every view alike: the paper's unfiltered baseline.
+
+    ``A``, ``y``, ``out`` and errors are those of ``fbp``. The result is the image convolved with
+    1 / r, in the image's unit times a length; compare it after an affine fit.
+    """
+    _check_projector(A)
+    factor = np.pi / len(A.scan.angles) * _unspread(A)
+    return (A.T * factor)(y, out, name="y")
+
+
+def _check_projector(A: Any) -> None:
+    if not isinstance(A, ParallelProjector):
+        raise InputError(f"A is a {type(A).__name__}, wanted a Projector first, then the sinogram")
+
+
+def object_diameter(A: ParallelProjector) -> float:
+    """Diameter of the circle in the grid that the detector sees, in the grid's unit of length."""
+    edges = (n * d for n, d in zip(A.grid.shape[-2:], A.grid.spacing[-2:], strict=True))
+    return min(*edges, A.scan.bins * A.scan.pitch)
+
+
+def _scaled(gains: Floats | Compensation, factor: float) -> Gains:
+    if isinstance(gains, Compensation):
+        return lambda frequencies: factor * gains(frequencies)
+    return factor * gains
+
+
+def _unspread(A: ParallelProjector) -> float:
+    # A.T spreads a bin over pixels with weights that add up to dx dy / pitch; the sum over
+    # views that inverts the transform wants weights that add up to one.
+    dy, dx = A.grid.spacing[-2:]
+    return A.scan.pitch / (dx * dy)

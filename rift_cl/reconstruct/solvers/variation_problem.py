@@ -1,0 +1,95 @@
+"""Least squares with total variation, the problem that FISTA and PDHG both solve.
+
+    minimise  |F^(1/2) (A x - y)|^2 / 2 + weight * TV(x),    x >= 0 if asked for.
+
+The data term is a sum over the samples of y, the variation an integral over the image (see
+``total_variation``), so that the weight has the unit of y squared over the unit of TV: for an image
+in u and lengths in mm, y is in u mm, TV in u mm, and the weight in u mm; for a volume TV is in
+u mm^2 and the weight in u. It does not depend on how fine the grid is, but for twice the views the
+data term is twice as large, and so is the weight that does the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rift_cl.cl.elementwise import clip_negative
+from rift_cl.cl.reductions import dot
+from rift_cl.errors import InputError
+from rift_cl.geometry.numbers import one_number
+from rift_cl.operators.linear import LinearOperator
+from rift_cl.reconstruct.solvers.data_term import DataTerm
+from rift_cl.reconstruct.solvers.direction_weights import DirectionWeights
+from rift_cl.reconstruct.solvers.residual_weight import Precondition
+from rift_cl.reconstruct.solvers.solver import Solver, SolverState
+from rift_cl.reconstruct.solvers.total_variation import TotalVariation
+
+
+@dataclass
+class VariationState(SolverState):
+    """What both methods keep.
+
+    Args:
+        weighted: F times the residual; None where there is no F.
+        dual: a vector at every sample, the dual of the variation.
+        objective: what is minimised, at the image.
+    """
+
+    weighted: Any
+    dual: Any
+    objective: float
+
+
+class VariationSolver(Solver):
+    """A method for this problem; arguments and errors are those of ``tv``."""
+
+    _now: VariationState
+
+    def __init__(
+        self,
+        A: LinearOperator,
+        y: Any,
+        weight: float,
+        *,
+        nonnegative: bool = False,
+        precondition: Precondition = None,
+        noise: float | None = None,
+        weights: Any = None,
+        direction_weights: DirectionWeights | None = None,
+    ) -> None:
+        if not one_number(weight) >= 0:
+            raise InputError(f"weight is {weight!r}, wanted a number, 0 or more")
+        data = DataTerm(A, y, precondition, noise, self.arrays, weights)
+        super().__init__(data, noise)
+        self._weight, self._nonnegative = float(weight), bool(nonnegative)
+        spacing = (1.0,) * len(A.domain) if A.grid is None else A.grid.spacing
+        self.variation = TotalVariation(
+            data.device, A.domain, spacing, data.dtype, direction_weights
+        )
+
+    def _begin(self, start: Any) -> dict[str, Any]:
+        """What both methods keep, for the image to begin from."""
+        data = self.data
+        image, residual = data.start(start), data.data()
+        self._constrain(image)
+        data.residual(image, residual)
+        weighted = None if data.weight is None else data.data()
+        if weighted is not None:
+            data.weigh(residual, weighted)
+        dual = data.device.zeros(self.variation.field_shape, data.dtype)
+        objective = self._objective(image, residual, weighted)
+        rms = data.rms(residual)
+        return vars(VariationState(image, residual, 0, rms, weighted, dual, objective))
+
+    def _constrain(self, image: Any) -> None:
+        """Bring an image to the nearest one that is allowed, in place."""
+        if self._nonnegative:
+            clip_negative(self.data.device, image)
+
+    def _objective(self, image: Any, residual: Any, weighted: Any) -> float:
+        square = dot(self.data.device, residual, residual if weighted is None else weighted)
+        return square / 2 + self._weight * self.variation.value(image)
+
+    def _figures(self) -> dict[str, float]:
+        return {"objective": self._now.objective}

@@ -1,0 +1,127 @@
+"""How well views sample each frequency of a target: the driver of ``kernels/sampling/coverage.cl``.
+
+``rift_cl.reference.coverage`` says what coverage is and is the kernel's twin. On the device lengths
+are in diameters of the target, so that float32 holds them in any unit; its results agree with the
+twin's to 2e-5 of the largest up to a thousand cycles per diameter, and lose a digit for each factor
+of ten beyond.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rift_cl.cl.budget import plan_chunks
+from rift_cl.cl.device import Device
+from rift_cl.errors import NonFiniteError, ShapeError
+from rift_cl.geometry.numbers import real_numbers
+from rift_cl.reference.coverage import LooksGradient
+from rift_cl.sampling.coverage.work import BOX, ROW, CoverageWork, Views
+from rift_cl.sampling.targets.target import Target
+
+# Frequencies that one work-item of the gradient sums over.
+_RUN = 1024
+
+
+def coverage(
+    views: Views,
+    target: Target,
+    k: ArrayLike | None = None,
+    *,
+    weights: ArrayLike | None = None,
+    device: Device | None = None,
+) -> NDArray[np.float32]:
+    """How well views sample frequencies, at each point of a target.
+
+    Args:
+        views: cameras, a parallel scan about the z axis, or ``Looks`` at the target's points.
+        target: its points and diameter.
+        k: (K, 3) cycles per unit of the world; those of the target by default.
+        weights: (V,) relative photons of cameras; 1 each by default.
+        device: where to compute; the default device if not given.
+
+    Returns:
+        (P, K): 1 where one view of weight 1 sees a frequency in full, 0 where none does.
+
+    Raises:
+        ShapeError: an array has the wrong shape, or there is no view.
+        InputError: a number is not finite or out of its range.
+        ResourceLimitError: the memory budget holds not even a few frequencies.
+    """
+    work = CoverageWork.of(views, target, k, weights, device)
+    found = np.empty((work.points, work.padded), np.float32)
+    for points, table in work.point_runs():
+        each = work.lanes * 4 * (3 + len(table)) + 4 * BOX
+        room = work.device.budget
+        for run in plan_chunks(len(work.boxes), each, table.nbytes, room, what="few frequencies"):
+            at = slice(run.start * work.lanes, run.stop * work.lanes)
+            part = work.device.empty((len(table), at.stop - at.start))
+            size = (run.stop - run.start, len(table))
+            given = (*work.send(at), table, part)
+            work.device.launch("coverage", size, *given, part.shape[1], work.views)
+            found[points, at] = work.device.get(part)
+    return found[:, : work.wanted]
+
+
+def coverage_grad(
+    views: Views,
+    target: Target,
+    grad: ArrayLike,
+    k: ArrayLike | None = None,
+    *,
+    weights: ArrayLike | None = None,
+    device: Device | None = None,
+) -> LooksGradient:
+    """The gradient of a number by the views, from its gradient by ``coverage``.
+
+    Args:
+        views: as given to ``coverage``, as are the rest but one.
+        target: its points and diameter.
+        grad: (P, K) the gradient by what ``coverage`` returned.
+        k: (K, 3) cycles per unit of the world.
+        weights: (V,) relative photons of cameras.
+        device: where to compute.
+
+    Returns:
+        In float64, with (V, P, 3) and (V, P) entries; that by the direction lies across it.
+
+    Raises:
+        ShapeError: an array has the wrong shape, or there is no view.
+        InputError: a number is not finite or out of its range.
+        ResourceLimitError: the memory budget holds not even one run of frequencies.
+    """
+    work = CoverageWork.of(views, target, k, weights, device)
+    upstream = np.zeros((work.points, work.padded), np.float32)
+    upstream[:, : work.wanted] = _upstream(grad, (work.points, work.wanted))
+    total = np.zeros((work.points, work.views, ROW))
+    for points, table in work.point_runs():
+        for parts in _parts(work, table, upstream[points]):
+            # One by one, so that the order of the sum is that of the runs however they are cut.
+            for part in work.device.get(parts):
+                total[points] += part
+    return work.in_world(total.transpose(1, 0, 2))
+
+
+def _parts(work: CoverageWork, table: Any, upstream: NDArray[np.float32]) -> Any:
+    """The gradients by runs of frequencies, in their order: (runs, points, V, 8) at a time."""
+    each = _RUN * 4 * (3 + len(table)) + _RUN // work.lanes * 4 * BOX + table.nbytes
+    runs, room = -(-work.padded // _RUN), work.device.budget
+    for run in plan_chunks(runs, each, table.nbytes, room, what="run of frequencies"):
+        at = slice(run.start * _RUN, min(run.stop * _RUN, work.padded))
+        parts = work.device.empty((run.stop - run.start, *table.shape))
+        given = work.device.array(np.ascontiguousarray(upstream[:, at]))
+        size = (work.views, len(table), run.stop - run.start)
+        arguments = (*work.send(at), table, given, parts, at.stop - at.start, work.views)
+        work.device.launch("coverage_grad", size, *arguments, RUN=_RUN)
+        yield parts
+
+
+def _upstream(grad: ArrayLike, shape: tuple[int, int]) -> NDArray[np.float64]:
+    values = real_numbers(grad)
+    if values is None or values.shape != shape:
+        raise ShapeError(f"grad has shape {np.shape(grad)}, wanted {shape}, as coverage returns")
+    if not np.isfinite(values).all():
+        raise NonFiniteError("grad holds NaN or infinity")
+    return values

@@ -1,0 +1,163 @@
+"""What the kernels of coverage are given: views and frequencies without unit, cut to the memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rift_cl.cl.budget import plan_chunks
+from rift_cl.cl.device import Device
+from rift_cl.cl.discovery import default_device
+from rift_cl.errors import InputError, NonFiniteError, ShapeError
+from rift_cl.geometry import Camera, Parallel
+from rift_cl.geometry.numbers import real_numbers
+from rift_cl.reference.coverage import LooksGradient
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.target import Target
+
+Floats = NDArray[np.float64]
+Views = Sequence[Camera] | Looks | Parallel
+# Numbers of a view and of a block's box.
+ROW, BOX = 8, 6
+_LARGEST = float(np.finfo(np.float32).max)
+# Cycles per diameter beyond which float32 does not tell a slab from its neighbour.
+_MOST = 1e5
+
+
+def looks_at(views: Views, target: Target, weights: ArrayLike | None = None) -> Looks:
+    """How views of any kind see a target's points.
+
+    Raises:
+        ShapeError: there is no view, ``Looks`` are at another number of points, or weights have
+            another shape.
+        InputError: a weight is given for what is no camera, or is no weight.
+    """
+    if not isinstance(views, (Looks, Parallel)):
+        return Looks.of(views, target.points, weights)
+    if weights is not None:
+        raise InputError("weights are for cameras; a scan has none, Looks have their own")
+    looks = Looks.of_scan(views, target.points) if isinstance(views, Parallel) else views
+    if looks.points != len(target.points):
+        raise ShapeError(
+            f"these Looks are at {looks.points} points, the target has {len(target.points)}"
+        )
+    return looks
+
+
+@dataclass(frozen=True, eq=False)
+class CoverageWork:
+    """Padded to whole blocks of frequencies, in diameters of the target.
+
+    Args:
+        device: where.
+        wanted: number of frequencies that were asked for.
+        k: (3, frequencies).
+        boxes: (blocks, 6) middle and half edges of the box that a block's frequencies lie in.
+        rows: (P, V, 8) the views; see ``kernels/include/coverage.h``.
+        diameter: of the target.
+    """
+
+    device: Device
+    wanted: int
+    k: NDArray[np.float32]
+    boxes: NDArray[np.float32]
+    rows: NDArray[np.float32]
+    diameter: float
+
+    @classmethod
+    def of(
+        cls,
+        views: Views,
+        target: Target,
+        k: ArrayLike | None,
+        weights: ArrayLike | None,
+        device: Device | None,
+    ) -> CoverageWork:
+        """Take up what ``coverage`` was given, which says what may be wrong with it."""
+        looks, device = looks_at(views, target, weights), device or default_device()
+        cycles = _cycles(target.k if k is None else k, target.diameter)
+        lanes = int(device.traits.macros["LANES"])
+        padded = np.concatenate([cycles, np.repeat(cycles[-1:], -len(cycles) % lanes, axis=0)])
+        blocks = padded.reshape(-1, lanes, 3)
+        low, high = blocks.min(1), blocks.max(1)
+        boxes = np.concatenate([(low + high) / 2, (high - low) / 2], axis=1)
+        rows = _rows(looks, target.diameter)
+        columns = np.ascontiguousarray(padded.T)
+        return cls(device, len(cycles), columns, boxes, rows, target.diameter)
+
+    @property
+    def points(self) -> int:
+        """P."""
+        return len(self.rows)
+
+    @property
+    def views(self) -> int:
+        """V."""
+        return int(self.rows.shape[1])
+
+    @property
+    def padded(self) -> int:
+        """Frequencies of whole blocks."""
+        return int(self.k.shape[1])
+
+    @property
+    def lanes(self) -> int:
+        """Frequencies of a block."""
+        return self.padded // len(self.boxes)
+
+    def point_runs(self) -> Iterator[tuple[slice, Any]]:
+        """Points whose views fill no more than a quarter of the memory, with those views."""
+        each, room = self.views * ROW * 4, self.device.budget // 4
+        for run in plan_chunks(self.points, each, 0, room, what="point's views"):
+            yield run, self.device.array(self.rows[run])
+
+    def send(self, at: slice) -> tuple[Any, Any]:
+        """Some frequencies and their boxes."""
+        boxes = self.boxes[at.start // self.lanes : at.stop // self.lanes]
+        return self.device.array(np.ascontiguousarray(self.k[:, at])), self.device.array(boxes)
+
+    def in_world(self, total: Floats) -> LooksGradient:
+        """The gradient (V, P, 8) by the kernel's numbers, in the unit of the world."""
+        inverse = self.rows[..., 5].T.astype(np.float64)
+        return LooksGradient(
+            direction=total[..., :3].copy(),
+            weight=total[..., 3].copy(),
+            pixel=total[..., 4] / self.diameter,
+            cutoff=-total[..., 5] * inverse**2 * self.diameter,
+            blur=total[..., 6] / self.diameter,
+        )
+
+
+def _rows(looks: Looks, diameter: float) -> NDArray[np.float32]:
+    rows = np.zeros((looks.points, looks.views, ROW), np.float32)
+    rows[..., :3] = looks.direction.transpose(1, 0, 2)
+    lengths = (looks.pixel / diameter, 1 / (looks.cutoff * diameter), looks.blur / diameter)
+    for place, values in enumerate((looks.weight, *lengths), start=3):
+        if values.max() > _LARGEST:
+            raise InputError(
+                f"a weight, a pixel or a blur over the diameter, or the diameter's inverse over a "
+                f"cut-off, is {values.max():g}: too large for float32; check the units"
+            )
+        rows[..., place] = values.T
+    return rows
+
+
+def _cycles(k: ArrayLike, diameter: float) -> NDArray[np.float32]:
+    values = real_numbers(k)
+    if values is None:
+        raise InputError("k: wanted real numbers, in cycles per unit of length")
+    if values.ndim != 2 or values.shape[1] != 3 or not len(values):
+        raise ShapeError(f"k has shape {values.shape}, wanted (frequencies, 3), at least one")
+    if not np.isfinite(values).all():
+        raise NonFiniteError("k holds NaN or infinity, wanted finite frequencies")
+    cycles = values * diameter
+    if np.abs(cycles).max() > _MOST:
+        raise InputError(
+            f"k reaches {np.abs(cycles).max():g} cycles per diameter of the target, wanted at most "
+            f"{_MOST:g}: check the unit of the diameter"
+        )
+    return cycles.astype(np.float32)

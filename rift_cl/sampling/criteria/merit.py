@@ -1,0 +1,138 @@
+"""How well views know a target: one number for a set of cameras, and where it falls fastest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rift_cl.errors import InputError, NonFiniteError, ShapeError
+from rift_cl.geometry import Camera
+from rift_cl.geometry.numbers import real_numbers
+from rift_cl.reference import coverage as twin
+from rift_cl.sampling.criteria.exact import exact
+from rift_cl.sampling.criteria.functionals import Floats, Scored
+from rift_cl.sampling.criteria.functionals import functionals as criteria
+from rift_cl.sampling.criteria.kriging import kriging
+from rift_cl.sampling.criteria.surface import surface_merit
+from rift_cl.sampling.targets.camera_gradients import CameraGradients, camera_gradients
+from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.prior import checked_power
+
+if TYPE_CHECKING:
+    from rift_cl.cl import Device
+    from rift_cl.sampling.targets.target import Target
+
+# Those that are functions of coverage, with a gradient.
+CoverageMerit = Literal["wiener", "logdet", "worst"]
+MeritKind = Literal["wiener", "logdet", "worst", "kriging", "exact"]
+# Products of views, points and frequencies from which a device is faster than the host.
+_LARGE = 1 << 18
+
+
+class Merit(NamedTuple):
+    """A score of cameras.
+
+    Args:
+        value: lower is better.
+        gradient: by what the cameras are; None for ``kriging`` and ``exact``.
+    """
+
+    value: float
+    gradient: CameraGradients | None
+
+
+def merit(
+    cameras: Sequence[Camera],
+    target: Target,
+    kind: MeritKind = "wiener",
+    *,
+    weights: ArrayLike | None = None,
+    device: Device | None = None,
+) -> Merit:
+    """Score what cameras will know of a target.
+
+    ``wiener``, the default, is the share of the target's power that stays unknown to the best
+    linear estimator; ``logdet`` minus the bits per frequency; ``worst`` the unknown share of the
+    worst seen direction. All three are functions of the coverage alone: where views tell the same
+    twice their values are optimistic, while their ranking holds.
+    ``kriging`` and ``exact`` count correlated views as what they are; they have no gradient and
+    take long. A target that no camera sees is all unknown: 1, or no bits. A target of mode
+    ``surface`` is scored by ``surface_merit``.
+
+    Args:
+        cameras: V views, at least one.
+        target: what is looked at.
+        kind: of the score; see above.
+        weights: (V,) relative photons of the views; 1 each by default.
+        device: where the coverage of a large problem is counted and passed back, in float32, so
+            that value and gradient hold to 1e-3: one whose views times points times frequencies
+            are over 260,000, some seven times faster than on the host even where the device is
+            its CPU. Smaller ones, and all without a device, are counted in float64 on the host.
+
+    Raises:
+        ShapeError: there is no camera, or weights do not fit.
+        InputError: what is given are no cameras, the kind is unknown or does not go with the
+            target's mode, or the prior makes no sense.
+    """
+    if kind not in get_args(MeritKind):
+        raise InputError(f"merit: kind is {kind!r}, wanted one of {', '.join(get_args(MeritKind))}")
+    seen = Looks.of(cameras, target.points)
+    looks = seen.weighted(weights)
+    if kind == "kriging" or kind == "exact":  # noqa: PLR1714 - what is narrowed by its type
+        if target.mode == "surface":
+            raise InputError(f"merit: a surface has no {kind}; take wiener, logdet or worst")
+        return Merit((kriging if kind == "kriging" else exact)(looks, target), None)
+    if target.mode == "surface":
+        value, by_looks = surface_merit(looks, target, kind)
+    else:
+        value, by_looks = _volume(looks, target, kind, device)
+    return Merit(value, camera_gradients(cameras, seen, by_looks))
+
+
+def _volume(
+    looks: Looks, target: Target, kind: CoverageMerit, device: Device | None
+) -> tuple[float, twin.LooksGradient]:
+    k, diameter = target.k, target.diameter
+    if device is None or looks.weight.size * len(k) < _LARGE:
+        scored = merit_of_coverage(kind, twin.coverage(looks, k, diameter), target)
+        return scored.value, twin.coverage_grad(looks, k, diameter, scored.gradient)
+    from rift_cl.sampling.coverage.device import coverage, coverage_grad
+
+    scored = merit_of_coverage(kind, coverage(looks, target, device=device), target)
+    return scored.value, coverage_grad(looks, target, scored.gradient, device=device)
+
+
+def merit_of_coverage(kind: CoverageMerit, coverage: Any, target: Target) -> Scored:
+    """Score the coverage of a target's frequencies.
+
+    Args:
+        kind: ``wiener``, ``logdet`` or ``worst``; see ``criteria``.
+        coverage: (P, K) L at each of the target's points and frequencies ``target.k``.
+        target: what is looked at: its prior and its signal-to-noise ratio count.
+
+    Returns:
+        The value, lower is better, and its derivative by the coverage (P, K).
+
+    Raises:
+        InputError: the kind is unknown, the prior makes no sense, or coverage is negative or does
+            not fit.
+    """
+    known = _coverage(coverage, len(target.k))
+    power = checked_power(target.prior, target.k, target.diameter)
+    return criteria.scored(kind, known, power, target.snr, target.k)
+
+
+def _coverage(values: Any, frequencies: int) -> Floats:
+    known = real_numbers(values)
+    if known is None or known.ndim != 2 or known.shape[1] != frequencies or not len(known):
+        raise ShapeError(
+            f"coverage has shape {np.shape(values)}, wanted (points, {frequencies}) real numbers"
+        )
+    if not np.isfinite(known).all():
+        raise NonFiniteError("coverage holds NaN or infinity, wanted finite numbers")
+    if known.min() < 0:
+        raise InputError(f"coverage goes down to {known.min():g}, wanted zero or more")
+    return known

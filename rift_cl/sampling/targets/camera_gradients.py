@@ -1,0 +1,90 @@
+"""From how points are seen back to the cameras that see them: the chain rule of ``Looks.of``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rift_cl.geometry import Camera
+from rift_cl.reference.coverage import Floats, LooksGradient
+from rift_cl.sampling.targets.observations import Looks
+
+
+class CameraGradients(NamedTuple):
+    """Derivatives of a number by what V cameras are; zero for what a camera does not have.
+
+    Args:
+        position: (V, 3) by the camera's centre, while it keeps its orientation. For a camera that
+            turns so as to keep a point in its middle, the derivative is the same where that is
+            the only point that counts.
+        focal: (V,) by the focal length fx in pixels, aperture unchanged.
+        radius: (V,) by the aperture's radius.
+        focus: (V,) by the distance of the plane in focus.
+        weight: (V,) by the view's weight.
+    """
+
+    position: Floats
+    focal: Floats
+    radius: Floats
+    focus: Floats
+    weight: Floats
+
+
+def camera_gradients(
+    cameras: Sequence[Camera], seen: Looks, gradient: LooksGradient
+) -> CameraGradients:
+    """Chain the derivatives by looks with those of looks by cameras.
+
+    Whether a point is in a picture is taken as given: a merit jumps where one leaves it.
+
+    Args:
+        cameras: V of them.
+        seen: how they see the points when all weights are 1.
+        gradient: by what looks hold.
+    """
+    found = [_one(camera, seen, gradient, view) for view, camera in enumerate(cameras)]
+    position, focal, radius, focus = (np.array(parts) for parts in zip(*found, strict=True))
+    weight = (gradient.weight * seen.weight).sum(1)
+    return CameraGradients(position, focal, radius, focus, weight)
+
+
+def _one(
+    camera: Camera, seen: Looks, gradient: LooksGradient, view: int
+) -> tuple[Floats, float, float, float]:
+    """Of one camera: by position (3,), focal length, radius, focus."""
+    fx, pixel = camera.intrinsics[0], seen.pixel[view]
+    # How far away a point counts as, which is a pixel's edge times the focal length.
+    reach = pixel * fx
+    by_pixel, by_blur = gradient.pixel[view], gradient.blur[view]
+    by_reach, radius, focus = by_pixel / fx, 0.0, 0.0
+    if camera.aperture is not None:
+        opening, plane = camera.aperture.radius, camera.aperture.focus
+        side = 2 * opening * np.sign(1 - reach / plane) * by_blur
+        radius, focus = float(by_blur @ seen.blur[view]), float(side @ reach) / plane**2
+        by_reach = by_reach - side / plane
+        if camera.aperture.wavelength > 0:
+            by_cutoff = gradient.cutoff[view] * seen.cutoff[view]
+            radius += float(by_cutoff.sum())
+            by_reach = by_reach - by_cutoff / reach
+        radius /= opening
+    position = _by_position(camera, seen, gradient.direction[view], by_reach, view)
+    return position, -float(by_pixel @ pixel) / fx, radius, focus
+
+
+def _by_position(
+    camera: Camera, seen: Looks, by_direction: Floats, by_reach: Floats, view: int
+) -> Floats:
+    if camera.model == "ortho":
+        return np.zeros(3)
+    direction = seen.direction[view]
+    if camera.model == "pinhole":
+        ahead = direction @ -camera.view[2, :3]
+        # Points beside and behind are not seen, so that nothing hangs on how far off they are.
+        distance = seen.pixel[view] * camera.intrinsics[0] / np.where(ahead > 0, ahead, 1)
+        farther = np.broadcast_to(-camera.view[2, :3], direction.shape)
+    else:
+        distance, farther = seen.pixel[view] * camera.intrinsics[0], direction
+    across = by_direction - (by_direction * direction).sum(1, keepdims=True) * direction
+    return np.asarray((across / distance[:, None] + by_reach[:, None] * farther).sum(0))

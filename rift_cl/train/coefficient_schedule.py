@@ -1,0 +1,124 @@
+"""What joins a fit as it goes on: degrees of harmonics, orders of modes, lobes; and what is held.
+
+All of it begins with zeros, so that no picture jumps. What is there follows from the step and the
+settings, and what is held from the modes themselves, so that no checkpoint needs to know of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.basis.angular import angular_basis
+from rift_cl.basis.indices import graded
+from rift_cl.geometry import Camera
+from rift_cl.splat.orders import count_of, order_of
+from rift_cl.splat.settings import SplatSettings
+from rift_cl.train.parameters import MODES, Parameters
+from rift_cl.train.settings import TrainSettings
+from rift_cl.train.start.lobes import lobe_axes
+
+
+class Joining:
+    """Lets coefficients join the parameters of a run, and holds some at zero.
+
+    Args:
+        settings: of the run.
+        cameras: that its pictures are from.
+        flat: whether all splats lie in one slice, and modes across it are held.
+    """
+
+    def __init__(
+        self, settings: TrainSettings, cameras: Sequence[Camera], *, flat: bool = False
+    ) -> None:
+        self.settings = settings
+        self._cameras = cameras
+        self._flat = flat
+
+    def drawing(self, parameters: Parameters, drawing: SplatSettings) -> SplatSettings:
+        """How splats are drawn that have what these have by now."""
+        angular = self.settings.angular.kind if "lobes" in parameters.raw else "sh"
+        return replace(drawing, activation=self.settings.basis.activation, angular=angular)
+
+    def after_step(self, parameters: Parameters) -> None:
+        """Add what is due after the steps that were taken; before the first one, too."""
+        settings, step = self.settings, parameters.step
+        depths = settings.basis.activation != "clamp"
+        if parameters.amplitude != depths:
+            parameters.amplitude = depths
+            parameters.activate()
+        if settings.angular.kind == "sh":
+            degree = int(np.sqrt(parameters.raw["sh"].shape[1])) - 1
+            if step and step % settings.sh_every == 0 and degree < settings.sh_degree:
+                parameters.add_degree()
+        elif "lobes" not in parameters.raw:
+            self._add_lobes(parameters)
+        self._add_orders(parameters)
+        if step and step == self._settled:
+            self._settle(parameters)
+
+    def hold(self, parameters: Parameters) -> None:
+        """Say which modes are trained; to be asked whenever the splats are others."""
+        parameters.free = {}
+        settled = bool(self._settled) and parameters.step >= self._settled
+        if not (self._flat or settled):
+            return
+        rows = self._with_modes(parameters) if settled else np.ones(len(parameters), bool)
+        for name in (name for name in MODES if name in parameters.raw):
+            shape = parameters.raw[name].shape
+            free = np.broadcast_to(rows.reshape(-1, *[1] * (len(shape) - 1)), shape)
+            if self._flat:
+                across = graded(order_of(shape[1] + 1), 3)[1:, 2] > 0
+                free = free & ~across.reshape(-1, *[1] * (len(shape) - 2))
+            parameters.free[name] = parameters.device.array(free.astype(np.float32))
+
+    @property
+    def _settled(self) -> int:
+        """The step at which splats of hardly any modes become Gaussians; 0 for never."""
+        basis = self.settings.basis
+        return round(basis.settle * self.settings.steps) if basis.least else 0
+
+    def _add_orders(self, parameters: Parameters) -> None:
+        basis, joined = self.settings.basis, False
+        reached = basis.order_at(parameters.step, self.settings.steps)
+        for name, highest in zip(MODES, (basis.order, basis.color_order), strict=True):
+            wanted = count_of(min(reached, highest)) - 1
+            had = parameters.raw[name].shape[1] if name in parameters.raw else 0
+            if wanted > had:
+                parameters.widen(name, wanted)
+                joined = True
+        if joined:
+            self.hold(parameters)
+
+    def _add_lobes(self, parameters: Parameters) -> None:
+        chosen, device = self.settings.angular, parameters.device
+        if parameters.step < round(chosen.first * self.settings.steps):
+            return
+        basis = angular_basis(chosen.kind, 1 + chosen.modes)
+        geometry = basis.start_geometry(lobe_axes(parameters.host()[0], self._cameras))
+        parameters.raw["lobes"] = device.array(geometry.astype(np.float32))
+        for moments in (parameters.first, parameters.second):
+            moments["lobes"] = device.zeros(geometry.shape)
+        parameters.widen("sh", basis.n_linear)
+
+    def _settle(self, parameters: Parameters) -> None:
+        """Make Gaussians of the splats whose modes do the least."""
+        kept = self._with_modes(parameters, self.settings.basis.least)
+        for name in (name for name in MODES if name in parameters.raw):
+            for group in (parameters.raw, parameters.first, parameters.second):
+                array = parameters.device.get(group[name])
+                array[~kept] = 0
+                group[name] = parameters.device.array(array)
+        parameters.redraw()
+        self.hold(parameters)
+
+    def _with_modes(self, parameters: Parameters, least: float = 0.0) -> NDArray[np.bool_]:
+        """(N,) splats whose modes have a larger norm."""
+        square = np.zeros(len(parameters))
+        for name in (name for name in MODES if name in parameters.raw):
+            modes = parameters.device.get(parameters.raw[name]).astype(float)
+            square += np.square(modes).reshape(len(square), -1).sum(axis=1)
+        return np.asarray(square > least**2)

@@ -1,0 +1,102 @@
+"""Spectral homogenisation: the loss pulls at every frequency alike.
+
+A set of views samples low frequencies too densely, and natural pictures hold most of their power
+there, so that a plain residual spends its steps on what is nearly right already. Here the gradient
+of the pixelwise part is multiplied by a ramp in the Fourier domain of the image,
+
+    (k^2 + k0^2)^(p/2),    k in cycles per pixel, k0 one cycle over the longer edge,
+
+and scaled back to the norm it had; that of D-SSIM, a high-pass itself, stays as it is. X-ray views
+of an orbit are too dense along the detector's rows alone: there k is the frequency along x.
+
+Both are what views that lie evenly sample. Where they do not, the weight may be what was counted
+instead: one over the coverage L of the frequency by all views, to the power p, which is k^p for
+even views on a sphere (``rift_cl.train.loss.coverage_weight``).
+
+Either amplifies noise as well, and once only noise is left of the residual a flat weight is the
+best there is. So the exponent falls with the share of the residual that is noise,
+
+    p = exponent (1 - noise^2 / mean square residual),    not below zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import convolve
+from scipy.special import ndtri
+
+from rift_cl.errors import InputError
+from rift_cl.geometry.numbers import one_number
+
+Floats = NDArray[np.float64]
+WeightKind = Literal["ramp", "coverage"]
+
+_STEEPEST = 4.0
+# Immerkaer's mask, which leaves out what is linear along an edge; its norm is 6. Noise is read off
+# the calmest share of the pixels, where there is the least texture to be taken for noise.
+_MASK = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]]) / 6
+_CALM = 0.25
+
+
+@dataclass(frozen=True)
+class Homogenisation:
+    """How strongly a loss favours high frequencies.
+
+    Args:
+        exponent: of the ramp; 0 leaves the plain loss, 1 is the whole ramp.
+        noise_aware: let the exponent fall as the residual comes down to the pictures' noise.
+        along_rows: take the ramp's frequency along x alone, as for projections of an orbit.
+        weight: what the exponent is of: ``ramp``, or ``coverage``, one over what was counted.
+
+    Raises:
+        InputError: the exponent is out of its range, or the weight unknown.
+    """
+
+    exponent: float = 0.0
+    noise_aware: bool = True
+    along_rows: bool = False
+    weight: WeightKind = "ramp"
+
+    def __post_init__(self) -> None:
+        """Check the exponent and the weight's name."""
+        if not 0 <= one_number(self.exponent) <= _STEEPEST:
+            raise InputError(
+                f"Homogenisation: exponent is {self.exponent!r}, wanted 0 to {_STEEPEST:g}"
+            )
+        if self.weight not in get_args(WeightKind):
+            wanted = " or ".join(get_args(WeightKind))
+            raise InputError(f"Homogenisation: weight is {self.weight!r}, wanted {wanted}")
+
+    def response(self, ky: Floats, kx: Floats, *, longest: int, exponent: float) -> Floats:
+        """The ramp at frequencies in cycles per pixel, for an image with that longer edge."""
+        square = (kx**2 if self.along_rows else ky**2 + kx**2) + 1 / longest**2
+        return np.asarray(square ** (exponent / 2))
+
+    def exponent_at(self, mean_square: float, noise: float) -> float:
+        """The exponent for a mean square residual and a standard deviation of the noise."""
+        if not self.noise_aware or noise == 0:
+            return self.exponent
+        return self.exponent * max(0.0, 1 - noise**2 / mean_square)
+
+
+def noise_of(images: Sequence[NDArray[np.float32]]) -> float:
+    """The standard deviation of white noise in pictures (Immerkaer 1996), a median over them.
+
+    Args:
+        images: (height, width, C) of any unit.
+    """
+    found = []
+    for image in images:
+        rough = np.concatenate([_roughness(image[..., c]) for c in range(image.shape[2])])
+        found.append(float(np.quantile(rough, _CALM)) / ndtri((1 + _CALM) / 2))
+    return float(np.median(found))
+
+
+def _roughness(channel: NDArray[np.float32]) -> Floats:
+    inner = convolve(channel.astype(float), _MASK, mode="nearest")[1:-1, 1:-1]
+    return np.asarray(np.abs(inner).ravel())

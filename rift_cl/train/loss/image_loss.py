@@ -1,0 +1,130 @@
+"""The loss of a splat trainer, pixel differences and SSIM, with its gradient on the device.
+
+Two kernels, each of which blurs down and along at once: ``kernels/train/ssim_map.cl`` derives the
+gradient, ``kernels/train/loss_grad.cl`` finishes it. Nothing waits for the device.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, get_args
+
+from rift_cl.cl.arithmetic import sum_columns
+from rift_cl.cl.device import Device
+from rift_cl.cl.memory import as_device_array
+from rift_cl.errors import InputError, ShapeError
+from rift_cl.geometry.numbers import one_number
+from rift_cl.train.settings import LossKind
+
+_WINDOW, _CHANNELS = 11, 4
+_ROWS, _STRIP, _MAPS = 4, 256, 3
+
+
+@dataclass(frozen=True)
+class ImageLoss:
+    """The mean of ``m ((1 - w) |image - target| + w (1 - SSIM))``, with the weights m.
+
+    SSIM is that of ``rift_cl.metrics.ssim``, channel by channel: a Gaussian window 11 pixels wide
+    with sigma 1.5, population covariance, data range 1, mirrored borders. The mean is over all
+    pixels and channels, so that a mask shrinks the loss.
+
+    Args:
+        ssim_weight: w, from 0 (no SSIM) to 1 (nothing else).
+        kind: ``l1``, or ``l2`` for the squared difference in place of its magnitude.
+
+    Raises:
+        InputError: a setting is out of its range.
+    """
+
+    ssim_weight: float = 0.2
+    kind: LossKind = "l1"
+
+    def __post_init__(self) -> None:
+        """Check every setting's range."""
+        if not 0 <= one_number(self.ssim_weight) <= 1:
+            raise InputError(
+                f"ImageLoss: ssim_weight is {self.ssim_weight!r}, wanted a number from 0 to 1"
+            )
+        if self.kind not in get_args(LossKind):
+            wanted = " or ".join(get_args(LossKind))
+            raise InputError(f"ImageLoss: kind is {self.kind!r}, wanted {wanted}")
+
+    def __call__(
+        self, device: Device, image: Any, target: Any, *, weights: Any = None
+    ) -> tuple[Any, Any]:
+        """The loss and its gradient, as device arrays whose bits do not depend on timing.
+
+        Args:
+            device: where the arrays are.
+            image: (height, width, D); channels behind those of the target do not count.
+            target: (height, width, C), at most 4 channels.
+            weights: m, (height, width), from 0 to 1; one if not given. They weigh the map of
+                SSIM: pixels that do not count still stand in the windows of those that do.
+
+        Returns:
+            The loss, (1,), and its gradient by the image, (height, width, D). Values are taken
+            as they are: a NaN among the channels that count makes the loss NaN.
+
+        Raises:
+            ShapeError: shapes do not fit, or a side is shorter than the window of SSIM.
+            DTypeError: an array is not float32 on a device.
+            DeviceError: an array belongs to another device.
+        """
+        _check(device, image, target, weights)
+        _check_window(target.shape[:2], self.ssim_weight)
+        return self._launch(device, image, target, weights)
+
+    def _launch(self, device: Device, image: Any, target: Any, weights: Any) -> tuple[Any, Any]:
+        height, width, channels = target.shape
+        floats, w, n = width * channels, float(self.ssim_weight), target.size
+        tiles = -(-floats // _STRIP), -(-height // _ROWS)
+        size = (tiles[0] * device.traits.macros["GROUP"], tiles[1])
+        items = size[0] * size[1]
+        macros = {"CHANNELS": channels, "IMAGE_CHANNELS": image.shape[2]}
+        macros |= {"ROWS": _ROWS, "STRIP": _STRIP, "WEIGHTED": weights is not None}
+        # Kernels that have no weights or maps still take an array in their place.
+        arrays, maps = [image, target, target if weights is None else weights], target
+        grad, parts = device.empty(image.shape), device.empty(((2 if w else 1) * items, 1))
+        pitch, first = _pitch(floats), 0
+        if w:
+            maps, first = device.empty((_MAPS, height, pitch)), items
+            ends = (maps, parts, height, floats, pitch, w / n)
+            device.launch("ssim_map", size, *arrays, *ends, **macros)
+        macros |= {"SSIM": w > 0, "SQUARED": self.kind == "l2"}
+        sizes = (first, height, floats, pitch, (1 - w) / n, w / n)
+        device.launch("loss_grad", size, *arrays, maps, grad, parts, *sizes, **macros)
+        return sum_columns(device, parts), grad
+
+
+def _pitch(floats: int) -> int:
+    """Floats from row to row of a map: an odd number of cache lines.
+
+    Rows a power of two apart would push each other out of a cache while they are blurred down.
+    """
+    return (-(-floats // 16) | 1) * 16
+
+
+def _check(device: Device, image: Any, target: Any, weights: Any) -> None:
+    for name, array in (("image", image), ("target", target)):
+        shape = getattr(array, "shape", ())
+        as_device_array(device, array, shape, name=name)
+        if len(shape) != 3 or 0 in shape:
+            raise ShapeError(f"{name} has shape {shape}, wanted (height, width, channels)")
+    *size, channels = target.shape
+    if channels > _CHANNELS:
+        raise ShapeError(f"target has {channels} channels, wanted 1 to {_CHANNELS}")
+    if list(image.shape[:2]) != size or image.shape[2] < channels:
+        raise ShapeError(
+            f"image has shape {image.shape}, wanted the size of the target, {target.shape}, and "
+            "at least its channels"
+        )
+    if weights is not None:
+        as_device_array(device, weights, tuple(size), name="weights")
+
+
+def _check_window(size: tuple[int, int], ssim_weight: float) -> None:
+    if ssim_weight and min(size) < _WINDOW:
+        raise ShapeError(
+            f"image has {size[0]} x {size[1]} pixels, SSIM wants {_WINDOW} or more along each "
+            "side: set ssim_weight to 0"
+        )

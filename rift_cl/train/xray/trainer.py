@@ -1,0 +1,127 @@
+"""The trainer of X-ray splats: densities alone, and in one slice if the scan has only one.
+
+Line integrals need no colour: it is one, has no rate, and the loss looks at the first channel. A
+scan of one detector row says nothing about what is across it. Gradients there are no more than
+rounding, which Adam would blow up to whole steps, so that after each step the splats are put back
+into their slice; modes of their shapes that vary across it stay at zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rift_cl.cl.arithmetic import copy_columns
+from rift_cl.splat.settings import SplatSettings
+from rift_cl.train.basis_settings import BasisSettings
+from rift_cl.train.loss.homogenisation import Homogenisation, WeightKind
+from rift_cl.train.parameters import Parameters
+from rift_cl.train.settings import BandLimit, Rates, Renewal, TrainSettings
+from rift_cl.train.start.xray import FLAT
+from rift_cl.train.trainer import Pictures, Trainer
+from rift_cl.train.xray.density_solve import solve_densities
+from rift_cl.train.xray.solve_settings import SolveSettings
+
+# The start is near already, so that positions may move fast and need not slow down by much.
+RATES = Rates(means=6e-4, means_last=0.1, quats=2e-2, log_scales=2e-2, logits=4e-2, sh=0.0)
+RENEWAL = Renewal(first=100, every=100, last=0.7, faint=0.02)
+# Of modes, in a loss of squares that is far smaller than that of photographs.
+RIDGE = 1e-5
+
+
+def xray_settings(
+    *,
+    steps: int,
+    seed: int,
+    splats: int,
+    exponent: float,
+    weight: WeightKind = "ramp",
+    band_limit: BandLimit | None = None,
+    basis: BasisSettings | None = None,
+    solve: SolveSettings | None = None,
+) -> TrainSettings:
+    """The settings of a fit to projections.
+
+    Args:
+        steps: projections that are looked at.
+        seed: of everything that is random.
+        splats: how many there are.
+        exponent: of the ramp along the detector's rows, since orbits are dense along nothing else,
+            or of the inverse coverage.
+        weight: which of the two.
+        band_limit: as in ``TrainSettings``.
+        basis: the modes of the splats' densities.
+        solve: how often densities and modes are solved for. Between solves they then stay as they
+            are, which serves better than moving them by Adam as well.
+    """
+    solve = solve or SolveSettings()
+    rates = replace(RATES, logits=0.0, shape_modes=0.0) if solve.every else RATES
+    return TrainSettings(
+        steps=steps,
+        seed=seed,
+        splats=splats,
+        sh_degree=0,
+        loss="l2",
+        ssim_weight=0.0,
+        homogenisation=Homogenisation(exponent, along_rows=True, weight=weight),
+        band_limit=band_limit,
+        rates=rates,
+        renewal=RENEWAL,
+        basis=basis or BasisSettings(),
+        solve=solve,
+    )
+
+
+class XrayTrainer(Trainer):
+    """A fit of densities in progress.
+
+    Args:
+        pictures: projections of one channel, of lengths in detector bins.
+        parameters: the splats to begin with, which have densities.
+        settings: of the fit.
+        drawing: of the rasterizer, in xray mode.
+        flat: whether there is but one detector row.
+    """
+
+    solves = True
+
+    def __init__(
+        self,
+        pictures: Pictures,
+        parameters: Parameters,
+        settings: TrainSettings,
+        drawing: SplatSettings,
+        *,
+        flat: bool,
+    ) -> None:
+        super().__init__(pictures, parameters, settings, drawing, flat=flat)
+        count = len(parameters)
+        self._zero = self.device.zeros((count, 2)) if flat else None
+        thin = np.full((count, 1), np.log(FLAT), np.float32)
+        self._thin = self.device.array(thin) if flat else None
+
+    def step(self) -> Any:
+        """One projection; the loss as a (1,) device array."""
+        if self.settings.solve.due(self.parameters.step):
+            self._solve()
+        value = super().step()
+        if self._zero is not None:
+            raw = self.parameters.raw
+            copy_columns(self.device, self._zero, 0, raw["means"], 2, 1)
+            copy_columns(self.device, self._zero, 0, raw["quats"], 1, 2)
+            copy_columns(self.device, self._thin, 0, raw["log_scales"], 2, 1)
+            self.parameters.activate()
+        if self.settings.solve.every and self.parameters.step == self.settings.steps:
+            self._solve()
+        return value
+
+    def _solve(self) -> None:
+        """Give the splats the densities and modes that serve best where they are."""
+        settings = self.settings
+        solve_densities(
+            *(self.parameters, self.renderer, self.pictures, settings.solve), seed=settings.seed
+        )
+        # What is held follows from the modes, which are others now.
+        self.joining.hold(self.parameters)

@@ -1,0 +1,219 @@
+"""``rift analyze``: what a ring, a single camera and scans sample, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from test_start import MIDDLE_OF_RING, ring
+
+from rift_cl.commands.analyze.facts import missing, resolution, unknown_share
+from rift_cl.commands.analyze.input import open_sampled
+from rift_cl.commands.analyze.settings import AnalyzeSettings
+from rift_cl.commands.analyze.suggestions import angles_to_add
+from rift_cl.commands.cli import main
+from rift_cl.commands.inputs.fan_views import fan_cameras
+from rift_cl.geometry import Camera, FanBeam
+from rift_cl.geometry.aperture import Aperture
+from rift_cl.io.captures.transforms_record import transforms_of
+from rift_cl.io.output import write_json
+from rift_cl.sampling.targets.observations import Looks
+
+# The ring's cameras stand so far above its middle.
+ELEVATION = math.degrees(math.atan(0.3))
+
+
+def capture(folder, cameras):
+    """A transforms.json without its photographs."""
+    folder.mkdir()
+    names = [f"{k}.png" for k in range(len(cameras))]
+    write_json(folder / "transforms.json", transforms_of(cameras, names))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def ringed(tmp_path_factory):
+    return capture(tmp_path_factory.mktemp("captures") / "ring", ring(48))
+
+
+def analyze(source, out, *more):
+    words = ["analyze", str(source), "--out", str(out), "--mode", "volume", "--quiet"]
+    return main([*words, *map(str, more)])
+
+
+def metrics_of(folder):
+    return json.loads((folder / "metrics.json").read_text())
+
+
+def page_of(folder):
+    return (folder / "report.html").read_text()
+
+
+def test_a_ring_misses_a_cone_about_its_axis_and_views_above_it_are_suggested(
+    ringed, tmp_path, capsys
+):
+    out = tmp_path / "analysis"
+    assert analyze(ringed, out, "--add", 2) == 0
+    printed = capsys.readouterr()
+    assert "largest hole" in printed.out and "report.html" in printed.out
+    # What was assumed is said on the console as well.
+    assert "--diameter" in printed.err and "--center" in printed.err
+    found = metrics_of(out)
+    assert (found["views"], found["seen_by"], found["unit"]) == (48, 48, "unit")
+    np.testing.assert_allclose(found["target"]["center"], MIDDLE_OF_RING, atol=1e-6)
+    for hole in found["missing"][1:]:
+        assert abs(hole["axis"][2]) > 0.999
+        assert hole["half_angle_degrees"] == pytest.approx(ELEVATION, abs=0.3)
+    assert not found["orlov"] and found["tuy"]["unmet"] > 0
+    shares = [hole["share"] for hole in found["missing"]]
+    assert shares == sorted(shares) and shares[2] > 1 - math.cos(math.radians(10))
+    assert found["crowther"]["needed"] == math.ceil(16 * math.pi)
+    assert len(found["add"]) == 2 and found["unknown_with_added"] < found["unknown"] < 1
+    assert len((out / "views.csv").read_text().splitlines()) == 3
+    page = page_of(out)
+    assert page.count("<img") >= 4 and "guessed, not measured" in page
+    assert json.loads((out / "config.json").read_text())["complete"]
+    # It is replaced only on demand, and nothing of it stays.
+    assert analyze(ringed, out) == 5
+    assert "--overwrite" in capsys.readouterr().err
+    assert analyze(ringed, out, "--add", 0, "--overwrite") == 0
+    assert not (out / "views.csv").exists()
+
+
+def found_of(source, **settings):
+    """The views, and what limits their detail, without a report."""
+    settings = AnalyzeSettings(source, **settings)
+    settings.check()
+    sampled = open_sampled(settings)
+    return sampled, resolution(sampled, ("a", "b", "c")).figures["limits"]
+
+
+def test_lengths_are_millimetres_once_the_unit_is_known(ringed):
+    units, in_units = found_of(ringed, aperture=0.02)
+    mm, in_mm = found_of(ringed, aperture=0.02, unit=100.0)
+    assert (units.unit, mm.unit) == ("unit", "mm")
+    assert mm.target.diameter == pytest.approx(100 * units.target.diameter)
+    for key in ("pixel", "number_of_views"):
+        assert in_mm[1][key] * 100 == pytest.approx(in_units[1][key], rel=1e-6)
+    # 2 R / (lambda z) of a pupil of 2 mm at 522 mm with 550 nm, at a tenth of the contrast.
+    cutoff = 4 / (550e-6 * 100 * 5 * math.hypot(1, 0.3))
+    assert in_mm[0]["diffraction"] == pytest.approx(0.8054 * cutoff, rel=1e-3)
+    assert in_units[0]["diffraction"] == math.inf
+    assert unknown_share(mm) == pytest.approx(unknown_share(units), rel=1e-2)
+
+
+def test_the_lens_of_the_file_comes_before_that_of_the_command(tmp_path):
+    lens = Aperture(0.05, 5.22, 1e-6)
+    cameras = [Camera(c.size, c.K, c.view, aperture=lens) for c in ring(8)]
+    source = capture(tmp_path / "sharp", cameras)
+    own, other = (found_of(source, aperture=radius)[1] for radius in (0.05, 0.5))
+    assert own == other and 0 < own[1]["depth_of_field"] < math.inf
+
+
+def test_one_camera_still_gets_an_answer(tmp_path, capsys):
+    source = capture(tmp_path / "alone", ring(1))
+    center = [f"{x}" for x in MIDDLE_OF_RING]
+    assert analyze(source, tmp_path / "out", "--center", *center, "--diameter", 1, "--add", 1) == 0
+    found, page = metrics_of(tmp_path / "out"), page_of(tmp_path / "out")
+    assert found["views"] == 1 and found["missing"][1]["share"] > 0.5
+    assert "One view samples a single slice" in page
+    assert found["limits"][0]["limited_by"] == "number of views"
+    assert analyze(source, tmp_path / "guessed", "--dry-run") == 0
+    assert "does not tell how far off" in capsys.readouterr().err
+
+
+def test_a_parallel_scan_has_directions_and_no_cameras(scan, tmp_path, capsys):
+    assert analyze(scan.integrals, tmp_path / "all") == 0
+    found = metrics_of(tmp_path / "all")
+    assert found["views"] == 150 and found["tuy"] is None
+    assert found["largest_gap_degrees"] == pytest.approx(180 / 150)
+    # pi D / d with d two bins.
+    assert found["crowther"]["needed"] == math.ceil(math.pi * 96 / 2)
+    assert page_of(tmp_path / "all").count("<img") == 3
+    assert not (tmp_path / "all" / "views.csv").exists()
+
+
+def test_a_wedge_of_a_scan_is_missing_and_its_middle_is_suggested(scan):
+    sampled = open_sampled(AnalyzeSettings(scan.integrals, theta="0:120"))
+    hole = missing(sampled).figures["missing"][1]
+    assert hole["half_angle_degrees"] == pytest.approx(30.4, abs=0.1)
+    gap, added = angles_to_add(sampled.scan.angles, 3)
+    assert gap == pytest.approx(60.8)
+    np.testing.assert_allclose(added, [149.6, 134.4, 164.8])
+
+
+def test_a_fan_is_taken_as_it_is():
+    fan, angle, bins = FanBeam(400.0, 600.0, 0.5, 30.0), 0.7, 64
+    point = np.array([[12.0, -9.0, 0]])
+    looks = Looks.of(fan_cameras(fan, [angle], bins), point)
+    source = 400 * np.array([np.sin(angle), -np.cos(angle), 0])
+    way = source - point[0]
+    np.testing.assert_allclose(looks.direction[0, 0], way / np.linalg.norm(way), atol=1e-12)
+    # The ray of its bin is that of a parallel scan, whose t is the point's.
+    u = fan.fan_angles(bins)
+    t = point[0, 0] * np.cos(angle - u) + point[0, 1] * np.sin(angle - u)
+    bin_seen = float(np.interp(0, (400 * np.sin(u) - t), np.arange(bins)))
+    camera = fan_cameras(fan, [angle], bins)[0]
+    x, _, z = camera.view[:3, :3] @ point[0] + camera.view[:3, 3]
+    fx, _, cx, _ = camera.intrinsics
+    assert fx * x / z + cx - 0.5 == pytest.approx(bin_seen, abs=1e-3)
+    assert looks.pixel[0, 0] == pytest.approx(0.5 * z / 600)
+    assert looks.weight[0, 0] == 1
+
+
+def test_a_dry_run_writes_nothing_and_says_what_would_be_done(ringed, tmp_path, capsys):
+    assert analyze(ringed, tmp_path / "out", "--dry-run", "--diameter", 2) == 0
+    printed = capsys.readouterr().out
+    assert "48 of ring" in printed and "1500 up to 8 cycles" in printed
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("--center", 500, 500, 500), "outside every picture"),
+        (("--center", "nan", 0, 0), "--center is"),
+        (("--diameter", 0), "--diameter is 0"),
+        (("--diameter", -3), "--diameter is -3"),
+        (("--aperture", 0), "--aperture is 0"),
+        (("--aperture", -0.1), "--aperture is -0.1"),
+        (("--focus", 3), "--focus is about --aperture"),
+        (("--wavelength", 0), "--wavelength is 0"),
+        (("--unit", "inf"), "--unit is inf"),
+        (("--add", -1), "--add is -1"),
+        (("--theta", "0:180"), "--theta is about a scan"),
+    ],
+)
+def test_what_makes_no_sense_is_named_and_leaves_nothing(ringed, tmp_path, capsys, more, words):
+    assert analyze(ringed, tmp_path / "out", *more) == 3
+    error = capsys.readouterr().err
+    assert words in error and "Traceback" not in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_no_capture_and_no_scan_is_named(scan, tmp_path, capsys):
+    (tmp_path / "notes.txt").write_text("nothing")
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "broken.json").write_text("{")
+    for name, words in (("notes.txt", ".txt"), ("empty", "empty"), ("nowhere", "nowhere"),
+                        ("broken.json", "broken.json")):  # fmt: skip
+        assert analyze(tmp_path / name, tmp_path / "out") == 3
+        assert words in capsys.readouterr().err
+    assert analyze(scan.integrals, tmp_path / "out", "--aperture", 1) == 3
+    assert "--aperture is about the cameras" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_of_a_narrow_wedge_the_detail_within_it_is_said_and_the_share_outside(scan):
+    sampled = open_sampled(AnalyzeSettings(scan.integrals, theta="0:30"))
+    found = resolution(sampled, ("middle", "b", "c"))
+    first = found.figures["limits"][0]
+    # Slices at 8 cycles per diameter reach asin(1 / 16) beyond the wedge, to either side.
+    seen = 30 * 149 / 150 + 2 * math.degrees(math.asin(1 / 16))
+    assert first["unseen"] == pytest.approx(1 - seen / 180, abs=0.005)
+    assert 1 / first["within_seen"] < 0.1 * sampled.target.diameter
+    assert 1 / first["reached"] > sampled.target.diameter
+    words = " ".join(found.sentences)
+    assert "Within those that are seen" in words and f"{1 / first['reached']:.3g}" not in words

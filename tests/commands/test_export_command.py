@@ -1,0 +1,85 @@
+"""``rift export``: files beside each other, what is said of them, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rift_cl.commands.cli import main
+from rift_cl.io.scenes.formats.formats import FORMATS
+from rift_cl.io.scenes.splat_scene import SplatScene, XrayScene
+
+
+@pytest.fixture
+def arrays() -> dict[str, np.ndarray]:
+    random = np.random.default_rng(0)
+    return {
+        "means": random.normal(size=(20, 3)),
+        "log_scales": np.full((20, 3), -3.0),
+        "quats": random.normal(size=(20, 4)),
+        "logit_opacities": np.zeros(20),
+        "sh": np.zeros((20, 4, 3)),
+    }
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def export(*arguments: object) -> int:
+    return main(["export", *map(str, arguments)])
+
+
+@pytest.mark.parametrize("name", list(FORMATS))
+def test_a_file_is_written_beside_the_others_and_never_twice(name, here, arrays, capsys):
+    SplatScene(**arrays).save(here / "ball.ply")
+    out = "copy.ply" if name == "ply" else f"ball{FORMATS[name].suffix}"
+    more = ("--out", out) if name == "ply" else ()
+    assert export("ball.ply", "--to", name, *more) == 0
+    content = (here / out).read_bytes()
+    assert out in capsys.readouterr().out
+    assert str(here).encode() not in content
+    assert export("ball.ply", "--to", name, *more) == 5
+    assert "--overwrite" in capsys.readouterr().err
+    assert export("ball.ply", "--to", name, *more, "--overwrite") == 0
+    assert (here / out).read_bytes() == content
+    assert sorted(entry.name for entry in here.iterdir()) == sorted(["ball.ply", out])
+
+
+def test_the_scene_itself_is_never_overwritten(here, arrays, capsys):
+    SplatScene(**arrays).save(here / "ball.ply")
+    before = (here / "ball.ply").read_bytes()
+    assert export("ball.ply", "--to", "ply", "--overwrite") == 5
+    assert "is the scene itself" in capsys.readouterr().err
+    assert (here / "ball.ply").read_bytes() == before
+
+
+def test_what_is_lost_is_said_before_and_nothing_is_written_on_a_dry_run(here, arrays, capsys):
+    SplatScene(**arrays, shape_modes=np.zeros((20, 3)), activation="exp").save(here / "ball.ply")
+    assert export("ball.ply", "--to", "spz", "--dry-run") == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "modes become" in said and "activation exp" in said
+    assert [entry.name for entry in here.iterdir()] == ["ball.ply"]
+    assert export("ball.ply", "--to", "spz") == 0
+    assert "rift: modes become" in capsys.readouterr().err
+
+
+def test_densities_of_xrays_are_no_splats_of_a_viewer(here, arrays, capsys):
+    XrayScene(**arrays | {"sh": np.zeros((20, 1, 3))}).save(here / "bone.ply")
+    assert export("bone.ply", "--to", "spz") == 3
+    assert "X-ray" in capsys.readouterr().err
+    assert [entry.name for entry in here.iterdir()] == ["bone.ply"]
+
+
+def test_up_is_y_in_formats_that_say_so(here, arrays):
+    SplatScene(**arrays).save(here / "ball.ply")
+    assert export("ball.ply", "--to", "glb", "--up", 0, 0, 1, "--quiet") == 0
+    from splat_readers import read_glb
+
+    _, read = read_glb((here / "ball.glb").read_bytes())
+    x, y, z = np.float32(arrays["means"]).T
+    np.testing.assert_allclose(read["POSITION"], np.column_stack([x, z, -y]), atol=1e-6)

@@ -1,0 +1,184 @@
+"""``rift fit`` with modes and lobes: options, and every command on what it leaves behind."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.commands.cli import main
+from rift_cl.commands.fit_photos.basis_options import BasisOptions
+from rift_cl.commands.fit_photos.job import Fit
+from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.view.job import ViewJob, ViewSettings
+from rift_cl.errors import StoppedError
+from rift_cl.io.scenes.splat_scene import XrayScene
+from rift_cl.io.volumes import read_volume
+from rift_cl.train.basis_settings import AngularSettings, BasisSettings
+
+KINDS = {
+    "laguerre exp": ["--basis", "laguerre", "--order", "2", "--activation", "exp"],
+    "lg": ["--angular", "lg", "--modes", "4"],
+    "asg": ["--angular", "asg", "--modes", "2", "--basis", "hermite", "--color-order", "0"],
+}
+
+
+def settings(capture, out, **more):
+    given = {"steps": 60, "splats": 60, "hold_out": 4, "checkpoint_every": 25}
+    return FitSettings(capture, out, **(given | more))
+
+
+def broken_off(given, after):
+    """Run a fit until a step, as Ctrl-C would break it off; what is said then."""
+    job = Fit(given)
+    with pytest.raises(StoppedError, match="to go on: rift fit") as caught:
+        for report in job.run():
+            if report.done >= after:
+                job.stop()
+    return str(caught.value)
+
+
+def fit(capture, out, *more, splats="60"):
+    arguments = ["fit", str(capture), "--out", str(out), "--steps", "24", "--splats", splats]
+    return main([*arguments, "--hold-out", "4", "--quiet", *more])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_fit_is_drawn_by_every_command_as_it_was_scored(capture, tmp_path, kind):
+    out = tmp_path / "fit"
+    assert fit(capture, out, *KINDS[kind]) == 0
+    scene = rift.SplatScene.load(out / "scene.ply")
+    given = dict(zip(KINDS[kind][::2], KINDS[kind][1::2], strict=True))
+    assert scene.activation == given.get("--activation", "clamp")
+    assert scene.angular == given.get("--angular", "sh")
+    order = given.get("--order", "1")
+    orders = {"shape_modes": order, "color_modes": given.get("--color-order", order)}
+    for name, order in orders.items():
+        modes = getattr(scene, name)
+        wanted = int(order) if "--basis" in given else 0
+        assert (0 if modes is None else modes.shape[1]) == {0: 0, 1: 3, 2: 9}[wanted]
+    metrics = json.loads((out / "metrics.json").read_text())
+    config = json.loads((out / "config.json").read_text())
+    assert metrics["basis"] and metrics["basis"] in (out / "report.html").read_text()
+    assert config["settings"]["angular"] == scene.angular
+    scored = ["eval", str(out), str(capture), "--hold-out", "4", "--out", str(tmp_path / "eval")]
+    assert main([*scored, "--train", str(capture), "--quiet"]) == 0
+    again = json.loads((tmp_path / "eval" / "metrics.json").read_text())["scores"]
+    (found,) = again.values()
+    assert found["fit_psnr"] == pytest.approx(metrics["scores"]["held out"]["fit_psnr"], abs=2e-3)
+    drawn = ["render", str(out), "--out", str(tmp_path / "render"), "--frames", "2"]
+    assert main([*drawn, "--size", "32", "24", "--depth", "--quiet"]) == 0
+    assert len(list((tmp_path / "render" / "frames").glob("*.png"))) == 2
+    assert main(["analyze", str(tmp_path / "render"), "--out", str(tmp_path / "a"), "--quiet"]) == 0
+    pytest.importorskip("viser", reason="viser is not installed")
+    with ViewJob(ViewSettings(out, port=0)) as job:
+        assert job.url.startswith("http://127.0.0.1:")
+
+
+@pytest.mark.parametrize(
+    "more",
+    [{"basis": "hermite", "order": 1, "activation": "exp"}, {"angular": "sg", "modes": 2}],
+)
+def test_a_fit_that_was_broken_off_goes_on_to_the_same_bits(capture, tmp_path, more):
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    list(Fit(settings(capture, whole, **more)).run())
+    words = broken_off(settings(capture, cut, **more), 25)
+    assert all(f"--{name} {value}" in words for name, value in more.items())
+    list(Fit(settings(capture, cut, resume=True, **more)).run())
+    assert (cut / "scene.ply").read_bytes() == (whole / "scene.ply").read_bytes()
+
+
+def test_another_basis_cannot_go_on(capture, tmp_path, capsys):
+    broken_off(settings(capture, tmp_path / "fit"), 25)
+    more = ["--steps", "60", "--resume", "--activation", "exp"]
+    assert fit(capture, tmp_path / "fit", *more) == 3
+    assert "had activation None, now it is 'exp'" in capsys.readouterr().err
+
+
+def test_plain_fits_say_nothing_of_a_basis():
+    """So that checkpoints from before there was one still go on."""
+    found = FitSettings(Path("capture")).decisive()
+    assert not {"basis", "order", "color_order", "activation", "angular", "modes"} & set(found)
+    found = FitSettings(Path("capture"), basis="hermite", order=2).decisive()
+    assert found["basis"] == "hermite" and found["order"] == 2 and "angular" not in found
+
+
+@pytest.mark.parametrize(
+    ("options", "orders"),
+    [
+        ({}, (0, 0)),
+        ({"basis": "hermite"}, (1, 1)),
+        ({"basis": "hermite", "order": 2}, (2, 2)),
+        ({"basis": "laguerre", "order": 2, "color_order": 0}, (2, 0)),
+        ({"basis": "hermite", "order": 0, "color_order": 3}, (0, 3)),
+    ],
+)
+def test_one_order_is_that_of_shape_and_colour(options, orders):
+    given = BasisOptions(**options)
+    found = given.basis_settings()
+    assert (found.order, found.color_order) == orders
+    assert given.basis_settings(colored=False).color_order == 0
+
+
+def test_words_say_what_splats_are():
+    assert BasisOptions().basis_words() == ""
+    given = BasisOptions(basis="hermite", order=2, color_order=1, activation="exp")
+    assert given.basis_words() == "hermite splats of shape order 2, colour order 1, activation exp"
+    assert BasisOptions(angular="lg", modes=5).basis_words() == "5 lg functions"
+    assert BasisOptions(angular="lg").angular_settings() == AngularSettings("lg", 8)
+    assert BasisOptions(activation="exp").basis_settings() == BasisSettings(activation="exp")
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--order", "1"], "--order is 1, but Gaussian splats have no modes"),
+        (["--color-order", "1"], "--color-order is 1, but Gaussian"),
+        (["--basis", "hermite", "--order", "9"], "order is 9, wanted 0 to 8"),
+        (["--basis", "hermite", "--order", "-1"], "order is -1"),
+        (["--modes", "4"], "--modes counts lobes: add --angular"),
+        (["--angular", "lg", "--modes", "36"], "modes is 36, wanted 1 to 35"),
+        (["--angular", "lg", "--sh-degree", "2"], "--sh-degree is about harmonics"),
+        (["--basis", "hermite", "--absgrad", "--strategy", "default"], "absgrad wants magnitudes"),
+        (["--mode", "xray", "--basis", "hermite", "--color-order", "1"], "--color-order has no"),
+        (["--mode", "xray", "--activation", "exp"], "--activation has no meaning"),
+        (["--mode", "xray", "--angular", "lg"], "--angular has no meaning"),
+        (["--mode", "xray", "--modes", "3"], "--modes has no meaning"),
+    ],
+)
+def test_what_makes_no_sense_is_named_and_leaves_nothing(capture, tmp_path, capsys, more, words):
+    assert fit(capture, tmp_path / "fit", *more) == 3
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "fit").exists()
+
+
+def test_a_dry_run_says_what_splats_would_be(capture, tmp_path, capsys):
+    assert fit(capture, tmp_path / "fit", "--basis", "hermite", "--dry-run") == 0
+    printed = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "hermite splats of shape order 1, colour order 1" in printed
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+def test_densities_of_x_rays_have_modes_too(tmp_path, rows):
+    size, pitch = 24, 0.5
+    grid = rift.Grid((rows, size, size), pitch)
+    scan = rift.Parallel(np.arange(18) * np.pi / 18, size, pitch)
+    values = 0.2 * rift.phantom.shepp_logan_sinogram(grid, scan)
+    np.savez(tmp_path / "scan.npz", projections=values, angles=scan.angles, pitch=pitch)
+    more = ["--mode", "xray", "--center", str((size - 1) / 2), "--basis", "hermite", "--order", "2"]
+    out = tmp_path / "fit"
+    assert fit(tmp_path / "scan.npz", out, *more, splats="80") == 0
+    scene = rift.SplatScene.load(out / "scene.ply")
+    assert isinstance(scene, XrayScene) and scene.shape_modes.shape == (80, 9)
+    assert scene.shape_modes.any() and scene.color_modes is None
+    # (x, y, z), then xx, xy, xz, yy, yz, zz.
+    across = np.array([0, 0, 1, 0, 0, 1, 0, 1, 1], bool)
+    assert scene.shape_modes[:, across].any() == (rows > 1)
+    slices = read_volume(out / "slices")
+    assert slices.shape == (rows, size, size)
+    truth = 0.2 * rift.phantom.shepp_logan(grid)
+    assert slices.sum() == pytest.approx(truth.sum(), rel=0.1)
+    assert "hermite splats of shape order 2" in (out / "report.html").read_text()

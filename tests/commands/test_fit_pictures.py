@@ -1,0 +1,112 @@
+"""What a fit sees of photographs: backgrounds, masks, light, the same codes from every store."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from view_files import linear, store, view_of
+
+import rift_cl as rift
+from rift_cl.commands.fit_photos.pictures import CapturePictures
+from rift_cl.commands.fit_photos.scores import scores_of
+
+GREY = 128
+
+
+def codes(channels=3, seed=0):
+    """A grey picture with coloured noise in its middle."""
+    picture = np.full((24, 30, channels), GREY, np.uint8)
+    picture[8:16, 10:20] = np.random.default_rng(seed).integers(0, 256, (8, 10, channels))
+    return picture
+
+
+def pictures(views, **more):
+    return CapturePictures(rift.default_device(), views, **more)
+
+
+def opened(folder, picture, kind="uint8", mask=None, name="a.png"):
+    path = store(folder / name, picture, kind)
+    where = None if mask is None else store(folder / "mask.png", mask, "uint8")
+    return view_of(path, where)
+
+
+def test_eight_bits_are_kept_exactly_and_sixteen_almost(tmp_path):
+    seen = pictures([opened(tmp_path, codes())])
+    np.testing.assert_array_equal(seen.image(0), np.float32(codes()) / np.float32(255))
+    deep = np.random.default_rng(1).integers(0, 65536, (24, 30, 3)).astype(np.uint16)
+    fine = pictures([opened(tmp_path, deep, "uint16", name="b.png")])
+    np.testing.assert_allclose(fine.image(0), deep / 65535, atol=0.51 / 65535)
+
+
+def test_what_does_not_fit_into_memory_is_the_same_when_decoded_again(tmp_path, monkeypatch):
+    deep = np.random.default_rng(1).uniform(0, 1, (24, 30, 3)).astype(np.float32)
+    view = opened(tmp_path, deep, "float", name="a.exr")
+    kept = pictures([view])
+    monkeypatch.setattr("rift_cl.commands.fit_photos.pictures._SHARE", 0.0)
+    streamed = pictures([view])
+    assert kept.image(0).tobytes() == streamed.image(0).tobytes()
+    assert kept._kept and not streamed._kept
+
+
+def test_a_common_border_is_the_background(tmp_path):
+    seen = pictures([opened(tmp_path, codes())])
+    np.testing.assert_allclose(seen.behind, GREY / 255, atol=1e-6)
+    front = seen.foreground(0)
+    assert front[8:16, 10:20].mean() > 0.95 and not front[:8].any()
+    noise = np.random.default_rng(0).integers(0, 256, (24, 30, 3)).astype(np.uint8)
+    assert pictures([opened(tmp_path, noise, name="b.png")]).foreground(0) is None
+
+
+def test_a_picture_that_was_cut_out_is_laid_over_a_new_background_every_step(tmp_path):
+    picture = codes(4)
+    picture[..., 3] = 0
+    picture[8:16, 10:20, 3] = 255
+    seen, shown = pictures([opened(tmp_path, picture)], seed=5), []
+    for step in (3, 4, 3):
+        seen.begin(step)
+        target, behind = (seen.device.get(a) for a in (seen.target(0), seen.background(0)))
+        np.testing.assert_allclose(target[0, 0], behind, atol=1e-6)
+        np.testing.assert_allclose(target[10, 12], picture[10, 12, :3] / 255, atol=1e-6)
+        shown.append(behind)
+    assert (shown[0] == shown[2]).all() and (shown[0] != shown[1]).any()
+    assert seen.weights(0) is None and seen.counted(0) is None
+    assert seen.foreground(0).sum() == 80
+
+
+def test_what_a_mask_hides_does_not_count_and_stays_no_hole(tmp_path):
+    mask = np.full((24, 30, 1), 255, np.uint8)
+    mask[:, :6] = 0
+    seen = pictures([opened(tmp_path, codes(), mask=mask)])
+    seen.begin(0)
+    weights = seen.device.get(seen.weights(0))
+    assert not weights[:, :6].any() and (weights[:, 6:] == 1).all()
+    # The background is that of the pictures, not one drawn by chance.
+    np.testing.assert_allclose(seen.device.get(seen.background(0)), seen.behind)
+    np.testing.assert_array_equal(seen.counted(0), weights > 0)
+    assert not seen.foreground(0)[:, :6].any()
+
+
+def test_pixels_that_do_not_count_change_no_score():
+    random = np.random.default_rng(0)
+    truth = random.uniform(0, 1, (20, 30, 3)).astype(np.float32)
+    image = np.clip(truth + 0.05 * random.normal(size=truth.shape), 0, 1).astype(np.float32)
+    counted = np.ones((20, 30), bool)
+    counted[:, :9] = False
+    found = []
+    for garbage in (0.0, 1.0):
+        image[:, :9] = garbage
+        found.append(scores_of(image, truth, (counted, None), "fit"))
+    assert found[0] == found[1]
+    right = scores_of(image[:, 9:], truth[:, 9:], (None, None), "fit")
+    assert found[0]["fit_psnr"] == pytest.approx(right["fit_psnr"], abs=1e-9)
+
+
+def test_linear_light_is_fitted_and_shown_for_a_display(tmp_path):
+    view = opened(tmp_path, codes())
+    seen = pictures([view], light="linear")
+    np.testing.assert_allclose(seen.image(0), linear(codes() / 255), atol=1e-6)
+    np.testing.assert_allclose(seen.shown(seen.image(0)), codes() / 255, atol=1e-5)
+    bright = np.full((24, 30, 3), 3.5, np.float32)
+    over = pictures([opened(tmp_path, bright, "float", name="c.exr")], light="linear")
+    assert over.image(0).max() == pytest.approx(3.5)
+    assert over.shown(over.image(0)).max() == pytest.approx(1.0)

@@ -1,0 +1,183 @@
+"""``rift fit --mode xray`` from a scan to splats, slices and a report."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.commands.cli import main
+from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_xray.job import XrayFit
+from rift_cl.errors import InputError, StoppedError
+from rift_cl.io.scans.formats import open_scan
+from rift_cl.io.volumes import read_volume
+from rift_cl.metrics import psnr
+
+SIZE, VIEWS, PITCH = 48, 36, 0.5
+
+
+@pytest.fixture(scope="module")
+def scans(tmp_path_factory):
+    """The head in one slice and in four, 48 x 48, from 36 views; and the true slices."""
+    folder, found = tmp_path_factory.mktemp("scans"), {}
+    for rows in (1, 4):
+        grid = rift.Grid((rows, SIZE, SIZE), PITCH)
+        scan = rift.Parallel(np.arange(VIEWS) * np.pi / VIEWS, SIZE, PITCH)
+        values = 0.2 * rift.phantom.shepp_logan_sinogram(grid, scan)
+        path = folder / f"{rows}.npz"
+        np.savez(path, projections=values, angles=scan.angles, pitch=PITCH)
+        found[rows] = path, 0.2 * rift.phantom.shepp_logan(grid)
+    return found
+
+
+def settings(path, out, **more):
+    given = {"steps": 60, "splats": 400, "center": (SIZE - 1) / 2, "checkpoint_every": 20}
+    return FitSettings(path, out, mode="xray", **(given | more))
+
+
+def fit(path, out, *more, splats=400):
+    arguments = ["fit", str(path), "--out", str(out), "--mode", "xray", "--steps", "60"]
+    arguments += ["--splats", str(splats), "--center", str((SIZE - 1) / 2), "--quiet"]
+    return main([*arguments, *more])
+
+
+@pytest.mark.parametrize("rows", [1, 4])
+def test_a_scan_becomes_densities_slices_and_a_report(scans, tmp_path, capsys, rows):
+    path, truth = scans[rows]
+    out = tmp_path / "fit"
+    splats = 400 * rows
+    by = "coverage" if rows == 1 else "ramp"
+    assert fit(path, out, "--homogenise", "0.5", "--homogenise-by", by, splats=splats) == 0
+    assert "held out" in capsys.readouterr().out
+    slices = read_volume(out / "slices")
+    metrics = json.loads((out / "metrics.json").read_text())
+    scores = metrics["scores"]["held out"]
+    assert slices.shape == truth.shape and slices.min() >= 0
+    # Filtered backprojection of these views has 21.5 dB and less.
+    assert psnr(slices, truth, peak=0.2) > 22
+    assert scores["fit_error"] < scores["fbp_error"] and metrics["start_error"] < 0.25
+    scene = rift.SplatScene.load(out / "scene.ply")
+    assert scene.mode == "xray" and len(scene) == splats == metrics["splats"]
+    assert slices.sum() == pytest.approx(truth.sum(), rel=0.05)
+    # Everything is in the scan's unit: the head is as large, and so is the splats' mass. Above and
+    # below a stack of rows they may hold some that no row sees.
+    assert 0.6 < np.abs(scene.means[:, :2]).max() / (0.5 * SIZE * PITCH) < 1.1
+    mass = np.exp(scene.logit_opacities + scene.log_scales[:, :2].sum(axis=1))
+    # One row shares its splats' height, half a bin, with the detector's blur, which widens it.
+    if rows == 1:
+        area = 2 * np.pi * mass.sum() / np.sqrt(1 + 0.1 / 0.25)
+        assert area == pytest.approx(truth.sum() * PITCH**2, rel=0.05)
+    page = (out / "report.html").read_text()
+    assert page.count('class="slider"') == 1 and "filtered backprojection" in page
+    config = json.loads((out / "config.json").read_text())
+    assert config["complete"] and config["settings"]["mode"] == "xray"
+
+
+def test_one_row_stays_in_its_slice(scans, tmp_path):
+    assert fit(scans[1][0], tmp_path / "fit") == 0
+    scene = rift.SplatScene.load(tmp_path / "fit" / "scene.ply")
+    assert (scene.means[:, 2] == 0).all() and (scene.quats[:, 1:3] == 0).all()
+    np.testing.assert_allclose(np.exp(scene.log_scales[:, 2]), 0.5 * PITCH, rtol=1e-5)
+    assert (scene.quats[:, 3] != 0).any()
+
+
+def test_the_unit_of_line_integrals_changes_nothing_but_the_unit(scans, tmp_path):
+    path, _ = scans[1]
+    scan = open_scan(path)
+    other = tmp_path / "thousand.npz"
+    values = 1024 * scan.read(0, 1).projections
+    np.savez(other, projections=values, angles=scan.angles, pitch=PITCH)
+    found = []
+    for number, source in enumerate((path, other)):
+        list(XrayFit(settings(source, tmp_path / str(number))).run())
+        found.append(rift.SplatScene.load(tmp_path / str(number) / "scene.ply"))
+    np.testing.assert_array_equal(found[0].means, found[1].means)
+    np.testing.assert_allclose(
+        found[1].logit_opacities - found[0].logit_opacities, np.log(1024), rtol=1e-5
+    )
+
+
+def test_a_fit_that_was_broken_off_goes_on_to_the_same_bits(scans, tmp_path):
+    path, more = scans[4][0], {"homogenise": 1.0, "steps": 140}
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    list(XrayFit(settings(path, whole, **more)).run())
+    for resume, after in ((False, 25), (True, 110)):
+        job = XrayFit(settings(path, cut, resume=resume, **more))
+        with pytest.raises(StoppedError, match=r"--mode xray .*--resume"):
+            for report in job.run():
+                if report.what == "steps" and report.done >= after:
+                    job.stop()
+    assert not (cut / "scene.ply").exists()
+    list(XrayFit(settings(path, cut, resume=True, **more)).run())
+    assert (cut / "scene.ply").read_bytes() == (whole / "scene.ply").read_bytes()
+
+
+def test_a_dry_run_writes_nothing(scans, tmp_path, capsys):
+    assert fit(scans[4][0], tmp_path / "fit", "--dry-run", "--rows", "1", "3") == 0
+    printed = capsys.readouterr().out
+    assert "1 to 2" in printed and "31 projections" in printed and "5 projections" in printed
+    assert not (tmp_path / "fit").exists()
+
+
+def test_a_scan_of_counts_finds_its_own_axis(scan, tmp_path):
+    """Flat and dark frames, the logarithm and the rotation axis come from the scan."""
+    given = settings(scan.counts, tmp_path / "fit", center=None, rows=(1, 2), format="h5")
+    list(XrayFit(given).run())
+    metrics = json.loads((tmp_path / "fit" / "metrics.json").read_text())
+    assert metrics["center"] == pytest.approx(45.0, abs=0.3)
+    slices = read_volume(tmp_path / "fit" / "volume.h5")
+    assert slices.shape == (1, 96, 96) and metrics["scores"]["held out"]["fit_error"] < 0.12
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--test", "elsewhere"], "--test has no meaning with --mode xray"),
+        (["--light", "linear"], "--light has no meaning"),
+        (["--refine-poses"], "--refine-poses has no meaning"),
+        (["--sh-degree", "2"], "--sh-degree has no meaning"),
+        (["--strategy", "default"], "--strategy has no meaning"),
+        (["--rows", "3", "9"], "--rows is 3 9"),
+        (["--center", "1000"], "--center is 1000"),
+        (["--hold-out", "1"], "leaves no projection"),
+        (["--memory", "1K"], "fewer rows"),
+        (["--pitch", "-1"], "pitch is -1"),
+    ],
+)
+def test_what_makes_no_sense_is_named_and_leaves_nothing(scans, tmp_path, capsys, more, words):
+    assert fit(scans[4][0], tmp_path / "fit", *more) == 3
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "fit").exists()
+
+
+def test_options_of_scans_are_refused_for_photographs(capture, tmp_path, capsys):
+    arguments = ["fit", str(capture), "--out", str(tmp_path / "fit"), "--center", "3"]
+    assert main(arguments) == 3
+    assert "--center is for X-ray scans: add --mode xray" in capsys.readouterr().err
+
+
+def test_photographs_are_no_scan_and_air_is_no_object(capture, tmp_path, capsys):
+    assert fit(capture, tmp_path / "fit") == 3
+    capsys.readouterr()
+    np.savez(tmp_path / "air.npz", sinogram=np.zeros((9, 20)), angles=np.arange(9) / 3)
+    job = XrayFit(settings(tmp_path / "air.npz", tmp_path / "air", center=9.5))
+    with pytest.raises(InputError, match="nothing to fit"):
+        list(job.run())
+    assert not (tmp_path / "air").exists()
+
+
+def test_a_checkpoint_of_photographs_says_nothing_of_scans(capture, tmp_path):
+    assert not {"mode", "rows", "center"} & set(FitSettings(capture, tmp_path).decisive())
+    assert {"mode", "rows", "center"} <= set(settings(capture, tmp_path).decisive())
+
+
+def test_the_real_tooth_from_one_command(shared_data, tmp_path):
+    path = shared_data / "tooth" / "tooth.h5"
+    if not path.is_file():
+        pytest.skip(f"no real scan: {path} is absent")
+    assert fit(path, tmp_path / "fit", "--rows", "0", "1", "--center", "296") == 0
+    scores = json.loads((tmp_path / "fit" / "metrics.json").read_text())["scores"]["held out"]
+    assert scores["fit_error"] < 0.15

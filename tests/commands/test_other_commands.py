@@ -1,0 +1,185 @@
+"""``rift demo``, ``rift center``, ``rift devices``, ``rift cache``."""
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.commands.cli import main
+
+# No fit: tests that look at other things should not wait for one.
+NO_FIT = ("--steps", "0")
+
+
+def test_demo(tmp_path, capsys):
+    out = tmp_path / "demo"
+    sizes = ["--size", "96", "--views", "8", "60", "150"]
+    assert main(["demo", "--out", str(out), *sizes, *NO_FIT]) == 0
+    rows = json.loads((out / "metrics.json").read_text())["views"]
+    filtered = [row["psnr_filtered"] for row in rows]
+    assert [row["count"] for row in rows] == [8, 60, 150]
+    assert filtered == sorted(filtered)
+    # The paper's point: without the filter more views do not help.
+    assert filtered[-1] > rows[-1]["psnr_unfiltered"] + 8
+    assert abs(rows[-1]["psnr_unfiltered"] - rows[1]["psnr_unfiltered"]) < 0.2
+    assert {"filtered_8.png", "unfiltered_150.png", "report.html"} <= {
+        p.name for p in out.iterdir()
+    }
+    assert not (out / "ornament").exists()
+    assert "PSNR filtered" in capsys.readouterr().out
+
+
+def test_demo_fits_the_sample_and_shows_both_ways(tmp_path, capsys):
+    out = tmp_path / "demo"
+    arguments = ["demo", "--out", str(out), "--size", "32", "--views", "4", "--splats", "300"]
+    assert main([*arguments, "--steps", "40"]) == 0
+    fits = json.loads((out / "metrics.json").read_text())["fits"]
+    groups = {"ornament": {"held out", "off_path"}, "wall": {"held out"}}
+    assert {name: set(fit["scores"]) for name, fit in fits.items()} == groups
+    for name, fit in fits.items():
+        assert fit == json.loads((out / name / "metrics.json").read_text())
+        for scores in fit["scores"].values():
+            assert {"fit_psnr", "nearest_psnr", "blend_psnr"} <= set(scores)
+        assert 0 < len(rift.SplatScene.load(out / name / "scene.ply")) <= 300
+    page = (out / "report.html").read_text()
+    regression = "Regression: splats fitted to pictures of the "
+    headings = ["Integration", f"{regression}ornament", "Pictures: off_path", f"{regression}wall"]
+    places = [page.index(f"<h2>{heading}") for heading in headings]
+    assert places == sorted(places)
+    # The best, the middle and the worst picture of three groups.
+    assert page.count('class="pair"') == 9
+    assert main([*arguments, *NO_FIT]) == 0
+    assert not (out / "ornament").exists() and not (out / "wall").exists()
+    assert not (out / "film").exists()
+
+
+def test_demo_keeps_what_else_lies_under_the_fits_name(tmp_path, capsys):
+    out = tmp_path / "demo"
+    arguments = ["demo", "--out", str(out), "--size", "32", "--views", "4", *NO_FIT]
+    assert main(arguments) == 0
+    (out / "ornament").mkdir()
+    (out / "ornament" / "notes.txt").write_text("keep")
+    assert main(arguments) == 5
+    assert (out / "ornament" / "notes.txt").read_text() == "keep"
+
+
+def test_demo_can_be_repeated_but_takes_no_other_folder(tmp_path, capsys):
+    arguments = ["demo", "--out", str(tmp_path / "demo"), "--size", "32", "--views", "4"]
+    assert main([*arguments, *NO_FIT]) == 0
+    assert main([*arguments, *NO_FIT]) == 0
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("keep")
+    assert main(["demo", "--out", str(tmp_path / "mine")]) == 5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (("--size", "4"), "--size"),
+        (("--views", "0"), "--views"),
+        (("--views",), "--views"),
+        (("--steps", "-1"), "steps is -1"),
+        (("--splats", "0"), "splats is 0"),
+    ],
+)
+def test_demo_arguments_are_told(tmp_path, capsys, arguments, word):
+    assert main(["demo", "--out", str(tmp_path / "demo"), *arguments]) == 3
+    assert word in capsys.readouterr().err
+    assert not (tmp_path / "demo").exists()
+
+
+def test_a_demo_that_is_repeated_leaves_no_old_pictures(tmp_path, capsys):
+    out = tmp_path / "demo"
+    for views in ("3", "5"):
+        arguments = ["demo", "--out", str(out), "--size", "32", "--views", views, *NO_FIT]
+        assert main(arguments) == 0
+    assert sorted(path.name for path in out.glob("*.png")) == ["filtered_5.png", "unfiltered_5.png"]
+
+
+@pytest.mark.parametrize("how", [">&-", "2>&-", "| head -0", "> /dev/full", "2> /dev/full"])
+def test_closed_and_full_streams_are_survived(how, tmp_path):
+    python = shlex.quote(sys.executable)
+    command = f"{python} -m rift_cl.commands.cli demo --size 32 --views 4 --steps 0 --out d {how}"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(
+        ["bash", "-c", command],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert done.returncode == (5 if how == "> /dev/full" else 0)
+    assert "Traceback" not in done.stderr
+    assert (tmp_path / "d" / "report.html").exists()
+
+
+def test_center(scan, tmp_path, capsys):
+    out = tmp_path / "center"
+    assert main(["center", str(scan.counts), "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert float(printed.split()[0]) == pytest.approx(45, abs=0.3)
+    page = (out / "report.html").read_text()
+    assert page.count("data:image/jpeg;base64,") == 17 + 9
+    assert page.count("<script>") == 1
+    assert "script-src 'sha256-" in page
+    by = json.loads((out / "metrics.json").read_text())["by"]
+    assert by == "double wedge and centre of mass"
+
+
+def test_center_of_a_row_that_is_not_there(scan, tmp_path, capsys):
+    assert main(["center", str(scan.counts), "--row", "7", "--out", str(tmp_path / "c")]) == 3
+    assert "--row is 7" in capsys.readouterr().err
+
+
+def test_devices(capsys):
+    assert main(["devices"]) == 0
+    printed = capsys.readouterr().out
+    assert "*" in printed
+    assert "passed" in printed
+    for device in rift.devices():
+        assert device.name in printed
+        assert device.platform in printed
+
+
+def test_cache(capsys):
+    assert main(["cache"]) == 0
+    assert " in " in capsys.readouterr().out
+
+
+def test_version(capsys):
+    assert main(["--version"]) == 0
+    assert rift.__version__ in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", ["demo", "devices", "reconstruct", "center", "cache"])
+def test_help_has_an_example(command, capsys):
+    with pytest.raises(SystemExit) as exit:
+        main([command, "--help"])
+    assert exit.value.code == 0
+    assert "Example:" in capsys.readouterr().out
+
+
+def test_every_way_to_ask_gives_the_same_axis(scan, tmp_path, capsys):
+    from rift_cl.commands.analyze.input import open_sampled
+    from rift_cl.commands.analyze.settings import AnalyzeSettings
+    from rift_cl.commands.center.axis_search import find_axis
+    from rift_cl.io.scans.formats import open_scan
+
+    with np.load(scan.integrals) as file:
+        python = rift.find_center(file["projections"], file["angles"]).center
+    assert main(["center", str(scan.integrals), "--out", str(tmp_path / "c")]) == 0
+    assert json.loads((tmp_path / "c/metrics.json").read_text())["center"] == python
+    options = ["--rows", "0", "1", "--out", str(tmp_path / "r")]
+    assert main(["reconstruct", str(scan.integrals), *options]) == 0
+    assert json.loads((tmp_path / "r/metrics.json").read_text())["center"] == python
+    assert find_axis(open_scan(scan.integrals)).center == python
+    analysed = open_sampled(AnalyzeSettings(source=scan.integrals))
+    assert analysed.scan.center == python
+    assert any(f"at bin {python:.2f}" in note for note in analysed.notes)

@@ -1,0 +1,211 @@
+"""Methods, windows and geometries of ``rift reconstruct``, each against a slice that is known."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.commands.cli import main
+from rift_cl.commands.inputs import scan_input
+from rift_cl.commands.reconstruct.job import Reconstruction
+from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.geometry.fan import FanBeam
+from rift_cl.io import read_volume
+
+SIZE, VIEWS = 64, 90
+HALF, FULL = np.arange(VIEWS) * np.pi / VIEWS, np.arange(2 * VIEWS) * np.pi / VIEWS
+
+
+def run(*arguments):
+    return main([str(argument) for argument in arguments])
+
+
+def save_phantom(path, angles, bins, center=None, size=SIZE, rows=1, offset=0.0):
+    """Write line integrals of the phantom, 0.2 times its values, and give its true slice."""
+    grid, scan = rift.Grid((size, size)), rift.Parallel(angles, bins, center=center)
+    integrals = 0.2 * rift.phantom.shepp_logan_sinogram(grid, scan)
+    stack = np.repeat(integrals[:, None], rows, axis=1) + offset
+    np.savez(path, projections=stack, angles=angles)
+    return 0.2 * rift.phantom.shepp_logan(grid)
+
+
+def reconstruct(path, out, *options):
+    """The volume that a command leaves, and what it assumed."""
+    assert run("reconstruct", path, "--out", out, *options) == 0
+    metrics = json.loads((out / "metrics.json").read_text())
+    return read_volume(out / "slices"), " ".join(metrics["assumed"])
+
+
+def error(image, truth):
+    return np.sqrt(np.mean((image - truth) ** 2)) / np.sqrt(np.mean(truth**2))
+
+
+@pytest.fixture(scope="module")
+def half(tmp_path_factory):
+    path = tmp_path_factory.mktemp("half") / "scan.npz"
+    return path, save_phantom(path, HALF, 72, rows=2)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--method", "fbp", "--compensate", "capped-voronoi"),
+        ("--method", "fbp", "--footprint", "strip"),
+        ("--method", "fbp", "--error", 1e-3),
+        ("--method", "cgls", "--steps", 8, "--error", 1e-3),
+        ("--method", "sirt", "--steps", 40, "--nonnegative"),
+        ("--method", "cgls", "--steps", 8, "--footprint", "joseph"),
+        ("--method", "cgls", "--steps", 2, "--precondition", "ramp"),
+        ("--method", "cgls", "--steps", 8, "--weights", "counts"),
+        ("--method", "sirt", "--steps", 40, "--weights", "counts", "--nonnegative"),
+        ("--method", "tv", "--steps", 150, "--nonnegative"),
+    ],
+)
+def test_every_method_finds_the_slice(half, tmp_path, options):
+    path, truth = half
+    volume, _ = reconstruct(path, tmp_path / "out", "--center", 35.5, "--size", SIZE, *options)
+    assert volume.shape == (2, SIZE, SIZE)
+    assert error(volume[0], truth) < 0.4
+    np.testing.assert_allclose(volume[0], volume[1], atol=1e-6)
+    if "--nonnegative" in options:
+        assert volume.min() >= 0
+
+
+def test_steps_end_where_noise_is_left(half, tmp_path):
+    path, _ = half
+    common = ("--center", 35.5, "--method", "cgls", "--steps", 30)
+    reconstruct(path, tmp_path / "out", *common, "--noise", 0.2)
+    metrics = json.loads((tmp_path / "out/metrics.json").read_text())
+    assert metrics["steps"] < 30
+    assert metrics["residual"] <= 0.2
+
+
+@pytest.mark.parametrize("method", ["fbp", "cgls"])
+def test_a_part_of_a_slice_is_that_part(half, tmp_path, method):
+    path, _ = half
+    common = ("--center", 35.5, "--method", method)
+    whole, _ = reconstruct(path, tmp_path / "whole", *common)
+    part, _ = reconstruct(path, tmp_path / "part", *common, "--roi", 10, 40, 25, 60)
+    assert part.shape == (2, 35, 30)
+    np.testing.assert_allclose(part, whole[:, 25:60, 10:40], atol=2e-3)
+
+
+@pytest.mark.parametrize("method", ["fbp", "sirt"])
+def test_pixels_of_another_size_hold_the_same_values(half, tmp_path, method):
+    path, truth = half
+    options = ("--center", 35.5, "--method", method, "--pixel", 2, "--size", SIZE // 2)
+    volume, _ = reconstruct(path, tmp_path / "out", *options)
+    coarse = truth.reshape(SIZE // 2, 2, SIZE // 2, 2).mean(axis=(1, 3))
+    assert volume[0].mean() == pytest.approx(coarse.mean(), rel=0.05)
+    assert error(volume[0], coarse) < 0.4
+
+
+@pytest.mark.parametrize("center", [6.4, 39.0 - 6.4])
+@pytest.mark.parametrize("options", [(), ("--method", "sirt", "--steps", 60)])
+def test_a_full_turn_with_an_offset_axis_needs_no_word(tmp_path, center, options):
+    path = tmp_path / "scan.npz"
+    truth = save_phantom(path, FULL, 40, center)
+    volume, assumed = reconstruct(path, tmp_path / "out", "--size", SIZE, *options)
+    assert "slices reach to the farther end" in assumed
+    assert ("opposite views were joined" in assumed) == (not options)
+    metrics = json.loads((tmp_path / "out/metrics.json").read_text())
+    assert metrics["center"] == pytest.approx(center, abs=0.2)
+    assert error(volume[0], truth) < 0.35
+    t = np.arange(SIZE) - (SIZE - 1) / 2
+    seen = np.hypot(t[:, None], t) < 31  # by every view; corners are not
+    assert volume[0][seen].mean() == pytest.approx(truth[seen].mean(), rel=0.02)
+
+
+def test_slices_of_an_offset_axis_reach_to_the_farther_end(tmp_path):
+    path = tmp_path / "scan.npz"
+    save_phantom(path, FULL, 40, 6.4)
+    volume, _ = reconstruct(path, tmp_path / "out", "--rows", 0, 1)
+    assert volume.shape[1:] == (67, 67)
+
+
+def test_an_object_wider_than_the_detector_is_continued(tmp_path):
+    path, bins = tmp_path / "scan.npz", 40
+    truth = save_phantom(path, HALF, bins, size=80)[20:60, 20:60]
+    middle = ("--kind", "attenuation", "--center", (bins - 1) / 2)
+    padded, assumed = reconstruct(path, tmp_path / "auto", *middle)
+    plain, _ = reconstruct(path, tmp_path / "off", *middle, "--pad", "off")
+    assert "continued smoothly" in assumed
+    t = np.arange(bins) - (bins - 1) / 2
+    border = np.abs(np.hypot(t[:, None], t) - 17.5) < 1.5
+    bias = [abs((image[0] - truth)[border].mean()) for image in (padded, plain)]
+    assert bias[0] < 0.3 * bias[1]
+    steps = ("--method", "sirt", "--steps", 30)
+    explained, assumed = reconstruct(path, tmp_path / "sirt", *middle, *steps)
+    assert "margin of 20 bins" in assumed
+    assert "continued smoothly" not in assumed
+    assert explained.shape == padded.shape
+    assert abs((explained[0] - truth)[border].mean()) < 0.3 * bias[1]
+
+
+def test_the_background_is_brought_to_zero(tmp_path):
+    path = tmp_path / "scan.npz"
+    truth = save_phantom(path, HALF, 80, offset=0.7)
+    options = ("--kind", "attenuation", "--center", 39.5, "--size", SIZE, "--pad", "off")
+    volume, assumed = reconstruct(path, tmp_path / "out", *options, "--background", 5)
+    assert "outermost 5 bins" in assumed
+    assert error(volume[0], truth) < 0.3
+    plain, _ = reconstruct(path, tmp_path / "plain", *options)
+    assert error(plain[0], truth) > 1.5 * error(volume[0], truth)
+
+
+def test_rings_are_taken_out_of_counts_alone_unless_told(scan, half, tmp_path):
+    cases = [
+        (scan.counts, "auto", "vo"),
+        (scan.counts, "off", None),
+        (half[0], "auto", None),
+        (half[0], "on", "vo"),
+    ]
+    for path, rings, expected in cases:
+        settings = ReconstructSettings(path, out=tmp_path / "out", center=40, rings=rings)
+        assert Reconstruction(settings).source.clean.rings == expected
+
+
+@pytest.fixture
+def fan_wedge(monkeypatch):
+    """Let readers say that a file's views are those of a fan beam."""
+    fan, opened = FanBeam(200, 300, 1.5, 35.5), scan_input.open_scan
+    monkeypatch.setattr(
+        scan_input,
+        "open_scan",
+        lambda *a, **k: dataclasses.replace(opened(*a, **k), fan=fan, pitch=fan.pitch),
+    )
+    return fan
+
+
+def save_fan(path, fan, angles):
+    gamma = fan.fan_angles(72)
+    t = fan.source_to_axis * np.sin(gamma)
+    # A disc of radius 20 and value 0.1 at (4, -3).
+    theta = angles[:, None] - gamma
+    off = t - 4 * np.cos(theta) + 3 * np.sin(theta)
+    views = 0.2 * np.sqrt(np.maximum(20.0**2 - off**2, 0))
+    np.savez(path, projections=views[:, None], angles=angles)
+
+
+@pytest.mark.parametrize("options", [(), ("--method", "cgls", "--steps", 12)])
+@pytest.mark.parametrize("degrees", [360, 60])
+def test_fan_views_are_resampled_and_that_is_said(tmp_path, fan_wedge, options, degrees):
+    path = tmp_path / "fan.npz"
+    save_fan(path, fan_wedge, np.deg2rad(np.arange(0, degrees, 1.0)))
+    volume, assumed = reconstruct(path, tmp_path / "out", *options, "--size", 60)
+    assert "Fan-beam views were resampled" in assumed
+    y, x = np.mgrid[:60, :60] - 29.5
+    inside = np.hypot(x - 4, y + 3) < 14
+    if degrees == 360:
+        assert volume[0][inside].mean() == pytest.approx(0.1, rel=0.03)
+    else:
+        assert "No view looks along" in assumed
+
+
+def test_other_commands_tell_of_a_fan(tmp_path, fan_wedge, capsys):
+    path = tmp_path / "fan.npz"
+    save_fan(path, fan_wedge, np.deg2rad(np.arange(0, 360, 2.0)))
+    assert run("center", path, "--out", tmp_path / "out") == 3
+    assert "fan beam" in capsys.readouterr().err

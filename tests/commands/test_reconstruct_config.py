@@ -1,0 +1,145 @@
+"""``config.json`` says what was decided, and ``--config`` repeats it."""
+
+import json
+
+import numpy as np
+import pytest
+
+from rift_cl.commands.cli import main
+from rift_cl.io import read_volume
+
+INPUT = 3
+
+
+def run(*arguments):
+    return main([str(argument) for argument in arguments])
+
+
+def config_of(out):
+    return json.loads((out / "config.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def first(scan, tmp_path_factory):
+    """A run that was told next to nothing."""
+    out = tmp_path_factory.mktemp("first") / "out"
+    assert run("reconstruct", scan.counts, "--out", out) == 0
+    return out
+
+
+def test_every_decision_is_recorded(first):
+    config = config_of(first)
+    settings = config["settings"]
+    wanted = {"filter": "ram-lak", "cutoff": 1.0, "compensate": "voronoi", "rings": "vo"}
+    wanted["kind"] = "counts"
+    assert {name: settings[name] for name in wanted} == wanted
+    open_ones = ("center", "rows", "pitch", "unit", "pixel", "size", "background", "pad")
+    assert all(settings[name] not in (None, "auto") for name in open_ones)
+    assert set(config["asked"]) == {"scan", "out"}
+    assert config["axis"]["center"] == settings["center"]
+    assert {"rift_cl", "numpy", "pyopencl", "driver"} <= set(config["environment"])
+
+
+def test_the_report_names_filter_and_axis(first):
+    page = (first / "report.html").read_text()
+    assert "ram-lak filter, cut-off 1, voronoi view weights" in page
+    assert f"bin {config_of(first)['settings']['center']:.2f}" in page
+
+
+def test_a_repeated_run_makes_the_same_bits(first, tmp_path):
+    again = tmp_path / "again"
+    assert run("reconstruct", "--config", first / "config.json", "--out", again) == 0
+    np.testing.assert_array_equal(read_volume(first / "slices"), read_volume(again / "slices"))
+    same = {**config_of(again)["settings"], "out": None, "config": None}
+    assert same == {**config_of(first)["settings"], "out": None}
+
+
+def test_options_win_over_the_configuration(first, tmp_path):
+    out = tmp_path / "out"
+    options = ("--filter", "hann", "--rows", 1, 2, "--out", out)
+    assert run("reconstruct", "--config", first / "config.json", *options) == 0
+    settings = config_of(out)["settings"]
+    assert (settings["filter"], settings["rows"]) == ("hann", [1, 2])
+    assert settings["center"] == config_of(first)["settings"]["center"]
+
+
+def test_steps_are_recorded(scan, tmp_path):
+    out = tmp_path / "out"
+    options = ("--method", "cgls", "--precondition", "ramp", "--center", 45)
+    assert run("reconstruct", scan.counts, "--out", out, *options) == 0
+    settings = config_of(out)["settings"]
+    assert (settings["steps"], settings["filter"]) == (4, None)
+
+
+def test_a_preview_is_always_left(first):
+    assert (first / "preview.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("{", "cannot be read"),
+        ("[]", "cannot be read"),
+        ('{"job": "fit", "settings": {}}', "is of 'rift fit'"),
+        ('{"job": "reconstruct", "settings": {"colour": 3}}', "no setting 'colour'"),
+        (
+            '{"job": "reconstruct", "settings": {"scan": "x", "filter": "best"}}',
+            "does not take all",
+        ),
+        ('{"job": "reconstruct", "settings": {"scan": "x", "steps": "many"}}', "does not take"),
+    ],
+)
+def test_a_configuration_that_cannot_be_used_is_told(text, sentence, tmp_path, capsys):
+    path = tmp_path / "config.json"
+    path.write_text(text)
+    assert run("reconstruct", f"--config={path}") == INPUT
+    message = capsys.readouterr().err
+    assert sentence in message
+    assert "Traceback" not in message
+
+
+def test_a_configuration_that_is_not_there_is_told(tmp_path, capsys):
+    assert run("reconstruct", "--config", tmp_path / "none.json") == INPUT
+    assert "none.json" in capsys.readouterr().err
+
+
+def test_integers_record_the_window_that_was_chosen(first, scan, tmp_path):
+    out = tmp_path / "out"
+    options = ("--dtype", "uint16", "--format", "h5", "--center", 45)
+    assert run("reconstruct", scan.counts, "--out", out, *options) == 0
+    low, high = config_of(out)["settings"]["window"]
+    exact, coarse = read_volume(first / "slices"), read_volume(out / "volume.h5")
+    assert low < exact.min() < exact.max() < high
+    assert "a window chosen from 3 slices" in (out / "report.html").read_text()
+    again = tmp_path / "again"
+    assert run("reconstruct", "--config", out / "config.json", "--out", again) == 0
+    np.testing.assert_array_equal(coarse, read_volume(again / "volume.h5"))
+    assert np.ptp(coarse) == pytest.approx(np.ptp(exact), rel=0.05)
+
+
+def test_what_does_not_fit_the_window_is_counted(scan, tmp_path):
+    out = tmp_path / "out"
+    options = ("--dtype", "uint8", "--window", 0, 0.01, "--center", 45, "--format", "tiff-stack")
+    assert run("reconstruct", scan.counts, "--out", out, *options) == 0
+    metrics = json.loads((out / "metrics.json").read_text())
+    assert metrics["clipped_below"] > 0
+    assert metrics["clipped_above"] > 0
+    volume = read_volume(out / "volume.tif")
+    assert (volume.min(), volume.max()) == (0, pytest.approx(0.01))
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--window", 0, 1), "add --dtype"),
+        (("--dtype", "uint8", "--window", 1, 1), "window"),
+        (("--dtype", "uint8", "--window", 2, 1), "window"),
+        (("--dtype", "uint8", "--window", 0, "nan"), "window"),
+        (("--dtype", "uint8", "--format", "mrc"), "uint16"),
+    ],
+)
+def test_a_window_that_cannot_be_used_is_told(scan, tmp_path, capsys, options, sentence):
+    out = tmp_path / "out"
+    assert run("reconstruct", scan.counts, "--out", out, *options) == INPUT
+    assert sentence in capsys.readouterr().err
+    assert not out.exists()

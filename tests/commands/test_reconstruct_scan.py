@@ -1,0 +1,48 @@
+"""``rift.reconstruct_scan`` does what the command does."""
+
+import json
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.commands.cli import main
+from rift_cl.errors import InputError
+
+
+def test_the_function_and_the_command_make_the_same_slices(scan, tmp_path):
+    seen = []
+    made = rift.reconstruct_scan(
+        scan.counts, tmp_path / "a", filter="hann", rows=(0, 2), format="h5", progress=seen.append
+    )
+    options = ["--filter", "hann", "--rows", "0", "2", "--format", "h5"]
+    assert main(["reconstruct", str(scan.counts), "--out", str(tmp_path / "b"), *options]) == 0
+    volume = made.read()
+    assert volume.shape == (2, 96, 96)
+    np.testing.assert_array_equal(volume, rift_volume(tmp_path / "b/volume.h5"))
+    assert made.path == tmp_path / "a/volume.h5"
+    assert made.settings.center == made.metrics["center"]
+    assert made.settings.center == json.loads((tmp_path / "b/metrics.json").read_text())["center"]
+    assert seen[-1].done == seen[-1].total == 2
+
+
+def rift_volume(path):
+    from rift_cl.io import read_volume
+
+    return read_volume(path)
+
+
+@pytest.mark.parametrize(
+    ("settings", "sentence"),
+    [
+        ({"colour": "red"}, "no setting 'colour'"),
+        ({"method": "best"}, "method=best"),
+        ({"steps": "many", "method": "sirt"}, "steps=many"),
+        ({"dry_run": True}, "leave it out"),
+        ({"filter": "hann", "method": "sirt"}, "means nothing"),
+    ],
+)
+def test_what_cannot_be_used_is_told(scan, tmp_path, settings, sentence):
+    with pytest.raises(InputError, match=sentence):
+        rift.reconstruct_scan(scan.counts, tmp_path / "out", **settings)
+    assert not (tmp_path / "out").exists()
