@@ -36,7 +36,7 @@ if TYPE_CHECKING:
         dot_test,
     )
     from rift_cl.reconstruct import AxisEstimate, backproject, cgls, fbp, find_center, sirt, tv
-    from rift_cl.sampling import Constraints, Looks, Plan, Target, next_views, plan
+    from rift_cl.sampling import Constraints, Observations, Plan, Target, next_views, plan
     from rift_cl.sampling.coverage.device import coverage
     from rift_cl.sampling.criteria.merit import merit
     from rift_cl.splat import Renderer, Splats, SplatSettings
@@ -53,7 +53,7 @@ _HOMES = {
     "Grid": "geometry",
     "HighPass": "operators",
     "LinearOperator": "operators",
-    "Looks": "sampling",
+    "Observations": "sampling",
     "Parallel": "geometry",
     "Plan": "sampling",
     "Projector": "operators",
@@ -68,19 +68,19 @@ _HOMES = {
     "backproject": "reconstruct",
     "cgls": "reconstruct",
     "cheapest_projector": "operators",
-    "coverage": "sampling.coverage",
+    "coverage": "sampling.coverage.device",
     "default_device": "cl",
     "devices": "cl",
     "dot_test": "operators",
     "fbp": "reconstruct",
     "find_center": "reconstruct",
-    "merit": "sampling.merit",
+    "merit": "sampling.criteria.merit",
     "next_views": "sampling",
     "open_device": "cl",
     "open_lens": "io",
     "open_scan": "io",
     "plan": "sampling",
-    "reconstruct_scan": "jobs.reconstruct.reconstruct_scan",
+    "reconstruct_scan": "commands.reconstruct.reconstruct_scan",
     "sirt": "reconstruct",
     "tv": "reconstruct",
 }
@@ -98,7 +98,7 @@ __all__ = [
     "Grid",
     "HighPass",
     "LinearOperator",
-    "Looks",
+    "Observations",
     "Parallel",
     "Plan",
     "Projector",

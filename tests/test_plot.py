@@ -199,8 +199,8 @@ def test_names_of_curves_that_meet_do_not_overlap():
     check_inside(figure)
     boxes = sorted((t.get_window_extent() for t in figure.axes[0].texts), key=lambda b: b.y0)
     assert all(low.y1 <= high.y0 for low, high in itertools.pairwise(boxes))
-    looks = {(line.get_color(), line.get_linestyle()) for line in figure.axes[0].lines}
-    assert len(looks) == 12
+    observations = {(line.get_color(), line.get_linestyle()) for line in figure.axes[0].lines}
+    assert len(observations) == 12
 
 
 def test_a_mark_is_drawn_and_valued():

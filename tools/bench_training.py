@@ -23,7 +23,7 @@ from bench.race import compared
 from bench.surroundings import surroundings
 from bench.trainers import TRAINERS, RiftTrainer, TorchTilesAlone, TrainerContender
 from bench.training_case import TrainingCase
-from bench.training_stages import host_work, renewal_price, stages, ways
+from bench.training_stages import host_work, relocation_price, stages, ways
 from bench.training_tables import training_page, training_tables
 
 _SCENES = ("ornament:10000", "10000:160x120", "20000:224x168", "20000:512x512")
@@ -84,7 +84,7 @@ def _measure(case: TrainingCase, options: Options, skipped: dict[str, str]) -> d
         **lead,
         "stages": {way: stages(fit, passes=rounds) for way, fit in ways(case).items()},
         "host": host_work(case, passes=2 * rounds),
-        "renewal": renewal_price(case, passes=rounds),
+        "renewal": relocation_price(case, passes=rounds),
     }
 
 

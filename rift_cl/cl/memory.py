@@ -222,7 +222,7 @@ def check_output(out: Any, shape: tuple[int, ...], dtype: DTypeLike = np.float32
     return out
 
 
-def demand_apart(x: Any, out: Any, *, name: str) -> None:
+def check_apart(x: Any, out: Any, *, name: str) -> None:
     """Refuse an output that shares memory with the input: parts would be read too late.
 
     Raises:

@@ -1,5 +1,7 @@
 """Kernel sources: found beside the package, their includes put in line.
 
+Folders are rooms for readers: a kernel is asked for by its name, whichever room it stands in.
+
 OpenCL's ``-I`` breaks on folders with spaces in their names (PoCL 3.0), so ``#include "..."`` is
 expanded here; ``#line`` directives keep the compiler's messages pointing at our own files. The
 expanded text is the whole truth about a kernel, which makes any cache keyed by it right.
@@ -26,13 +28,16 @@ def kernel_folder() -> Path:
 
 def kernel_names() -> list[str]:
     """Every kernel that is shipped; a kernel, its file and its entry point share one name."""
-    return sorted(path.stem for path in kernel_folder().glob("*.cl"))
+    return sorted(path.stem for path in kernel_folder().rglob("*.cl"))
 
 
 @cache
 def kernel_source(name: str) -> str:
     """The source of one kernel with its includes in line."""
-    return "\n".join(_expand(f"{name}.cl", set()))
+    folder = kernel_folder()
+    found = sorted(folder.rglob(f"{name}.cl"))
+    file = found[0].relative_to(folder).as_posix() if found else f"{name}.cl"
+    return "\n".join(_expand(file, set()))
 
 
 def _expand(name: str, seen: set[str]) -> list[str]:

@@ -1,1 +1,1 @@
-"""The long commands: each one's settings, the work as a generator of reports, its run folder."""
+"""The command line: every command in a room of its own, and what commands have in common."""

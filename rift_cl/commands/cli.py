@@ -1,7 +1,7 @@
 """The command ``rift``: which commands there are, and what each of them prints.
 
 Every command is a settings dataclass and a job; this file only brings the two together and prints
-what the job found to stdout. How a command is run stands in ``command``.
+what the job found to stdout. How a command is run stands in ``runner``.
 """
 
 from __future__ import annotations
@@ -215,14 +215,14 @@ _COMMANDS: dict[str, tuple[Callable[[Any, Output], None], str, str]] = {
     "devices": (_devices, "devices", "DevicesSettings"),
     "demo": (_demo, "demo", "DemoSettings"),
     "reconstruct": (_reconstruct, "reconstruct.settings", "ReconstructSettings"),
-    "center": (_center, "center", "CenterSettings"),
-    "fit": (_fit, "fit_settings", "FitSettings"),
-    "eval": (_eval, "evaluate", "EvalSettings"),
-    "render": (_render, "render_settings", "RenderSettings"),
-    "view": (_view, "viewing.job", "ViewSettings"),
+    "center": (_center, "center.job", "CenterSettings"),
+    "fit": (_fit, "fit_photos.settings", "FitSettings"),
+    "eval": (_eval, "evaluate.job", "EvalSettings"),
+    "render": (_render, "render.settings", "RenderSettings"),
+    "view": (_view, "view.job", "ViewSettings"),
     "export": (_export, "export.settings", "ExportSettings"),
-    "analyze": (_analyze, "analyze_settings", "AnalyzeSettings"),
-    "plan": (_plan, "plan_settings", "PlanSettings"),
+    "analyze": (_analyze, "analyze.settings", "AnalyzeSettings"),
+    "plan": (_plan, "plan.settings", "PlanSettings"),
     "cache": (_cache, "cache", "CacheSettings"),
 }
 

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.geometry.numbers import one_number
-from rift_cl.optics.transfer import positive_or_infinite
+from rift_cl.geometry.numbers import one_number, positive_or_infinite
 
 
 @dataclass(frozen=True)

@@ -37,3 +37,11 @@ def one_number(value: Any) -> float:
     if numbers is None or np.ndim(numbers) > 0 or not np.isfinite(numbers):
         return float("nan")
     return float(numbers)
+
+
+def positive_or_infinite(value: Any) -> float:
+    """Read one positive number, or infinity; NaN if the value is anything else."""
+    number = real_numbers(value)
+    if number is None or np.ndim(number) > 0 or not number > 0:
+        return float("nan")
+    return float(number)

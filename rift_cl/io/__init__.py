@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     )
     from rift_cl.io.captures.photographs import (
         PosedPhotographs,
-        demand_photographs,
+        check_photographs,
         pose_photographs,
     )
     from rift_cl.io.images.image import read_image, write_png
@@ -32,29 +32,29 @@ if TYPE_CHECKING:
     from rift_cl.io.volumes import VolumeWriter, open_volume, read_volume, suggested_window
 
 _HOMES = {
-    "Capture": "capture",
-    "PosedPhotographs": "photographs",
+    "Capture": "captures.capture",
+    "PosedPhotographs": "captures.photographs",
     "ScanFile": "scans.scan_file",
     "ScanRows": "scans.scan_file",
-    "SplatScene": "splat_scene",
-    "View": "capture",
+    "SplatScene": "scenes.splat_scene",
+    "View": "captures.capture",
     "VolumeWriter": "volumes",
     "atomic_path": "output",
-    "camera_at": "capture",
-    "demand_photographs": "photographs",
-    "holds_bare_photographs": "capture",
+    "camera_at": "captures.capture",
+    "check_photographs": "captures.photographs",
+    "holds_bare_photographs": "captures.capture",
     "make_folder": "output",
-    "open_capture": "capture",
-    "open_lens": "lens_file",
+    "open_capture": "captures.capture",
+    "open_lens": "lenses.lens_file",
     "open_scan": "scans.formats",
     "open_volume": "volumes",
-    "pose_photographs": "photographs",
-    "read_image": "image",
-    "read_view": "capture",
+    "pose_photographs": "captures.photographs",
+    "read_image": "images.image",
+    "read_view": "captures.capture",
     "read_volume": "volumes",
     "suggested_window": "volumes",
     "write_json": "output",
-    "write_png": "image",
+    "write_png": "images.image",
     "write_text": "output",
 }
 
@@ -68,7 +68,7 @@ __all__ = [
     "VolumeWriter",
     "atomic_path",
     "camera_at",
-    "demand_photographs",
+    "check_photographs",
     "holds_bare_photographs",
     "make_folder",
     "open_capture",

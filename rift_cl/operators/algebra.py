@@ -78,7 +78,7 @@ class Sum(LinearOperator):
                 f"sum of operators {left.domain} -> {left.range} and {right.domain} -> "
                 f"{right.range}: both must map between the same shapes"
             )
-        demand_one_kind(left, right)
+        check_one_kind(left, right)
         super().__init__(left.domain, left.range, left.device, left.dtype)
         self.grid = left.grid if left.grid == right.grid else None
         self.scan = left.scan if left.scan == right.scan else None
@@ -114,7 +114,7 @@ class Product(LinearOperator):
                 f"product of operators: the inner one gives {inner.range}, the outer one takes "
                 f"{outer.domain}"
             )
-        demand_one_kind(outer, inner)
+        check_one_kind(outer, inner)
         super().__init__(inner.domain, outer.range, outer.device, outer.dtype)
         self.grid, self.scan = inner.grid, outer.scan
         self._outer, self._inner = outer, inner
@@ -144,7 +144,7 @@ def _finite(factor: float, dtype: np.dtype[Any]) -> float:
     return rounded
 
 
-def demand_one_kind(first: LinearOperator, second: LinearOperator) -> None:
+def check_one_kind(first: LinearOperator, second: LinearOperator) -> None:
     """Refuse to combine operators whose arrays cannot be the same.
 
     Raises:

@@ -26,8 +26,8 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.memory import (
     as_device_array,
     as_host_array,
+    check_apart,
     check_output,
-    demand_apart,
     download,
     is_device_array,
     is_tensor,
@@ -116,13 +116,13 @@ class LinearOperator(ABC):
             x = as_device_array(self.device, x, self.domain, name=name, dtype=self.dtype)
             y = self.device.empty(self.range, self.dtype) if out is None else out
             y = as_device_array(self.device, y, self.range, name="out", dtype=self.dtype)
-            demand_apart(x, y, name=name)
+            check_apart(x, y, name=name)
             self._apply(x, y)
             return y
         host = as_host_array(x, self.domain, name=name, wants="the operator", dtype=self.dtype)
         y = np.empty(self.range, self.dtype) if out is None else out
         y = check_output(y, self.range, self.dtype)
-        demand_apart(host, y, name=name)
+        check_apart(host, y, name=name)
         self._apply_host(host, y)
         return y
 

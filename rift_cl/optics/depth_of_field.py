@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rift_cl.errors import InputError
-from rift_cl.geometry.numbers import one_number
+from rift_cl.geometry.numbers import one_number, positive_or_infinite
 from rift_cl.optics.pupil import defocused_otf
-from rift_cl.optics.transfer import check_positive, incoherent_cutoff, positive_or_infinite
+from rift_cl.optics.transfer import check_positive, incoherent_cutoff
 
 # Best aperture over z sqrt(2 wavelength / depth), and the cut-off there over
 # 1 / sqrt(wavelength depth); found with the exact OTF, which has no other scale.

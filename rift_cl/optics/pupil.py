@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.geometry.numbers import one_number
+from rift_cl.geometry.numbers import one_number, positive_or_infinite
 from rift_cl.optics.transfer import (
     Floats,
     check_positive,
     diffraction_mtf,
     frequencies,
-    positive_or_infinite,
 )
 
 # A pupil of this many samples across is an autocorrelation of 1 GiB.

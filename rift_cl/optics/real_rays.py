@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError
+from rift_cl.geometry.numbers import positive_or_infinite
 from rift_cl.optics.gaussian_lens import GaussianLens
 from rift_cl.optics.lens_prescription import LensPrescription, Surface
-from rift_cl.optics.transfer import positive_or_infinite
 
 Floats = NDArray[np.float64]
 # How close to the middle of the stop a chief ray comes, as a share of its radius.

@@ -8,13 +8,12 @@ chapter 6; the product of the MTFs is a model whose error ``pupil.defocused_otf`
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.geometry.numbers import one_number, real_numbers
+from rift_cl.geometry.numbers import one_number, positive_or_infinite, real_numbers
 
 Floats = NDArray[np.float64]
 
@@ -174,14 +173,6 @@ def check_positive(**values: float) -> None:
     for name, value in values.items():
         if not one_number(value) > 0:
             raise InputError(f"{name} is {value!r}, wanted a positive number")
-
-
-def positive_or_infinite(value: Any) -> float:
-    """Read one positive number, or infinity; NaN if the value is anything else."""
-    number = real_numbers(value)
-    if number is None or np.ndim(number) > 0 or not number > 0:
-        return float("nan")
-    return float(number)
 
 
 def _cutoff(value: float) -> float:

@@ -16,7 +16,7 @@ from rift_cl.reconstruct.solvers.direction_weights import DirectionWeights
 from rift_cl.reconstruct.solvers.disc_prior import Disc, find_disc, material_lengths
 from rift_cl.reconstruct.solvers.few_levels import FewLevels
 from rift_cl.reconstruct.solvers.fista import Fista
-from rift_cl.reconstruct.solvers.measured_rays import SeenRays
+from rift_cl.reconstruct.solvers.measured_rays import MeasuredRays
 from rift_cl.reconstruct.solvers.ordered_subsets import OrderedSubsets
 from rift_cl.reconstruct.solvers.pdhg import Pdhg
 from rift_cl.reconstruct.solvers.poisson_weights import RayWeights, poisson_weights
@@ -32,10 +32,10 @@ __all__ = [
     "FewLevels",
     "FilteredBackprojection",
     "Fista",
+    "MeasuredRays",
     "OrderedSubsets",
     "Pdhg",
     "RayWeights",
-    "SeenRays",
     "Sirt",
     "attenuation",
     "backproject",

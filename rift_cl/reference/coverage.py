@@ -39,8 +39,8 @@ _SMALL = 1e-4
 _ACROSS = 1e-14
 
 
-class LooksLike(Protocol):
-    """Views of points, as ``rift_cl.sampling.Looks`` holds them."""
+class ObservationsLike(Protocol):
+    """Views of points, as ``rift_cl.sampling.Observations`` holds them."""
 
     @property
     def direction(self) -> Floats:
@@ -81,7 +81,7 @@ class Transfer(NamedTuple):
     square: Floats
 
 
-class LooksGradient(NamedTuple):
+class ObservationsGradient(NamedTuple):
     """The gradient of a number by what looks hold, in their shapes.
 
     Args:
@@ -132,22 +132,27 @@ def optical_transfer(
     )
 
 
-def coverage(looks: LooksLike, k: ArrayLike, diameter: float) -> Floats:
+def coverage(observations: ObservationsLike, k: ArrayLike, diameter: float) -> Floats:
     """The coverage L, (P, K), of frequencies (K, 3) by views of a target of that diameter."""
-    return np.stack([_near(looks, p, k, diameter).coverage() for p in range(_points(looks))])
+    return np.stack(
+        [_near(observations, p, k, diameter).coverage() for p in range(_points(observations))]
+    )
 
 
 def coverage_grad(
-    looks: LooksLike, k: ArrayLike, diameter: float, grad: ArrayLike
-) -> LooksGradient:
+    observations: ObservationsLike, k: ArrayLike, diameter: float, grad: ArrayLike
+) -> ObservationsGradient:
     """The gradient of E by the looks, from dE/dL (P, K)."""
     upstream = np.asarray(grad, np.float64)
-    by_point = [_near(looks, p, k, diameter).gradient(upstream[p]) for p in range(_points(looks))]
-    return LooksGradient(*(np.stack(parts, axis=1) for parts in zip(*by_point, strict=True)))
+    by_point = [
+        _near(observations, p, k, diameter).gradient(upstream[p])
+        for p in range(_points(observations))
+    ]
+    return ObservationsGradient(*(np.stack(parts, axis=1) for parts in zip(*by_point, strict=True)))
 
 
-def _points(looks: LooksLike) -> int:
-    return int(looks.weight.shape[1])
+def _points(observations: ObservationsLike) -> int:
+    return int(observations.weight.shape[1])
 
 
 class _Near(NamedTuple):
@@ -200,17 +205,19 @@ class _Near(NamedTuple):
         return _summed(self.view, values, len(self.normals))
 
 
-def _near(looks: LooksLike, point: int, frequencies: ArrayLike, diameter: float) -> _Near:
-    k, normals = np.asarray(frequencies, np.float64), looks.direction[:, point]
+def _near(
+    observations: ObservationsLike, point: int, frequencies: ArrayLike, diameter: float
+) -> _Near:
+    k, normals = np.asarray(frequencies, np.float64), observations.direction[:, point]
     steepness = 2 * (diameter / 0.5) ** 2
     products = normals @ k.T
     view, place = np.nonzero(steepness * products**2 < _FAR)
     u = products[view, place]
     square = (k**2).sum(1)[place]
     k_perp = np.sqrt(np.maximum(square - u**2, _ACROSS * square))
-    optics = (looks.pixel, looks.cutoff, looks.blur)
+    optics = (observations.pixel, observations.cutoff, observations.blur)
     transfer = optical_transfer(k_perp, *(values[view, point] for values in optics))
-    window, weight = np.exp(-steepness * u**2), looks.weight[view, point]
+    window, weight = np.exp(-steepness * u**2), observations.weight[view, point]
     return _Near(k, normals, view, place, u, steepness, window, weight, transfer)
 
 

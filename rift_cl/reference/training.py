@@ -1,6 +1,7 @@
 """A step of training by its definitions.
 
-Twins of adam, splat_activate, splat_band, splat_band_coverage, splat_noise and splat_statistics.
+Coincident of adam, splat_activate, splat_band, splat_band_coverage, splat_noise and
+splat_statistics.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Self-contained HTML reports, and the plots in them."""

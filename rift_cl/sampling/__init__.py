@@ -8,8 +8,8 @@ from rift_cl.sampling.planning.constraints import Budget, Constraints, Ranges
 from rift_cl.sampling.planning.keep_out import Box, Cone, KeepOut, Sphere
 from rift_cl.sampling.planning.paths import Free, Ring, Spline, TiltedRings
 from rift_cl.sampling.planning.planner import next_views, plan
-from rift_cl.sampling.planning.view_plan import Knee, Plan
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.planning.view_plan import DiminishingReturns, Plan
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.pilot import Pilot
 from rift_cl.sampling.targets.prior import PowerLaw, Spectrum
 from rift_cl.sampling.targets.target import Target
@@ -20,10 +20,10 @@ __all__ = [
     "Budget",
     "Cone",
     "Constraints",
+    "DiminishingReturns",
     "Free",
     "KeepOut",
-    "Knee",
-    "Looks",
+    "Observations",
     "Pilot",
     "Plan",
     "PowerLaw",

@@ -1,7 +1,7 @@
 """What splats show: their colours by the viewing direction, features of any number, depth.
 
-All of it stands in one table of features, (N, D), in this order: three shaded colours, the
-splats' own ``colors``, depth; each where it is asked for. ``kernels/splat/splat_shade.cl`` says what a
+All of it stands in one table of features, (N, D), in this order: three shaded colours, the splats'
+own ``colors``, depth; each where it is asked for. ``kernels/splat/splat_shade.cl`` says what a
 colour of spherical harmonics is, ``kernels/splat/lobe_shade.cl`` what one of lobes is.
 
 ``angular`` names the functions: ``sh`` with ``sh`` (N, K, 3) alone, or one of the lobes of

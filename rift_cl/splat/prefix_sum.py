@@ -1,7 +1,7 @@
 """Prefix sums on the device, and how a list is cut among work-items.
 
-A scan goes up and down a pyramid of sums; ``kernels/vector/scan_sum.cl`` and ``scan_place.cl`` are one
-step each way. Integers are exact, so the result does not depend on how the list was cut.
+A scan goes up and down a pyramid of sums; ``kernels/vector/scan_sum.cl`` and ``scan_place.cl`` are
+one step each way. Integers are exact, so the result does not depend on how the list was cut.
 """
 
 from __future__ import annotations

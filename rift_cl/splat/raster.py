@@ -1,8 +1,9 @@
 """Splats on the screen to pixels, and the gradient back: the drivers of the raster kernels.
 
-``kernels/splat/splat_raster_cpu.cl`` says what is computed, ``kernels/splat/splat_raster_grad_cpu.cl`` how it
-is differentiated; ``kernels/splat/hermite_raster_cpu.cl`` and its gradient do both for splats with
-Hermite modes. Features of more than 32 channels are drawn 32 at a time, without modes alone.
+``kernels/splat/splat_raster_cpu.cl`` says what is computed,
+``kernels/splat/splat_raster_grad_cpu.cl`` how it is differentiated;
+``kernels/splat/hermite_raster_cpu.cl`` and its gradient do both for splats with Hermite modes.
+Features of more than 32 channels are drawn 32 at a time, without modes alone.
 """
 
 from __future__ import annotations

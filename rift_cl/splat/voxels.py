@@ -4,10 +4,10 @@ A pixel is a mean over a little square and a voxel one over a little cube. The r
 the square by a dilation that keeps every splat's mass; the same dilation along all three axes makes
 slices whose projections are what the rasterizer draws.
 
-``kernels/splat/hermite_dilate.cl`` brings splats into steps of the grid, ``kernels/splat/hermite_voxelise.cl``
-sums them, ``rift_cl.reference.voxels`` is the twin of both. The grid is cut into bricks, and each
-layer of bricks has the tile lists of an image, in the order of the splats' numbers, so that the
-same call gives the same bits, in whatever memory.
+``kernels/splat/hermite_dilate.cl`` brings splats into steps of the grid,
+``kernels/splat/hermite_voxelise.cl`` sums them, ``rift_cl.reference.voxels`` is the twin of both.
+The grid is cut into bricks, and each layer of bricks has the tile lists of an image, in the order
+of the splats' numbers, so that the same call gives the same bits, in whatever memory.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.lobes import lobe_axes
 
 
-class Joining:
+class CoefficientSchedule:
     """Lets coefficients join the parameters of a run, and holds some at zero.
 
     Args:

@@ -65,7 +65,7 @@ class Rates:
 
 
 @dataclass(frozen=True)
-class Renewal:
+class Relocation:
     """Splats that have faded move to where others have much to do (3DGS as MCMC).
 
     Args:
@@ -216,7 +216,7 @@ class TrainSettings:
     finish: float = 0.12
     rates: Rates = field(default_factory=Rates)
     strategy: StrategyName = "mcmc"
-    renewal: Renewal = field(default_factory=Renewal)
+    relocation: Relocation = field(default_factory=Relocation)
     densification: Densification = field(default_factory=Densification)
     basis: BasisSettings = field(default_factory=BasisSettings)
     angular: AngularSettings = field(default_factory=AngularSettings)

@@ -2,8 +2,8 @@
 
 A step draws a view, takes the gradient of the loss, and moves the splats by Adam, and the view's
 pose and exposure if they are fitted too. Between steps the set of splats changes
-(``rift_cl.train.strategy.mcmc``); in the last part of the run, the finish, nothing walks at random any
-more and all rates fade, so that the picture settles.
+(``rift_cl.train.strategy.mcmc``); in the last part of the run, the finish, nothing walks at random
+any more and all rates fade, so that the picture settles.
 
 What a run does depends on its settings, its pictures and the device alone: the order of the views
 and all that is random come from the seed and the number of the step. So ``state``, taken between
@@ -25,7 +25,7 @@ from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.band_limit import BandLimiter
-from rift_cl.train.coefficient_schedule import Joining
+from rift_cl.train.coefficient_schedule import CoefficientSchedule
 from rift_cl.train.loss.coverage_weight import weight_of
 from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
 from rift_cl.train.parameters import Parameters
@@ -87,7 +87,7 @@ class Trainer:
         self.parameters = parameters
         self.settings = settings
         self.flat = flat
-        settings.solve.demand_heed(self.solves)
+        settings.solve.check_heed(self.solves)
         self.device: Device = parameters.device
         self.schedule = Schedule(settings, scene_extent(pictures.cameras))
         extent, views = self.schedule.extent, len(pictures.cameras)
@@ -96,7 +96,7 @@ class Trainer:
         )
         drawing = self.strategy.drawing(drawing or SplatSettings())
         self.renderer = Renderer(drawing, device=self.device)
-        self.joining = Joining(settings, pictures.cameras, flat=flat)
+        self.coefficient_schedule = CoefficientSchedule(settings, pictures.cameras, flat=flat)
         self._join()
         self.poses = Poses(pictures.cameras, extent) if settings.rates.poses else None
         self.exposures = Exposures(self.device, views) if settings.rates.exposures else None
@@ -160,10 +160,10 @@ class Trainer:
         parameters.update(gradients, rates, sh_rest=rest, ridge=ridge, **penalties)
         self._join()
         self.parameters = self.strategy.after_step(parameters, frame, gradients, rates["means"])
-        renewed = self.parameters is not parameters
-        if renewed:
-            self.joining.hold(self.parameters)
-        if self._band is not None and (renewed or self.parameters.step % _BAND_EVERY == 0):
+        relocated = self.parameters is not parameters
+        if relocated:
+            self.coefficient_schedule.hold(self.parameters)
+        if self._band is not None and (relocated or self.parameters.step % _BAND_EVERY == 0):
             self._limit_band()
         return value
 
@@ -222,7 +222,7 @@ class Trainer:
                 amplitude=self.parameters.amplitude,
                 band=groups.get("band", {}).get("lengths"),
             )
-            self.joining.hold(self.parameters)
+            self.coefficient_schedule.hold(self.parameters)
             self._fit_drawing()
             self.strategy.restore(groups.get("strategy", {}))
             self.loss.restore(groups["loss"])
@@ -246,12 +246,12 @@ class Trainer:
 
     def _join(self) -> None:
         """Let join what is due, and draw it."""
-        self.joining.after_step(self.parameters)
+        self.coefficient_schedule.after_step(self.parameters)
         self._fit_drawing()
 
     def _fit_drawing(self) -> None:
         """Draw the splats as what they are by now."""
-        drawing = self.joining.drawing(self.parameters, self.renderer.settings)
+        drawing = self.coefficient_schedule.drawing(self.parameters, self.renderer.settings)
         if drawing != self.renderer.settings:
             self.renderer = Renderer(drawing, device=self.device)
 

@@ -19,7 +19,7 @@ from rift_cl.geometry import Camera, FanBeam
 from rift_cl.geometry.aperture import Aperture
 from rift_cl.io.captures.transforms_record import transforms_of
 from rift_cl.io.output import write_json
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 
 # The ring's cameras stand so far above its middle.
 ELEVATION = math.degrees(math.atan(0.3))
@@ -147,10 +147,10 @@ def test_a_wedge_of_a_scan_is_missing_and_its_middle_is_suggested(scan):
 def test_a_fan_is_taken_as_it_is():
     fan, angle, bins = FanBeam(400.0, 600.0, 0.5, 30.0), 0.7, 64
     point = np.array([[12.0, -9.0, 0]])
-    looks = Looks.of(fan_cameras(fan, [angle], bins), point)
+    observations = Observations.of(fan_cameras(fan, [angle], bins), point)
     source = 400 * np.array([np.sin(angle), -np.cos(angle), 0])
     way = source - point[0]
-    np.testing.assert_allclose(looks.direction[0, 0], way / np.linalg.norm(way), atol=1e-12)
+    np.testing.assert_allclose(observations.direction[0, 0], way / np.linalg.norm(way), atol=1e-12)
     # The ray of its bin is that of a parallel scan, whose t is the point's.
     u = fan.fan_angles(bins)
     t = point[0, 0] * np.cos(angle - u) + point[0, 1] * np.sin(angle - u)
@@ -159,8 +159,8 @@ def test_a_fan_is_taken_as_it_is():
     x, _, z = camera.view[:3, :3] @ point[0] + camera.view[:3, 3]
     fx, _, cx, _ = camera.intrinsics
     assert fx * x / z + cx - 0.5 == pytest.approx(bin_seen, abs=1e-3)
-    assert looks.pixel[0, 0] == pytest.approx(0.5 * z / 600)
-    assert looks.weight[0, 0] == 1
+    assert observations.pixel[0, 0] == pytest.approx(0.5 * z / 600)
+    assert observations.weight[0, 0] == 1
 
 
 def test_a_dry_run_writes_nothing_and_says_what_would_be_done(ringed, tmp_path, capsys):

@@ -53,7 +53,7 @@ def test_the_cameras_of_a_fit_are_those_of_its_capture(capture, fitted):
         assert found.image == view.image and found.camera.size == view.camera.size
         np.testing.assert_allclose(found.camera.view, view.camera.view, atol=1e-12)
         np.testing.assert_array_equal(found.camera.K, view.camera.K)
-    cameras.demand_photographs(fitted)
+    cameras.check_photographs(fitted)
     np.testing.assert_allclose(cameras.focus, MIDDLE_OF_RING, atol=1e-6)
     assert (cameras.placed, cameras.photographs) == (8, 8)
     assert cameras.arc.closed and cameras.reprojection_error is None
@@ -118,7 +118,7 @@ def test_a_fit_that_moves_with_its_photographs_finds_them(capture, fitted, tmp_p
     assert main(["fit", str(home / "photographs"), "--out", str(home / "fit"), *words]) == 0
     home.rename(tmp_path / "away")
     cameras = open_fit_cameras(tmp_path / "away" / "fit")
-    cameras.demand_photographs(tmp_path)
+    cameras.check_photographs(tmp_path)
     assert cameras.views[0].image.parent == tmp_path / "away" / "photographs"
 
 
@@ -133,15 +133,15 @@ def test_photographs_that_have_moved_are_asked_for_and_named(capture, tmp_path):
     cameras = open_fit_cameras(tmp_path / "fit")
     assert len(cameras.views) == 8, "cameras are there without photographs"
     with pytest.raises(InputError, match=r"8 of its 8 photographs have moved.*--photographs"):
-        cameras.demand_photographs(tmp_path / "fit")
+        cameras.check_photographs(tmp_path / "fit")
     (tmp_path / "there").mkdir()
     (tmp_path / "new").rename(tmp_path / "there" / "images")
     (tmp_path / "new").symlink_to(tmp_path / "there" / "images")
     for place in ("new", "there"):
         found = open_fit_cameras(tmp_path / "fit", photographs=tmp_path / place)
-        found.demand_photographs(tmp_path / "fit")
+        found.check_photographs(tmp_path / "fit")
     again = open_fit_cameras(tmp_path / "fit", photographs=tmp_path / "new")
-    again.demand_photographs(tmp_path / "fit")
+    again.check_photographs(tmp_path / "fit")
 
 
 def test_a_fit_that_somebody_passed_on_leads_to_no_file_of_ours(capture, tmp_path):
@@ -161,7 +161,7 @@ def test_a_fit_that_somebody_passed_on_leads_to_no_file_of_ours(capture, tmp_pat
         cameras = open_fit_cameras(tmp_path / "fit")
         assert all(v.image.is_relative_to(tmp_path / "fit") for v in cameras.views)
         with pytest.raises(InputError, match="no longer the same"):
-            cameras.demand_photographs(tmp_path / "fit")
+            cameras.check_photographs(tmp_path / "fit")
 
 
 def test_photographs_may_be_put_into_the_fit(capture, fitted, tmp_path):
@@ -171,7 +171,7 @@ def test_photographs_may_be_put_into_the_fit(capture, fitted, tmp_path):
     write_json(tmp_path / "fit" / "config.json", config)
     shutil.copytree(capture, tmp_path / "fit" / "photographs")
     cameras = open_fit_cameras(tmp_path / "fit")
-    cameras.demand_photographs(tmp_path / "fit")
+    cameras.check_photographs(tmp_path / "fit")
     assert cameras.views[0].image == tmp_path / "fit" / "photographs" / "0.png"
 
 

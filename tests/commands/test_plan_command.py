@@ -106,8 +106,12 @@ def test_what_was_planned_can_be_analysed_without_photographs(planned):
     sampled = open_sampled(AnalyzeSettings(planned, unit=1.0))
     assert sampled.views == 8 and sampled.unit == "mm"
     np.testing.assert_allclose(sampled.target.center, [0, 0, 5], atol=1e-6)
-    looks = sampled.looks()
-    assert (looks.weight > 0).all() and np.isfinite(looks.cutoff).all() and looks.blur[:, 1:].any()
+    observations = sampled.observations()
+    assert (
+        (observations.weight > 0).all()
+        and np.isfinite(observations.cutoff).all()
+        and observations.blur[:, 1:].any()
+    )
 
 
 def test_the_same_seed_gives_the_same_plan_and_replaces_one_only_on_demand(

@@ -9,13 +9,13 @@ from walls import arc, looking
 
 from rift_cl.commands.analyze.verdicts import HELD, foretold, said
 from rift_cl.commands.inputs.surfaces import sides_of
-from rift_cl.commands.inputs.view_set import Sampled
+from rift_cl.commands.inputs.view_set import ViewSet
 from rift_cl.sampling.targets.target import Target
 
 
 def views(cameras):
     target = Target((0, 0, 0), 1.2)
-    return Sampled("arc", target, np.array([0.0, 0, 1]), "unit", tuple(cameras), opaque=True)
+    return ViewSet("arc", target, np.array([0.0, 0, 1]), "unit", tuple(cameras), opaque=True)
 
 
 def at(degrees, distance=4.0):

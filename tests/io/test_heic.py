@@ -13,7 +13,7 @@ from view_files import store
 
 from rift_cl.errors import FileFormatError, InputError, ResourceLimitError
 from rift_cl.io import (
-    demand_photographs,
+    check_photographs,
     open_capture,
     pose_photographs,
     read_image,
@@ -76,7 +76,7 @@ def test_without_the_library_one_sentence_says_what_to_install(
     for number in (2, 3):
         photograph.with_name(f"IMG_000{number}.HEIC").write_bytes(HEIC)
     monkeypatch.setattr("rift_cl.io.images.heic.find_spec", lambda name: None)
-    for act in (lambda: read_image(photograph), lambda: demand_photographs(photograph.parent)):
+    for act in (lambda: read_image(photograph), lambda: check_photographs(photograph.parent)):
         with pytest.raises(InputError, match="pip install pi-heif") as caught:
             act()
         assert "\n" not in str(caught.value) and photograph.name in str(caught.value)

@@ -20,7 +20,7 @@ from view_files import display, store
 
 from rift_cl.errors import InputError, OutputError
 from rift_cl.io import (
-    demand_photographs,
+    check_photographs,
     holds_bare_photographs,
     open_capture,
     pose_photographs,
@@ -207,7 +207,7 @@ def test_what_is_missing_is_said_before_anything_is_written(
     for name in NAMES[:2]:
         (folder / name).rename(tmp_path / "two" / name)
     with pytest.raises(InputError, match=r"holds 2 photographs, .* from 3 on"):
-        demand_photographs(tmp_path / "two")
+        check_photographs(tmp_path / "two")
     made.photographs(folder, NAMES)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"not installed; pip install pycolmap"):

@@ -12,7 +12,7 @@ from photograph_files import run
 
 from rift_cl.errors import FileFormatError, InputError, OutputError
 from rift_cl.io import read_image
-from rift_cl.io.captures.video import demand_video, holds_video, sharpest_frames, video_notes
+from rift_cl.io.captures.video import check_video, holds_video, sharpest_frames, video_notes
 
 HEIGHT, WIDTH = 48, 64
 # The sharp frames; in a stretch of 5 the others are one grey.
@@ -105,7 +105,7 @@ def test_frames_are_turned_as_the_file_says(
 def test_files_without_frames_are_refused_in_a_sentence(video: Path, tmp_path: Path) -> None:
     sound = store_video(tmp_path / "sound.mp4", [], audio_only=True)
     with pytest.raises(InputError, match=r"sound\.mp4: the video holds no pictures"):
-        demand_video(sound)
+        check_video(sound)
     for name, content in (
         ("empty.mp4", b""),
         ("text.mov", b"no video"),
@@ -114,7 +114,7 @@ def test_files_without_frames_are_refused_in_a_sentence(video: Path, tmp_path: P
         path = tmp_path / name
         path.write_bytes(content)
         with pytest.raises((InputError, FileFormatError), match=name.replace(".", r"\.")):
-            demand_video(path)
+            check_video(path)
     assert not (tmp_path / "frames").exists()
 
 
@@ -123,7 +123,7 @@ def test_without_the_library_one_sentence_says_what_to_install(
 ) -> None:
     monkeypatch.setattr("rift_cl.io.captures.video.find_spec", lambda name: None)
     with pytest.raises(InputError, match="pip install av") as caught:
-        demand_video(video)
+        check_video(video)
     assert "\n" not in str(caught.value)
 
 

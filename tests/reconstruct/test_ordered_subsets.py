@@ -8,7 +8,7 @@ from solver_cases import GRID, SCAN, Matrix, finished, problem
 
 from rift_cl import FastProjector, Grid, Parallel, Projector, phantom
 from rift_cl.errors import CheckpointError, InputError
-from rift_cl.reconstruct import OrderedSubsets, SeenRays, Sirt, sirt
+from rift_cl.reconstruct import MeasuredRays, OrderedSubsets, Sirt, sirt
 from rift_cl.reconstruct.solvers.view_subsets import restricted, view_subsets
 from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays
 
@@ -47,7 +47,7 @@ def test_an_operator_of_some_views_gives_these_views(device, kind):
         "projector": lambda: A,
         "fast": lambda: FastProjector(GRID, SCAN, device=device),
         "weighted": lambda: WeightedRays(A, weights_of(A)),
-        "seen": lambda: SeenRays(A, RANDOM.random(A.range) > 0.4),
+        "seen": lambda: MeasuredRays(A, RANDOM.random(A.range) > 0.4),
         "multiple": lambda: 3 * A,
         "volume": lambda: Projector(Grid((2, *GRID.shape)), SCAN, device=device),
     }[kind]()

@@ -9,7 +9,7 @@ from solver_cases import GRID, METHODS, SCAN, Matrix, finished, problem, twin_ma
 
 from rift_cl import FastProjector, Grid, Parallel, Projector, metrics
 from rift_cl.errors import CheckpointError, InputError, NonFiniteError, RiftError, ShapeError
-from rift_cl.reconstruct import Cgls, Fista, Pdhg, SeenRays, Sirt, cgls, sirt, tv
+from rift_cl.reconstruct import Cgls, Fista, MeasuredRays, Pdhg, Sirt, cgls, sirt, tv
 from rift_cl.reconstruct.solvers import poisson_weights
 from rift_cl.reference import total_variation as twin
 
@@ -111,7 +111,7 @@ def test_rays_of_weight_zero_are_rays_unseen(device, method, precondition):
         rays = method(A, np.where(seen, 99.0, y), weights=~seen)
         assert finished(rays, 30)[-1].values["residual"] < 0.3
         return
-    masked = method(SeenRays(A, seen), np.where(seen, y, 0), precondition=precondition)
+    masked = method(MeasuredRays(A, seen), np.where(seen, y, 0), precondition=precondition)
     weighted = method(A, spoilt, weights=seen, precondition=precondition)
     finished(masked, 5), finished(weighted, 5)
     expected = device.get(masked.image)

@@ -8,7 +8,7 @@ import pytest
 from rift_cl.errors import InputError
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.sampling.planning.constraints import Budget, Constraints, Ranges
-from rift_cl.sampling.planning.design_space import DISTANCE, FOCAL, Site, default_types
+from rift_cl.sampling.planning.design_space import DISTANCE, FOCAL, DesignSpace, default_types
 from rift_cl.sampling.planning.paths import Spline, TiltedRings
 from rift_cl.sampling.targets.target import Target
 
@@ -58,13 +58,13 @@ def test_what_makes_no_sense_is_refused_by_name(make, words):
 )
 def test_a_camera_that_cannot_be_used_is_named(limits, types, words):
     with pytest.raises(InputError, match=words):
-        Site(TARGET, limits, types)
+        DesignSpace(TARGET, limits, types)
 
 
 @pytest.mark.parametrize("cover", [1.0, 0.6, 0.2])
 def test_the_nearest_place_has_just_so_much_of_the_target_in_the_picture(cover):
-    site = Site(TARGET, Constraints(cover=cover), (LENS,))
-    near, far = site.limits[0, DISTANCE]
+    design = DesignSpace(TARGET, Constraints(cover=cover), (LENS,))
+    near, far = design.limits[0, DISTANCE]
     assert near == far
     # The outline of the ball: a disc in the picture, counted point by point.
     radius = TARGET.diameter / 2 / math.sqrt(near**2 - TARGET.diameter**2 / 4)
@@ -78,30 +78,32 @@ def test_the_nearest_place_has_just_so_much_of_the_target_in_the_picture(cover):
 
 def test_a_zoom_lens_may_be_as_long_as_the_target_still_fits():
     limits = Constraints(distance=(1, 200), ranges={"lens": Ranges((2, 90))})
-    site = Site(TARGET, limits, (LENS,))
-    assert site.limits[0, DISTANCE, 1] == 200
-    for distance in (site.limits[0, DISTANCE, 0], 50.0, 150.0):
-        longest, by_distance, by_focus = site.longest(0, np.array(distance), np.array(0.5))
-        zoomed = site.type_at(0, [0, 0, distance, float(longest), 8, 0, 1])
+    design = DesignSpace(TARGET, limits, (LENS,))
+    assert design.limits[0, DISTANCE, 1] == 200
+    for distance in (design.limits[0, DISTANCE, 0], 50.0, 150.0):
+        longest, by_distance, by_focus = design.longest(0, np.array(distance), np.array(0.5))
+        zoomed = design.type_at(0, [0, 0, distance, float(longest), 8, 0, 1])
         tangent = 5 / math.sqrt(distance**2 - 25)
         wide = tangent * zoomed.image_distance(distance + 0.5) / zoomed.pixel
         assert wide == pytest.approx(150)
         for slope, step in ((by_distance, (1e-4, 0)), (by_focus, (0, 1e-4))):
             ends = [
-                site.longest(0, np.array(distance + sign * step[0]), np.array(0.5 + sign * step[1]))
+                design.longest(
+                    0, np.array(distance + sign * step[0]), np.array(0.5 + sign * step[1])
+                )
                 for sign in (1, -1)
             ]
             assert slope == pytest.approx((ends[0][0] - ends[1][0]) / 2e-4, rel=1e-5)
     # At the nearest place, the shortest focal length is the longest that fits.
-    near = site.limits[0, DISTANCE, 0]
-    assert site.longest(0, np.array(near), np.array(0.0))[0] == pytest.approx(
-        site.limits[0, FOCAL, 0], rel=1e-6
+    near = design.limits[0, DISTANCE, 0]
+    assert design.longest(0, np.array(near), np.array(0.0))[0] == pytest.approx(
+        design.limits[0, FOCAL, 0], rel=1e-6
     )
 
 
 def test_who_names_no_camera_gets_one_that_passes_the_whole_band():
     (kind,) = default_types(TARGET)
-    near = Site(TARGET, Constraints(), (kind,)).limits[0, DISTANCE, 0]
+    near = DesignSpace(TARGET, Constraints(), (kind,)).limits[0, DISTANCE, 0]
     assert TARGET.highest * kind.pixel * near / kind.image_distance(near) < 0.05
 
 

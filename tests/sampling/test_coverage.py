@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from looks_of_all_kinds import random_looks, ring_of_cameras
+from observations_of_all_kinds import random_observations, ring_of_cameras
 
 import rift_cl as rift
 from rift_cl.errors import InputError, ResourceLimitError, ShapeError
@@ -14,7 +14,7 @@ from rift_cl.geometry import Parallel
 from rift_cl.reference import coverage as twin
 from rift_cl.sampling.coverage.cube import coverage_cube, cube_axis
 from rift_cl.sampling.coverage.device import coverage, coverage_grad
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
 DIAMETER = 3.0
@@ -27,90 +27,96 @@ def target():
 
 
 @pytest.fixture
-def looks():
-    return random_looks(23, 2, diameter=DIAMETER)
+def observations():
+    return random_observations(23, 2, diameter=DIAMETER)
 
 
 def off(found, wanted):
     return np.abs(found - wanted).max() / np.abs(wanted).max()
 
 
-def test_it_is_the_twins(device, looks, target):
-    found = coverage(looks, target, device=device)
+def test_it_is_the_twins(device, observations, target):
+    found = coverage(observations, target, device=device)
     assert found.dtype == np.float32 and found.shape == (2, 1500)
-    assert off(found, twin.coverage(looks, target.k, DIAMETER)) < 2e-6
+    assert off(found, twin.coverage(observations, target.k, DIAMETER)) < 2e-6
 
 
-def test_the_gradient_is_the_twins(device, looks, target):
+def test_the_gradient_is_the_twins(device, observations, target):
     upstream = np.random.default_rng(0).normal(size=(2, 1500))
-    found = coverage_grad(looks, target, upstream, device=device)
-    wanted = twin.coverage_grad(looks, target.k, DIAMETER, upstream)
+    found = coverage_grad(observations, target, upstream, device=device)
+    wanted = twin.coverage_grad(observations, target.k, DIAMETER, upstream)
     for name in found._fields:
         assert off(getattr(found, name), getattr(wanted, name)) < 1e-4, name
 
 
 @pytest.mark.parametrize("count", [1, 7, 8, 9, 1025])
-def test_any_number_of_frequencies_will_do(device, looks, target, count):
+def test_any_number_of_frequencies_will_do(device, observations, target, count):
     k = np.random.default_rng(count).normal(size=(count, 3))
     upstream = np.random.default_rng(1).normal(size=(2, count))
-    found = coverage(looks, target, k, device=device)
+    found = coverage(observations, target, k, device=device)
     assert found.shape == (2, count)
-    assert off(found, twin.coverage(looks, k, DIAMETER)) < 2e-6
-    by_weight = coverage_grad(looks, target, upstream, k, device=device).weight
-    assert off(by_weight, twin.coverage_grad(looks, k, DIAMETER, upstream).weight) < 1e-5
+    assert off(found, twin.coverage(observations, k, DIAMETER)) < 2e-6
+    by_weight = coverage_grad(observations, target, upstream, k, device=device).weight
+    assert off(by_weight, twin.coverage_grad(observations, k, DIAMETER, upstream).weight) < 1e-5
 
 
 def test_a_view_that_is_skipped_adds_nothing(device):
     """Rows of a cube lie in long boxes that most slabs miss; in another order hardly any is."""
-    target, looks = Target((0, 0, 0), 1.0), random_looks(40, 1)
+    target, observations = Target((0, 0, 0), 1.0), random_observations(40, 1)
     axis = cube_axis(16.0, 16)
     z, y, x = np.meshgrid(axis, axis, axis, indexing="ij")
     k = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
     order = np.random.default_rng(0).permutation(len(k))
     np.testing.assert_array_equal(
-        coverage(looks, target, k, device=device)[:, order],
-        coverage(looks, target, k[order], device=device),
+        coverage(observations, target, k, device=device)[:, order],
+        coverage(observations, target, k[order], device=device),
     )
 
 
-def test_a_small_memory_changes_no_bit(device, looks, target):
+def test_a_small_memory_changes_no_bit(device, observations, target):
     k = np.random.default_rng(3).normal(size=(6000, 3))
     upstream = np.random.default_rng(4).normal(size=(2, 6000))
     small = rift.Device(device._handle, device.selector, traits=device.traits, memory=60_000)
     np.testing.assert_array_equal(
-        coverage(looks, target, k, device=small), coverage(looks, target, k, device=device)
+        coverage(observations, target, k, device=small),
+        coverage(observations, target, k, device=device),
     )
-    found = coverage_grad(looks, target, upstream, k, device=small)
-    for name, values in coverage_grad(looks, target, upstream, k, device=device)._asdict().items():
+    found = coverage_grad(observations, target, upstream, k, device=small)
+    for name, values in (
+        coverage_grad(observations, target, upstream, k, device=device)._asdict().items()
+    ):
         np.testing.assert_array_equal(getattr(found, name), values)
     tiny = rift.Device(device._handle, device.selector, traits=device.traits, memory=2_000)
     with pytest.raises(ResourceLimitError, match="point's views"):
-        coverage(looks, target, k, device=tiny)
+        coverage(observations, target, k, device=tiny)
 
 
-def test_two_runs_give_the_same_bits(device, looks, target):
+def test_two_runs_give_the_same_bits(device, observations, target):
     upstream = np.random.default_rng(5).normal(size=(2, 1500))
-    first, second = (coverage_grad(looks, target, upstream, device=device) for _ in range(2))
+    first, second = (coverage_grad(observations, target, upstream, device=device) for _ in range(2))
     for one, other in zip(first, second, strict=True):
         np.testing.assert_array_equal(one, other)
 
 
-def test_the_unit_of_length_does_not_matter(device, looks, target):
+def test_the_unit_of_length_does_not_matter(device, observations, target):
     scale = 1e9
     large = dataclasses.replace(
-        looks, pixel=looks.pixel * scale, cutoff=looks.cutoff / scale, blur=looks.blur * scale
+        observations,
+        pixel=observations.pixel * scale,
+        cutoff=observations.cutoff / scale,
+        blur=observations.blur * scale,
     )
     far = Target((0, 0, 0), DIAMETER * scale, points=POINTS)
     found = coverage(large, far, target.k / scale, device=device)
-    np.testing.assert_allclose(found, coverage(looks, target, device=device), atol=1e-5)
+    np.testing.assert_allclose(found, coverage(observations, target, device=device), atol=1e-5)
 
 
 def test_cameras_and_their_looks_are_the_same(device):
     cameras, target = ring_of_cameras(5), Target((0, 0, 0), 2.0, points=POINTS)
-    looks = Looks.of(cameras, POINTS, weights=[1, 2, 3, 4, 5])
+    observations = Observations.of(cameras, POINTS, weights=[1, 2, 3, 4, 5])
     np.testing.assert_array_equal(
         coverage(cameras, target, weights=[1, 2, 3, 4, 5], device=device),
-        coverage(looks, target, device=device),
+        coverage(observations, target, device=device),
     )
 
 
@@ -120,16 +126,18 @@ def test_a_scan_covers_what_its_directions_do(device):
     scan = Parallel(angles, bins=64, pitch=0.01)
     lines = np.stack([-np.sin(angles), np.cos(angles), 0 * angles], axis=1)
     found = coverage(scan, target, device=device)
-    bare = coverage(Looks.along(lines), target, device=device)
+    bare = coverage(Observations.along(lines), target, device=device)
     np.testing.assert_allclose(found, bare, atol=1e-3 * bare.max())
 
 
-def test_half_a_cube_tells_the_other(device, looks, target):
+def test_half_a_cube_tells_the_other(device, observations, target):
     for count in (5, 6):
-        cube = coverage_cube(looks, target, count, device=device)
+        cube = coverage_cube(observations, target, count, device=device)
         axis = cube_axis(target.highest, count)
         z, y, x = np.meshgrid(axis, axis, axis, indexing="ij")
-        whole = coverage(looks, target, np.stack([x, y, z], -1).reshape(-1, 3), device=device)
+        whole = coverage(
+            observations, target, np.stack([x, y, z], -1).reshape(-1, 3), device=device
+        )
         np.testing.assert_allclose(cube.reshape(2, -1), whole, atol=1e-5)
 
 
@@ -149,24 +157,24 @@ def test_what_no_view_sees_is_not_covered(device):
         ([[1e9, 0, 0]], "unit of the diameter"),
     ],
 )
-def test_bad_frequencies_are_refused(looks, target, k, wanted):
+def test_bad_frequencies_are_refused(observations, target, k, wanted):
     with pytest.raises(InputError, match=wanted):
-        coverage(looks, target, k)
+        coverage(observations, target, k)
 
 
-def test_bad_views_and_gradients_are_refused(looks, target):
+def test_bad_views_and_gradients_are_refused(observations, target):
     with pytest.raises(ShapeError, match="cameras is empty"):
         coverage([], target)
     with pytest.raises(ShapeError, match="2 points, the target has 1"):
-        coverage(looks, Target((0, 0, 0), 1.0))
+        coverage(observations, Target((0, 0, 0), 1.0))
     with pytest.raises(InputError, match="weights are for cameras"):
-        coverage(looks, target, weights=[1.0])
+        coverage(observations, target, weights=[1.0])
     with pytest.raises(InputError, match="too large for float32"):
         coverage(ring_of_cameras(1), Target((0, 0, 0), 1.0), weights=[1e39])
     for count in (1, 2.5, "five"):
         with pytest.raises(InputError, match="count is"):
-            coverage_cube(looks, target, count)
+            coverage_cube(observations, target, count)
     with pytest.raises(ShapeError, match="grad has shape"):
-        coverage_grad(looks, target, np.zeros((1, 3)))
+        coverage_grad(observations, target, np.zeros((1, 3)))
     with pytest.raises(InputError, match="NaN"):
-        coverage_grad(looks, target, np.full((2, 1500), np.nan))
+        coverage_grad(observations, target, np.full((2, 1500), np.nan))

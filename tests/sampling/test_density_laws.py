@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from looks_of_all_kinds import ring_directions
+from observations_of_all_kinds import ring_directions
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
@@ -17,7 +17,7 @@ from rift_cl.sampling.coverage.density import (
     sphere_density,
     window_width,
 )
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
 VIEWS = 512
@@ -38,8 +38,8 @@ def test_in_the_plane_the_slope_is_minus_one(device):
 
 
 def test_over_the_sphere_the_slope_is_minus_one(device):
-    looks = Looks.along(half_sphere(VIEWS))
-    found = mean_density(looks, SPACE, RADII, samples=4096, device=device)
+    observations = Observations.along(half_sphere(VIEWS))
+    found = mean_density(observations, SPACE, RADII, samples=4096, device=device)
     assert power_slope(RADII, found) == pytest.approx(-1, abs=0.02)
     np.testing.assert_allclose(found, VIEWS / (2 * RADII), rtol=0.01)
 
@@ -47,25 +47,31 @@ def test_over_the_sphere_the_slope_is_minus_one(device):
 def test_random_views_keep_the_law_of_the_sphere(device):
     directions = np.random.default_rng(0).normal(size=(4096, 3))
     k = 12.0 * half_sphere(512)
-    found = density(Looks.along(directions), SPACE, k, device=device)[0]
+    found = density(Observations.along(directions), SPACE, k, device=device)[0]
     assert found.mean() == pytest.approx(4096 / 24, rel=0.01)
     np.testing.assert_allclose(sphere_density(4096, k), 4096 / 24)
 
 
 def test_a_ring_is_dense_about_its_axis_and_not_about_zero(device):
     """K / (pi sqrt(kx^2 + ky^2)), at every height above the ring's plane."""
-    looks = Looks.along(ring_directions(4 * VIEWS))
+    observations = Observations.along(ring_directions(4 * VIEWS))
     turn = np.linspace(0, np.pi, 7)
     for height in (0.0, 5.0, 30.0):
         k = np.stack([9 * np.cos(turn), 9 * np.sin(turn), np.full(7, height)], axis=1)
-        found = density(looks, SPACE, k, device=device)[0]
+        found = density(observations, SPACE, k, device=device)[0]
         np.testing.assert_allclose(found, ring_density(4 * VIEWS, k), rtol=0.01)
 
 
 def test_a_weight_counts_as_so_many_views(device):
-    looks, k = Looks.along(ring_directions(64)), [[5.0, 1, 0]]
-    heavy = Looks(looks.direction, 3 * looks.weight, looks.pixel, looks.cutoff, looks.blur)
-    found = [density(some, SPACE, k, device=device) for some in (looks, heavy)]
+    observations, k = Observations.along(ring_directions(64)), [[5.0, 1, 0]]
+    heavy = Observations(
+        observations.direction,
+        3 * observations.weight,
+        observations.pixel,
+        observations.cutoff,
+        observations.blur,
+    )
+    found = [density(some, SPACE, k, device=device) for some in (observations, heavy)]
     np.testing.assert_allclose(found[1], 3 * found[0], rtol=1e-6)
 
 
@@ -77,10 +83,10 @@ def test_the_laws_are_infinite_where_all_slices_meet():
 def test_bad_arguments_are_refused():
     for radii in ([0.0, 1.0], [], [np.inf], [np.nan], "wide"):
         with pytest.raises(InputError, match="radii"):
-            mean_density(Looks.along([[1, 0, 0]]), SPACE, radii)
+            mean_density(Observations.along([[1, 0, 0]]), SPACE, radii)
     for samples in (0, 2.5, "many"):
         with pytest.raises(InputError, match="samples"):
-            mean_density(Looks.along([[1, 0, 0]]), SPACE, [1.0], samples=samples)
+            mean_density(Observations.along([[1, 0, 0]]), SPACE, [1.0], samples=samples)
     with pytest.raises(InputError, match="views is 'few'"):
         ring_density("few", [1, 0, 0])
     with pytest.raises(ShapeError, match="two or more"):

@@ -88,7 +88,7 @@ def test_a_plan_says_what_it_loses_if_its_prior_is_wrong_and_a_blend_loses_less(
     right = flat(along_x())
     wrong = flat(turned(along_x(), (0, 0, 1), math.pi / 2))
     unknown = {
-        (name, kind): found.objective.rough._at(target).value(found.stations)
+        (name, kind): found.objective.rough._at(target).value(found.view_table)
         for name, found in (("sure", sure), ("blend", blend))
         for kind, target in (("right", right), ("wrong", wrong))
     }

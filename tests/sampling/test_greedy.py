@@ -8,12 +8,12 @@ import pytest
 
 from rift_cl.sampling.planning.candidates import candidates, spread
 from rift_cl.sampling.planning.constraints import Constraints
-from rift_cl.sampling.planning.design_space import Site, default_types
+from rift_cl.sampling.planning.design_space import DesignSpace, default_types
 from rift_cl.sampling.planning.greedy import Limits, bound, choose
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.pool import pool_of
-from rift_cl.sampling.planning.view_table import Stations
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.planning.view_table import ViewTable
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.prior import directions_for
 from rift_cl.sampling.targets.target import Target, half_ball
 
@@ -23,13 +23,13 @@ SURFACE = Target((0, 0, 0), 10.0, 5 * NORMALS, NORMALS, "surface", snr=30.0, ban
 
 
 def pool(target=VOLUME, kind="wiener", count=9, fixed=False):
-    site = Site(target, Constraints(), default_types(target))
-    objective = Objective(site, kind)
+    design = DesignSpace(target, Constraints(), default_types(target))
+    objective = Objective(design, kind)
     offered = candidates(objective, 4, 0)
     offered = offered.take(range(0, len(offered), len(offered) // count))
     if fixed:
-        seen = Looks.of(offered.take([0, 3]).cameras(site), target.points)
-        objective = Objective(site, kind, seen)
+        seen = Observations.of(offered.take([0, 3]).cameras(design), target.points)
+        objective = Objective(design, kind, seen)
     return pool_of(objective, offered), objective, offered
 
 
@@ -113,8 +113,8 @@ def test_a_candidate_is_chosen_once_where_that_is_asked():
 
 def test_directions_are_spread_evenly_over_what_is_allowed():
     limits = Constraints(elevation=(0.2, 1.2), azimuth=(-1, 2))
-    site = Site(VOLUME, limits, default_types(VOLUME))
-    angles = spread(site.constraints, 900, 3)
+    design = DesignSpace(VOLUME, limits, default_types(VOLUME))
+    angles = spread(design.constraints, 900, 3)
     heights = np.sin(angles[:, 1])
     cells, _, _ = np.histogram2d(
         angles[:, 0], heights, (6, 5), range=((-1, 2), (np.sin(0.2), np.sin(1.2)))
@@ -125,9 +125,9 @@ def test_directions_are_spread_evenly_over_what_is_allowed():
 
 
 def test_no_two_directions_in_the_plane_lie_opposite_each_other():
-    site = Site(VOLUME, Constraints(elevation=(0, 0)), default_types(VOLUME))
+    design = DesignSpace(VOLUME, Constraints(elevation=(0, 0)), default_types(VOLUME))
     for count in (480, 481):
-        lines = np.sort(spread(site.constraints, count, 0)[:, 0] % math.pi)
+        lines = np.sort(spread(design.constraints, count, 0)[:, 0] % math.pi)
         gaps = np.diff(lines, append=lines[0] + math.pi)
         assert gaps.min() > 0.9 * math.pi / count - 1e-3
-        assert len(Stations(np.zeros(count, int), np.zeros((count, 7)))) == count
+        assert len(ViewTable(np.zeros(count, int), np.zeros((count, 7)))) == count

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from looks_of_all_kinds import ring_of_cameras
+from observations_of_all_kinds import ring_of_cameras
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Aperture
@@ -12,7 +12,7 @@ from rift_cl.optics.pupil import defocused_otf
 from rift_cl.reference.coverage import optical_transfer
 from rift_cl.sampling.coverage.density import half_sphere
 from rift_cl.sampling.criteria.limits import limits
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
 # Small enough that 60 views are never too few.
@@ -20,14 +20,14 @@ SMALL = Target((0, 0, 0), 0.01)
 
 
 def test_the_constants_are_where_contrast_falls_to_a_tenth():
-    looks = Looks(
+    observations = Observations(
         np.array([[[0, 0, 1.0]]] * 2),
         np.ones((2, 1)),
         np.zeros((2, 1)),
         np.array([[3.0], [np.inf]]),
         np.array([[0.0], [0.2]]),
     )
-    found = limits(looks, SMALL)
+    found = limits(observations, SMALL)
     ends = found.diffraction[0, 0], found.focus[1, 0]
     assert optical_transfer(ends[0], 0, 3.0, 0).value == pytest.approx(0.1, abs=1e-4)
     assert optical_transfer(ends[1], 0, np.inf, 0.2).value == pytest.approx(0.1, abs=1e-4)
@@ -62,7 +62,7 @@ def test_a_wide_opening_is_limited_by_depth_of_field_away_from_its_focus():
 
 def lens(cutoff, blur, pixel=0.0):
     one = np.ones((1, 1))
-    return Looks(np.array([[[0, 0, 1.0]]]), one, pixel * one, cutoff * one, blur * one)
+    return Observations(np.array([[[0, 0, 1.0]]]), one, pixel * one, cutoff * one, blur * one)
 
 
 @pytest.mark.parametrize("waves", [0.6, 1.0, 2.0, 6.0])
@@ -101,7 +101,7 @@ def test_one_camera_and_bare_directions_work():
     one = limits(ring_of_cameras(1), Target((0, 0, 0), 1.0))
     # One slice holds nine tenths of all directions up to 1 / (2 D 0.9).
     assert one.reached[0] == pytest.approx(0.5 / 0.9, rel=0.01)
-    bare = limits(Looks.along(half_sphere(100)), Target((0, 0, 0), 1.0))
+    bare = limits(Observations.along(half_sphere(100)), Target((0, 0, 0), 1.0))
     assert bare.cause == ("number of views",) and np.isinf(bare.camera).all()
     assert set(bare.camera_cause()) == {""}
     assert "any detail" in bare.sentence

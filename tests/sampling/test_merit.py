@@ -9,11 +9,11 @@ from scipy.stats import spearmanr
 from rift_cl.geometry import Camera, Parallel
 from rift_cl.geometry.pose import look_at
 from rift_cl.reference.coverage import coverage
-from rift_cl.sampling import merit as merit_file
+from rift_cl.sampling.criteria import merit as merit_file
 from rift_cl.sampling.criteria.exact import exact
 from rift_cl.sampling.criteria.kriging import kriging
 from rift_cl.sampling.criteria.merit import merit, merit_of_coverage
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.prior import directions_for
 from rift_cl.sampling.targets.target import Target, half_ball
 
@@ -22,8 +22,8 @@ POINTS = ((0.1, 0, 0), (-0.1, 0.2, 0.05))
 
 
 def scored(kind, directions, target):
-    looks = Looks.along(directions)
-    return merit_of_coverage(kind, coverage(looks, target.k, target.diameter), target).value
+    observations = Observations.along(directions)
+    return merit_of_coverage(kind, coverage(observations, target.k, target.diameter), target).value
 
 
 def scattered(count, seed):
@@ -132,15 +132,15 @@ def test_it_ranks_as_the_exact_error_does(flat):
         spread = random.uniform(0.2, 1)
         if flat:
             angles = np.pi * spread * random.uniform(size=10)
-            looks = Looks.of_scan(Parallel(angles, 64, 1 / 64))
+            observations = Observations.of_scan(Parallel(angles, 64, 1 / 64))
         else:
-            looks = Looks.along(random.normal(size=(10, 3)) * [1, spread, spread**2])
-        known = coverage(looks, target.k, 1.0)
+            observations = Observations.along(random.normal(size=(10, 3)) * [1, spread, spread**2])
+        known = coverage(observations, target.k, 1.0)
         found.append(
             (
                 merit_of_coverage("wiener", known, target).value,
-                kriging(looks, target),
-                exact(looks, target, samples),
+                kriging(observations, target),
+                exact(observations, target, samples),
             )
         )
     diagonal, correlated, whole = np.array(found).T
@@ -222,9 +222,9 @@ def test_points_beside_and_behind_a_camera_change_nothing(model):
 
 
 def test_what_correlated_views_tell_twice_is_counted_once(target):
-    looks = Looks.along(np.repeat([[1.0, 0, 0]], 8, axis=0))
-    one = Looks.along([[1.0, 0, 0]])
+    observations = Observations.along(np.repeat([[1.0, 0, 0]], 8, axis=0))
+    one = Observations.along([[1.0, 0, 0]])
     # Eight times the same view is one with eight times the light.
     brighter = Target((0, 0, 0), 1.0, snr=8 * target.snr, frequencies=target.k)
-    assert kriging(looks, target) == pytest.approx(kriging(one, brighter), rel=1e-6)
-    assert exact(looks, target, 6) == pytest.approx(exact(one, brighter, 6), rel=1e-6)
+    assert kriging(observations, target) == pytest.approx(kriging(one, brighter), rel=1e-6)
+    assert exact(observations, target, 6) == pytest.approx(exact(one, brighter, 6), rel=1e-6)

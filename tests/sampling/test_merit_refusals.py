@@ -7,7 +7,7 @@ from scattered_cameras import cameras
 from rift_cl.errors import InputError, NonFiniteError, RiftError, ShapeError
 from rift_cl.sampling.criteria.exact import exact
 from rift_cl.sampling.criteria.merit import merit, merit_of_coverage
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.prior import PowerLaw
 from rift_cl.sampling.targets.target import Target, half_ball
 
@@ -34,9 +34,9 @@ class Odd:
         (lambda t: merit_of_coverage("exact", t.k.T[2:], t), InputError, "kind is 'exact'"),
         (lambda t: merit([], t), ShapeError, "cameras is empty"),
         (lambda t: merit(cameras(1)[0], t), InputError, "cameras in a sequence"),
-        (lambda t: merit(Looks.along([[0, 0, 1]]), t), InputError, "this is a Looks"),
+        (lambda t: merit(Observations.along([[0, 0, 1]]), t), InputError, "this is a Observations"),
         (
-            lambda t: exact(Looks.along([[0, 0, 1]] * 3), Target((0, 0, 0), 1.0, snr=1e30)),
+            lambda t: exact(Observations.along([[0, 0, 1]] * 3), Target((0, 0, 0), 1.0, snr=1e30)),
             InputError,
             "take a lower snr",
         ),
@@ -46,9 +46,9 @@ class Odd:
         (lambda t: merit_of_coverage("wiener", [[1.0]], t), ShapeError, "coverage has shape"),
         (lambda t: merit_of_coverage("wiener", -t.k.T[2:], t), InputError, "goes down to -"),
         (lambda t: merit_of_coverage("worst", t.k.T[2:] + np.nan, t), NonFiniteError, "NaN"),
-        (lambda t: exact(Looks.along([[1, 0, 0]]), t, 99), RiftError, "99 samples across"),
+        (lambda t: exact(Observations.along([[1, 0, 0]]), t, 99), RiftError, "99 samples across"),
         (
-            lambda t: exact(Looks.along([[0, 0, 1]]), Target.flat(1.0)),
+            lambda t: exact(Observations.along([[0, 0, 1]]), Target.flat(1.0)),
             InputError,
             "target is flat",
         ),

@@ -9,7 +9,7 @@ import pytest
 from rift_cl.errors import InputError
 from rift_cl.sampling.planning.constraints import Constraints
 from rift_cl.sampling.planning.curves import curves_of
-from rift_cl.sampling.planning.design_space import Site, default_types
+from rift_cl.sampling.planning.design_space import DesignSpace, default_types
 from rift_cl.sampling.planning.keep_out import Cone, KeepOut, Sphere
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.path_layout import PathLayout
@@ -42,13 +42,13 @@ def steps(directions, closed):
 @pytest.mark.parametrize("name", PATHS)
 def test_whatever_the_numbers_a_path_keeps_to_its_limits(name):
     limits = PATHS[name]
-    site = Site(TARGET, limits, default_types(TARGET))
+    design = DesignSpace(TARGET, limits, default_types(TARGET))
     for index, curve in enumerate(curves_of(limits)):
         random = np.random.default_rng(index)
         drawn = random.uniform(curve.low, curve.high, (30, len(curve.low)))
         for numbers in [*drawn, *curve.starts]:
-            layout = PathLayout(site, curve, 0, 11, np.append(numbers, np.zeros(4)))
-            assert permitted(site, layout.stations(layout.start))
+            layout = PathLayout(design, curve, 0, 11, np.append(numbers, np.zeros(4)))
+            assert permitted(design, layout.view_table(layout.start))
 
 
 @pytest.mark.parametrize("name", PATHS)
@@ -57,7 +57,7 @@ def test_a_path_is_planned_and_moved_to_advantage(name):
     found = plan(TARGET, 9, limits)
     first = plan(TARGET, 9, limits, method="greedy")
     assert len(found) == 9
-    assert permitted(found.objective.site, found.stations)
+    assert permitted(found.objective.design, found.view_table)
     assert found.merit <= first.merit
     assert found.bound <= found.merit
     assert "random" not in found.baselines
@@ -107,26 +107,26 @@ def test_views_along_a_spline_are_evenly_spaced(closed):
 @pytest.mark.parametrize("name", PATHS)
 def test_a_path_has_derivatives_as_finite_differences_have(name):
     limits = PATHS[name]
-    site = Site(TARGET, limits, default_types(TARGET))
-    objective, curve = Objective(site), curves_of(limits)[-1]
+    design = DesignSpace(TARGET, limits, default_types(TARGET))
+    objective, curve = Objective(design), curves_of(limits)[-1]
     random = np.random.default_rng(3)
     numbers = curve.low + (curve.high - curve.low) * random.uniform(0.2, 0.8, len(curve.low))
-    layout = PathLayout(site, curve, 0, 7, np.append(numbers, np.zeros(4)))
+    layout = PathLayout(design, curve, 0, 7, np.append(numbers, np.zeros(4)))
     at = layout.start
-    _, by_table = objective.gradient(layout.stations(at))
+    _, by_table = objective.gradient(layout.view_table(at))
     slope = layout.pulled_back(at, by_table[None])[0]
     for index in range(len(at)):
         step = np.eye(len(at))[index] * 1e-5
-        ends = [objective.value(layout.stations(at + sign * step)) for sign in (1, -1)]
+        ends = [objective.value(layout.view_table(at + sign * step)) for sign in (1, -1)]
         rate = (ends[0] - ends[1]) / 2e-5
         assert slope[index] == pytest.approx(rate, rel=0.02, abs=2e-3 * np.abs(slope).max())
 
 
 def test_a_path_goes_round_keep_outs_or_says_that_none_does():
-    near = Site(TARGET, Constraints(), default_types(TARGET)).limits[0, 2, 0]
+    near = DesignSpace(TARGET, Constraints(), default_types(TARGET)).limits[0, 2, 0]
     ball = KeepOut(Sphere((near, 0, 0), 0.3 * near))
     found = plan(TARGET, 9, Constraints(path=Spline(6), keepouts=(ball,)))
-    assert permitted(found.objective.site, found.stations)
+    assert permitted(found.objective.design, found.view_table)
     wall = KeepOut(Cone((0, 0, 0), (1, 0, 0), 1.5))
     with pytest.raises(InputError, match=r"no path Ring with 9 views .* keepouts\[0\] cuts"):
         plan(TARGET, 9, Constraints(path=Ring(), elevation=(-0.5, 0.5), keepouts=(wall,)))
@@ -136,7 +136,7 @@ def test_a_spline_finds_its_way_beside_a_wall_that_cuts_every_full_turn():
     wall = KeepOut(Cone((0, 0, 0), (1, 0, 0), 1.3))
     limits = Constraints(elevation=(0, 0.6), keepouts=(wall,))
     found = plan(TARGET, 12, replace(limits, path=Spline(6)))
-    assert permitted(found.objective.site, found.stations)
+    assert permitted(found.objective.design, found.view_table)
     with pytest.raises(InputError, match="no path Ring"):
         plan(TARGET, 12, replace(limits, path=Ring()))
 

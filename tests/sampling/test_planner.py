@@ -25,9 +25,9 @@ ZOOM = CameraType("zoom", 16.0, 8.0, 0.005, (1000, 1200))
 
 def keeps(found):
     """All that every plan promises."""
-    site = found.objective.site
-    assert permitted(site, found.stations)
-    scored = merit(found.cameras, site.target, found.objective.kind, weights=found.weights)
+    design = found.objective.design
+    assert permitted(design, found.view_table)
+    scored = merit(found.cameras, design.target, found.objective.kind, weights=found.weights)
     if not found.fixed:
         assert found.merit == pytest.approx(scored.value, rel=1e-9)
     assert found.bound <= found.merit + 1e-9
@@ -46,7 +46,7 @@ def test_a_plan_in_a_sector_beats_rings_arcs_and_even_views():
     assert set(found.baselines) == {"ring", "arc", "fibonacci", "zigzag", "random"}
     for baseline in found.baselines.values():
         assert len(baseline.cameras) == 12
-        assert permitted(found.objective.site, baseline.stations)
+        assert permitted(found.objective.design, baseline.view_table)
         assert found.merit < baseline.merit
     # A zigzag along the edge may beat the greedy choice, from which the polish begins as well.
     for name in ("ring", "arc", "fibonacci", "random"):
@@ -104,8 +104,8 @@ def test_a_known_direction_of_detail_is_looked_at():
 
 def test_the_same_seed_gives_the_same_plan_and_another_turns_it():
     first, again, other = (plan(TARGET, 6, Constraints(**SECTOR), seed=s) for s in (1, 1, 2))
-    np.testing.assert_array_equal(first.stations.table, again.stations.table)
-    assert np.abs(first.stations.table - other.stations.table).max() > 1e-3
+    np.testing.assert_array_equal(first.view_table.table, again.view_table.table)
+    assert np.abs(first.view_table.table - other.view_table.table).max() > 1e-3
     assert other.merit == pytest.approx(first.merit, rel=0.1)
 
 
@@ -177,7 +177,7 @@ def test_further_views_go_where_the_first_left_most_unknown():
     more = next_views(first, TARGET, 5)
     assert keeps(more)
     assert len(more.fixed) == 5
-    assert more.objective.site.constraints is first.objective.site.constraints
+    assert more.objective.design.constraints is first.objective.design.constraints
     assert more.merit < first.merit
     whole = [*first.cameras, *more.cameras]
     weights = np.concatenate([first.weights, more.weights])
@@ -206,14 +206,14 @@ def test_other_merits_are_planned_as_well(kind):
     assert keeps(found)
     assert found.merit < min(baseline.merit for baseline in found.baselines.values())
     assert isinstance(found.verdict(), str)
-    assert len(found.knee().gains) == 6
+    assert len(found.diminishing_returns().gains) == 6
 
 
 def test_a_surface_is_planned_by_the_sides_that_its_points_show():
     normals = np.array([[1.0, 0, 0], [0, 0, 1]])
     target = Target(CENTER, 60.0, CENTER + 30 * normals, normals, "surface", band=0.5, snr=100.0)
     found = plan(target, 6, kind="wiener")
-    asked = found.objective.site.target
+    asked = found.objective.design.target
     scored = merit(found.cameras, asked, weights=found.weights)
     assert found.merit == pytest.approx(scored.value, rel=1e-9)
     # Nobody looks at what has no points.

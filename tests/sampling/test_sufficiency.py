@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from looks_of_all_kinds import ring_directions, ring_of_cameras
+from observations_of_all_kinds import ring_directions, ring_of_cameras
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
@@ -19,7 +19,7 @@ from rift_cl.sampling.criteria.sufficiency import (
     sufficiency,
 )
 from rift_cl.sampling.criteria.tuy import tuy
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
 SPACE = Target((0, 0, 0), 1.0)
@@ -29,7 +29,7 @@ SPACE = Target((0, 0, 0), 1.0)
 @pytest.mark.parametrize("frequency", [8.0, 200.0])
 def test_a_ring_at_an_elevation_misses_a_cone_less_half_a_slice(degrees, frequency):
     elevation = math.radians(degrees)
-    found = orlov(Looks.along(ring_directions(2000, elevation)), SPACE, frequency=frequency)
+    found = orlov(Observations.along(ring_directions(2000, elevation)), SPACE, frequency=frequency)
     seen_beside = math.asin(0.5 / frequency)
     assert found.missing == pytest.approx(1 - math.cos(elevation - seen_beside), abs=2e-3)
     assert found.angle == pytest.approx(elevation, abs=2e-3)
@@ -39,13 +39,13 @@ def test_a_ring_at_an_elevation_misses_a_cone_less_half_a_slice(degrees, frequen
 
 def test_a_ring_in_its_plane_and_a_sphere_miss_nothing():
     for directions in (ring_directions(200), half_sphere(600)):
-        found = orlov(Looks.along(directions), SPACE, frequency=8.0)
+        found = orlov(Observations.along(directions), SPACE, frequency=8.0)
         assert found.satisfied and found.missing == 0
         assert "every direction" in found.sentence
 
 
 def test_one_view_misses_all_but_its_slice():
-    found = orlov(Looks.along([[0, 0, 1]]), SPACE, frequency=10.0)
+    found = orlov(Observations.along([[0, 0, 1]]), SPACE, frequency=10.0)
     assert found.missing == pytest.approx(0.95, abs=2e-3)
     assert abs(found.axis[2]) == pytest.approx(1, abs=1e-3)
 
@@ -75,11 +75,11 @@ def test_crowthers_count_is_that_of_an_even_set():
 
 def test_more_views_reach_further_and_a_cluster_does_not():
     reached = [
-        crowther(Looks.along(half_sphere(count)), SPACE).frequency for count in (10, 40, 160)
+        crowther(Observations.along(half_sphere(count)), SPACE).frequency for count in (10, 40, 160)
     ]
     assert reached[0] < reached[1] < reached[2]
     cluster = half_sphere(4000)[:160]
-    assert crowther(Looks.along(cluster), SPACE).frequency < reached[0]
+    assert crowther(Observations.along(cluster), SPACE).frequency < reached[0]
 
 
 def test_one_ring_fails_tuy_and_two_meet_it():
@@ -111,7 +111,7 @@ def test_one_camera_works():
 
 
 def test_parallel_rays_have_no_tuy():
-    assert sufficiency(Looks.along(half_sphere(20)), SPACE).tuy is None
+    assert sufficiency(Observations.along(half_sphere(20)), SPACE).tuy is None
 
 
 def test_only_views_that_see_a_point_count():
@@ -124,12 +124,12 @@ def test_only_views_that_see_a_point_count():
 
 
 def test_bad_arguments_are_refused():
-    looks = Looks.along([[0, 0, 1]])
+    observations = Observations.along([[0, 0, 1]])
     with pytest.raises(InputError, match="frequency is"):
-        orlov(looks, SPACE, frequency=-1)
+        orlov(observations, SPACE, frequency=-1)
     for point in (3, -1, 0.5, "middle"):
         with pytest.raises(InputError, match=f"point is '?{point}"):
-            orlov(looks, SPACE, point=point)
+            orlov(observations, SPACE, point=point)
     with pytest.raises(InputError, match="wanted positive"):
         crowther_views(1.0, 0.0)
     with pytest.raises(InputError, match="wanted positive"):

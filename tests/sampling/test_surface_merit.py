@@ -10,7 +10,7 @@ from rift_cl.reference.splat_projection import spherical_harmonics
 from rift_cl.sampling.criteria.appearance import variances
 from rift_cl.sampling.criteria.merit import merit
 from rift_cl.sampling.criteria.surface import surface_merit, texture_coverage
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.prior import directions_for
 from rift_cl.sampling.targets.target import Target
 
@@ -23,8 +23,14 @@ def patch(**settings):
 
 
 def looking(directions, pixel=0.0):
-    looks = Looks.along(directions)
-    return Looks(looks.direction, looks.weight, looks.pixel + pixel, looks.cutoff, looks.blur)
+    observations = Observations.along(directions)
+    return Observations(
+        observations.direction,
+        observations.weight,
+        observations.pixel + pixel,
+        observations.cutoff,
+        observations.blur,
+    )
 
 
 def tilted(angle, turn=0.0):
@@ -61,15 +67,15 @@ def test_light_adds_up_and_more_views_never_make_it_worse():
 @pytest.mark.parametrize("kind", ["wiener", "logdet"])
 def test_sheen_is_that_of_the_matrix_of_harmonics(kind):
     views = np.random.default_rng(1).normal((0, 0, 2), size=(7, 3))
-    looks, degree = looking(views), 2
-    both, _ = surface_merit(looks, patch(snr=20.0, degree=degree), kind)
+    observations, degree = looking(views), 2
+    both, _ = surface_merit(observations, patch(snr=20.0, degree=degree), kind)
     # Of degree 0 the brightness is one number, whose error is known by itself.
-    units = looks.direction[:, 0]
+    units = observations.direction[:, 0]
     light = units[:, 2]
     scale = np.sqrt(np.repeat(variances(degree), [1, 3, 5]))
     basis = spherical_harmonics(units, degree) * np.sqrt(4 * np.pi) * scale
     gram = np.eye(9) + 20 * (basis * light[:, None]).T @ basis
-    plain, _ = surface_merit(looks, patch(snr=20.0, degree=0), kind)
+    plain, _ = surface_merit(observations, patch(snr=20.0, degree=0), kind)
     if kind == "wiener":
         toward = directions_for(3, 4000)
         waves = spherical_harmonics(toward, degree) * np.sqrt(4 * np.pi) * scale
@@ -85,9 +91,9 @@ def test_sheen_is_that_of_the_matrix_of_harmonics(kind):
 def test_sheen_wants_views_from_several_sides():
     close = [tilted(0.05 * n, n) for n in range(16)]
     spread = [tilted(1.2 * np.sqrt((n + 0.5) / 16), 2.4 * n) for n in range(16)]
-    sheen = [surface_merit(looking(v), patch(degree=3))[0] for v in (close, spread)]
+    appearance = [surface_merit(looking(v), patch(degree=3))[0] for v in (close, spread)]
     matt = [surface_merit(looking(v), patch(degree=0))[0] for v in (close, spread)]
-    assert sheen[1] < sheen[0]
+    assert appearance[1] < appearance[0]
     assert matt[1] > matt[0]
 
 

@@ -23,14 +23,14 @@ LONG = CameraType("long", 35.0, 4.0, 0.005, (1000, 1200))
 def test_a_plan_is_judged_at_frequencies_that_it_was_not_made_with():
     target = Target(CENTER, 60.0, band=6 / 60, snr=100.0)
     found = plan(target, 4, method="greedy")
-    planned = found.objective.site.target.k
-    judged = found.objective.elsewhere.site.target.k
+    planned = found.objective.design.target.k
+    judged = found.objective.elsewhere.design.target.k
     assert len(planned) == 4 * len(target.k)
     assert len(judged) > len(planned)
     assert not set(map(tuple, planned)) & set(map(tuple, judged))
     scored = merit(found.cameras, replace(target, frequencies=judged), weights=found.weights)
     assert found.elsewhere == pytest.approx(scored.value, rel=1e-9)
-    assert found.knee().merits[-1] == pytest.approx(found.elsewhere, rel=1e-9)
+    assert found.diminishing_returns().merits[-1] == pytest.approx(found.elsewhere, rel=1e-9)
     own = plan(replace(target, frequencies=target.k), 4, method="greedy")
     assert own.elsewhere == own.merit
 
@@ -62,14 +62,16 @@ def test_a_plan_is_written_in_one_line():
 
 def test_gains_only_shrink_and_the_knee_is_where_they_are_little():
     found = plan(TARGET, 16, Constraints(**SECTOR))
-    knee = found.knee(0.2)
+    diminishing_returns = found.diminishing_returns(0.2)
     assert sorted(found.order) == list(range(16))
-    assert len(knee.merits) == 17
-    assert knee.merits[0] == pytest.approx(1)
-    assert knee.merits[-1] == pytest.approx(found.merit, rel=1e-9)
-    assert (np.diff(knee.gains) <= 1e-9).all()
-    mean = (knee.merits[0] - knee.merits[knee.views]) / knee.views
-    assert knee.gains[knee.views] < 0.2 * mean
-    assert found.knee(1e-9).views is None
+    assert len(diminishing_returns.merits) == 17
+    assert diminishing_returns.merits[0] == pytest.approx(1)
+    assert diminishing_returns.merits[-1] == pytest.approx(found.merit, rel=1e-9)
+    assert (np.diff(diminishing_returns.gains) <= 1e-9).all()
+    mean = (
+        diminishing_returns.merits[0] - diminishing_returns.merits[diminishing_returns.views]
+    ) / diminishing_returns.views
+    assert diminishing_returns.gains[diminishing_returns.views] < 0.2 * mean
+    assert found.diminishing_returns(1e-9).views is None
     with pytest.raises(InputError, match="share is 2"):
-        found.knee(2)
+        found.diminishing_returns(2)

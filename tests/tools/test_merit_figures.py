@@ -20,7 +20,9 @@ def study(monkeypatch):
     monkeypatch.setattr(module, "_extent", lambda plan: (1, 2))
     monkeypatch.setattr(module, "COUNTS", (12,))
     exact = module.exact
-    monkeypatch.setattr(module, "exact", lambda looks, target: exact(looks, target, 12))
+    monkeypatch.setattr(
+        module, "exact", lambda observations, target: exact(observations, target, 12)
+    )
     known = importlib.import_module("figures.known_objects")
     for name, value in {"_LEARNT": 30, "_STEPS": 8, "_FREQUENCIES": 400}.items():
         monkeypatch.setattr(known, name, value)

@@ -9,9 +9,9 @@ from test_basis_parameters import COUNT, with_modes
 
 from rift_cl.basis.indices import graded
 from rift_cl.train.parameters import MORE, Parameters
-from rift_cl.train.settings import Densification, Renewal
+from rift_cl.train.settings import Densification, Relocation
 from rift_cl.train.strategy.densify import densify
-from rift_cl.train.strategy.relocation import renew, renew_densities
+from rift_cl.train.strategy.relocation import relocate, relocate_densities
 from rift_cl.train.views.quaternions import rotated
 
 
@@ -21,7 +21,7 @@ def test_splats_that_share_a_place_have_the_depth_of_the_one_before(device):
     raw["logits"] = np.linspace(-2, 6, 60).astype(np.float32)
     raw["logits"][:9] = -9
     before = Parameters.of(device, raw, step=600, amplitude=True)
-    after = renew(before, Renewal(), most=60, seed=1, growth=0.0)
+    after = relocate(before, Relocation(), most=60, seed=1, growth=0.0)
     assert after.amplitude
     new = after.host()[0]
     assert np.array_equal(new["log_scales"][9:], raw["log_scales"][9:])
@@ -72,7 +72,7 @@ def test_halves_of_x_ray_splats_keep_all_moments_to_the_third(device, order):
     raw["logits"] = np.linspace(0, 1, 12).astype(np.float32)
     raw["logits"][:3] = -40
     before = Parameters.of(device, raw, step=100, density=True)
-    after = renew_densities(before, Renewal(faint=0.05), np.ones(12, np.float32), seed=4)
+    after = relocate_densities(before, Relocation(faint=0.05), np.ones(12, np.float32), seed=4)
     new = after.host()[0]
     assert (new["logits"] > -10).all()
     one, other = moments_of(raw, 3), moments_of(new, 3)

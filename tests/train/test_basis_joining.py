@@ -13,7 +13,7 @@ from rift_cl.splat.orders import count_of
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.settings import Renewal
+from rift_cl.train.settings import Relocation
 from rift_cl.train.start.points import random_points, start_splats
 from rift_cl.train.trainer import Trainer
 from rift_cl.train.xray.trainer import XrayTrainer, xray_settings
@@ -34,8 +34,8 @@ KINDS = {
 def trainer_of(device, kind, ball=None, **more):
     pictures = ball or Ball(device)
     raw = start_splats(random_points(pictures.cameras, 60, 1), None, seed=1)
-    renewal = Renewal(first=10, every=10)
-    settings = replace(SETTINGS, steps=STEPS, splats=80, renewal=renewal, **KINDS[kind])
+    relocation = Relocation(first=10, every=10)
+    settings = replace(SETTINGS, steps=STEPS, splats=80, relocation=relocation, **KINDS[kind])
     return Trainer(pictures, Parameters.of(device, raw), replace(settings, **more))
 
 
@@ -114,12 +114,12 @@ def test_settled_splats_are_gaussians_for_good(device):
         raw = trainer.parameters.host()[0]
         return np.sqrt((raw["shape_modes"] ** 2).sum(1) + (raw["color_modes"] ** 2).sum((1, 2)))
 
-    ball, still = Ball(device), Renewal(first=STEPS)
-    free = trainer_of(device, "settled", ball, renewal=still, basis=BOTH)
+    ball, still = Ball(device), Relocation(first=STEPS)
+    free = trainer_of(device, "settled", ball, relocation=still, basis=BOTH)
     run_to(free, 15)
     least = float(np.median(norms(free)))
     basis = replace(BOTH, least=least, settle=0.5)
-    trainer = trainer_of(device, "settled", ball, renewal=still, basis=basis)
+    trainer = trainer_of(device, "settled", ball, relocation=still, basis=basis)
     run_to(trainer, 15)
     held = norms(trainer) == 0
     assert 20 < held.sum() < 40 and (norms(trainer)[~held] > least).all()

@@ -39,7 +39,7 @@ def found(device, loss, image, target, weights=None):
     return float(device.get(value)[0]), device.get(grad)
 
 
-def demand_equal(found, wanted):
+def check_equal(found, wanted):
     value, gradient = wanted
     assert found[0] == pytest.approx(value, rel=1e-5)
     assert np.linalg.norm(found[1] - gradient) <= 1e-5 * np.linalg.norm(gradient)
@@ -64,13 +64,13 @@ def test_gradient_of_the_twin_is_that_of_differences(kind, weighted):
 @pytest.mark.parametrize("size", [(11, 11), (19, 87)])
 def test_any_number_of_channels_is_the_twins(device, size, channels):
     image, target = pair(size, channels)
-    demand_equal(found(device, ImageLoss(), image, target), twin.image_loss(image, target))
+    check_equal(found(device, ImageLoss(), image, target), twin.image_loss(image, target))
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_loss_and_gradient_are_the_twins(device, size):
     image, target = pair(size)
-    demand_equal(found(device, ImageLoss(), image, target), twin.image_loss(image, target))
+    check_equal(found(device, ImageLoss(), image, target), twin.image_loss(image, target))
 
 
 SETTINGS = [(0, "l2", True), (0.7, "l2", True), (1, "l1", False), (0.2, "l1", True)]
@@ -83,7 +83,7 @@ def test_every_setting_is_the_twins(device, ssim_weight, kind, weighted):
     weights = mask(size) if weighted else None
     settings = {"ssim_weight": ssim_weight, "kind": kind}
     wanted = twin.image_loss(image, target, weights, **settings)
-    demand_equal(found(device, ImageLoss(**settings), image, target, weights), wanted)
+    check_equal(found(device, ImageLoss(**settings), image, target, weights), wanted)
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -120,7 +120,7 @@ def test_flipped_images_have_the_flipped_gradient(device, axis):
     image, target = pair((29, 101))
     value, gradient = found(device, ImageLoss(), image, target)
     flipped = found(device, ImageLoss(), np.flip(image, axis), np.flip(target, axis))
-    demand_equal(flipped, (value, np.flip(gradient, axis)))
+    check_equal(flipped, (value, np.flip(gradient, axis)))
 
 
 def test_gradient_reaches_no_further_than_two_windows(device):
@@ -138,7 +138,7 @@ def test_loss_is_linear_in_the_weights(device):
     some = mask((40, 33))
     parts = [found(device, ImageLoss(), image, target, each) for each in (some, 1 - some)]
     whole = found(device, ImageLoss(), image, target)
-    demand_equal([a + b for a, b in zip(*parts, strict=True)], whole)
+    check_equal([a + b for a, b in zip(*parts, strict=True)], whole)
     ones = found(device, ImageLoss(), image, target, np.ones((40, 33), np.float32))
     assert ones[0] == whole[0] and np.array_equal(ones[1], whole[1])
 
@@ -163,7 +163,7 @@ def test_loss_is_the_mean_over_the_channels(device):
         for c in range(4)
     ]
     wanted = np.mean([one for one, _ in planes]), np.dstack([grad for _, grad in planes]) / 4
-    demand_equal((value, gradient), wanted)
+    check_equal((value, gradient), wanted)
 
 
 def test_every_run_has_the_same_bits(device):
@@ -178,7 +178,7 @@ def test_every_run_has_the_same_bits(device):
 def test_small_images_have_a_loss_without_ssim(device, size):
     image, target = pair(size)
     wanted = twin.image_loss(image, target, ssim_weight=0)
-    demand_equal(found(device, ImageLoss(0), image, target), wanted)
+    check_equal(found(device, ImageLoss(0), image, target), wanted)
 
 
 def test_loss_and_gradient_are_kornias_inside(device):
@@ -194,7 +194,7 @@ def test_loss_and_gradient_are_kornias_inside(device):
     map_ = kornia.ssim(*planes, 11, padding="valid")
     wanted = (1 - map_).sum() / target.size
     wanted.backward()
-    demand_equal((value, gradient), (wanted.item(), planes[0].grad[0].permute(1, 2, 0).numpy()))
+    check_equal((value, gradient), (wanted.item(), planes[0].grad[0].permute(1, 2, 0).numpy()))
 
 
 def test_settings_are_checked():

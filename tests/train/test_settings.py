@@ -7,7 +7,7 @@ from dataclasses import fields
 import pytest
 
 from rift_cl.errors import InputError
-from rift_cl.train.settings import Densification, Rates, Renewal, TrainSettings
+from rift_cl.train.settings import Densification, Rates, Relocation, TrainSettings
 
 NAN, INF = float("nan"), float("inf")
 
@@ -20,12 +20,12 @@ NAN, INF = float("nan"), float("inf")
         (Rates, {"means_last": 1.5}, "means_last is 1.5"),
         (Rates, {"logits": 1e39}, "logits is 1e\\+39"),
         (Rates, {"sh": "fast"}, "sh is 'fast'"),
-        (Renewal, {"every": 0}, "Renewal: every is 0, wanted a whole number >= 1"),
-        (Renewal, {"every": 2.5}, "every is 2.5"),
-        (Renewal, {"first": -1}, "first is -1"),
-        (Renewal, {"last": 1.1}, "last is 1.1, wanted 0 to 1"),
-        (Renewal, {"growth": -0.1}, "growth is -0.1"),
-        (Renewal, {"faint": 2}, "faint is 2"),
+        (Relocation, {"every": 0}, "Relocation: every is 0, wanted a whole number >= 1"),
+        (Relocation, {"every": 2.5}, "every is 2.5"),
+        (Relocation, {"first": -1}, "first is -1"),
+        (Relocation, {"last": 1.1}, "last is 1.1, wanted 0 to 1"),
+        (Relocation, {"growth": -0.1}, "growth is -0.1"),
+        (Relocation, {"faint": 2}, "faint is 2"),
         (Densification, {"every": 0}, "Densification: every is 0"),
         (Densification, {"reset_least": 0}, "reset_least is 0"),
         (Densification, {"first": -0.1}, "first is -0.1, wanted 0 to 1"),
@@ -43,7 +43,7 @@ def test_a_number_out_of_its_range_is_named(kind, changes, words):
         kind(**changes)
 
 
-@pytest.mark.parametrize("kind", [Rates, Renewal, Densification])
+@pytest.mark.parametrize("kind", [Rates, Relocation, Densification])
 @pytest.mark.parametrize("value", [NAN, INF, -INF, "1", [1, 2]])
 def test_what_is_no_number_is_refused_everywhere(kind, value):
     for item in fields(kind):
@@ -55,7 +55,7 @@ def test_what_is_no_number_is_refused_everywhere(kind, value):
 def test_zero_switches_off_what_can_be_switched_off():
     groups = ("means", "quats", "log_scales", "logits", "sh", "sh_rest")
     assert Rates(**dict.fromkeys(groups, 0)).sh == 0
-    assert Renewal(noise=0, opacity_penalty=0, scale_penalty=0, growth=0).noise == 0
+    assert Relocation(noise=0, opacity_penalty=0, scale_penalty=0, growth=0).noise == 0
     assert Densification(reset=0, large_on_screen=None).reset == 0
 
 

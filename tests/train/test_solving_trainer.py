@@ -32,12 +32,12 @@ def trainer_of(device, pictures, *, rows, every=5, **more):
         basis=BasisSettings("hermite", 2, first=0.2, every=0.2, **more),
         solve=SolveSettings(every, views=4),
     )
-    # Renewed between solves and just before one.
-    renewal = replace(settings.renewal, first=4, every=6, faint=0.5)
+    # Relocated between solves and just before one.
+    relocation = replace(settings.relocation, first=4, every=6, faint=0.5)
     return XrayTrainer(
         pictures,
         Parameters.of(device, raw, density=True),
-        replace(settings, renewal=renewal),
+        replace(settings, relocation=relocation),
         DRAWING,
         flat=rows == 1,
     )
@@ -74,7 +74,7 @@ def test_between_solves_densities_stay_and_the_last_one_ends_the_fit(device):
     pictures = pictures_of(device, scene(0))
     trainer = trainer_of(device, pictures, rows=SIZE, every=10)
     trainer.settings = replace(
-        trainer.settings, renewal=replace(trainer.settings.renewal, first=STEPS)
+        trainer.settings, relocation=replace(trainer.settings.relocation, first=STEPS)
     )
     trainer.strategy.settings = trainer.settings
 

@@ -13,14 +13,14 @@ from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.loss.image_loss import ImageLoss
 from rift_cl.train.parameters import GROUPS, Parameters
-from rift_cl.train.settings import Densification, Renewal, TrainSettings
+from rift_cl.train.settings import Densification, Relocation, TrainSettings
 from rift_cl.train.start.points import random_points, scene_extent, start_splats
-from rift_cl.train.strategy.default import Densify
+from rift_cl.train.strategy.default import DefaultStrategy
 from rift_cl.train.strategy.mcmc import strategy_of
 
 RATES = {"means": 1e-3, "quats": 1e-3, "log_scales": 5e-3, "logits": 5e-2, "sh": 2.5e-3}
 MCMC = TrainSettings(
-    steps=40, splats=90, strategy="mcmc", finish=0.25, renewal=Renewal(first=10, every=5)
+    steps=40, splats=90, strategy="mcmc", finish=0.25, relocation=Relocation(first=10, every=5)
 )
 # The scene is as large as its extent and its splats are few, so that size prunes none.
 HOW = Densification(every=5, first=0.2, last=0.8, reset=0.1, reset_least=12, gradient=3e-5, large=1)
@@ -85,7 +85,7 @@ def test_a_short_run_gets_all_its_splats_by_its_middle(ball):
     _, sizes = run(ball, *begun(ball, replace(MCMC, splats=200)), 30)
     assert sizes[8] == 60 and 60 < sizes[9] < sizes[14] < 200
     assert sizes[19] == 200 == sizes[-1]
-    still = replace(MCMC, splats=200, renewal=replace(MCMC.renewal, growth=0))
+    still = replace(MCMC, splats=200, relocation=replace(MCMC.relocation, growth=0))
     assert run(ball, *begun(ball, still), 30)[1] == [60] * 30
 
 
@@ -131,7 +131,7 @@ def test_opacities_are_reset_and_come_back(ball):
 def test_resets_scale_with_the_run_but_leave_time_to_come_back(ball, steps, how, wanted):
     settings = TrainSettings(steps=steps, strategy="default", densification=how)
     strategy = begun(ball, settings)[1]
-    assert isinstance(strategy, Densify) and strategy.reset_every == wanted
+    assert isinstance(strategy, DefaultStrategy) and strategy.reset_every == wanted
 
 
 def test_penalties_end_with_the_finish_and_densification_has_none(ball):

@@ -15,16 +15,16 @@ from rift_cl.commands.progress_bar import Pace
 from rift_cl.progress import Report
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.settings import Renewal, TrainSettings
+from rift_cl.train.settings import Relocation, TrainSettings
 from rift_cl.train.start.points import start_splats
-from rift_cl.train.strategy.mcmc import MarkovChain
+from rift_cl.train.strategy.mcmc import McmcStrategy
 from rift_cl.train.trainer import Trainer
 
 
 def trained(device, **more):
     """A small fit: its reports, and how many splats each of its steps had."""
-    renewal = Renewal(first=20, every=10, growth=0.3)
-    settings = TrainSettings(steps=120, splats=80, sh_degree=0, renewal=renewal, **more)
+    relocation = Relocation(first=20, every=10, growth=0.3)
+    settings = TrainSettings(steps=120, splats=80, sh_degree=0, relocation=relocation, **more)
     points = np.random.default_rng(0).uniform(-0.5, 0.5, (25, 3))
     trainer = Trainer(
         Ball(device),
@@ -64,7 +64,7 @@ def test_reports_say_how_much_work_is_done_and_left(device):
 def test_the_time_left_is_within_a_quarter_from_a_tenth_of_the_run_on(steps, first, share):
     """Whatever share of a last step's time is its splats'; the worst is printed."""
     most = 8000
-    chain = MarkovChain(TrainSettings(steps=steps, splats=most), finish=steps)
+    chain = McmcStrategy(TrainSettings(steps=steps, splats=most), finish=steps)
     runs = chain.forecast(0, first)
     counts = np.concatenate([np.full(length, count) for length, count in runs])
     seconds = np.cumsum(1 - share + share * counts / most)

@@ -13,13 +13,18 @@ from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import GROUPS, Parameters
 from rift_cl.train.schedule import Schedule
-from rift_cl.train.settings import Renewal, TrainSettings
+from rift_cl.train.settings import Relocation, TrainSettings
 from rift_cl.train.start.points import hull_points, random_points, start_splats
 from rift_cl.train.trainer import Trainer
 
 MIDDLE = np.array([0.3, -0.2, 0.1])
 SETTINGS = TrainSettings(
-    steps=120, splats=150, sh_degree=1, sh_every=40, seed=3, renewal=Renewal(first=40, every=20)
+    steps=120,
+    splats=150,
+    sh_degree=1,
+    sh_every=40,
+    seed=3,
+    relocation=Relocation(first=40, every=20),
 )
 
 

@@ -4,8 +4,8 @@ Every splat has density one; what it shows is a colour with Hermite modes (``Spl
 so that pictures are linear in the coefficients of all modes, the constant one included, and no
 coefficient is divided by another. All that depends on the geometry alone is worked out once: where
 splats are on the screen, their tile lists, and the matrices by which modes go there. That is for
-races of a few hundred splats; ``rift_cl.train.xray.additive`` does the same for as many as fits have,
-view by view.
+races of a few hundred splats; ``rift_cl.train.xray.additive`` does the same for as many as fits
+have, view by view.
 """
 
 from __future__ import annotations

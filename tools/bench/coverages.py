@@ -21,7 +21,7 @@ from rift_cl.geometry import Aperture, Camera
 from rift_cl.geometry.pose import look_at
 from rift_cl.sampling.coverage.density import half_sphere
 from rift_cl.sampling.coverage.device import coverage, coverage_grad
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
 # Numbers of a view, and beyond how many u = n . k, in cycles per diameter, a slab is over.
@@ -65,7 +65,7 @@ class CoverageCase:
     @cached_property
     def pairs(self) -> float:
         """Views and frequencies in their slabs."""
-        normals = Looks.of(self.cameras, [(0, 0, 0)]).direction[:, 0]
+        normals = Observations.of(self.cameras, [(0, 0, 0)]).direction[:, 0]
         return float(sum(np.count_nonzero(np.abs(self.k @ n) * 2 < _REACH) for n in normals))
 
     def record(self) -> dict[str, Any]:

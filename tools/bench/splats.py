@@ -82,7 +82,7 @@ class SplatCase:
 
     @cached_property
     def camera(self) -> Camera:
-        """Looks at the cube from four half-edges away."""
+        """Observations at the cube from four half-edges away."""
         view = np.eye(4)
         view[2, 3] = 4
         focal, center = 1.2 * self.size, self.size / 2

@@ -66,7 +66,7 @@ class TorchTrainer:
             self._adam.step()
             self._step += 1
             if self._step <= self._schedule.finish:
-                self._shake(self._settings.renewal.noise * rates["means"])
+                self._shake(self._settings.relocation.noise * rates["means"])
             return float(loss.detach())
 
     def _set_rates(self) -> dict[str, float]:
@@ -87,11 +87,11 @@ class TorchTrainer:
         }
 
     def _penalties(self, drawn: Mapping[str, torch.Tensor]) -> torch.Tensor:
-        renewal = self._settings.renewal
+        relocation = self._settings.relocation
         if self._step >= self._schedule.finish:
             return torch.zeros(())
         opacity, scale = drawn["opacities"].mean(), drawn["scales"].mean()
-        return renewal.opacity_penalty * opacity + renewal.scale_penalty * scale
+        return relocation.opacity_penalty * opacity + relocation.scale_penalty * scale
 
     @torch.no_grad()
     def _shake(self, amount: float) -> None:

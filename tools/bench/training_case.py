@@ -30,7 +30,7 @@ from rift_cl.sample import ornament
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
 from rift_cl.train.parameters import Arrays, Parameters
-from rift_cl.train.settings import Renewal, TrainSettings
+from rift_cl.train.settings import Relocation, TrainSettings
 from rift_cl.train.trainer import Pictures, Trainer
 
 # Views that are looked at; each has its turn in every pass.
@@ -97,7 +97,7 @@ class TrainingCase:
             splats=self.count,
             sh_degree=3,
             noise=0.0,
-            renewal=Renewal(first=_STEPS),
+            relocation=Relocation(first=_STEPS),
         )
 
     @cached_property
@@ -168,7 +168,7 @@ class DrawnPictures:
 
 
 def _on_ring(number: int, size: tuple[int, int]) -> Camera:
-    """Looks at the cube from four half-edges away, a part of the way around it."""
+    """Observations at the cube from four half-edges away, a part of the way around it."""
     turn = 2 * math.pi * number / VIEWS
     view = np.eye(4)
     view[0, 0] = view[2, 2] = math.cos(turn)

@@ -24,8 +24,8 @@ from bench.training_case import VIEWS, TrainingCase
 from bench.waits import Wait, each_wait
 from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.settings import Rates, Renewal
-from rift_cl.train.strategy.relocation import renew
+from rift_cl.train.settings import Rates, Relocation
+from rift_cl.train.strategy.relocation import relocate
 from rift_cl.train.trainer import Pictures, Trainer
 
 _STAGES = {
@@ -188,15 +188,15 @@ def host_work(case: TrainingCase, *, passes: int) -> dict[str, Any]:
     }
 
 
-def renewal_price(case: TrainingCase, *, passes: int) -> dict[str, Any]:
+def relocation_price(case: TrainingCase, *, passes: int) -> dict[str, Any]:
     """What a renewal takes on the host where a share of the splats has faded, and of a step."""
-    settings, faded = Renewal(), int(_FADED * len(case.raw["means"]))
+    settings, faded = Relocation(), int(_FADED * len(case.raw["means"]))
     logits = case.raw["logits"].copy()
     logits[:faded] = _FADED_LOGIT
     parameters = Parameters.of(case.device, {**case.raw, "logits": logits})
 
     def run() -> None:
-        renew(parameters, settings, most=case.count, seed=0, growth=0.0)
+        relocate(parameters, settings, most=case.count, seed=0, growth=0.0)
         case.device.finish()
 
     run()

@@ -98,10 +98,10 @@ def _difference(scene: dict[str, Any], entry: dict[str, Any]) -> str:
 def _host(record: dict[str, Any]) -> Table:
     rows = []
     for scene in record["scenes"]:
-        host, renewal = scene["host"], scene["renewal"]
+        host, relocation = scene["host"], scene["renewal"]
         step, busy, waits = host["step"], host["host"], host["waits"]["plain"]
         waited = sum(wait["seconds"] for wait in waits)
-        each = renewal["min_s"] / renewal["every"] / step["min_s"]
+        each = relocation["min_s"] / relocation["every"] / step["min_s"]
         rows.append(
             (
                 *(
@@ -111,7 +111,7 @@ def _host(record: dict[str, Any]) -> Table:
                     f"{busy['min_s'] / step['min_s']:.0%}",
                 ),
                 *(f"{sum(wait['per_step'] for wait in waits):.3g}", milliseconds(waited)),
-                *(times(renewal), f"{each:.1%}"),
+                *(times(relocation), f"{each:.1%}"),
             )
         )
     columns = ("scene", "a step, ms", "host, ms", "of the step", "waits in a step", "waited, ms")

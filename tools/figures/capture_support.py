@@ -21,7 +21,7 @@ from rift_cl import Device
 from rift_cl.commands.analyze.facts import missing, resolution
 from rift_cl.commands.analyze.input import open_sampled
 from rift_cl.commands.analyze.settings import AnalyzeSettings
-from rift_cl.commands.inputs.view_set import Sampled
+from rift_cl.commands.inputs.view_set import ViewSet
 from rift_cl.commands.pictures.coverage_pictures import LEAST, PLANES, near_band, plane_density
 from rift_cl.io.captures.capture import capture_name, holds_capture
 from rift_cl.report.html_page import Page
@@ -135,7 +135,7 @@ def _logarithms() -> tuple[float, float]:
     return float(np.log10(_WINDOW[0] / 2)), float(np.log10(_WINDOW[1]))
 
 
-def _mean(sampled: Sampled, device: Device) -> Floats:
+def _mean(sampled: ViewSet, device: Device) -> Floats:
     """The mean over directions, as a share of the views."""
     k = (_CYCLES[:, None, None] / sampled.target.diameter * half_sphere(_WAYS)).reshape(-1, 3)
     found = sampled.coverage(k, device, points=sampled.target.center[None])[0]

@@ -23,7 +23,7 @@ from rift_cl.report.plot import FrequencySlice, curves, figure_png, frequency_ma
 from rift_cl.sampling.coverage.cube import cube_axis
 from rift_cl.sampling.coverage.density import density, half_sphere, mean_density, power_slope
 from rift_cl.sampling.coverage.slice_theorem import slice_comparison
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
 NAME = "figure_02_04"
@@ -109,8 +109,8 @@ def _densities(samples: int, device: Device) -> dict[str, Any]:
     scan = Parallel(np.arange(VIEWS) * np.pi / VIEWS, 64, pitch=1e-4)
     plane = mean_density(scan, Target.flat(1.0), radii, samples=samples, device=device)
     space = Target((0, 0, 0), 1.0)
-    looks = Looks.along(half_sphere(VIEWS))
-    sphere = mean_density(looks, space, radii, samples=samples, device=device)
+    observations = Observations.along(half_sphere(VIEWS))
+    sphere = mean_density(observations, space, radii, samples=samples, device=device)
     return {
         "k": radii.tolist(),
         "plane": plane.tolist(),

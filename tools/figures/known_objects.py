@@ -41,7 +41,8 @@ class Objects:
         array = np.fft.fftshift(self.power)
         known = Spectrum(array, 1 / SIZE)
         prior: Prior = PowerLaw(_slope(array)) if kind == "isotropic" else known
-        # Power at one cycle per diameter, over the noise's there: see ``rift_cl.sampling.criteria.exact``.
+        # Power at one cycle per diameter, over the noise's there: see
+        # ``rift_cl.sampling.criteria.exact``.
         first = array[SIZE // 2, SIZE // 2] / known.power(np.zeros((1, 3)), diameter)[0]
         self.target = Target.flat(
             diameter,

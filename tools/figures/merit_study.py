@@ -30,7 +30,7 @@ from rift_cl.report.plot import figure_png
 from rift_cl.sampling.criteria.exact import exact
 from rift_cl.sampling.criteria.kriging import kriging
 from rift_cl.sampling.criteria.merit import CoverageMerit, merit_of_coverage
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
 NAME = "merit_study"
@@ -145,13 +145,13 @@ def _row(objects: Objects, angles: Floats, seed: int, device: Device) -> dict[st
 
 def scores(angles: Floats, target: Target) -> dict[str, float]:
     """Every score of a set of directions; lower is better."""
-    looks = Looks.of_scan(Parallel(angles, SIZE))
+    observations = Observations.of_scan(Parallel(angles, SIZE))
     between = gaps(angles)
-    known = coverage(looks, target.k, target.diameter)
+    known = coverage(observations, target.k, target.diameter)
     return {
         **{kind: merit_of_coverage(kind, known, target).value for kind in _BY_COVERAGE},
-        "kriging": kriging(looks, target),
-        "exact": exact(looks, target),
+        "kriging": kriging(observations, target),
+        "exact": exact(observations, target),
         "gap": float(between.max()),
         "gaps": float((between**2).sum()),
     }

@@ -72,8 +72,8 @@ def _piloted(objects: Objects, views: int, phase: float, seed: int, device: Devi
     """(objects, views) a few even angles, and those planned from a reconstruction by them."""
     first = (np.arange(PILOT[views]) + phase) * np.pi / PILOT[views]
     target, found = objects.target, []
-    looks = _images(objects, np.tile(first, (len(objects.truth), 1)), seed, device)["CGLS"]
-    for image in looks:
+    observations = _images(objects, np.tile(first, (len(objects.truth), 1)), seed, device)["CGLS"]
+    for image in observations:
         prior = Pilot(image, 1.0)
         band = _audible(prior, target)
         known = Target.flat(

@@ -75,7 +75,7 @@ def sector_sets(target: Target, seeds: int) -> tuple[dict[str, list[Floats]], Pl
     double = np.linspace(first, last, 2 * VIEWS)
     found[TWICE] = [directions(double, np.full(2 * VIEWS, np.pi / 6))]
     made = plan(target, VIEWS, SECTOR)
-    even = made.baselines["fibonacci"].stations.table
+    even = made.baselines["fibonacci"].view_table.table
     found["Fibonacci"] = [directions(even[:, 0], even[:, 1])]
     random = np.random.default_rng(0)
     found["random"] = [
@@ -92,7 +92,7 @@ def sector_sets(target: Target, seeds: int) -> tuple[dict[str, list[Floats]], Pl
 def free_sets(target: Target) -> tuple[dict[str, list[Floats]], Plan]:
     """Directions all round by name, and the plan."""
     made = plan(target, VIEWS)
-    even = made.baselines["fibonacci"].stations.table
+    even = made.baselines["fibonacci"].view_table.table
     turn = np.arange(VIEWS) * 2 * np.pi / VIEWS
     return {
         "ring at 30": [directions(turn, np.full(VIEWS, np.pi / 6))],

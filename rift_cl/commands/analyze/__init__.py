@@ -1,1 +1,1 @@
-"""TODO."""
+"""``rift analyze``: what views sampled, what they missed, what limits detail, what to add."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rift_cl.commands.inputs.view_set import Sampled
+from rift_cl.commands.inputs.view_set import ViewSet
 from rift_cl.sampling.criteria.limits import CAUSES, Limits, limits
 from rift_cl.sampling.criteria.merit import merit_of_coverage
 from rift_cl.sampling.criteria.orlov import Orlov, orlov
@@ -50,12 +50,12 @@ class Findings:
     sentences: tuple[str, ...]
 
 
-def missing(sampled: Sampled) -> Findings:
+def missing(sampled: ViewSet) -> Findings:
     """Orlov's and Tuy's conditions, the missing cone and the largest gap."""
-    looks, target = sampled.looks(), sampled.target
+    observations, target = sampled.observations(), sampled.target
     finest = sampled.finest * target.diameter
     found = {
-        n: orlov(looks, target, frequency=n / target.diameter)
+        n: orlov(observations, target, frequency=n / target.diameter)
         for n in _CYCLES
         if n <= max(finest, _DETAIL)
     }
@@ -69,7 +69,7 @@ def missing(sampled: Sampled) -> Findings:
         "tuy": None,
     }  # fmt: skip
     sentences = [_hole(found[_DETAIL]), *one_place(sampled)]
-    if len(looks.weight) == 1:
+    if len(observations.weight) == 1:
         sentences.append(_ONE)
     if not sampled.is_flat and all(camera.model != "ortho" for camera in sampled.cameras):
         planes = tuy(sampled.cameras, target)
@@ -78,7 +78,7 @@ def missing(sampled: Sampled) -> Findings:
     return Findings(figures, (_holes(found, sampled.unit),), tuple(sentences))
 
 
-def one_place(sampled: Sampled) -> tuple[str, ...]:
+def one_place(sampled: ViewSet) -> tuple[str, ...]:
     """A sentence if several views look from one and the same side; none otherwise."""
     ways = sampled.directions()
     if len(ways) < 2:
@@ -94,7 +94,7 @@ def one_place(sampled: Sampled) -> tuple[str, ...]:
     )
 
 
-def _told_by(frequency: float, sampled: Sampled) -> str:
+def _told_by(frequency: float, sampled: ViewSet) -> str:
     """What a set's slices tell in nine tenths of all directions, if that is less than the whole."""
     if frequency * sampled.target.diameter < 1:
         return ", and leave more than a tenth of all directions without any detail"
@@ -143,15 +143,15 @@ def _planes(unmet: float, near: str) -> str:
     )
 
 
-def resolution(sampled: Sampled, names: tuple[str, ...]) -> Findings:
+def resolution(sampled: ViewSet, names: tuple[str, ...]) -> Findings:
     """What ends detail at each point of the target, with lengths, and Crowther's count.
 
     Args:
         sampled: the views.
         names: of the target's points.
     """
-    looks, target, units = sampled.looks(), sampled.target, sampled.units
-    found, count = limits(looks, target), crowther(looks, target)
+    observations, target, units = sampled.observations(), sampled.target, sampled.units
+    found, count = limits(observations, target), crowther(observations, target)
     points = [_ends(found, p, name) for p, name in enumerate(names)]
     rows = [
         (
@@ -179,7 +179,7 @@ def resolution(sampled: Sampled, names: tuple[str, ...]) -> Findings:
     return Findings(record, ((heads, rows, caption),), sentences)
 
 
-def _ended(found: Limits, name: str, sampled: Sampled) -> str:
+def _ended(found: Limits, name: str, sampled: ViewSet) -> str:
     """What ends detail at the first point; within the directions seen, where many are not."""
     units, cause = sampled.units, found.cause[0]
     if found.reached[0] * sampled.target.diameter >= 1 or not found.within[0]:
@@ -210,17 +210,17 @@ def _ends(found: Limits, p: int, name: str) -> dict[str, Any]:
     }
 
 
-def length_in_words(frequency: float, sampled: Sampled) -> str:
+def length_in_words(frequency: float, sampled: ViewSet) -> str:
     """One cycle at which detail ends; a dash where it does not, none where nothing is told."""
     if frequency * sampled.target.diameter < 1:
         return "none"
     return f"{1 / frequency:.3g}" if frequency < _ENDLESS * sampled.finest else "–"
 
 
-def unknown_share(sampled: Sampled) -> float:
+def unknown_share(sampled: ViewSet) -> float:
     """The share of the target's power that stays unknown, if it falls as 1/k^2."""
     from rift_cl.reference.coverage import coverage
 
     target = sampled.target
-    found = coverage(sampled.looks(), target.k, target.diameter)
+    found = coverage(sampled.observations(), target.k, target.diameter)
     return merit_of_coverage("wiener", found, target).value

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from rift_cl.commands.analyze.settings import AnalyzeSettings
-from rift_cl.commands.cameras.arc import demand_places
+from rift_cl.commands.cameras.arc import check_places
 from rift_cl.commands.center.axis_search import find_axis
 from rift_cl.commands.inputs.fan_views import fan_cameras
 from rift_cl.commands.inputs.scene_bounds import SceneBounds, bounds_of_cameras
 from rift_cl.commands.inputs.scene_depth import space_of
 from rift_cl.commands.inputs.surfaces import trusted
-from rift_cl.commands.inputs.view_set import Floats, Sampled, points_of
+from rift_cl.commands.inputs.view_set import Floats, ViewSet, points_of
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera, Parallel
 from rift_cl.geometry.aperture import Aperture
@@ -34,7 +34,7 @@ _OPAQUE = (
 _NANO = 1e6
 
 
-def open_sampled(settings: AnalyzeSettings) -> Sampled:
+def open_sampled(settings: AnalyzeSettings) -> ViewSet:
     """The views of a capture or of a scan, and their target.
 
     Raises:
@@ -44,18 +44,18 @@ def open_sampled(settings: AnalyzeSettings) -> Sampled:
     return _capture(settings) if holds_capture(path) else _scan(settings)
 
 
-def _capture(settings: AnalyzeSettings) -> Sampled:
+def _capture(settings: AnalyzeSettings) -> ViewSet:
     for name in ("dataset", "theta", "image_key", "axes", "angle_unit"):
         if getattr(settings, name) is not None:
             option = name.replace("_", "-")
             raise InputError(f"--{option} is about a scan, {settings.source} is a capture")
     capture = open_capture(settings.source, photographs=False)
     cameras = [view.camera for view in capture.views]
-    demand_places(cameras, settings.source)
+    check_places(cameras, settings.source)
     bounds = bounds_of_cameras(cameras, points=capture.points)
     center, diameter, notes = _ball(settings, capture, cameras, bounds)
     lens, more = _with_lens(settings, cameras, center)
-    sampled = Sampled(
+    sampled = ViewSet(
         name=capture_name(settings.source),
         target=_target(settings, center, diameter, bounds.up, flat=False),
         up=bounds.up,
@@ -70,7 +70,7 @@ def _capture(settings: AnalyzeSettings) -> Sampled:
     return sampled if settings.unit is None else in_millimetres(sampled, settings.unit)
 
 
-def _with_space(sampled: Sampled, settings: AnalyzeSettings, capture: Capture) -> Sampled:
+def _with_space(sampled: ViewSet, settings: AnalyzeSettings, capture: Capture) -> ViewSet:
     """The same with what stands where, as far as splats or sparse points tell it."""
     space, known = space_of(settings.source, sampled.cameras, capture.points, settings.device)
     if space is None:
@@ -144,7 +144,7 @@ def _with_lens(
     return made, notes
 
 
-def in_millimetres(sampled: Sampled, unit: float) -> Sampled:
+def in_millimetres(sampled: ViewSet, unit: float) -> ViewSet:
     """The same views with lengths in millimetres, of which a unit of the world has so many."""
     target = sampled.target
     band = None if target.band is None else target.band / unit
@@ -180,7 +180,7 @@ def _target(
     return Target(center=center, diameter=diameter, points=points, band=settings.band)
 
 
-def _scan(settings: AnalyzeSettings) -> Sampled:
+def _scan(settings: AnalyzeSettings) -> ViewSet:
     if settings.mode == "surface":
         raise InputError(f"--mode surface is about photographs, {settings.source} is a scan")
     for name in ("center", "aperture", "focus", "unit"):
@@ -202,7 +202,7 @@ def _scan(settings: AnalyzeSettings) -> Sampled:
         )
     # What a scan can tell ends at half a cycle a bin.
     wanted = replace(settings, band=settings.band or 0.5 / edge)
-    return Sampled(
+    return ViewSet(
         name=Path(file.path).name,
         target=_target(wanted, np.zeros(3), diameter, up, flat=True),
         up=up,

@@ -17,7 +17,7 @@ from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.analyze.suggestions import angles_to_add, cameras_to_add, usual_distance
 from rift_cl.commands.analyze.surface import surface_missing, surface_resolution
 from rift_cl.commands.inputs.surfaces import sides_of, surface_of
-from rift_cl.commands.inputs.view_set import Floats, Sampled, place_of, points_of
+from rift_cl.commands.inputs.view_set import Floats, ViewSet, place_of, points_of
 from rift_cl.commands.pictures.coverage_pictures import MAP_BYTES
 from rift_cl.commands.pictures.views_table import csv_text, view_row
 from rift_cl.commands.run_folder.run_folder import RunFolder
@@ -85,7 +85,7 @@ class Analysis:
         self.metrics = {
             "source": str(self.settings.source),
             "views": sampled.views,
-            "seen_by": int((sampled.looks().weight[:, 0] > 0).sum()),
+            "seen_by": int((sampled.observations().weight[:, 0] > 0).sum()),
             "target": {"center": sampled.target.center, "diameter": sampled.target.diameter},
             "unit": sampled.unit,
             "unknown": self._unknown(sampled),
@@ -160,12 +160,12 @@ class Analysis:
         return Findings(figures, ((columns, rows, caption),), (text,))
 
     @staticmethod
-    def _unknown(sampled: Sampled) -> float:
+    def _unknown(sampled: ViewSet) -> float:
         """What the views leave unknown: of the target's power, or of a surface."""
         if not sampled.opaque:
             return unknown_share(sampled)
         target = surface_of(sampled, usual_distance(sampled))
-        return surface_merit(sampled.looks(target.points), target)[0]
+        return surface_merit(sampled.observations(target.points), target)[0]
 
     def _rows(self, cameras: tuple[Camera, ...]) -> list[tuple[Any, ...]]:
         center, up = self.sampled.target.center, self.sampled.up
@@ -179,16 +179,16 @@ class Analysis:
             write_text(self.settings.out / "views.csv", csv_text(self._rows(cameras)))
 
 
-def _seen(sampled: Sampled) -> tuple[Sampled, dict[str, Floats]]:
+def _seen(sampled: ViewSet) -> tuple[ViewSet, dict[str, Floats]]:
     """The views with those points of the target that one of them sees, and the points' names.
 
     Raises:
         InputError: none sees its middle.
     """
     target = sampled.target
-    sampled.looks(target.center[None]).require_seen()
+    sampled.observations(target.center[None]).check_seen()
     points = points_of(target.center, target.diameter, sampled.up, flat=sampled.is_flat)
-    weight = sampled.looks(np.array(list(points.values()))).weight
+    weight = sampled.observations(np.array(list(points.values()))).weight
     kept = {name: at for (name, at), w in zip(points.items(), weight.T, strict=True) if w.any()}
     notes = sampled.notes
     if len(kept) < len(points):

@@ -7,7 +7,7 @@ from typing import Any
 
 from rift_cl.cl.device import Device
 from rift_cl.commands.analyze.facts import Findings
-from rift_cl.commands.inputs.view_set import Floats, Sampled, place_of
+from rift_cl.commands.inputs.view_set import Floats, ViewSet, place_of
 from rift_cl.commands.pictures.coverage_pictures import (
     add_coverage,
     camera_figure,
@@ -21,7 +21,7 @@ _HEADINGS = ("What is missing", "What limits detail", "What to add")
 
 
 def analysis_page(
-    sampled: Sampled,
+    sampled: ViewSet,
     points: Mapping[str, Floats],
     findings: Sequence[Findings],
     metrics: Mapping[str, Any],
@@ -56,7 +56,7 @@ def analysis_page(
     return page
 
 
-def _unknown(sampled: Sampled, value: float) -> dict[str, str]:
+def _unknown(sampled: ViewSet, value: float) -> dict[str, str]:
     if sampled.opaque:
         return {}
     target = sampled.target
@@ -66,7 +66,7 @@ def _unknown(sampled: Sampled, value: float) -> dict[str, str]:
     }
 
 
-def _views(page: Page, sampled: Sampled, added: Sequence[Camera], device: Device) -> None:
+def _views(page: Page, sampled: ViewSet, added: Sequence[Camera], device: Device) -> None:
     if sampled.cameras:
         page.section("Where the cameras stand")
         groups = {"at hand": sampled.cameras, "to add": tuple(added)}

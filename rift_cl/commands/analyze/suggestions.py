@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from rift_cl.commands.inputs.surfaces import hidden_places, strange_places, surface_of
-from rift_cl.commands.inputs.view_set import Floats, Sampled
+from rift_cl.commands.inputs.view_set import Floats, ViewSet
 from rift_cl.commands.pictures.views_table import angles_of
 from rift_cl.geometry import Camera
 from rift_cl.geometry.camera_type import CameraType
@@ -22,7 +22,7 @@ _PINHOLE = 1e4
 _COVER = 0.05
 
 
-def cameras_to_add(sampled: Sampled, count: int) -> tuple[Camera, ...]:
+def cameras_to_add(sampled: ViewSet, count: int) -> tuple[Camera, ...]:
     """Cameras like those at hand, as far away, between their elevations or 0 to 75 degrees.
 
     Of an opaque target none stands in or behind what the views show, or where that hides the
@@ -56,7 +56,7 @@ def cameras_to_add(sampled: Sampled, count: int) -> tuple[Camera, ...]:
     return tuple(found.cameras[place] for place in found.order)
 
 
-def usual_distance(sampled: Sampled) -> float:
+def usual_distance(sampled: ViewSet) -> float:
     """How far off the target's middle cameras stand, in the median."""
     away = np.array([camera.center for camera in sampled.cameras]) - sampled.target.center
     return float(np.median(np.linalg.norm(away, axis=1)))

@@ -14,14 +14,14 @@ import numpy as np
 from rift_cl.commands.analyze.facts import WHY, Findings, length_in_words, one_place
 from rift_cl.commands.analyze.verdicts import said
 from rift_cl.commands.inputs.surfaces import SQUARE, sides_of
-from rift_cl.commands.inputs.view_set import Sampled
+from rift_cl.commands.inputs.view_set import ViewSet
 from rift_cl.sampling.criteria.surface_limits import SurfaceLimits, surface_limits
 
 _KEYS = ("pixel", "diffraction", "depth_of_field", "reached")
 _HEADS = ("point", "pixel", "diffraction", "depth of field", "all together", "limited by")
 
 
-def surface_missing(sampled: Sampled, distance: float) -> Findings:
+def surface_missing(sampled: ViewSet, distance: float) -> Findings:
     """Which sides of the target no view shows, and which cannot be looked at.
 
     Args:
@@ -58,14 +58,14 @@ def surface_missing(sampled: Sampled, distance: float) -> Findings:
     return Findings(figures, (), (*sentences, *one_place(sampled)))
 
 
-def surface_resolution(sampled: Sampled, names: tuple[str, ...]) -> Findings:
+def surface_resolution(sampled: ViewSet, names: tuple[str, ...]) -> Findings:
     """What ends detail at each point of the target, and how well parallax tells its depth.
 
     Args:
         sampled: the views.
         names: of the target's points.
     """
-    found, units = surface_limits(sampled.looks(), sampled.target), sampled.units
+    found, units = surface_limits(sampled.observations(), sampled.target), sampled.units
     points = [_ends(found, p, name) for p, name in enumerate(names)]
     rows = [
         (

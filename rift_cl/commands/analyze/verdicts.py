@@ -15,12 +15,12 @@ import numpy as np
 
 from rift_cl.commands.analyze.suggestions import usual_distance
 from rift_cl.commands.inputs.surfaces import SQUARE, surface_of
-from rift_cl.commands.inputs.view_set import Floats, Sampled
+from rift_cl.commands.inputs.view_set import Floats, ViewSet
 from rift_cl.geometry import Camera
 from rift_cl.reference.coverage import coverage
-from rift_cl.sampling.criteria.appearance import sheen_error
+from rift_cl.sampling.criteria.appearance import appearance_error
 from rift_cl.sampling.criteria.functionals import wiener
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target, half_disc
 
 # The verdicts that held, Spearman with the errors of held-out photographs on the fox, the ornament
@@ -38,12 +38,12 @@ def said(sentences: Mapping[str, str]) -> list[str]:
     return [sentence for name, sentence in sentences.items() if name in HELD]
 
 
-def foretold(sampled: Sampled, cameras: Sequence[Camera]) -> dict[str, Floats]:
+def foretold(sampled: ViewSet, cameras: Sequence[Camera]) -> dict[str, Floats]:
     """What verdicts say of views (V,), by name; more is worse.
 
-    ``angle``: radians to the nearest view that was taken; ``sheen``: what is unknown of brightness
-    towards the view; ``sides``: share of the sides it faces that few views see square on;
-    ``pixel``: a pixel of the middle one of the views taken, in its own; ``parallax``: pixels of
+    ``angle``: radians to the nearest view that was taken; ``appearance``: what is unknown of
+    brightness towards the view; ``sides``: share of the sides it faces that few views see square
+    on; ``pixel``: a pixel of the middle one of the views taken, in its own; ``parallax``: pixels of
     depth, in pixels of the picture, by the views that share its side; ``slices``: what a target
     that is seen through would keep unknown on the view's own slice, which is what the number of
     views limits.
@@ -54,19 +54,23 @@ def foretold(sampled: Sampled, cameras: Sequence[Camera]) -> dict[str, Floats]:
     """
     target = surface_of(sampled, usual_distance(sampled))
     center = sampled.target.center
-    taken, asked = (Looks.of(group, center[None]) for group in (sampled.cameras, list(cameras)))
+    taken, asked = (
+        Observations.of(group, center[None]) for group in (sampled.cameras, list(cameras))
+    )
     ways, sides = taken.direction[:, 0], asked.direction[:, 0]
     apart = np.arccos(np.clip(sides @ ways.T, -1, 1))
-    looks = sampled.looks(target.points)
+    observations = sampled.observations(target.points)
     normals = np.asarray(target.normals)
-    square = np.einsum("vpd,pd->vp", looks.direction, normals) >= math.cos(math.radians(SQUARE))
-    count = (square & (looks.weight > 0)).sum(axis=0)
+    square = np.einsum("vpd,pd->vp", observations.direction, normals) >= math.cos(
+        math.radians(SQUARE)
+    )
+    count = (square & (observations.weight > 0)).sum(axis=0)
     facing = np.maximum(sides @ normals.T - _FACING, 0)
     few = (facing / (1 + count)).sum(1) / np.maximum(facing.sum(1), 1e-12)
     pixel = np.median(taken.pixel[:, 0]) / asked.pixel[:, 0]
     return {
         "angle": apart.min(axis=1),
-        "sheen": np.array([_sheen(looks, target, side) for side in sides]),
+        "sheen": np.array([_appearance(observations, target, side) for side in sides]),
         "sides": few,
         "pixel": pixel,
         "parallax": np.array([_parallax(ways[near]) for near in apart < math.radians(SQUARE)]),
@@ -74,7 +78,7 @@ def foretold(sampled: Sampled, cameras: Sequence[Camera]) -> dict[str, Floats]:
     }
 
 
-def _on_slice(taken: Looks, target: Target, side: Floats) -> float:
+def _on_slice(taken: Observations, target: Target, side: Floats) -> float:
     """The share of power on the slice across a line of sight that views of a volume leave."""
     first = np.cross(side, np.eye(3)[np.argmin(np.abs(side))])
     first /= np.linalg.norm(first)
@@ -84,10 +88,10 @@ def _on_slice(taken: Looks, target: Target, side: Floats) -> float:
     return wiener(coverage(taken, k, target.diameter), power, target.snr).value
 
 
-def _sheen(looks: Looks, target: Target, side: Floats) -> float:
+def _appearance(observations: Observations, target: Target, side: Floats) -> float:
     """What is unknown of the brightness of all points towards one side."""
     toward = replace(target, seen_from=side[None])
-    return float(sheen_error(looks, toward, np.asarray(toward.normals), "wiener")[0])
+    return float(appearance_error(observations, toward, np.asarray(toward.normals), "wiener")[0])
 
 
 def _parallax(ways: Floats) -> float:

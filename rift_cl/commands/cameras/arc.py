@@ -107,7 +107,7 @@ def across(up: Floats) -> Floats:
     return np.asarray(np.cross(second / np.linalg.norm(second), up))
 
 
-def demand_places(cameras: Sequence[Camera], where: Path) -> None:
+def check_places(cameras: Sequence[Camera], where: Path) -> None:
     """Make sure that cameras, if there are several, do not all stand in one place.
 
     Raises:

@@ -82,7 +82,7 @@ class FitCameras:
         """All of them, in the capture's order."""
         return self.reopened.views
 
-    def demand_photographs(self, fit: Path) -> None:
+    def check_photographs(self, fit: Path) -> None:
         """Make sure that every photograph is where it was.
 
         Raises:
@@ -166,7 +166,7 @@ def _turned(view: View) -> dict[str, bool]:
 def open_fit_cameras(fit: Path, *, photographs: Path | None = None) -> FitCameras | None:
     """The cameras of a fit; None where it is no fit's folder, or an older version wrote it.
 
-    Photographs need not be there: see ``FitCameras.demand_photographs``.
+    Photographs need not be there: see ``FitCameras.check_photographs``.
 
     Args:
         fit: the folder of the fit.

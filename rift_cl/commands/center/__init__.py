@@ -1,1 +1,1 @@
-"""TODO."""
+"""``rift center``: where the rotation axis of a scan is."""

@@ -134,7 +134,7 @@ class Evaluation:
             raise InputError(
                 f"{where} held no photographs out: name a capture to score after the scene"
             )
-        cameras.demand_photographs(where)
+        cameras.check_photographs(where)
         return cameras.unseen
 
     def _trained(self) -> tuple[View, ...]:

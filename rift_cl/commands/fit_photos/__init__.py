@@ -1,1 +1,1 @@
-"""TODO."""
+"""``rift fit photos``: splats from posed photographs."""

@@ -10,10 +10,10 @@ from collections.abc import Generator, Mapping, Sequence
 from pathlib import Path
 
 from rift_cl.io.captures.capture import Capture, holds_bare_photographs, open_capture
-from rift_cl.io.captures.colmap_process import demand_pycolmap
+from rift_cl.io.captures.colmap_process import check_pycolmap
 from rift_cl.io.captures.photograph_folder import other_files, photographs_in
-from rift_cl.io.captures.photographs import demand_photographs, pose_photographs
-from rift_cl.io.captures.video import demand_video, holds_video, sharpest_frames, video_notes
+from rift_cl.io.captures.photographs import check_photographs, pose_photographs
+from rift_cl.io.captures.video import check_video, holds_video, sharpest_frames, video_notes
 from rift_cl.progress import Report
 
 # Names that a sentence lists.
@@ -42,11 +42,11 @@ class BareInput:
         self.notes: list[str] = []
         self.photographs = 0
         if self._video:
-            demand_video(source)
+            check_video(source)
             if not self._posed.exists():
-                demand_pycolmap()
+                check_pycolmap()
         elif not self._posed.exists():
-            demand_photographs(source)
+            check_photographs(source)
 
     @staticmethod
     def fits(source: Path) -> bool:

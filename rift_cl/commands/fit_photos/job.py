@@ -6,7 +6,7 @@ import dataclasses
 import time
 from collections.abc import Iterator
 
-from rift_cl.commands.cameras.arc import demand_places
+from rift_cl.commands.cameras.arc import check_places
 from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras, with_poses
 from rift_cl.commands.cameras.photograph_place import place_record
 from rift_cl.commands.export.fit_page import leave_page
@@ -223,7 +223,7 @@ class Fit(FitRun):
 
     def _split(self, capture: Capture) -> None:
         settings = self.settings
-        demand_places([view.camera for view in capture.views], settings.capture)
+        check_places([view.camera for view in capture.views], settings.capture)
         self.seen, self.unseen = split_views(capture.views, settings.hold_out, settings.views)
         decided = self.checkpoints.decided.get("downscale")
         self.downscale = decided or fitting_downscale(self.seen, self.device)

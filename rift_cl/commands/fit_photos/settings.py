@@ -118,7 +118,7 @@ class FitSettings(XrayOptions, BasisOptions):
         Raises:
             InputError: an option makes no sense, or not in this mode.
         """
-        self.demand_mode()
+        self.check_mode()
         self.check_basis()
         if self.angular != "sh" and self.sh_degree != type(self).sh_degree:
             raise InputError(

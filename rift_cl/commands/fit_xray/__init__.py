@@ -1,1 +1,1 @@
-"""TODO."""
+"""``rift fit xray``: splats from the projections of an X-ray scan."""

@@ -60,7 +60,7 @@ class XrayOptions:
     """X-rays: steps between two solves of all densities, and their modes, by least squares, such as
     100; between them only places and shapes move. 0 for none."""
 
-    def demand_mode(self) -> None:
+    def check_mode(self) -> None:
         """Refuse what has no meaning in this mode.
 
         Raises:

@@ -1,1 +1,1 @@
-"""TODO."""
+"""What commands are given: scans, scenes, and sets of views, opened and checked."""

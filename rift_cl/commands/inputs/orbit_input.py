@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.commands.cameras.arc import demand_places
+from rift_cl.commands.cameras.arc import check_places
 from rift_cl.commands.inputs.scene_bounds import SceneBounds, bounds_of_cameras, bounds_of_splats
 from rift_cl.commands.inputs.scene_input import OpenedScene, SceneInput
 from rift_cl.errors import InputError
@@ -38,7 +38,7 @@ class OrbitInput(SceneInput):
         if self.capture is not None:
             capture = open_capture(self.capture, photographs=False)
             cameras = [view.camera for view in capture.views]
-            demand_places(cameras, self.capture)
+            check_places(cameras, self.capture)
             return bounds_of_cameras(cameras, bounds, capture.points, up=up)
         if own is not None:
             cameras, up = [view.camera for view in own.views], own.up if up is None else up

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rift_cl.commands.inputs.view_set import Floats, Sampled
+from rift_cl.commands.inputs.view_set import Floats, ViewSet
 from rift_cl.errors import InputError
 from rift_cl.sampling.planning.keep_out import KeepOut
 from rift_cl.sampling.planning.out_of_sight import OutOfSight, out_of_sight, places_about
@@ -48,7 +48,7 @@ class Sides:
     farthest: Floats
 
 
-def trusted(space: FreeSpace | None, sampled: Sampled) -> bool:
+def trusted(space: FreeSpace | None, sampled: ViewSet) -> bool:
     """Whether most cameras at hand see the target by what depth says."""
     if space is None:
         return False
@@ -58,7 +58,7 @@ def trusted(space: FreeSpace | None, sampled: Sampled) -> bool:
     return float(np.mean(clear >= 0.5)) >= _TRUSTED
 
 
-def hidden_places(sampled: Sampled, near: float, far: float) -> KeepOut | None:
+def hidden_places(sampled: ViewSet, near: float, far: float) -> KeepOut | None:
     """Where no camera sees the target, between two distances from it; None for nowhere.
 
     Raises:
@@ -71,7 +71,7 @@ def hidden_places(sampled: Sampled, near: float, far: float) -> KeepOut | None:
     return None if shape is None else KeepOut(shape)
 
 
-def strange_places(sampled: Sampled, distance: float) -> KeepOut | None:
+def strange_places(sampled: ViewSet, distance: float) -> KeepOut | None:
     """Where nobody stood near: of what is there nothing is known."""
     places, step = places_about(sampled.target.center, distance, distance)
     ways = (places - sampled.target.center) / distance
@@ -81,7 +81,7 @@ def strange_places(sampled: Sampled, distance: float) -> KeepOut | None:
     return KeepOut(OutOfSight(places[near], places[~near], step / 4))
 
 
-def surface_of(sampled: Sampled, distance: float) -> Target:
+def surface_of(sampled: ViewSet, distance: float) -> Target:
     """A sphere for the target's surface, without the sides that cannot be looked at.
 
     Args:
@@ -99,7 +99,7 @@ def surface_of(sampled: Sampled, distance: float) -> Target:
     )
 
 
-def sides_of(sampled: Sampled, distance: float) -> Sides:
+def sides_of(sampled: ViewSet, distance: float) -> Sides:
     """Which sides of the target pictures show; arguments as ``surface_of``.
 
     Sides that are seen from below the horizon are left out where no camera stands there: few
@@ -107,9 +107,9 @@ def sides_of(sampled: Sampled, distance: float) -> Sides:
     """
     ways = _open_ways(sampled, distance, _SIDES)
     target = sampled.target
-    looks = sampled.looks(target.center + target.diameter / 2 * ways)
-    square = np.einsum("vpd,pd->vp", looks.direction, ways) >= math.cos(math.radians(SQUARE))
-    count = (square & (looks.weight > 0)).sum(axis=0)
+    observations = sampled.observations(target.center + target.diameter / 2 * ways)
+    square = np.einsum("vpd,pd->vp", observations.direction, ways) >= math.cos(math.radians(SQUARE))
+    count = (square & (observations.weight > 0)).sum(axis=0)
     nearest = (ways @ sampled.directions().T).max(axis=1)
     worst = int(np.argmin(nearest))
     return Sides(
@@ -121,7 +121,7 @@ def sides_of(sampled: Sampled, distance: float) -> Sides:
     )
 
 
-def _ways(sampled: Sampled, count: int) -> Floats:
+def _ways(sampled: ViewSet, count: int) -> Floats:
     """Directions (n, 3) evenly all round, but for those below all cameras."""
     half = directions_for(3, count // 2)
     ways = np.concatenate([half, -half])
@@ -129,7 +129,7 @@ def _ways(sampled: Sampled, count: int) -> Floats:
     return np.asarray(ways[ways @ sampled.up >= lowest - 1e-9])
 
 
-def _open_ways(sampled: Sampled, distance: float, count: int) -> Floats:
+def _open_ways(sampled: ViewSet, distance: float, count: int) -> Floats:
     """Those of the directions from which a camera would see the target."""
     ways = _ways(sampled, count)
     if sampled.space is None:

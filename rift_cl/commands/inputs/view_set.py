@@ -12,7 +12,7 @@ from rift_cl.cl.device import Device
 from rift_cl.geometry import Camera, Parallel
 from rift_cl.sampling.coverage.device import coverage
 from rift_cl.sampling.targets.free_space import FreeSpace
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
 Floats = NDArray[np.float64]
@@ -23,7 +23,7 @@ _ENDLESS = 1e200
 
 
 @dataclass(frozen=True, eq=False)
-class Sampled:
+class ViewSet:
     """Views of a target.
 
     Args:
@@ -68,12 +68,12 @@ class Sampled:
 
         The target's highest where views have neither.
         """
-        looks = self.looks(self.target.center[None])
-        seen = looks.weight[:, 0] > 0
+        observations = self.observations(self.target.center[None])
+        seen = observations.weight[:, 0] > 0
         if not seen.any():
             return self.target.highest
-        pixels = 0.5 / np.maximum(looks.pixel[seen, 0], 1e-300)
-        finest = float(np.minimum(pixels, looks.cutoff[seen, 0]).max())
+        pixels = 0.5 / np.maximum(observations.pixel[seen, 0], 1e-300)
+        finest = float(np.minimum(pixels, observations.cutoff[seen, 0]).max())
         return finest if finest < _ENDLESS else self.target.highest
 
     @property
@@ -81,12 +81,12 @@ class Sampled:
         """Whether the target is a plane, as the slices of a scan are."""
         return self.target.is_flat
 
-    def looks(self, points: ArrayLike | None = None) -> Looks:
+    def observations(self, points: ArrayLike | None = None) -> Observations:
         """How the views see points (P, 3); those of the target when not given."""
         at = self.target.points if points is None else np.asarray(points, np.float64)
         if self.scan is not None:
-            return Looks.of_scan(self.scan, at)
-        return Looks.of(self.cameras, at, self.weights)
+            return Observations.of_scan(self.scan, at)
+        return Observations.of(self.cameras, at, self.weights)
 
     def coverage(
         self,
@@ -110,15 +110,15 @@ class Sampled:
             diameter or self.target.diameter,
             self.target.points if points is None else np.asarray(points, np.float64),
         )
-        found = coverage(self.looks(target.points), target, k, device=device)
+        found = coverage(self.observations(target.points), target, k, device=device)
         return np.asarray(found, np.float64)
 
     def directions(self) -> Floats:
         """Unit vectors (n, 3) from the target's middle to the views that see it."""
-        looks = self.looks(self.target.center[None])
-        return np.asarray(looks.direction[looks.weight[:, 0] > 0, 0])
+        observations = self.observations(self.target.center[None])
+        return np.asarray(observations.direction[observations.weight[:, 0] > 0, 0])
 
-    def with_cameras(self, cameras: Sequence[Camera], weights: ArrayLike | None = None) -> Sampled:
+    def with_cameras(self, cameras: Sequence[Camera], weights: ArrayLike | None = None) -> ViewSet:
         """The same target seen by more cameras."""
         light = None
         if weights is not None or self.weights is not None:

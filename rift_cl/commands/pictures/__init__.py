@@ -1,1 +1,1 @@
-"""TODO."""
+"""Pictures and tables that more than one command puts into its report."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.commands.inputs.view_set import Sampled
+from rift_cl.commands.inputs.view_set import ViewSet
 from rift_cl.geometry import Camera
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import curves, figure_svg
@@ -37,13 +37,13 @@ _DETAIL = 8.0
 _RADII, _WAYS = 60, 500
 
 
-def slice_maps(sampled: Sampled, points: Mapping[str, Floats], device: Device) -> Figure:
+def slice_maps(sampled: ViewSet, points: Mapping[str, Floats], device: Device) -> Figure:
     """Density over planes of frequencies about each point, so near that slices are told apart."""
     near = near_band(sampled)
     return _maps(sampled, [(name, point, near) for name, point in points.items()], device)
 
 
-def support_maps(sampled: Sampled, device: Device) -> Figure | None:
+def support_maps(sampled: ViewSet, device: Device) -> Figure | None:
     """Density over planes of frequencies out to the finest detail; None if that is near already."""
     finest = 1.05 * sampled.finest
     if finest < 1.5 * near_band(sampled):
@@ -51,12 +51,12 @@ def support_maps(sampled: Sampled, device: Device) -> Figure | None:
     return _maps(sampled, [("middle", sampled.target.center, finest)], device)
 
 
-def near_band(sampled: Sampled) -> float:
+def near_band(sampled: ViewSet) -> float:
     """The highest frequency of a map in which single slices are told apart."""
     return min(_SLICES / sampled.target.diameter, 1.05 * sampled.finest)
 
 
-def _maps(sampled: Sampled, wanted: list[tuple[str, Floats, float]], device: Device) -> Figure:
+def _maps(sampled: ViewSet, wanted: list[tuple[str, Floats, float]], device: Device) -> Figure:
     """A row of planes for each name, point and highest frequency; for a flat target, a panel."""
     planes = PLANES[:1] if sampled.is_flat else PLANES
     slices = [
@@ -81,7 +81,7 @@ def _maps(sampled: Sampled, wanted: list[tuple[str, Floats, float]], device: Dev
 
 
 def plane_density(
-    sampled: Sampled, point: Floats, plane: tuple[int, int], band: float, device: Device
+    sampled: ViewSet, point: Floats, plane: tuple[int, int], band: float, device: Device
 ) -> Floats:
     """Coverage over a plane, (n, n); slices thinner than a sample are averaged over it."""
     n = _SAMPLES
@@ -98,7 +98,7 @@ def plane_density(
     return np.asarray(whole.reshape(n, n))
 
 
-def density_curves(sampled: Sampled, device: Device) -> Figure:
+def density_curves(sampled: ViewSet, device: Device) -> Figure:
     """Coverage against frequency, over all directions and for the tenth that has least."""
     target = sampled.target
     first, last = 1 / target.diameter, max(1.2 * sampled.finest, 4 / target.diameter)
@@ -128,7 +128,7 @@ def density_curves(sampled: Sampled, device: Device) -> Figure:
     )
 
 
-def direction_figure(sampled: Sampled, device: Device, added: Sequence[Camera] = ()) -> Figure:
+def direction_figure(sampled: ViewSet, device: Device, added: Sequence[Camera] = ()) -> Figure:
     """Lines of sight, and how many views see detail along each direction, at 8 per diameter.
 
     A direction that lies on no slice, slices being as thick as the target makes them, is shaded.
@@ -148,12 +148,12 @@ def direction_figure(sampled: Sampled, device: Device, added: Sequence[Camera] =
     )
 
 
-def detail_of(sampled: Sampled) -> float:
+def detail_of(sampled: ViewSet) -> float:
     """The frequency of the detail whose directions are shown, in cycles per unit of length."""
     return min(_DETAIL / sampled.target.diameter, 0.5 * sampled.finest)
 
 
-def camera_figure(groups: Mapping[str, Sequence[Camera]], sampled: Sampled) -> Figure:
+def camera_figure(groups: Mapping[str, Sequence[Camera]], sampled: ViewSet) -> Figure:
     """Cameras round the target from above and from the side."""
     return camera_plot(
         {
@@ -172,7 +172,7 @@ def camera_figure(groups: Mapping[str, Sequence[Camera]], sampled: Sampled) -> F
 
 
 def add_coverage(
-    page: Page, sampled: Sampled, points: Mapping[str, Floats], device: Device
+    page: Page, sampled: ViewSet, points: Mapping[str, Floats], device: Device
 ) -> None:
     """Add the maps of density near and far, and density against frequency, to a report."""
     page.figure(

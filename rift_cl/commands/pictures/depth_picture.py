@@ -47,9 +47,9 @@ def depth_window(
     Each of a few cameras has a window of its own, and the medians are taken, so that one that
     stands in a fog of wide splats does not take the colours from the others.
     """
-    looks = evenly(len(cameras), _LOOKS)
+    observations = evenly(len(cameras), _LOOKS)
     windows = []
-    for number in looks:
+    for number in observations:
         camera = cameras[number]
         share = min(1.0, _EDGE / max(camera.size))
         size = max(1, round(share * camera.height)), max(1, round(share * camera.width))

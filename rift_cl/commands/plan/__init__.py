@@ -1,1 +1,1 @@
-"""TODO."""
+"""``rift plan``: where to take photographs from."""

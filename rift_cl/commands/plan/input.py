@@ -11,7 +11,7 @@ import numpy as np
 from rift_cl.commands.analyze.input import open_sampled
 from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.inputs.surfaces import SURFACE, hidden_places, surface_of
-from rift_cl.commands.inputs.view_set import Floats, Sampled
+from rift_cl.commands.inputs.view_set import Floats, ViewSet
 from rift_cl.commands.plan.keep_out_words import keep_out_of
 from rift_cl.commands.plan.settings import PlanSettings
 from rift_cl.errors import InputError
@@ -21,7 +21,7 @@ from rift_cl.io.captures.capture import holds_capture
 from rift_cl.io.lenses.lens_file import open_lens
 from rift_cl.io.volumes import read_volume
 from rift_cl.sampling.planning.constraints import Budget, Constraints, Ranges
-from rift_cl.sampling.planning.design_space import DISTANCE, Site
+from rift_cl.sampling.planning.design_space import DISTANCE, DesignSpace
 from rift_cl.sampling.planning.paths import Free, Ring, Spline, TiltedRings
 from rift_cl.sampling.planning.paths import Path as Way
 from rift_cl.sampling.targets.directional_prior import Trusted
@@ -49,7 +49,7 @@ class PlanInput:
     target: Target
     constraints: Constraints
     choices: tuple[CameraChoice, ...]
-    have: Sampled | None
+    have: ViewSet | None
     notes: tuple[str, ...]
 
     @property
@@ -75,11 +75,11 @@ def plan_input(settings: PlanSettings) -> PlanInput:
 
 
 def _in_sight(
-    have: Sampled, target: Target, constraints: Constraints, choices: tuple[CameraChoice, ...]
+    have: ViewSet, target: Target, constraints: Constraints, choices: tuple[CameraChoice, ...]
 ) -> tuple[Constraints, Target]:
     """The constraints, and the sides of the target, without what views show to be in the way."""
-    site = Site(target, constraints, tuple(choice.kind for choice in choices))
-    near, far = site.limits[:, DISTANCE, 0].min(), site.limits[:, DISTANCE, 1].max()
+    design = DesignSpace(target, constraints, tuple(choice.kind for choice in choices))
+    near, far = design.limits[:, DISTANCE, 0].min(), design.limits[:, DISTANCE, 1].max()
     shut = hidden_places(have, float(near), float(far))
     open_sides = surface_of(have, float(math.sqrt(near * far)))
     target = replace(target, points=open_sides.points, normals=open_sides.normals)
@@ -88,7 +88,7 @@ def _in_sight(
     return replace(constraints, keepouts=(*constraints.keepouts, shut)), target
 
 
-def _have(settings: PlanSettings, path: Path) -> Sampled:
+def _have(settings: PlanSettings, path: Path) -> ViewSet:
     if not holds_capture(path):
         raise InputError(f"--have {path} is no capture, wanted photographs and their cameras")
     asked = AnalyzeSettings(
@@ -110,7 +110,7 @@ def _over(length: float | None, unit: float) -> float | None:
     return None if length is None else length / unit
 
 
-def _target(settings: PlanSettings, have: Sampled | None, notes: list[str]) -> Target:
+def _target(settings: PlanSettings, have: ViewSet | None, notes: list[str]) -> Target:
     if have is not None:
         center, diameter = have.target.center, have.target.diameter
         notes.extend(have.notes)
@@ -191,7 +191,7 @@ def _named(choice: CameraChoice, made: CameraType) -> CameraType:
 
 
 def _constraints(
-    settings: PlanSettings, choices: tuple[CameraChoice, ...], have: Sampled | None
+    settings: PlanSettings, choices: tuple[CameraChoice, ...], have: ViewSet | None
 ) -> Constraints:
     budget = None
     if settings.budget is not None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.discovery import open_device
-from rift_cl.commands.inputs.view_set import Sampled, place_of
+from rift_cl.commands.inputs.view_set import ViewSet, place_of
 from rift_cl.commands.pictures.views_table import csv_text, view_row
 from rift_cl.commands.plan.input import plan_input
 from rift_cl.commands.plan.report import plan_page
@@ -19,7 +19,7 @@ from rift_cl.io.captures.transforms_record import transforms_of
 from rift_cl.io.output import write_json, write_text
 from rift_cl.progress import Report
 from rift_cl.sampling.planning.candidates import most_candidates
-from rift_cl.sampling.planning.design_space import Site
+from rift_cl.sampling.planning.design_space import DesignSpace
 from rift_cl.sampling.planning.frequency_sets import for_planning
 from rift_cl.sampling.planning.planner import plan
 from rift_cl.sampling.planning.view_plan import Plan
@@ -43,7 +43,7 @@ class Planning:
         self.settings = settings
         self.given = plan_input(settings)
         # Cameras that cannot have the target in their picture are refused here, before any work.
-        Site(self.given.target, self.given.constraints, self.given.types)
+        DesignSpace(self.given.target, self.given.constraints, self.given.types)
         self.device = open_device(settings.device)
         self.folder = RunFolder(settings.out, "plan", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
@@ -99,20 +99,20 @@ class Planning:
         yield Report(1, _STEPS, "steps", {"merit": found.elsewhere})
         self.wrong = if_wrong(found)
         self.verdict = " ".join([found.verdict(), *(entry.sentence for entry in self.wrong)])
-        knee = found.knee()
+        diminishing_returns = found.diminishing_returns()
         yield Report(2, _STEPS, "steps", {"merit": found.elsewhere})
         sampled = self._sampled(found)
         self.metrics = self._figures(found)
-        page = plan_page(given, found, knee, sampled, self.metrics, self.device)
+        page = plan_page(given, found, diminishing_returns, sampled, self.metrics, self.device)
         yield Report(3, _STEPS, "steps", {"merit": found.elsewhere})
         self._write(found)
         self.folder.finish(settings, self.metrics, page, self.device)
         yield Report(_STEPS, _STEPS, "steps", {"merit": found.elsewhere})
 
-    def _sampled(self, found: Plan) -> Sampled:
+    def _sampled(self, found: Plan) -> ViewSet:
         """All views, those that were there already first."""
         given = self.given
-        return Sampled(
+        return ViewSet(
             name="plan",
             target=given.target,
             up=np.array(given.constraints.up),
@@ -122,7 +122,7 @@ class Planning:
         )
 
     def _figures(self, found: Plan) -> dict[str, Any]:
-        given, knee = self.given, found.knee()
+        given, diminishing_returns = self.given, found.diminishing_returns()
         return {
             "views": len(found),
             "wanted": self.settings.views,
@@ -135,8 +135,8 @@ class Planning:
             "baselines": {name: entry.elsewhere for name, entry in found.baselines.items()},
             "verdict": self.verdict,
             "if_prior_is_wrong": [entry._asdict() for entry in self.wrong],
-            "knee": knee.views,
-            "merits": knee.merits,
+            "knee": diminishing_returns.views,
+            "merits": diminishing_returns.merits,
             "target": {"center": given.target.center, "diameter": given.target.diameter},
             "assumed": list(given.notes),
         }

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rift_cl.cl.device import Device
-from rift_cl.commands.inputs.view_set import Sampled, points_of
+from rift_cl.commands.inputs.view_set import ViewSet, points_of
 from rift_cl.commands.pictures.coverage_pictures import (
     add_coverage,
     camera_figure,
@@ -18,7 +18,7 @@ from rift_cl.commands.pictures.coverage_pictures import (
 from rift_cl.commands.plan.input import PlanInput
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import curves, figure_svg
-from rift_cl.sampling.planning.view_plan import Knee, Plan
+from rift_cl.sampling.planning.view_plan import DiminishingReturns, Plan
 
 # What a merit is, for people.
 _MERITS = {
@@ -39,8 +39,8 @@ _NAMES = {
 def plan_page(
     given: PlanInput,
     found: Plan,
-    knee: Knee,
-    sampled: Sampled,
+    diminishing_returns: DiminishingReturns,
+    sampled: ViewSet,
     metrics: Mapping[str, Any],
     device: Device,
 ) -> Page:
@@ -54,7 +54,7 @@ def plan_page(
     page.paragraph(metrics["verdict"])
     page.paragraph(bound_words(metrics))
     _assumed(page, given)
-    _gains(page, found, knee, merit_name(metrics))
+    _gains(page, found, diminishing_returns, merit_name(metrics))
     _coverage(page, sampled, device)
     return page
 
@@ -133,7 +133,7 @@ def _assumed(page: Page, given: PlanInput) -> None:
     )
 
 
-def _cameras(page: Page, given: PlanInput, found: Plan, sampled: Sampled) -> None:
+def _cameras(page: Page, given: PlanInput, found: Plan, sampled: ViewSet) -> None:
     page.section("Where the cameras stand")
     groups = {"taken already": found.fixed, "planned": found.cameras}
     page.figure(
@@ -157,14 +157,16 @@ def _range(values: Any) -> str:
     return f"{low:.4g}" if high - low < 1e-3 * high else f"{low:.4g} to {high:.4g}"
 
 
-def _gains(page: Page, found: Plan, knee: Knee, name: str) -> None:
+def _gains(page: Page, found: Plan, diminishing_returns: DiminishingReturns, name: str) -> None:
     page.section("What each view brings")
-    views = np.arange(len(knee.merits)) + len(found.fixed)
+    views = np.arange(len(diminishing_returns.merits)) + len(found.fixed)
     figure = curves(
-        {"planned": (views, knee.merits)},
+        {"planned": (views, diminishing_returns.merits)},
         xlabel="views",
         ylabel=name,
-        mark=None if knee.views is None else float(knee.views + len(found.fixed)),
+        mark=None
+        if diminishing_returns.views is None
+        else float(diminishing_returns.views + len(found.fixed)),
     )
     page.figure(
         figure_svg(figure),
@@ -172,15 +174,16 @@ def _gains(page: Page, found: Plan, knee: Knee, name: str) -> None:
         alt="Merit against the number of views",
     )
     average = "of what those before it brought on average"
+    share = f"{diminishing_returns.share:.0%}"
     page.paragraph(
-        f"Every view still brings more than {knee.share:.0%} {average}: more would help."
-        if knee.views is None
-        else f"After {knee.views} views, the curve's knee, the next brings less than "
-        f"{knee.share:.0%} {average}."
+        f"Every view still brings more than {share} {average}: more would help."
+        if diminishing_returns.views is None
+        else f"After {diminishing_returns.views} views the returns diminish: the next brings less "
+        f"than {share} {average}."
     )
 
 
-def _coverage(page: Page, sampled: Sampled, device: Device) -> None:
+def _coverage(page: Page, sampled: ViewSet, device: Device) -> None:
     target = sampled.target
     page.section("What the views sample")
     page.figure(

@@ -26,12 +26,11 @@ from rift_cl.operators import (
     cheapest_projector,
 )
 from rift_cl.progress import Report
-from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp
-from rift_cl.reconstruct.solvers import poisson_weights
+from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp, poisson_weights
 from rift_cl.reconstruct.solvers.direction_weights import DirectionWeights
 from rift_cl.reconstruct.solvers.disc_prior import find_disc, material_lengths
 from rift_cl.reconstruct.solvers.few_levels import FewLevels
-from rift_cl.reconstruct.solvers.measured_rays import SeenRays
+from rift_cl.reconstruct.solvers.measured_rays import MeasuredRays
 from rift_cl.reconstruct.solvers.ordered_subsets import OrderedSubsets
 from rift_cl.reconstruct.solvers.solver import Solver
 
@@ -210,7 +209,7 @@ class Inversion:
         """The projector of the rays that were measured, and the solver's weights of them."""
         whole, seen = self.projector(1), self.source.seen
         if self.settings.weights is None:
-            return (whole if seen is None else SeenRays(whole, seen)), {}
+            return (whole if seen is None else MeasuredRays(whole, seen)), {}
         weights = poisson_weights(sinogram).weights
         if seen is not None:
             weights[~seen] = 0

@@ -22,7 +22,7 @@ from rift_cl.commands.reconstruct.decided import decided_settings
 from rift_cl.commands.reconstruct.inversion import Inversion
 from rift_cl.commands.reconstruct.kept_slabs import (
     SlabFolder,
-    demand_same,
+    check_same,
     finished_run,
     run_folder,
 )
@@ -36,7 +36,7 @@ from rift_cl.commands.reconstruct.report import (
 )
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.slice_input import SliceInput
-from rift_cl.commands.reconstruct.volume import demand_place, open_slices, volume_path
+from rift_cl.commands.reconstruct.volume import check_place, open_slices, volume_path
 from rift_cl.errors import StoppedError
 from rift_cl.io.volumes import VOLUME_NAMES, suggested_window
 from rift_cl.progress import Report
@@ -132,7 +132,7 @@ class Reconstruction:
             if self.settings.preview:
                 yield from self._look()
                 return
-            demand_place(self.settings, self.source, self.inversion.window)
+            check_place(self.settings, self.source, self.inversion.window)
             if not self._gone_on:
                 self._ours = True
                 self._kept.begin(self._facts())
@@ -182,7 +182,7 @@ class Reconstruction:
         if before is None or self._kept.begun:
             return False
         now = {**self._facts(), **{name: before.get(name) for name in _FOUND}}
-        demand_same(self.settings.out, "the finished run", before, now)
+        check_same(self.settings.out, "the finished run", before, now)
         return True
 
     def _facts(self) -> dict[str, str]:

@@ -73,7 +73,7 @@ class SlabFolder:
         Raises:
             CheckpointError: it does not; the sentence names what differs.
         """
-        demand_same(self.path, "the run that was cut off", self._recorded(), run)
+        check_same(self.path, "the run that was cut off", self._recorded(), run)
 
     def _recorded(self) -> dict[str, Any]:
         try:
@@ -142,7 +142,7 @@ class SlabFolder:
         return [entry for entry in found if 0 <= entry[0] < entry[1] <= self.shape[0]]
 
 
-def demand_same(path: Path, what: str, before: Mapping[str, Any], run: Mapping[str, Any]) -> None:
+def check_same(path: Path, what: str, before: Mapping[str, Any], run: Mapping[str, Any]) -> None:
     """Make sure that two runs make the same slices.
 
     Raises:

@@ -39,7 +39,7 @@ class Window:
             ratio = source.pitch / pixel
             size, most = (int(np.ceil(n * ratio - 1e-6)) for n in (source.bins, source.most_bins))
         roi = settings.roi or (0, size, 0, size)
-        demand_window(roi, most)
+        check_window(roi, most)
         return cls(size, pixel, roi)
 
     @property
@@ -66,7 +66,7 @@ class Window:
         return whole, (slice(top, bottom), slice(left, right))
 
 
-def demand_window(roi: tuple[int, int, int, int], size: int) -> None:
+def check_window(roi: tuple[int, int, int, int], size: int) -> None:
     """Make sure that a part of a slice is inside it.
 
     Raises:

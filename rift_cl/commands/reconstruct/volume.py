@@ -48,7 +48,7 @@ def open_slices(
     )
 
 
-def demand_place(settings: ReconstructSettings, source: SliceInput, window: Window) -> None:
+def check_place(settings: ReconstructSettings, source: SliceInput, window: Window) -> None:
     """Tell before the work, not after it, that the volume cannot be written; nothing is left.
 
     An earlier volume in another format is looked at as well, since it goes when this one comes.

@@ -1,1 +1,1 @@
-"""TODO."""
+"""``rift render``: pictures and films of a scene."""

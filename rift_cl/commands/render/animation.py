@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.io.images.film_file import FilmKind, demand_films, films_can_be_written
+from rift_cl.io.images.film_file import FilmKind, check_films, films_can_be_written
 
 FilmChoice = Literal["auto", "webm", "mp4", "mp4-h264", "apng"]
 # The shortest edge that every encoder takes, in pixels.
@@ -42,7 +42,7 @@ def chosen_film(
         return asked
     if not large:
         raise InputError(f"--film {asked} wants edges of {_SMALLEST} pixels or more: give --size")
-    demand_films(asked)
+    check_films(asked)
     return asked
 
 

@@ -72,7 +72,7 @@ class Render:
         self.folder = RunFolder(settings.out, "render", overwrite=settings.overwrite)
         for name, read in (("path", settings.path), ("capture", settings.capture)):
             if read is not None:
-                self.folder.demand_kept(name, read, *_LEFT)
+                self.folder.check_kept(name, read, *_LEFT)
         self.metrics: dict[str, Any] = {}
         # A small copy of the film, for reports; None where nothing moves, or before it was drawn.
         self.moving: bytes | None = None

@@ -1,1 +1,1 @@
-"""TODO."""
+"""The folder that a run leaves behind: settings, figures, report."""

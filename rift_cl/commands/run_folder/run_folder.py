@@ -90,7 +90,7 @@ class RunFolder:
                 with writing(entry):
                     shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
 
-    def demand_kept(self, name: str, file: Path, *patterns: str) -> None:
+    def check_kept(self, name: str, file: Path, *patterns: str) -> None:
         """Make sure that what is read is not what ``drop`` removes.
 
         Args:

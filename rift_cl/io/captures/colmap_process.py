@@ -27,7 +27,7 @@ _BLOCKS = re.compile(r"(?:Matching|Processing) block \[(\d+)/(\d+), (\d+)/(\d+)\
 _PLACED = re.compile(r"Registering image #\d+ \((?:num_reg_frames=)?(\d+)\)")
 
 
-def demand_pycolmap() -> None:
+def check_pycolmap() -> None:
     """Make sure that pycolmap is installed; it is not loaded.
 
     Raises:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rift_cl.errors import InputError, PathEscapeError, RiftError
 from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.captures.capture_paths import CaptureFolder, mask_beside, mask_of
-from rift_cl.io.captures.view_image import demand_colors, read_photograph, upright
+from rift_cl.io.captures.view_image import check_colors, read_photograph, upright
 from rift_cl.io.images.display_light import to_display
 from rift_cl.io.images.picture_header import PictureHeader, read_picture_header
 from rift_cl.io.images.pixels import SUFFIXES, write_pixels
@@ -120,7 +120,7 @@ def with_headers(
                 raise InputError(f"{place.path}: {name!r} is no name that a model can hold")
             path = place.file(str(place.path), name)
             header = read_picture_header(path)
-            demand_colors(path, header)
+            check_colors(path, header)
             contents.setdefault(_digest(path), []).append(name)
         except PathEscapeError:
             raise

@@ -15,7 +15,7 @@ from typing import Any
 
 from rift_cl.errors import InputError, RiftError
 from rift_cl.io.captures.capture_paths import CaptureFolder
-from rift_cl.io.captures.colmap_process import colmap_result, demand_pycolmap, run_colmap
+from rift_cl.io.captures.colmap_process import check_pycolmap, colmap_result, run_colmap
 from rift_cl.io.captures.photograph_folder import (
     Photograph,
     photograph_names,
@@ -25,7 +25,7 @@ from rift_cl.io.captures.photograph_folder import (
     with_headers,
 )
 from rift_cl.io.captures.pose_record import POSE_RECORD
-from rift_cl.io.images.heic import demand_heic
+from rift_cl.io.images.heic import check_heic
 from rift_cl.io.images.pixels import HEIC, SUFFIXES
 from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import make_folder, staged_folder, write_json, writing
@@ -54,7 +54,7 @@ class PosedPhotographs:
     missing: Mapping[str, str]
 
 
-def demand_photographs(folder: str | os.PathLike[str]) -> list[str]:
+def check_photographs(folder: str | os.PathLike[str]) -> list[str]:
     """Make sure that poses can be looked for; no photograph is read.
 
     Args:
@@ -70,12 +70,12 @@ def demand_photographs(folder: str | os.PathLike[str]) -> list[str]:
     names = photograph_names(photographs_in(Path(folder)))
     heic = next((name for name in names if SUFFIXES[Path(name).suffix.lower()] == HEIC), None)
     if heic is not None:
-        demand_heic(Path(folder, heic))
+        check_heic(Path(folder, heic))
     if len(names) < _FEWEST:
         raise InputError(
             f"{folder}: holds {len(names)} photographs, poses can be found from {_FEWEST} on"
         )
-    demand_pycolmap()
+    check_pycolmap()
     return names
 
 
@@ -118,7 +118,7 @@ def pose_photographs(
     if earlier is not None:
         yield Report(len(earlier.placed), len(names), "photographs placed")
         return earlier
-    demand_photographs(folder)
+    check_photographs(folder)
     make_folder(work.parent)
     left_out: dict[str, str] = {}
     with staged_folder(work, _strange) as part:

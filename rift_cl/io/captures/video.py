@@ -45,7 +45,7 @@ def holds_video(path: str | os.PathLike[str]) -> bool:
     return is_video(os.fspath(path)) and Path(path).is_file()
 
 
-def demand_video(path: Path) -> None:
+def check_video(path: Path) -> None:
     """Make sure that a video can be read; no frame is decoded.
 
     Raises:
@@ -60,7 +60,7 @@ def video_notes(path: Path) -> list[str]:
     """What of a video is taken otherwise than a player shows it, a sentence each.
 
     Raises:
-        RiftError: see ``demand_video``.
+        RiftError: see ``check_video``.
     """
     with _stream(path) as (_, stream):
         curve = _HDR.get(int(stream.codec_context.color_trc))

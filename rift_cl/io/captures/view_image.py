@@ -112,7 +112,7 @@ def _checked_header(view: View, budget: int | None) -> PictureHeader:
 
 
 def _demand_fit(view: View, path: Path, header: PictureHeader, fits: bool) -> None:
-    demand_colors(path, header)
+    check_colors(path, header)
     if not fits:
         raise ShapeError(
             f"{path}: is {_size(header.size)} pixels, the camera of view {view.name!r} says "
@@ -127,7 +127,7 @@ def upright(image: Image, orientation: int) -> Image:
     return np.ascontiguousarray(shown[::-1] if flipped else shown)
 
 
-def demand_colors(path: Path, header: PictureHeader) -> None:
+def check_colors(path: Path, header: PictureHeader) -> None:
     """Refuse a picture that is neither grey nor RGB.
 
     Raises:

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Images and films, in and out."""

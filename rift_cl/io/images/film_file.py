@@ -59,7 +59,7 @@ def suffix_of(kind: FilmKind) -> str:
     return f".{_ENCODERS[kind].container}"
 
 
-def demand_films(kind: FilmKind) -> None:
+def check_films(kind: FilmKind) -> None:
     """Make sure that films of a kind can be written.
 
     Raises:
@@ -90,7 +90,7 @@ def film_writer(
 
     Args:
         path: the file.
-        kind: container and codec; see ``demand_films``.
+        kind: container and codec; see ``check_films``.
         size: (height, width) of the frames in pixels; an odd last row or column is left out.
         rate: frames in a second.
 

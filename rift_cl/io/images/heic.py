@@ -24,7 +24,7 @@ BRANDS = (b"heic", b"heix", b"heim", b"heis", b"mif1")
 _MAKE, _MODEL, _EXIF, _FOCALS = 271, 272, 0x8769, (0x920A, 0xA405)
 
 
-def demand_heic(path: Path) -> None:
+def check_heic(path: Path) -> None:
     """Make sure that pi-heif is installed.
 
     Raises:
@@ -44,7 +44,7 @@ def opened_heic(path: Path) -> Any:
         InputError: pi-heif is not installed.
         FileFormatError: it is neither grey nor RGB.
     """
-    demand_heic(path)
+    check_heic(path)
     from pi_heif import open_heif
 
     picture = open_heif(path)

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Lens prescriptions from files."""

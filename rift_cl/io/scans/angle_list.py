@@ -79,7 +79,7 @@ class AngleList:
         unit, notes = self._unit(path, asked)
         radians: Angles = np.deg2rad(values) if unit == "degrees" else values.copy()
         radians.flags.writeable = False
-        demand_directions(path, self.name, radians)
+        check_directions(path, self.name, radians)
         span = float(np.rad2deg(np.ptp(radians)))
         over = f"{span:.4g}" if unit == "degrees" else f"{span:.4g} degrees"
         return radians, f"angles in {unit} over {over}", notes
@@ -89,7 +89,7 @@ class AngleList:
         degrees = start + (stop - start) * np.arange(projections) / projections
         radians: Angles = np.deg2rad(degrees)
         radians.flags.writeable = False
-        demand_directions(path, self.name, radians)
+        check_directions(path, self.name, radians)
         phrase = f"angles even from {start:g} to {stop:g} degrees, the end left out"
         return radians, phrase, ()
 
@@ -132,7 +132,7 @@ def _half_turns(values: Angles, unit: AngleUnit) -> bool:
     return any(abs(end / (turns * half) - 1) < _CLOSE for end in ends for turns in (1, 2))
 
 
-def demand_directions(path: Path, name: str, angles: Angles) -> None:
+def check_directions(path: Path, name: str, angles: Angles) -> None:
     """Refuse views that tell nothing of a slice.
 
     Args:

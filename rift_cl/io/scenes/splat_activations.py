@@ -76,13 +76,13 @@ def kept_strengths(
         InputError: there are none that a file could hold.
     """
     bounded = mode == "light" and activation == "clamp"
-    demand_range("opacities", drawn, 1 if bounded else np.inf)
+    check_range("opacities", drawn, 1 if bounded else np.inf)
     if mode == "xray":
         return log_scales_of(drawn)
     return (logits_of if bounded else logits_of_amplitudes)(drawn)
 
 
-def demand_range(name: str, values: NDArray[np.float32], most: float) -> None:
+def check_range(name: str, values: NDArray[np.float32], most: float) -> None:
     """Check that scales or opacities have logarithms or logits.
 
     Raises:

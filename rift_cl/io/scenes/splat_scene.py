@@ -23,7 +23,7 @@ from rift_cl.errors import FileFormatError, InputError, OutputError, ShapeError
 from rift_cl.io.boundary import reading
 from rift_cl.io.output import atomic_path, check_space
 from rift_cl.io.scenes.splat_activations import (
-    demand_range,
+    check_range,
     drawn_strengths,
     kept_strengths,
     log_scales_of,
@@ -207,7 +207,7 @@ class SplatScene:
         if splats.quats is None or splats.sh is None or splats.colors is not None:
             raise InputError("SplatScene: wants splats with quats, scales and sh, and no colors")
         scales = device.get(splats.scales)
-        demand_range("scales", scales, np.inf)
+        check_range("scales", scales, np.inf)
         more = {name: getattr(splats, name) for name in ("shape_modes", "color_modes", "lobes")}
         return cls(
             means=device.get(splats.means),

@@ -1,8 +1,8 @@
 """Fourier transforms down the columns of complex planes, on the device.
 
 Columns stand side by side, so that every device goes through them in step; lengths are products of
-twos and threes (kernels/fourier/fft_pass.cl). Images are transformed by two of these and a transpose,
-detector rows by one.
+twos and threes (kernels/fourier/fft_pass.cl). Images are transformed by two of these and a
+transpose, detector rows by one.
 """
 
 from __future__ import annotations

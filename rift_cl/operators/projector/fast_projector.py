@@ -28,8 +28,8 @@ from rift_cl.operators.projector.ray_geometry import IMAGE, rays
 from rift_cl.operators.projector.ray_tables import RayTables
 
 _MOST_LOBES = 8
-# Slices that a CPU spreads at once (kernels/fourier/rays_spread_stack_cpu.cl), and the bytes of rays
-# and grids that they may take.
+# Slices that a CPU spreads at once (kernels/fourier/rays_spread_stack_cpu.cl), and the bytes of
+# rays and grids that they may take.
 _TOGETHER, _TOGETHER_BYTES = 4, 512 << 20
 
 

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Iterative reconstruction: the solvers, their data terms and their priors."""

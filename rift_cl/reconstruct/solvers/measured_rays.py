@@ -14,7 +14,7 @@ from rift_cl.operators.projector.parallel_projector import ParallelProjector
 from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays
 
 
-class SeenRays(WeightedRays):
+class MeasuredRays(WeightedRays):
     """A projector whose unseen rays are zero: weights that are 0 or 1.
 
     Args:

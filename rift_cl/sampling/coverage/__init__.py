@@ -1,1 +1,1 @@
-"""TODO."""
+"""How densely views sample the Fourier domain of a target."""

@@ -1,12 +1,13 @@
 """What each view of a set stands for at each frequency: responses of density-compensated filters.
 
-The weights of ``rift_cl.operators.filters.compensation`` (views of a slice) and ``compensation_3d`` (views
-of a volume) under one name, and beside them the inverse of the coverage that plans are made with:
+The weights of ``rift_cl.operators.filters.compensation`` (views of a slice) and ``compensation_3d``
+(views of a volume) under one name, and beside them the inverse of the coverage that plans are made
+with:
 
 - ``capped-voronoi``, ``pipe-menon``, ``exact``: as there;
 - ``coverage``: 1 / L on each view's slice, L the sum over all views of rho(n . k)^2 with the smooth
-  window of ``rift_cl.sampling.coverage.device``, scaled as ``exact`` is, to what all views know at each
-  frequency, so that the level at frequency zero is right.
+  window of ``rift_cl.sampling.coverage.device``, scaled as ``exact`` is, to what all views know at
+  each frequency, so that the level at frequency zero is right.
 
 The last is ``exact`` with a Gaussian slab 0.63 / D thick in place of a triangular one of 1 / D: at
 equal thickness slices filtered by the two score the same within 0.3 dB in all but clusters of
@@ -26,7 +27,7 @@ from rift_cl.geometry.numbers import real_numbers
 from rift_cl.operators.filters.compensation import COMPENSATIONS, Compensation
 from rift_cl.operators.filters.compensation_3d import central_planes
 from rift_cl.sampling.coverage.device import coverage
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
 Floats = NDArray[np.float64]
@@ -106,8 +107,8 @@ def _of_planes(
 
 def _covered(normals: Floats, k: Floats, diameter: float, device: Device | None) -> Floats:
     """The coverage (V, n) by bare directions at frequencies (V, n, 3); a view knows its own."""
-    looks, target = Looks.along(normals), Target(np.zeros(3), diameter)
-    found = coverage(looks, target, k.reshape(-1, 3), device=device)[0]
+    observations, target = Observations.along(normals), Target(np.zeros(3), diameter)
+    found = coverage(observations, target, k.reshape(-1, 3), device=device)[0]
     counted = found.reshape(k.shape[:2]).astype(np.float64)
     return np.asarray(np.maximum(counted, 1))
 
@@ -136,7 +137,7 @@ def _axes(views: ArrayLike) -> Floats:
         )
     if values.ndim == 3:
         return values
-    sight = Looks.along(values).direction[:, 0]
+    sight = Observations.along(values).direction[:, 0]
     level = np.cross(sight, (0.0, 0.0, 1.0))
     lengths = np.linalg.norm(level, axis=1, keepdims=True)
     level = np.where(lengths > 1e-9, level / np.maximum(lengths, 1e-9), (1.0, 0.0, 0.0))

@@ -17,7 +17,7 @@ from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.errors import NonFiniteError, ShapeError
 from rift_cl.geometry.numbers import real_numbers
-from rift_cl.reference.coverage import LooksGradient
+from rift_cl.reference.coverage import ObservationsGradient
 from rift_cl.sampling.coverage.work import BOX, ROW, CoverageWork, Views
 from rift_cl.sampling.targets.target import Target
 
@@ -36,7 +36,8 @@ def coverage(
     """How well views sample frequencies, at each point of a target.
 
     Args:
-        views: cameras, a parallel scan about the z axis, or ``Looks`` at the target's points.
+        views: cameras, a parallel scan about the z axis, or ``Observations`` at the target's
+            points.
         target: its points and diameter.
         k: (K, 3) cycles per unit of the world; those of the target by default.
         weights: (V,) relative photons of cameras; 1 each by default.
@@ -73,7 +74,7 @@ def coverage_grad(
     *,
     weights: ArrayLike | None = None,
     device: Device | None = None,
-) -> LooksGradient:
+) -> ObservationsGradient:
     """The gradient of a number by the views, from its gradient by ``coverage``.
 
     Args:

@@ -15,12 +15,12 @@ from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.geometry import Camera, Parallel
 from rift_cl.geometry.numbers import real_numbers
-from rift_cl.reference.coverage import LooksGradient
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.reference.coverage import ObservationsGradient
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
 Floats = NDArray[np.float64]
-Views = Sequence[Camera] | Looks | Parallel
+Views = Sequence[Camera] | Observations | Parallel
 # Numbers of a view and of a block's box.
 ROW, BOX = 8, 6
 _LARGEST = float(np.finfo(np.float32).max)
@@ -28,24 +28,27 @@ _LARGEST = float(np.finfo(np.float32).max)
 _MOST = 1e5
 
 
-def looks_at(views: Views, target: Target, weights: ArrayLike | None = None) -> Looks:
+def looks_at(views: Views, target: Target, weights: ArrayLike | None = None) -> Observations:
     """How views of any kind see a target's points.
 
     Raises:
-        ShapeError: there is no view, ``Looks`` are at another number of points, or weights have
-            another shape.
+        ShapeError: there is no view, ``Observations`` are at another number of points, or weights
+            have another shape.
         InputError: a weight is given for what is no camera, or is no weight.
     """
-    if not isinstance(views, (Looks, Parallel)):
-        return Looks.of(views, target.points, weights)
+    if not isinstance(views, (Observations, Parallel)):
+        return Observations.of(views, target.points, weights)
     if weights is not None:
-        raise InputError("weights are for cameras; a scan has none, Looks have their own")
-    looks = Looks.of_scan(views, target.points) if isinstance(views, Parallel) else views
-    if looks.points != len(target.points):
+        raise InputError("weights are for cameras; a scan has none, Observations have their own")
+    observations = (
+        Observations.of_scan(views, target.points) if isinstance(views, Parallel) else views
+    )
+    if observations.points != len(target.points):
         raise ShapeError(
-            f"these Looks are at {looks.points} points, the target has {len(target.points)}"
+            f"these Observations are at {observations.points} points, "
+            f"the target has {len(target.points)}"
         )
-    return looks
+    return observations
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,14 +81,14 @@ class CoverageWork:
         device: Device | None,
     ) -> CoverageWork:
         """Take up what ``coverage`` was given, which says what may be wrong with it."""
-        looks, device = looks_at(views, target, weights), device or default_device()
+        observations, device = looks_at(views, target, weights), device or default_device()
         cycles = _cycles(target.k if k is None else k, target.diameter)
         lanes = int(device.traits.macros["LANES"])
         padded = np.concatenate([cycles, np.repeat(cycles[-1:], -len(cycles) % lanes, axis=0)])
         blocks = padded.reshape(-1, lanes, 3)
         low, high = blocks.min(1), blocks.max(1)
         boxes = np.concatenate([(low + high) / 2, (high - low) / 2], axis=1)
-        rows = _rows(looks, target.diameter)
+        rows = _rows(observations, target.diameter)
         columns = np.ascontiguousarray(padded.T)
         return cls(device, len(cycles), columns, boxes, rows, target.diameter)
 
@@ -120,10 +123,10 @@ class CoverageWork:
         boxes = self.boxes[at.start // self.lanes : at.stop // self.lanes]
         return self.device.array(np.ascontiguousarray(self.k[:, at])), self.device.array(boxes)
 
-    def in_world(self, total: Floats) -> LooksGradient:
+    def in_world(self, total: Floats) -> ObservationsGradient:
         """The gradient (V, P, 8) by the kernel's numbers, in the unit of the world."""
         inverse = self.rows[..., 5].T.astype(np.float64)
-        return LooksGradient(
+        return ObservationsGradient(
             direction=total[..., :3].copy(),
             weight=total[..., 3].copy(),
             pixel=total[..., 4] / self.diameter,
@@ -132,11 +135,15 @@ class CoverageWork:
         )
 
 
-def _rows(looks: Looks, diameter: float) -> NDArray[np.float32]:
-    rows = np.zeros((looks.points, looks.views, ROW), np.float32)
-    rows[..., :3] = looks.direction.transpose(1, 0, 2)
-    lengths = (looks.pixel / diameter, 1 / (looks.cutoff * diameter), looks.blur / diameter)
-    for place, values in enumerate((looks.weight, *lengths), start=3):
+def _rows(observations: Observations, diameter: float) -> NDArray[np.float32]:
+    rows = np.zeros((observations.points, observations.views, ROW), np.float32)
+    rows[..., :3] = observations.direction.transpose(1, 0, 2)
+    lengths = (
+        observations.pixel / diameter,
+        1 / (observations.cutoff * diameter),
+        observations.blur / diameter,
+    )
+    for place, values in enumerate((observations.weight, *lengths), start=3):
         if values.max() > _LARGEST:
             raise InputError(
                 f"a weight, a pixel or a blur over the diameter, or the diameter's inverse over a "

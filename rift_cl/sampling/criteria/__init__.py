@@ -1,1 +1,1 @@
-"""TODO."""
+"""From coverage to a number: optimality criteria, sufficiency, limits of resolution."""

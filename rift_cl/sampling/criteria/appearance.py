@@ -1,4 +1,4 @@
-"""Sheen: what views know of how a surface's brightness changes with the direction.
+"""Appearance: what views know of how a surface's brightness changes with the direction.
 
 The brightness of a point is taken for a Gaussian process on the sphere of directions: spherical
 harmonics to a degree, with independent coefficients whose variances fall with the level l like
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from rift_cl.reference.coverage import LooksLike
+from rift_cl.reference.coverage import ObservationsLike
 from rift_cl.sampling.targets.prior import directions_for
 
 if TYPE_CHECKING:
@@ -58,13 +58,13 @@ class _Score(NamedTuple):
     direction: Floats
 
 
-def sheen_error(
-    looks: LooksLike, target: Target, normals: Floats, kind: str
+def appearance_error(
+    observations: ObservationsLike, target: Target, normals: Floats, kind: str
 ) -> tuple[float, Floats, Floats]:
     """The share of the brightness's variance that stays unknown, a mean over points.
 
     Args:
-        looks: V views of the target's P points.
+        observations: V views of the target's P points.
         target: its degree, its ratio of signal to noise, and from where it will be looked at.
         normals: (P, 3).
         kind: ``logdet`` for minus the bits per harmonic, from wherever it will be looked at;
@@ -73,25 +73,25 @@ def sheen_error(
     Returns:
         The value, and its derivatives by the views' directions (V, P, 3) and weights (V, P).
     """
-    v = looks.direction.transpose(1, 0, 2)
+    v = observations.direction.transpose(1, 0, 2)
     cosine = np.einsum("pvd,pd->pv", v, normals)
-    light, kernel = light_of(looks, normals), covariance(v, v, target.degree)
+    light, kernel = light_of(observations, normals), covariance(v, v, target.degree)
     left = np.linalg.inv(np.eye(v.shape[1]) + target.snr * light[:, :, None] * kernel)
     views = _Views(v, light, kernel, np.asarray(left, np.float64))
     score = _bits(views, target) if kind == "logdet" else _variance(views, target, normals)
     slopes = covariance(v, v, target.degree, slope=True)
     by_between = (score.kernel + score.kernel.transpose(0, 2, 1)) * slopes
-    by_cosine = score.light * looks.weight.T * (cosine > 0)
+    by_cosine = score.light * observations.weight.T * (cosine > 0)
     by_direction = by_between @ v + by_cosine[..., None] * normals[:, None] + score.direction
     across = by_direction - (by_direction * v).sum(2, keepdims=True) * v
     by_weight = score.light * np.maximum(cosine, 0)
     return score.value, across.transpose(1, 0, 2), by_weight.T
 
 
-def light_of(looks: LooksLike, normals: Floats) -> Floats:
+def light_of(observations: ObservationsLike, normals: Floats) -> Floats:
     """(P, V) weights of views times the cosines to the normals (P, 3), 0 from behind."""
-    cosine = np.einsum("vpd,pd->pv", looks.direction, normals)
-    return np.asarray(looks.weight.T * np.maximum(cosine, 0))
+    cosine = np.einsum("vpd,pd->pv", observations.direction, normals)
+    return np.asarray(observations.weight.T * np.maximum(cosine, 0))
 
 
 def wanted_of(target: Target) -> Floats:

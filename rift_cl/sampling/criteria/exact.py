@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rift_cl.errors import InputError, ResourceLimitError
-from rift_cl.reference.coverage import Floats, LooksLike, optical_transfer
+from rift_cl.reference.coverage import Floats, ObservationsLike, optical_transfer
 from rift_cl.sampling.targets.prior import checked_power
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ _COLUMNS = 4096
 _WIDER = 1.25
 
 
-def exact(looks: LooksLike, target: Target, samples: int | None = None) -> float:
+def exact(observations: ObservationsLike, target: Target, samples: int | None = None) -> float:
     """Share of the variance that stays: ``tr(C - C M' (M C M' + N)^-1 M C) / tr(C)``.
 
     C is the covariance by the prior of samples in the target's disc or ball, M projects them along
@@ -38,7 +38,7 @@ def exact(looks: LooksLike, target: Target, samples: int | None = None) -> float
     target's band.
 
     Args:
-        looks: V views of the target's points; the mean over points is taken.
+        observations: V views of the target's points; the mean over points is taken.
         target: its prior, diameter and signal-to-noise ratio count. A flat one is taken in the
             plane z = 0.
         samples: across the diameter; 24 in the plane and 10 in space by default.
@@ -49,7 +49,7 @@ def exact(looks: LooksLike, target: Target, samples: int | None = None) -> float
             there is so much more signal than noise that rounding hides what stays.
     """
     axes = 2 if target.is_flat else 3
-    if axes == 2 and np.abs(looks.direction[..., 2]).max() > _IN_THE_PLANE:
+    if axes == 2 and np.abs(observations.direction[..., 2]).max() > _IN_THE_PLANE:
         raise InputError("exact: the target is flat, wanted views along its plane z = 0")
     count = (_IN_PLANE if axes == 2 else _IN_SPACE) if samples is None else samples
     if not 1 <= count**axes <= _MOST:
@@ -62,8 +62,10 @@ def exact(looks: LooksLike, target: Target, samples: int | None = None) -> float
     inside = np.linalg.norm(x, axis=1) <= target.diameter / 2
     within = _covariance(target, count, axes)[np.ix_(inside, inside)]
     root = np.asarray(np.linalg.cholesky(within), np.float64)
-    points = range(looks.weight.shape[1])
-    left = [_left(root, _information(looks, point, target, x[inside], step)) for point in points]
+    points = range(observations.weight.shape[1])
+    left = [
+        _left(root, _information(observations, point, target, x[inside], step)) for point in points
+    ]
     return float(np.mean(left) / (root**2).sum())
 
 
@@ -97,7 +99,9 @@ def _covariance(target: Target, count: int, axes: int) -> Floats:
     return np.asarray(covariance)
 
 
-def _information(looks: LooksLike, point: int, target: Target, x: Floats, step: float) -> Floats:
+def _information(
+    observations: ObservationsLike, point: int, target: Target, x: Floats, step: float
+) -> Floats:
     """``M' N^-1 M``, (n, n), summed over the views of one point."""
     axes, diameter = (2 if target.is_flat else 3), target.diameter
     width = _WIDER * diameter
@@ -109,20 +113,23 @@ def _information(looks: LooksLike, point: int, target: Target, x: Floats, step: 
     scale = step ** (2 * axes) / (density * width ** (axes - 1))
     at_once = max(_COLUMNS // (2 * len(q)), 1)
     total = np.zeros((len(x), len(x)))
-    for first in range(0, len(looks.weight), at_once):
-        views = range(first, min(first + at_once, len(looks.weight)))
-        columns = [_columns(looks, view, point, x, q) for view in views]
+    for first in range(0, len(observations.weight), at_once):
+        views = range(first, min(first + at_once, len(observations.weight)))
+        columns = [_columns(observations, view, point, x, q) for view in views]
         every = np.concatenate(columns, axis=1)
         total += scale * (every @ every.T)
     return total
 
 
-def _columns(looks: LooksLike, view: int, point: int, x: Floats, q: Floats) -> Floats:
+def _columns(observations: ObservationsLike, view: int, point: int, x: Floats, q: Floats) -> Floats:
     """What each sample adds to one view's spectrum, cosines and sines, (n, 2 frequencies)."""
-    optics = (values[view, point] for values in (looks.pixel, looks.cutoff, looks.blur))
+    optics = (
+        values[view, point]
+        for values in (observations.pixel, observations.cutoff, observations.blur)
+    )
     passed = optical_transfer(np.linalg.norm(q, axis=1), *optics).value
-    passed = passed * np.sqrt(looks.weight[view, point])
-    phase = 2 * np.pi * (x @ _across(looks.direction[view, point], q.shape[1] + 1)) @ q.T
+    passed = passed * np.sqrt(observations.weight[view, point])
+    phase = 2 * np.pi * (x @ _across(observations.direction[view, point], q.shape[1] + 1)) @ q.T
     return np.concatenate([np.cos(phase) * passed, np.sin(phase) * passed], axis=1)
 
 

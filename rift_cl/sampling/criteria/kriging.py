@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rift_cl.reference.coverage import Floats, LooksLike, optical_transfer
+from rift_cl.reference.coverage import Floats, ObservationsLike, optical_transfer
 from rift_cl.sampling.targets.prior import checked_power
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ _NEAREST, _AT_ONCE = 24, 256
 _NOTHING = 1e12
 
 
-def kriging(looks: LooksLike, target: Target) -> float:
+def kriging(observations: ObservationsLike, target: Target) -> float:
     """Share of the power that stays unknown, as ``wiener``, but with correlated views.
 
     Each frequency is estimated from the nearest points of the 24 slices closest to it:
@@ -31,35 +31,42 @@ def kriging(looks: LooksLike, target: Target) -> float:
     a ball, and N is the noise of each, ``1 / (snr S w MTF^2)``.
 
     Args:
-        looks: V views of the target's points.
+        observations: V views of the target's points.
         target: its frequencies, prior and signal-to-noise ratio count.
     """
     power = checked_power(target.prior, target.k, target.diameter)
-    shares = [_shares(looks, point, target, power) for point in range(looks.weight.shape[1])]
+    shares = [
+        _shares(observations, point, target, power) for point in range(observations.weight.shape[1])
+    ]
     return float(np.mean([power @ share for share in shares]) / power.sum())
 
 
-def _shares(looks: LooksLike, point: int, target: Target, power: Floats) -> Floats:
+def _shares(observations: ObservationsLike, point: int, target: Target, power: Floats) -> Floats:
     parts = [
-        _some(looks, point, target, target.k[first:last], power[first:last])
+        _some(observations, point, target, target.k[first:last], power[first:last])
         for first in range(0, len(power), _AT_ONCE)
         for last in [first + _AT_ONCE]
     ]
     return np.concatenate(parts)
 
 
-def _some(looks: LooksLike, point: int, target: Target, k: Floats, power: Floats) -> Floats:
+def _some(
+    observations: ObservationsLike, point: int, target: Target, k: Floats, power: Floats
+) -> Floats:
     """Unknown shares of some frequencies (K,)."""
-    normals = looks.direction[:, point]
+    normals = observations.direction[:, point]
     offsets = k @ normals.T
     near = np.argsort(np.abs(offsets), axis=1, kind="stable")[:, :_NEAREST]
     u, n = np.take_along_axis(offsets, near, 1), normals[near]
     places = k[:, None] - u[..., None] * n
     passed = optical_transfer(
         np.linalg.norm(places, axis=2),
-        *(values[near, point] for values in (looks.pixel, looks.cutoff, looks.blur)),
+        *(
+            values[near, point]
+            for values in (observations.pixel, observations.cutoff, observations.blur)
+        ),
     ).value
-    told = target.snr * power[:, None] * looks.weight[near, point] * passed**2
+    told = target.snr * power[:, None] * observations.weight[near, point] * passed**2
     noise = np.minimum(1 / np.maximum(told, 1 / _NOTHING), _NOTHING)
     window = _disc if target.is_flat else _ball
     apart = np.linalg.norm(places[:, :, None] - places[:, None], axis=3)

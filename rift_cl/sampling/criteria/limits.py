@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from rift_cl.reference.coverage import optical_transfer
 from rift_cl.sampling.coverage.work import Views, looks_at
 from rift_cl.sampling.criteria.orlov import frequency_directions, runs
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
 Floats = NDArray[np.float64]
@@ -103,7 +103,7 @@ def limits(views: Views, target: Target, *, weights: ArrayLike | None = None) ->
     """What limits detail at each point of a target.
 
     Args:
-        views: cameras, a parallel scan about z, or ``Looks`` at the target's points.
+        views: cameras, a parallel scan about z, or ``Observations`` at the target's points.
         target: its points and diameter.
         weights: (V,) relative photons of cameras; a camera of weight 0 does not count.
 
@@ -111,17 +111,17 @@ def limits(views: Views, target: Target, *, weights: ArrayLike | None = None) ->
         ShapeError: there is no view.
         InputError: every point lies outside every picture, or a number is out of its range.
     """
-    looks = looks_at(views, target, weights)
-    seen = looks.weight > 0
+    observations = looks_at(views, target, weights)
+    seen = observations.weight > 0
     if not seen.any():
-        looks.require_seen()
+        observations.check_seen()
     with np.errstate(divide="ignore"):
-        parts = [0.5 / looks.pixel, _DIFFRACTION * looks.cutoff, _focus(looks)]
+        parts = [0.5 / observations.pixel, _DIFFRACTION * observations.cutoff, _focus(observations)]
     pixel, diffraction, focus = (np.where(seen, part, 0) for part in parts)
-    camera = np.where(seen, _end(looks, np.min(parts, axis=0)), 0)
-    first = np.where(seen & np.isfinite(camera), _first(looks, camera, parts[0]), -1)
+    camera = np.where(seen, _end(observations, np.min(parts, axis=0)), 0)
+    first = np.where(seen & np.isfinite(camera), _first(observations, camera, parts[0]), -1)
     perfect, told = (
-        [_told(looks, target, p, ends[:, p]) for p in range(looks.points)]
+        [_told(observations, target, p, ends[:, p]) for p in range(observations.points)]
         for ends in (np.where(seen, np.inf, 0), camera)
     )
     number, reached = (np.array([_most(one) for one in found]) for found in (perfect, told))
@@ -129,27 +129,28 @@ def limits(views: Views, target: Target, *, weights: ArrayLike | None = None) ->
     unseen = np.array([1 - len(part) / len(one) for part, one in zip(held, told, strict=True)])
     within = np.array([float(np.median(part)) if len(part) else 0.0 for part in held])
     cause = tuple(
-        _cause(number[p], camera[seen[:, p], p], first[seen[:, p], p]) for p in range(looks.points)
+        _cause(number[p], camera[seen[:, p], p], first[seen[:, p], p])
+        for p in range(observations.points)
     )
     return Limits(pixel, diffraction, focus, camera, first, number, reached, unseen, within, cause)
 
 
-def _focus(looks: Looks) -> Floats:
+def _focus(observations: Observations) -> Floats:
     """Where the disc of defocus alone passes a tenth: the least k of blur k (1 - k / cutoff)."""
-    plain = _DEFOCUS / looks.blur
+    plain = _DEFOCUS / observations.blur
     with np.errstate(invalid="ignore"):
-        share = 4 * plain / looks.cutoff
+        share = 4 * plain / observations.cutoff
     # No real root where the disc never passes so little, and none without blur.
     root = np.sqrt(1 - np.where(share <= 1, share, 1))
     return np.where(share <= 1, 2 * plain / (1 + root), np.inf)
 
 
-def _first(looks: Looks, camera: Floats, pixel: Floats) -> NDArray[np.intp]:
+def _first(observations: Observations, camera: Floats, pixel: Floats) -> NDArray[np.intp]:
     """(V, P) what passes least where each camera ends; pixels where that is half their cycle."""
     k = np.where(np.isfinite(camera), camera, 0)
-    square = optical_transfer(k, looks.pixel, np.inf, 0).value
-    light = optical_transfer(k, 0, looks.cutoff, 0).value
-    both = optical_transfer(k, 0, looks.cutoff, looks.blur).value
+    square = optical_transfer(k, observations.pixel, np.inf, 0).value
+    light = optical_transfer(k, 0, observations.cutoff, 0).value
+    both = optical_transfer(k, 0, observations.cutoff, observations.blur).value
     disc = both / np.where(light > 0, light, 1)
     first = np.argmin([square, light, disc], axis=0)
     return np.where(camera >= pixel * (1 - 1e-9), 0, first)
@@ -164,7 +165,7 @@ def _cause(number: float, camera: Floats, first: NDArray[np.intp]) -> str:
     return CAUSES[int(np.argmax(np.bincount(first[first >= 0])))]
 
 
-def _end(looks: Looks, first: Floats) -> Floats:
+def _end(observations: Observations, first: Floats) -> Floats:
     """Where the product of all optics first passes a tenth, at most at the first of the ends."""
     ends = first.copy()
     view, point = np.nonzero(np.isfinite(first))
@@ -172,7 +173,10 @@ def _end(looks: Looks, first: Floats) -> Floats:
     for part in runs(len(view), _STEPS):
         at = view[part], point[part]
         k = first[at][:, None] * steps
-        optics = (values[at][:, None] for values in (looks.pixel, looks.cutoff, looks.blur))
+        optics = (
+            values[at][:, None]
+            for values in (observations.pixel, observations.cutoff, observations.blur)
+        )
         passed = optical_transfer(k, *optics).value
         below = passed < _CONTRAST
         last = np.where(below.any(1), np.argmax(below, axis=1), _STEPS - 1)
@@ -190,9 +194,9 @@ def _most(told: Floats) -> float:
     return float(np.quantile(told, 1 - _MOST))
 
 
-def _told(looks: Looks, target: Target, point: int, ends: Floats) -> Floats:
+def _told(observations: Observations, target: Target, point: int, ends: Floats) -> Floats:
     """(K,) the frequency that each direction is told up to, if the cameras' detail ends there."""
-    units, directions = frequency_directions(target), looks.direction[:, point]
+    units, directions = frequency_directions(target), observations.direction[:, point]
     best = np.empty(len(units))
     for part in runs(len(units), len(directions)):
         gaps = np.maximum(np.abs(units[part] @ directions.T), _LEAST)

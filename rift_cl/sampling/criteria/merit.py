@@ -13,12 +13,11 @@ from rift_cl.geometry import Camera
 from rift_cl.geometry.numbers import real_numbers
 from rift_cl.reference import coverage as twin
 from rift_cl.sampling.criteria.exact import exact
-from rift_cl.sampling.criteria.functionals import Floats, Scored
-from rift_cl.sampling.criteria.functionals import functionals as criteria
+from rift_cl.sampling.criteria.functionals import Floats, Scored, scored
 from rift_cl.sampling.criteria.kriging import kriging
 from rift_cl.sampling.criteria.surface import surface_merit
 from rift_cl.sampling.targets.camera_gradients import CameraGradients, camera_gradients
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.prior import checked_power
 
 if TYPE_CHECKING:
@@ -79,37 +78,37 @@ def merit(
     """
     if kind not in get_args(MeritKind):
         raise InputError(f"merit: kind is {kind!r}, wanted one of {', '.join(get_args(MeritKind))}")
-    seen = Looks.of(cameras, target.points)
-    looks = seen.weighted(weights)
+    seen = Observations.of(cameras, target.points)
+    observations = seen.weighted(weights)
     if kind == "kriging" or kind == "exact":  # noqa: PLR1714 - what is narrowed by its type
         if target.mode == "surface":
             raise InputError(f"merit: a surface has no {kind}; take wiener, logdet or worst")
-        return Merit((kriging if kind == "kriging" else exact)(looks, target), None)
+        return Merit((kriging if kind == "kriging" else exact)(observations, target), None)
     if target.mode == "surface":
-        value, by_looks = surface_merit(looks, target, kind)
+        value, by_observations = surface_merit(observations, target, kind)
     else:
-        value, by_looks = _volume(looks, target, kind, device)
-    return Merit(value, camera_gradients(cameras, seen, by_looks))
+        value, by_observations = _volume(observations, target, kind, device)
+    return Merit(value, camera_gradients(cameras, seen, by_observations))
 
 
 def _volume(
-    looks: Looks, target: Target, kind: CoverageMerit, device: Device | None
-) -> tuple[float, twin.LooksGradient]:
+    observations: Observations, target: Target, kind: CoverageMerit, device: Device | None
+) -> tuple[float, twin.ObservationsGradient]:
     k, diameter = target.k, target.diameter
-    if device is None or looks.weight.size * len(k) < _LARGE:
-        scored = merit_of_coverage(kind, twin.coverage(looks, k, diameter), target)
-        return scored.value, twin.coverage_grad(looks, k, diameter, scored.gradient)
+    if device is None or observations.weight.size * len(k) < _LARGE:
+        scored = merit_of_coverage(kind, twin.coverage(observations, k, diameter), target)
+        return scored.value, twin.coverage_grad(observations, k, diameter, scored.gradient)
     from rift_cl.sampling.coverage.device import coverage, coverage_grad
 
-    scored = merit_of_coverage(kind, coverage(looks, target, device=device), target)
-    return scored.value, coverage_grad(looks, target, scored.gradient, device=device)
+    scored = merit_of_coverage(kind, coverage(observations, target, device=device), target)
+    return scored.value, coverage_grad(observations, target, scored.gradient, device=device)
 
 
 def merit_of_coverage(kind: CoverageMerit, coverage: Any, target: Target) -> Scored:
     """Score the coverage of a target's frequencies.
 
     Args:
-        kind: ``wiener``, ``logdet`` or ``worst``; see ``criteria``.
+        kind: ``wiener``, ``logdet`` or ``worst``; see ``functionals``.
         coverage: (P, K) L at each of the target's points and frequencies ``target.k``.
         target: what is looked at: its prior and its signal-to-noise ratio count.
 
@@ -122,7 +121,7 @@ def merit_of_coverage(kind: CoverageMerit, coverage: Any, target: Target) -> Sco
     """
     known = _coverage(coverage, len(target.k))
     power = checked_power(target.prior, target.k, target.diameter)
-    return criteria.scored(kind, known, power, target.snr, target.k)
+    return scored(kind, known, power, target.snr, target.k)
 
 
 def _coverage(values: Any, frequencies: int) -> Floats:

@@ -112,12 +112,12 @@ def seen_directions(views: Views, target: Target, point: int) -> Floats:
         ShapeError: there is no view.
         InputError: there is no such point, or it lies outside every picture.
     """
-    looks = looks_at(views, target)
-    if point not in range(looks.points):
-        raise InputError(f"point is {point!r}, the target has {looks.points}, from 0 on")
+    observations = looks_at(views, target)
+    if point not in range(observations.points):
+        raise InputError(f"point is {point!r}, the target has {observations.points}, from 0 on")
     point = int(point)
-    looks.require_seen(point)
-    directions: Floats = looks.direction[looks.weight[:, point] > 0, point]
+    observations.check_seen(point)
+    directions: Floats = observations.direction[observations.weight[:, point] > 0, point]
     return directions
 
 

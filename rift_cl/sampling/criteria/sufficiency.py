@@ -25,7 +25,7 @@ from rift_cl.sampling.criteria.orlov import (
     wanted_frequency,
 )
 from rift_cl.sampling.criteria.tuy import Tuy, tuy
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
 # Share of directions that the converse of Crowther's count asks for: a small hole is left to
@@ -81,7 +81,7 @@ def sufficiency(
     """Whether views suffice for a target, at one of its points.
 
     Args:
-        views: cameras, a parallel scan about z, or ``Looks`` at the target's points.
+        views: cameras, a parallel scan about z, or ``Observations`` at the target's points.
         target: its diameter, points and band.
         frequency: that is wanted, in cycles per unit of length; the target's highest if not given.
         point: number of the point.
@@ -95,7 +95,7 @@ def sufficiency(
         None,
         crowther(views, target, frequency=frequency, point=point),
     )
-    if isinstance(views, (Looks, Parallel)) or all(c.model == "ortho" for c in views):
+    if isinstance(views, (Observations, Parallel)) or all(c.model == "ortho" for c in views):
         return found
     return Sufficiency(found.orlov, tuy(views, target), found.crowther)
 

@@ -17,13 +17,13 @@ import numpy as np
 from rift_cl.errors import InputError
 from rift_cl.reference.coverage import (
     Floats,
-    LooksGradient,
-    LooksLike,
+    ObservationsGradient,
+    ObservationsLike,
     Transfer,
     optical_transfer,
 )
 from rift_cl.sampling.criteria import functionals as criteria
-from rift_cl.sampling.criteria.appearance import sheen_error
+from rift_cl.sampling.criteria.appearance import appearance_error
 from rift_cl.sampling.targets.prior import checked_power
 
 if TYPE_CHECKING:
@@ -50,15 +50,15 @@ class _Seen(NamedTuple):
 
 
 def surface_merit(
-    looks: LooksLike, target: Target, kind: str = "wiener"
-) -> tuple[float, LooksGradient]:
+    observations: ObservationsLike, target: Target, kind: str = "wiener"
+) -> tuple[float, ObservationsGradient]:
     """Errors of a surface's texture and of its sheen, added; each from 0 to 1.
 
     The texture's coverage is ``sum w cos MTF^2``, scored by ``criteria``; what is unknown of the
     sheen says ``rift_cl.sampling.criteria.appearance``.
 
     Args:
-        looks: V views of the target's points.
+        observations: V views of the target's points.
         target: of mode ``surface``; the prior is taken in the tangent planes' own axes.
         kind: ``wiener``, ``logdet`` or ``worst``, the last for the texture alone.
 
@@ -70,19 +70,23 @@ def surface_merit(
     """
     if target.normals is None:
         raise InputError("surface_merit: the target has no normals, wanted one for each point")
-    texture, gradient = _texture(looks, target, target.normals, kind)
-    sheen, by_direction, by_weight = sheen_error(looks, target, target.normals, kind)
+    texture, gradient = _texture(observations, target, target.normals, kind)
+    appearance, by_direction, by_weight = appearance_error(
+        observations, target, target.normals, kind
+    )
     whole = gradient._replace(
         direction=gradient.direction + by_direction, weight=gradient.weight + by_weight
     )
-    return texture + sheen, whole
+    return texture + appearance, whole
 
 
-def texture_coverage(looks: LooksLike, target: Target) -> Floats:
+def texture_coverage(observations: ObservationsLike, target: Target) -> Floats:
     """Coverage (P, K) of the frequencies of each point's tangent plane."""
-    points = range(looks.weight.shape[1])
+    points = range(observations.weight.shape[1])
     normals = np.zeros((len(points), 3)) if target.normals is None else target.normals
-    return np.stack([_sum(looks, p, _seen(looks, p, normals[p], _plane(target))) for p in points])
+    return np.stack(
+        [_sum(observations, p, _seen(observations, p, normals[p], _plane(target))) for p in points]
+    )
 
 
 def _plane(target: Target) -> Floats:
@@ -92,43 +96,46 @@ def _plane(target: Target) -> Floats:
 
 
 def _texture(
-    looks: LooksLike, target: Target, normals: Floats, kind: str
-) -> tuple[float, LooksGradient]:
+    observations: ObservationsLike, target: Target, normals: Floats, kind: str
+) -> tuple[float, ObservationsGradient]:
     plane = _plane(target)
     power = checked_power(target.prior, plane, target.diameter)
-    seen = [_seen(looks, p, normal, plane) for p, normal in enumerate(normals)]
-    coverage = np.stack([_sum(looks, p, one) for p, one in enumerate(seen)])
+    seen = [_seen(observations, p, normal, plane) for p, normal in enumerate(normals)]
+    coverage = np.stack([_sum(observations, p, one) for p, one in enumerate(seen)])
     scored = criteria.scored(kind, coverage, power, target.snr, plane)
-    parts = [_gradient(looks, p, normals[p], one, scored.gradient[p]) for p, one in enumerate(seen)]
-    return scored.value, LooksGradient(
+    parts = [
+        _gradient(observations, p, normals[p], one, scored.gradient[p])
+        for p, one in enumerate(seen)
+    ]
+    return scored.value, ObservationsGradient(
         *(np.stack(values, axis=1) for values in zip(*parts, strict=True))
     )
 
 
-def _seen(looks: LooksLike, point: int, normal: Floats, plane: Floats) -> _Seen:
+def _seen(observations: ObservationsLike, point: int, normal: Floats, plane: Floats) -> _Seen:
     axis = np.eye(3)[np.argmin(np.abs(normal))]
     first = np.cross(axis, normal)
     first /= np.linalg.norm(first)
     q = plane[:, :1] * first + plane[:, 1:2] * np.cross(normal, first)
-    direction = looks.direction[:, point]
+    direction = observations.direction[:, point]
     cosine = np.maximum(direction @ normal, 0)[:, None]
     along = (direction @ q.T) / np.maximum(cosine, 1e-9)
     k = np.sqrt((q**2).sum(1) + along**2)
-    optics = (looks.pixel, looks.cutoff, looks.blur)
+    optics = (observations.pixel, observations.cutoff, observations.blur)
     transfer = optical_transfer(k, *(values[:, point, None] for values in optics))
     return _Seen(q, cosine, along, transfer)
 
 
-def _sum(looks: LooksLike, point: int, seen: _Seen) -> Floats:
-    light = looks.weight[:, point, None] * seen.cosine
+def _sum(observations: ObservationsLike, point: int, seen: _Seen) -> Floats:
+    light = observations.weight[:, point, None] * seen.cosine
     return np.asarray((light * seen.transfer.value**2).sum(0))
 
 
 def _gradient(
-    looks: LooksLike, point: int, normal: Floats, seen: _Seen, upstream: Floats
+    observations: ObservationsLike, point: int, normal: Floats, seen: _Seen, upstream: Floats
 ) -> tuple[Any, ...]:
     """Of one point: by direction (V, 3), weight, pixel, cutoff and blur (V,)."""
-    passed, weight = seen.transfer, looks.weight[:, point, None]
+    passed, weight = seen.transfer, observations.weight[:, point, None]
     by_light = (upstream * passed.value**2).sum(1)
     by_value = 2 * upstream * weight * seen.cosine * passed.value
     # The frequency's square is |q|^2 + along^2, and along is q . v / n . v.
@@ -136,7 +143,7 @@ def _gradient(
     by_cosine = by_light * weight[:, 0] - (by_along * seen.along).sum(1)
     by_direction = by_along @ seen.q + (by_cosine * (seen.cosine[:, 0] > 0))[:, None] * normal
     optics = [(by_value * part).sum(1) for part in (passed.pixel, passed.cutoff, passed.blur)]
-    direction = _tangential(by_direction, looks.direction[:, point])
+    direction = _tangential(by_direction, observations.direction[:, point])
     return direction, by_light * seen.cosine[:, 0], *optics
 
 

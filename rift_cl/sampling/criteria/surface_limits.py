@@ -53,15 +53,15 @@ def surface_limits(
         ShapeError: there is no view.
         InputError: every point lies outside every picture, or a number is out of its range.
     """
-    looks = looks_at(views, target, weights)
-    found = limits(looks, target)
-    points = range(looks.points)
-    seen = [looks.weight[:, p] > 0 for p in points]
+    observations = looks_at(views, target, weights)
+    found = limits(observations, target)
+    points = range(observations.points)
+    seen = [observations.weight[:, p] > 0 for p in points]
     pixel, diffraction, focus, camera = (
         np.array([float(np.median(end[seen[p], p])) if seen[p].any() else 0.0 for p in points])
         for end in (found.pixel, found.diffraction, found.focus, found.camera)
     )
-    parallax = np.array([_parallax(looks.direction[seen[p], p]) for p in points])
+    parallax = np.array([_parallax(observations.direction[seen[p], p]) for p in points])
     with np.errstate(divide="ignore"):
         # Half a cycle is a pixel.
         depth = 0.5 / (pixel * 2 * np.tan(parallax / 2))

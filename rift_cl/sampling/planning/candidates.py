@@ -24,10 +24,10 @@ from rift_cl.sampling.planning.design_space import (
     F_NUMBER,
     FOCAL,
     FOCUS,
-    Site,
+    DesignSpace,
 )
 from rift_cl.sampling.planning.objective import Objective
-from rift_cl.sampling.planning.view_table import Stations
+from rift_cl.sampling.planning.view_table import ViewTable
 from rift_cl.sampling.targets.target import Target
 
 Floats = NDArray[np.float64]
@@ -42,7 +42,7 @@ _ROUNDS = 5
 _LOOKED_FROM = 200
 
 
-def candidates(objective: Objective, views: int, seed: int) -> Stations:
+def candidates(objective: Objective, views: int, seed: int) -> ViewTable:
     """Views to choose from.
 
     Args:
@@ -53,23 +53,23 @@ def candidates(objective: Objective, views: int, seed: int) -> Stations:
     Raises:
         InputError: keep-outs leave no place to stand.
     """
-    site = objective.site
-    settings = [settings_of(objective, kind, views) for kind in range(len(site.types))]
+    design = objective.design
+    settings = [settings_of(objective, kind, views) for kind in range(len(design.types))]
     per_direction = sum(len(rows) for rows in settings)
     least = max(_DIRECTIONS, _PER_VIEW * views)
     wanted = max(min(least, _CANDIDATES // per_direction), 2 * views)
     laid = wanted
     for attempt in itertools.count():
-        angles = spread(site.constraints, laid, seed)
+        angles = spread(design.constraints, laid, seed)
         parts = [_at(angles, kind, rows) for kind, rows in enumerate(settings)]
-        stations = Stations.joined(parts)
-        open_places = allowed(site, stations)
+        view_table = ViewTable.joined(parts)
+        open_places = allowed(design, view_table)
         if open_places.sum() >= wanted * per_direction // 2 or attempt == _ROUNDS:
             break
         laid *= 3 if attempt < 2 else 2
     if not open_places.any():
-        raise InputError(_nowhere(site, stations))
-    found = stations.take(open_places)
+        raise InputError(_nowhere(design, view_table))
+    found = view_table.take(open_places)
     # More were laid than wanted where much is kept out; every n-th is spread as evenly.
     return found.take(np.arange(0, len(found), max(1, len(found) // (2 * wanted * per_direction))))
 
@@ -107,19 +107,19 @@ def looked_at(target: Target, constraints: Constraints) -> Target:
     return replace(target, seen_from=frames[:, 0])
 
 
-def allowed(site: Site, stations: Stations) -> NDArray[np.bool_]:
+def allowed(design: DesignSpace, view_table: ViewTable) -> NDArray[np.bool_]:
     """(V,) which of them keep clear of every keep-out."""
-    places = stations.places(site)
+    places = view_table.places(design)
     clear = np.ones(len(places), bool)
-    for keepout in site.constraints.keepouts:
-        clear &= keepout.clearance(places, site.target.center)[0] >= 0
+    for keepout in design.constraints.keepouts:
+        clear &= keepout.clearance(places, design.target.center)[0] >= 0
     return clear
 
 
-def _nowhere(site: Site, stations: Stations) -> str:
-    places, center = stations.places(site), site.target.center
+def _nowhere(design: DesignSpace, view_table: ViewTable) -> str:
+    places, center = view_table.places(design), design.target.center
     shares = []
-    for index, keepout in enumerate(site.constraints.keepouts):
+    for index, keepout in enumerate(design.constraints.keepouts):
         lost = float(np.mean(keepout.clearance(places, center)[0] < 0))
         shares.append(f"keepouts[{index}] takes {lost:.0%}")
     return (
@@ -129,22 +129,22 @@ def _nowhere(site: Site, stations: Stations) -> str:
     )
 
 
-def _at(angles: Floats, kind: int, rows: Floats) -> Stations:
+def _at(angles: Floats, kind: int, rows: Floats) -> ViewTable:
     table = np.repeat(rows[None], len(angles), axis=0)
     table[:, :, [AZIMUTH, ELEVATION]] = angles[:, None]
-    return Stations(np.full(table[..., 0].size, kind), table.reshape(-1, COLUMNS))
+    return ViewTable(np.full(table[..., 0].size, kind), table.reshape(-1, COLUMNS))
 
 
 def settings_of(objective: Objective, kind: int, views: int) -> Floats:
     """A few rows of settings of one type; their azimuths and elevations do not count."""
-    site = objective.site
-    limits = site.limits[kind]
-    exposure = affordable(site, kind, views)
+    design = objective.design
+    limits = design.limits[kind]
+    exposure = affordable(design, kind, views)
     rows = []
     for distance, share, stop, focus in itertools.product(
         _levels(limits[DISTANCE]), (0.0, 0.5, 1.0), _levels(limits[F_NUMBER]), _even(limits[FOCUS])
     ):
-        longest, _, _ = site.longest(kind, np.array(distance), np.array(focus))
+        longest, _, _ = design.longest(kind, np.array(distance), np.array(focus))
         low, high = limits[FOCAL, 0], min(limits[FOCAL, 1], float(longest))
         if share > 0 and high <= low * 1.02:
             continue
@@ -159,7 +159,7 @@ def _best(objective: Objective, kind: int, rows: Floats) -> Floats:
     """Those settings that serve best when every view has them."""
     if len(rows) <= _SETTINGS:
         return rows
-    angles = spread(objective.site.constraints, _TRIAL, 0)
+    angles = spread(objective.design.constraints, _TRIAL, 0)
     values = [objective.value(_at(angles, kind, row[None])) for row in rows]
     return rows[np.sort(np.argsort(values, kind="stable")[:_SETTINGS])]
 

@@ -33,7 +33,7 @@ _LARGEST = 1e50
 
 
 @dataclass(frozen=True, eq=False)
-class Site:
+class DesignSpace:
     """Where views are planned.
 
     Args:

@@ -18,9 +18,9 @@ from rift_cl.sampling.planning.design_space import (
     F_NUMBER,
     FOCAL,
     FOCUS,
-    Site,
+    DesignSpace,
 )
-from rift_cl.sampling.planning.view_table import Stations
+from rift_cl.sampling.planning.view_table import ViewTable
 
 Floats = NDArray[np.float64]
 # Azimuths turn in steps that grow towards the poles, up to this much.
@@ -42,13 +42,16 @@ class FreeLayout:
         begin: the views at the start.
     """
 
-    site: Site
-    begin: Stations
+    design: DesignSpace
+    begin: ViewTable
 
     @cached_property
     def trust(self) -> float:
         """How far views may turn, in radians."""
-        (first, last), (low, high) = self.site.constraints.azimuth, self.site.constraints.elevation
+        (first, last), (low, high) = (
+            self.design.constraints.azimuth,
+            self.design.constraints.elevation,
+        )
         area = (last - first) * (math.sin(high) - math.sin(low))
         if area < 1e-9:
             return _TRUST * max(last - first, high - low) / max(1, len(self.begin) - 1)
@@ -57,16 +60,19 @@ class FreeLayout:
     @property
     def reach(self) -> float:
         """How far a camera may move at the most."""
-        near, far = self.site.limits[:, DISTANCE, 0].min(), self.site.limits[:, DISTANCE, 1].max()
+        near, far = (
+            self.design.limits[:, DISTANCE, 0].min(),
+            self.design.limits[:, DISTANCE, 1].max(),
+        )
         return float(2 * self.trust * far + far - near)
 
     @cached_property
     def _limits(self) -> Floats:
         """(V, 7, 2) of every view's numbers."""
-        limits = self.site.limits[self.begin.kind].copy()
+        limits = self.design.limits[self.begin.kind].copy()
         level = self._level[:, None]
         table = self.begin.table
-        if self.site.constraints.full_circle:
+        if self.design.constraints.full_circle:
             limits[:, AZIMUTH] = table[:, [AZIMUTH]] + np.array([-math.pi, math.pi])
         limits[:, AZIMUTH] = (limits[:, AZIMUTH] - table[:, [AZIMUTH]]) * level
         limits[:, ELEVATION] -= table[:, [ELEVATION]]
@@ -76,7 +82,7 @@ class FreeLayout:
         fixed = limits[:, FOCAL, 1] <= limits[:, FOCAL, 0]
         limits[:, FOCAL] = [0, 1]
         limits[fixed, FOCAL, 1] = 0
-        limits[:, FOCUS] /= self.site.target.diameter
+        limits[:, FOCUS] /= self.design.target.diameter
         limits[:, EXPOSURE] /= limits[:, EXPOSURE, 1:].copy()
         return limits
 
@@ -95,21 +101,21 @@ class FreeLayout:
         """(V, 7) the numbers at the start, fixed ones among them."""
         table, numbers = self.begin.table, np.zeros_like(self.begin.table)
         numbers[:, [DISTANCE, F_NUMBER]] = np.log(table[:, [DISTANCE, F_NUMBER]])
-        shortest = self.site.limits[self.begin.kind, FOCAL, 0]
+        shortest = self.design.limits[self.begin.kind, FOCAL, 0]
         room, _, _ = self._room(table)
         share = (table[:, FOCAL] - shortest) / np.where(room > 0, room, 1)
         numbers[:, FOCAL] = np.where(self._limits[:, FOCAL, 1] > 0, np.clip(share, 0, 1), 0)
-        numbers[:, FOCUS] = table[:, FOCUS] / self.site.target.diameter
-        numbers[:, EXPOSURE] = table[:, EXPOSURE] / self.site.limits[self.begin.kind, EXPOSURE, 1]
+        numbers[:, FOCUS] = table[:, FOCUS] / self.design.target.diameter
+        numbers[:, EXPOSURE] = table[:, EXPOSURE] / self.design.limits[self.begin.kind, EXPOSURE, 1]
         return numbers
 
     def _room(self, table: Floats) -> tuple[Floats, Floats, Floats]:
         """Focal lengths from the shortest to the longest allowed; by distance, by focus."""
-        shortest, ceiling = np.moveaxis(self.site.limits[self.begin.kind, FOCAL], 1, 0)
+        shortest, ceiling = np.moveaxis(self.design.limits[self.begin.kind, FOCAL], 1, 0)
         room, by_distance, by_focus = ceiling - shortest, *np.zeros((2, len(table)))
         for kind in np.unique(self.begin.kind):
             rows = np.flatnonzero(self.begin.kind == kind)
-            found = self.site.longest(int(kind), table[rows, DISTANCE], table[rows, FOCUS])
+            found = self.design.longest(int(kind), table[rows, DISTANCE], table[rows, FOCUS])
             short = found[0] < ceiling[rows]
             room[rows] = np.where(short, np.maximum(found[0] - shortest[rows], 0), room[rows])
             by_distance[rows] = np.where(short, found[1], 0)
@@ -132,26 +138,26 @@ class FreeLayout:
         full[self._moved] = numbers
         return full
 
-    def stations(self, numbers: Floats) -> Stations:
+    def view_table(self, numbers: Floats) -> ViewTable:
         """The views at some numbers."""
         full, table = self._filled(numbers), self.begin.table.copy()
-        limits = self.site.limits[self.begin.kind]
+        limits = self.design.limits[self.begin.kind]
         table[:, AZIMUTH] += full[:, AZIMUTH] / self._level
         table[:, ELEVATION] += full[:, ELEVATION]
         moved = self._moved
         for column in (DISTANCE, F_NUMBER):
             rows = moved[:, column]
             table[rows, column] = np.exp(full[rows, column])
-        table[:, FOCUS] = full[:, FOCUS] * self.site.target.diameter
+        table[:, FOCUS] = full[:, FOCUS] * self.design.target.diameter
         table[:, EXPOSURE] = full[:, EXPOSURE] * limits[:, EXPOSURE, 1]
         room, _, _ = self._room(table)
         rows = moved[:, FOCAL]
         table[rows, FOCAL] = (limits[:, FOCAL, 0] + full[:, FOCAL] * room)[rows]
-        return Stations(self.begin.kind, table)
+        return ViewTable(self.begin.kind, table)
 
     def pulled_back(self, numbers: Floats, by_table: Floats) -> Floats:
         """Derivatives by the numbers, (m, n), from those by the table, (m, V, 7)."""
-        full, table = self._filled(numbers), self.stations(numbers).table
+        full, table = self._filled(numbers), self.view_table(numbers).table
         room, by_distance, by_focus = self._room(table)
         by = by_table.copy()
         zoomed = by[..., FOCAL] * full[:, FOCAL]
@@ -162,8 +168,8 @@ class FreeLayout:
         scale[:, DISTANCE] = table[:, DISTANCE]
         scale[:, F_NUMBER] = table[:, F_NUMBER]
         scale[:, FOCAL] = room
-        scale[:, FOCUS] = self.site.target.diameter
-        scale[:, EXPOSURE] = self.site.limits[self.begin.kind, EXPOSURE, 1]
+        scale[:, FOCUS] = self.design.target.diameter
+        scale[:, EXPOSURE] = self.design.limits[self.begin.kind, EXPOSURE, 1]
         return np.asarray((by * scale)[:, self._moved])
 
     def nearer(self, numbers: Floats, views: NDArray[np.bool_]) -> Floats:

@@ -1,8 +1,8 @@
 """The merit of views as a planner moves them, and its derivatives by every number of theirs.
 
-The chain goes from a row of settings to how the target's points are seen (``Looks``), to coverage,
-to the merit, and back. It does for whole tables what ``Stations.cameras`` and ``Looks.of`` do one
-camera at a time; tests hold the two together.
+The chain goes from a row of settings to how the target's points are seen (``Observations``), to
+coverage, to the merit, and back. It does for whole tables what ``ViewTable.cameras`` and
+``Observations.of`` do one camera at a time; tests hold the two together.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.reference.coverage import LooksGradient, coverage, coverage_grad
+from rift_cl.reference.coverage import ObservationsGradient, coverage, coverage_grad
 from rift_cl.sampling.criteria import functionals as criteria
 from rift_cl.sampling.criteria.merit import CoverageMerit
 from rift_cl.sampling.criteria.surface import surface_merit
@@ -25,11 +25,11 @@ from rift_cl.sampling.planning.design_space import (
     F_NUMBER,
     FOCAL,
     FOCUS,
-    Site,
+    DesignSpace,
 )
 from rift_cl.sampling.planning.frequency_sets import for_choosing, for_judging
-from rift_cl.sampling.planning.view_table import Stations
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.planning.view_table import ViewTable
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.prior import checked_power
 from rift_cl.sampling.targets.target import Target
 
@@ -47,15 +47,15 @@ class Objective:
         asked: the target, where the site has it at more frequencies; None if it has not.
     """
 
-    site: Site
+    design: DesignSpace
     kind: CoverageMerit = "wiener"
-    fixed: Looks | None = None
+    fixed: Observations | None = None
     asked: Target | None = None
 
     @cached_property
     def base(self) -> Floats:
         """(P, K) coverage by the views that are there already."""
-        target = self.site.target
+        target = self.design.target
         if self.fixed is None:
             return np.zeros((len(target.points), len(target.k)))
         return coverage(self.fixed, target.k, target.diameter)
@@ -68,24 +68,24 @@ class Objective:
     @cached_property
     def elsewhere(self) -> Objective:
         """The same at frequencies that nothing was optimised with, to judge what was."""
-        target = self.site.target
+        target = self.design.target
         judged = for_judging(target if self.asked is None else self.asked, target)
         return self if judged is target else self._at(judged)
 
     @cached_property
     def aside(self) -> Objective:
         """The same at a third set of frequencies, to choose with between what was optimised."""
-        target = self.site.target
+        target = self.design.target
         chosen = for_choosing(target if self.asked is None else self.asked, target)
         return self if chosen is target else self._at(chosen)
 
     def _at(self, target: Target) -> Objective:
-        return replace(self, site=replace(self.site, target=target), asked=None)
+        return replace(self, design=replace(self.design, target=target), asked=None)
 
     @cached_property
     def power(self) -> Floats:
         """(K,) what the prior expects."""
-        target = self.site.target
+        target = self.design.target
         return checked_power(target.prior, target.k, target.diameter)
 
     def scored(self, added: Floats) -> criteria.Scored:
@@ -93,69 +93,75 @@ class Objective:
 
         That of ``merit_of_coverage``, with the prior asked but once.
         """
-        known, target = self.base + added, self.site.target
+        known, target = self.base + added, self.design.target
         return criteria.scored(self.kind, known, self.power, target.snr, target.k)
 
-    def looks(self, stations: Stations) -> Looks:
+    def observations(self, view_table: ViewTable) -> Observations:
         """How the stations see the target's points."""
-        return _Sight(self.site, stations).looks
+        return _Sight(self.design, view_table).observations
 
-    def value(self, stations: Stations) -> float:
+    def value(self, view_table: ViewTable) -> float:
         """The merit of the stations, with what is there already."""
-        return self.value_of(self.looks(stations))
+        return self.value_of(self.observations(view_table))
 
-    def value_of(self, looks: Looks) -> float:
+    def value_of(self, observations: Observations) -> float:
         """The merit of views that see the target so, with what is there already."""
-        target = self.site.target
+        target = self.design.target
         if target.mode == "surface":
-            return self.surface(looks)[0]
-        return self.scored(coverage(looks, target.k, target.diameter)).value
+            return self.surface(observations)[0]
+        return self.scored(coverage(observations, target.k, target.diameter)).value
 
-    def surface(self, looks: Looks) -> tuple[float, LooksGradient]:
+    def surface(self, observations: Observations) -> tuple[float, ObservationsGradient]:
         """The merit of a surface, and its derivative by the looks."""
-        known = looks if self.fixed is None else joined([self.fixed, looks])
-        value, gradient = surface_merit(known, self.site.target, self.kind)
-        return value, LooksGradient(*(values[-looks.views :] for values in gradient))
+        known = observations if self.fixed is None else joined([self.fixed, observations])
+        value, gradient = surface_merit(known, self.design.target, self.kind)
+        return value, ObservationsGradient(*(values[-observations.views :] for values in gradient))
 
-    def gradient(self, stations: Stations) -> tuple[float, Floats]:
+    def gradient(self, view_table: ViewTable) -> tuple[float, Floats]:
         """The merit, and its derivative (V, 7) by the stations' table."""
-        target, sight = self.site.target, _Sight(self.site, stations)
+        target, sight = self.design.target, _Sight(self.design, view_table)
         if target.mode == "surface":
-            value, by_looks = self.surface(sight.looks)
-            return value, sight.chained(by_looks)
-        scored = self.scored(coverage(sight.looks, target.k, target.diameter))
-        by_looks = coverage_grad(sight.looks, target.k, target.diameter, scored.gradient)
-        return scored.value, sight.chained(by_looks)
+            value, by_observations = self.surface(sight.observations)
+            return value, sight.chained(by_observations)
+        scored = self.scored(coverage(sight.observations, target.k, target.diameter))
+        by_observations = coverage_grad(
+            sight.observations, target.k, target.diameter, scored.gradient
+        )
+        return scored.value, sight.chained(by_observations)
 
 
-def joined(parts: Sequence[Looks]) -> Looks:
-    """Looks of one set of points, one after another."""
-    names = [entry.name for entry in fields(Looks)]
-    return Looks(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+def joined(parts: Sequence[Observations]) -> Observations:
+    """Observations of one set of points, one after another."""
+    names = [entry.name for entry in fields(Observations)]
+    return Observations(
+        *(np.concatenate([getattr(part, name) for part in parts]) for name in names)
+    )
 
 
-def some(looks: Looks, which: Sequence[int] | slice) -> Looks:
+def some(observations: Observations, which: Sequence[int] | slice) -> Observations:
     """Some of the views."""
-    return Looks(*(getattr(looks, entry.name)[which] for entry in fields(Looks)))
+    return Observations(
+        *(getattr(observations, entry.name)[which] for entry in fields(Observations))
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class _Sight:
     """How stations see points; all arrays (V,), or (V, P) once points come in."""
 
-    site: Site
-    stations: Stations
+    design: DesignSpace
+    view_table: ViewTable
 
     def _column(self, column: int) -> Floats:
-        return self.stations.table[:, column]
+        return self.view_table.table[:, column]
 
     def _of_type(self, name: str) -> Floats:
-        values = np.array([getattr(kind, name) for kind in self.site.types], np.float64)
-        return values[self.stations.kind]
+        values = np.array([getattr(kind, name) for kind in self.design.types], np.float64)
+        return values[self.view_table.kind]
 
     @cached_property
     def frames(self) -> Floats:
-        return self.stations.frames(self.site)
+        return self.view_table.frames(self.design)
 
     @cached_property
     def plane(self) -> Floats:
@@ -177,7 +183,7 @@ class _Sight:
     def away(self) -> Floats:
         """(V, P, 3) from the points to the cameras."""
         outward = self._column(DISTANCE)[:, None] * self.frames[:, 0]
-        target = self.site.target
+        target = self.design.target
         return np.asarray(outward[:, None] + (target.center - target.points))
 
     @cached_property
@@ -188,17 +194,17 @@ class _Sight:
     def photons(self) -> Floats:
         """Relative photons from the target, exposure A^2 / z^2."""
         per_area = self._column(EXPOSURE) * (self.pupil / self._column(DISTANCE)) ** 2
-        return per_area / self.site.brightness
+        return per_area / self.design.brightness
 
     @cached_property
-    def looks(self) -> Looks:
-        reach = np.maximum(self.depth, 1e-9 * self.site.target.diameter)
+    def observations(self) -> Observations:
+        reach = np.maximum(self.depth, 1e-9 * self.design.target.diameter)
         seen = (self.depth > 0) & self._in_picture(reach)
         wavelength = self._of_type("wavelength")[:, None]
         pupil = self.pupil[:, None]
         with np.errstate(divide="ignore"):
             cutoff = pupil / (wavelength * reach)
-        return Looks(
+        return Observations(
             direction=self.away / np.linalg.norm(self.away, axis=2, keepdims=True),
             weight=self.photons[:, None] * seen,
             pixel=reach * (self._of_type("pixel") / self.image)[:, None],
@@ -208,24 +214,26 @@ class _Sight:
 
     def _in_picture(self, reach: Floats) -> NDArray[np.bool_]:
         scale = (self.image / self._of_type("pixel"))[:, None] / reach
-        sizes = np.array([kind.size for kind in self.site.types], np.float64)[self.stations.kind]
+        sizes = np.array([kind.size for kind in self.design.types], np.float64)[
+            self.view_table.kind
+        ]
         rise = np.einsum("vpd,vd->vp", self.away, self.frames[:, 2]) * scale
         along = np.einsum("vpd,vd->vp", self.away, self.frames[:, 1]) * scale
         return np.asarray((np.abs(rise) <= sizes[:, :1] / 2) & (np.abs(along) <= sizes[:, 1:] / 2))
 
-    def chained(self, by: LooksGradient) -> Floats:
+    def chained(self, by: ObservationsGradient) -> Floats:
         """From derivatives by looks to those by the table, (V, 7)."""
-        looks, plane = self.looks, self.plane[:, None]
-        reach = np.maximum(self.depth, 1e-9 * self.site.target.diameter)
+        observations, plane = self.observations, self.plane[:, None]
+        reach = np.maximum(self.depth, 1e-9 * self.design.target.diameter)
         sharp = 1 - reach / plane
-        limited = np.isfinite(looks.cutoff)
-        cut = by.cutoff * np.where(limited, looks.cutoff, 0)
+        limited = np.isfinite(observations.cutoff)
+        cut = by.cutoff * np.where(limited, observations.cutoff, 0)
         side = self.pupil[:, None] * np.sign(sharp) * by.blur
-        by_reach = (by.pixel * looks.pixel - cut) / reach - side / plane
-        by_pupil = ((cut + by.blur * looks.blur).sum(1)) / self.pupil
-        by_image = -(by.pixel * looks.pixel).sum(1) / self.image
+        by_reach = (by.pixel * observations.pixel - cut) / reach - side / plane
+        by_pupil = ((cut + by.blur * observations.blur).sum(1)) / self.pupil
+        by_image = -(by.pixel * observations.pixel).sum(1) / self.image
         by_plane = (side * reach).sum(1) / self.plane**2
-        by_photons = (by.weight * (looks.weight > 0)).sum(1) * self.photons
+        by_photons = (by.weight * (observations.weight > 0)).sum(1) * self.photons
         by_pupil = by_pupil + 2 * by_photons / self.pupil
         magnified = self._of_type("pupil_magnification")
         by_plane = by_plane - by_image * (self.image / self.plane) ** 2 / magnified

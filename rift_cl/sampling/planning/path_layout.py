@@ -20,9 +20,9 @@ from rift_cl.sampling.planning.design_space import (
     F_NUMBER,
     FOCAL,
     FOCUS,
-    Site,
+    DesignSpace,
 )
-from rift_cl.sampling.planning.view_table import Stations
+from rift_cl.sampling.planning.view_table import ViewTable
 
 Floats = NDArray[np.float64]
 # Step of the differences with which a path's shape is derived; the merit's own derivative is exact.
@@ -43,7 +43,7 @@ class PathLayout:
         numbers: (n,) all numbers at the start.
     """
 
-    site: Site
+    design: DesignSpace
     curve: Curve
     kind: int
     views: int
@@ -56,7 +56,7 @@ class PathLayout:
     @cached_property
     def _box(self) -> Floats:
         """(n, 2) of all numbers; equal ends where there is nothing to choose."""
-        limits = self.site.limits[self.kind]
+        limits = self.design.limits[self.kind]
         box = np.column_stack([self.curve.low, self.curve.high])
         shared = np.array([[0.0, 1.0] if np.ptp(limits[c]) > 0 else [0.0, 0.0] for c in _SHARED])
         return np.concatenate([box, shared])
@@ -81,13 +81,13 @@ class PathLayout:
         """How far a camera may move: anywhere."""
         return math.inf
 
-    def stations(self, numbers: Floats) -> Stations:
+    def view_table(self, numbers: Floats) -> ViewTable:
         """The views at some numbers."""
         full = self.numbers.copy()
         full[self._moved] = numbers
         shape, shared = full[: -len(_SHARED)], full[-len(_SHARED) :]
         zoom, stop, focus, exposure = shared.tolist()
-        limits = self.site.limits[self.kind]
+        limits = self.design.limits[self.kind]
         rows = self.curve.angles(shape, self.views)
         table = np.empty((self.views, COLUMNS))
         table[:, [AZIMUTH, ELEVATION]] = rows[:, :2]
@@ -95,11 +95,11 @@ class PathLayout:
         table[:, F_NUMBER] = _between(limits[F_NUMBER], stop)
         table[:, FOCUS] = limits[FOCUS, 0] + focus * np.ptp(limits[FOCUS])
         table[:, EXPOSURE] = limits[EXPOSURE, 0] + exposure * np.ptp(limits[EXPOSURE])
-        longest, _, _ = self.site.longest(self.kind, table[:, DISTANCE], table[:, FOCUS])
+        longest, _, _ = self.design.longest(self.kind, table[:, DISTANCE], table[:, FOCUS])
         shortest, ceiling = limits[FOCAL]
         room = max(min(ceiling, float(longest.min())) - shortest, 0)
         table[:, FOCAL] = shortest + zoom * room
-        return Stations(np.full(self.views, self.kind), table)
+        return ViewTable(np.full(self.views, self.kind), table)
 
     def pulled_back(self, numbers: Floats, by_table: Floats) -> Floats:
         """Derivatives by the numbers, (m, n), from those by the table, (m, V, 7)."""
@@ -116,7 +116,7 @@ class PathLayout:
         for index in range(len(numbers)):
             step = np.zeros(len(numbers))
             step[index] = _STEP
-            change = self.stations(numbers + step).table - self.stations(numbers - step).table
+            change = self.view_table(numbers + step).table - self.view_table(numbers - step).table
             turn = 2 * math.pi
             change[:, AZIMUTH] -= turn * np.round(change[:, AZIMUTH] / turn)
             changes[index] = change / (2 * _STEP)

@@ -18,19 +18,19 @@ from rift_cl.sampling.planning.design_space import (
     F_NUMBER,
     FOCAL,
     FOCUS,
-    Site,
+    DesignSpace,
 )
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.path_layout import PathLayout
-from rift_cl.sampling.planning.refine import permitted, polish
-from rift_cl.sampling.planning.view_table import Stations
+from rift_cl.sampling.planning.refine import permitted, refine
+from rift_cl.sampling.planning.view_table import ViewTable
 
 Floats = NDArray[np.float64]
 # Paths that are moved after the best start of each; settings that are tried with each start.
 _MOVED, _TRIED = 3, 3
 
 
-def best_path(objective: Objective, views: int, *, moved: bool) -> Stations:
+def best_path(objective: Objective, views: int, *, moved: bool) -> ViewTable:
     """Views along the best path that was found; fewer than asked for where a budget ends first.
 
     Args:
@@ -41,28 +41,30 @@ def best_path(objective: Objective, views: int, *, moved: bool) -> Stations:
     Raises:
         InputError: no path that was tried keeps to the constraints.
     """
-    site = objective.site
-    curves = curves_of(site.constraints)
+    design = objective.design
+    curves = curves_of(design.constraints)
     found: list[tuple[float, PathLayout]] = []
-    for kind in range(len(site.types)):
+    for kind in range(len(design.types)):
         rows = settings_of(objective, kind, views)[:_TRIED]
         for layout in (
-            PathLayout(site, curve, kind, count, np.concatenate([start, _shared(site, kind, row)]))
+            PathLayout(
+                design, curve, kind, count, np.concatenate([start, _shared(design, kind, row)])
+            )
             for row in rows
-            for count in [paid(site, kind, float(row[EXPOSURE]), views)]
+            for count in [paid(design, kind, float(row[EXPOSURE]), views)]
             for curve in curves
             for start in curve.starts
-            if count > 0 and _fits(site, kind, curve, start)
+            if count > 0 and _fits(design, kind, curve, start)
         ):
-            stations = layout.stations(layout.start)
-            if permitted(site, stations):
-                found.append((objective.value(stations), layout))
+            view_table = layout.view_table(layout.start)
+            if permitted(design, view_table):
+                found.append((objective.value(view_table), layout))
     if not found:
-        raise InputError(_no_path(site, curves, views))
+        raise InputError(_no_path(design, curves, views))
     found.sort(key=lambda entry: entry[0])
-    ends = [layout.stations(layout.start) for _, layout in found[:1]]
+    ends = [layout.view_table(layout.start) for _, layout in found[:1]]
     if moved:
-        ends += [polish(objective, layout) for layout in _best_of_each(found)]
+        ends += [refine(objective, layout) for layout in _best_of_each(found)]
     return min(ends, key=objective.value)
 
 
@@ -75,16 +77,16 @@ def _best_of_each(found: list[tuple[float, PathLayout]]) -> list[PathLayout]:
     return [*leaders, *others][:_MOVED]
 
 
-def _fits(site: Site, kind: int, curve: Curve, start: Floats) -> bool:
+def _fits(design: DesignSpace, kind: int, curve: Curve, start: Floats) -> bool:
     """Whether a start differs from others where distance cannot be chosen."""
-    fixed = np.ptp(site.limits[kind, DISTANCE]) <= 0.02 * site.limits[kind, DISTANCE, 0]
+    fixed = np.ptp(design.limits[kind, DISTANCE]) <= 0.02 * design.limits[kind, DISTANCE, 0]
     return not (fixed and start[-1] > 0)
 
 
-def _shared(site: Site, kind: int, row: Floats) -> Floats:
+def _shared(design: DesignSpace, kind: int, row: Floats) -> Floats:
     """A row's focal length, f-number, focus and exposure as shares of their ranges."""
-    limits = site.limits[kind]
-    longest, _, _ = site.longest(kind, limits[DISTANCE, 0], limits[FOCUS, 0])
+    limits = design.limits[kind]
+    longest, _, _ = design.longest(kind, limits[DISTANCE, 0], limits[FOCUS, 0])
     room = max(min(limits[FOCAL, 1], float(longest)) - limits[FOCAL, 0], 0)
     zoom = (row[FOCAL] - limits[FOCAL, 0]) / room if room > 0 else 0.0
     low, high = limits[F_NUMBER]
@@ -96,18 +98,18 @@ def _shared(site: Site, kind: int, row: Floats) -> Floats:
     return np.asarray(np.clip([zoom, stop, *rest], 0, 1))
 
 
-def _no_path(site: Site, curves: list[Curve], views: int) -> str:
+def _no_path(design: DesignSpace, curves: list[Curve], views: int) -> str:
     """Why no start will do."""
-    name = type(site.constraints.path).__name__
-    tried, lost = 0, np.zeros(len(site.constraints.keepouts), int)
+    name = type(design.constraints.path).__name__
+    tried, lost = 0, np.zeros(len(design.constraints.keepouts), int)
     for curve in curves:
         for start in curve.starts:
             shared = np.zeros(4)
-            layout = PathLayout(site, curve, 0, views, np.concatenate([start, shared]))
-            stations = layout.stations(layout.start)
+            layout = PathLayout(design, curve, 0, views, np.concatenate([start, shared]))
+            view_table = layout.view_table(layout.start)
             tried += 1
-            places, center = stations.places(site), site.target.center
-            for index, keepout in enumerate(site.constraints.keepouts):
+            places, center = view_table.places(design), design.target.center
+            for index, keepout in enumerate(design.constraints.keepouts):
                 lost[index] += (keepout.clearance(places, center)[0] < 0).any()
     shares = ", ".join(f"keepouts[{i}] cuts {n}" for i, n in enumerate(lost.tolist()))
     return (

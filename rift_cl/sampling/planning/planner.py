@@ -15,11 +15,11 @@ from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.numbers import one_number
 from rift_cl.sampling.criteria.merit import CoverageMerit
 from rift_cl.sampling.planning.baselines import Baseline, baselines
-from rift_cl.sampling.planning.budget import prices, require_paid, total
+from rift_cl.sampling.planning.budget import check_paid, prices, total
 from rift_cl.sampling.planning.candidates import candidates, looked_at, most_candidates
 from rift_cl.sampling.planning.coincident import parted
 from rift_cl.sampling.planning.constraints import Constraints
-from rift_cl.sampling.planning.design_space import Site, default_types
+from rift_cl.sampling.planning.design_space import DesignSpace, default_types
 from rift_cl.sampling.planning.free_layout import FreeLayout
 from rift_cl.sampling.planning.frequency_sets import for_planning
 from rift_cl.sampling.planning.greedy import Limits, bound, choose
@@ -27,10 +27,10 @@ from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.path_search import best_path
 from rift_cl.sampling.planning.paths import Free
 from rift_cl.sampling.planning.pool import pool_of
-from rift_cl.sampling.planning.refine import polish
+from rift_cl.sampling.planning.refine import refine
 from rift_cl.sampling.planning.view_plan import Plan
-from rift_cl.sampling.planning.view_table import Stations, turned
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.planning.view_table import ViewTable, turned
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.prior import checked_power
 from rift_cl.sampling.targets.target import Target
 
@@ -91,19 +91,19 @@ def plan(
     limits = Constraints() if constraints is None else constraints
     target = looked_at(target, limits)
     fine = for_planning(target, most_candidates(int(views)))
-    site = Site(fine, limits, tuple(cameras) or default_types(target))
-    require_paid(site)
+    design = DesignSpace(fine, limits, tuple(cameras) or default_types(target))
+    check_paid(design)
     _warn_of_few_frequencies(fine)
-    taken, weights = _taken(fixed, site)
-    seen = Looks.of(taken, target.points, weights) if taken else None
-    objective = Objective(site, kind, seen, target)
+    taken, weights = _taken(fixed, design)
+    seen = Observations.of(taken, target.points, weights) if taken else None
+    objective = Objective(design, kind, seen, target)
     simple = baselines(objective, int(views), seed) if compare else {}
     found, least = _chosen(objective, int(views), method, seed, simple)
-    stations = Stations(found.kind, turned(found.table, site))
-    if compare and len(stations) < views:
-        simple = baselines(objective, len(stations), seed)
-    merit = objective.value(stations)
-    return Plan(objective, stations, merit, min(least, merit), taken, weights, simple)
+    view_table = ViewTable(found.kind, turned(found.table, design))
+    if compare and len(view_table) < views:
+        simple = baselines(objective, len(view_table), seed)
+    merit = objective.value(view_table)
+    return Plan(objective, view_table, merit, min(least, merit), taken, weights, simple)
 
 
 def next_views(
@@ -139,8 +139,8 @@ def next_views(
     if not isinstance(taken, Plan) and not len(taken):
         raise InputError("next_views: no view was taken, wanted a plan or cameras; see plan")
     if isinstance(taken, Plan):
-        constraints = taken.objective.site.constraints if constraints is None else constraints
-        cameras = cameras or taken.objective.site.types
+        constraints = taken.objective.design.constraints if constraints is None else constraints
+        cameras = cameras or taken.objective.design.types
     return plan(
         target,
         views,
@@ -169,13 +169,13 @@ def _warn_of_few_frequencies(target: Target) -> None:
 
 def _chosen(
     objective: Objective, views: int, method: Method, seed: int, simple: Mapping[str, Baseline]
-) -> tuple[Stations, float]:
+) -> tuple[ViewTable, float]:
     """The views, and a bound of their merit."""
-    site = objective.site
+    design = objective.design
     offered = candidates(objective, views, seed)
     pool = pool_of(objective, offered)
-    if isinstance(site.constraints.path, Free):
-        choice = choose(pool, Limits(views, prices(site, offered), total(site)))
+    if isinstance(design.constraints.path, Free):
+        choice = choose(pool, Limits(views, prices(design, offered), total(design)))
         found = offered.take(choice.order)
         if method == "greedy+mma":
             found = _moved(objective, found, simple)
@@ -183,49 +183,51 @@ def _chosen(
         found = best_path(objective, views, moved=method == "greedy+mma")
     if not simple:
         return found, -np.inf
-    whole = Stations.joined([offered, found])
-    limits = Limits(views, prices(site, whole), total(site))
+    whole = ViewTable.joined([offered, found])
+    limits = Limits(views, prices(design, whole), total(design))
     places = list(range(len(offered), len(whole)))
     return found, bound(pool.with_views(found), limits, places)
 
 
-def _moved(objective: Objective, chosen: Stations, simple: Mapping[str, Baseline]) -> Stations:
+def _moved(objective: Objective, chosen: ViewTable, simple: Mapping[str, Baseline]) -> ViewTable:
     """The best of what was chosen and of simple arrangements, polished."""
-    site, spacing = objective.site, FreeLayout(objective.site, chosen).trust
-    starts = [chosen, *(baseline.stations for baseline in simple.values())]
+    design, spacing = objective.design, FreeLayout(objective.design, chosen).trust
+    starts = [chosen, *(baseline.view_table for baseline in simple.values())]
     values = [objective.value(start) for start in starts]
     order = sorted(range(len(starts)), key=values.__getitem__)[:_MOVED]
     first, worst = starts[order[0]], (1 + _HOPELESS * np.sign(values[order[0]])) * values[order[0]]
     layouts = [
-        FreeLayout(site, parted(site, starts[n], spacing)) for n in order if values[n] <= worst
+        FreeLayout(design, parted(design, starts[n], spacing)) for n in order if values[n] <= worst
     ]
-    tried = [polish(objective, layout, _TRIED) for layout in layouts]
+    tried = [refine(objective, layout, _TRIED) for layout in layouts]
     winner = layouts[int(np.argmin([objective.value(views) for views in tried]))]
     # From its start again: who begins anew where it came to is let too far from there.
-    best = min((first, *tried, polish(objective, winner)), key=objective.aside.value)
+    best = min((first, *tried, refine(objective, winner)), key=objective.aside.value)
     # In a corner of what is allowed views may meet again: a little apart they are worth as much.
     value = objective.value(best)
     for share in (1, 0.25, 0.05):
-        apart = parted(site, best, share * spacing)
+        apart = parted(design, best, share * spacing)
         if objective.value(apart) <= value + _PARTING * abs(value):
             return apart
     return best
 
 
-def _taken(fixed: Sequence[Camera] | Plan, site: Site) -> tuple[tuple[Camera, ...], Floats]:
+def _taken(
+    fixed: Sequence[Camera] | Plan, design: DesignSpace
+) -> tuple[tuple[Camera, ...], Floats]:
     """The views that were taken, and the relative photons of each."""
     if isinstance(fixed, Plan):
-        light = fixed.objective.site.brightness / site.brightness
+        light = fixed.objective.design.brightness / design.brightness
         weights = np.concatenate([fixed.fixed_weights, fixed.weights])
         return (*fixed.fixed, *fixed.cameras), weights * light
-    return tuple(fixed), np.array([_photons(camera, site) for camera in fixed])
+    return tuple(fixed), np.array([_photons(camera, design) for camera in fixed])
 
 
-def _photons(camera: Camera, site: Site) -> float:
+def _photons(camera: Camera, design: DesignSpace) -> float:
     """Relative photons of a camera of unknown exposure; 1 where even its aperture is unknown."""
     if not isinstance(camera, Camera):
         raise InputError(f"plan: fixed holds {camera!r}, wanted cameras")
     if camera.aperture is None:
         return 1.0
-    distance = float(np.linalg.norm(camera.center - site.target.center))
-    return (2 * camera.aperture.radius / distance) ** 2 / site.brightness
+    distance = float(np.linalg.norm(camera.center - design.target.center))
+    return (2 * camera.aperture.radius / distance) ** 2 / design.brightness

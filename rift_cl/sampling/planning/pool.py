@@ -11,8 +11,8 @@ from scipy.sparse import csr_array
 from rift_cl.reference.coverage import coverage
 from rift_cl.sampling.planning.objective import Objective, some
 from rift_cl.sampling.planning.surface_pool import SurfacePool
-from rift_cl.sampling.planning.view_table import Stations
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.planning.view_table import ViewTable
+from rift_cl.sampling.targets.observations import Observations
 
 Floats = NDArray[np.float64]
 _MIXING = 25
@@ -44,24 +44,24 @@ class Pool(Protocol):
     def ceilings(self) -> Floats:
         """(C,) by how much one more of each lowers the merit at the most."""
 
-    def with_views(self, stations: Stations) -> Pool:
+    def with_views(self, view_table: ViewTable) -> Pool:
         """A pool with some more candidates, and none chosen."""
 
     def mixed(self, amounts: Floats) -> tuple[float, Floats]:
         """The merit of so much of each candidate (C,), and how fast it falls with each."""
 
 
-def pool_of(objective: Objective, stations: Stations) -> Pool:
+def pool_of(objective: Objective, view_table: ViewTable) -> Pool:
     """The candidates at some stations."""
-    looks = objective.looks(stations)
-    if objective.site.target.mode == "surface":
-        return SurfacePool(objective, looks)
-    return _VolumePool(objective, _each(objective, looks))
+    observations = objective.observations(view_table)
+    if objective.design.target.mode == "surface":
+        return SurfacePool(objective, observations)
+    return _VolumePool(objective, _each(objective, observations))
 
 
-def _each(objective: Objective, looks: Looks) -> Floats:
-    target = objective.site.target
-    views = (some(looks, slice(view, view + 1)) for view in range(looks.views))
+def _each(objective: Objective, observations: Observations) -> Floats:
+    target = objective.design.target
+    views = (some(observations, slice(view, view + 1)) for view in range(observations.views))
     return np.stack([coverage(one, target.k, target.diameter) for one in views])
 
 
@@ -93,8 +93,8 @@ class _VolumePool:
     def add(self, index: int) -> None:
         self._known = self._known + self._each[index]
 
-    def with_views(self, stations: Stations) -> Pool:
-        own = _each(self._objective, self._objective.looks(stations))
+    def with_views(self, view_table: ViewTable) -> Pool:
+        own = _each(self._objective, self._objective.observations(view_table))
         return _VolumePool(self._objective, np.concatenate([self._each, own]))
 
     def ceilings(self) -> Floats:

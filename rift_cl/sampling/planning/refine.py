@@ -21,11 +21,11 @@ from rift_cl.sampling.planning.design_space import (
     DISTANCE,
     ELEVATION,
     EXPOSURE,
-    Site,
+    DesignSpace,
 )
 from rift_cl.sampling.planning.keep_out import KeepOut
 from rift_cl.sampling.planning.objective import Objective
-from rift_cl.sampling.planning.view_table import Stations
+from rift_cl.sampling.planning.view_table import ViewTable
 
 Floats = NDArray[np.float64]
 # Evaluations of the merit. One that falls little says nothing, since the method first finds out how
@@ -51,7 +51,7 @@ class Layout(Protocol):
     def reach(self) -> float:
         """How far a camera may move at the most."""
 
-    def stations(self, numbers: Floats) -> Stations:
+    def view_table(self, numbers: Floats) -> ViewTable:
         """The views at some numbers."""
 
     def pulled_back(self, numbers: Floats, by_table: Floats) -> Floats:
@@ -61,7 +61,7 @@ class Layout(Protocol):
         """Numbers at which some views (V,) are closer to where they were at the start."""
 
 
-def polish(objective: Objective, layout: Layout, steps: int = STEPS) -> Stations:
+def refine(objective: Objective, layout: Layout, steps: int = STEPS) -> ViewTable:
     """The best views found from a layout's start, which itself is one of them.
 
     Args:
@@ -73,7 +73,7 @@ def polish(objective: Objective, layout: Layout, steps: int = STEPS) -> Stations
 
     start = layout.start
     if not len(start):
-        return layout.stations(start)
+        return layout.view_table(start)
     low, high = layout.box
     optimiser = nlopt.opt(nlopt.LD_MMA, len(start))
     optimiser.set_lower_bounds(low)
@@ -82,7 +82,7 @@ def polish(objective: Objective, layout: Layout, steps: int = STEPS) -> Stations
     seen: list[tuple[float, Floats]] = []
 
     def merit(numbers: Floats, slope: Floats) -> float:
-        value, by_table = objective.gradient(layout.stations(numbers))
+        value, by_table = objective.gradient(layout.view_table(numbers))
         seen.append((value, numbers.copy()))
         if slope.size:
             slope[:] = layout.pulled_back(numbers, by_table[None])[0]
@@ -91,7 +91,7 @@ def polish(objective: Objective, layout: Layout, steps: int = STEPS) -> Stations
         return value
 
     optimiser.set_min_objective(merit)
-    _constrain(optimiser, objective.site, layout)
+    _constrain(optimiser, objective.design, layout)
     # Where it breaks off, what was seen until then stands.
     with contextlib.suppress(nlopt.RoundoffLimited, nlopt.ForcedStop):
         optimiser.optimize(np.clip(start, low, high))
@@ -106,81 +106,81 @@ def _settled(merits: list[float]) -> bool:
     return before - now <= _ENOUGH * abs(before)
 
 
-def _best(objective: Objective, layout: Layout, seen: list[tuple[float, Floats]]) -> Stations:
+def _best(objective: Objective, layout: Layout, seen: list[tuple[float, Floats]]) -> ViewTable:
     """The best of what was seen that keeps to the constraints; the start if nothing is better."""
-    site, best = objective.site, layout.stations(layout.start)
+    design, best = objective.design, layout.view_table(layout.start)
     value = objective.value(best)
     for merit, numbers in seen:
         if merit >= value:
             break
-        views = layout.stations(numbers)
-        if permitted(site, views):
+        views = layout.view_table(numbers)
+        if permitted(design, views):
             best, value = views, merit
             break
     # What is met in the limit only is left by a hair: from the lowest of all a little back.
-    views = _back(site, layout, seen[0][1])
-    return views if permitted(site, views) and objective.value(views) < value else best
+    views = _back(design, layout, seen[0][1])
+    return views if permitted(design, views) and objective.value(views) < value else best
 
 
-def _back(site: Site, layout: Layout, numbers: Floats) -> Stations:
+def _back(design: DesignSpace, layout: Layout, numbers: Floats) -> ViewTable:
     for _ in range(_BACK):
-        views = layout.stations(numbers)
-        wrong = ~allowed(site, views)
-        if cost(site, views) > total(site):
+        views = layout.view_table(numbers)
+        wrong = ~allowed(design, views)
+        if cost(design, views) > total(design):
             wrong[:] = True
         if not wrong.any():
             break
         numbers = layout.nearer(numbers, wrong)
-    return layout.stations(numbers)
+    return layout.view_table(numbers)
 
 
-def permitted(site: Site, views: Stations) -> bool:
+def permitted(design: DesignSpace, views: ViewTable) -> bool:
     """Whether views keep clear of keep-outs, and within their limits and the budget."""
-    limits = site.limits[views.kind]
+    limits = design.limits[views.kind]
     slack = 1e-9 * (1 + np.abs(limits[..., 0]))
-    first = AZIMUTH + 1 if site.constraints.full_circle else AZIMUTH
+    first = AZIMUTH + 1 if design.constraints.full_circle else AZIMUTH
     inside = (views.table >= limits[..., 0] - slack) & (views.table <= limits[..., 1] + slack)
-    if not inside[:, first:].all() or cost(site, views) > total(site):
+    if not inside[:, first:].all() or cost(design, views) > total(design):
         return False
-    return bool(allowed(site, views).all())
+    return bool(allowed(design, views).all())
 
 
-def _constrain(optimiser: Any, site: Site, layout: Layout) -> None:
-    begin, budget = layout.stations(layout.start), site.constraints.budget
-    places = begin.places(site)
-    for keepout in site.constraints.keepouts:
-        clear, _ = keepout.clearance(places, site.target.center)
+def _constrain(optimiser: Any, design: DesignSpace, layout: Layout) -> None:
+    begin, budget = layout.view_table(layout.start), design.constraints.budget
+    places = begin.places(design)
+    for keepout in design.constraints.keepouts:
+        clear, _ = keepout.clearance(places, design.target.center)
         near = np.flatnonzero(clear <= layout.reach)
         if len(near):
             tolerance = np.full(len(near), _TOLERANCE)
-            entered = _entering(site, layout, keepout, near)
+            entered = _entering(design, layout, keepout, near)
             optimiser.add_inequality_mconstraint(entered, tolerance)
-    exposures = site.limits[begin.kind, EXPOSURE]
+    exposures = design.limits[begin.kind, EXPOSURE]
     if budget is not None and budget.per_exposure > 0 and np.ptp(exposures, axis=1).any():
-        optimiser.add_inequality_constraint(_spending(site, layout), 0.0)
+        optimiser.add_inequality_constraint(_spending(design, layout), 0.0)
 
 
 def _entering(
-    site: Site, layout: Layout, keepout: KeepOut, near: NDArray[np.intp]
+    design: DesignSpace, layout: Layout, keepout: KeepOut, near: NDArray[np.intp]
 ) -> Callable[[Floats, Floats, Floats], None]:
     """How deep some views are in a keep-out, in target diameters, for the optimiser."""
-    unit = site.target.diameter
+    unit = design.target.diameter
 
     def entered(result: Floats, numbers: Floats, slope: Floats) -> None:
-        views = layout.stations(numbers)
-        clear, by_place = keepout.clearance(views.take(near).places(site), site.target.center)
+        views = layout.view_table(numbers)
+        clear, by_place = keepout.clearance(views.take(near).places(design), design.target.center)
         result[:] = -clear / unit
         if slope.size:
             by_table = np.zeros((len(near), len(views), COLUMNS))
-            by_table[np.arange(len(near)), near] = _by_row(site, views.take(near), by_place)
+            by_table[np.arange(len(near)), near] = _by_row(design, views.take(near), by_place)
             slope[:] = -layout.pulled_back(numbers, by_table) / unit
 
     return entered
 
 
-def _by_row(site: Site, views: Stations, by_place: Floats) -> Floats:
+def _by_row(design: DesignSpace, views: ViewTable, by_place: Floats) -> Floats:
     """Derivatives by places (V, 3) as derivatives by rows of the table, (V, 7)."""
-    along = (views.frames(site) @ by_place[:, :, None])[..., 0]
+    along = (views.frames(design) @ by_place[:, :, None])[..., 0]
     distance, level = views.table[:, DISTANCE], np.cos(views.table[:, ELEVATION])
     rows = np.zeros((len(views), COLUMNS))
     rows[:, DISTANCE] = along[:, 0]
@@ -189,17 +189,17 @@ def _by_row(site: Site, views: Stations, by_place: Floats) -> Floats:
     return rows
 
 
-def _spending(site: Site, layout: Layout) -> Callable[[Floats, Floats], float]:
+def _spending(design: DesignSpace, layout: Layout) -> Callable[[Floats, Floats], float]:
     """By how much of the budget views cost too much, for the optimiser."""
-    budget = site.constraints.budget
+    budget = design.constraints.budget
     assert budget is not None
 
     def spent(numbers: Floats, slope: Floats) -> float:
-        views = layout.stations(numbers)
+        views = layout.view_table(numbers)
         if slope.size:
             by_table = np.zeros((1, len(views), COLUMNS))
             by_table[..., EXPOSURE] = budget.per_exposure / budget.total
             slope[:] = layout.pulled_back(numbers, by_table)[0]
-        return cost(site, views) / budget.total - 1
+        return cost(design, views) / budget.total - 1
 
     return spent

@@ -17,8 +17,8 @@ from rift_cl.sampling.criteria import functionals as criteria
 from rift_cl.sampling.criteria.appearance import covariance, light_of, shown, wanted_of
 from rift_cl.sampling.criteria.surface import texture_coverage
 from rift_cl.sampling.planning.objective import Objective, joined, some
-from rift_cl.sampling.planning.view_table import Stations
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.planning.view_table import ViewTable
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.prior import checked_power
 from rift_cl.sampling.targets.target import half_disc
 
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 _MIXING, _FEW = 4, 600
 
 
-class _Sheen(NamedTuple):
+class _Appearance(NamedTuple):
     """Brightness of P points given what is chosen: S views, candidates and others, D directions.
 
     Args:
@@ -54,15 +54,17 @@ class SurfacePool:
         texture: (C, P, K) coverage by every candidate, where it is known.
     """
 
-    def __init__(self, objective: Objective, looks: Looks, texture: Floats | None = None) -> None:
-        target, fixed = objective.site.target, objective.fixed
-        self._objective, self._looks, self._target = objective, looks, target
-        self._texture = _texture(looks, objective) if texture is None else texture
+    def __init__(
+        self, objective: Objective, observations: Observations, texture: Floats | None = None
+    ) -> None:
+        target, fixed = objective.design.target, objective.fixed
+        self._objective, self._observations, self._target = objective, observations, target
+        self._texture = _texture(observations, objective) if texture is None else texture
         self._plane = half_disc(target.highest, self._texture.shape[2])
         self._power = checked_power(target.prior, self._plane, target.diameter)
         self._base = 0 * self._texture[0] if fixed is None else texture_coverage(fixed, target)
         # Views that are there already stand behind the candidates.
-        views = looks if fixed is None else joined([looks, fixed])
+        views = observations if fixed is None else joined([observations, fixed])
         self._views = views.direction.transpose(1, 0, 2)
         normals = np.zeros((views.points, 3)) if target.normals is None else target.normals
         self._light = target.snr * light_of(views, normals)
@@ -71,7 +73,7 @@ class SurfacePool:
         for index in range(len(self), views.views):
             self._given = self._with(self._given, index)
         self.clear()
-        self.start = self._scored(self._base).value + self._error(self._sheen)
+        self.start = self._scored(self._base).value + self._error(self._appearance)
 
     @property
     def mixing(self) -> int:
@@ -84,33 +86,33 @@ class SurfacePool:
 
     def clear(self) -> None:
         """Choose none."""
-        self._known, self._sheen = self._base, self._given
+        self._known, self._appearance = self._base, self._given
 
     def merit_with(self, index: int) -> float:
         """The merit of what is chosen, and one more."""
         texture = self._scored(self._known + self._texture[index]).value
-        light, sheen = self._light[:, index], self._sheen
-        more = 1 + light * sheen.variance[:, index]
+        light, appearance = self._light[:, index], self._appearance
+        more = 1 + light * appearance.variance[:, index]
         if self._objective.kind == "logdet":
-            return texture + self._error(sheen) - self._per_wave(np.log2(more))
-        lost = (self._share * sheen.toward[:, index] ** 2).sum(1) * light / more
-        return texture + self._error(sheen) - float(lost.mean())
+            return texture + self._error(appearance) - self._per_wave(np.log2(more))
+        lost = (self._share * appearance.toward[:, index] ** 2).sum(1) * light / more
+        return texture + self._error(appearance) - float(lost.mean())
 
     def add(self, index: int) -> None:
         """Choose one more."""
         self._known = self._known + self._texture[index]
-        self._sheen = self._with(self._sheen, index)
+        self._appearance = self._with(self._appearance, index)
 
     def ceilings(self) -> Floats:
         """(C,) by how much one more of each lowers the merit at the most."""
         slope = self._scored(self._known).gradient
-        return self._falls(slope, self._sheen.toward, self._sheen.variance)
+        return self._falls(slope, self._appearance.toward, self._appearance.variance)
 
-    def with_views(self, stations: Stations) -> SurfacePool:
+    def with_views(self, view_table: ViewTable) -> SurfacePool:
         """A pool with some more candidates, and none chosen."""
-        own = self._objective.looks(stations)
+        own = self._objective.observations(view_table)
         texture = np.concatenate([self._texture, _texture(own, self._objective)])
-        return SurfacePool(self._objective, joined([self._looks, own]), texture)
+        return SurfacePool(self._objective, joined([self._observations, own]), texture)
 
     def mixed(self, amounts: Floats) -> tuple[float, Floats]:
         """The merit of so much of each candidate (C,), and how fast it falls with each."""
@@ -127,42 +129,44 @@ class SurfacePool:
         variance = before.variance - (between * solved[:, :, wanted:].transpose(0, 2, 1)).sum(2)
         left = before.left - (before.toward[:, used] * solved[:, :, :wanted]).sum(1)
         bits = np.linalg.slogdet(gram)[1] / np.log(2)
-        sheen = _Sheen(toward, variance, left, (), bits)
-        return scored.value + self._error(sheen), self._falls(scored.gradient, toward, variance)
+        appearance = _Appearance(toward, variance, left, (), bits)
+        return scored.value + self._error(appearance), self._falls(
+            scored.gradient, toward, variance
+        )
 
-    def _before(self) -> _Sheen:
+    def _before(self) -> _Appearance:
         """With no view at all."""
         wanted, degree = wanted_of(self._target), self._target.degree
         toward = covariance(self._views, wanted[None], degree)
         variance, left = np.ones(toward.shape[:2]), np.ones((len(toward), len(wanted)))
-        return _Sheen(toward, variance, left, (), np.zeros(len(toward)))
+        return _Appearance(toward, variance, left, (), np.zeros(len(toward)))
 
-    def _with(self, sheen: _Sheen, index: int) -> _Sheen:
+    def _with(self, appearance: _Appearance, index: int) -> _Appearance:
         """With one view more, by Schur's complement."""
         one = self._views[:, index, None]
         across = covariance(self._views, one, self._target.degree)[:, :, 0]
-        for row in sheen.rows:
+        for row in appearance.rows:
             across = across - row * row[:, index, None]
         light = self._light[:, index]
-        more = 1 + light * sheen.variance[:, index]
+        more = 1 + light * appearance.variance[:, index]
         root = np.sqrt(light / more)[:, None]
-        row, column = root * across, root * sheen.toward[:, index]
-        return _Sheen(
-            sheen.toward - row[:, :, None] * column[:, None],
-            sheen.variance - row**2,
-            sheen.left - column**2,
-            (*sheen.rows, row),
-            sheen.bits + np.log2(more),
+        row, column = root * across, root * appearance.toward[:, index]
+        return _Appearance(
+            appearance.toward - row[:, :, None] * column[:, None],
+            appearance.variance - row**2,
+            appearance.left - column**2,
+            (*appearance.rows, row),
+            appearance.bits + np.log2(more),
         )
 
     def _scored(self, coverage: Floats) -> criteria.Scored:
         kind = self._objective.kind
         return criteria.scored(kind, coverage, self._power, self._target.snr, self._plane)
 
-    def _error(self, sheen: _Sheen) -> float:
+    def _error(self, appearance: _Appearance) -> float:
         if self._objective.kind == "logdet":
-            return -self._per_wave(sheen.bits)
-        return float((self._share * sheen.left).sum(1).mean())
+            return -self._per_wave(appearance.bits)
+        return float((self._share * appearance.left).sum(1).mean())
 
     def _falls(self, slope: Floats, toward: Floats, variance: Floats) -> Floats:
         count = len(self)
@@ -182,8 +186,8 @@ class SurfacePool:
         return float(bits.mean() / self._waves)
 
 
-def _texture(looks: Looks, objective: Objective) -> Floats:
+def _texture(observations: Observations, objective: Objective) -> Floats:
     """(V, P, K) coverage of the texture's frequencies by every view for itself."""
-    target = objective.site.target
-    views = (some(looks, slice(view, view + 1)) for view in range(looks.views))
+    target = objective.design.target
+    views = (some(observations, slice(view, view + 1)) for view in range(observations.views))
     return np.stack([texture_coverage(one, target) for one in views])

@@ -22,7 +22,7 @@ from rift_cl.sampling.planning.greedy import Choice, Limits, choose
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.paths import Free
 from rift_cl.sampling.planning.pool import pool_of
-from rift_cl.sampling.planning.view_table import Stations
+from rift_cl.sampling.planning.view_table import ViewTable
 from rift_cl.sampling.targets.directional_prior import anisotropy
 
 Floats = NDArray[np.float64]
@@ -34,7 +34,7 @@ _NONE, _LITTLE = 0.02, 0.07
 _ALIKE = 0.2
 
 
-class Knee(NamedTuple):
+class DiminishingReturns(NamedTuple):
     """What each further view brings, when the most useful come first.
 
     Args:
@@ -70,7 +70,7 @@ class Plan:
     """
 
     objective: Objective
-    stations: Stations
+    view_table: ViewTable
     merit: float
     bound: float
     fixed: tuple[Camera, ...]
@@ -79,14 +79,14 @@ class Plan:
 
     def __len__(self) -> int:
         """How many new views there are."""
-        return len(self.stations)
+        return len(self.view_table)
 
     def __repr__(self) -> str:
         """One line: how many views, what they are worth, with which cameras."""
-        counts = np.bincount(self.stations.kind, minlength=len(self.objective.site.types))
+        counts = np.bincount(self.view_table.kind, minlength=len(self.objective.design.types))
         kinds = ", ".join(
             f"{n} x {kind.name!r}"
-            for n, kind in zip(counts.tolist(), self.objective.site.types, strict=True)
+            for n, kind in zip(counts.tolist(), self.objective.design.types, strict=True)
             if n
         )
         more = f" besides {len(self.fixed)}" if self.fixed else ""
@@ -95,18 +95,18 @@ class Plan:
     @cached_property
     def cameras(self) -> tuple[Camera, ...]:
         """The new views."""
-        return self.stations.cameras(self.objective.site)
+        return self.view_table.cameras(self.objective.design)
 
     @cached_property
     def types(self) -> tuple[CameraType, ...]:
         """What each new view is taken with, as it is set: focal length, f-number, exposure."""
-        return self.stations.camera_types(self.objective.site)
+        return self.view_table.camera_types(self.objective.design)
 
     @property
     def weights(self) -> Floats:
         """(V,) relative photons of each view: the ``weights`` of ``merit`` and ``coverage``."""
-        looks = self.objective.looks(self.stations)
-        return np.asarray(looks.weight.max(1))
+        observations = self.objective.observations(self.view_table)
+        return np.asarray(observations.weight.max(1))
 
     @property
     def poses(self) -> Floats:
@@ -116,39 +116,39 @@ class Plan:
     @property
     def directions(self) -> Floats:
         """(V, 3) unit vectors from the target's centre to the cameras."""
-        return np.asarray(self.stations.frames(self.objective.site)[:, 0])
+        return np.asarray(self.view_table.frames(self.objective.design)[:, 0])
 
     @property
     def azimuth(self) -> Floats:
         """(V,) radians."""
-        return self.stations.table[:, AZIMUTH]
+        return self.view_table.table[:, AZIMUTH]
 
     @property
     def elevation(self) -> Floats:
         """(V,) radians."""
-        return self.stations.table[:, ELEVATION]
+        return self.view_table.table[:, ELEVATION]
 
     @property
     def distance(self) -> Floats:
         """(V,) from the target's centre."""
-        return self.stations.table[:, DISTANCE]
+        return self.view_table.table[:, DISTANCE]
 
     @property
     def focus(self) -> Floats:
         """(V,) distance of the plane in focus from each camera."""
-        return self.stations.table[:, DISTANCE] + self.stations.table[:, FOCUS]
+        return self.view_table.table[:, DISTANCE] + self.view_table.table[:, FOCUS]
 
     @property
     def exposure(self) -> Floats:
         """(V,) in the unit of ``CameraType.exposure``."""
-        return self.stations.table[:, EXPOSURE]
+        return self.view_table.table[:, EXPOSURE]
 
     @property
     def cost(self) -> float:
         """What the views cost of the budget; 0 without one."""
-        return cost(self.objective.site, self.stations)
+        return cost(self.objective.design, self.view_table)
 
-    def knee(self, share: float = 0.25) -> Knee:
+    def diminishing_returns(self, share: float = 0.25) -> DiminishingReturns:
         """What each further view brings, and after how many that is little.
 
         Args:
@@ -163,7 +163,7 @@ class Plan:
         gains = -np.diff(merits)
         average = np.cumsum(gains) / np.arange(1, len(gains) + 1)
         little = np.flatnonzero(gains[1:] < share * average[:-1])
-        return Knee(merits, gains, int(little[0]) + 1 if len(little) else None, share)
+        return DiminishingReturns(merits, gains, int(little[0]) + 1 if len(little) else None, share)
 
     @property
     def order(self) -> list[int]:
@@ -173,12 +173,12 @@ class Plan:
     @cached_property
     def _ordered(self) -> Choice:
         limits = Limits(len(self), np.zeros(len(self)), math.inf)
-        return choose(pool_of(self.objective.elsewhere, self.stations), limits, again=False)
+        return choose(pool_of(self.objective.elsewhere, self.view_table), limits, again=False)
 
     @cached_property
     def elsewhere(self) -> float:
         """The merit at frequencies that the plan was not made with, so that none was favoured."""
-        return self.objective.elsewhere.value(self.stations)
+        return self.objective.elsewhere.value(self.view_table)
 
     def gain(self, merit: float) -> float:
         """The share by which the plan lies below another ``elsewhere``; negative if above."""
@@ -207,14 +207,14 @@ class Plan:
     @cached_property
     def isotropic(self) -> bool:
         """Whether the target's power is alike in all directions, as far as that can be told."""
-        return anisotropy(self.objective.site.target) < _ALIKE
+        return anisotropy(self.objective.design.target) < _ALIKE
 
     def _target_in_words(self) -> str:
         return "isotropic" if self.isotropic else "anisotropic"
 
     def _cameras_in_words(self) -> str:
-        limits = self.objective.site.constraints
-        flat = self.objective.site.target.is_flat
+        limits = self.objective.design.constraints
+        flat = self.objective.design.target.is_flat
         whole = limits.full_circle and (flat or float(np.ptp(limits.elevation)) > math.pi - 1e-6)
         free = whole and not limits.keepouts and isinstance(limits.path, Free)
         return "free" if free else "constrained"

@@ -19,7 +19,7 @@ from rift_cl.sampling.planning.design_space import (
     DISTANCE,
     ELEVATION,
     FOCUS,
-    Site,
+    DesignSpace,
 )
 
 Floats = NDArray[np.float64]
@@ -28,7 +28,7 @@ _BESIDE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Stations:
+class ViewTable:
     """V views.
 
     Args:
@@ -44,37 +44,37 @@ class Stations:
         """V, the number of views."""
         return len(self.kind)
 
-    def take(self, which: Sequence[int] | NDArray[np.intp] | NDArray[np.bool_]) -> Stations:
+    def take(self, which: Sequence[int] | NDArray[np.intp] | NDArray[np.bool_]) -> ViewTable:
         """Some of them."""
         chosen = np.asarray(which)
         chosen = chosen.astype(np.intp) if chosen.dtype != np.bool_ else chosen
-        return Stations(self.kind[chosen], self.table[chosen])
+        return ViewTable(self.kind[chosen], self.table[chosen])
 
     @staticmethod
-    def joined(parts: Sequence[Stations]) -> Stations:
+    def joined(parts: Sequence[ViewTable]) -> ViewTable:
         """Several sets as one."""
         kinds = np.concatenate([part.kind for part in parts])
-        return Stations(kinds, np.concatenate([part.table for part in parts]))
+        return ViewTable(kinds, np.concatenate([part.table for part in parts]))
 
-    def frames(self, site: Site) -> Floats:
+    def frames(self, design: DesignSpace) -> Floats:
         """(V, 3, 3) rows: unit vectors outwards, along growing azimuth, and upright."""
-        return site.constraints.frames(self.table[:, [AZIMUTH, ELEVATION]])
+        return design.constraints.frames(self.table[:, [AZIMUTH, ELEVATION]])
 
-    def places(self, site: Site) -> Floats:
+    def places(self, design: DesignSpace) -> Floats:
         """(V, 3) where the cameras stand."""
-        outward = self.frames(site)[:, 0]
-        return site.target.center + self.table[:, DISTANCE, None] * outward
+        outward = self.frames(design)[:, 0]
+        return design.target.center + self.table[:, DISTANCE, None] * outward
 
-    def camera_types(self, site: Site) -> tuple[CameraType, ...]:
+    def camera_types(self, design: DesignSpace) -> tuple[CameraType, ...]:
         """What each camera is, as it is set."""
         return tuple(
-            site.type_at(int(kind), row) for kind, row in zip(self.kind, self.table, strict=True)
+            design.type_at(int(kind), row) for kind, row in zip(self.kind, self.table, strict=True)
         )
 
-    def cameras(self, site: Site) -> tuple[Camera, ...]:
+    def cameras(self, design: DesignSpace) -> tuple[Camera, ...]:
         """The cameras, upright: over a pole the picture's top is where lower azimuths rise to."""
-        frames, center = self.frames(site), site.target.center
-        types = self.camera_types(site)
+        frames, center = self.frames(design), design.target.center
+        types = self.camera_types(design)
         return tuple(
             kind.camera(
                 # The upright of the sphere has a value at the poles, other than ``up``.
@@ -90,25 +90,25 @@ class Stations:
         cameras: Sequence[Camera],
         types: Sequence[CameraType],
         kinds: Sequence[int],
-        site: Site,
-    ) -> Stations:
+        design: DesignSpace,
+    ) -> ViewTable:
         """Read cameras back.
 
         Args:
             cameras: that look at the target's centre; their roll is not kept.
             types: (V) how each is set.
             kinds: (V) which of the site's types each is.
-            site: where they stand.
+            design: where they stand.
 
         Raises:
             InputError: a camera does not look at the target's centre, or has no aperture.
         """
         table = np.empty((len(cameras), COLUMNS))
         for index, (camera, kind) in enumerate(zip(cameras, types, strict=True)):
-            away = site.constraints.axes @ (camera.center - site.target.center)
+            away = design.constraints.axes @ (camera.center - design.target.center)
             x, y, z = away.tolist()
             distance = math.hypot(x, y, z)
-            beside = camera.view[:2, :3] @ (site.target.center - camera.center)
+            beside = camera.view[:2, :3] @ (design.target.center - camera.center)
             if camera.aperture is None or not math.hypot(*beside.tolist()) <= _BESIDE * distance:
                 raise InputError(
                     f"cameras[{index}] does not look at the target's centre, or has no aperture"
@@ -119,11 +119,11 @@ class Stations:
         return cls(np.asarray(kinds, np.intp), table)
 
 
-def turned(table: Floats, site: Site) -> Floats:
+def turned(table: Floats, design: DesignSpace) -> Floats:
     """A table with azimuths brought into the allowed turn, for full circles."""
-    if not site.constraints.full_circle:
+    if not design.constraints.full_circle:
         return table
-    first = site.constraints.azimuth[0]
+    first = design.constraints.azimuth[0]
     moved = table.copy()
     moved[:, AZIMUTH] = first + np.mod(moved[:, AZIMUTH] - first, 2 * math.pi)
     return moved

@@ -47,20 +47,20 @@ def if_wrong(plan: Plan) -> tuple[WrongPrior, ...]:
     planes, for a merit that is no share of power, and without evenly spread views to compare with.
     """
     judged = plan.objective.elsewhere
-    target = judged.site.target
+    target = judged.design.target
     even = plan.baselines.get(_EVEN)
     if even is None or target.mode == "surface" or plan.objective.kind != "wiener":
         return ()
     if plan.isotropic:
         return ()
-    axes = np.eye(3)[2:] if target.is_flat else plan.objective.site.constraints.axes
+    axes = np.eye(3)[2:] if target.is_flat else plan.objective.design.constraints.axes
     found = []
     for degrees in TURNS:
         merits = []
         for axis in axes:
             prior = turned(target.prior, axis, math.radians(degrees))
-            site = replace(judged.site, target=replace(target, prior=prior))
-            other = replace(judged, site=site, asked=None)
-            merits.append((other.value(plan.stations), other.value(even.stations)))
+            design = replace(judged.design, target=replace(target, prior=prior))
+            other = replace(judged, design=design, asked=None)
+            merits.append((other.value(plan.view_table), other.value(even.view_table)))
         found.append(WrongPrior(degrees, *max(merits)))
     return tuple(found)

@@ -1,4 +1,4 @@
-"""From how points are seen back to the cameras that see them: the chain rule of ``Looks.of``."""
+"""Back from observations of points to the cameras that made them: the chain rule."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rift_cl.geometry import Camera
-from rift_cl.reference.coverage import Floats, LooksGradient
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.reference.coverage import Floats, ObservationsGradient
+from rift_cl.sampling.targets.observations import Observations
 
 
 class CameraGradients(NamedTuple):
@@ -33,7 +33,7 @@ class CameraGradients(NamedTuple):
 
 
 def camera_gradients(
-    cameras: Sequence[Camera], seen: Looks, gradient: LooksGradient
+    cameras: Sequence[Camera], seen: Observations, gradient: ObservationsGradient
 ) -> CameraGradients:
     """Chain the derivatives by looks with those of looks by cameras.
 
@@ -51,7 +51,7 @@ def camera_gradients(
 
 
 def _one(
-    camera: Camera, seen: Looks, gradient: LooksGradient, view: int
+    camera: Camera, seen: Observations, gradient: ObservationsGradient, view: int
 ) -> tuple[Floats, float, float, float]:
     """Of one camera: by position (3,), focal length, radius, focus."""
     fx, pixel = camera.intrinsics[0], seen.pixel[view]
@@ -74,7 +74,7 @@ def _one(
 
 
 def _by_position(
-    camera: Camera, seen: Looks, by_direction: Floats, by_reach: Floats, view: int
+    camera: Camera, seen: Observations, by_direction: Floats, by_reach: Floats, view: int
 ) -> Floats:
     if camera.model == "ortho":
         return np.zeros(3)

@@ -23,7 +23,7 @@ _UNIT = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Looks:
+class Observations:
     """V views of P points; lengths in the unit of the world.
 
     Args:
@@ -48,25 +48,31 @@ class Looks:
         """Check the numbers."""
         shape = np.shape(self.weight)
         if len(shape) != 2 or 0 in shape:
-            raise ShapeError(f"Looks: weight has shape {shape}, wanted (views, points), none empty")
+            raise ShapeError(
+                f"Observations: weight has shape {shape}, wanted (views, points), none empty"
+            )
         for entry in fields(self):
             given = getattr(self, entry.name)
             values = real_numbers(given)
             if values is None:
-                raise InputError(f"Looks: {entry.name} is {given!r}, wanted real numbers")
+                raise InputError(f"Observations: {entry.name} is {given!r}, wanted real numbers")
             wanted = (*shape, 3) if entry.name == "direction" else shape
             if values.shape != wanted:
-                raise ShapeError(f"Looks: {entry.name} has shape {values.shape}, wanted {wanted}")
+                raise ShapeError(
+                    f"Observations: {entry.name} has shape {values.shape}, wanted {wanted}"
+                )
             if entry.name != "direction" and not (values >= 0).all():
-                raise InputError(f"Looks: {entry.name} holds NaN or a negative number")
+                raise InputError(f"Observations: {entry.name} holds NaN or a negative number")
             if entry.name in ("weight", "pixel", "blur") and not np.isfinite(values).all():
-                raise NonFiniteError(f"Looks: {entry.name} holds infinity")
+                raise NonFiniteError(f"Observations: {entry.name} holds infinity")
             object.__setattr__(self, entry.name, values)
         lengths = np.sqrt(np.einsum("vpd,vpd->vp", self.direction, self.direction))
         if not (np.abs(lengths - 1) < _UNIT).all():
-            raise InputError("Looks: direction holds vectors that are not of length 1")
+            raise InputError("Observations: direction holds vectors that are not of length 1")
         if not (self.cutoff > 0).all():
-            raise InputError("Looks: cutoff holds 0, wanted positive frequencies, inf for none")
+            raise InputError(
+                "Observations: cutoff holds 0, wanted positive frequencies, inf for none"
+            )
 
     @property
     def views(self) -> int:
@@ -78,7 +84,7 @@ class Looks:
         """P, the number of points."""
         return int(self.weight.shape[1])
 
-    def require_seen(self, point: int | None = None) -> None:
+    def check_seen(self, point: int | None = None) -> None:
         """Refuse points that no view sees, all of them or one.
 
         Raises:
@@ -97,7 +103,7 @@ class Looks:
     @classmethod
     def of(
         cls, cameras: Sequence[Camera], points: ArrayLike, weights: ArrayLike | None = None
-    ) -> Looks:
+    ) -> Observations:
         """How cameras see points; nothing stands in the way.
 
         Args:
@@ -111,10 +117,10 @@ class Looks:
         """
         x = _points(points)
         sights = [_sight(camera, x) for camera in _cameras(cameras)]
-        looks = cls(*(np.stack(parts) for parts in zip(*sights, strict=True)))
-        return looks.weighted(weights)
+        observations = cls(*(np.stack(parts) for parts in zip(*sights, strict=True)))
+        return observations.weighted(weights)
 
-    def weighted(self, weights: ArrayLike | None) -> Looks:
+    def weighted(self, weights: ArrayLike | None) -> Observations:
         """The same with so many times the light in each view (V,); None leaves it as it is.
 
         Raises:
@@ -128,7 +134,7 @@ class Looks:
     @classmethod
     def of_scan(
         cls, scan: Parallel, points: ArrayLike = ((0, 0, 0),), row_pitch: float | None = None
-    ) -> Looks:
+    ) -> Observations:
         """How a parallel scan about the z axis sees points.
 
         Args:
@@ -154,7 +160,7 @@ class Looks:
         return cls(direction, seen, edge, np.full(seen.shape, np.inf), np.zeros(seen.shape))
 
     @classmethod
-    def along(cls, directions: ArrayLike) -> Looks:
+    def along(cls, directions: ArrayLike) -> Observations:
         """Views along bare directions (V, 3) of any length but zero: one point, no optics.
 
         Raises:
@@ -172,7 +178,7 @@ class Looks:
 
 
 class _Sight(NamedTuple):
-    """One camera's view of P points: ``Looks`` without the views' axis."""
+    """One camera's view of P points: ``Observations`` without the views' axis."""
 
     direction: Floats
     seen: Floats

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.geometry.numbers import one_number, real_numbers
-from rift_cl.sampling.targets.prior import directions_for, require_flat
+from rift_cl.sampling.targets.prior import check_flat, directions_for
 
 Floats = NDArray[np.float64]
 _FLAT, _SOLID, _SMALLEST = 2, 3, 8
@@ -85,7 +85,7 @@ class Pilot:
             InputError: the reconstruction was flat, and ``k`` is not.
         """
         frequencies = np.asarray(k, np.float64)
-        require_flat("Pilot: reconstruction", self.axes, frequencies)
+        check_flat("Pilot: reconstruction", self.axes, frequencies)
         radius = np.maximum(np.linalg.norm(frequencies, axis=1), 1 / diameter)
         along = self._radial(radius) / self._radial(np.array([1 / diameter]))
         length = np.linalg.norm(frequencies, axis=1, keepdims=True)

@@ -126,7 +126,7 @@ class Spectrum:
         from scipy.ndimage import map_coordinates
 
         axes = self.array.ndim
-        require_flat("Spectrum: array", axes, k)
+        check_flat("Spectrum: array", axes, k)
         middle = np.array(self.array.shape)[:, None] // 2
         steps = k[:, axes - 1 :: -1].T / self.spacing
         both = [
@@ -136,7 +136,7 @@ class Spectrum:
         return np.asarray(both[0] + both[1]) / 2
 
 
-def require_flat(what: str, axes: int, k: Floats) -> None:
+def check_flat(what: str, axes: int, k: Floats) -> None:
     """Refuse frequencies out of the plane for what is known in the plane alone.
 
     Raises:

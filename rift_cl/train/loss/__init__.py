@@ -1,1 +1,1 @@
-"""TODO."""
+"""The loss of a fit: pixel differences, SSIM, and spectral homogenisation."""

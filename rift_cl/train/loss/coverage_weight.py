@@ -1,10 +1,10 @@
 """Inverse coverage as the weight of a residual: what all views know well counts less.
 
-The ramp of ``rift_cl.train.loss.homogenisation`` is the inverse density of views that lie evenly on a
-sphere, or on a ring. Here the density is counted: an image frequency f of a view stands for the
+The ramp of ``rift_cl.train.loss.homogenisation`` is the inverse density of views that lie evenly on
+a sphere, or on a ring. Here the density is counted: an image frequency f of a view stands for the
 frequency k of the target on that view's slice, which all views together cover L(k) times
-(``rift_cl.sampling.coverage.device``), so that it gets the weight (1 / L)^p. Even views on a sphere give
-|k|^p, a ring |k_r|^p along the rows of its detector, up to where the slices part (Crowther's
+(``rift_cl.sampling.coverage.device``), so that it gets the weight (1 / L)^p. Even views on a sphere
+give |k|^p, a ring |k_r|^p along the rows of its detector, up to where the slices part (Crowther's
 frequency); beyond, a view alone knows its slice and the weight is flat.
 
 L is taken at the middle of what the cameras look at, for a target that fills their pictures. It is
@@ -23,7 +23,7 @@ from rift_cl.cl.device import Device
 from rift_cl.geometry import Camera
 from rift_cl.operators.fourier.spectrum import Response
 from rift_cl.sampling.coverage.device import coverage
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.start.points import field_diameter, focus_of
@@ -59,17 +59,19 @@ class CoverageWeight:
     def __init__(self, cameras: Sequence[Camera], device: Device) -> None:
         self.device = device
         self._cameras = cameras
-        self._looks = Looks.of(cameras, focus_of(cameras)[None])
+        self._observations = Observations.of(cameras, focus_of(cameras)[None])
         self._longest = np.array([max(camera.size) for camera in cameras])
         self._target = Target(focus_of(cameras), field_diameter(cameras))
         self._tables: dict[int, NDArray[np.float32]] = {}
 
     def response(self, view: int, exponent: float) -> Response:
         """The weight of a view's image frequencies, in cycles per pixel."""
-        table, knee = self._table(view), self._knee(view)
+        table, diminishing_returns = self._table(view), self._diminishing_returns(view)
 
         def weight(ky: Floats, kx: Floats) -> Floats:
-            radius = np.arcsinh(np.hypot(ky, kx) / knee) / np.arcsinh(_LARGEST / knee)
+            radius = np.arcsinh(np.hypot(ky, kx) / diminishing_returns) / np.arcsinh(
+                _LARGEST / diminishing_returns
+            )
             angle = np.mod(np.arctan2(ky, kx), np.pi) / np.pi
             places = np.broadcast_arrays(angle * _ANGLES - 0.5, radius * (_RADII - 1))
             # The last angle is the neighbour of the first: spectra of pictures are even.
@@ -79,7 +81,7 @@ class CoverageWeight:
 
         return weight
 
-    def _knee(self, view: int) -> float:
+    def _diminishing_returns(self, view: int) -> float:
         """The frequency from which the grid's radii lie in proportion to themselves."""
         return float(0.5 / self._longest[view])
 
@@ -90,26 +92,28 @@ class CoverageWeight:
         return self._tables[view]
 
     def _counted(self, view: int) -> NDArray[np.float32]:
-        if not self._looks.weight[view, 0]:
+        if not self._observations.weight[view, 0]:
             # What the others know where this one does not look says nothing about it.
             return np.zeros((_ANGLES, _RADII), np.float32)
         within = -(-_LINES // len(self._cameras))
         angles = (np.arange(_ANGLES * within) + 0.5) * (np.pi / _ANGLES / within)
-        knee = self._knee(view)
-        radii = knee * np.sinh(np.linspace(0, 1, _RADII) * np.arcsinh(_LARGEST / knee))
+        diminishing_returns = self._diminishing_returns(view)
+        radii = diminishing_returns * np.sinh(
+            np.linspace(0, 1, _RADII) * np.arcsinh(_LARGEST / diminishing_returns)
+        )
         ky, kx = np.sin(angles)[:, None] * radii, np.cos(angles)[:, None] * radii
         k = self._on_slice(view, ky.ravel(), kx.ravel())
-        covered = coverage(self._looks, self._target, k, device=self.device)[0]
+        covered = coverage(self._observations, self._target, k, device=self.device)[0]
         means = covered.reshape(_ANGLES, within, _RADII).mean(axis=1)
         return np.asarray(np.log(np.maximum(means, _LEAST)), np.float32)
 
     def _on_slice(self, view: int, ky: Floats, kx: Floats) -> Floats:
         """The target's frequencies (n, 3) that image frequencies of a view stand for."""
-        camera, sight = self._cameras[view], self._looks.direction[view, 0]
+        camera, sight = self._cameras[view], self._observations.direction[view, 0]
         fx, fy = camera.intrinsics[:2]
         axes = camera.view[:2, :3]
         # Across the line of sight, which need not be the optical axis.
         axes = axes - np.outer(axes @ sight, sight)
         axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-        pixels = np.stack([kx, ky * (fy / fx)], axis=1) / self._looks.pixel[view, 0]
+        pixels = np.stack([kx, ky * (fy / fx)], axis=1) / self._observations.pixel[view, 0]
         return np.asarray(pixels @ axes)

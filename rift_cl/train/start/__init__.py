@@ -1,1 +1,1 @@
-"""TODO."""
+"""Where splats begin."""

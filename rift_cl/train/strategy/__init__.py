@@ -1,1 +1,1 @@
-"""TODO."""
+"""Strategies: where splats come from and go to while they are trained."""

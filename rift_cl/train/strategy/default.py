@@ -1,7 +1,8 @@
 """Strategies that gather, frame by frame, how strongly each splat is pulled at on the screen.
 
-``Densify`` clones, splits and prunes by it, ``Halving`` renews X-ray splats; both keep what they
-have gathered in checkpoints. ``rift_cl.train.strategy.mcmc`` has the protocol, and chooses.
+``DefaultStrategy`` clones, splits and prunes by it, ``XrayStrategy`` renews X-ray splats; both keep
+what they have gathered in checkpoints. ``rift_cl.train.strategy.mcmc`` has the protocol, and
+chooses.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.strategy.densify import densify, reset_opacities
-from rift_cl.train.strategy.relocation import renew_densities
+from rift_cl.train.strategy.relocation import relocate_densities
 from rift_cl.train.strategy.screen_statistics import ScreenStatistics
 
 # A reset leaves opacities so many times as large as the faintest that stay.
@@ -55,8 +56,8 @@ class _Gathering:
         self._seen.restore(np.asarray(state["statistics"]))
 
 
-class Halving(_Gathering):
-    """X-ray splats without mass take over halves of others; see ``renew_densities``.
+class XrayStrategy(_Gathering):
+    """X-ray splats without mass take over halves of others; see ``relocate_densities``.
 
     Their number stays, nothing walks at random and nothing is penalised.
 
@@ -71,19 +72,19 @@ class Halving(_Gathering):
     def after_step(
         self, parameters: Parameters, frame: Frame, gradients: FrameGradients, rate: float
     ) -> Parameters:
-        """Renewed now and then, by how strongly each splat was pulled at since the last time."""
-        step, renewal = parameters.step, self.settings.renewal
-        if step >= renewal.last * self.settings.steps:
+        """Relocated now and then, by how strongly each splat was pulled at since the last time."""
+        step, relocation = parameters.step, self.settings.relocation
+        if step >= relocation.last * self.settings.steps:
             return parameters
         self._seen.add(frame, gradients)
-        if step >= renewal.first and step % renewal.every == 0:
+        if step >= relocation.first and step % relocation.every == 0:
             pull = self._seen.host()[:, 0]
-            parameters = renew_densities(parameters, renewal, pull, seed=self.settings.seed)
+            parameters = relocate_densities(parameters, relocation, pull, seed=self.settings.seed)
             self._seen.clear(len(parameters))
         return parameters
 
 
-class Densify(_Gathering):
+class DefaultStrategy(_Gathering):
     """Splats are cloned, split and pruned; see ``rift_cl.train.strategy.densify``.
 
     Args:

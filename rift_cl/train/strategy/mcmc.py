@@ -1,9 +1,9 @@
 """Where splats come from and go to while they are trained: one protocol, three ways.
 
-``MarkovChain`` renews splats that have faded and lets faint ones walk at random (3DGS as MCMC);
-``Densify`` clones, splits and prunes (3DGS as it was at first); ``Halving`` renews X-ray splats,
-whose densities add up. A trainer asks for penalties before each step of Adam and for the splats to
-go on with after it, and keeps ``state`` in checkpoints.
+``McmcStrategy`` renews splats that have faded and lets faint ones walk at random (3DGS as MCMC);
+``DefaultStrategy`` clones, splits and prunes (3DGS as it was at first); ``XrayStrategy`` renews
+X-ray splats, whose densities add up. A trainer asks for penalties before each step of Adam and for
+the splats to go on with after it, and keeps ``state`` in checkpoints.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from rift_cl.splat.frame import Frame, FrameGradients
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.settings import TrainSettings
-from rift_cl.train.strategy.default import Densify, Halving, check_names
-from rift_cl.train.strategy.relocation import grown, renew
+from rift_cl.train.strategy.default import DefaultStrategy, XrayStrategy, check_names
+from rift_cl.train.strategy.relocation import grown, relocate
 
 # A set of splats grows by no more than this at once.
 _MOST_GROWTH = 1.0
@@ -73,7 +73,7 @@ class Strategy(Protocol):
 def strategy_of(
     settings: TrainSettings, parameters: Parameters, *, extent: float, finish: int
 ) -> Strategy:
-    """The strategy of a run: for densities ``mcmc`` means ``Halving``.
+    """The strategy of a run: for densities ``mcmc`` means ``XrayStrategy``.
 
     Args:
         settings: of the run.
@@ -85,14 +85,14 @@ def strategy_of(
         InputError: the strategy cannot do with these splats.
     """
     if settings.strategy == "default":
-        return Densify(settings, parameters, extent=extent)
+        return DefaultStrategy(settings, parameters, extent=extent)
     if parameters.density:
-        return Halving(settings, parameters)
-    return MarkovChain(settings, finish=finish)
+        return XrayStrategy(settings, parameters)
+    return McmcStrategy(settings, finish=finish)
 
 
-class MarkovChain:
-    """Faded splats are renewed, faint ones walk at random; see ``rift_cl.train.strategy.relocation``.
+class McmcStrategy:
+    """Faded splats are renewed, faint ones walk at random; see ``strategy.relocation``.
 
     Args:
         settings: of the run.
@@ -109,33 +109,33 @@ class MarkovChain:
 
     def before_step(self, step: int) -> dict[str, float]:
         """Of opacities and scales, until the finish."""
-        renewal, on = self.settings.renewal, step < self.finish
+        relocation, on = self.settings.relocation, step < self.finish
         return {
-            "opacity_penalty": renewal.opacity_penalty if on else 0.0,
-            "scale_penalty": renewal.scale_penalty if on else 0.0,
+            "opacity_penalty": relocation.opacity_penalty if on else 0.0,
+            "scale_penalty": relocation.scale_penalty if on else 0.0,
         }
 
     def after_step(
         self, parameters: Parameters, frame: Frame, gradients: FrameGradients, rate: float
     ) -> Parameters:
-        """Renewed now and then, and shaken until the finish."""
-        settings, step, renewal = self.settings, parameters.step, self.settings.renewal
-        if step >= renewal.first and step % renewal.every == 0 and step < settings.steps:
-            parameters = renew(
+        """Relocated now and then, and shaken until the finish."""
+        settings, step, relocation = self.settings, parameters.step, self.settings.relocation
+        if step >= relocation.first and step % relocation.every == 0 and step < settings.steps:
+            parameters = relocate(
                 parameters,
-                renewal,
+                relocation,
                 most=settings.splats,
                 seed=settings.seed,
                 growth=self._growth(step, len(parameters)),
             )
         if step <= self.finish:
-            parameters.shake(renewal.noise * rate, settings.seed)
+            parameters.shake(relocation.noise * rate, settings.seed)
         return parameters
 
     def forecast(self, step: int, count: int) -> Iterator[tuple[int, int]]:
         """Growth follows from the number of splats alone; see ``Strategy``."""
-        settings, every = self.settings, self.settings.renewal.every
-        next_one = every * (max(step, settings.renewal.first - 1) // every + 1)
+        settings, every = self.settings, self.settings.relocation.every
+        next_one = every * (max(step, settings.relocation.first - 1) // every + 1)
         for until in range(next_one, settings.steps, every):
             yield until - step, count
             step = until
@@ -144,12 +144,12 @@ class MarkovChain:
 
     def _growth(self, step: int, count: int) -> float:
         """The usual growth, or what a short run needs to have all its splats in time."""
-        settings, renewal = self.settings, self.settings.renewal
-        if step >= settings.steps * renewal.last:
+        settings, relocation = self.settings, self.settings.relocation
+        if step >= settings.steps * relocation.last:
             return 0.0
-        left = max(1, int(settings.steps * renewal.full - step) // renewal.every + 1)
+        left = max(1, int(settings.steps * relocation.full - step) // relocation.every + 1)
         needed = (settings.splats / count) ** (1 / left) - 1
-        return max(renewal.growth, min(needed, _MOST_GROWTH)) if renewal.growth else 0.0
+        return max(relocation.growth, min(needed, _MOST_GROWTH)) if relocation.growth else 0.0
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Nothing: all that is random comes from the seed and the step."""

@@ -35,7 +35,7 @@ from rift_cl.basis.indices import graded
 from rift_cl.errors import InputError
 from rift_cl.splat.orders import order_of
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.settings import Renewal
+from rift_cl.train.settings import Relocation
 from rift_cl.train.views.quaternions import rotated
 
 # More splats than this in one place share it like so many.
@@ -47,8 +47,8 @@ _APART = 0.5
 Floats = NDArray[np.float64]
 
 
-def renew(
-    parameters: Parameters, settings: Renewal, *, most: int, seed: int, growth: float
+def relocate(
+    parameters: Parameters, settings: Relocation, *, most: int, seed: int, growth: float
 ) -> Parameters:
     """Relocate faded splats and add new ones.
 
@@ -63,7 +63,7 @@ def renew(
         Parameters in which Adam's moments of all splats that were touched are zero.
 
     Raises:
-        InputError: the splats have densities; ``renew_densities`` is for them.
+        InputError: the splats have densities; ``relocate_densities`` is for them.
     """
     if parameters.density:
         raise InputError("renew: these splats have densities, wanted opacities")
@@ -95,8 +95,8 @@ def grown(count: int, growth: float, most: int) -> int:
     return max(0, min(round(count * growth), most - count))
 
 
-def renew_densities(
-    parameters: Parameters, settings: Renewal, pull: NDArray[np.float32], *, seed: int
+def relocate_densities(
+    parameters: Parameters, settings: Relocation, pull: NDArray[np.float32], *, seed: int
 ) -> Parameters:
     """Relocate splats of hardly any mass into the halves of others.
 
@@ -111,7 +111,7 @@ def renew_densities(
         those that were faded is lost.
 
     Raises:
-        InputError: the splats have opacities; ``renew`` is for them.
+        InputError: the splats have opacities; ``relocate`` is for them.
     """
     if not parameters.density:
         raise InputError("renew_densities: these splats have opacities, wanted densities")

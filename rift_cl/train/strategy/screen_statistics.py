@@ -1,6 +1,7 @@
 """How much each splat would move on the screen, gathered over frames: what densification goes by.
 
-``kernels/train/splat_statistics.cl`` says what is computed; ``rift_cl.reference.training`` has its twin.
+``kernels/train/splat_statistics.cl`` says what is computed; ``rift_cl.reference.training`` has its
+twin.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Fits of X-ray scans: splats with densities, and least squares for what is linear in them."""

@@ -1,8 +1,8 @@
 """Densities of X-ray splats by least squares, while Adam moves only what is not linear in them.
 
 Line integrals are linear in densities and in densities times modes. Now and then these are solved
-for from a draw of the views, beginning where they are (``rift_cl.train.xray.variable_projection``). A
-density below zero is none: those that come out so are held at the least one, their modes at zero,
+for from a draw of the views, beginning where they are (``rift_cl.train.xray.variable_projection``).
+A density below zero is none: those that come out so are held at the least one, their modes at zero,
 and the others are solved for once more. Since even that may end worse than it began, the change is
 then halved until it does not.
 

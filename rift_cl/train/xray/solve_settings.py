@@ -40,7 +40,7 @@ class SolveSettings:
             check_whole(self, name, 1)
         check_number(self, "ridge")
 
-    def demand_heed(self, solves: bool) -> None:
+    def check_heed(self, solves: bool) -> None:
         """Refuse solves to a trainer that does none, as that of splats that hide one another.
 
         Raises:

@@ -18,7 +18,7 @@ from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.basis_settings import BasisSettings
 from rift_cl.train.loss.homogenisation import Homogenisation, WeightKind
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.settings import BandLimit, Rates, Renewal, TrainSettings
+from rift_cl.train.settings import BandLimit, Rates, Relocation, TrainSettings
 from rift_cl.train.start.xray import FLAT
 from rift_cl.train.trainer import Pictures, Trainer
 from rift_cl.train.xray.density_solve import solve_densities
@@ -26,7 +26,7 @@ from rift_cl.train.xray.solve_settings import SolveSettings
 
 # The start is near already, so that positions may move fast and need not slow down by much.
 RATES = Rates(means=6e-4, means_last=0.1, quats=2e-2, log_scales=2e-2, logits=4e-2, sh=0.0)
-RENEWAL = Renewal(first=100, every=100, last=0.7, faint=0.02)
+RENEWAL = Relocation(first=100, every=100, last=0.7, faint=0.02)
 # Of modes, in a loss of squares that is far smaller than that of photographs.
 RIDGE = 1e-5
 
@@ -68,7 +68,7 @@ def xray_settings(
         homogenisation=Homogenisation(exponent, along_rows=True, weight=weight),
         band_limit=band_limit,
         rates=rates,
-        renewal=RENEWAL,
+        relocation=RENEWAL,
         basis=basis or BasisSettings(),
         solve=solve,
     )
@@ -124,4 +124,4 @@ class XrayTrainer(Trainer):
             *(self.parameters, self.renderer, self.pictures, settings.solve), seed=settings.seed
         )
         # What is held follows from the modes, which are others now.
-        self.joining.hold(self.parameters)
+        self.coefficient_schedule.hold(self.parameters)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rift_cl.io.scenes.formats.plain import (
     Floats,
     along_curve,
-    demand_plain,
+    check_plain,
     smallest_three,
     unit_quats,
 )
@@ -41,7 +41,7 @@ def encode_compressed_ply(scene: SplatScene) -> bytes:
     Raises:
         InputError: the scene is none that the format holds.
     """
-    demand_plain(scene, 3)
+    check_plain(scene, 3)
     scene = along_curve(scene)
     starts = np.arange(0, len(scene), _CHUNK)
     colors = HARMONIC_0 * scene.sh[:, 0].astype(np.float64) + 0.5

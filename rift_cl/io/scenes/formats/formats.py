@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rift_cl.io.scenes.formats.compressed_ply import encode_compressed_ply
 from rift_cl.io.scenes.formats.gltf import encode_glb
-from rift_cl.io.scenes.formats.plain import demand_plain
+from rift_cl.io.scenes.formats.plain import check_plain
 from rift_cl.io.scenes.formats.sog import encode_sog
 from rift_cl.io.scenes.formats.spz import encode_spz
 from rift_cl.io.scenes.splat_ply import encode_ply
@@ -35,7 +35,7 @@ class SplatFormat:
 
 
 def _plain_ply(scene: SplatScene) -> bytes:
-    demand_plain(scene, DEGREE)
+    check_plain(scene, DEGREE)
     return b"".join(encode_ply(scene)[1])
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.io.scenes.formats.plain import demand_plain, unit_quats
+from rift_cl.io.scenes.formats.plain import check_plain, unit_quats
 from rift_cl.io.scenes.splat_activations import HARMONIC_0, opacities_of, scales_of
 from rift_cl.io.scenes.splat_scene import SplatScene
 
@@ -35,7 +35,7 @@ def encode_glb(scene: SplatScene) -> bytes:
     Raises:
         InputError: the scene is none that the format holds.
     """
-    demand_plain(scene, 3)
+    check_plain(scene, 3)
     opacities = np.clip(opacities_of(scene.logit_opacities), 0, 1)
     shown = np.clip(HARMONIC_0 * scene.sh[:, 0].astype(np.float64) + 0.5, 0, 1)
     colors = np.rint(255 * np.column_stack([shown, opacities]))

@@ -30,7 +30,7 @@ _SPREAD = (
 )
 
 
-def demand_plain(scene: SplatScene, degree: int) -> None:
+def check_plain(scene: SplatScene, degree: int) -> None:
     """Check that a format can hold the scene.
 
     Raises:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from rift_cl.io.scenes.formats.palettes import number_palette, vector_palette
-from rift_cl.io.scenes.formats.plain import along_curve, demand_plain, smallest_three, unit_quats
+from rift_cl.io.scenes.formats.plain import along_curve, check_plain, smallest_three, unit_quats
 from rift_cl.io.scenes.splat_activations import opacities_of
 from rift_cl.io.scenes.splat_scene import SplatScene
 
@@ -44,7 +44,7 @@ def encode_sog(scene: SplatScene) -> bytes:
     Raises:
         InputError: the scene is none that the format holds.
     """
-    demand_plain(scene, 3)
+    check_plain(scene, 3)
     scene = along_curve(scene)
     width = _whole(int(np.ceil(np.sqrt(len(scene)))))
     size = (_whole(-(-len(scene) // width)), width)

@@ -24,7 +24,7 @@ from rift_cl.errors import InputError
 from rift_cl.io.scenes.formats.plain import (
     Floats,
     along_curve,
-    demand_plain,
+    check_plain,
     smallest_three,
     unit_quats,
 )
@@ -47,7 +47,7 @@ def encode_spz(scene: SplatScene) -> bytes:
     Raises:
         InputError: the scene is none that the format holds, or too large for its numbers.
     """
-    demand_plain(scene, 3)
+    check_plain(scene, 3)
     scene = along_curve(scene)
     digits = fraction_bits(scene)
     header = (_MAGIC, _VERSION, len(scene), scene.degree, digits, 0, 0)

@@ -1,4 +1,4 @@
-"""Sheen where it will be looked at: a Gaussian process' variance, and what a plan makes of it."""
+"""Appearance in directions to come: a Gaussian process' variance, and what a plan makes of it."""
 
 from math import radians
 
@@ -7,14 +7,14 @@ import pytest
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.reference.splat_projection import spherical_harmonics
-from rift_cl.sampling.criteria.appearance import sheen_error, shown, variances
+from rift_cl.sampling.criteria.appearance import appearance_error, shown, variances
 from rift_cl.sampling.planning.candidates import candidates, looked_at
 from rift_cl.sampling.planning.constraints import Constraints
-from rift_cl.sampling.planning.design_space import Site, default_types
+from rift_cl.sampling.planning.design_space import DesignSpace, default_types
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.planner import plan
 from rift_cl.sampling.planning.pool import pool_of
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
 UP = np.array([[0, 0, 1.0]])
@@ -34,7 +34,7 @@ def ball(count=12, **settings):
 def test_the_error_is_the_variance_that_is_left_where_it_is_looked_at():
     degree, views, wanted = 3, units(7, 0), units(11, 2)
     target = Target((0, 0, 0), 1.0, normals=UP, mode="surface", degree=degree, seen_from=wanted)
-    error, _, _ = sheen_error(Looks.along(views), target, UP, "wiener")
+    error, _, _ = appearance_error(Observations.along(views), target, UP, "wiener")
     # Harmonics of variance 1, and the covariance of their coefficients given the views.
     scale = np.sqrt(4 * np.pi * np.repeat(variances(degree), [1, 3, 5, 7]))
     seen, asked = (spherical_harmonics(d, degree) * scale for d in (views, wanted))
@@ -49,7 +49,7 @@ def test_views_where_it_is_looked_at_help_and_those_elsewhere_do_not():
     toward = [[0.1, 0, 1], [-0.1, 0.1, 1]]
     target = Target((0, 0, 0), 1.0, normals=UP, mode="surface", degree=6, seen_from=toward)
     near, far = (
-        sheen_error(Looks.along([way]), target, UP, "wiener")[0]
+        appearance_error(Observations.along([way]), target, UP, "wiener")[0]
         for way in ([0, 0, 1.0], [1.0, 0, 0.2])
     )
     assert near < 0.2
@@ -59,13 +59,13 @@ def test_views_where_it_is_looked_at_help_and_those_elsewhere_do_not():
 def test_what_nobody_looks_at_has_no_error():
     target = Target((0, 0, 0), 1.0, normals=-UP, mode="surface", seen_from=UP)
     assert not shown(target, -UP).any()
-    assert sheen_error(Looks.along(UP), target, -UP, "wiener")[0] == 0
+    assert appearance_error(Observations.along(UP), target, -UP, "wiener")[0] == 0
 
 
 @pytest.mark.parametrize("kind", ["wiener", "logdet", "worst"])
 def test_candidates_add_up_to_the_merit_of_all_of_them(kind):
     target = looked_at(ball(degree=4), LOW)
-    objective = Objective(Site(target, LOW, default_types(target)), kind)
+    objective = Objective(DesignSpace(target, LOW, default_types(target)), kind)
     offered = candidates(objective, 2, 0).take(range(9))
     pool = pool_of(objective, offered)
     for index in range(8):
@@ -95,8 +95,8 @@ def test_a_plan_for_where_it_is_looked_at_knows_more_there():
     asked = looked_at(target, LOW)
     everywhere = looked_at(target, Constraints(distance=4.0))
     ours, theirs = (plan(told, 12, LOW, method="greedy") for told in (target, everywhere))
-    there = Objective(Site(asked, LOW, default_types(asked)))
-    assert there.value(ours.stations) < 0.995 * there.value(theirs.stations)
+    there = Objective(DesignSpace(asked, LOW, default_types(asked)))
+    assert there.value(ours.view_table) < 0.995 * there.value(theirs.view_table)
 
 
 def test_directions_that_are_none_are_refused():

@@ -6,10 +6,12 @@ import numpy as np
 
 from rift_cl.geometry import Aperture, Camera
 from rift_cl.geometry.pose import look_at
-from rift_cl.sampling.targets.observations import Looks
+from rift_cl.sampling.targets.observations import Observations
 
 
-def random_looks(views: int, points: int, *, diameter: float = 1.0, seed: int = 0) -> Looks:
+def random_observations(
+    views: int, points: int, *, diameter: float = 1.0, seed: int = 0
+) -> Observations:
     """Views in all directions; some have no pixels, no diffraction or no blur."""
     random = np.random.default_rng(seed)
     direction = random.normal(size=(views, points, 3))
@@ -19,7 +21,7 @@ def random_looks(views: int, points: int, *, diameter: float = 1.0, seed: int = 
     def some(values: np.ndarray, otherwise: float) -> np.ndarray:
         return np.where(random.random(shape) < 0.25, otherwise, values)
 
-    return Looks(
+    return Observations(
         direction,
         random.uniform(0.5, 1.5, shape),
         some(diameter * random.uniform(0.005, 0.08, shape), 0),
