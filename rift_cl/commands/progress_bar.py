@@ -16,14 +16,18 @@ from rift_cl.progress import Report
 
 # Plain lines come no closer together than this, in seconds, except the last.
 _PAUSE = 5.0
+# Share of the work so far that counts as later, of it the share that is taken for undisturbed, and
+# the least share of all work that makes a stretch. Measured with ``tools/time_left.py``.
+_LATER, _QUICK, _SHORTEST = 0.7, 1 / 3, 1 / 400
 
 
 class Pace:
     """Steps per second since the first report of steps of a kind, and the seconds that are left.
 
-    What was done before that report may be an earlier run's, and took no time of this one. The
-    time left goes by the work of the later half of what was done since: steps may be slow at first,
-    and so may be a machine that had other things to do.
+    What was done before that report may be an earlier run's, and took no time of this one. Time
+    goes by in stretches between reports. The time left goes by the pace that a third of the later
+    stretches reach or surpass: the first steps of a fit are slow, and what happens now and then,
+    as a kernel that is built or another program that runs, only ever makes a stretch longer.
 
     Args:
         clock: seconds; those of the wall if not given.
@@ -32,26 +36,45 @@ class Pace:
     def __init__(self, clock: Callable[[], float] | None = None) -> None:
         self._clock = clock or time.monotonic
         self._what, self._done, self._first = "", 0, 0
-        # Work and time at the reports that still count, and at the first one.
-        self._marks: deque[tuple[float, float]] = deque()
-        self._begin = (0.0, 0.0)
+        # Work and time at the first report and at the last one that ended a stretch.
+        self._begin = self._last = (0.0, 0.0)
+        # Of each stretch that still counts: work at its end, its work, its seconds.
+        self._stretches: deque[tuple[float, float, float]] = deque()
 
     def after(self, report: Report) -> tuple[float, float]:
         """The rate after this report and the seconds left; 0 while there is none to tell."""
         done, total = report.work or (float(report.done), float(report.total))
         now = self._clock()
         if report.what != self._what or report.done < self._done:
-            self._what, self._first, self._begin = report.what, report.done, (done, now)
-            self._marks = deque([self._begin])
+            self._what, self._first = report.what, report.done
+            self._begin = self._last = (done, now)
+            self._stretches.clear()
         self._done = report.done
-        self._marks.append((done, now))
-        half = (self._begin[0] + done) / 2
-        while len(self._marks) > 2 and self._marks[1][0] <= half:
-            self._marks.popleft()
-        work, seconds = done - self._marks[0][0], now - self._marks[0][1]
+        self._end_stretch(done, now, total)
         elapsed = now - self._begin[1]
         rate = (report.done - self._first) / elapsed if elapsed > 0 else 0.0
-        return rate, (total - done) * seconds / work if work > 0 else 0.0
+        return rate, (total - done) * self._seconds_of_work()
+
+    def _end_stretch(self, done: float, now: float, total: float) -> None:
+        """Note a stretch that is long enough, and forget those that are too early to count."""
+        work, seconds = done - self._last[0], now - self._last[1]
+        if work <= 0 or (self._stretches and work < total * _SHORTEST):
+            return
+        self._stretches.append((done, work, seconds))
+        self._last = (done, now)
+        oldest = self._begin[0] + (1 - _LATER) * (done - self._begin[0])
+        while len(self._stretches) > 1 and self._stretches[0][0] <= oldest:
+            self._stretches.popleft()
+
+    def _seconds_of_work(self) -> float:
+        """Seconds that a unit of work takes; 0 before there is a stretch."""
+        paces = sorted((seconds / work, work) for _, work, seconds in self._stretches)
+        wanted = _QUICK * sum(work for _, work in paces)
+        for pace, work in paces:
+            wanted -= work
+            if wanted <= 0:
+                return pace
+        return 0.0
 
 
 def show_progress(reports: Iterable[Report], *, quiet: bool) -> None:

@@ -41,6 +41,10 @@ from rift_cl.train.views.poses import Poses
 REPORT_EVERY = 25
 # Steps after which the limit of splats' bands is set anew.
 _BAND_EVERY = 100
+# What a step costs beside its splats, what harmonics of degree 1 add to a splat, and what each
+# further degree adds, all in the cost of as many splats of one color as there may be. Fitted to the
+# times of steps on PoCL (``tools/time_left.py``).
+_PIXELS, _FIRST_DEGREE, _NEXT_DEGREE = 0.4, 0.5, 0.25
 
 
 class Pictures(Protocol):
@@ -127,7 +131,7 @@ class Trainer:
         """
         total, worked = self.settings.steps, 0.0
         while self.parameters.step < total:
-            worked += self._work(len(self.parameters))
+            worked += self._work(self.parameters.step, len(self.parameters))
             value, stop = self.step(), stopped()
             done = self.parameters.step
             if done % REPORT_EVERY == 0 or done == total or stop:
@@ -167,15 +171,27 @@ class Trainer:
             self._limit_band()
         return value
 
-    def _work(self, splats: int) -> float:
-        """What a step costs with so many splats, against one that has none."""
-        return 1 + splats / self.settings.splats
+    def _work(self, step: int, splats: int) -> float:
+        """The cost of a step with so many splats, in that of all splats of one color."""
+        degree = min(step // self.settings.sh_every, self._last_degree)
+        harmonics = _FIRST_DEGREE + _NEXT_DEGREE * (degree - 1) if degree else 0.0
+        return _PIXELS + splats / self.settings.splats * (1 + harmonics)
+
+    @property
+    def _last_degree(self) -> int:
+        """Of the harmonics, once all have joined."""
+        return self.settings.sh_degree if self.settings.angular.kind == "sh" else 0
 
     def _work_left(self) -> float:
-        """What the steps to come will cost."""
-        parameters = self.parameters
-        ahead = self.strategy.forecast(parameters.step, len(parameters))
-        return sum(steps * self._work(count) for steps, count in ahead)
+        """The cost of all steps to come."""
+        step, left = self.parameters.step, 0.0
+        joins = [self.settings.sh_every * degree for degree in range(1, self._last_degree + 1)]
+        for steps, count in self.strategy.forecast(step, len(self.parameters)):
+            end = step + steps
+            for until in [*(at for at in joins if step < at < end), end]:
+                left += (until - step) * self._work(step, count)
+                step = until
+        return left
 
     def alike(self, parameters: Parameters) -> Trainer:
         """A fit of the same pictures by the same settings that begins with other splats."""
