@@ -23,6 +23,9 @@ class Adjoint(LinearOperator):
     def __repr__(self) -> str:
         return f"{self._forward!r}.T"
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return getattr, (self._forward, "T")
+
     @property
     def T(self) -> LinearOperator:
         """The operator that this is the adjoint of."""
@@ -51,6 +54,12 @@ class Scaled(LinearOperator):
         self.grid, self.scan = inner.grid, inner.scan
         self._inner = inner
         self._factor = _finite(factor, self.dtype)
+
+    def __repr__(self) -> str:
+        return f"({self._factor:g} * {self._inner!r})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Scaled, (self._inner, self._factor)
 
     def _apply(self, x: Any, out: Any) -> None:
         self._inner._apply(x, out)
@@ -83,6 +92,13 @@ class Sum(LinearOperator):
         self.grid = left.grid if left.grid == right.grid else None
         self.scan = left.scan if left.scan == right.scan else None
         self._terms = (left, right)
+
+    def __repr__(self) -> str:
+        left, right = self._terms
+        return f"({left!r} + {right!r})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Sum, self._terms
 
     @property
     def scratch(self) -> int:
@@ -118,6 +134,12 @@ class Product(LinearOperator):
         super().__init__(inner.domain, outer.range, outer.device, outer.dtype)
         self.grid, self.scan = inner.grid, outer.scan
         self._outer, self._inner = outer, inner
+
+    def __repr__(self) -> str:
+        return f"({self._outer!r} @ {self._inner!r})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Product, (self._outer, self._inner)
 
     @property
     def scratch(self) -> int:

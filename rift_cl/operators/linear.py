@@ -5,6 +5,10 @@ NumPy in gives NumPy out; a device array in gives a device array out, without a 
 tensor, or a batch of them, gives a tensor that passes gradients on. The adjoint is an operator like
 any other, ``A.T.T is A``, and solvers need to know nothing else.
 
+Operators do not change once they are made. They are pickled and copied as the arguments that make
+them again, the device as its selector, so that no device memory travels and the copy gives the
+same bits.
+
 Host arrays that are too large for the device are taken in pieces where the operator says how
 (``_pieces``); the result is the same to the bit.
 """
@@ -63,8 +67,8 @@ class LinearOperator(ABC):
 
     grid: Grid | None = None
     scan: Parallel | None = None
-    # NumPy's arrays leave ``array * A`` to the operator, which refuses it, instead of making an
-    # array of operators.
+    # NumPy's arrays leave ``array * A`` and ``array @ A`` to the operator, which refuses them,
+    # instead of making an array of operators.
     __array_ufunc__ = None
 
     def __init__(
@@ -76,12 +80,17 @@ class LinearOperator(ABC):
         self.dtype = real_type(device, dtype)
 
     def __repr__(self) -> str:
-        what = self._description()
-        return f"<{type(self).__name__}: {what}, {self.dtype}, device {self.device.selector}>"
+        facts = [*self._facts(), str(self.dtype), f"device {self.device.selector}"]
+        return f"<{type(self).__name__} {self.domain} -> {self.range}: {', '.join(facts)}>"
 
-    def _description(self) -> str:
-        """What it maps, in a few words."""
-        return f"{self.domain} -> {self.range}"
+    def _facts(self) -> list[str]:
+        """What tells it from others of its class, for its repr."""
+        return []
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns) of the matrix that it is: samples of its range, and of its domain."""
+        return math.prod(self.range), math.prod(self.domain)
 
     @cached_property
     def T(self) -> LinearOperator:
@@ -89,6 +98,11 @@ class LinearOperator(ABC):
         from rift_cl.operators.algebra import Adjoint
 
         return Adjoint(self)
+
+    @property
+    def H(self) -> LinearOperator:
+        """The conjugate transpose, which is ``T``, since operators are real."""
+        return self.T
 
     def __call__(self, x: Any, out: Any = None, *, name: str = "x") -> Any:
         """Apply the operator.
@@ -132,6 +146,17 @@ class LinearOperator(ABC):
 
         return Product(self, other) if isinstance(other, LinearOperator) else self(other)
 
+    def __rmatmul__(self, x: Any) -> LinearOperator:
+        """Refuse ``x @ A``, in which x would be a row.
+
+        Raises:
+            InputError: always; the adjoint is ``A.T(x)``.
+        """
+        raise InputError(
+            f"x @ A, with x a {type(x).__name__} before the operator, is not defined: write A.T(x) "
+            "for its adjoint, or A(x)"
+        )
+
     def __add__(self, other: LinearOperator) -> LinearOperator:
         """The operator x -> A x + B x."""
         from rift_cl.operators.algebra import Sum
@@ -146,18 +171,26 @@ class LinearOperator(ABC):
         """The operator x -> factor * A x.
 
         Raises:
-            InputError: the factor is an array, to which the operator was probably meant to be
-                applied.
+            InputError: the factor is no finite real number: an array, to which the operator was
+                probably meant to be applied, another operator, or a complex number.
         """
         from rift_cl.operators.algebra import Scaled
 
+        if isinstance(factor, np.ndarray) and factor.ndim == 0:
+            factor = factor[()]
         if isinstance(factor, (int, float, np.integer, np.floating)):
             return Scaled(self, float(factor))
+        if isinstance(factor, LinearOperator):
+            raise InputError(
+                "A * B of two operators is not defined: write A @ B to apply B, then A"
+            )
         if hasattr(factor, "shape") or isinstance(factor, (list, tuple)):
             raise InputError(
                 "an operator can be multiplied by a number only, and was given an array: to apply "
                 "the operator A to an array x write A(x) or A @ x"
             )
+        if isinstance(factor, complex):
+            raise InputError(f"an operator is real and cannot be multiplied by {factor}")
         return NotImplemented
 
     __rmul__ = __mul__

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
 import rift_cl as rift
 from rift_cl.errors import DTypeError, InputError, NonFiniteError, ShapeError
-from rift_cl.operators import LinearOperator, Ramp, ViewFilter
+from rift_cl.operators import Compensation, HighPass, LinearOperator, Ramp, ViewFilter
+from rift_cl.reconstruct import FilteredBackprojection, MeasuredRays
+from rift_cl.reconstruct.solvers.view_subsets import restricted
+from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays
 
 GRID = rift.Grid((12, 15))
 SCAN = rift.Parallel(np.linspace(0, np.pi, 8, endpoint=False), bins=21)
@@ -179,13 +185,84 @@ def test_arguments_that_are_no_geometry_are_told_by_name(device):
 
 def test_operators_say_what_they_are(A, F, device):
     place = f"float32, device {device.selector}>"
-    samples = "12 x 15 samples 1 apart, 8 views of 21 bins 1 apart"
-    assert repr(A) == f"<Projector: {samples}, footprint strip, {place}"
+    samples = "grid 12 x 15, spacing 1, 8 parallel views of 21 bins, pitch 1"
+    sizes = f"{A.domain} -> {A.range}"
+    assert repr(A) == f"<Projector {sizes}: {samples}, footprint strip, {place}"
     stack = rift.Projector(rift.Grid((2, 12, 15), (3, 1, 0.5)), SCAN, device=device)
-    assert "2 x 12 x 15 samples 3 x 1 x 0.5 apart" in repr(stack)
+    assert "grid 2 x 12 x 15, spacing 3 x 1 x 0.5" in repr(stack)
+    fast = rift.FastProjector(GRID, SCAN, 0.01, lobes=2, device=device)
+    assert repr(fast) == f"<FastProjector {sizes}: {samples}, error 0.01, lobes 2, {place}"
     assert repr(A.T) == f"{A!r}.T"
-    assert repr(F) == f"<ViewFilter: {F.domain} -> {F.range}, {place}"
-    assert repr(2 * A) == f"<Scaled: {A.domain} -> {A.range}, {place}"
+    assert repr(F).startswith(f"<ViewFilter {F.domain} -> {F.range}: {Ramp('hann')!r}, gains")
+    assert repr(2 * A.T @ F) == f"((2 * {A!r}.T) @ {F!r})"
+    assert repr(A + A) == f"({A!r} + {A!r})"
+    assert f"12 of 168 samples of {A!r}" in repr(WeightedRays(A, np.eye(8, 21) + np.eye(8, 21, 17)))
+
+
+def test_the_shape_is_the_matrixs_and_the_conjugate_transpose_the_adjoint(A, F):
+    for B in (A, A.T, F, 2 * A.T @ F):
+        assert B.shape == (B(np.zeros(B.domain)).size, np.prod(B.domain))
+        assert B.H is B.T
+        assert B.H.shape == B.shape[::-1]
+
+
+def slices():
+    return rift.Projector(rift.Grid((2, 12, 15)), SCAN)
+
+
+def joseph():
+    return rift.Projector(GRID, SCAN, "joseph")
+
+
+def filtering(rows=None):
+    gains = np.arange(8) if rows is None else Compensation(SCAN.angles, "exact", 9)
+    return ViewFilter(SCAN, HighPass(0.5), rows=rows, gains=gains)
+
+
+# On the default device, which is the one that a pickle opens again.
+EVERY_CLASS = {
+    "Projector": joseph,
+    "FastProjector": lambda: rift.FastProjector(GRID, SCAN, 0.01, lobes=1),
+    "ViewFilter": filtering,
+    "ViewFilter of rows": lambda: filtering(rows=2),
+    "FilteredBackprojection": lambda: FilteredBackprojection(
+        slices(), "hann", compensate="capped-voronoi", diameter=9
+    ),
+    "Adjoint": lambda: joseph().T,
+    "Scaled": lambda: 0.3 * joseph(),
+    "Sum": lambda: joseph() + 2 * joseph(),
+    "Product": lambda: joseph().T @ filtering(),
+    "WeightedRays": lambda: WeightedRays(joseph(), np.abs(Y)),
+    "MeasuredRays": lambda: MeasuredRays(joseph(), Y > 0),
+    "ChosenViews": lambda: restricted(filtering() @ joseph(), np.array([1, 4, 5])),
+}
+COPIES = {
+    "pickle": lambda B: pickle.loads(pickle.dumps(B)),
+    "copy": copy.copy,
+    "deepcopy": copy.deepcopy,
+}
+
+
+@pytest.mark.parametrize("way", COPIES)
+@pytest.mark.parametrize("name", EVERY_CLASS)
+def test_a_copy_is_made_of_its_settings_and_gives_the_same_bits(name, way):
+    B = EVERY_CLASS[name]()
+    x = RANDOM.standard_normal(B.domain).astype(np.float32)
+    wanted = B(x)
+    C = COPIES[way](B)
+    assert type(C) is type(B)
+    assert repr(C) == repr(B)
+    assert np.array_equal(C(x), wanted)
+    assert np.array_equal(C.T(wanted), B.T(wanted))
+    assert np.array_equal((B - C)(x), 0 * wanted)
+
+
+def test_a_pickle_holds_no_tables():
+    grid, scan = rift.Grid((300, 300)), rift.Parallel([0.1, 0.2], bins=400)
+    for B in (rift.Projector(grid, scan), rift.FastProjector(grid, scan)):
+        B(np.zeros(grid.shape))
+        assert len(pickle.dumps(B)) < 1500
+        assert len(pickle.dumps(B.T @ B)) < 1500
 
 
 def test_a_product_with_an_array_is_refused(A, device):
@@ -201,9 +278,16 @@ def test_a_product_with_an_array_is_refused(A, device):
     for product in products:
         with pytest.raises(InputError, match=r"write A\(x\) or A @ x"):
             product()
-    for nonsense in (lambda: A * "2", lambda: X + A, lambda: X @ A, lambda: np.sin(A)):
+    for nonsense in (lambda: A * "2", lambda: X + A, lambda: np.sin(A)):
         with pytest.raises(TypeError):
             nonsense()
+    for row in (Y, device.array(Y), 2.0):
+        with pytest.raises(InputError, match=r"A\.T\(x\)"):
+            row @ A
+    with pytest.raises(InputError, match="A @ B"):
+        A * A.T
+    with pytest.raises(InputError, match="1j"):
+        A * 1j
     assert np.array_equal(A @ X, A(X))
 
 
@@ -214,6 +298,8 @@ def test_algebra(A, F):
     assert close((3 * A)(X), 3 * y)
     assert close((A * np.float64(-0.5))(X), -0.5 * y)
     assert close((np.float32(4) * A)(X), 4 * y)
+    assert close((A * np.int64(2))(X), 2 * y)
+    assert close((np.array(4.0) * A)(X), 4 * y)
     assert close((-A)(X), -y)
     assert close((F @ A)(X), z)
     assert close((A.T @ F @ A)(X), A.T(z))

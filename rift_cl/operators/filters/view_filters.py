@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -179,6 +180,8 @@ class ViewFilter(LinearOperator):
         super().__init__(shape, shape, device or default_device(), dtype)
         if rows is not None and rows < 1:
             raise ShapeError(f"rows is {rows}, wanted at least 1 detector row")
+        self.filter = filter
+        self._views, self._rows, self._given_gains = scan, rows, gains
         factors, taps = _factors_and_taps(scan, filter, gains)
         self._gains = self.device.array(factors, self.dtype)
         self._convolve: RowConvolution | RowTransform
@@ -187,6 +190,20 @@ class ViewFilter(LinearOperator):
             self._convolve = RowConvolution(self.device, taps, self.dtype)
         else:
             self._convolve = RowTransform(self.device, taps, math.prod(shape[:-1]), self.dtype)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        settled = partial(
+            ViewFilter,
+            rows=self._rows,
+            gains=self._given_gains,
+            device=self.device,
+            dtype=self.dtype,
+        )
+        return settled, (self._views, self.filter)
+
+    def _facts(self) -> list[str]:
+        gains = [] if self._given_gains is None else ["gains of each view"]
+        return [repr(self.filter), *gains]
 
     def _apply(self, x: Any, out: Any) -> None:
         self._convolve(x, out, self._gains, x.shape[1] if len(x.shape) == 3 else 1)

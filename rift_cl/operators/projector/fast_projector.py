@@ -11,7 +11,7 @@ view, where every pixel of every view costs ``Projector`` something.
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -105,6 +105,13 @@ class FastProjector(ParallelProjector):
     def period(self) -> int:
         """Bins after which a view's continuation repeats itself."""
         return self._rays.length
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        make = partial(FastProjector, lobes=self.lobes, device=self.device)
+        return make, (self.grid, self.scan, self.error)
+
+    def _facts(self) -> list[str]:
+        return [*super()._facts(), f"error {self.error:g}", f"lobes {self.lobes}"]
 
     @cached_property
     def _tables(self) -> RayTables:

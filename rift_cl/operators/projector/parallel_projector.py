@@ -55,14 +55,14 @@ class ParallelProjector(LinearOperator):
         super().__init__(grid.shape, shape, device or default_device(), dtype)
         self.grid, self.scan = grid, scan
 
-    def _description(self) -> str:
-        samples = " x ".join(map(str, self.grid.shape))
+    def _facts(self) -> list[str]:
         lengths = self.grid.spacing if len(set(self.grid.spacing)) > 1 else self.grid.spacing[:1]
-        spacing = " x ".join(f"{length:g}" for length in lengths)
-        return (
-            f"{samples} samples {spacing} apart, {len(self.scan.angles)} views of "
-            f"{self.scan.bins} bins {self.scan.pitch:g} apart"
-        )
+        return [
+            f"grid {' x '.join(map(str, self.grid.shape))}",
+            f"spacing {' x '.join(f'{length:g}' for length in lengths)}",
+            f"{len(self.scan.angles)} parallel views of {self.scan.bins} bins",
+            f"pitch {self.scan.pitch:g}",
+        ]
 
     def _pieces(self, budget: int) -> Iterable[Piece]:
         return self.pieces(budget)

@@ -84,8 +84,11 @@ class Projector(ParallelProjector):
         )
         return _Walk(self.device, by_rows, self.dtype), _Walk(self.device, by_columns, self.dtype)
 
-    def _description(self) -> str:
-        return f"{super()._description()}, footprint {self.footprint}"
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Projector, (self.grid, self.scan, self.footprint, self.device, self.dtype)
+
+    def _facts(self) -> list[str]:
+        return [*super()._facts(), f"footprint {self.footprint}"]
 
     def _apply(self, x: Any, out: Any) -> None:
         for slab in _slabs(x):

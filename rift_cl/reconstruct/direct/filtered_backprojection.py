@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,7 @@ class FilteredBackprojection(LinearOperator):
     ) -> None:
         super().__init__(A.range, A.domain, A.device, A.dtype)
         self._A = A
+        self._compensate, self._diameter = compensate, diameter
         size = object_diameter(A) if diameter is None else one_number(diameter)
         if not size > 0:
             raise InputError(f"diameter is {diameter!r}, wanted the object's, a positive length")
@@ -71,6 +73,16 @@ class FilteredBackprojection(LinearOperator):
             device=A.device,
             dtype=A.dtype,
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        settled = partial(
+            FilteredBackprojection, compensate=self._compensate, diameter=self._diameter
+        )
+        return settled, (self._A, self._filter.filter)
+
+    def _facts(self) -> list[str]:
+        compensate = [] if self._compensate is None else [f"compensate {self._compensate}"]
+        return [repr(self._filter.filter), *compensate, *self._A._facts()]
 
     def _apply(self, x: Any, out: Any) -> None:
         filtered = self.device.empty(x.shape, self.dtype)

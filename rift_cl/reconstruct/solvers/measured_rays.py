@@ -6,6 +6,8 @@ zero in what the operator gives and in the data, and pull at nothing.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -33,3 +35,6 @@ class MeasuredRays(WeightedRays):
         if mask.dtype != np.bool_:
             raise DTypeError(f"seen holds {mask.dtype}, wanted booleans: compare it with a number")
         super().__init__(A, mask)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return MeasuredRays, (self.inner, self.weights > 0)

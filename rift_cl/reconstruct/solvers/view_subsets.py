@@ -78,6 +78,12 @@ class ChosenViews(LinearOperator):
         self.grid = A.grid
         self._A, self._views = A, views
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ChosenViews, (self._A, self._views)
+
+    def _facts(self) -> list[str]:
+        return [f"{len(self._views)} of {self._A.range[0]} views of {self._A!r}"]
+
     @property
     def scratch(self) -> int:
         """The operator's, and data of all views."""

@@ -40,6 +40,12 @@ class WeightedRays(LinearOperator):
         """Samples that count at all."""
         self._roots = A.device.array(np.sqrt(found), A.dtype)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.inner, self.weights)
+
+    def _facts(self) -> list[str]:
+        return [f"{self.measured} of {self.weights.size} samples of {self.inner!r}"]
+
     def weigh(self, y: Any) -> None:
         """Multiply a device array of data by the roots of the weights, in place."""
         multiply(self.device, self._roots, y)
