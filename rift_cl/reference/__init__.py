@@ -2,7 +2,7 @@
 
 They are the oracle of the tests and the documentation of the mathematics: each says in a few lines
 what a kernel computes, from the definition and with numbers of its own. Nothing here knows a
-device, and nothing above uses it to compute a result.
+device. Tests and tools alone import it: an import contract in pyproject.toml keeps it so.
 """
 
 from rift_cl.reference.filters import filter_rows, ramp_taps, response_taps, shepp_logan_taps

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.reference.coverage import optical_transfer
+from rift_cl.optics.optical_transfer import optical_transfer
 
 Floats = NDArray[np.float64]
 

@@ -9,6 +9,7 @@ import pytest
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Aperture
+from rift_cl.optics.optical_transfer import optical_transfer
 from rift_cl.optics.pupil import (
     annular_mtf,
     defocus_waves,
@@ -24,7 +25,6 @@ from rift_cl.optics.transfer import (
     polychromatic_mtf,
     system_mtf,
 )
-from rift_cl.reference.coverage import optical_transfer
 
 SHARE = np.linspace(0, 1, 1001)
 

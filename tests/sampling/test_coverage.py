@@ -11,9 +11,9 @@ from observations_of_all_kinds import random_observations, ring_of_cameras
 import rift_cl as rift
 from rift_cl.errors import InputError, ResourceLimitError, ShapeError
 from rift_cl.geometry import Parallel
-from rift_cl.reference import coverage as twin
 from rift_cl.sampling.coverage.cube import coverage_cube, cube_axis
 from rift_cl.sampling.coverage.device import coverage, coverage_grad
+from rift_cl.sampling.coverage.host import host_coverage, host_coverage_grad
 from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
@@ -38,13 +38,13 @@ def off(found, wanted):
 def test_it_is_the_twins(device, observations, target):
     found = coverage(observations, target, device=device)
     assert found.dtype == np.float32 and found.shape == (2, 1500)
-    assert off(found, twin.coverage(observations, target.k, DIAMETER)) < 2e-6
+    assert off(found, host_coverage(observations, target.k, DIAMETER)) < 2e-6
 
 
 def test_the_gradient_is_the_twins(device, observations, target):
     upstream = np.random.default_rng(0).normal(size=(2, 1500))
     found = coverage_grad(observations, target, upstream, device=device)
-    wanted = twin.coverage_grad(observations, target.k, DIAMETER, upstream)
+    wanted = host_coverage_grad(observations, target.k, DIAMETER, upstream)
     for name in found._fields:
         assert off(getattr(found, name), getattr(wanted, name)) < 1e-4, name
 
@@ -55,9 +55,9 @@ def test_any_number_of_frequencies_will_do(device, observations, target, count):
     upstream = np.random.default_rng(1).normal(size=(2, count))
     found = coverage(observations, target, k, device=device)
     assert found.shape == (2, count)
-    assert off(found, twin.coverage(observations, k, DIAMETER)) < 2e-6
+    assert off(found, host_coverage(observations, k, DIAMETER)) < 2e-6
     by_weight = coverage_grad(observations, target, upstream, k, device=device).weight
-    assert off(by_weight, twin.coverage_grad(observations, k, DIAMETER, upstream).weight) < 1e-5
+    assert off(by_weight, host_coverage_grad(observations, k, DIAMETER, upstream).weight) < 1e-5
 
 
 def test_a_view_that_is_skipped_adds_nothing(device):

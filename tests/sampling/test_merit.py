@@ -8,7 +8,7 @@ from scipy.stats import spearmanr
 
 from rift_cl.geometry import Camera, Parallel
 from rift_cl.geometry.pose import look_at
-from rift_cl.reference.coverage import coverage
+from rift_cl.sampling.coverage.host import host_coverage
 from rift_cl.sampling.criteria import merit as merit_file
 from rift_cl.sampling.criteria.exact import exact
 from rift_cl.sampling.criteria.kriging import kriging
@@ -23,7 +23,9 @@ POINTS = ((0.1, 0, 0), (-0.1, 0.2, 0.05))
 
 def scored(kind, directions, target):
     observations = Observations.along(directions)
-    return merit_of_coverage(kind, coverage(observations, target.k, target.diameter), target).value
+    return merit_of_coverage(
+        kind, host_coverage(observations, target.k, target.diameter), target
+    ).value
 
 
 def scattered(count, seed):
@@ -135,7 +137,7 @@ def test_it_ranks_as_the_exact_error_does(flat):
             observations = Observations.of_scan(Parallel(angles, 64, 1 / 64))
         else:
             observations = Observations.along(random.normal(size=(10, 3)) * [1, spread, spread**2])
-        known = coverage(observations, target.k, 1.0)
+        known = host_coverage(observations, target.k, 1.0)
         found.append(
             (
                 merit_of_coverage("wiener", known, target).value,

@@ -11,8 +11,8 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.pose import look_at
-from rift_cl.reference.coverage import coverage
 from rift_cl.reference.spectrum import spectrally_filtered
+from rift_cl.sampling.coverage.host import host_coverage
 from rift_cl.sampling.targets.observations import Observations
 from rift_cl.train.loss.coverage_weight import CoverageWeight
 from rift_cl.train.loss.homogenisation import Homogenisation
@@ -79,7 +79,9 @@ def test_the_weight_is_one_over_the_twins_coverage(device):
     depth = camera.view[2, :3] @ middle + camera.view[2, 3]
     k = kx[:, None] * camera.view[0, :3] + ky[:, None] * camera.view[1, :3]
     k *= camera.intrinsics[0] / depth
-    wanted = 1 / coverage(Observations.of(cameras, middle[None]), k, field_diameter(cameras))[0]
+    wanted = (
+        1 / host_coverage(Observations.of(cameras, middle[None]), k, field_diameter(cameras))[0]
+    )
     # The grid's cells are coarse where slices of others meet this one.
     np.testing.assert_allclose(weights.response(2, 1.0)(ky, kx), wanted, rtol=0.35)
 

@@ -24,9 +24,9 @@ from figures.random_objects import RADIUS
 from figures.score_scatter import score_scatter
 from rift_cl import Device, Grid, Parallel, Projector, cgls
 from rift_cl.metrics import disc
-from rift_cl.reference.coverage import coverage
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_png
+from rift_cl.sampling.coverage.host import host_coverage
 from rift_cl.sampling.criteria.exact import exact
 from rift_cl.sampling.criteria.kriging import kriging
 from rift_cl.sampling.criteria.merit import CoverageMerit, merit_of_coverage
@@ -147,7 +147,7 @@ def scores(angles: Floats, target: Target) -> dict[str, float]:
     """Every score of a set of directions; lower is better."""
     observations = Observations.of_scan(Parallel(angles, SIZE))
     between = gaps(angles)
-    known = coverage(observations, target.k, target.diameter)
+    known = host_coverage(observations, target.k, target.diameter)
     return {
         **{kind: merit_of_coverage(kind, known, target).value for kind in _BY_COVERAGE},
         "kriging": kriging(observations, target),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rift_cl.commands.inputs.view_set import ViewSet
+from rift_cl.sampling.coverage.host import host_coverage
 from rift_cl.sampling.criteria.limits import CAUSES, Limits, limits
 from rift_cl.sampling.criteria.merit import merit_of_coverage
 from rift_cl.sampling.criteria.orlov import Orlov, orlov
@@ -219,8 +220,6 @@ def length_in_words(frequency: float, sampled: ViewSet) -> str:
 
 def unknown_share(sampled: ViewSet) -> float:
     """The share of the target's power that stays unknown, if it falls as 1/k^2."""
-    from rift_cl.reference.coverage import coverage
-
     target = sampled.target
-    found = coverage(sampled.observations(), target.k, target.diameter)
+    found = host_coverage(sampled.observations(), target.k, target.diameter)
     return merit_of_coverage("wiener", found, target).value

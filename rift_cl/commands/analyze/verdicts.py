@@ -17,7 +17,7 @@ from rift_cl.commands.analyze.suggestions import usual_distance
 from rift_cl.commands.inputs.surfaces import SQUARE, surface_of
 from rift_cl.commands.inputs.view_set import Floats, ViewSet
 from rift_cl.geometry import Camera
-from rift_cl.reference.coverage import coverage
+from rift_cl.sampling.coverage.host import host_coverage
 from rift_cl.sampling.criteria.appearance import appearance_error
 from rift_cl.sampling.criteria.functionals import wiener
 from rift_cl.sampling.targets.observations import Observations
@@ -85,7 +85,7 @@ def _on_slice(taken: Observations, target: Target, side: Floats) -> float:
     plane = half_disc(target.highest)
     k = plane[:, :1] * first + plane[:, 1:2] * np.cross(side, first)
     power = target.prior.power(k, target.diameter)
-    return wiener(coverage(taken, k, target.diameter), power, target.snr).value
+    return wiener(host_coverage(taken, k, target.diameter), power, target.snr).value
 
 
 def _appearance(observations: Observations, target: Target, side: Floats) -> float:

@@ -1,9 +1,9 @@
 """How well views sample each frequency of a target: the driver of ``kernels/sampling/coverage.cl``.
 
-``rift_cl.reference.coverage`` says what coverage is and is the kernel's twin. On the device lengths
-are in diameters of the target, so that float32 holds them in any unit; its results agree with the
-twin's to 2e-5 of the largest up to a thousand cycles per diameter, and lose a digit for each factor
-of ten beyond.
+``host`` says what coverage is and computes the same in float64. On the device lengths are in
+diameters of the target, so that float32 holds them in any unit; its results agree with the host's
+to 2e-5 of the largest up to a thousand cycles per diameter, and lose a digit for each factor of ten
+beyond.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.errors import NonFiniteError, ShapeError
 from rift_cl.geometry.numbers import real_numbers
-from rift_cl.reference.coverage import ObservationsGradient
 from rift_cl.sampling.coverage.work import BOX, ROW, CoverageWork, Views
+from rift_cl.sampling.targets.observations import ObservationsGradient
 from rift_cl.sampling.targets.target import Target
 
 # Frequencies that one work-item of the gradient sums over.

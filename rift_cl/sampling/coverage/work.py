@@ -15,8 +15,7 @@ from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.geometry import Camera, Parallel
 from rift_cl.geometry.numbers import real_numbers
-from rift_cl.reference.coverage import ObservationsGradient
-from rift_cl.sampling.targets.observations import Observations
+from rift_cl.sampling.targets.observations import Observations, ObservationsGradient
 from rift_cl.sampling.targets.target import Target
 
 Floats = NDArray[np.float64]

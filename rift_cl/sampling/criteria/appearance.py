@@ -21,7 +21,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from rift_cl.reference.coverage import ObservationsLike
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.prior import directions_for
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class _Score(NamedTuple):
 
 
 def appearance_error(
-    observations: ObservationsLike, target: Target, normals: Floats, kind: str
+    observations: Observations, target: Target, normals: Floats, kind: str
 ) -> tuple[float, Floats, Floats]:
     """The share of the brightness's variance that stays unknown, a mean over points.
 
@@ -88,7 +88,7 @@ def appearance_error(
     return score.value, across.transpose(1, 0, 2), by_weight.T
 
 
-def light_of(observations: ObservationsLike, normals: Floats) -> Floats:
+def light_of(observations: Observations, normals: Floats) -> Floats:
     """(P, V) weights of views times the cosines to the normals (P, 3), 0 from behind."""
     cosine = np.einsum("vpd,pd->pv", observations.direction, normals)
     return np.asarray(observations.weight.T * np.maximum(cosine, 0))

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rift_cl.errors import InputError, ResourceLimitError
-from rift_cl.reference.coverage import Floats, ObservationsLike, optical_transfer
+from rift_cl.optics.optical_transfer import Floats, optical_transfer
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.prior import checked_power
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ _COLUMNS = 4096
 _WIDER = 1.25
 
 
-def exact(observations: ObservationsLike, target: Target, samples: int | None = None) -> float:
+def exact(observations: Observations, target: Target, samples: int | None = None) -> float:
     """Share of the variance that stays: ``tr(C - C M' (M C M' + N)^-1 M C) / tr(C)``.
 
     C is the covariance by the prior of samples in the target's disc or ball, M projects them along
@@ -100,7 +101,7 @@ def _covariance(target: Target, count: int, axes: int) -> Floats:
 
 
 def _information(
-    observations: ObservationsLike, point: int, target: Target, x: Floats, step: float
+    observations: Observations, point: int, target: Target, x: Floats, step: float
 ) -> Floats:
     """``M' N^-1 M``, (n, n), summed over the views of one point."""
     axes, diameter = (2 if target.is_flat else 3), target.diameter
@@ -121,7 +122,7 @@ def _information(
     return total
 
 
-def _columns(observations: ObservationsLike, view: int, point: int, x: Floats, q: Floats) -> Floats:
+def _columns(observations: Observations, view: int, point: int, x: Floats, q: Floats) -> Floats:
     """What each sample adds to one view's spectrum, cosines and sines, (n, 2 frequencies)."""
     optics = (
         values[view, point]

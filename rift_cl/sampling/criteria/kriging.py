@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rift_cl.reference.coverage import Floats, ObservationsLike, optical_transfer
+from rift_cl.optics.optical_transfer import Floats, optical_transfer
+from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.prior import checked_power
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ _NEAREST, _AT_ONCE = 24, 256
 _NOTHING = 1e12
 
 
-def kriging(observations: ObservationsLike, target: Target) -> float:
+def kriging(observations: Observations, target: Target) -> float:
     """Share of the power that stays unknown, as ``wiener``, but with correlated views.
 
     Each frequency is estimated from the nearest points of the 24 slices closest to it:
@@ -41,7 +42,7 @@ def kriging(observations: ObservationsLike, target: Target) -> float:
     return float(np.mean([power @ share for share in shares]) / power.sum())
 
 
-def _shares(observations: ObservationsLike, point: int, target: Target, power: Floats) -> Floats:
+def _shares(observations: Observations, point: int, target: Target, power: Floats) -> Floats:
     parts = [
         _some(observations, point, target, target.k[first:last], power[first:last])
         for first in range(0, len(power), _AT_ONCE)
@@ -51,7 +52,7 @@ def _shares(observations: ObservationsLike, point: int, target: Target, power: F
 
 
 def _some(
-    observations: ObservationsLike, point: int, target: Target, k: Floats, power: Floats
+    observations: Observations, point: int, target: Target, k: Floats, power: Floats
 ) -> Floats:
     """Unknown shares of some frequencies (K,)."""
     normals = observations.direction[:, point]

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rift_cl.reference.coverage import optical_transfer
+from rift_cl.optics.optical_transfer import optical_transfer
 from rift_cl.sampling.coverage.work import Views, looks_at
 from rift_cl.sampling.criteria.orlov import frequency_directions, runs
 from rift_cl.sampling.targets.observations import Observations

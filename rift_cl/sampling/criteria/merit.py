@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.geometry import Camera
 from rift_cl.geometry.numbers import real_numbers
-from rift_cl.reference import coverage as twin
+from rift_cl.sampling.coverage.host import host_coverage, host_coverage_grad
 from rift_cl.sampling.criteria.exact import exact
 from rift_cl.sampling.criteria.functionals import Floats, Scored, scored
 from rift_cl.sampling.criteria.kriging import kriging
 from rift_cl.sampling.criteria.surface import surface_merit
 from rift_cl.sampling.targets.camera_gradients import CameraGradients, camera_gradients
-from rift_cl.sampling.targets.observations import Observations
+from rift_cl.sampling.targets.observations import Observations, ObservationsGradient
 from rift_cl.sampling.targets.prior import checked_power
 
 if TYPE_CHECKING:
@@ -93,11 +93,11 @@ def merit(
 
 def _volume(
     observations: Observations, target: Target, kind: CoverageMerit, device: Device | None
-) -> tuple[float, twin.ObservationsGradient]:
+) -> tuple[float, ObservationsGradient]:
     k, diameter = target.k, target.diameter
     if device is None or observations.weight.size * len(k) < _LARGE:
-        scored = merit_of_coverage(kind, twin.coverage(observations, k, diameter), target)
-        return scored.value, twin.coverage_grad(observations, k, diameter, scored.gradient)
+        scored = merit_of_coverage(kind, host_coverage(observations, k, diameter), target)
+        return scored.value, host_coverage_grad(observations, k, diameter, scored.gradient)
     from rift_cl.sampling.coverage.device import coverage, coverage_grad
 
     scored = merit_of_coverage(kind, coverage(observations, target, device=device), target)

@@ -15,15 +15,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rift_cl.errors import InputError
-from rift_cl.reference.coverage import (
-    Floats,
-    ObservationsGradient,
-    ObservationsLike,
-    Transfer,
-    optical_transfer,
-)
+from rift_cl.optics.optical_transfer import Floats, Transfer, optical_transfer
 from rift_cl.sampling.criteria import functionals as criteria
 from rift_cl.sampling.criteria.appearance import appearance_error
+from rift_cl.sampling.targets.observations import Observations, ObservationsGradient
 from rift_cl.sampling.targets.prior import checked_power
 
 if TYPE_CHECKING:
@@ -50,7 +45,7 @@ class _Seen(NamedTuple):
 
 
 def surface_merit(
-    observations: ObservationsLike, target: Target, kind: str = "wiener"
+    observations: Observations, target: Target, kind: str = "wiener"
 ) -> tuple[float, ObservationsGradient]:
     """Errors of a surface's texture and of its sheen, added; each from 0 to 1.
 
@@ -80,7 +75,7 @@ def surface_merit(
     return texture + appearance, whole
 
 
-def texture_coverage(observations: ObservationsLike, target: Target) -> Floats:
+def texture_coverage(observations: Observations, target: Target) -> Floats:
     """Coverage (P, K) of the frequencies of each point's tangent plane."""
     points = range(observations.weight.shape[1])
     normals = np.zeros((len(points), 3)) if target.normals is None else target.normals
@@ -96,7 +91,7 @@ def _plane(target: Target) -> Floats:
 
 
 def _texture(
-    observations: ObservationsLike, target: Target, normals: Floats, kind: str
+    observations: Observations, target: Target, normals: Floats, kind: str
 ) -> tuple[float, ObservationsGradient]:
     plane = _plane(target)
     power = checked_power(target.prior, plane, target.diameter)
@@ -112,7 +107,7 @@ def _texture(
     )
 
 
-def _seen(observations: ObservationsLike, point: int, normal: Floats, plane: Floats) -> _Seen:
+def _seen(observations: Observations, point: int, normal: Floats, plane: Floats) -> _Seen:
     axis = np.eye(3)[np.argmin(np.abs(normal))]
     first = np.cross(axis, normal)
     first /= np.linalg.norm(first)
@@ -126,13 +121,13 @@ def _seen(observations: ObservationsLike, point: int, normal: Floats, plane: Flo
     return _Seen(q, cosine, along, transfer)
 
 
-def _sum(observations: ObservationsLike, point: int, seen: _Seen) -> Floats:
+def _sum(observations: Observations, point: int, seen: _Seen) -> Floats:
     light = observations.weight[:, point, None] * seen.cosine
     return np.asarray((light * seen.transfer.value**2).sum(0))
 
 
 def _gradient(
-    observations: ObservationsLike, point: int, normal: Floats, seen: _Seen, upstream: Floats
+    observations: Observations, point: int, normal: Floats, seen: _Seen, upstream: Floats
 ) -> tuple[Any, ...]:
     """Of one point: by direction (V, 3), weight, pixel, cutoff and blur (V,)."""
     passed, weight = seen.transfer, observations.weight[:, point, None]

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.reference.coverage import ObservationsGradient, coverage, coverage_grad
+from rift_cl.sampling.coverage.host import host_coverage, host_coverage_grad
 from rift_cl.sampling.criteria import functionals as criteria
 from rift_cl.sampling.criteria.merit import CoverageMerit
 from rift_cl.sampling.criteria.surface import surface_merit
@@ -29,7 +29,7 @@ from rift_cl.sampling.planning.design_space import (
 )
 from rift_cl.sampling.planning.frequency_sets import for_choosing, for_judging
 from rift_cl.sampling.planning.view_table import ViewTable
-from rift_cl.sampling.targets.observations import Observations
+from rift_cl.sampling.targets.observations import Observations, ObservationsGradient
 from rift_cl.sampling.targets.prior import checked_power
 from rift_cl.sampling.targets.target import Target
 
@@ -58,7 +58,7 @@ class Objective:
         target = self.design.target
         if self.fixed is None:
             return np.zeros((len(target.points), len(target.k)))
-        return coverage(self.fixed, target.k, target.diameter)
+        return host_coverage(self.fixed, target.k, target.diameter)
 
     @cached_property
     def rough(self) -> Objective:
@@ -109,7 +109,7 @@ class Objective:
         target = self.design.target
         if target.mode == "surface":
             return self.surface(observations)[0]
-        return self.scored(coverage(observations, target.k, target.diameter)).value
+        return self.scored(host_coverage(observations, target.k, target.diameter)).value
 
     def surface(self, observations: Observations) -> tuple[float, ObservationsGradient]:
         """The merit of a surface, and its derivative by the looks."""
@@ -123,8 +123,8 @@ class Objective:
         if target.mode == "surface":
             value, by_observations = self.surface(sight.observations)
             return value, sight.chained(by_observations)
-        scored = self.scored(coverage(sight.observations, target.k, target.diameter))
-        by_observations = coverage_grad(
+        scored = self.scored(host_coverage(sight.observations, target.k, target.diameter))
+        by_observations = host_coverage_grad(
             sight.observations, target.k, target.diameter, scored.gradient
         )
         return scored.value, sight.chained(by_observations)

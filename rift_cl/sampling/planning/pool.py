@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from rift_cl.reference.coverage import coverage
+from rift_cl.sampling.coverage.host import host_coverage
 from rift_cl.sampling.planning.objective import Objective, some
 from rift_cl.sampling.planning.surface_pool import SurfacePool
 from rift_cl.sampling.planning.view_table import ViewTable
@@ -62,7 +62,7 @@ def pool_of(objective: Objective, view_table: ViewTable) -> Pool:
 def _each(objective: Objective, observations: Observations) -> Floats:
     target = objective.design.target
     views = (some(observations, slice(view, view + 1)) for view in range(observations.views))
-    return np.stack([coverage(one, target.k, target.diameter) for one in views])
+    return np.stack([host_coverage(one, target.k, target.diameter) for one in views])
 
 
 class _VolumePool:

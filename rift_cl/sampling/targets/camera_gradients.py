@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rift_cl.geometry import Camera
-from rift_cl.reference.coverage import Floats, ObservationsGradient
-from rift_cl.sampling.targets.observations import Observations
+from rift_cl.sampling.targets.observations import Floats, Observations, ObservationsGradient
 
 
 class CameraGradients(NamedTuple):

@@ -177,6 +177,24 @@ class Observations:
         return cls((values / lengths)[:, None], one, 0 * one, np.inf * one, 0 * one)
 
 
+class ObservationsGradient(NamedTuple):
+    """The gradient of a number by what ``Observations`` hold, in their shapes.
+
+    Args:
+        direction: (V, P, 3) across the line of sight: a unit vector moves only so.
+        weight: (V, P), as are the rest.
+        pixel: by the pixel's edge.
+        cutoff: by the cut-off of diffraction.
+        blur: by the diameter of the disc of defocus.
+    """
+
+    direction: Floats
+    weight: Floats
+    pixel: Floats
+    cutoff: Floats
+    blur: Floats
+
+
 class _Sight(NamedTuple):
     """One camera's view of P points: ``Observations`` without the views' axis."""
 

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.geometry import Grid
-from rift_cl.reference.splat_projection import covariances
 
 # Gaussians end at so many standard deviations or farther: what is left out has 2e-3 of the peak.
 _EXTENT = 3.5
@@ -51,7 +50,7 @@ class Footprints:
         first = [grid.coordinates(axis)[0] for axis in (2, 1, 0)]
         # In steps of the grid, from its first sample on.
         self._places = (np.asarray(means, float) - first) / self._spacing
-        shapes = covariances(np.asarray(quats, float), np.asarray(scales, float))
+        shapes = _covariances(np.asarray(quats, float), np.asarray(scales, float))
         wider = shapes + np.eye(3) * dilation
         self._peaks = np.sqrt(np.linalg.det(shapes) / np.linalg.det(wider))
         self._inverses = np.linalg.inv(wider) * np.multiply.outer(self._spacing, self._spacing)
@@ -105,3 +104,15 @@ class Footprints:
         x, y, z = np.moveaxis(voxels, -1, 0)
         flat = (z * self._counts[1] + y) * self._counts[0] + x
         return flat, self._peaks[splats, None] * np.exp(-0.5 * square)
+
+
+def _covariances(quats: Floats, scales: Floats) -> Floats:
+    """R S S^T R^T of quaternions (w, x, y, z) and scales: (N, 3, 3)."""
+    with np.errstate(all="ignore"):
+        w, x, y, z = (quats / np.linalg.norm(quats, axis=1, keepdims=True)).T
+    zero = np.zeros_like(w)
+    # Rodrigues: R = 1 + 2 w [v] + 2 [v]^2 with [v] the matrix of the cross product.
+    cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    rotation = np.eye(3) + 2 * w[:, None, None] * cross + 2 * cross @ cross
+    root = rotation * scales[:, None, :]
+    return np.asarray(root @ root.transpose(0, 2, 1))

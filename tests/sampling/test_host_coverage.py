@@ -1,4 +1,4 @@
-"""The coverage's twin: optics by closed forms and integrals, gradients by finite differences."""
+"""Coverage on the host: optics by closed forms and integrals, gradients by finite differences."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from observations_of_all_kinds import random_observations
 
-from rift_cl.reference.coverage import coverage, coverage_grad, optical_transfer
+from rift_cl.optics.optical_transfer import optical_transfer
+from rift_cl.sampling.coverage.host import host_coverage, host_coverage_grad
 from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import half_ball
 
@@ -71,17 +72,17 @@ def test_the_gradient_is_that_of_differences(name):
         if name == "direction":
             moved /= np.linalg.norm(moved, axis=2, keepdims=True)
         return (
-            upstream * coverage(dataclasses.replace(observations, **{name: moved}), k, 1.0)
+            upstream * host_coverage(dataclasses.replace(observations, **{name: moved}), k, 1.0)
         ).sum()
 
     difference = (total(STEP) - total(-STEP)) / (2 * STEP)
-    gradient = getattr(coverage_grad(observations, k, 1.0, upstream), name)
+    gradient = getattr(host_coverage_grad(observations, k, 1.0, upstream), name)
     assert (gradient * along).sum() == pytest.approx(difference, rel=1e-5)
 
 
 def test_the_gradient_by_a_direction_lies_across_it():
     observations, k = random_observations(6, 1), half_ball(10.0, 100)
-    gradient = coverage_grad(observations, k, 1.0, np.ones((1, 100)))
+    gradient = host_coverage_grad(observations, k, 1.0, np.ones((1, 100)))
     along = (gradient.direction * observations.direction).sum(2)
     assert np.abs(along).max() < 1e-12 * np.abs(gradient.direction).max()
 
@@ -90,13 +91,13 @@ def test_a_view_sees_its_own_plane_and_nothing_across_it():
     observations = Observations.along([[0, 0, 1]])
     k = np.array([[3.0, 4.0, 0.0], [0, 0, 9.0], [0, 0, 0], [0, 0, 0.25]])
     expected = [[1, 0, 1, np.exp(-2 * 0.5**2)]]
-    np.testing.assert_allclose(coverage(observations, k, 1.0), expected, atol=1e-12)
+    np.testing.assert_allclose(host_coverage(observations, k, 1.0), expected, atol=1e-12)
 
 
 def test_opposite_frequencies_are_covered_alike():
     observations, k = random_observations(9, 2), half_ball(12.0, 200)
     np.testing.assert_allclose(
-        coverage(observations, k, 1.0), coverage(observations, -k, 1.0), rtol=1e-12
+        host_coverage(observations, k, 1.0), host_coverage(observations, -k, 1.0), rtol=1e-12
     )
 
 
@@ -105,7 +106,7 @@ def test_gradients_stay_finite_along_the_line_of_sight_and_at_zero():
         np.array([[[0.0, 0, 1]]]), *np.array([1.0, 0.1, 5.0, 0.2]).reshape(4, 1, 1)
     )
     k = np.array([[0, 0, 0.3], [0, 0, 0], [1e-12, 0, 0.2]])
-    gradient = coverage_grad(observations, k, 1.0, np.ones((1, 3)))
+    gradient = host_coverage_grad(observations, k, 1.0, np.ones((1, 3)))
     assert all(np.isfinite(part).all() for part in gradient)
 
 
@@ -117,4 +118,7 @@ def test_rounding_along_the_line_of_sight_does_not_blow_up():
         n /= np.linalg.norm(n)
         observations = Observations(n[None, None], *np.array([1.0, 0.1, 5.0, 0.2]).reshape(4, 1, 1))
         k = random.uniform(0.05, 0.5, (20, 1)) * n * (1 + 1e-16 * random.integers(-2, 3, (20, 3)))
-        assert np.abs(coverage_grad(observations, k, 1.0, np.ones((1, 20))).direction).max() < 1e-6
+        assert (
+            np.abs(host_coverage_grad(observations, k, 1.0, np.ones((1, 20))).direction).max()
+            < 1e-6
+        )
