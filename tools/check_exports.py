@@ -31,7 +31,7 @@ from rift_cl.cl.discovery import default_device
 from rift_cl.commands.export.axes import turned
 from rift_cl.commands.export.export import Export
 from rift_cl.commands.export.settings import ExportSettings, Target
-from rift_cl.commands.inputs.scene_input import in_display_light
+from rift_cl.commands.inputs.opened_scene import in_display_light
 from rift_cl.geometry import Camera
 from rift_cl.io.captures.view_image import camera_at, read_view
 from rift_cl.io.scenes.formats.plain import along_curve, unit_quats

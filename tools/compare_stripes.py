@@ -167,7 +167,7 @@ def _rms(values: Floats) -> float:
 
 def _read(path: Path) -> tuple[Floats, Floats]:
     """Line integrals of one row, zero outside the object, and the angles."""
-    from rift_cl.commands.inputs.scan_input import read_attenuation
+    from rift_cl.commands.inputs.scan_rows import read_attenuation
 
     scan = open_scan(path)
     sinogram = read_attenuation(scan, 0, 1).projections[:, 0]

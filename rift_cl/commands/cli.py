@@ -1,7 +1,7 @@
-"""The command ``rift``: which commands there are, and what each of them prints.
+"""The command ``rift``: the table of its commands, and what each of them prints.
 
-Every command is a settings dataclass and a job; this file only brings the two together and prints
-what the job found to stdout. How a command is run stands in ``runner``.
+Every command has a folder with ``settings`` (a dataclass: its options) and ``job``. A command
+imports its own settings to parse or to help, and its job only to run; ``rift --help`` imports none.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 import tyro
 
@@ -20,6 +20,30 @@ from rift_cl.commands.interruption import gentle_interrupt
 from rift_cl.commands.progress_bar import print_line
 from rift_cl.commands.runner import Output, command, exit_status, ran, told, watch
 
+_USAGE = 2
+
+
+class Command(NamedTuple):
+    """One command of ``rift``.
+
+    Args:
+        run: carries it out and prints what came out.
+        module: of its settings, within ``rift_cl.commands``.
+        settings: the name of their class.
+        summary: one sentence for ``rift --help``; the first one of the class's docstring.
+    """
+
+    run: Callable[[Any, Output], None]
+    module: str
+    settings: str
+    summary: str
+
+    def settings_class(self) -> type:
+        """The class of the settings; its module is imported now."""
+        found = getattr(import_module(f"rift_cl.commands.{self.module}"), self.settings)
+        assert isinstance(found, type)
+        return found
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
@@ -28,45 +52,66 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str]) -> int:
-    if list(arguments) == ["--version"]:
+    first = arguments[0] if arguments else ""
+    if first == "--version":
         print(f"rift {__version__}")
         return 0
+    if first in ("-h", "--help", "-H", "--help-verbose"):
+        print(_overview())
+        return 0
     config = (tyro.conf.OmitArgPrefixes,)
-    if arguments and arguments[0] in _COMMANDS:
+    if first in COMMANDS:
         name, *rest = arguments
         chosen: Callable[[], int] = tyro.cli(
             _command(name, _earlier(name, rest)), prog=f"rift {name}", args=rest, config=config
         )
         return chosen()
-    chosen = tyro.extras.subcommand_cli_from_dict(
-        {name: _command(name) for name in _COMMANDS},
-        prog="rift",
-        description="Tomography and splatting on any OpenCL device.",
-        args=arguments,
-        config=config,
+    if first.startswith("--tyro-"):
+        # Shell completion needs the options of every command.
+        tyro.extras.subcommand_cli_from_dict(
+            {name: _command(name) for name in COMMANDS}, prog="rift", args=arguments, config=config
+        )
+    what = f"there is no command {first!r}" if first else "a command is missing"
+    print_line(f"rift: {what}; 'rift --help' lists the commands")
+    return _USAGE
+
+
+def _overview() -> str:
+    """The help of ``rift`` itself, which imports no command."""
+    width = max(map(len, COMMANDS))
+    lines = [f"  {name:<{width}}  {entry.summary}" for name, entry in COMMANDS.items()]
+    return "\n".join(
+        [
+            "usage: rift COMMAND [OPTIONS]",
+            "",
+            "Tomography and splatting on any OpenCL device.",
+            "",
+            "commands:",
+            *lines,
+            "",
+            "'rift COMMAND --help' lists the options of a command, 'rift --version' tells the "
+            "version.",
+        ]
     )
-    return chosen()
 
 
 def _command(name: str, earlier: Any = None) -> Callable[..., Callable[[], int]]:
-    """A command for tyro; of all the commands' modules, only its own is imported."""
-    run, home, settings = _COMMANDS[name]
-    return command(run, getattr(import_module(f"rift_cl.commands.{home}"), settings), earlier)
+    """A command for tyro; of all the commands' modules, only its own settings are imported."""
+    return command(COMMANDS[name].run, COMMANDS[name].settings_class(), earlier)
 
 
 def _earlier(name: str, arguments: Sequence[str]) -> Any:
-    """The settings of the run that ``--config`` names, which options change; else None."""
+    """The settings of the run that ``--config`` names, which options override; else None."""
     if name not in ("fit", "reconstruct"):
         return None
     from rift_cl.commands.run_folder.saved_settings import named_config, saved_settings
 
-    path, (_, home, settings) = named_config(arguments), _COMMANDS[name]
-    found = getattr(import_module(f"rift_cl.commands.{home}"), settings)
-    return None if path is None else saved_settings(path, name, found)
+    path = named_config(arguments)
+    return None if path is None else saved_settings(path, name, COMMANDS[name].settings_class())
 
 
 def _devices(settings: Any, output: Output) -> None:
-    from rift_cl.commands.devices import device_facts
+    from rift_cl.commands.devices.job import device_facts
 
     for name, facts in device_facts():
         print(name)
@@ -75,7 +120,7 @@ def _devices(settings: Any, output: Output) -> None:
 
 
 def _demo(settings: Any, output: Output) -> None:
-    from rift_cl.commands.demo import COLUMNS, SCORING, DemoJob
+    from rift_cl.commands.demo.job import COLUMNS, SCORING, DemoJob
     from rift_cl.commands.fit_photos.report import COLUMNS as FIT_COLUMNS
     from rift_cl.commands.fit_photos.report import SCORING as FIT_SCORING
     from rift_cl.commands.fit_photos.report import score_rows
@@ -205,25 +250,85 @@ def _say_assumed(notes: Sequence[str]) -> None:
 
 
 def _cache(settings: Any, output: Output) -> None:
-    from rift_cl.commands.cache import run_cache
+    from rift_cl.commands.cache.job import run_cache
 
     print(run_cache(settings))
 
 
-# What runs each command, and where its settings are.
-_COMMANDS: dict[str, tuple[Callable[[Any, Output], None], str, str]] = {
-    "devices": (_devices, "devices", "DevicesSettings"),
-    "demo": (_demo, "demo", "DemoSettings"),
-    "reconstruct": (_reconstruct, "reconstruct.settings", "ReconstructSettings"),
-    "center": (_center, "center.job", "CenterSettings"),
-    "fit": (_fit, "fit_photos.settings", "FitSettings"),
-    "eval": (_eval, "evaluate.job", "EvalSettings"),
-    "render": (_render, "render.settings", "RenderSettings"),
-    "view": (_view, "view.job", "ViewSettings"),
-    "export": (_export, "export.settings", "ExportSettings"),
-    "analyze": (_analyze, "analyze.settings", "AnalyzeSettings"),
-    "plan": (_plan, "plan.settings", "PlanSettings"),
-    "cache": (_cache, "cache", "CacheSettings"),
+COMMANDS = {
+    "reconstruct": Command(
+        _reconstruct,
+        "reconstruct.settings",
+        "ReconstructSettings",
+        "Reconstruct a parallel-beam or fan-beam scan, slice by slice.",
+    ),
+    "center": Command(
+        _center,
+        "center.settings",
+        "CenterSettings",
+        "Find the rotation axis of a parallel-beam scan.",
+    ),
+    "fit": Command(
+        _fit,
+        "fit_photos.settings",
+        "FitSettings",
+        "Fit splats to posed photographs, or to the projections of an X-ray scan.",
+    ),
+    "eval": Command(
+        _eval,
+        "evaluate.settings",
+        "EvalSettings",
+        "Score a scene on held-out photographs, or on other captures of it.",
+    ),
+    "render": Command(
+        _render,
+        "render.settings",
+        "RenderSettings",
+        "Render a film of a scene, or the views of a capture.",
+    ),
+    "view": Command(
+        _view,
+        "view.settings",
+        "ViewSettings",
+        "Show a scene in a web browser on this computer, until Ctrl-C.",
+    ),
+    "export": Command(
+        _export,
+        "export.settings",
+        "ExportSettings",
+        "Write a scene as a web page, as splats or as a mesh for other software.",
+    ),
+    "analyze": Command(
+        _analyze,
+        "analyze.settings",
+        "AnalyzeSettings",
+        "Analyze how views sample a target: coverage, resolution limits, and views to add.",
+    ),
+    "plan": Command(
+        _plan,
+        "plan.settings",
+        "PlanSettings",
+        "Plan camera poses that minimize what remains uncertain about a target.",
+    ),
+    "demo": Command(
+        _demo,
+        "demo.settings",
+        "DemoSettings",
+        "Reconstruct a phantom and fit splats to two small sample captures.",
+    ),
+    "devices": Command(
+        _devices,
+        "devices.settings",
+        "DevicesSettings",
+        "List every OpenCL device, its properties and a self-test; a star marks the default "
+        "device.",
+    ),
+    "cache": Command(
+        _cache,
+        "cache.settings",
+        "CacheSettings",
+        "Show where compiled kernels are kept and how much disk space they take, or remove them.",
+    ),
 }
 
 

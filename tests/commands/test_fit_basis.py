@@ -13,7 +13,8 @@ from rift_cl.commands.cli import main
 from rift_cl.commands.fit_photos.basis_options import BasisOptions
 from rift_cl.commands.fit_photos.job import Fit
 from rift_cl.commands.fit_photos.settings import FitSettings
-from rift_cl.commands.view.job import ViewJob, ViewSettings
+from rift_cl.commands.view.job import ViewJob
+from rift_cl.commands.view.settings import ViewSettings
 from rift_cl.errors import StoppedError
 from rift_cl.io.scenes.splat_scene import XrayScene
 from rift_cl.io.volumes import read_volume

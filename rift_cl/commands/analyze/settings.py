@@ -10,14 +10,14 @@ from typing import Annotated, Literal
 from tyro.conf import Positional
 
 from rift_cl.errors import InputError
-from rift_cl.io.scans.scan_file import AngleUnit
+from rift_cl.io.scans.literals import AngleUnit
 
 _MOST_ADDED = 64
 
 
 @dataclass(frozen=True)
 class AnalyzeSettings:
-    """Say what views sampled of a target, what they missed, what limits detail, what to add.
+    """Analyze how views sample a target: coverage, resolution limits, and views to add.
 
     Example: rift analyze capture --out analysis --diameter 0.2 --unit 1000
     """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rift_cl.cl.device import Device
-from rift_cl.commands.inputs.scan_input import read_attenuation
+from rift_cl.commands.inputs.scan_rows import read_attenuation
 from rift_cl.errors import InputError
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.reconstruct.axis import AxisEstimate, axis_of_rows, searched_rows

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.commands.center.axis_search import find_axis
-from rift_cl.commands.inputs.scan_input import ScanInput, read_attenuation
+from rift_cl.commands.center.settings import CenterSettings
+from rift_cl.commands.inputs.scan_rows import read_attenuation
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
@@ -27,23 +26,6 @@ _SLIDER = (-8.0, -6, -4, -3, -2, -1.5, -1, -0.5, 0, 0.5, 1, 1.5, 2, 3, 4, 6, 8)
 _SHEET = (-8.0, -4, -2, -1, 0, 1, 2, 4, 8)
 # Percentiles of the best slice that are shown black and white, in percent.
 _WINDOW = (0.5, 99.5)
-
-
-@dataclass(frozen=True)
-class CenterSettings(ScanInput):
-    """Find the centre of rotation of a parallel-beam scan.
-
-    Example: rift center scan.h5 --out center
-    """
-
-    out: Path = Path("rift-center")
-    """Folder for the pictures, the score curve and report.html."""
-    row: int | None = None
-    """Detector row that the pictures show; the middle one when not given. The axis is searched in
-    several rows, whichever this is."""
-    span: tuple[float, float] | None = None
-    """First and last detector bin between which to search; when not given, the middle 60 % of the
-    detector for half turns and all of it for full turns."""
 
 
 class CenterJob:

@@ -3,52 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
-
-from tyro.conf import Positional
+from typing import Any
 
 from rift_cl.cl.discovery import open_device
 from rift_cl.commands.cameras.fit_cameras import FitCameras, open_fit_cameras
 from rift_cl.commands.evaluate.report import eval_page
+from rift_cl.commands.evaluate.settings import EvalSettings
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.scores import ViewScore, score_record, score_views
 from rift_cl.commands.fit_photos.view_split import open_seen, split_views
-from rift_cl.commands.inputs.scene_input import SceneInput
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import InputError
 from rift_cl.io.captures.capture import View, camera_at, capture_name, holds_bare_photographs
 from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
-
-
-@dataclass(frozen=True)
-class EvalSettings(SceneInput):
-    """Score a scene by the photographs that its fit held out, or by captures of it.
-
-    Example: rift eval fit --out scores
-    """
-
-    captures: Annotated[tuple[Path, ...], Positional] = ()
-    """Captures to score: each a transforms.json, a folder with one, or a COLMAP model; the
-    photographs that the fit held out when not given."""
-    out: Path = Path("rift-eval")
-    """Folder for report.html, config.json and metrics.json."""
-    train: Path | None = None
-    """The capture that was trained on: for the scores of its nearest pictures, and the angles;
-    what the fit was trained on when not given."""
-    photographs: Path | None = None
-    """Folder of the fit's own photographs, if they have moved."""
-    hold_out: int = 0
-    """Score every so many-th photograph of each capture, and take those of --train for unseen, as
-    'rift fit' does; 0 scores all of them."""
-    downscale: int | None = None
-    """Whole factor by which photographs are made smaller; that of the fit, or 1, when not given."""
-    overwrite: bool = False
-    """Replace an earlier evaluation in the same folder."""
-    dry_run: bool = False
-    """Say what would be done, and stop."""
 
 
 class Evaluation:

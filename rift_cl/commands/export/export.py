@@ -14,7 +14,7 @@ from rift_cl.commands.export.axes import turn_between, turned
 from rift_cl.commands.export.plain_scene import plain_scene
 from rift_cl.commands.export.settings import ExportSettings
 from rift_cl.commands.export.web_page import FirstView, web_page
-from rift_cl.commands.inputs.scene_input import in_display_light, scene_file
+from rift_cl.commands.inputs.opened_scene import in_display_light, scene_file
 from rift_cl.errors import InputError, OutputError
 from rift_cl.io.output import atomic_path, check_space
 from rift_cl.io.scenes.formats.formats import DEGREE, FORMATS, SplatFormat

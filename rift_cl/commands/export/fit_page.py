@@ -17,8 +17,8 @@ from rift_cl.commands.cameras.film import first_view
 from rift_cl.commands.export.plain_scene import plain_scene
 from rift_cl.commands.export.web_page import FirstView, web_page
 from rift_cl.commands.fit_photos.pictures import CapturePictures
+from rift_cl.commands.inputs.opened_scene import in_display_light
 from rift_cl.commands.inputs.scene_bounds import bounds_of_cameras, bounds_of_splats
-from rift_cl.commands.inputs.scene_input import in_display_light
 from rift_cl.io.output import write_text
 from rift_cl.io.scenes.splat_scene import SplatScene
 

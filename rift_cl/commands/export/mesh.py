@@ -16,7 +16,7 @@ from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.discovery import open_device
 from rift_cl.commands.export.export import output_path, write_whole
 from rift_cl.commands.export.settings import ExportSettings
-from rift_cl.commands.inputs.scene_input import scene_file
+from rift_cl.commands.inputs.opened_scene import scene_file
 from rift_cl.errors import InputError
 from rift_cl.geometry import Grid
 from rift_cl.io.scenes.mesh_files import MESH_FORMATS

@@ -13,7 +13,7 @@ Target = Literal["html", "ply", "compressed-ply", "spz", "sog", "glb", "stl", "o
 
 @dataclass(frozen=True)
 class ExportSettings(OrbitInput):
-    """Write a scene for viewers, editors and printers of other makers.
+    """Write a scene as a web page, as splats or as a mesh for other software.
 
     Example: rift export fit --to spz --out scene.spz
     """

@@ -17,8 +17,8 @@ from rift_cl.cl.device import Device
 from rift_cl.commands.center.axis_search import find_axis
 from rift_cl.commands.fit_photos.pictures import Light
 from rift_cl.commands.fit_photos.settings import FitSettings
-from rift_cl.commands.inputs.scan_input import (
-    ScanInput,
+from rift_cl.commands.inputs.scan_input import ScanInput
+from rift_cl.commands.inputs.scan_rows import (
     check_center,
     chosen_rows,
     read_attenuation,

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from rift_cl.cl.budget import parse_bytes
 from rift_cl.errors import InputError
-from rift_cl.io.scans.scan_file import AngleUnit, Kind
+from rift_cl.io.scans.literals import AngleUnit, Kind
 
 # What photographs alone know.
 _LIGHT = (

@@ -1,19 +1,24 @@
-"""A scene and what a camera turns about in it, as the commands take them."""
+"""A scene and what a camera turns about in it, as the commands take them.
+
+What the methods need is imported by them, so that a command's help loads neither.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from rift_cl.commands.cameras.arc import check_places
-from rift_cl.commands.inputs.scene_bounds import SceneBounds, bounds_of_cameras, bounds_of_splats
-from rift_cl.commands.inputs.scene_input import OpenedScene, SceneInput
+from rift_cl.commands.inputs.scene_input import SceneInput
 from rift_cl.errors import InputError
-from rift_cl.io.captures.capture import open_capture
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from rift_cl.commands.inputs.opened_scene import OpenedScene
+    from rift_cl.commands.inputs.scene_bounds import SceneBounds
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,10 @@ class OrbitInput(SceneInput):
             RiftError: the capture cannot be read, or its cameras all stand in one place, or --up
                 has no direction.
         """
+        from rift_cl.commands.cameras.arc import check_places
+        from rift_cl.commands.inputs.scene_bounds import bounds_of_cameras, bounds_of_splats
+        from rift_cl.io.captures.capture import open_capture
+
         bounds, own, up = bounds_of_splats(scene.splats), scene.cameras, self._direction_up()
         if self.capture is not None:
             capture = open_capture(self.capture, photographs=False)
@@ -47,6 +56,8 @@ class OrbitInput(SceneInput):
 
     def _direction_up(self) -> NDArray[np.float64] | None:
         """The unit vector (3,) that --up asks for, or None."""
+        import numpy as np
+
         if self.up is None:
             return None
         length = math.hypot(*self.up)

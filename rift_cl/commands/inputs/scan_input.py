@@ -1,29 +1,23 @@
-"""A scan as the commands take it: a file, what to call its arrays, and how to read its rows."""
+"""A scan as the commands take it: a file, what to call its arrays, and how to read its rows.
+
+What the methods need is imported by them, so that a command's help loads no reader and no device.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
-from numpy.typing import NDArray
 from tyro.conf import Positional
 
-from rift_cl.cl.budget import parse_bytes
-from rift_cl.cl.device import Device
-from rift_cl.cl.discovery import open_device
-from rift_cl.errors import InputError, NonFiniteError
-from rift_cl.io.scans.formats import open_scan
-from rift_cl.io.scans.scan_file import AngleUnit, Kind, ScanFile, ScanRows
-from rift_cl.io.scans.tiff_frames import TiffRows
-from rift_cl.reconstruct.preprocess.flatfield import (
-    Attenuation,
-    attenuation,
-    attenuation_without_flats,
-)
+from rift_cl.errors import InputError
+from rift_cl.io.scans.literals import AngleUnit, Kind
+
+if TYPE_CHECKING:
+    from rift_cl.cl.device import Device
+    from rift_cl.io.scans.scan_file import ScanFile
 
 
 @dataclass(frozen=True)
@@ -66,8 +60,9 @@ class ScanInput:
 
     def open_device(self) -> Device:
         """The chosen device."""
-        limit = None if self.memory is None else parse_bytes(self.memory)
-        return open_device(self.device, limit)
+        from rift_cl.cl.discovery import open_device
+
+        return open_device(self.device, self._memory_limit())
 
     def open_scan(self, *, fan: bool = False) -> ScanFile:
         """The file's description.
@@ -78,7 +73,8 @@ class ScanInput:
         Raises:
             InputError: they are and may not be, or the background is wider than the detector.
         """
-        limit = None if self.memory is None else parse_bytes(self.memory)
+        from rift_cl.io.scans.formats import open_scan
+
         scan = open_scan(
             self.scan,
             dataset=self.dataset,
@@ -89,7 +85,7 @@ class ScanInput:
             kind=self.kind,
             axes=self.axes,
             angle_unit=self.angle_unit,
-            budget=limit,
+            budget=self._memory_limit(),
         )
         if scan.fan is not None and not fan:
             raise InputError(
@@ -105,110 +101,8 @@ class ScanInput:
             )
         return dataclasses.replace(scan, background=self.background)
 
+    def _memory_limit(self) -> int | None:
+        """``--memory`` in bytes; None if not given."""
+        from rift_cl.cl.budget import parse_bytes
 
-def scan_identity(scan: ScanFile) -> dict[str, str]:
-    """What tells a scan from others, and from itself before a change; sentences by name."""
-    angles = np.ascontiguousarray(scan.angles).tobytes()
-    told = {"angles": f"{scan.angles.size} with the hash {_hash(angles)}"}
-    if not isinstance(scan.rows, TiffRows):
-        return {"scan file": f"{scan.path}, changed at {scan.path.stat().st_mtime_ns}", **told}
-    # A folder's own date tells nothing: what is beside the frames changes it, their content not.
-    lines = []
-    for path in scan.rows.files:
-        state = path.stat()
-        lines.append(f"{path.name}\0{state.st_size}\0{state.st_mtime_ns}\n")
-    frames = _hash("".join(lines).encode("utf-8", "surrogateescape"))
-    return {
-        "scan file": str(scan.path),
-        "frames": f"{len(lines)} files with the hash {frames}",
-        **told,
-    }
-
-
-def _hash(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()[:16]
-
-
-def read_attenuation(scan: ScanFile, start: int, stop: int) -> Attenuation:
-    """Line integrals of some detector rows, less what the scan's background bins see.
-
-    Raises:
-        NonFiniteError: a sample is not finite; the sentence names the file, view, row and bin.
-        InputError: the rows cannot be read or corrected.
-    """
-    rows = scan.read(start, stop)
-    for name in ("projections", "flats", "darks"):
-        frames = getattr(rows, name)
-        if frames is not None:
-            _check(frames, f"{scan.path}: {name}", start)
-    try:
-        integrals = _integrals(scan, rows, start)
-    except InputError as error:
-        raise type(error)(f"{scan.path}: {error}") from error
-    if scan.background:
-        subtract_background(integrals.projections, scan.background)
-    return integrals
-
-
-def _integrals(scan: ScanFile, rows: ScanRows, start: int) -> Attenuation:
-    if scan.kind == "attenuation":
-        return Attenuation(rows.projections, 0, 0)
-    if rows.flats is None:
-        return attenuation_without_flats(
-            rows.projections, rows.darks, incident=scan.incident, first_row=start
-        )
-    return attenuation(
-        rows.projections, rows.flats, rows.darks, flats_at=scan.flats_at, first_row=start
-    )
-
-
-def subtract_background(projections: NDArray[np.float32], bins: int) -> None:
-    """Bring the mean of the outermost bins of both ends to zero, in every row of every view.
-
-    Args:
-        projections: line integrals (angle, row, bin); changed in place.
-        bins: at each end.
-    """
-    ends = np.concatenate([projections[..., :bins], projections[..., -bins:]], axis=-1)
-    offset = ends.mean(axis=-1, keepdims=True, dtype=np.float64)
-    projections -= offset.astype(np.float32)
-
-
-def _check(frames: NDArray[np.float32], name: str, start: int) -> None:
-    finite = np.isfinite(frames)
-    if not finite.all():
-        view, row, bin = (int(i) for i in np.argwhere(~finite)[0])
-        raise NonFiniteError(
-            f"{name} hold {np.count_nonzero(~finite)} values that are not finite in these rows, "
-            f"the first at view {view}, row {start + row}, bin {bin}: repair the file, or choose "
-            "other rows"
-        )
-
-
-def chosen_rows(wanted: tuple[int, int] | None, scan: ScanFile) -> tuple[int, int]:
-    """The detector rows that are asked for, all if none are.
-
-    Raises:
-        InputError: there are no such rows.
-    """
-    rows = wanted or (0, scan.shape[1])
-    if not 0 <= rows[0] < rows[1] <= scan.shape[1]:
-        raise InputError(
-            f"--rows is {rows[0]} {rows[1]}, {scan.path} has the rows 0 to {scan.shape[1]}: give "
-            "the first and the one after the last"
-        )
-    return rows
-
-
-def check_center(center: float | None, scan: ScanFile) -> None:
-    """Make sure that a rotation axis lies on the detector: else no point is seen all round.
-
-    Raises:
-        InputError: it does not.
-    """
-    bins = scan.shape[2]
-    if center is not None and not -0.5 <= center <= bins - 0.5:
-        raise InputError(
-            f"--center is {center:g}, off the detector of {scan.path}, which has the bins 0 to "
-            f"{bins - 1}"
-        )
+        return None if self.memory is None else parse_bytes(self.memory)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import open_device
-from rift_cl.commands.inputs.scene_input import OpenedScene, SceneInput
+from rift_cl.commands.inputs.opened_scene import OpenedScene
+from rift_cl.commands.inputs.scene_input import SceneInput
 from rift_cl.commands.pictures.depth_picture import depth_and_alpha
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.commands.render.camera_path import resized

@@ -1,31 +1,15 @@
-"""A scene as the commands take it: a file of splats, or the folder that a fit left behind.
-
-How wide splats are drawn (eps2d) is part of what was fitted: drawn otherwise, the same splats look
-softer or harder. So is the light that their colours are in, and what was behind them. A file of
-splats says none of it, the folder of a fit does. Modes, lobes and activation are in the file.
-"""
+"""Which scene a command takes, and how its splats are drawn."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
-from numpy.typing import NDArray
 from tyro.conf import Positional
 
-from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, FitCameras, open_fit_cameras
-from rift_cl.commands.fit_photos.pictures import Light
-from rift_cl.errors import FileFormatError, InputError
-from rift_cl.io.images.display_light import to_display, to_linear
-from rift_cl.io.json_fields import Fields, read_json_object
-from rift_cl.io.scenes.splat_scene import SplatScene
-from rift_cl.splat.settings import SplatSettings
-
-_SCENE, _CONFIG, _METRICS = "scene.ply", "config.json", "metrics.json"
-_OF_FIT = (_CONFIG, *CAMERA_FILES[:1])
+if TYPE_CHECKING:
+    from rift_cl.commands.inputs.opened_scene import OpenedScene
 
 
 @dataclass(frozen=True)
@@ -52,139 +36,6 @@ class SceneInput:
         Raises:
             RiftError: there is none, it is damaged, or a number makes no sense.
         """
+        from rift_cl.commands.inputs.opened_scene import OpenedScene
+
         return OpenedScene(self, densities=densities)
-
-
-class OpenedScene:
-    """Splats in host memory, and how to draw them.
-
-    Args:
-        settings: where the scene is.
-        densities: whether it may be one of X-rays.
-
-    Raises:
-        InputError: there is no scene, a number makes no sense, or the scene is empty.
-        FileFormatError: the scene, or what a fit wrote beside it, is damaged.
-    """
-
-    def __init__(self, settings: SceneInput, *, densities: bool = False) -> None:
-        path = settings.scene
-        self.path, self.folder = path, path if path.is_dir() else None
-        self.name: str = path.resolve().name
-        self.splats = SplatScene.load(scene_file(path))
-        if self.splats.mode == "xray" and not densities:
-            raise InputError(
-                f"{path}: is an X-ray scene, of densities and not of light; its slices lie with "
-                "its fit, 'rift view' shows it, and 'rift export --mesh' makes a surface of it"
-            )
-        if len(self.splats) == 0:
-            raise InputError(f"{path}: holds no splats, there is nothing to draw")
-        eps2d = self._fitted("eps2d") if settings.eps2d is None else settings.eps2d
-        drawing = SplatSettings(
-            mode=self.splats.mode, activation=self.splats.activation, angular=self.splats.angular
-        )
-        self.drawing = drawing if eps2d is None else replace(drawing, eps2d=eps2d)
-        self.light: Light = self._light()
-        self.background: NDArray[np.float32] = self._background(settings)
-
-    @property
-    def fit(self) -> Path | None:
-        """The folder of the fit that the file of a scene lies in; None where it lies in none."""
-        folder = self.path.parent
-        is_fit = self.path.name == _SCENE and all((folder / name).is_file() for name in _OF_FIT)
-        return folder if is_fit else None
-
-    @property
-    def downscale(self) -> int:
-        """The factor by which the fit made photographs smaller; 1 where there is no fit."""
-        factor = self._fitted("downscale")
-        return 1 if factor is None else int(factor)
-
-    @property
-    def pinhole(self) -> bool:
-        """Whether the fit took every lens for a pinhole, so that blur is in the splats."""
-        return self._settings is not None and self._settings.flag("pinhole")
-
-    @cached_property
-    def cameras(self) -> FitCameras | None:
-        """Those that the fit knows; None where there is no fit, or an older version's.
-
-        Raises:
-            RiftError: the files that say so are damaged.
-        """
-        return None if self.folder is None else open_fit_cameras(self.folder)
-
-    def _fitted(self, name: str) -> float | None:
-        """A number among the settings of the fit."""
-        return None if self._settings is None else self._settings.number(name)
-
-    @cached_property
-    def _settings(self) -> Fields | None:
-        """What the fit was told; None where there is no fit."""
-        if self.folder is None or not (self.folder / _CONFIG).is_file():
-            return None
-        config = read_json_object(self.folder / _CONFIG)
-        values = config.values.get("settings")
-        if not isinstance(values, dict):
-            raise FileFormatError(f"{config.where}: holds no settings of a finished fit")
-        return Fields(f"{config.where}: settings", values)
-
-    def _light(self) -> Light:
-        """The light that the splats' colours are in."""
-        if self._settings is None:
-            return "display"
-        light = self._settings.text("light")
-        if light == "linear":
-            return "linear"
-        if light in (None, "display"):
-            return "display"
-        raise FileFormatError(f"{self._settings.where}: 'light' is no light: {light!r}")
-
-    def _background(self, settings: SceneInput) -> NDArray[np.float32]:
-        """What is behind the splats, in their light."""
-        if settings.background is not None:
-            color = np.array(check_color("--background", settings.background), np.float32)
-            if self.light == "linear":
-                to_linear(color)
-            return color
-        if self.folder is None or not (self.folder / _METRICS).is_file():
-            return np.zeros(3, np.float32)
-        metrics = read_json_object(self.folder / _METRICS)
-        found = metrics.values.get("background", [0, 0, 0])
-        if not (isinstance(found, list) and len(found) == 3):
-            raise FileFormatError(f"{metrics.where}: 'background' is no red, green and blue")
-        return np.array(check_color(f"{metrics.where}: 'background'", tuple(found)), np.float32)
-
-
-def scene_file(path: Path) -> Path:
-    """The file of splats itself: the path, or what a fit left in that folder.
-
-    Raises:
-        InputError: it is a folder without one.
-    """
-    if not path.is_dir():
-        return path
-    if not (path / _SCENE).is_file():
-        raise InputError(f"{path}: holds no {_SCENE}; name a .ply or .splat file, or a fit")
-    return path / _SCENE
-
-
-def in_display_light(image: NDArray[np.float32], light: Light) -> NDArray[np.float32]:
-    """A drawn image as a display shows it, 0 to 1."""
-    shown = np.clip(image, 0, 1)
-    if light == "linear":
-        to_display(shown)
-    return shown
-
-
-def check_color(name: str, color: tuple[object, ...]) -> tuple[float, ...]:
-    """Three numbers from 0 to 1.
-
-    Raises:
-        InputError: they are not.
-    """
-    values = tuple(float(v) for v in color if isinstance(v, (int, float)) and 0 <= v <= 1)
-    if len(values) != 3:
-        shown = " ".join(map(str, color))
-        raise InputError(f"{name} is {shown}, wanted red, green and blue from 0 to 1")
-    return values

@@ -14,7 +14,7 @@ _MOST_VIEWS = 10_000
 
 @dataclass(frozen=True)
 class PlanSettings:
-    """Plan from where to photograph a target, so that least of it stays unknown.
+    """Plan camera poses that minimize what remains uncertain about a target.
 
     Example: rift plan --views 64 --diameter 60 --elevation 0 70 --out plan
     """

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.commands.inputs.scan_input import read_attenuation
+from rift_cl.commands.inputs.scan_rows import read_attenuation
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.errors import InputError
 from rift_cl.io.scans.scan_file import ScanFile

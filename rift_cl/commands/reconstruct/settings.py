@@ -5,12 +5,13 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from rift_cl.commands.inputs.scan_input import ScanInput
 from rift_cl.errors import InputError
-from rift_cl.io.volumes import SampleWindow
-from rift_cl.operators import HighPass, Ramp
+
+if TYPE_CHECKING:
+    from rift_cl.operators import HighPass, Ramp
 
 SOLVERS = ("sirt", "cgls", "tv")
 ITERATIVE = (*SOLVERS, "levels")
@@ -215,6 +216,8 @@ class ReconstructSettings(ScanInput):
             raise InputError("--resume goes on with what --overwrite throws away: give one of them")
 
     def _check_samples(self) -> None:
+        from rift_cl.io.volumes import SampleWindow
+
         if self.dtype == "float32":
             if self.window is not None:
                 raise InputError("--window is for integer samples: add --dtype uint16 or uint8")
@@ -247,6 +250,8 @@ class ReconstructSettings(ScanInput):
         Raises:
             InputError: its options do not fit each other.
         """
+        from rift_cl.operators import HighPass, Ramp
+
         if self.filter == "high-pass":
             if self.cutoff is not None:
                 raise InputError("--cutoff means nothing for --filter high-pass: leave it out")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.commands.center.axis_search import find_axis
-from rift_cl.commands.inputs.scan_input import (
+from rift_cl.commands.inputs.scan_rows import (
     check_center,
     chosen_rows,
     scan_identity,

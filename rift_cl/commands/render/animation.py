@@ -13,10 +13,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.commands.render.settings import FilmChoice
 from rift_cl.errors import InputError
 from rift_cl.io.images.film_file import FilmKind, check_films, films_can_be_written
 
-FilmChoice = Literal["auto", "webm", "mp4", "mp4-h264", "apng"]
 # The shortest edge that every encoder takes, in pixels.
 _SMALLEST = 4
 # Quality of WebP: that of a small copy.

@@ -15,8 +15,8 @@ from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.discovery import open_device
 from rift_cl.commands.cameras.film import capture_arc, farthest_from_cameras, film, frame_of
 from rift_cl.commands.cameras.subject import subject_of
+from rift_cl.commands.inputs.opened_scene import in_display_light
 from rift_cl.commands.inputs.scene_depth import depth_maps
-from rift_cl.commands.inputs.scene_input import in_display_light
 from rift_cl.commands.pictures.depth_picture import LEAST_ALPHA, depth_picture, depth_window
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.commands.render.animation import chosen_film, shrunk

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from rift_cl.commands.inputs.orbit_input import OrbitInput
-from rift_cl.commands.render.animation import FilmChoice
 from rift_cl.errors import InputError
 
+FilmChoice = Literal["auto", "webm", "mp4", "mp4-h264", "apng"]
 _STEEPEST, _WIDEST = 89.0, 170.0
 # Pixels along an edge, and frames; more is a slip of the hand.
 _LONGEST, MOST_FRAMES = 16384, 100_000
@@ -17,10 +18,10 @@ _LONGEST, MOST_FRAMES = 16384, 100_000
 
 @dataclass(frozen=True)
 class RenderSettings(OrbitInput):
-    """Film a scene from where it was photographed, or draw it from the cameras of a capture.
+    """Render a film of a scene, or the views of a capture.
 
-    A ring of cameras gives an orbit at their height and distance, cameras on one side a way there
-    and back along them; a file of splats, whose cameras nobody knows, an orbit.
+    The film follows the cameras of the photographs: an orbit if they surround the scene, else
+    a path along them and back. A file of splats without cameras gives an orbit.
 
     Example: rift render fit --out film --frames 120 --depth
     """

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from rift_cl.cl.discovery import open_device
 from rift_cl.commands.cameras.film import first_view
-from rift_cl.commands.inputs.orbit_input import OrbitInput
+from rift_cl.commands.inputs.opened_scene import OpenedScene
 from rift_cl.commands.inputs.scene_bounds import SceneBounds
-from rift_cl.commands.inputs.scene_input import OpenedScene
 from rift_cl.commands.render.camera_path import resized
 from rift_cl.commands.view.browser_splats import MovingSplats, browser_can
 from rift_cl.commands.view.photographs import photographs_of
+from rift_cl.commands.view.settings import ViewSettings
 from rift_cl.commands.view.viewer import SplatViewer
 from rift_cl.io.captures.capture import View, as_pinholes, open_capture
 from rift_cl.progress import Report
@@ -23,22 +21,6 @@ from rift_cl.splat.renderer import Renderer
 
 # Seconds between two looks at whether a camera has come to rest.
 _PAUSE = 0.05
-
-
-@dataclass(frozen=True)
-class ViewSettings(OrbitInput):
-    """Show a scene in the browser of this computer, until Ctrl-C.
-
-    Example: rift view fit --port 8080 --size 1200
-    """
-
-    port: int = 8080
-    """Port to listen on, at 127.0.0.1 alone; 0 for any that is free."""
-    moving: Literal["browser", "rift"] = "browser"
-    """Who draws while the camera moves: the browser, where it can (splats without modes or lobes,
-    one colour each), or rift, as it does when the camera rests, in smaller pictures."""
-    size: int = 960
-    """Longer edge of a picture in pixels, once the camera rests."""
 
 
 class ViewJob:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.commands.fit_photos.pictures import Light
+from rift_cl.commands.inputs.opened_scene import in_display_light
 from rift_cl.commands.inputs.scene_bounds import SceneBounds
-from rift_cl.commands.inputs.scene_input import in_display_light
 from rift_cl.commands.pictures.depth_picture import depth_and_alpha, depth_picture, window_of
 from rift_cl.commands.view.crop import Crop, cropped
 from rift_cl.commands.view.photographs import Photograph, compared, seen_by, taken_from

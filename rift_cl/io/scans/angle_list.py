@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.io.number_list import SUFFIXES, read_numbers
-from rift_cl.io.scans.scan_file import AngleUnit, check_angles
+from rift_cl.io.scans.literals import AngleUnit
+from rift_cl.io.scans.scan_file import check_angles
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
 _TURN = re.compile(rf"(?:({_NUMBER}):)?({_NUMBER})")

@@ -28,7 +28,8 @@ from rift_cl.io.scans.kind import (
     sampled,
     spread,
 )
-from rift_cl.io.scans.scan_file import Kind, RowSource, ScanFile, ScanRequest
+from rift_cl.io.scans.literals import Kind
+from rift_cl.io.scans.scan_file import RowSource, ScanFile, ScanRequest
 
 # What ``flats`` may say in place of a name.
 AIR, MEAN = "air", "mean"

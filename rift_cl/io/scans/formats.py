@@ -13,11 +13,12 @@ from typing import Any, get_args
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.boundary import reading
 from rift_cl.io.scans.hdf5_scan import open_hdf5_scan
+from rift_cl.io.scans.literals import AngleUnit, Kind
 from rift_cl.io.scans.mat_scan import open_mat5_scan, open_mat73_scan
 from rift_cl.io.scans.mrc_scan import SUFFIXES as MRC_SUFFIXES
 from rift_cl.io.scans.mrc_scan import open_mrc_scan
 from rift_cl.io.scans.npz_scan import open_npz_scan
-from rift_cl.io.scans.scan_file import AngleUnit, Kind, ScanFile, ScanRequest
+from rift_cl.io.scans.scan_file import ScanFile, ScanRequest
 from rift_cl.io.scans.tiff_scan import open_tiff_scan
 
 # What reads a file, by its extension and then by its content.

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.io.scans.scan_file import Kind, RowSource
+from rift_cl.io.scans.literals import Kind
+from rift_cl.io.scans.scan_file import RowSource
 
 # The sample: views across the scan, rows of the detector, and the most values in all.
 _VIEWS, _ROWS, _MOST = 9, 3, 1 << 18

@@ -21,7 +21,8 @@ from rift_cl.io.scans.axes import axes_of
 from rift_cl.io.scans.contract import AIR, MEAN, Finding, scan_of
 from rift_cl.io.scans.frame_stack import FrameStack, runs_of
 from rift_cl.io.scans.frame_words import is_said
-from rift_cl.io.scans.scan_file import AngleUnit, Kind, RowSource, ScanFile, ScanRequest
+from rift_cl.io.scans.literals import AngleUnit, Kind
+from rift_cl.io.scans.scan_file import RowSource, ScanFile, ScanRequest
 
 _THETA = ("theta", "thetas", "angle", "angles", "rotation_angle", "rotation_angles", "anglesrad")
 _KEY = ("image_key",)

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.geometry.fan import FanBeam
+from rift_cl.io.scans.literals import AngleUnit, Kind
 
 Frames = NDArray[np.float32]
-Kind = Literal["counts", "transmission", "attenuation"]
-AngleUnit = Literal["degrees", "radians"]
 Part = Literal["projections", "flats", "darks"]
 
 

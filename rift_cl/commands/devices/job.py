@@ -1,8 +1,6 @@
-"""``rift devices``: what there is to compute on, and whether it computes rightly."""
+"""``rift devices``: the devices, their properties, and whether they compute correctly."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
@@ -10,22 +8,11 @@ from rift_cl.cl.discovery import devices, open_device
 from rift_cl.cl.self_test import self_test
 
 
-@dataclass(frozen=True)
-class DevicesSettings:
-    """List every OpenCL device, its traits and a self-test; the one that is used has a star.
-
-    Choose another with --device in any command, or with the environment's RIFT_DEVICE: its
-    number, cpu, gpu, or a part of its name.
-
-    Example: RIFT_DEVICE=cpu rift devices
-    """
-
-
 def device_facts() -> list[tuple[str, dict[str, str]]]:
-    """The name of every device, in the order of their numbers, and what there is to say of it.
+    """The name and the properties of every device, in the order of their numbers.
 
     Raises:
-        NoDeviceError: there is none, or ``RIFT_DEVICE`` fits none.
+        NoDeviceError: there is none, or ``RIFT_DEVICE`` matches none.
     """
     chosen = open_device().selector
     return [

@@ -8,12 +8,11 @@ one side; each leaves a folder as ``rift fit`` does.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from rift_cl.cl.discovery import open_device
+from rift_cl.commands.demo.settings import DemoSettings
 from rift_cl.commands.fit_photos.job import Fit
 from rift_cl.commands.fit_photos.report import show_fit
 from rift_cl.commands.fit_photos.settings import FitSettings
@@ -51,29 +50,6 @@ SCORING = (
     "PSNR in dB (peak 1) and SSIM, inside the inscribed disc. Unfiltered slices are scored after "
     "an affine fit to the phantom (gain and offset), filtered ones as they are."
 )
-
-
-@dataclass(frozen=True)
-class DemoSettings:
-    """Reconstruct a phantom from few views and many, then fit splats to two small sample captures.
-
-    Example: rift demo --size 256 --views 8 32 128
-    """
-
-    out: Path = Path("rift-demo")
-    """Folder for the pictures, report.html, config.json, metrics.json, the fits in ornament/ and
-    wall/, and a film of the wall in film/."""
-    size: int = 512
-    """Samples along each side of the slice."""
-    views: tuple[int, ...] = (2, 12, 24, 95, 512)
-    """Numbers of views; the default is that of the paper's Figure 5."""
-    steps: int = 1500
-    """Pictures that the fit of the ornament looks at, one after the other, and a third of that for
-    the wall; 0 for no fits."""
-    splats: int = 4000
-    """Most splats of a fit."""
-    device: str | None = None
-    """Device to use: its number, cpu, gpu, or a part of its name; see 'rift devices'."""
 
 
 class DemoJob:

@@ -1,0 +1,1 @@
+"""``rift cache``: the compiled kernels that drivers keep."""

@@ -1,0 +1,1 @@
+"""``rift demo``: its settings and its job."""

@@ -1,0 +1,1 @@
+"""``rift devices``: the OpenCL devices of this computer."""

@@ -1,0 +1,68 @@
+"""The command line itself: what it lists, and that a command's help loads that command alone."""
+
+import ast
+import re
+
+import pytest
+
+from rift_cl.commands.cli import COMMANDS, main
+
+# What the command line and one class of settings need: far below what any job loads.
+MOST_MODULES = 24
+
+
+def modules_after(python, *arguments):
+    """Names of the modules that a process holds when the command line has answered."""
+    done = python(
+        "import sys\n"
+        "from rift_cl.commands.cli import main\n"
+        "try:\n"
+        f"    main({list(arguments)!r})\n"
+        "except SystemExit:\n"
+        "    pass\n"
+        "print('\\n' + repr(sorted(sys.modules)))"
+    )
+    assert done.returncode == 0, done.stderr
+    return ast.literal_eval(done.stdout.splitlines()[-1])
+
+
+def settings_modules(modules):
+    return {name for name in modules if re.fullmatch(r"rift_cl\.commands\.\w+\.settings", name)}
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS.keys() - {"fit"}))
+def test_help_of_a_command_loads_its_settings_alone(python, name):
+    modules = modules_after(python, name, "--help")
+    assert settings_modules(modules) == {f"rift_cl.commands.{COMMANDS[name].module}"}
+    assert sum(module.startswith("rift_cl") for module in modules) <= MOST_MODULES
+    assert not {"numpy", "h5py", "pyopencl", "scipy"} & set(modules)
+
+
+@pytest.mark.parametrize("arguments", [("--help",), ("--version",), ("no-such-command",), ()])
+def test_the_overview_loads_no_settings(python, arguments):
+    modules = modules_after(python, *arguments)
+    assert settings_modules(modules) == set()
+    assert "numpy" not in modules
+
+
+def test_the_overview_says_of_every_command_what_its_help_says(capsys):
+    assert main(["--help"]) == 0
+    shown = capsys.readouterr().out
+    for name, entry in COMMANDS.items():
+        first = re.split(r"(?<=\.)\s", " ".join(entry.settings_class().__doc__.split()))[0]
+        assert entry.summary == first, name
+        assert f"{name} " in shown and entry.summary in shown
+
+
+@pytest.mark.parametrize("arguments", [["no-such-command"], []])
+def test_no_command_is_told(capsys, arguments):
+    assert main(arguments) == 2
+    assert "rift --help" in capsys.readouterr().err
+
+
+def test_completion_knows_every_command(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["--tyro-print-completion", "bash"])
+    assert not end.value.code
+    shown = capsys.readouterr().out
+    assert all(name in shown for name in COMMANDS)
