@@ -18,6 +18,8 @@ import pytest
 
 import rift_cl as rift
 
+pytest_plugins = ["selection"]
+
 
 def pytest_configure(config: pytest.Config) -> None:
     """Keep compiled kernels in the tests' own folder, which stays warm from run to run."""
