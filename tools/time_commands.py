@@ -40,7 +40,7 @@ def main() -> None:
     """Print the table."""
     version = processor_time("--version")
     print(f"{'rift --version':<26} {version:6.3f} s")
-    for arguments in (["--help"], *([name, "--help"] for name in COMMANDS)):
+    for arguments in (["--help"], *([*name.split(), "--help"] for name in COMMANDS)):
         spent = processor_time(*arguments)
         print(f"{' '.join(['rift', *arguments]):<26} {spent:6.3f} s  {spent - version:+.3f}")
 

@@ -20,7 +20,7 @@ import tyro
 from tyro.conf import Positional
 
 from rift_cl.commands.fit_photos.job import Fit
-from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.progress_bar import Pace
 
 _SHARES = (0.1, 0.25, 0.5, 0.75)
@@ -46,7 +46,7 @@ class Asked:
 def main(asked: Asked) -> None:
     """Fit, and print the table."""
     with tempfile.TemporaryDirectory() as folder:
-        settings = FitSettings(
+        settings = FitPhotosSettings(
             asked.capture,
             Path(folder) / "fit",
             steps=asked.steps,

@@ -60,12 +60,15 @@ def _run(arguments: Sequence[str]) -> int:
         print(_overview())
         return 0
     config = (tyro.conf.OmitArgPrefixes,)
-    if first in COMMANDS:
-        name, *rest = arguments
+    name, rest = _named(list(arguments))
+    if name in COMMANDS:
         chosen: Callable[[], int] = tyro.cli(
             _command(name, _earlier(name, rest)), prog=f"rift {name}", args=rest, config=config
         )
         return chosen()
+    if first == "fit":
+        print(_FIT_HELP)
+        return 0 if rest else _USAGE
     if first.startswith("--tyro-"):
         # Shell completion needs the options of every command.
         tyro.extras.subcommand_cli_from_dict(
@@ -74,6 +77,20 @@ def _run(arguments: Sequence[str]) -> int:
     what = f"there is no command {first!r}" if first else "a command is missing"
     print_line(f"rift: {what}; 'rift --help' lists the commands")
     return _USAGE
+
+
+def _named(arguments: list[str]) -> tuple[str, list[str]]:
+    """The command that is meant, and its arguments; ``fit`` alone goes by what it is given."""
+    for words in (2, 1):
+        name = " ".join(arguments[:words])
+        if name in COMMANDS:
+            return name, arguments[words:]
+    rest = arguments[1:]
+    if arguments[:1] == ["fit"] and rest and not {"-h", "--help"} & set(rest):
+        from rift_cl.commands.fit.kind import kind_of_fit
+
+        return f"fit {kind_of_fit(rest)}", rest
+    return "", rest
 
 
 def _overview() -> str:
@@ -102,7 +119,7 @@ def _command(name: str, earlier: Any = None) -> Callable[..., Callable[[], int]]
 
 def _earlier(name: str, arguments: Sequence[str]) -> Any:
     """The settings of the run that ``--config`` names, which options override; else None."""
-    if name not in ("fit", "reconstruct"):
+    if name not in ("fit photos", "fit xray", "reconstruct"):
         return None
     from rift_cl.commands.run_folder.saved_settings import named_config, saved_settings
 
@@ -158,21 +175,30 @@ def _center(settings: Any, output: Output) -> None:
     print(f"contact sheet and report.html are in {settings.out}", file=sys.stderr)
 
 
-def _fit(settings: Any, output: Output) -> None:
-    from rift_cl.commands.fit_photos import report as fit_report
+def _fit_photos(settings: Any, output: Output) -> None:
+    from rift_cl.commands.fit_photos import report
     from rift_cl.commands.fit_photos.job import Fit
-    from rift_cl.commands.fit_xray import scores as xray_scores
+
+    if _fitted(Fit(settings), report, output):
+        print(f"scene.ply and report.html are in {settings.out}")
+
+
+def _fit_xray(settings: Any, output: Output) -> None:
+    from rift_cl.commands.fit_xray import scores
     from rift_cl.commands.fit_xray.job import XrayFit
 
-    xray = settings.mode == "xray"
-    job, table = (XrayFit(settings), xray_scores) if xray else (Fit(settings), fit_report)
+    if _fitted(XrayFit(settings), scores, output):
+        print(f"scene.ply, slices and report.html are in {settings.out}")
+
+
+def _fitted(job: Any, table: Any, output: Output) -> bool:
+    """Run a fit and print its scores; whether it was run."""
     job.announce = print_line
     with gentle_interrupt(job.stop):
-        done = ran(job, settings, output)
-    if not done:
-        return
-    print_table(table.COLUMNS, table.score_rows(job.metrics), caption=table.SCORING)
-    print(f"scene.ply{', slices' if xray else ''} and report.html are in {settings.out}")
+        done = ran(job, job.settings, output)
+    if done:
+        print_table(table.COLUMNS, table.score_rows(job.metrics), caption=table.SCORING)
+    return done
 
 
 def _eval(settings: Any, output: Output) -> None:
@@ -255,6 +281,14 @@ def _cache(settings: Any, output: Output) -> None:
     print(run_cache(settings))
 
 
+_FIT_HELP = """usage: rift fit photos CAPTURE [OPTIONS]
+       rift fit xray SCAN [OPTIONS]
+       rift fit CAPTURE [OPTIONS]
+
+Fit splats to photographs, or Gaussian densities to an X-ray scan.
+
+'rift fit CAPTURE' chooses by what it is given: a scan file is fitted as X-rays, everything else as
+photographs. 'rift fit photos --help' and 'rift fit xray --help' list the options."""
 COMMANDS = {
     "reconstruct": Command(
         _reconstruct,
@@ -268,11 +302,17 @@ COMMANDS = {
         "CenterSettings",
         "Find the rotation axis of a parallel-beam scan.",
     ),
-    "fit": Command(
-        _fit,
+    "fit photos": Command(
+        _fit_photos,
         "fit_photos.settings",
-        "FitSettings",
-        "Fit splats to posed photographs, or to the projections of an X-ray scan.",
+        "FitPhotosSettings",
+        "Fit splats to photographs.",
+    ),
+    "fit xray": Command(
+        _fit_xray,
+        "fit_xray.settings",
+        "FitXraySettings",
+        "Fit Gaussian densities to the projections of a parallel-beam X-ray scan.",
     ),
     "eval": Command(
         _eval,

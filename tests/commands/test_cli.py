@@ -30,7 +30,7 @@ def settings_modules(modules):
     return {name for name in modules if re.fullmatch(r"rift_cl\.commands\.\w+\.settings", name)}
 
 
-@pytest.mark.parametrize("name", sorted(COMMANDS.keys() - {"fit"}))
+@pytest.mark.parametrize("name", sorted(COMMANDS.keys() - {"fit photos", "fit xray"}))
 def test_help_of_a_command_loads_its_settings_alone(python, name):
     modules = modules_after(python, name, "--help")
     assert settings_modules(modules) == {f"rift_cl.commands.{COMMANDS[name].module}"}
@@ -52,6 +52,13 @@ def test_the_overview_says_of_every_command_what_its_help_says(capsys):
         first = re.split(r"(?<=\.)\s", " ".join(entry.settings_class().__doc__.split()))[0]
         assert entry.summary == first, name
         assert f"{name} " in shown and entry.summary in shown
+
+
+def test_fit_alone_names_both_of_its_commands(capsys):
+    assert main(["fit", "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert "rift fit photos" in shown and "rift fit xray" in shown
+    assert main(["fit"]) == 2
 
 
 @pytest.mark.parametrize("arguments", [["no-such-command"], []])

@@ -46,7 +46,7 @@ def fit(tmp_path_factory):
         logit_opacities=[5.0, 5.0],
         sh=((colors - 0.5) / C0)[:, None],
     ).save(folder / "scene.ply")
-    write_json(folder / "config.json", {"job": "fit", "settings": {"light": "display"}})
+    write_json(folder / "config.json", {"job": "fit photos", "settings": {"light": "display"}})
     pose = np.linalg.inv(view_from(4.0)) @ np.diag([1, -1, -1, 1.0])
     frame = {"file_path": "photo.png", "split": "train", "transform_matrix": pose}
     lens = {"w": SIZE[1], "h": SIZE[0], "fl_x": FOCAL, "fl_y": FOCAL, "cx": 200, "cy": 150}

@@ -10,15 +10,14 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
-from rift_cl.commands.fit_photos.basis_options import BasisOptions
 from rift_cl.commands.fit_photos.job import Fit
-from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
+from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.view.job import ViewJob
 from rift_cl.commands.view.settings import ViewSettings
 from rift_cl.errors import StoppedError
 from rift_cl.io.scenes.splat_scene import XrayScene
 from rift_cl.io.volumes import read_volume
-from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 
 KINDS = {
     "laguerre exp": ["--basis", "laguerre", "--order", "2", "--activation", "exp"],
@@ -29,7 +28,7 @@ KINDS = {
 
 def settings(capture, out, **more):
     given = {"steps": 60, "splats": 60, "hold_out": 4, "checkpoint_every": 25}
-    return FitSettings(capture, out, **(given | more))
+    return FitPhotosSettings(capture, out, **(given | more))
 
 
 def broken_off(given, after):
@@ -96,15 +95,7 @@ def test_another_basis_cannot_go_on(capture, tmp_path, capsys):
     broken_off(settings(capture, tmp_path / "fit"), 25)
     more = ["--steps", "60", "--resume", "--activation", "exp"]
     assert fit(capture, tmp_path / "fit", *more) == 3
-    assert "had activation None, now it is 'exp'" in capsys.readouterr().err
-
-
-def test_plain_fits_say_nothing_of_a_basis():
-    """So that checkpoints from before there was one still go on."""
-    found = FitSettings(Path("capture")).decisive()
-    assert not {"basis", "order", "color_order", "activation", "angular", "modes"} & set(found)
-    found = FitSettings(Path("capture"), basis="hermite", order=2).decisive()
-    assert found["basis"] == "hermite" and found["order"] == 2 and "angular" not in found
+    assert "had activation 'clamp', now it is 'exp'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -118,19 +109,21 @@ def test_plain_fits_say_nothing_of_a_basis():
     ],
 )
 def test_one_order_is_that_of_shape_and_colour(options, orders):
-    given = BasisOptions(**options)
-    found = given.basis_settings()
+    found = FitPhotosSettings(Path("capture"), **options).training().basis
     assert (found.order, found.color_order) == orders
-    assert given.basis_settings(colored=False).color_order == 0
+    options.pop("color_order", None)
+    found = FitXraySettings(Path("scan"), **options).training().basis
+    assert (found.order, found.color_order) == (orders[0], 0)
 
 
 def test_words_say_what_splats_are():
-    assert BasisOptions().basis_words() == ""
-    given = BasisOptions(basis="hermite", order=2, color_order=1, activation="exp")
-    assert given.basis_words() == "hermite splats of shape order 2, colour order 1, activation exp"
-    assert BasisOptions(angular="lg", modes=5).basis_words() == "5 lg functions"
-    assert BasisOptions(angular="lg").angular_settings() == AngularSettings("lg", 8)
-    assert BasisOptions(activation="exp").basis_settings() == BasisSettings(activation="exp")
+    def words(**options):
+        return FitPhotosSettings(Path("capture"), **options).basis_words()
+
+    assert words() == ""
+    found = words(basis="hermite", order=2, color_order=1, activation="exp")
+    assert found == "hermite splats of shape order 2, colour order 1, activation exp"
+    assert words(angular="lg", modes=5) == "5 lg functions"
 
 
 @pytest.mark.parametrize(
@@ -144,10 +137,6 @@ def test_words_say_what_splats_are():
         (["--angular", "lg", "--modes", "36"], "modes is 36, wanted 1 to 35"),
         (["--angular", "lg", "--sh-degree", "2"], "--sh-degree is about harmonics"),
         (["--basis", "hermite", "--absgrad", "--strategy", "default"], "absgrad wants magnitudes"),
-        (["--mode", "xray", "--basis", "hermite", "--color-order", "1"], "--color-order has no"),
-        (["--mode", "xray", "--activation", "exp"], "--activation has no meaning"),
-        (["--mode", "xray", "--angular", "lg"], "--angular has no meaning"),
-        (["--mode", "xray", "--modes", "3"], "--modes has no meaning"),
     ],
 )
 def test_what_makes_no_sense_is_named_and_leaves_nothing(capture, tmp_path, capsys, more, words):
@@ -169,7 +158,7 @@ def test_densities_of_x_rays_have_modes_too(tmp_path, rows):
     scan = rift.Parallel(np.arange(18) * np.pi / 18, size, pitch)
     values = 0.2 * rift.phantom.shepp_logan_sinogram(grid, scan)
     np.savez(tmp_path / "scan.npz", projections=values, angles=scan.angles, pitch=pitch)
-    more = ["--mode", "xray", "--center", str((size - 1) / 2), "--basis", "hermite", "--order", "2"]
+    more = ["--center", str((size - 1) / 2), "--basis", "hermite", "--order", "2"]
     out = tmp_path / "fit"
     assert fit(tmp_path / "scan.npz", out, *more, splats="80") == 0
     scene = rift.SplatScene.load(out / "scene.ply")

@@ -31,7 +31,9 @@ def saved(fit, capture, **facts):
     fit.mkdir()
     seen = [view for k, view in enumerate(capture.views) if k % 3]
     unseen = capture.views[::3]
-    write_json(fit / "config.json", {"job": "fit", "photographs": place_record(capture.views, fit)})
+    write_json(
+        fit / "config.json", {"job": "fit photos", "photographs": place_record(capture.views, fit)}
+    )
     save_fit_cameras(fit, capture, seen, unseen, **facts)
     return open_fit_cameras(fit)
 

@@ -18,7 +18,7 @@ from rift_cl.cl.discovery import default_device
 from rift_cl.commands.cli import main
 from rift_cl.commands.fit_photos.job import Fit
 from rift_cl.commands.fit_photos.photograph_size import MOST_PIXELS, fitting_downscale, size_words
-from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.errors import InputError
 from rift_cl.geometry.camera import Camera
 from rift_cl.io import View
@@ -119,10 +119,10 @@ def test_a_size_that_is_asked_for_is_kept(capture, tmp_path, monkeypatch):
     monkeypatch.setattr(
         "rift_cl.commands.fit_photos.photograph_size.MOST_PIXELS", {True: 400, False: 400}
     )
-    asked = FitSettings(capture=capture, out=tmp_path / "fit", downscale=1)
+    asked = FitPhotosSettings(capture=capture, out=tmp_path / "fit", downscale=1)
     assert Fit(asked).downscale == 1
-    decided = Fit(FitSettings(capture=capture, out=tmp_path / "fit"))
+    decided = Fit(FitPhotosSettings(capture=capture, out=tmp_path / "fit"))
     assert decided.downscale > 1 and "made smaller by" in decided.plan()["largest photograph"]
     assert "--downscale 1 fits them as they are" in decided._notes()[0]
     with pytest.raises(InputError, match="--frames is 2"):
-        FitSettings(capture=capture, frames=2).check()
+        FitPhotosSettings(capture=capture, frames=2).check()

@@ -10,14 +10,13 @@ import json
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rift_cl.commands.cli import main
 from rift_cl.commands.fit_photos.job import Fit
-from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.errors import StoppedError
 from rift_cl.io.checkpoint import newest_checkpoint
 
@@ -30,7 +29,7 @@ VARIANTS = {
 
 def settings(capture, out, **more):
     given = {"steps": 150, "splats": 200, "hold_out": 4, "checkpoint_every": 25}
-    return FitSettings(capture, out, **(given | more))
+    return FitPhotosSettings(capture, out, **(given | more))
 
 
 def fit(capture, out, *more):
@@ -55,7 +54,7 @@ def newest(folder):
 def broken_off(given, after):
     """Run a fit until a step, as Ctrl-C would break it off."""
     job = Fit(given)
-    with pytest.raises(StoppedError, match="to go on: rift fit") as caught:
+    with pytest.raises(StoppedError, match="to go on: rift fit photos") as caught:
         for report in job.run():
             if report.done >= after:
                 job.stop()
@@ -123,15 +122,6 @@ def test_one_that_is_killed_goes_on_to_the_same_bits(capture, tmp_path):
         assert not (cut / "scene.ply").exists(), "it was through before it could be killed"
     assert subprocess.run([*command, "--resume", "--quiet"], check=False).returncode == 0
     assert digest(cut) == digest(whole)
-
-
-def test_fits_from_before_there_was_a_choice_go_on():
-    """They say of the band's limit whether there is one, and nothing of the weight."""
-    for limit, before in ((None, False), ("pixels", True), ("coverage", "coverage")):
-        found = settings(Path("capture"), Path("out"), band_limit=limit).decisive()
-        assert found["band_limit"] == before and "homogenise_by" not in found
-    found = settings(Path("capture"), Path("out"), homogenise_by="coverage").decisive()
-    assert found["homogenise_by"] == "coverage"
 
 
 def test_few_photographs_are_fitted_without_the_ramp_unless_it_is_asked_for(capture, tmp_path):

@@ -1,4 +1,4 @@
-"""``rift fit --mode xray --solve``: densities by least squares, from the command line."""
+"""``rift fit xray --solve``: densities by least squares, from the command line."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
-from rift_cl.commands.fit_photos.settings import FitSettings
 from rift_cl.commands.fit_xray.job import XrayFit
+from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.errors import StoppedError
 
 SIZE, VIEWS = 32, 24
@@ -26,7 +26,7 @@ def scan(tmp_path_factory):
 
 
 def fit(path, out, *more):
-    arguments = ["fit", str(path), "--out", str(out), "--mode", "xray", "--steps", "60"]
+    arguments = ["fit", "xray", str(path), "--out", str(out), "--steps", "60"]
     arguments += ["--splats", "200", "--center", str((SIZE - 1) / 2), "--quiet"]
     return main([*arguments, *more])
 
@@ -34,7 +34,7 @@ def fit(path, out, *more):
 def settings(path, out, **more):
     center = (SIZE - 1) / 2
     given = {"steps": 90, "splats": 200, "center": center, "checkpoint_every": 20, "solve": 20}
-    return FitSettings(path, out, mode="xray", basis="hermite", **(given | more))
+    return FitXraySettings(path, out, basis="hermite", **(given | more))
 
 
 def test_solving_serves_projections_that_were_not_looked_at(scan, tmp_path):
@@ -60,20 +60,9 @@ def test_a_fit_that_was_broken_off_goes_on_to_the_same_bits(scan, tmp_path):
     assert (cut / "scene.ply").read_bytes() == (whole / "scene.ply").read_bytes()
 
 
-def test_fits_that_do_not_solve_say_nothing_of_it(scan, tmp_path):
-    """So that checkpoints from before there was a choice still go on."""
-    assert "solve" not in settings(scan, tmp_path, solve=0).decisive()
-    assert settings(scan, tmp_path).decisive()["solve"] == 20
-
-
 def test_negative_steps_between_solves_are_refused(scan, tmp_path, capsys):
     assert fit(scan, tmp_path / "fit", "--solve", "-5") == 3
     assert "--solve is -5, wanted 0 or more" in capsys.readouterr().err
     assert fit(scan, tmp_path / "fit", "--solve", "9" * 20) == 3
     assert "--solve is 99999999999999999999, wanted at most" in capsys.readouterr().err
     assert not (tmp_path / "fit").exists()
-
-
-def test_photographs_are_not_solved_for(capture, tmp_path, capsys):
-    assert main(["fit", str(capture), "--out", str(tmp_path / "fit"), "--solve", "100"]) == 3
-    assert "--solve is for X-ray scans: add --mode xray" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""``rift fit --mode xray`` from a scan to splats, slices and a report."""
+"""``rift fit xray`` from a scan to splats, slices and a report."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
-from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit.kind import kind_of_fit
 from rift_cl.commands.fit_xray.job import XrayFit
+from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.errors import InputError, StoppedError
 from rift_cl.io.scans.formats import open_scan
 from rift_cl.io.volumes import read_volume
@@ -35,11 +36,11 @@ def scans(tmp_path_factory):
 
 def settings(path, out, **more):
     given = {"steps": 60, "splats": 400, "center": (SIZE - 1) / 2, "checkpoint_every": 20}
-    return FitSettings(path, out, mode="xray", **(given | more))
+    return FitXraySettings(path, out, **(given | more))
 
 
 def fit(path, out, *more, splats=400):
-    arguments = ["fit", str(path), "--out", str(out), "--mode", "xray", "--steps", "60"]
+    arguments = ["fit", "xray", str(path), "--out", str(out), "--steps", "60"]
     arguments += ["--splats", str(splats), "--center", str((SIZE - 1) / 2), "--quiet"]
     return main([*arguments, *more])
 
@@ -73,7 +74,7 @@ def test_a_scan_becomes_densities_slices_and_a_report(scans, tmp_path, capsys, r
     page = (out / "report.html").read_text()
     assert page.count('class="slider"') == 1 and "filtered backprojection" in page
     config = json.loads((out / "config.json").read_text())
-    assert config["complete"] and config["settings"]["mode"] == "xray"
+    assert config["complete"] and config["job"] == "fit xray"
 
 
 def test_one_row_stays_in_its_slice(scans, tmp_path):
@@ -106,7 +107,7 @@ def test_a_fit_that_was_broken_off_goes_on_to_the_same_bits(scans, tmp_path):
     list(XrayFit(settings(path, whole, **more)).run())
     for resume, after in ((False, 25), (True, 110)):
         job = XrayFit(settings(path, cut, resume=resume, **more))
-        with pytest.raises(StoppedError, match=r"--mode xray .*--resume"):
+        with pytest.raises(StoppedError, match=r"rift fit xray .*--resume"):
             for report in job.run():
                 if report.what == "steps" and report.done >= after:
                     job.stop()
@@ -135,11 +136,6 @@ def test_a_scan_of_counts_finds_its_own_axis(scan, tmp_path):
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (["--test", "elsewhere"], "--test has no meaning with --mode xray"),
-        (["--light", "linear"], "--light has no meaning"),
-        (["--refine-poses"], "--refine-poses has no meaning"),
-        (["--sh-degree", "2"], "--sh-degree has no meaning"),
-        (["--strategy", "default"], "--strategy has no meaning"),
         (["--rows", "3", "9"], "--rows is 3 9"),
         (["--center", "1000"], "--center is 1000"),
         (["--hold-out", "1"], "leaves no projection"),
@@ -153,10 +149,17 @@ def test_what_makes_no_sense_is_named_and_leaves_nothing(scans, tmp_path, capsys
     assert not (tmp_path / "fit").exists()
 
 
-def test_options_of_scans_are_refused_for_photographs(capture, tmp_path, capsys):
-    arguments = ["fit", str(capture), "--out", str(tmp_path / "fit"), "--center", "3"]
-    assert main(arguments) == 3
-    assert "--center is for X-ray scans: add --mode xray" in capsys.readouterr().err
+@pytest.mark.parametrize("option", ["--test", "--light", "--refine-poses", "--strategy"])
+def test_there_are_no_options_about_photographs(scans, tmp_path, capsys, option):
+    with pytest.raises(SystemExit) as caught:
+        fit(scans[4][0], tmp_path / "fit", option, "linear")
+    assert caught.value.code == 2 and option in capsys.readouterr().err
+
+
+def test_options_of_scans_are_not_those_of_photographs(capture, tmp_path, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["fit", str(capture), "--out", str(tmp_path / "fit"), "--center", "3"])
+    assert caught.value.code == 2 and "--center" in capsys.readouterr().err
 
 
 def test_photographs_are_no_scan_and_air_is_no_object(capture, tmp_path, capsys):
@@ -169,9 +172,15 @@ def test_photographs_are_no_scan_and_air_is_no_object(capture, tmp_path, capsys)
     assert not (tmp_path / "air").exists()
 
 
-def test_a_checkpoint_of_photographs_says_nothing_of_scans(capture, tmp_path):
-    assert not {"mode", "rows", "center"} & set(FitSettings(capture, tmp_path).decisive())
-    assert {"mode", "rows", "center"} <= set(settings(capture, tmp_path).decisive())
+def test_the_command_follows_from_what_it_is_given(scans, capture, tmp_path):
+    scan, folder = str(scans[1][0]), str(capture)
+    assert kind_of_fit([scan, "--steps", "3"]) == kind_of_fit(["--overwrite", scan]) == "xray"
+    assert kind_of_fit(["--out", scan, folder]) == kind_of_fit(["--steps", "3"]) == "photos"
+    (tmp_path / "config.json").write_text('{"job": "fit xray"}')
+    assert kind_of_fit(["--config", str(tmp_path / "config.json")]) == "xray"
+    out = tmp_path / "fit"
+    assert main(["fit", scan, "--out", str(out), "--steps", "2", "--splats", "9", "--quiet"]) == 0
+    assert json.loads((out / "config.json").read_text())["job"] == "fit xray"
 
 
 def test_the_real_tooth_from_one_command(shared_data, tmp_path):

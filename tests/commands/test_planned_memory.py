@@ -12,7 +12,7 @@ import pytest
 import rift_cl as rift
 from rift_cl.cl.budget import format_bytes
 from rift_cl.commands.fit_photos.job import Fit
-from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.render.job import Render
 from rift_cl.commands.render.settings import RenderSettings
 from rift_cl.splat.bands import FrameMemory
@@ -33,7 +33,7 @@ def fitted(request, capture, tmp_path_factory):
     """A little fit: its settings, and the scene that it left."""
     given = {"steps": 12, "splats": 30, "hold_out": 0, "checkpoint_every": 0}
     out = tmp_path_factory.mktemp("fit") / "fit"
-    settings = FitSettings(capture, out, **given, **KINDS[request.param])
+    settings = FitPhotosSettings(capture, out, **given, **KINDS[request.param])
     list(Fit(settings).run())
     return settings, rift.SplatScene.load(out / "scene.ply")
 

@@ -80,7 +80,7 @@ def test_a_preview_is_always_left(first):
     [
         ("{", "cannot be read"),
         ("[]", "cannot be read"),
-        ('{"job": "fit", "settings": {}}', "is of 'rift fit'"),
+        ('{"job": "fit photos", "settings": {}}', "is of 'rift fit photos'"),
         ('{"job": "reconstruct", "settings": {"colour": 3}}', "no setting 'colour'"),
         (
             '{"job": "reconstruct", "settings": {"scan": "x", "filter": "best"}}',

@@ -130,7 +130,7 @@ def test_the_folder_of_a_fit_brings_its_drawing_and_background_along(scene, tmp_
     fit = tmp_path / "fit"
     fit.mkdir()
     SplatScene.load(scene).save(fit / "scene.ply")
-    write_json(fit / "config.json", {"job": "fit", "settings": {"eps2d": 0.05}})
+    write_json(fit / "config.json", {"job": "fit photos", "settings": {"eps2d": 0.05}})
     write_json(fit / "metrics.json", {"background": [0, 1, 0]})
     assert render(fit, tmp_path / "film", *small()) == 0
     np.testing.assert_allclose(read_image(tmp_path / "film/frames/0000.png")[0, 0], (0, 1, 0))
@@ -172,7 +172,7 @@ def test_a_fit_in_linear_light_is_shown_as_a_display_shows_it(scene, tmp_path):
         fit = tmp_path / light
         fit.mkdir()
         SplatScene.load(scene).save(fit / "scene.ply")
-        write_json(fit / "config.json", {"job": "fit", "settings": {"light": light}})
+        write_json(fit / "config.json", {"job": "fit photos", "settings": {"light": light}})
         assert render(fit, tmp_path / f"{light}.film", *small("--background", 0.5, 0.2, 0)) == 0
     plain, curved = (
         read_image(tmp_path / f"{light}.film" / "frames" / "0001.png")
@@ -222,7 +222,7 @@ def test_what_is_no_scene_is_named(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [
-        ("config.json", {"job": "fit"}, "no settings"),
+        ("config.json", {"job": "fit photos"}, "no settings"),
         ("config.json", {"settings": {"eps2d": "wide"}}, "wanted a number"),
         ("config.json", {"settings": {"eps2d": -3}}, "eps2d is -3"),
         ("config.json", {"settings": {"light": "candle"}}, "'candle'"),

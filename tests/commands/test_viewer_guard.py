@@ -11,7 +11,7 @@ import pytest
 from viewer_wire import Wire, dialled, told, until
 
 from rift_cl.commands.fit_photos.job import Fit
-from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.inputs.scene_bounds import SceneBounds
 from rift_cl.commands.view import page as page_module
 from rift_cl.commands.view import watched as watched_module
@@ -147,7 +147,7 @@ class Broken:
 def fitted(capture, out, announce=lambda line: None, **more):
     """The bytes of the scene of a short fit."""
     given = {"steps": 30, "splats": 100, "hold_out": 4, "checkpoint_every": 0}
-    job = Fit(FitSettings(capture, out, **given, **more))
+    job = Fit(FitPhotosSettings(capture, out, **given, **more))
     job.announce = announce
     list(job.run())
     return (out / "scene.ply").read_bytes()

@@ -22,7 +22,7 @@ def test_each_format_comes_back_as_well_as_it_can(tool, tmp_path, capsys):
         logit_opacities=random.normal(size=400),
         sh=random.normal(0, 0.2, (400, 16, 3)),
     ).save(fit / "scene.ply")
-    write_json(fit / "config.json", {"job": "fit", "settings": {}})
+    write_json(fit / "config.json", {"job": "fit photos", "settings": {}})
     check.main(check.Options(fit, tmp_path / "out", tmp_path / "none"))
     lines = capsys.readouterr().out.split("\n")
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]

@@ -22,7 +22,7 @@ from bases.statistics import distinct, paired, sentence, spread, values
 from bench.table import Table
 from rift_cl import Device
 from rift_cl.commands.fit_photos.job import Fit
-from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.report.plot import curves
 from rift_cl.sample import ornament
 from rift_cl.train.trainer import REPORT_EVERY
@@ -128,7 +128,7 @@ def _advance(one: _Running, reports: Iterator[Any]) -> bool:
 
 def _settings(
     asked: Mapping[str, Any], kind: str, steps: int, seed: int, folder: Path, device: str | None
-) -> FitSettings:
+) -> FitPhotosSettings:
     given: dict[str, Any] = {
         "capture": ornament(),
         "out": folder / kind.replace(" ", "_").replace(",", ""),
@@ -138,8 +138,8 @@ def _settings(
         "device": device,
         **KINDS[kind],
     }
-    numbers = FitSettings(**given).training().numbers
-    return FitSettings(**given, splats=asked["parameters"] // numbers)
+    numbers = FitPhotosSettings(**given).training().numbers
+    return FitPhotosSettings(**given, splats=asked["parameters"] // numbers)
 
 
 def _record(one: _Running, seed: int) -> dict[str, Any]:

@@ -29,7 +29,7 @@ from figures.images import decode, encode
 from figures.plan import EPS2D, Plan
 from rift_cl import Device
 from rift_cl.commands.fit_photos.job import Fit
-from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.progress_bar import show_progress
 from rift_cl.io import open_capture, read_view
 from rift_cl.metrics import psnr
@@ -106,7 +106,7 @@ def _of_sharp_splats(drawn: Drawn, unseen: Path) -> tuple[dict[str, Any], dict[s
 def _fit_scores(plan: Plan, seen: Path, unseen: Path, place: Path, way: str) -> dict[str, Any]:
     """PSNR of a fit to the pictures through the lens, by radius, and of sharp pictures."""
     (steps, splats), sharp = _length(plan), plan.captures.test or plan.captures.off_path
-    job = FitSettings(
+    job = FitPhotosSettings(
         capture=seen,
         test=(unseen, sharp, seen),
         out=place / f"aperture_{way.replace(' ', '_')}_{steps}_steps_{splats}_splats",

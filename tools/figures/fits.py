@@ -10,7 +10,7 @@ from typing import Any
 from figures.plan import EPS2D, Plan
 from figures.view_choice import choose_views, fixed_views, write_capture
 from rift_cl.commands.fit_photos.job import Fit
-from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.progress_bar import show_progress
 
 # The sets of pictures that are scored, in the order in which a fit gets them.
@@ -33,7 +33,7 @@ class Fitted:
     """
 
     count: int
-    settings: FitSettings
+    settings: FitPhotosSettings
     metrics: dict[str, Any]
 
     def scores(self, name: str) -> dict[str, float]:
@@ -50,7 +50,7 @@ class Fitted:
 
 def fit_settings(
     plan: Plan, count: int, *, exponent: float = 0.0, seed: int, noise: float = 0.0
-) -> FitSettings:
+) -> FitPhotosSettings:
     """The settings of a fit to some of the ring's views; writes the captures it wants.
 
     Only what is trained on is noisy.
@@ -64,7 +64,7 @@ def fit_settings(
     held_out = write_capture(ring, choice.held_out, place / HELD_OUT)
     noisy = f"_noise_{noise:g}" if noise else ""
     name = f"fit_{plan.steps}_steps_{plan.splats}_splats_ramp_{exponent:g}_seed_{seed}{noisy}"
-    return FitSettings(
+    return FitPhotosSettings(
         capture=write_capture(ring, choice.trained, place / f"trained{noisy}", noise=noise),
         test=(held_out, test, captures.off_path),
         out=place / name,
@@ -92,7 +92,7 @@ def fitted(
     return Fitted(count, settings, metrics)
 
 
-def _complete(settings: FitSettings) -> bool:
+def _complete(settings: FitPhotosSettings) -> bool:
     """Whether a fit with these settings is finished in its folder."""
     try:
         config = json.loads((settings.out / "config.json").read_text(encoding="utf-8"))

@@ -11,7 +11,7 @@ import numpy as np
 from figures.spectra import error_spectrum, ring_edges
 from rift_cl import Device
 from rift_cl.commands.fit_photos.pictures import CapturePictures
-from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.fit_photos.start import first_splats
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.commands.progress_bar import show_progress
@@ -25,7 +25,7 @@ SHARES = (1 / 8, 1 / 4, 1 / 2, 1)
 _PICTURES, _NOISE_VIEWS = 12, 8
 
 
-def watched(settings: FitSettings, test: Any, device: Device) -> dict[str, Any]:
+def watched(settings: FitPhotosSettings, test: Any, device: Device) -> dict[str, Any]:
     """Train as ``Fit`` would, and take the spectrum of the error now and then.
 
     Args:
@@ -50,7 +50,7 @@ def watched(settings: FitSettings, test: Any, device: Device) -> dict[str, Any]:
     return {"frequency": frequency, "pictures": len(few), "moments": moments}
 
 
-def _trainer(settings: FitSettings, device: Device) -> tuple[Trainer, CapturePictures]:
+def _trainer(settings: FitPhotosSettings, device: Device) -> tuple[Trainer, CapturePictures]:
     capture = open_capture(settings.capture)
     pictures = CapturePictures(device, capture.views, seed=settings.seed)
     first = first_splats(

@@ -26,7 +26,7 @@ from ornament.capture_folder import render_capture
 from ornament.tracer import BACKGROUND, Tracer, choose_variant
 from rift_cl import Device
 from rift_cl.commands.fit_photos.job import Fit
-from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.progress_bar import show_progress
 from rift_cl.io import open_capture
 from rift_cl.report.html_page import Page
@@ -226,7 +226,7 @@ def _is_there(file: Path, shots: Sequence[Shot]) -> bool:
 def _fitted(plan: Plan, name: str, capture: Path) -> dict[str, dict[str, float]]:
     """Mean scores by scored set, of a fit that is done, now or by an earlier run."""
     seed = plan.seeds[0]
-    asked = FitSettings(
+    asked = FitPhotosSettings(
         capture=capture,
         test=(_rendered(plan, ON_RING), _rendered(plan, OFF_RING)),
         out=_folder(plan) / f"{name}_{plan.steps}_steps_{plan.splats}_splats_seed_{seed}",

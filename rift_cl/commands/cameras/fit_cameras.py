@@ -180,7 +180,7 @@ def open_fit_cameras(fit: Path, *, photographs: Path | None = None) -> FitCamera
         return None
     kept, record = read_json_object(config), read_json_object(file)
     facts = record.values.get("capture")
-    if kept.text("job") != "fit" or not isinstance(facts, dict):
+    if kept.text("job") != "fit photos" or not isinstance(facts, dict):
         return None
     frames = list(record.objects("frames"))
     splits = [frame.text("split") for frame in frames]

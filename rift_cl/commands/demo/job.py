@@ -15,7 +15,7 @@ from rift_cl.cl.discovery import open_device
 from rift_cl.commands.demo.settings import DemoSettings
 from rift_cl.commands.fit_photos.job import Fit
 from rift_cl.commands.fit_photos.report import show_fit
-from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.render.job import Render
 from rift_cl.commands.render.settings import RenderSettings
 from rift_cl.commands.run_folder.run_folder import RunFolder
@@ -69,14 +69,14 @@ class DemoJob:
         self.folder = RunFolder(settings.out, "demo", overwrite=True)
         # Whatever else is there under a fit's name is not lost either.
         for name in FITS:
-            RunFolder(settings.out / name, "fit", overwrite=True)
+            RunFolder(settings.out / name, "fit photos", overwrite=True)
         RunFolder(settings.out / FILM, "render", overwrite=True)
         self.fits = {name: Fit(self._fit_settings(name)) for name in FITS if settings.steps}
         self.rows: list[tuple[float, ...]] = []
 
-    def _fit_settings(self, name: str) -> FitSettings:
+    def _fit_settings(self, name: str) -> FitPhotosSettings:
         settings, ring = self.settings, name == "ornament"
-        return FitSettings(
+        return FitPhotosSettings(
             capture=ornament() if ring else wall(),
             test=(ornament_off_path(),) if ring else (),
             out=settings.out / name,

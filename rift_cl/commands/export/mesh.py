@@ -56,7 +56,7 @@ class MeshExport:
         if self.scene.mode != "xray":
             raise InputError(
                 f"{path}: is a scene of photographs, whose opacities are no densities: --mesh is "
-                "about scenes of 'rift fit --mode xray'"
+                "about scenes of 'rift fit xray'"
             )
         if not len(self.scene):
             raise InputError(f"{path}: holds no splats, there is no surface")

@@ -98,9 +98,6 @@ class FitCheckpoints:
     def _compare(self, facts: Any) -> None:
         before, now = facts.get("settings", {}), self._facts["settings"]
         names = (before.keys() | now.keys()) - {"steps"}
-        # Once it was 1 where nobody said; what was decided then holds.
-        if now["downscale"] is None:
-            names -= {"downscale"}
         # What was left open may be said now, if it is what was decided then.
         open_then = {k: v for k, v in facts.get("decided", {}).items() if before.get(k) is None}
         differing = sorted(

@@ -7,19 +7,21 @@ they leave behind.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from rift_cl.cl.discovery import open_device
 from rift_cl.commands.fit.checkpoints import FitCheckpoints
+from rift_cl.commands.fit.settings import FitSettings
 from rift_cl.commands.fit_photos.scores import ViewScore
-from rift_cl.commands.fit_photos.settings import FitSettings
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import CheckpointError, StoppedError
 from rift_cl.progress import Report
 from rift_cl.train.trainer import REPORT_EVERY, Trainer
 
+S = TypeVar("S", bound=FitSettings)
 
-class FitRun:
+
+class FitRun(Generic[S]):
     """A fit that is planned; nothing is written yet.
 
     Args:
@@ -29,14 +31,14 @@ class FitRun:
         RiftError: a setting makes no sense, the folder is in use, or the fit in it cannot go on.
     """
 
-    def __init__(self, settings: FitSettings) -> None:
+    def __init__(self, settings: S) -> None:
         settings.check()
         self.settings = settings
         # With a value for all that was left open, once it is decided.
         self.settled = settings
         self.training, self.drawing = settings.training(), settings.drawing()
         self.folder = RunFolder(
-            settings.out, "fit", overwrite=settings.overwrite, resume=settings.resume
+            settings.out, settings.job, overwrite=settings.overwrite, resume=settings.resume
         )
         self.device = open_device(settings.device, settings.budget())
         self.checkpoints = FitCheckpoints(

@@ -17,7 +17,7 @@ from rift_cl.commands.fit_photos.photograph_size import fitting_downscale, size_
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.report import fit_page, history_notes, ramp_notes
 from rift_cl.commands.fit_photos.scores import score_record, score_views
-from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.fit_photos.start import first_splats
 from rift_cl.commands.fit_photos.view_split import open_seen, split_views
 from rift_cl.commands.pictures.evenly_spaced import evenly
@@ -39,7 +39,7 @@ from rift_cl.train.trainer import Trainer
 _NOISE_VIEWS = 8
 
 
-class Fit(FitRun):
+class Fit(FitRun[FitPhotosSettings]):
     """A fit to photographs that is planned; nothing is written yet.
 
     Args:
@@ -49,7 +49,7 @@ class Fit(FitRun):
         RiftError: the capture cannot be read, or a setting makes no sense.
     """
 
-    def __init__(self, settings: FitSettings) -> None:
+    def __init__(self, settings: FitPhotosSettings) -> None:
         super().__init__(settings)
         self.source: Capture | BareInput
         if BareInput.fits(settings.capture):
@@ -239,7 +239,7 @@ class Fit(FitRun):
         return notes
 
     def _trainer(
-        self, capture: Capture, pictures: CapturePictures, given: FitSettings | None = None
+        self, capture: Capture, pictures: CapturePictures, given: FitPhotosSettings | None = None
     ) -> Trainer:
         settings = given or self.settings
         exponent = settings.exponent_for(len(pictures.views))

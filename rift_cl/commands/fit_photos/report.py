@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rift_cl.commands.fit_photos.scores import ViewScore
-from rift_cl.commands.fit_photos.settings import ENOUGH_VIEWS, FitSettings
+from rift_cl.commands.fit_photos.settings import ENOUGH_VIEWS, FitPhotosSettings
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.report.html_page import Compared, Page
 from rift_cl.report.plot import curves, figure_svgs, jpeg
@@ -77,7 +77,7 @@ def history_notes(history: Sequence[tuple[int, int]]) -> list[str]:
     return [f"It was trained {', then '.join(stages)}."]
 
 
-def ramp_notes(settings: FitSettings, views: int) -> list[str]:
+def ramp_notes(settings: FitPhotosSettings, views: int) -> list[str]:
     """A sentence about the ramp, where its exponent was not asked for."""
     exponent = settings.exponent_for(views)
     if settings.homogenise is not None or exponent == settings.exponent:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.device import Device
 from rift_cl.commands.center.axis_search import find_axis
 from rift_cl.commands.fit_photos.pictures import Light
-from rift_cl.commands.fit_photos.settings import FitSettings
+from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.inputs.scan_input import ScanInput
 from rift_cl.commands.inputs.scan_rows import (
     check_center,
@@ -50,7 +50,7 @@ class XrayInput:
         RiftError: the scan cannot be read, or an option does not fit it.
     """
 
-    def __init__(self, settings: FitSettings, device: Device) -> None:
+    def __init__(self, settings: FitXraySettings, device: Device) -> None:
         self.source = ScanInput(
             settings.capture,
             dataset=settings.dataset,

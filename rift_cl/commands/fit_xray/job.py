@@ -1,4 +1,4 @@
-"""``rift fit --mode xray``: the projections of a parallel beam become Gaussian densities."""
+"""``rift fit xray``: the projections of a parallel beam become Gaussian densities."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from rift_cl.commands.fit.probe import TRIED, probed, time_words
 from rift_cl.commands.fit.run import FitRun
 from rift_cl.commands.fit_photos.scores import score_record
-from rift_cl.commands.fit_photos.settings import FitSettings
 from rift_cl.commands.fit_photos.view_split import split_views
 from rift_cl.commands.fit_xray.input import Projections, XrayInput, XrayPictures
 from rift_cl.commands.fit_xray.report import xray_page
 from rift_cl.commands.fit_xray.scores import backprojected, drawn, relative_error, score_projections
+from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.io.scenes.splat_scene import XrayScene
 from rift_cl.io.volumes import VOLUME_NAMES, open_volume
@@ -37,7 +37,7 @@ _FEW = 8
 Floats = NDArray[np.float32]
 
 
-class XrayFit(FitRun):
+class XrayFit(FitRun[FitXraySettings]):
     """A fit to projections that is planned; nothing is written yet.
 
     Args:
@@ -47,7 +47,7 @@ class XrayFit(FitRun):
         RiftError: the scan cannot be read, or a setting makes no sense.
     """
 
-    def __init__(self, settings: FitSettings) -> None:
+    def __init__(self, settings: FitXraySettings) -> None:
         super().__init__(settings)
         self.input = XrayInput(settings, self.device)
         numbers = tuple(range(self.input.scan.shape[0]))
@@ -64,7 +64,7 @@ class XrayFit(FitRun):
         few = dataclasses.replace(settings, splats=tried)
         trainer = self._trainer(seen, XrayPictures(self.device, seen), few)
         seconds = settings.steps * probed(trainer, tried).step(settings.splats)
-        words = settings.basis_words(colored=False)
+        words = settings.basis_words()
         return {
             "scan": f"{scan.path} ({scan.source}, {scan.kind})",
             "trained on": f"{len(self.seen)} projections",
@@ -119,13 +119,13 @@ class XrayFit(FitRun):
             "center": whole.center,
             "scale": whole.scale,
             "start_error": first,
-            **self.settings.basis_facts(colored=False),
+            **self.settings.basis_facts(),
             **score_record(self.scores),
         }
         self._leave(splats, volume, whole)
 
     def _trainer(
-        self, seen: Projections, pictures: XrayPictures, given: FitSettings | None = None
+        self, seen: Projections, pictures: XrayPictures, given: FitXraySettings | None = None
     ) -> XrayTrainer:
         settings, training, rows = given or self.settings, self.training, seen.values.shape[1]
         volume = np.maximum(backprojected(self.device, seen, "hann"), 0)

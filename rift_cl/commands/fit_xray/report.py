@@ -1,4 +1,4 @@
-"""What ``rift fit --mode xray`` shows: slices of splats and of voxels, projections, the loss."""
+"""What ``rift fit xray`` shows: slices of splats and of voxels, projections, the loss."""
 
 from __future__ import annotations
 

@@ -39,6 +39,11 @@ _MRC_SIGNATURE = b"MAP "
 _USER_BLOCKS = (0, 512, 1024, 2048, 4096, 8192)
 
 
+def is_scan_file(path: Path) -> bool:
+    """Whether a path is a file of a kind that holds scans, by its extension."""
+    return path.suffix.lower() in _READERS and path.is_file()
+
+
 def open_scan(
     path: str | os.PathLike[str],
     *,
