@@ -1,4 +1,4 @@
-"""What changes from step to step of a fit: Adam's rates, and when the finish begins."""
+"""Adam's learning rates from step to step of a fit, and when its cooldown begins."""
 
 from __future__ import annotations
 
@@ -6,34 +6,34 @@ from dataclasses import dataclass
 
 from rift_cl.train.settings import TrainSettings
 
-# Rates at the very end of the finish, as a share of those at its beginning.
+# Learning rates at the very end of the cooldown, as a fraction of those at its beginning.
 _LAST_SHARE = 0.05
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """What changes from step to step.
+    """Learning rates of a run.
 
     Args:
         settings: of the run.
-        extent: of the scene.
+        extent: size of the scene, in its units.
     """
 
     settings: TrainSettings
     extent: float
 
     @property
-    def finish(self) -> int:
-        """The step with which the finish begins."""
-        return round(self.settings.steps * (1 - self.settings.finish))
+    def cooldown(self) -> int:
+        """The step with which the cooldown begins."""
+        return round(self.settings.steps * (1 - self.settings.cooldown))
 
-    def rates(self, step: int) -> dict[str, float]:
-        """Adam's rates at a step, by group."""
-        rates, settings = self.settings.rates, self.settings
-        way = min(step / max(self.finish, 1), 1.0)
+    def learning_rates(self, step: int) -> dict[str, float]:
+        """Adam's learning rates at a step, by group; of positions in units of the scene."""
+        rates, settings = self.settings.learning_rates, self.settings
+        way = min(step / max(self.cooldown, 1), 1.0)
         falling, fade = rates.means_last**way, 1.0
-        if step >= self.finish:
-            into = (step - self.finish) / max(settings.steps - self.finish, 1)
+        if step >= self.cooldown:
+            into = (step - self.cooldown) / max(settings.steps - self.cooldown, 1)
             fade = _LAST_SHARE**into
         return {
             "means": fade * self.extent * rates.means * falling,

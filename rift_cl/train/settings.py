@@ -1,4 +1,7 @@
-"""How splats are fitted to pictures: every switch of the trainer, in frozen values."""
+"""Settings of a fit: every switch of the trainer, in frozen values.
+
+The settings of strategies stand beside their strategies, in ``rift_cl.train.strategy``.
+"""
 
 from __future__ import annotations
 
@@ -10,54 +13,53 @@ from rift_cl.splat.orders import count_of
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.ranges import check_choice, check_number, check_whole
+from rift_cl.train.strategy import DefaultSettings, McmcSettings, StrategySettings
 from rift_cl.train.xray.solve_settings import SolveSettings
 
 LossKind = Literal["l1", "l2"]
-StrategyName = Literal["mcmc", "default"]
 BandLimit = Literal["pixels", "coverage"]
 
 
 @dataclass(frozen=True)
-class Rates:
-    """Learning rates of Adam, of the values that are trained (3DGS, Kerbl et al. 2023).
-
-    Args:
-        means: first rate of positions, as a share of the scene's extent.
-        means_last: last rate of positions, as a share of the first; it falls exponentially.
-        quats: of quaternions.
-        log_scales: of the logarithms of scales.
-        logits: of opacities' logits.
-        sh: of the constant harmonic.
-        sh_rest: of the others, as a share of that.
-        poses: of the cameras' turns, in radians, and shifts, in extents of the scene; falls as
-            that of positions does. At 0 the cameras stay where they are.
-        exposures: of each photograph's gains and offsets; falls likewise. At 0 there are none.
-        shape_modes: of the Hermite modes of splats' shapes.
-        color_modes: of those of their colours. At 1e-2 both serve short fits better, but fits of
-            order 2 were lost after some 1,500 steps.
-        lobes: of the geometry of lobes: quaternions or axes, and logarithms of widths.
-        lobes_rest: of the lobes' coefficients, as a share of ``sh``.
+class LearningRates:
+    """Adam's learning rates at the first step (3DGS, Kerbl et al. 2023); 0 = not trained.
 
     Raises:
         InputError: a number is out of its range.
     """
 
     means: float = 1.6e-4
+    """Learning rate of positions, as a fraction of the scene's extent."""
     means_last: float = 0.01
+    """Learning rate of positions at the cooldown, as a fraction of the first; it falls
+    exponentially until then."""
     quats: float = 1e-3
+    """Learning rate of quaternions."""
     log_scales: float = 5e-3
+    """Learning rate of the logarithms of scales."""
     logits: float = 5e-2
+    """Learning rate of the logits of opacities, or of the logarithms of X-ray densities."""
     sh: float = 2.5e-3
+    """Learning rate of the constant colour (spherical harmonic of degree 0)."""
     sh_rest: float = 0.2
+    """Learning rate of harmonics of degree 1 and above, as a fraction of ``sh``."""
     poses: float = 0.0
+    """Learning rate of camera poses: of rotations in radians, of positions as a fraction of the
+    scene's extent; it falls as that of the splats' positions does. 0 = poses are fixed."""
     exposures: float = 0.0
+    """Learning rate of each image's gains and offsets; it falls likewise. 0 = there are none."""
     shape_modes: float = 2.5e-3
+    """Learning rate of the Hermite modes of splats' shapes."""
+    # At 1e-2 both serve short fits better, but fits of order 2 were lost after some 1,500 steps.
     color_modes: float = 2.5e-3
+    """Learning rate of the Hermite modes of splats' colours."""
     lobes: float = 1e-2
+    """Learning rate of the geometry of lobes: quaternions or axes, and logarithms of widths."""
     lobes_rest: float = 1.0
+    """Learning rate of the coefficients of lobes, as a fraction of ``sh``."""
 
     def __post_init__(self) -> None:
-        """Check every number's range: a rate of 0 holds a group still."""
+        """Check every number's range."""
         for item in fields(self):
             if item.name != "means_last":
                 check_number(self, item.name)
@@ -65,169 +67,56 @@ class Rates:
 
 
 @dataclass(frozen=True)
-class Relocation:
-    """Splats that have faded move to where others have much to do (3DGS as MCMC).
-
-    Args:
-        every: steps between two renewals.
-        first: step of the first one.
-        last: share of the steps after which there are none.
-        growth: share by which the number of splats grows at each, up to the most there may be;
-            more where the run would be too short for it.
-        full: share of the steps after which there should be as many as there may be.
-        faint: opacity up to which a splat counts as faded.
-        noise: of the random walk, as a multiple of the positions' rate.
-        opacity_penalty: weight of the mean opacity in the loss.
-        scale_penalty: weight of the mean scale in the loss, per extent of the scene.
-
-    Raises:
-        InputError: a number is out of its range.
-    """
-
-    every: int = 100
-    first: int = 500
-    last: float = 0.85
-    growth: float = 0.05
-    full: float = 0.5
-    faint: float = 0.005
-    noise: float = 5e5
-    opacity_penalty: float = 0.01
-    scale_penalty: float = 0.01
-
-    def __post_init__(self) -> None:
-        """Check every number's range."""
-        check_whole(self, "every", 1)
-        check_whole(self, "first", 0)
-        for name in ("last", "full", "faint"):
-            check_number(self, name, most=1)
-        for name in ("growth", "noise", "opacity_penalty", "scale_penalty"):
-            check_number(self, name)
-
-
-@dataclass(frozen=True)
-class Densification:
-    """Splats are cloned, split and pruned (3DGS, Kerbl et al. 2023; constants of gsplat 1.5).
-
-    The original counts steps of a run of 30,000: the first densification at 500, the last before
-    15,000, opacities reset every 3,000. What follows from the course of the run is a share of its
-    steps here, so that 30,000 give the original's numbers. What follows from how fast Adam moves
-    is not: a mean gradient wants as many pictures in a short run, and an opacity takes as many
-    steps to come back after a reset.
-
-    Args:
-        every: steps between two densifications, over which gradients are averaged.
-        first: share of the steps before the first one.
-        last: share of the steps after which there are none, and no resets.
-        gradient: mean gradient from which a splat is cloned or split, by its place in an image
-            from -1 to 1; 2e-4 if not given, 8e-4 with ``absgrad``.
-        absgrad: go by the sum of the gradient's magnitudes over pixels (AbsGS).
-        small: largest scale of splats that are cloned rather than split, in extents of the scene.
-        faint: opacity below which splats are pruned; a reset leaves no opacity above twice that.
-        large: scale above which splats are pruned after the first reset, in extents of the scene.
-        large_on_screen: the same for the radius on the screen, as a share of the image's larger
-            side, 0.15 say; None for never, as in gsplat.
-        reset: share of the steps between two resets of opacities; 0 for none.
-        reset_least: but so many steps at least.
-        revised_opacity: give two splats in place of one the opacity 1 - sqrt(1 - o), with which
-            they hide together what one did (Rota Bulo et al. 2024).
-
-    Raises:
-        InputError: a number is out of its range.
-    """
-
-    every: int = 100
-    first: float = 1 / 60
-    last: float = 0.5
-    gradient: float | None = None
-    absgrad: bool = False
-    small: float = 0.01
-    faint: float = 0.005
-    large: float = 0.1
-    large_on_screen: float | None = None
-    reset: float = 0.1
-    reset_least: int = 500
-    revised_opacity: bool = False
-
-    def __post_init__(self) -> None:
-        """Check every number's range."""
-        for name in ("every", "reset_least"):
-            check_whole(self, name, 1)
-        for name in ("first", "last", "reset"):
-            check_number(self, name, most=1)
-        for name in ("gradient", "large_on_screen"):
-            if getattr(self, name) is not None:
-                check_number(self, name, above=True)
-        for name in ("small", "large"):
-            check_number(self, name, above=True)
-        check_number(self, "faint", most=0.25, above=True)
-        if self.small > self.large:
-            raise InputError(
-                f"Densification: small is {self.small!r} and large is {self.large!r}, wanted "
-                "small <= large"
-            )
-
-    @property
-    def threshold(self) -> float:
-        """The mean gradient from which a splat is cloned or split."""
-        return self.gradient or (8e-4 if self.absgrad else 2e-4)
-
-
-@dataclass(frozen=True)
 class TrainSettings:
-    """What a fit is made with.
-
-    Args:
-        steps: pictures that are looked at, one after the other.
-        seed: of everything that is random.
-        splats: most splats.
-        sh_degree: of the colours' harmonics, 0 to 4.
-        sh_every: steps after which the next degree joins.
-        loss: of pixels, ``l1`` or ``l2``.
-        ssim_weight: share of D-SSIM in the loss; the rest is that of pixels.
-        homogenisation: weight of high frequencies in the loss of pixels.
-        noise: standard deviation of the noise in the pictures; none if not given.
-        band_limit: let no splat be finer than what the cameras resolve: half a pixel of the finest
-            camera (``pixels``, Mip-Splatting), or what all know above noise (``coverage``).
-        finish: share of the steps, at the end, without noise and penalties and with fading rates.
-        rates: of Adam.
-        strategy: where splats come from and go to: ``mcmc`` renews them with random walks and
-            penalties, ``default`` densifies as 3DGS did at first, with neither.
-        renewal: of splats that have faded, with ``mcmc``.
-        densification: with ``default``.
-        basis: Hermite modes of the splats' shapes and colours, and how densities become opacities.
-        angular: what colours vary in with the direction they are seen from; anything but ``sh``
-            takes the place of the harmonics, all but the constant one.
-        solve: what is linear is solved for now and then; X-rays alone.
+    """Settings of a fit.
 
     Raises:
         InputError: a number is out of its range.
     """
 
     steps: int = 3000
+    """Number of optimization steps (one training image each)."""
     seed: int = 0
+    """Random seed."""
     splats: int = 20_000
+    """Largest number of splats."""
     sh_degree: int = 3
+    """Highest degree of the spherical harmonics of colours, 0 to 4."""
     sh_every: int = 500
+    """Steps after which the next degree of harmonics is added."""
     loss: LossKind = "l1"
+    """Pixel loss: absolute (l1) or squared (l2) differences."""
     ssim_weight: float = 0.2
+    """Fraction of 1 - SSIM in the loss; the rest is the pixel loss."""
     homogenisation: Homogenisation = field(default_factory=Homogenisation)
+    """Weight of spatial frequencies in the gradient of the pixel loss."""
     noise: float | None = None
+    """Standard deviation of the noise in the training images, in units of the image. Default:
+    none."""
     band_limit: BandLimit | None = None
-    finish: float = 0.12
-    rates: Rates = field(default_factory=Rates)
-    strategy: StrategyName = "mcmc"
-    relocation: Relocation = field(default_factory=Relocation)
-    densification: Densification = field(default_factory=Densification)
+    """Keep splats no finer than the cameras resolve: half a pixel of the finest camera (pixels,
+    Mip-Splatting), or what all views determine above noise (coverage). Default: no limit."""
+    cooldown: float = 0.12
+    """Fraction of the run, at its end, without random walks and penalties and with falling
+    learning rates."""
+    learning_rates: LearningRates = field(default_factory=LearningRates)
+    """Adam's learning rates."""
+    strategy: StrategySettings = field(default_factory=McmcSettings)
+    """How splats are added, moved and removed."""
     basis: BasisSettings = field(default_factory=BasisSettings)
+    """Hermite modes of the splats' shapes and colours, and how densities become opacities."""
     angular: AngularSettings = field(default_factory=AngularSettings)
+    """Functions of the viewing direction that colours are made of; other kinds than ``sh`` take the
+    place of all harmonics but the constant one."""
     solve: SolveSettings = field(default_factory=SolveSettings)
+    """Periodic least-squares solve for densities and shape modes (X-rays only)."""
 
     def __post_init__(self) -> None:
         """Check every number's range."""
         for name, least in (("steps", 1), ("splats", 1), ("sh_every", 1), ("seed", 0)):
             check_whole(self, name, least)
         check_whole(self, "sh_degree", 0, 4)
-        for name in ("ssim_weight", "finish"):
+        for name in ("ssim_weight", "cooldown"):
             check_number(self, name, most=1)
         if self.noise is not None:
             check_number(self, "noise")
@@ -235,16 +124,21 @@ class TrainSettings:
         if self.band_limit is not None and self.band_limit not in get_args(BandLimit):
             wanted = "None, " + " or ".join(get_args(BandLimit))
             raise InputError(f"TrainSettings: band_limit is {self.band_limit!r}, wanted {wanted}")
-        check_choice(self, "strategy", get_args(StrategyName))
-        if self.densification.absgrad and not self.basis.plain:
+        if not isinstance(self.strategy, StrategySettings):
             raise InputError(
-                "TrainSettings: densification.absgrad wants magnitudes of screen gradients, which "
+                f"TrainSettings: strategy is {self.strategy!r}, wanted the settings of one, such "
+                "as McmcSettings()"
+            )
+        absgrad = isinstance(self.strategy, DefaultSettings) and self.strategy.absgrad
+        if absgrad and not self.basis.plain:
+            raise InputError(
+                "TrainSettings: strategy.absgrad wants magnitudes of screen gradients, which "
                 "splats with modes or an activation do not have: leave it off"
             )
 
     @property
     def numbers(self) -> int:
-        """Parameters that a splat has in the end."""
+        """Trained numbers of a splat at the end of the run."""
         basis, colors = self.basis, 3 * (self.sh_degree + 1) ** 2
         modes = count_of(basis.order) - 1 + 3 * (count_of(basis.color_order) - 1)
         return 11 + modes + (self.angular.numbers or colors)

@@ -2,8 +2,8 @@
 
 A step draws a view, takes the gradient of the loss, and moves the splats by Adam, and the view's
 pose and exposure if they are fitted too. Between steps the set of splats changes
-(``rift_cl.train.strategy.mcmc``); in the last part of the run, the finish, nothing walks at random
-any more and all rates fade, so that the picture settles.
+(``rift_cl.train.strategy``); in the last part of the run, the cooldown, nothing walks at random and
+all learning rates fall, so that the picture settles.
 
 What a run does depends on its settings, its pictures and the device alone: the order of the views
 and all that is random come from the seed and the number of the step. So ``state``, taken between
@@ -33,7 +33,7 @@ from rift_cl.train.run_state import flattened, grouped
 from rift_cl.train.schedule import Schedule
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import scene_extent
-from rift_cl.train.strategy.mcmc import strategy_of
+from rift_cl.train.strategy import TrainingRun
 from rift_cl.train.views.exposures import Exposures
 from rift_cl.train.views.poses import Poses
 
@@ -95,15 +95,18 @@ class Trainer:
         self.device: Device = parameters.device
         self.schedule = Schedule(settings, scene_extent(pictures.cameras))
         extent, views = self.schedule.extent, len(pictures.cameras)
-        self.strategy = strategy_of(
-            settings, parameters, extent=extent, finish=self.schedule.finish
+        run = TrainingRun(
+            settings.steps, settings.splats, settings.seed, extent, self.schedule.cooldown
         )
-        drawing = self.strategy.drawing(drawing or SplatSettings())
+        self.strategy = settings.strategy.begin(parameters, run)
+        drawing = self.strategy.render_settings(drawing or SplatSettings())
         self.renderer = Renderer(drawing, device=self.device)
         self.coefficient_schedule = CoefficientSchedule(settings, pictures.cameras, flat=flat)
         self._join()
-        self.poses = Poses(pictures.cameras, extent) if settings.rates.poses else None
-        self.exposures = Exposures(self.device, views) if settings.rates.exposures else None
+        self.poses = Poses(pictures.cameras, extent) if settings.learning_rates.poses else None
+        self.exposures = (
+            Exposures(self.device, views) if settings.learning_rates.exposures else None
+        )
         self.loss = HomogenisedLoss(
             self.device,
             settings.homogenisation,
@@ -145,7 +148,7 @@ class Trainer:
         """One picture; the loss as a (1,) device array."""
         settings, parameters = self.settings, self.parameters
         step = parameters.step
-        number, rates = self.view_at(step), self.schedule.rates(step)
+        number, rates = self.view_at(step), self.schedule.learning_rates(step)
         self.pictures.begin(step)
         frame = self.renderer.forward(
             parameters.drawn, self.camera(number), background=self.pictures.background(number)
@@ -157,11 +160,19 @@ class Trainer:
         if self.poses is not None:
             by_view = self.device.get(gradients.camera)[:12].reshape(3, 4).astype(float)
             self.poses.update(number, by_view, rates["poses"])
-        penalties = self.strategy.before_step(step)
+        penalties = self.strategy.penalties(step)
         lobed = "lobes" in parameters.raw
-        rest = settings.rates.lobes_rest if lobed else settings.rates.sh_rest
+        rates_of = settings.learning_rates
+        rest = rates_of.lobes_rest if lobed else rates_of.sh_rest
         ridge = settings.basis.ridge
-        parameters.update(gradients, rates, sh_rest=rest, ridge=ridge, **penalties)
+        parameters.update(
+            gradients,
+            rates,
+            sh_rest=rest,
+            opacity_penalty=penalties.opacity,
+            scale_penalty=penalties.scale,
+            ridge=ridge,
+        )
         self._join()
         self.parameters = self.strategy.after_step(parameters, frame, gradients, rates["means"])
         relocated = self.parameters is not parameters

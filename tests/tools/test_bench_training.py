@@ -21,7 +21,7 @@ import pytest
 import rift_cl as rift
 from rift_cl import metrics
 from rift_cl.errors import InputError
-from rift_cl.train.settings import Relocation
+from rift_cl.train.strategy import McmcSettings
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "tools" / "bench_training.py"
@@ -164,7 +164,7 @@ def test_missing_torch_is_one_sentence_that_says_what_to_do(tool, case, monkeypa
 def test_torch_trains_the_same_splats_where_nothing_is_random(tool, case):
     pytest.importorskip("torch", reason="torch is not installed")
     trainers = tool("bench.trainers")
-    still = replace(case.settings, relocation=replace(case.settings.relocation, noise=0.0))
+    still = replace(case.settings, strategy=replace(case.settings.strategy, noise=0.0))
     object.__setattr__(case, "settings", still)
     ours = trainers.RiftTrainer(case.device, case)
     theirs = trainers.TorchTilesAlone(case.device, case)
@@ -178,7 +178,7 @@ def test_torch_trains_the_same_splats_where_nothing_is_random(tool, case):
 def test_the_walk_in_torch_is_as_wide_as_ours(tool, case):
     torch = pytest.importorskip("torch", reason="torch is not installed")
     faint = {**case.raw, "logits": np.full(case.count, -7.0, np.float32)}
-    walk = replace(case.settings, relocation=Relocation(first=30_000, noise=1.0))
+    walk = replace(case.settings, strategy=McmcSettings(first=30_000, noise=1.0))
     theirs = tool("bench.torch_trainer").TorchTrainer(faint, walk, extent=1.0)
     before = theirs._leaves["means"].detach().clone()
     theirs._shake(1.0)

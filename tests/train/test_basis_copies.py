@@ -9,9 +9,9 @@ from test_basis_parameters import COUNT, with_modes
 
 from rift_cl.basis.indices import graded
 from rift_cl.train.parameters import MORE, Parameters
-from rift_cl.train.settings import Densification, Relocation
-from rift_cl.train.strategy.densify import densify
-from rift_cl.train.strategy.relocation import relocate, relocate_densities
+from rift_cl.train.strategy.default import DefaultSettings, densify
+from rift_cl.train.strategy.mcmc import relocate
+from rift_cl.train.strategy.xray import relocate_densities
 from rift_cl.train.views.quaternions import rotated
 
 
@@ -21,7 +21,7 @@ def test_splats_that_share_a_place_have_the_depth_of_the_one_before(device):
     raw["logits"] = np.linspace(-2, 6, 60).astype(np.float32)
     raw["logits"][:9] = -9
     before = Parameters.of(device, raw, step=600, amplitude=True)
-    after = relocate(before, Relocation(), most=60, seed=1, growth=0.0)
+    after = relocate(before, min_opacity=0.005, most=60, seed=1, growth=0.0)
     assert after.amplitude
     new = after.host()[0]
     assert np.array_equal(new["log_scales"][9:], raw["log_scales"][9:])
@@ -72,7 +72,7 @@ def test_halves_of_x_ray_splats_keep_all_moments_to_the_third(device, order):
     raw["logits"] = np.linspace(0, 1, 12).astype(np.float32)
     raw["logits"][:3] = -40
     before = Parameters.of(device, raw, step=100, density=True)
-    after = relocate_densities(before, Relocation(faint=0.05), np.ones(12, np.float32), seed=4)
+    after = relocate_densities(before, np.ones(12, np.float32), min_mass=0.05, seed=4)
     new = after.host()[0]
     assert (new["logits"] > -10).all()
     one, other = moments_of(raw, 3), moments_of(new, 3)
@@ -88,7 +88,7 @@ def test_clones_copy_modes_and_lobes(device):
     statistics = np.zeros((COUNT, 3), np.float32)
     statistics[:5, :2] = 1.0
     after = densify(
-        parameters, statistics, Densification(), extent=1.0, most=100, seed=0, prune_large=False
+        parameters, statistics, DefaultSettings(), extent=1.0, most=100, seed=0, prune_large=False
     )
     new, first, _ = after.host()
     grown = len(after) - COUNT
@@ -106,7 +106,7 @@ def test_splats_without_finite_modes_are_pruned(device):
     raw["logits"][:] = 1
     raw["shape_modes"][7, 2] = np.nan
     after = densify(
-        Parameters.of(device, raw, step=600), np.zeros((COUNT, 3), np.float32), Densification(),
+        Parameters.of(device, raw, step=600), np.zeros((COUNT, 3), np.float32), DefaultSettings(),
         extent=1.0, most=100, seed=0, prune_large=False,
     )  # fmt: skip
     assert len(after) == COUNT - 1

@@ -13,8 +13,8 @@ from rift_cl.splat.orders import count_of
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.settings import Relocation
 from rift_cl.train.start.points import random_points, start_splats
+from rift_cl.train.strategy import DefaultSettings, McmcSettings
 from rift_cl.train.trainer import Trainer
 from rift_cl.train.xray.trainer import XrayTrainer, xray_settings
 
@@ -22,20 +22,20 @@ STEPS = 30
 BOTH = BasisSettings("hermite", 1, 1, first=0, ridge=0)
 KINDS = {
     "shape": {"basis": BasisSettings("hermite", 2, 0, first=0.2, every=0.2)},
-    "color": {"basis": BasisSettings("laguerre", 0, 1, first=0.2), "strategy": "default"},
+    "color": {"basis": BasisSettings("laguerre", 0, 1, first=0.2), "strategy": DefaultSettings()},
     "exp": {"basis": BasisSettings("hermite", 1, 1, "exp", first=0.2)},
     "square": {"basis": BasisSettings(activation="square")},
     "settled": {"basis": replace(BOTH, least=0.05, settle=0.5)},
     "lg": {"angular": AngularSettings("lg", 5, first=0.2)},
-    "asg": {"angular": AngularSettings("asg", 2, first=0.2), "strategy": "default"},
+    "asg": {"angular": AngularSettings("asg", 2, first=0.2), "strategy": DefaultSettings()},
 }
 
 
 def trainer_of(device, kind, ball=None, **more):
     pictures = ball or Ball(device)
     raw = start_splats(random_points(pictures.cameras, 60, 1), None, seed=1)
-    relocation = Relocation(first=10, every=10)
-    settings = replace(SETTINGS, steps=STEPS, splats=80, relocation=relocation, **KINDS[kind])
+    strategy = McmcSettings(first=10, every=10)
+    settings = replace(SETTINGS, steps=STEPS, splats=80, **({"strategy": strategy} | KINDS[kind]))
     return Trainer(pictures, Parameters.of(device, raw), replace(settings, **more))
 
 
@@ -114,12 +114,12 @@ def test_settled_splats_are_gaussians_for_good(device):
         raw = trainer.parameters.host()[0]
         return np.sqrt((raw["shape_modes"] ** 2).sum(1) + (raw["color_modes"] ** 2).sum((1, 2)))
 
-    ball, still = Ball(device), Relocation(first=STEPS)
-    free = trainer_of(device, "settled", ball, relocation=still, basis=BOTH)
+    ball, still = Ball(device), McmcSettings(first=STEPS)
+    free = trainer_of(device, "settled", ball, strategy=still, basis=BOTH)
     run_to(free, 15)
     least = float(np.median(norms(free)))
     basis = replace(BOTH, least=least, settle=0.5)
-    trainer = trainer_of(device, "settled", ball, relocation=still, basis=basis)
+    trainer = trainer_of(device, "settled", ball, strategy=still, basis=basis)
     run_to(trainer, 15)
     held = norms(trainer) == 0
     assert 20 < held.sum() < 40 and (norms(trainer)[~held] > least).all()

@@ -8,9 +8,10 @@ from test_start import ring
 
 from rift_cl.errors import InputError
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
-from rift_cl.train.settings import Densification, Rates, TrainSettings
+from rift_cl.train.settings import LearningRates, TrainSettings
 from rift_cl.train.start.lobes import lobe_axes
 from rift_cl.train.start.points import focus_of
+from rift_cl.train.strategy import DefaultSettings
 
 NAN = float("nan")
 
@@ -34,8 +35,8 @@ NAN = float("nan")
         (AngularSettings, {"modes": 0}, "modes is 0, wanted 1 to 35"),
         (AngularSettings, {"kind": "sg", "modes": 36}, "modes is 36"),
         (AngularSettings, {"first": -0.1}, "first is -0.1"),
-        (Rates, {"shape_modes": -1}, "shape_modes is -1"),
-        (Rates, {"lobes": NAN}, "lobes is nan"),
+        (LearningRates, {"shape_modes": -1}, "shape_modes is -1"),
+        (LearningRates, {"lobes": NAN}, "lobes is nan"),
     ],
 )
 def test_what_is_out_of_range_is_named(kind, changes, words):
@@ -44,11 +45,11 @@ def test_what_is_out_of_range_is_named(kind, changes, words):
 
 
 def test_magnitudes_of_gradients_are_for_plain_splats():
-    sums = Densification(absgrad=True)
-    assert TrainSettings(strategy="default", densification=sums).basis.plain
+    sums = DefaultSettings(absgrad=True)
+    assert TrainSettings(strategy=sums).basis.plain
     for basis in (BasisSettings("hermite", 1), BasisSettings(activation="exp")):
         with pytest.raises(InputError, match="absgrad wants magnitudes"):
-            TrainSettings(strategy="default", densification=sums, basis=basis)
+            TrainSettings(strategy=sums, basis=basis)
 
 
 def test_orders_join_one_after_the_other():

@@ -8,8 +8,7 @@ from test_parameters import raw_values
 
 from rift_cl.reference.splat_projection import covariances
 from rift_cl.train.parameters import GROUPS, Parameters
-from rift_cl.train.settings import Densification
-from rift_cl.train.strategy.densify import densify, reset_opacities
+from rift_cl.train.strategy.default import DefaultSettings, densify, reset_opacities
 
 COUNT = 60
 SMALL, LARGE = np.log(0.005), np.log(0.05)
@@ -40,7 +39,7 @@ def statistics_of(pulled, count=COUNT, radius=0.01):
 
 def densified(parameters, statistics, settings=None, **changes):
     options = {"extent": 1.0, "most": 10_000, "seed": 3, "prune_large": True} | changes
-    settings = settings or Densification(large_on_screen=0.15)
+    settings = settings or DefaultSettings(prune_screen_size=0.15)
     return densify(parameters, statistics, settings, **options)
 
 
@@ -108,7 +107,7 @@ def test_what_is_faint_or_too_large_is_gone(device):
     assert same(after.host()[0], raw, slice(None), np.setdiff1d(np.arange(COUNT), gone))
     early = densified(parameters_of(device, raw), table, prune_large=False)
     assert same(early.host()[0], raw, slice(None), np.arange(4, COUNT))
-    anywhere = densified(parameters_of(device, raw), table, Densification())
+    anywhere = densified(parameters_of(device, raw), table, DefaultSettings())
     assert len(anywhere) == COUNT - 7
 
 
@@ -206,7 +205,7 @@ def test_the_same_seed_and_step_give_the_same_bits(device):
 def test_revised_opacities_hide_together_what_one_did(device, size):
     raw = raw_of(size)
     raw["logits"][:3] = -5, 0, 80
-    settings = Densification(revised_opacity=True)
+    settings = DefaultSettings(revised_opacity=True)
     after = densified(parameters_of(device, raw), statistics_of([0, 1, 2]), settings)
     new = after.host()[0]
     pairs = new["logits"][[COUNT, COUNT + 1, COUNT + 2]].astype(float)

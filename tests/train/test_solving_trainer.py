@@ -13,13 +13,14 @@ from rift_cl.train.basis_settings import BasisSettings
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import start_splats
+from rift_cl.train.strategy import XraySettings
 from rift_cl.train.xray.solve_settings import SolveSettings
 from rift_cl.train.xray.trainer import XrayTrainer, xray_settings
 
 STEPS = 24
 
 
-def trainer_of(device, pictures, *, rows, every=5, **more):
+def trainer_of(device, pictures, *, rows, every=5, first=4, **more):
     random = np.random.default_rng(2)
     means = random.uniform(-8, 8, (30, 3)) * (1, 1, rows > 1)
     raw = start_splats(means, np.ones((30, 3)), seed=1)
@@ -33,11 +34,11 @@ def trainer_of(device, pictures, *, rows, every=5, **more):
         solve=SolveSettings(every, views=4),
     )
     # Relocated between solves and just before one.
-    relocation = replace(settings.relocation, first=4, every=6, faint=0.5)
+    strategy = XraySettings(first=first, every=6, min_mass=0.5)
     return XrayTrainer(
         pictures,
         Parameters.of(device, raw, density=True),
-        replace(settings, relocation=relocation),
+        replace(settings, strategy=strategy),
         DRAWING,
         flat=rows == 1,
     )
@@ -72,11 +73,7 @@ def test_a_fit_goes_on_from_any_state_to_the_same_bits(device, rows, more):
 
 def test_between_solves_densities_stay_and_the_last_one_ends_the_fit(device):
     pictures = pictures_of(device, scene(0))
-    trainer = trainer_of(device, pictures, rows=SIZE, every=10)
-    trainer.settings = replace(
-        trainer.settings, relocation=replace(trainer.settings.relocation, first=STEPS)
-    )
-    trainer.strategy.settings = trainer.settings
+    trainer = trainer_of(device, pictures, rows=SIZE, every=10, first=STEPS)
 
     def densities():
         return trainer.parameters.host()[0]["logits"].copy()
@@ -102,7 +99,12 @@ def test_solves_serve_short_fits(device):
 
 
 def test_settings_say_what_moves():
-    assert xray_settings(steps=9, seed=0, splats=1, exponent=0.0).rates.logits > 0
+    assert xray_settings(steps=9, seed=0, splats=1, exponent=0.0).learning_rates.logits > 0
     solving = xray_settings(steps=9, seed=0, splats=1, exponent=0.0, solve=SolveSettings(3))
-    assert solving.rates.logits == solving.rates.shape_modes == 0 < solving.rates.means
+    assert (
+        solving.learning_rates.logits
+        == solving.learning_rates.shape_modes
+        == 0
+        < solving.learning_rates.means
+    )
     assert TrainSettings().solve == SolveSettings(0)

@@ -13,19 +13,18 @@ from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.loss.image_loss import ImageLoss
 from rift_cl.train.parameters import GROUPS, Parameters
-from rift_cl.train.settings import Densification, Relocation, TrainSettings
+from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import random_points, scene_extent, start_splats
-from rift_cl.train.strategy.default import DefaultStrategy
-from rift_cl.train.strategy.mcmc import strategy_of
+from rift_cl.train.strategy import DefaultSettings, DefaultStrategy, McmcSettings, TrainingRun
 
 RATES = {"means": 1e-3, "quats": 1e-3, "log_scales": 5e-3, "logits": 5e-2, "sh": 2.5e-3}
-MCMC = TrainSettings(
-    steps=40, splats=90, strategy="mcmc", finish=0.25, relocation=Relocation(first=10, every=5)
-)
+MCMC = TrainSettings(steps=40, splats=90, cooldown=0.25, strategy=McmcSettings(first=10, every=5))
 # The scene is as large as its extent and its splats are few, so that size prunes none.
-HOW = Densification(every=5, first=0.2, last=0.8, reset=0.1, reset_least=12, gradient=3e-5, large=1)
-DEFAULT = TrainSettings(steps=40, splats=300, strategy="default", densification=HOW)
-ABSGRAD = replace(DEFAULT, densification=replace(HOW, absgrad=True, gradient=1e-4))
+HOW = DefaultSettings(
+    every=5, first=0.2, last=0.8, reset=0.1, min_reset=12, grow_gradient=3e-5, prune_scale=1
+)
+DEFAULT = TrainSettings(steps=40, splats=300, strategy=HOW)
+ABSGRAD = replace(DEFAULT, strategy=replace(HOW, absgrad=True, grow_gradient=1e-4))
 
 
 @pytest.fixture
@@ -41,15 +40,16 @@ def begun(ball, settings):
 
 
 def with_strategy(ball, settings, parameters):
-    finish = round(settings.steps * (1 - settings.finish))
+    cooldown = round(settings.steps * (1 - settings.cooldown))
     extent = scene_extent(ball.cameras)
-    return parameters, strategy_of(settings, parameters, extent=extent, finish=finish)
+    run = TrainingRun(settings.steps, settings.splats, settings.seed, extent, cooldown)
+    return parameters, settings.strategy.begin(parameters, run)
 
 
 def run(ball, parameters, strategy, steps):
     """A trainer's loop; the parameters, and how many splats there were after each step."""
     device, sizes = ball.device, []
-    renderer = Renderer(strategy.drawing(SplatSettings()), device=device)
+    renderer = Renderer(strategy.render_settings(SplatSettings()), device=device)
     for step in range(parameters.step, parameters.step + steps):
         number = step % len(ball.cameras)
         frame = renderer.forward(
@@ -57,7 +57,14 @@ def run(ball, parameters, strategy, steps):
         )
         by_image = ImageLoss(ssim_weight=0)(device, frame.image, ball.target(number))[1]
         gradients = renderer.backward(frame, by_image)
-        parameters.update(gradients, RATES, sh_rest=0.2, **strategy.before_step(step))
+        penalties = strategy.penalties(step)
+        parameters.update(
+            gradients,
+            RATES,
+            sh_rest=0.2,
+            opacity_penalty=penalties.opacity,
+            scale_penalty=penalties.scale,
+        )
         parameters = strategy.after_step(parameters, frame, gradients, RATES["means"])
         sizes.append(len(parameters))
     return parameters, sizes
@@ -85,7 +92,7 @@ def test_a_short_run_gets_all_its_splats_by_its_middle(ball):
     _, sizes = run(ball, *begun(ball, replace(MCMC, splats=200)), 30)
     assert sizes[8] == 60 and 60 < sizes[9] < sizes[14] < 200
     assert sizes[19] == 200 == sizes[-1]
-    still = replace(MCMC, splats=200, relocation=replace(MCMC.relocation, growth=0))
+    still = replace(MCMC, splats=200, strategy=replace(MCMC.strategy, growth=0))
     assert run(ball, *begun(ball, still), 30)[1] == [60] * 30
 
 
@@ -123,22 +130,22 @@ def test_opacities_are_reset_and_come_back(ball):
 @pytest.mark.parametrize(
     ("steps", "how", "wanted"),
     [
-        (30_000, Densification(), 3000),
-        (2000, Densification(reset_least=700), 700),
-        (2000, Densification(reset=0.0), 0),
+        (30_000, DefaultSettings(), 3000),
+        (2000, DefaultSettings(min_reset=700), 700),
+        (2000, DefaultSettings(reset=0.0), 0),
     ],
 )
 def test_resets_scale_with_the_run_but_leave_time_to_come_back(ball, steps, how, wanted):
-    settings = TrainSettings(steps=steps, strategy="default", densification=how)
+    settings = TrainSettings(steps=steps, strategy=how)
     strategy = begun(ball, settings)[1]
     assert isinstance(strategy, DefaultStrategy) and strategy.reset_every == wanted
 
 
-def test_penalties_end_with_the_finish_and_densification_has_none(ball):
+def test_penalties_end_with_the_cooldown_and_densification_has_none(ball):
     chain, densify = begun(ball, MCMC)[1], begun(ball, DEFAULT)[1]
-    assert chain.before_step(29) == {"opacity_penalty": 0.01, "scale_penalty": 0.01}
-    assert set(chain.before_step(30).values()) == {0.0}
-    assert all(set(densify.before_step(step).values()) == {0.0} for step in (0, 29, 39))
+    assert chain.penalties(29) == (0.01, 0.01)
+    assert chain.penalties(30) == (0, 0)
+    assert all(densify.penalties(step) == (0, 0) for step in (0, 29, 39))
 
 
 def test_densification_shakes_nothing(ball):
@@ -157,8 +164,8 @@ def test_only_absgrad_asks_for_another_drawing(ball):
     plain, magnitudes = SplatSettings(eps2d=0.1), SplatSettings(eps2d=0.1, absgrad=True)
     for settings, wanted in ((MCMC, plain), (DEFAULT, plain), (ABSGRAD, magnitudes)):
         strategy = begun(ball, settings)[1]
-        assert strategy.drawing(plain) == wanted
-        assert strategy.drawing(magnitudes) == magnitudes
+        assert strategy.render_settings(plain) == wanted
+        assert strategy.render_settings(magnitudes) == magnitudes
 
 
 def test_statistics_of_other_splats_are_found_at_the_next_step(ball):
@@ -168,10 +175,10 @@ def test_statistics_of_other_splats_are_found_at_the_next_step(ball):
         run(ball, parameters, strategy, 1)
 
 
-def test_densities_are_left_to_markov_chains(ball):
+def test_densities_are_not_densified(ball):
     raw = start_splats(random_points(ball.cameras, 60, 1), None, seed=1)
     densities = Parameters.of(ball.device, raw, density=True)
-    with pytest.raises(InputError, match="wants opacities"):
+    with pytest.raises(InputError, match="for splats with opacities"):
         with_strategy(ball, DEFAULT, densities)
 
 

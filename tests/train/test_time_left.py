@@ -15,17 +15,17 @@ from rift_cl.commands.progress_bar import Pace
 from rift_cl.progress import Report
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.settings import Relocation, TrainSettings
+from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import start_splats
-from rift_cl.train.strategy.mcmc import McmcStrategy
+from rift_cl.train.strategy import McmcSettings, McmcStrategy, TrainingRun
 from rift_cl.train.trainer import Trainer
 
 
 def trained(device, **more):
     """A small fit: its reports, and how many splats each of its steps had."""
-    relocation = Relocation(first=20, every=10, growth=0.3)
+    strategy = McmcSettings(first=20, every=10, growth=0.3)
     more = {"sh_degree": 0, **more}
-    settings = TrainSettings(steps=120, splats=80, relocation=relocation, **more)
+    settings = TrainSettings(steps=120, splats=80, strategy=strategy, **more)
     points = np.random.default_rng(0).uniform(-0.5, 0.5, (25, 3))
     trainer = Trainer(
         Ball(device),
@@ -75,7 +75,7 @@ def test_the_time_left_is_within_a_quarter_from_a_tenth_of_the_run_on(
 ):
     """Whatever pixels, splats and harmonics cost; kernels are built, and other programs run."""
     most = 8000
-    chain = McmcStrategy(TrainSettings(steps=steps, splats=most), finish=steps)
+    chain = McmcStrategy(McmcSettings(), TrainingRun(steps, most, 0, 1.0, steps))
     runs = chain.forecast(0, first)
     counts = np.concatenate([np.full(length, count) for length, count in runs])
     degrees = np.minimum(np.arange(steps) // 500, 3)

@@ -13,8 +13,9 @@ from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import GROUPS, Parameters
 from rift_cl.train.schedule import Schedule
-from rift_cl.train.settings import Relocation, TrainSettings
+from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import hull_points, random_points, start_splats
+from rift_cl.train.strategy import McmcSettings
 from rift_cl.train.trainer import Trainer
 
 MIDDLE = np.array([0.3, -0.2, 0.1])
@@ -24,7 +25,7 @@ SETTINGS = TrainSettings(
     sh_degree=1,
     sh_every=40,
     seed=3,
-    relocation=Relocation(first=40, every=20),
+    strategy=McmcSettings(first=40, every=20),
 )
 
 
@@ -93,10 +94,10 @@ def test_every_picture_is_looked_at_once_before_any_is_again(device):
     assert order[:8] != order[8:16]
 
 
-def test_rates_fall_and_fade_in_the_finish():
-    schedule = Schedule(TrainSettings(steps=1000, finish=0.2), extent=2.0)
-    assert schedule.finish == 800
-    first, middle, last = (schedule.rates(step) for step in (0, 800, 1000))
+def test_learning_rates_fall_and_fall_further_in_the_cooldown():
+    schedule = Schedule(TrainSettings(steps=1000, cooldown=0.2), extent=2.0)
+    assert schedule.cooldown == 800
+    first, middle, last = (schedule.learning_rates(step) for step in (0, 800, 1000))
     assert first["means"] == pytest.approx(2 * 1.6e-4)
     assert middle["means"] == pytest.approx(0.01 * first["means"])
     assert middle["logits"] == first["logits"]
@@ -125,7 +126,7 @@ def test_the_hull_is_where_every_mask_agrees():
         ({"splats": 1.5}, "splats is 1.5"),
         ({"sh_degree": 5}, "sh_degree is 5"),
         ({"ssim_weight": 1.2}, "ssim_weight is 1.2"),
-        ({"finish": float("nan")}, "finish is nan"),
+        ({"cooldown": float("nan")}, "cooldown is nan"),
         ({"seed": -1}, "seed is -1"),
     ],
 )

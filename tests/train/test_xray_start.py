@@ -12,14 +12,13 @@ from rift_cl.errors import InputError
 from rift_cl.reference.splat_projection import covariances
 from rift_cl.splat import Renderer, Splats, SplatSettings
 from rift_cl.train.parameters import GROUPS, Parameters
-from rift_cl.train.settings import Relocation, TrainSettings
 from rift_cl.train.start.xray import density_splats
-from rift_cl.train.strategy.default import XrayStrategy
-from rift_cl.train.strategy.mcmc import strategy_of
-from rift_cl.train.strategy.relocation import relocate, relocate_densities
+from rift_cl.train.strategy import DefaultSettings, McmcSettings, TrainingRun, XraySettings
+from rift_cl.train.strategy.mcmc import relocate
+from rift_cl.train.strategy.xray import relocate_densities
 from rift_cl.train.xray.voxels import Footprints
 
-RENEWAL = Relocation(faint=0.05)
+MIN_MASS = 0.05
 
 
 def gaussians(count=12, flat=False):
@@ -129,7 +128,7 @@ def moments_of(parameters):
 
 def test_halves_keep_mass_mean_and_spread(device):
     before = densities_of(device)
-    after = relocate_densities(before, RENEWAL, np.ones(60, np.float32), seed=4)
+    after = relocate_densities(before, np.ones(60, np.float32), min_mass=MIN_MASS, seed=4)
     assert len(after) == 60 and after.density and after.step == 100
     for one, other in zip(moments_of(before), moments_of(after), strict=True):
         np.testing.assert_allclose(one, other, rtol=2e-3, atol=2e-3 * np.abs(one).max())
@@ -141,19 +140,27 @@ def test_halves_keep_mass_mean_and_spread(device):
 
 def test_splats_that_nothing_pulls_at_are_not_halved(device):
     before, pull = densities_of(device), np.zeros(60, np.float32)
-    assert relocate_densities(before, RENEWAL, pull, seed=4) is before
+    assert relocate_densities(before, pull, min_mass=MIN_MASS, seed=4) is before
     pull[30:33] = 1, 2, np.nan
-    after = relocate_densities(before, RENEWAL, pull, seed=4)
+    after = relocate_densities(before, pull, min_mass=MIN_MASS, seed=4)
     moved = (before.host()[0]["means"] != after.host()[0]["means"]).any(axis=1)
     assert np.flatnonzero(moved).tolist() == [0, 1, 30, 31]
 
 
 def test_opacities_and_densities_are_not_taken_for_each_other(device):
     densities = densities_of(device)
+    opacities = replace(densities, density=False)
     with pytest.raises(InputError, match="wanted opacities"):
-        relocate(densities, RENEWAL, most=60, seed=0, growth=0.0)
+        relocate(densities, min_opacity=0.05, most=60, seed=0, growth=0.0)
     with pytest.raises(InputError, match="wanted densities"):
-        relocate_densities(replace(densities, density=False), RENEWAL, np.ones(60), seed=0)
-    strategy = strategy_of(TrainSettings(), densities, extent=1.0, finish=10)
-    assert isinstance(strategy, XrayStrategy)
-    assert set(strategy.before_step(0).values()) == {0.0}
+        relocate_densities(opacities, np.ones(60), min_mass=MIN_MASS, seed=0)
+
+
+def test_each_strategy_says_which_splats_it_is_for(device):
+    densities, run = densities_of(device), TrainingRun(100, 60, 0, 1.0, 90)
+    for settings in (McmcSettings(), DefaultSettings()):
+        with pytest.raises(InputError, match="use 'xray'"):
+            settings.begin(densities, run)
+    with pytest.raises(InputError, match="use 'mcmc' or 'default'"):
+        XraySettings().begin(replace(densities, density=False), run)
+    assert not any(XraySettings().begin(densities, run).penalties(0))

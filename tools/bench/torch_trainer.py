@@ -18,6 +18,7 @@ from bench.torch_tiles import draw, flushed_denormals, on_threads
 from rift_cl.geometry import Camera
 from rift_cl.train.schedule import Schedule
 from rift_cl.train.settings import TrainSettings
+from rift_cl.train.strategy import McmcSettings
 
 _BETAS, _EPSILON = (0.9, 0.999), 1e-15
 _WINDOW, _SIGMA = 11, 1.5
@@ -30,7 +31,7 @@ class TorchTrainer:
 
     Args:
         raw: first splats before their activations, as ``Parameters.of`` takes them.
-        settings: of the run; what changes the number of splats is not done.
+        settings: of the run, with the MCMC strategy; splats are not relocated.
         extent: of the scene.
         threads: of torch; as many as it takes if None.
     """
@@ -45,6 +46,8 @@ class TorchTrainer:
     ) -> None:
         self._settings, self._schedule = settings, Schedule(settings, extent)
         self._threads, self._step = threads, 0
+        assert isinstance(settings.strategy, McmcSettings)
+        self._strategy = settings.strategy
         arrays = {name: torch.tensor(array) for name, array in raw.items()}
         sh = arrays.pop("sh")
         arrays |= {"sh": sh[:, :1].clone(), "sh_rest": sh[:, 1:].clone()}
@@ -65,13 +68,13 @@ class TorchTrainer:
             (loss + self._penalties(drawn)).backward()
             self._adam.step()
             self._step += 1
-            if self._step <= self._schedule.finish:
-                self._shake(self._settings.relocation.noise * rates["means"])
+            if self._step <= self._schedule.cooldown:
+                self._shake(self._strategy.noise * rates["means"])
             return float(loss.detach())
 
     def _set_rates(self) -> dict[str, float]:
-        rates = self._schedule.rates(self._step)
-        rates["sh_rest"] = rates["sh"] * self._settings.rates.sh_rest
+        rates = self._schedule.learning_rates(self._step)
+        rates["sh_rest"] = rates["sh"] * self._settings.learning_rates.sh_rest
         for group in self._adam.param_groups:
             group["lr"] = rates[group["name"]]
         return rates
@@ -87,11 +90,11 @@ class TorchTrainer:
         }
 
     def _penalties(self, drawn: Mapping[str, torch.Tensor]) -> torch.Tensor:
-        relocation = self._settings.relocation
-        if self._step >= self._schedule.finish:
+        if self._step >= self._schedule.cooldown:
             return torch.zeros(())
         opacity, scale = drawn["opacities"].mean(), drawn["scales"].mean()
-        return relocation.opacity_penalty * opacity + relocation.scale_penalty * scale
+        strategy = self._strategy
+        return strategy.opacity_penalty * opacity + strategy.scale_penalty * scale
 
     @torch.no_grad()
     def _shake(self, amount: float) -> None:

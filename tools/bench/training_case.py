@@ -30,7 +30,8 @@ from rift_cl.sample import ornament
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
 from rift_cl.train.parameters import Arrays, Parameters
-from rift_cl.train.settings import Relocation, TrainSettings
+from rift_cl.train.settings import TrainSettings
+from rift_cl.train.strategy import McmcSettings
 from rift_cl.train.trainer import Pictures, Trainer
 
 # Views that are looked at; each has its turn in every pass.
@@ -91,13 +92,13 @@ class TrainingCase:
 
     @cached_property
     def settings(self) -> TrainSettings:
-        """L1 and D-SSIM, Adam, penalties and the random walk of 3DGS as MCMC; no renewals."""
+        """L1 and D-SSIM, Adam, penalties and the random walk of 3DGS as MCMC; no relocation."""
         return TrainSettings(
             steps=_STEPS,
             splats=self.count,
             sh_degree=3,
             noise=0.0,
-            relocation=Relocation(first=_STEPS),
+            strategy=McmcSettings(first=_STEPS),
         )
 
     @cached_property

@@ -24,8 +24,8 @@ from bench.training_case import VIEWS, TrainingCase
 from bench.waits import Wait, each_wait
 from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.settings import Rates, Relocation
-from rift_cl.train.strategy.relocation import relocate
+from rift_cl.train.settings import LearningRates
+from rift_cl.train.strategy.mcmc import McmcSettings, relocate
 from rift_cl.train.trainer import Pictures, Trainer
 
 _STAGES = {
@@ -45,7 +45,7 @@ DECODING, UPLOAD = "decoding of the picture", "upload"
 # Share of the splats that have faded when the price of a renewal is taken.
 _FADED, _FADED_LOGIT = 0.05, -7.0
 # Fits of more than splats, whose waits are looked at as well.
-_REFINED = Rates(poses=1e-4, exposures=1e-3)
+_REFINED = LearningRates(poses=1e-4, exposures=1e-3)
 
 
 def stage_of(kernel: str) -> str:
@@ -172,7 +172,7 @@ def host_work(case: TrainingCase, *, passes: int) -> dict[str, Any]:
 
     Waits are those of plain steps, and for what poses and exposures ask when they are fitted too.
     """
-    refined = case.trainer(replace(case.settings, rates=_REFINED))
+    refined = case.trainer(replace(case.settings, learning_rates=_REFINED))
     plain = case.trainer()
     _pass(plain)
     busy, whole = [], []
@@ -189,14 +189,14 @@ def host_work(case: TrainingCase, *, passes: int) -> dict[str, Any]:
 
 
 def relocation_price(case: TrainingCase, *, passes: int) -> dict[str, Any]:
-    """What a renewal takes on the host where a share of the splats has faded, and of a step."""
-    settings, faded = Relocation(), int(_FADED * len(case.raw["means"]))
+    """What a relocation takes on the host where a share of the splats has faded, and of a step."""
+    settings, faded = McmcSettings(), int(_FADED * len(case.raw["means"]))
     logits = case.raw["logits"].copy()
     logits[:faded] = _FADED_LOGIT
     parameters = Parameters.of(case.device, {**case.raw, "logits": logits})
 
     def run() -> None:
-        relocate(parameters, settings, most=case.count, seed=0, growth=0.0)
+        relocate(parameters, min_opacity=settings.min_opacity, most=case.count, seed=0, growth=0.0)
         case.device.finish()
 
     run()

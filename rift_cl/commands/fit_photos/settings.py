@@ -13,7 +13,8 @@ from rift_cl.errors import InputError
 from rift_cl.splat.settings import Activation, Angular, SplatSettings
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
-from rift_cl.train.settings import Densification, Rates, TrainSettings
+from rift_cl.train.settings import LearningRates, TrainSettings
+from rift_cl.train.strategy import DefaultSettings, McmcSettings
 
 # Photographs from which on the ramp is used: with 8 to 36 it never gained, with 64 short fits did.
 ENOUGH_VIEWS = 40
@@ -123,14 +124,15 @@ class FitPhotosSettings(FitSettings):
             steps=self.steps,
             seed=self.seed,
             splats=self.splats,
-            strategy=self.strategy,
-            densification=Densification(absgrad=self.absgrad),
+            strategy=(
+                McmcSettings() if self.strategy == "mcmc" else DefaultSettings(absgrad=self.absgrad)
+            ),
             sh_degree=self.sh_degree,
             homogenisation=Homogenisation(self.exponent, weight=self.homogenise_by),
             band_limit=self.band_limit,
             basis=self._basis(),
             angular=AngularSettings(self.angular, 8 if self.modes is None else self.modes),
-            rates=Rates(
+            learning_rates=LearningRates(
                 poses=_POSE_RATE if self.refine_poses else 0.0,
                 exposures=_EXPOSURE_RATE if self.refine_exposures else 0.0,
             ),

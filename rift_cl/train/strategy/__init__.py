@@ -1,1 +1,55 @@
-"""Strategies: where splats come from and go to while they are trained."""
+"""Strategies: how splats are added, moved and removed while they are trained.
+
+Three come with the package, by the names of ``STRATEGIES``: ``mcmc`` relocates splats that have
+become transparent (3DGS as MCMC), ``default`` clones, splits and prunes (the original 3DGS), and
+``xray`` relocates X-ray splats, whose densities add up. ``protocol`` says how to write another.
+"""
+
+from __future__ import annotations
+
+from dataclasses import is_dataclass
+
+from rift_cl.errors import InputError
+from rift_cl.registry import Registry
+from rift_cl.train.strategy.default import DefaultSettings, DefaultStrategy
+from rift_cl.train.strategy.mcmc import McmcSettings, McmcStrategy
+from rift_cl.train.strategy.protocol import Penalties, Strategy, StrategySettings, TrainingRun
+from rift_cl.train.strategy.xray import XraySettings, XrayStrategy
+
+__all__ = [
+    "STRATEGIES",
+    "DefaultSettings",
+    "DefaultStrategy",
+    "McmcSettings",
+    "McmcStrategy",
+    "Penalties",
+    "Strategy",
+    "StrategySettings",
+    "TrainingRun",
+    "XraySettings",
+    "XrayStrategy",
+    "register_strategy",
+]
+
+STRATEGIES: Registry[type[StrategySettings]] = Registry(
+    "strategy", {"mcmc": McmcSettings, "default": DefaultSettings, "xray": XraySettings}
+)
+
+
+def register_strategy(name: str, settings: type[StrategySettings]) -> None:
+    """Make a strategy known by a name.
+
+    Args:
+        name: what saved settings call it.
+        settings: its settings: a dataclass derived from ``StrategySettings``, all of whose fields
+            have defaults.
+
+    Raises:
+        InputError: the name is taken, or the settings are no such class.
+    """
+    kinds = isinstance(settings, type), is_dataclass(settings)
+    if not (all(kinds) and issubclass(settings, StrategySettings)):
+        raise InputError(
+            f"register_strategy: {settings!r} is not a dataclass derived from StrategySettings"
+        )
+    STRATEGIES.add(name, settings)

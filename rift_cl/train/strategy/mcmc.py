@@ -1,160 +1,230 @@
-"""Where splats come from and go to while they are trained: one protocol, three ways.
+"""MCMC strategy: transparent splats are relocated, faint ones walk at random, the set grows.
 
-``McmcStrategy`` renews splats that have faded and lets faint ones walk at random (3DGS as MCMC);
-``DefaultStrategy`` clones, splits and prunes (3DGS as it was at first); ``XrayStrategy`` renews
-X-ray splats, whose densities add up. A trainer asks for penalties before each step of Adam and for
-the splats to go on with after it, and keeps ``state`` in checkpoints.
+3D Gaussian Splatting as Markov Chain Monte Carlo (Kheradmand et al. 2024): a transparent splat is
+put on top of one that is drawn by chance, in proportion to its opacity. The picture must not jump,
+so the k splats that now share a place get the opacity and scale with which they look together like
+the one before:
+
+    o' = 1 - (1 - o)^(1/k),    s' = s o / sum over i = 1..k, j = 0..i-1 of
+                                         binomial(i-1, j) (-1)^j o'^(j+1) / sqrt(j+1).
+
+Where densities are drawn as optical depths (``SplatSettings.activation``) depths add up: each of
+the k gets one k-th, which is the same o', and keeps its scale, whatever its modes. That is exact.
+
+Relocation is seldom, on the host, in NumPy; what is random comes from (seed, step) alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any, Protocol
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import comb
 
+import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.errors import InputError
 from rift_cl.splat.frame import Frame, FrameGradients
-from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.settings import TrainSettings
-from rift_cl.train.strategy.default import DefaultStrategy, XrayStrategy, check_names
-from rift_cl.train.strategy.relocation import grown, relocate
+from rift_cl.train.ranges import check_number, check_whole
+from rift_cl.train.strategy.protocol import Penalties, Strategy, StrategySettings, TrainingRun
 
-# A set of splats grows by no more than this at once.
+# A set of splats grows by no more than this share at once.
 _MOST_GROWTH = 1.0
+# More splats than this in one place share it like so many.
+_MOST_IN_PLACE = 51
+_OPACITY_EDGE = 1e-6
+
+Floats = NDArray[np.float64]
 
 
-class Strategy(Protocol):
-    """What changes the set of splats between steps.
-
-    Steps are counted by ``Parameters.step``: the first step of Adam makes it 1.
-    """
-
-    def drawing(self, drawing: SplatSettings) -> SplatSettings:
-        """How splats have to be drawn, so that gradients have all that is needed."""
-
-    def before_step(self, step: int) -> dict[str, float]:
-        """The penalties of a step, as ``Parameters.update`` takes them; ``step`` are taken."""
-
-    def after_step(
-        self, parameters: Parameters, frame: Frame, gradients: FrameGradients, rate: float
-    ) -> Parameters:
-        """The splats to go on with.
-
-        Args:
-            parameters: the splats after the step, the same ones in the same order as in the frame.
-            frame: what was drawn in the step.
-            gradients: of its loss.
-            rate: of the positions in the step.
-        """
-
-    def forecast(self, step: int, count: int) -> Iterator[tuple[int, int]]:
-        """How many splats the steps to come will have, as far as that is known.
-
-        Args:
-            step: how many steps were taken.
-            count: splats there are by now.
-
-        Yields:
-            Numbers of steps and of the splats that those have, up to the last step of the run.
-        """
-
-    def state(self) -> dict[str, NDArray[Any]]:
-        """What a checkpoint must hold besides parameters and settings: host arrays by name."""
-
-    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from ``state``, with the parameters of the same checkpoint from the next step on.
-
-        Raises:
-            CheckpointError: it is none of this strategy.
-        """
-
-
-def strategy_of(
-    settings: TrainSettings, parameters: Parameters, *, extent: float, finish: int
-) -> Strategy:
-    """The strategy of a run: for densities ``mcmc`` means ``XrayStrategy``.
-
-    Args:
-        settings: of the run.
-        parameters: the splats it begins or goes on with.
-        extent: of the scene.
-        finish: the step with which noise and penalties end.
+@dataclass(frozen=True)
+class McmcSettings(StrategySettings):
+    """Relocate transparent splats, with random walks and penalties (3DGS as MCMC).
 
     Raises:
-        InputError: the strategy cannot do with these splats.
+        InputError: a number is out of its range.
     """
-    if settings.strategy == "default":
-        return DefaultStrategy(settings, parameters, extent=extent)
-    if parameters.density:
-        return XrayStrategy(settings, parameters)
-    return McmcStrategy(settings, finish=finish)
+
+    every: int = 100
+    """Steps between two relocations."""
+    first: int = 500
+    """Step of the first relocation."""
+    last: float = 0.85
+    """Fraction of the run after which the number of splats no longer grows."""
+    growth: float = 0.05
+    """Fraction by which the number of splats grows at each relocation, up to the most that there
+    may be; more where the run is too short for it. 0 = the number stays."""
+    full: float = 0.5
+    """Fraction of the run after which the most splats that there may be should be there."""
+    min_opacity: float = 0.005
+    """Opacity up to which a splat counts as transparent and is relocated."""
+    noise: float = 5e5
+    """Step of the random walk of faint splats, as a multiple of the positions' learning rate."""
+    opacity_penalty: float = 0.01
+    """Weight of the mean opacity in the loss."""
+    scale_penalty: float = 0.01
+    """Weight of the mean scale in the loss, with scales in units of the scene."""
+
+    def __post_init__(self) -> None:
+        """Check every number's range."""
+        check_whole(self, "every", 1)
+        check_whole(self, "first", 0)
+        for name in ("last", "full", "min_opacity"):
+            check_number(self, name, most=1)
+        for name in ("growth", "noise", "opacity_penalty", "scale_penalty"):
+            check_number(self, name)
+
+    def begin(self, parameters: Parameters, run: TrainingRun) -> McmcStrategy:
+        """The strategy of a run; see ``StrategySettings``."""
+        if parameters.density:
+            raise InputError(
+                "TrainSettings: strategy 'mcmc' is for splats with opacities, and these have "
+                "densities: use 'xray'"
+            )
+        return McmcStrategy(self, run)
 
 
-class McmcStrategy:
-    """Faded splats are renewed, faint ones walk at random; see ``strategy.relocation``.
+class McmcStrategy(Strategy):
+    """Relocates transparent splats and moves faint ones at random.
 
     Args:
-        settings: of the run.
-        finish: the step with which noise and penalties end.
+        settings: when, and what counts as transparent.
+        run: the run that it serves.
     """
 
-    def __init__(self, settings: TrainSettings, *, finish: int) -> None:
+    def __init__(self, settings: McmcSettings, run: TrainingRun) -> None:
+        super().__init__(run)
         self.settings = settings
-        self.finish = finish
 
-    def drawing(self, drawing: SplatSettings) -> SplatSettings:
-        """As it is."""
-        return drawing
-
-    def before_step(self, step: int) -> dict[str, float]:
-        """Of opacities and scales, until the finish."""
-        relocation, on = self.settings.relocation, step < self.finish
-        return {
-            "opacity_penalty": relocation.opacity_penalty if on else 0.0,
-            "scale_penalty": relocation.scale_penalty if on else 0.0,
-        }
+    def penalties(self, step: int) -> Penalties:
+        """Of opacities and scales, until the cooldown."""
+        settings = self.settings
+        if step >= self.run.cooldown:
+            return Penalties()
+        return Penalties(settings.opacity_penalty, settings.scale_penalty)
 
     def after_step(
-        self, parameters: Parameters, frame: Frame, gradients: FrameGradients, rate: float
+        self,
+        parameters: Parameters,
+        frame: Frame,
+        gradients: FrameGradients,
+        learning_rate: float,
     ) -> Parameters:
-        """Relocated now and then, and shaken until the finish."""
-        settings, step, relocation = self.settings, parameters.step, self.settings.relocation
-        if step >= relocation.first and step % relocation.every == 0 and step < settings.steps:
+        """Relocated every few steps, and moved at random until the cooldown."""
+        settings, run, step = self.settings, self.run, parameters.step
+        if step >= settings.first and step % settings.every == 0 and step < run.steps:
             parameters = relocate(
                 parameters,
-                relocation,
-                most=settings.splats,
-                seed=settings.seed,
+                min_opacity=settings.min_opacity,
+                most=run.splats,
+                seed=run.seed,
                 growth=self._growth(step, len(parameters)),
             )
-        if step <= self.finish:
-            parameters.shake(relocation.noise * rate, settings.seed)
+        if step <= run.cooldown:
+            parameters.shake(settings.noise * learning_rate, run.seed)
         return parameters
 
     def forecast(self, step: int, count: int) -> Iterator[tuple[int, int]]:
         """Growth follows from the number of splats alone; see ``Strategy``."""
-        settings, every = self.settings, self.settings.relocation.every
-        next_one = every * (max(step, settings.relocation.first - 1) // every + 1)
-        for until in range(next_one, settings.steps, every):
+        run, every = self.run, self.settings.every
+        next_one = every * (max(step, self.settings.first - 1) // every + 1)
+        for until in range(next_one, run.steps, every):
             yield until - step, count
             step = until
-            count += grown(count, self._growth(until, count), settings.splats)
-        yield settings.steps - step, count
+            count += grown(count, self._growth(until, count), run.splats)
+        yield run.steps - step, count
 
     def _growth(self, step: int, count: int) -> float:
         """The usual growth, or what a short run needs to have all its splats in time."""
-        settings, relocation = self.settings, self.settings.relocation
-        if step >= settings.steps * relocation.last:
+        settings, run = self.settings, self.run
+        if step >= run.steps * settings.last:
             return 0.0
-        left = max(1, int(settings.steps * relocation.full - step) // relocation.every + 1)
-        needed = (settings.splats / count) ** (1 / left) - 1
-        return max(relocation.growth, min(needed, _MOST_GROWTH)) if relocation.growth else 0.0
+        left = max(1, int(run.steps * settings.full - step) // settings.every + 1)
+        needed = (run.splats / count) ** (1 / left) - 1
+        return max(settings.growth, min(needed, _MOST_GROWTH)) if settings.growth else 0.0
 
-    def state(self) -> dict[str, NDArray[Any]]:
-        """Nothing: all that is random comes from the seed and the step."""
-        return {}
 
-    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Check that there is nothing; see ``Strategy``."""
-        check_names(state, self.state())
+def relocate(
+    parameters: Parameters, *, min_opacity: float, most: int, seed: int, growth: float
+) -> Parameters:
+    """Relocate transparent splats and add new ones.
+
+    Args:
+        parameters: the splats; they are not changed.
+        min_opacity: opacity up to which a splat counts as transparent.
+        most: splats that there may be.
+        seed: random seed, used with the step.
+        growth: fraction by which their number grows, up to ``most``.
+
+    Returns:
+        Parameters in which Adam's moments of all splats that were touched are zero.
+
+    Raises:
+        InputError: the splats have densities; ``strategy.xray`` is for them.
+    """
+    if parameters.density:
+        raise InputError("relocate: these splats have densities, wanted opacities")
+    raw, first, second = parameters.host()
+    random = np.random.default_rng((seed, parameters.step, 0xA11))
+    opacities = _sigmoid(raw["logits"].astype(float))
+    faded = np.flatnonzero(opacities <= min_opacity)
+    alive = np.flatnonzero(opacities > min_opacity)
+    if alive.size == 0:
+        return parameters
+    added = grown(len(parameters), growth, most)
+    chance = opacities[alive] / opacities[alive].sum()
+    chosen = alive[random.choice(alive.size, faded.size + added, p=chance)]
+    shared = np.bincount(chosen, minlength=len(parameters))
+    _share(raw, opacities, shared, depths=parameters.amplitude)
+    places = np.concatenate([faded, np.arange(len(parameters), len(parameters) + added)])
+    touched = np.concatenate([places, np.flatnonzero(shared)])
+    for name in parameters.groups:
+        raw[name] = _extended(raw[name], added)
+        raw[name][places] = raw[name][chosen]
+        for moments in (first, second):
+            moments[name] = _extended(moments[name], added)
+            moments[name][touched] = 0
+    return parameters.replaced(raw, first, second)
+
+
+def grown(count: int, growth: float, most: int) -> int:
+    """Number of splats that a relocation adds to ``count``."""
+    return max(0, min(round(count * growth), most - count))
+
+
+def _share(
+    raw: dict[str, NDArray[np.float32]],
+    opacities: Floats,
+    shared: NDArray[np.int64],
+    *,
+    depths: bool,
+) -> None:
+    """Make splats share their place with as many others as fell on it."""
+    hosts = np.flatnonzero(shared)
+    count = np.minimum(shared[hosts] + 1, _MOST_IN_PLACE)
+    opacity = opacities[hosts]
+    each = 1 - (1 - opacity) ** (1 / count)
+    if not depths:
+        scale = opacity / np.array([_overlap(o, k) for o, k in zip(each, count, strict=True)])
+        raw["log_scales"][hosts] += np.log(scale)[:, None]
+    each = np.clip(each, _OPACITY_EDGE, 1 - _OPACITY_EDGE)
+    raw["logits"][hosts] = np.log(each / (1 - each))
+
+
+def _overlap(opacity: float, count: int) -> float:
+    """The double sum above: what ``count`` splats in one place hide on the whole."""
+    terms = (
+        comb(i - 1, j) * (-1) ** j * opacity ** (j + 1) / np.sqrt(j + 1)
+        for i in range(1, count + 1)
+        for j in range(i)
+    )
+    return float(sum(terms))
+
+
+def _extended(array: NDArray[np.float32], more: int) -> NDArray[np.float32]:
+    return np.concatenate([array, np.zeros((more, *array.shape[1:]), np.float32)])
+
+
+def _sigmoid(x: Floats) -> Floats:
+    return np.asarray(1 / (1 + np.exp(-x)))

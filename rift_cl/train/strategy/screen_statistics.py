@@ -1,4 +1,4 @@
-"""How much each splat would move on the screen, gathered over frames: what densification goes by.
+"""Screen-space gradients of each splat, gathered over frames: what densification goes by.
 
 ``kernels/train/splat_statistics.cl`` says what is computed; ``rift_cl.reference.training`` has its
 twin.
@@ -6,6 +6,7 @@ twin.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.device import Device
 from rift_cl.errors import CheckpointError, InputError
 from rift_cl.splat.frame import Frame, FrameGradients
+from rift_cl.train.strategy.protocol import Strategy, TrainingRun, check_names
 
 _COLUMNS = 3
 
@@ -38,7 +40,7 @@ class ScreenStatistics:
         return int(self._table.shape[0])
 
     def clear(self, count: int) -> None:
-        """Begin again with ``count`` splats that were never seen."""
+        """Begin again with ``count`` splats and no frames."""
         self._table = self.device.zeros((count, _COLUMNS))
 
     def add(self, frame: Frame, gradients: FrameGradients) -> None:
@@ -85,3 +87,25 @@ class ScreenStatistics:
         if not (np.isfinite(table).all() and (table >= 0).all()):
             raise CheckpointError("statistics hold numbers that are not finite or below zero")
         self._table = self.device.array(table)
+
+
+class StatisticsStrategy(Strategy):
+    """What strategies have in common that go by the statistics of splats on the screen.
+
+    Args:
+        run: the run that it serves.
+        statistics: of the splats that it begins with.
+    """
+
+    def __init__(self, run: TrainingRun, statistics: ScreenStatistics) -> None:
+        super().__init__(run)
+        self.statistics = statistics
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """The statistics since they were last cleared."""
+        return {"statistics": self.statistics.host()}
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from them; see ``Strategy``."""
+        check_names(state, ("statistics",))
+        self.statistics.restore(np.asarray(state["statistics"]))

@@ -18,15 +18,17 @@ from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.basis_settings import BasisSettings
 from rift_cl.train.loss.homogenisation import Homogenisation, WeightKind
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.settings import BandLimit, Rates, Relocation, TrainSettings
+from rift_cl.train.settings import BandLimit, LearningRates, TrainSettings
 from rift_cl.train.start.xray import FLAT
+from rift_cl.train.strategy import XraySettings
 from rift_cl.train.trainer import Pictures, Trainer
 from rift_cl.train.xray.density_solve import solve_densities
 from rift_cl.train.xray.solve_settings import SolveSettings
 
 # The start is near already, so that positions may move fast and need not slow down by much.
-RATES = Rates(means=6e-4, means_last=0.1, quats=2e-2, log_scales=2e-2, logits=4e-2, sh=0.0)
-RENEWAL = Relocation(first=100, every=100, last=0.7, faint=0.02)
+LEARNING_RATES = LearningRates(
+    means=6e-4, means_last=0.1, quats=2e-2, log_scales=2e-2, logits=4e-2, sh=0.0
+)
 # Of modes, in a loss of squares that is far smaller than that of photographs.
 RIDGE = 1e-5
 
@@ -57,7 +59,9 @@ def xray_settings(
             are, which serves better than moving them by Adam as well.
     """
     solve = solve or SolveSettings()
-    rates = replace(RATES, logits=0.0, shape_modes=0.0) if solve.every else RATES
+    rates = LEARNING_RATES
+    if solve.every:
+        rates = replace(rates, logits=0.0, shape_modes=0.0)
     return TrainSettings(
         steps=steps,
         seed=seed,
@@ -67,8 +71,8 @@ def xray_settings(
         ssim_weight=0.0,
         homogenisation=Homogenisation(exponent, along_rows=True, weight=weight),
         band_limit=band_limit,
-        rates=rates,
-        relocation=RENEWAL,
+        learning_rates=rates,
+        strategy=XraySettings(),
         basis=basis or BasisSettings(),
         solve=solve,
     )

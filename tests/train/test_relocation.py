@@ -1,4 +1,4 @@
-"""Faded splats find new places, and the picture hardly notices."""
+"""MCMC relocation: transparent splats find new places, and the picture hardly changes."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from test_parameters import raw_values
 from rift_cl.geometry import Camera
 from rift_cl.splat.renderer import Renderer
 from rift_cl.train.parameters import GROUPS, Parameters
-from rift_cl.train.settings import Relocation
-from rift_cl.train.strategy.relocation import relocate
+from rift_cl.train.strategy.mcmc import McmcSettings, relocate
+
+MIN_OPACITY = McmcSettings().min_opacity
 
 
 def parameters_of(device, count=200, faded=40):
@@ -32,7 +33,7 @@ def image_of(device, parameters):
 
 def test_faded_splats_move_onto_others(device):
     before = parameters_of(device)
-    after = relocate(before, Relocation(), most=200, seed=3, growth=0.0)
+    after = relocate(before, min_opacity=MIN_OPACITY, most=200, seed=3, growth=0.0)
     old, new = before.host()[0], after.host()[0]
     assert len(after) == 200 and after.step == 600
     moved = (new["means"] != old["means"]).any(axis=1)
@@ -44,7 +45,7 @@ def test_faded_splats_move_onto_others(device):
 
 def test_the_picture_stays(device):
     before = parameters_of(device)
-    after = relocate(before, Relocation(), most=200, seed=3, growth=0.0)
+    after = relocate(before, min_opacity=MIN_OPACITY, most=200, seed=3, growth=0.0)
     first, second = image_of(device, before), image_of(device, after)
     jump = np.abs(first - second).mean() / first.mean()
     # A host that only halved its opacity would lose much more.
@@ -54,15 +55,15 @@ def test_the_picture_stays(device):
 def test_the_set_grows_to_its_size_and_no_further(device):
     parameters, sizes = parameters_of(device, faded=0), []
     for _ in range(5):
-        parameters = relocate(parameters, Relocation(), most=230, seed=3, growth=0.1)
+        parameters = relocate(parameters, min_opacity=MIN_OPACITY, most=230, seed=3, growth=0.1)
         sizes.append(len(parameters))
     assert sizes == [220, 230, 230, 230, 230]
-    assert len(relocate(parameters, Relocation(), most=400, seed=3, growth=0.0)) == 230
+    assert len(relocate(parameters, min_opacity=MIN_OPACITY, most=400, seed=3, growth=0.0)) == 230
 
 
 def test_moments_of_what_was_touched_begin_again(device):
     before = parameters_of(device)
-    after = relocate(before, Relocation(), most=210, seed=3, growth=0.05)
+    after = relocate(before, min_opacity=MIN_OPACITY, most=210, seed=3, growth=0.05)
     old, new = before.host()[0], after.host()
     hosts = np.flatnonzero((new[0]["logits"][:200] != old["logits"])[40:]) + 40
     assert hosts.size > 10
@@ -76,7 +77,7 @@ def test_moments_of_what_was_touched_begin_again(device):
 
 def test_the_same_seed_and_step_choose_the_same(device):
     runs = [
-        relocate(parameters_of(device), Relocation(), most=300, seed=seed, growth=0.05)
+        relocate(parameters_of(device), min_opacity=MIN_OPACITY, most=300, seed=seed, growth=0.05)
         for seed in (3, 3, 4)
     ]
     first, second, other = (run.host()[0] for run in runs)
@@ -86,4 +87,6 @@ def test_the_same_seed_and_step_choose_the_same(device):
 
 def test_nothing_alive_means_nothing_to_do(device):
     parameters = parameters_of(device, 40, 40)
-    assert relocate(parameters, Relocation(), most=100, seed=0, growth=0.05) is parameters
+    assert (
+        relocate(parameters, min_opacity=MIN_OPACITY, most=100, seed=0, growth=0.05) is parameters
+    )

@@ -1,0 +1,86 @@
+"""Things known by a name, which a user can add to without editing the package.
+
+Filters, losses, angular bases and strategies are each one ``Registry``. Adding an entry holds for
+the running process: import the module that adds it before its name is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Generic, TypeVar
+
+from rift_cl.errors import InputError
+
+T = TypeVar("T")
+
+
+class Registry(Generic[T]):
+    """Entries by name, in the order in which they were added.
+
+    Args:
+        kind: what an entry is, in the words of error messages: "strategy", say.
+        entries: what the package comes with.
+    """
+
+    def __init__(self, kind: str, entries: Mapping[str, T]) -> None:
+        self.kind = kind
+        self._entries = dict(entries)
+
+    def add(self, name: str, entry: T) -> None:
+        """Add an entry.
+
+        Raises:
+            InputError: the name is empty, no text, or taken.
+        """
+        if not isinstance(name, str) or not name:
+            raise InputError(f"the name of a {self.kind} is {name!r}, wanted a text")
+        if name in self._entries:
+            raise InputError(
+                f"a {self.kind} named {name!r} is registered already: choose another name"
+            )
+        self._entries[name] = entry
+
+    def remove(self, name: str) -> None:
+        """Remove an entry.
+
+        Raises:
+            InputError: there is none of that name.
+        """
+        self[name]
+        del self._entries[name]
+
+    def __getitem__(self, name: str) -> T:
+        """The entry of a name.
+
+        Raises:
+            InputError: there is none.
+        """
+        if not isinstance(name, str) or name not in self._entries:
+            raise InputError(f"{self.kind} is {name!r}, wanted one of {', '.join(self)}")
+        return self._entries[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._entries
+
+    def __iter__(self) -> Iterator[str]:
+        """The names."""
+        return iter(tuple(self._entries))
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names."""
+        return tuple(self._entries)
+
+    def name_of(self, entry: T) -> str:
+        """The name of an entry.
+
+        Raises:
+            InputError: it was never registered.
+        """
+        for name, other in self._entries.items():
+            if other is entry:
+                return name
+        raise InputError(f"{entry!r} is not registered as a {self.kind}")

@@ -1,0 +1,143 @@
+"""What a strategy is: it adds, moves and removes splats while they are trained.
+
+A strategy comes as two classes. Its settings are a frozen dataclass (``StrategySettings``), which
+``TrainSettings.strategy`` holds and which is saved with a run; ``begin`` makes of them the object
+(``Strategy``) that the trainer calls in each step. ``register_strategy`` gives the settings a name.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from numpy.typing import NDArray
+
+from rift_cl.errors import CheckpointError
+from rift_cl.splat.frame import Frame, FrameGradients
+from rift_cl.splat.settings import SplatSettings
+from rift_cl.train.parameters import Parameters
+
+
+@dataclass(frozen=True)
+class TrainingRun:
+    """What a strategy knows of the run that it serves.
+
+    Args:
+        steps: optimization steps of the whole run.
+        splats: most splats that there may be.
+        seed: random seed; draw from (seed, step), so that a resumed run repeats the same bits.
+        extent: size of the scene, in its units.
+        cooldown: the step with which the cooldown begins.
+    """
+
+    steps: int
+    splats: int
+    seed: int
+    extent: float
+    cooldown: int
+
+
+class StrategySettings(ABC):
+    """Base of the settings of strategies, which are frozen dataclasses."""
+
+    @abstractmethod
+    def begin(self, parameters: Parameters, run: TrainingRun) -> Strategy:
+        """The strategy of a run.
+
+        Args:
+            parameters: the splats that the run begins or goes on with.
+            run: the run.
+
+        Raises:
+            InputError: the strategy cannot serve splats of this kind.
+        """
+
+
+class Penalties(NamedTuple):
+    """Terms that a strategy adds to the loss of a step.
+
+    Args:
+        opacity: weight of the mean opacity.
+        scale: weight of the mean scale.
+    """
+
+    opacity: float = 0.0
+    scale: float = 0.0
+
+
+class Strategy:
+    """Hooks that the trainer calls; each does nothing unless a strategy overrides it.
+
+    Steps are counted by ``Parameters.step``: the first step of Adam makes it 1.
+
+    Args:
+        run: the run that the strategy serves.
+    """
+
+    def __init__(self, run: TrainingRun) -> None:
+        self.run = run
+
+    def render_settings(self, settings: SplatSettings) -> SplatSettings:
+        """How frames have to be rendered, so that their gradients hold all that is needed."""
+        return settings
+
+    def penalties(self, step: int) -> Penalties:
+        """The penalties in the loss of the step after ``step`` steps."""
+        return Penalties()
+
+    def after_step(
+        self,
+        parameters: Parameters,
+        frame: Frame,
+        gradients: FrameGradients,
+        learning_rate: float,
+    ) -> Parameters:
+        """The splats to go on with, after a step of Adam.
+
+        Args:
+            parameters: the splats after the step, in the same order as in the frame.
+            frame: what was rendered in the step.
+            gradients: of its loss.
+            learning_rate: of the positions in the step, in units of the scene.
+
+        Returns:
+            These parameters, or others in their place (``Parameters.replaced``).
+        """
+        return parameters
+
+    def forecast(self, step: int, count: int) -> Iterator[tuple[int, int]]:
+        """How many splats the remaining steps will have, as far as that is known in advance.
+
+        Args:
+            step: how many steps were taken.
+            count: splats that there are now.
+
+        Yields:
+            Numbers of steps and of the splats that those have, up to the last step of the run.
+        """
+        yield self.run.steps - step, count
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """What a checkpoint must hold besides parameters and settings: host arrays by name."""
+        return {}
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from ``state``, with the parameters of the same checkpoint from the next step on.
+
+        Raises:
+            CheckpointError: the state is not one of this strategy.
+        """
+        check_names(state, self.state())
+
+
+def check_names(state: Mapping[str, Any], wanted: Any) -> None:
+    """Check that a state holds exactly the arrays that a strategy keeps.
+
+    Raises:
+        CheckpointError: it does not.
+    """
+    if set(state) != set(wanted):
+        found, names = (" and ".join(sorted(x)) or "nothing" for x in (state, wanted))
+        raise CheckpointError(f"the strategy's state holds {found}, wanted {names}")
