@@ -7,6 +7,9 @@
     A = rift.Projector(grid, scan)
     image = rift.fbp(A, sinogram)
 
+    fitted = rift.fit("capture", steps=3000)  # what the commands do, as functions
+    film = rift.render(fitted, "film")
+
 Public names are looked up when they are first used, so that the import stays light and no OpenCL
 driver is touched before there is work for one.
 """
@@ -21,10 +24,17 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from rift_cl import basis, metrics, phantom
     from rift_cl.cl import Device, default_device, devices, open_device
-    from rift_cl.commands.reconstruct.reconstruct_scan import reconstruct_scan
+    from rift_cl.commands.functions import (
+        analyze,
+        evaluate,
+        fit,
+        plan_views,
+        reconstruct_scan,
+        render,
+    )
     from rift_cl.errors import RiftError
     from rift_cl.geometry import Aperture, Camera, CameraType, FanBeam, Grid, Parallel
-    from rift_cl.io import SplatScene, open_lens, open_scan
+    from rift_cl.io import SplatScene, open_capture, open_lens, open_scan
     from rift_cl.operators import (
         FastProjector,
         HighPass,
@@ -65,6 +75,7 @@ _HOMES = {
     "SplatSettings": "splat",
     "Splats": "splat",
     "Target": "sampling",
+    "analyze": "commands.functions",
     "backproject": "reconstruct",
     "cgls": "reconstruct",
     "cheapest_projector": "operators",
@@ -72,15 +83,20 @@ _HOMES = {
     "default_device": "cl",
     "devices": "cl",
     "dot_test": "operators",
+    "evaluate": "commands.functions",
     "fbp": "reconstruct",
     "find_center": "reconstruct",
+    "fit": "commands.functions",
     "merit": "sampling.criteria.merit",
     "next_views": "sampling",
+    "open_capture": "io",
     "open_device": "cl",
     "open_lens": "io",
     "open_scan": "io",
     "plan": "sampling",
-    "reconstruct_scan": "commands.reconstruct.reconstruct_scan",
+    "plan_views": "commands.functions",
+    "reconstruct_scan": "commands.functions",
+    "render": "commands.functions",
     "sirt": "reconstruct",
     "tv": "reconstruct",
 }
@@ -110,6 +126,7 @@ __all__ = [
     "SplatSettings",
     "Splats",
     "Target",
+    "analyze",
     "backproject",
     "basis",
     "cgls",
@@ -118,17 +135,22 @@ __all__ = [
     "default_device",
     "devices",
     "dot_test",
+    "evaluate",
     "fbp",
     "find_center",
+    "fit",
     "merit",
     "metrics",
     "next_views",
+    "open_capture",
     "open_device",
     "open_lens",
     "open_scan",
     "phantom",
     "plan",
+    "plan_views",
     "reconstruct_scan",
+    "render",
     "sirt",
     "tv",
 ]

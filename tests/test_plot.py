@@ -240,7 +240,7 @@ def test_a_mark_must_suit_the_axis():
 
 def test_importing_it_loads_no_matplotlib_and_drawing_no_pyplot():
     code = (
-        "import sys; from rift_cl import plot; assert 'matplotlib' not in sys.modules\n"
+        "import sys; from rift_cl.report import plot; assert 'matplotlib' not in sys.modules\n"
         "plot.figure_png(plot.curves({'a': ([1], [2])}, xlabel='', ylabel=''))\n"
         "assert 'matplotlib.pyplot' not in sys.modules"
     )

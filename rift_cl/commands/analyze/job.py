@@ -50,6 +50,7 @@ class Analysis:
         self.folder = RunFolder(settings.out, "analyze", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
         self.tables: list[Table] = []
+        self.added: tuple[Camera, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -78,7 +79,7 @@ class Analysis:
         yield Report(0, _STEPS, "steps")
         findings = self._found()
         yield Report(1, _STEPS, "steps")
-        cameras, more = self._added()
+        self.added, more = self._added()
         yield Report(2, _STEPS, "steps")
         findings.append(more)
         self.tables = [table for found in findings for table in found.tables]
@@ -92,9 +93,9 @@ class Analysis:
             **{key: value for found in findings for key, value in found.figures.items()},
             "assumed": list(sampled.notes),
         }
-        page = analysis_page(sampled, self.points, findings, self.metrics, cameras, self.device)
+        page = analysis_page(sampled, self.points, findings, self.metrics, self.added, self.device)
         yield Report(3, _STEPS, "steps")
-        self._write(cameras)
+        self._write()
         self.folder.finish(self.settings, self.metrics, page, self.device)
         yield Report(_STEPS, _STEPS, "steps")
 
@@ -171,12 +172,12 @@ class Analysis:
         center, up = self.sampled.target.center, self.sampled.up
         return [view_row(f"{k + 1}", c, center, up) for k, c in enumerate(cameras)]
 
-    def _write(self, cameras: tuple[Camera, ...]) -> None:
+    def _write(self) -> None:
         self.folder.make()
         self.folder.mark()
         self.folder.drop("views.csv")
-        if cameras:
-            write_text(self.settings.out / "views.csv", csv_text(self._rows(cameras)))
+        if self.added:
+            write_text(self.settings.out / "views.csv", csv_text(self._rows(self.added)))
 
 
 def _seen(sampled: ViewSet) -> tuple[ViewSet, dict[str, Floats]]:

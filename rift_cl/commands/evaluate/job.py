@@ -49,6 +49,7 @@ class Evaluation:
         self.device = open_device(settings.device)
         self.folder = RunFolder(settings.out, "eval", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
+        self.scores: dict[str, list[ViewScore]] = {}
 
     def _scored(self, path: Path) -> tuple[View, ...]:
         """The views of a capture that are scored.
@@ -139,20 +140,19 @@ class Evaluation:
         splats = self.scene.splats.upload(self.device)
         seen = self._pictures(self.seen) if self.seen else None
         self.folder.make()
-        groups: dict[str, list[ViewScore]] = {}
         for name, views in self.groups.items():
             unseen = self._pictures(views, seen)
-            groups[name] = []
+            self.scores[name] = []
             for score in score_views(renderer, splats, unseen, seen):
-                groups[name].append(score)
-                yield Report(len(groups[name]), len(views), f"views of {name}")
+                self.scores[name].append(score)
+                yield Report(len(self.scores[name]), len(views), f"views of {name}")
         self.metrics = {
             "splats": len(self.scene.splats),
             "eps2d": self.scene.drawing.eps2d,
             "downscale": self.downscale,
-            **score_record(groups),
+            **score_record(self.scores),
         }
-        page = eval_page(self.scene.name, groups, self.metrics)
+        page = eval_page(self.scene.name, self.scores, self.metrics)
         self.folder.finish(self.settings, self.metrics, page, self.device)
 
     def _pictures(

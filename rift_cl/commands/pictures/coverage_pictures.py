@@ -156,14 +156,7 @@ def detail_of(sampled: ViewSet) -> float:
 def camera_figure(groups: Mapping[str, Sequence[Camera]], sampled: ViewSet) -> Figure:
     """Cameras round the target from above and from the side."""
     return camera_plot(
-        {
-            name: Stands(
-                np.array([camera.center for camera in cameras]),
-                np.array([camera.view[2, :3] for camera in cameras]),
-            )
-            for name, cameras in groups.items()
-            if cameras
-        },
+        {name: Stands.of(cameras) for name, cameras in groups.items() if cameras},
         center=tuple(sampled.target.center),
         diameter=sampled.target.diameter,
         up=tuple(sampled.up),

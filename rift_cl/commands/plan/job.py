@@ -47,6 +47,7 @@ class Planning:
         self.device = open_device(settings.device)
         self.folder = RunFolder(settings.out, "plan", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
+        self.found: Plan | None = None
         self.verdict = ""
         self.wrong: tuple[WrongPrior, ...] = ()
 
@@ -96,6 +97,7 @@ class Planning:
             seed=settings.seed,
             kind=settings.merit,
         )
+        self.found = found
         yield Report(1, _STEPS, "steps", {"merit": found.elsewhere})
         self.wrong = if_wrong(found)
         self.verdict = " ".join([found.verdict(), *(entry.sentence for entry in self.wrong)])

@@ -89,13 +89,14 @@ def parsed_settings(values: dict[str, Any], job: str, settings: type[S], *, wher
 def _as_arguments(values: dict[str, Any], settings: type) -> list[str]:
     """The command line that means these values."""
     hints = get_type_hints(settings, include_extras=True)
-    positional, options = [], []
+    positional: list[str] = []
+    options: list[str] = []
     for name, value in values.items():
         if value is None:
             continue
         option = "--" + name.replace("_", "-")
         if Positional in getattr(hints[name], "__metadata__", ()):
-            positional.append(str(value))
+            positional += map(str, value if isinstance(value, tuple) else (value,))
         elif isinstance(value, bool):
             options.append(option if value else f"--no-{option[2:]}")
         elif isinstance(value, (list, tuple)):

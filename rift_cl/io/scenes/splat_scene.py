@@ -98,6 +98,12 @@ class SplatScene:
             )
             object.__setattr__(self, name, array)
 
+    def __repr__(self) -> str:
+        """How many splats there are, and what they are made of."""
+        more = [name for name in ("shape_modes", "color_modes") if getattr(self, name) is not None]
+        facts = [f"{len(self)} splats", f"{self.sh.shape[1]} x {self.angular}", *more]
+        return f"<{type(self).__name__}: {', '.join(facts)}>"
+
     def __len__(self) -> int:
         """Number of splats."""
         return len(self.means)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,11 @@ class AxisEstimate:
             f"at bin {self.center:.2f} ({low:.2f} to {high:.2f} at 95 % confidence, by {self.by} "
             f"in {self.rows.size} rows)"
         )
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: where the axis is, and the curve that says so."""
+        html: str = import_module("rift_cl.report.notebook").axis_card(self)
+        return html
 
     def record(self) -> dict[str, Any]:
         """The estimate in words and numbers, as reports and configurations keep it."""

@@ -48,7 +48,7 @@ def figure(picture: bytes | tuple[bytes, bytes], *, caption: str, alt: str, key:
     wide, narrow = picture if isinstance(picture, tuple) else (picture, None)
     shown = _img(wide, alt, "drawing")
     if narrow is not None:
-        source = f'<source media="(max-width: 36rem)" srcset="{_address(narrow)}">'
+        source = f'<source media="(max-width: 36rem)" srcset="{data_address(narrow)}">'
         shown = f"<picture>{source}{shown}</picture>"
     kind = "" if narrow is None else ' class="adapts"'
     inner = f'<label for="{key}">{shown}</label>'
@@ -161,12 +161,13 @@ def _img(content: bytes, alt: str, kind: str = "", *, label: str = "") -> str:
     named = f' class="{words}"' if words else ""
     data = f' data-label="{escape(label)}"' if label else ""
     return (
-        f'<img{named} src="{_address(content)}" alt="{escape(alt)}"{data} width="{wide}" '
+        f'<img{named} src="{data_address(content)}" alt="{escape(alt)}"{data} width="{wide}" '
         f'height="{high}" style="--w: {wide}; --h: {high}">'
     )
 
 
-def _address(content: bytes) -> str:
+def data_address(content: bytes) -> str:
+    """A picture as the address of an image in HTML."""
     return f"data:image/{_kind(content)};base64,{base64.b64encode(content).decode('ascii')}"
 
 

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from rift_cl.geometry import Camera
+
 # Symbols, so that groups are told apart without colour.
 _SYMBOLS = ("o", "^", "s", "D", "v", "P", "X")
 # A line of sight is drawn so far towards what the camera looks at, as a share of the distance.
@@ -42,6 +44,14 @@ class Stands(NamedTuple):
 
     places: ArrayLike
     forward: ArrayLike
+
+    @classmethod
+    def of(cls, cameras: Sequence[Camera]) -> Stands:
+        """The places and directions of cameras, of which there is one at least."""
+        return cls(
+            np.array([camera.center for camera in cameras]),
+            np.array([camera.view[2, :3] for camera in cameras]),
+        )
 
 
 def camera_plot(

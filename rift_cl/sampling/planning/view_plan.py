@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
 from typing import NamedTuple
 
 import numpy as np
@@ -91,6 +92,11 @@ class Plan:
         )
         more = f" besides {len(self.fixed)}" if self.fixed else ""
         return f"Plan({len(self)} views{more}, merit {self.merit:.4g}, cameras: {kinds})"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: what the plan is worth, and where its cameras stand."""
+        html: str = import_module("rift_cl.report.notebook").plan_card(self)
+        return html
 
     @cached_property
     def cameras(self) -> tuple[Camera, ...]:

@@ -1,0 +1,273 @@
+"""The commands as functions: ``rift.fit``, ``rift.render``, ``rift.plan_views`` and so on.
+
+Each takes what its command takes, by the same names with underscores, checked by the same parser;
+runs the same job; and gives back a record of what came out. Nothing is printed: ``progress`` is
+called with each ``Report``. Without ``out`` the files go to a temporary folder, which is removed
+with the record that is given back.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from rift_cl.commands.results import (
+    AnalyzedViews,
+    FittedScene,
+    PlannedViews,
+    ReconstructedScan,
+    RenderedScene,
+    Result,
+    Scored,
+)
+from rift_cl.commands.run_folder.saved_settings import parsed_settings
+from rift_cl.errors import InputError
+from rift_cl.progress import Report
+
+PathLike = str | os.PathLike[str]
+Progress = Callable[[Report], None] | None
+S = TypeVar("S")
+# Options that have a meaning on a command line alone.
+_COMMAND_LINE = ("config", "dry_run", "preview")
+
+
+def reconstruct_scan(
+    scan: PathLike, out: PathLike | None = None, *, progress: Progress = None, **settings: Any
+) -> ReconstructedScan:
+    """Reconstruct a scan, slice by slice, as ``rift reconstruct`` does.
+
+    Args:
+        scan: the scan's file or folder; see ``open_scan``.
+        out: folder for the slices, preview.png, report.html, config.json and metrics.json; a
+            temporary one when not given.
+        progress: is called with a report after every slab or step.
+        **settings: the command's options by their names in Python, such as ``center=295.9`` or
+            ``method="tv"``; see ``ReconstructSettings``.
+
+    Raises:
+        RiftError: a setting, the scan, the device or the folder cannot be used.
+    """
+    from rift_cl.commands.reconstruct.job import Reconstruction
+    from rift_cl.commands.reconstruct.settings import ReconstructSettings
+    from rift_cl.commands.reconstruct.volume import volume_path
+
+    with _folder(out) as (folder, keep):
+        given = {"scan": scan, "out": folder, **settings}
+        job = Reconstruction(_settings(given, "reconstruct", ReconstructSettings))
+        _run(job.run(), progress)
+        record = (folder, job.decided, dict(job.metrics), tuple(job.source.notes))
+        return keep(ReconstructedScan(*record, path=volume_path(job.settings)))
+
+
+def fit(
+    capture: PathLike,
+    out: PathLike | None = None,
+    *,
+    kind: Literal["photos", "xray"] | None = None,
+    progress: Progress = None,
+    **settings: Any,
+) -> FittedScene:
+    """Fit splats to photographs or to an X-ray scan, as ``rift fit`` does.
+
+    Args:
+        capture: a capture, a folder of photographs or a video, see ``open_capture``; or a scan,
+            see ``open_scan``.
+        out: folder for scene.ply, the cameras, report.html, config.json, metrics.json and
+            checkpoints; a temporary one when not given.
+        kind: which of the two; an X-ray scan where ``capture`` is a scan file, else photographs,
+            when not given.
+        progress: is called with a report now and then.
+        **settings: the command's options by their names in Python, such as ``steps=3000`` or
+            ``splats=20_000``; see ``FitPhotosSettings`` and ``FitXraySettings``.
+
+    Raises:
+        RiftError: a setting, the capture, the device or the folder cannot be used.
+    """
+    from rift_cl.commands.fit_photos.job import Fit
+    from rift_cl.commands.fit_photos.settings import FitPhotosSettings
+    from rift_cl.commands.fit_xray.job import XrayFit
+    from rift_cl.commands.fit_xray.settings import FitXraySettings
+    from rift_cl.io.scans.formats import is_scan_file
+
+    xray = is_scan_file(Path(capture)) if kind is None else kind == "xray"
+    with _folder(out) as (folder, keep):
+        given = {"capture": capture, "out": folder, **settings}
+        job: Fit | XrayFit
+        if xray:
+            job = XrayFit(_settings(given, "fit xray", FitXraySettings))
+        else:
+            job = Fit(_settings(given, "fit photos", FitPhotosSettings))
+        notes: list[str] = []
+        job.announce = lambda line: notes.append(line.removeprefix("rift: "))
+        _run(job.run(), progress)
+        record = (folder, job.settled, dict(job.metrics), tuple(notes))
+        return keep(FittedScene(*record, scores=job.scores, losses=tuple(job.losses)))
+
+
+def evaluate(
+    scene: PathLike,
+    captures: Sequence[PathLike] = (),
+    out: PathLike | None = None,
+    *,
+    progress: Progress = None,
+    **settings: Any,
+) -> Scored:
+    """Score a scene by photographs it was not trained on, as ``rift eval`` does.
+
+    Args:
+        scene: a fit, its folder, or a file of splats.
+        captures: what to score it by; the photographs that the fit held out when not given.
+        out: folder for report.html, config.json and metrics.json; a temporary one when not given.
+        progress: is called with a report for each picture.
+        **settings: the command's options by their names in Python; see ``EvalSettings``.
+
+    Raises:
+        RiftError: a setting, the scene, a capture or the folder cannot be used.
+    """
+    from rift_cl.commands.evaluate.job import Evaluation
+    from rift_cl.commands.evaluate.settings import EvalSettings
+
+    with _folder(out) as (folder, keep):
+        given = {"scene": scene, "captures": tuple(captures), "out": folder, **settings}
+        job = Evaluation(_settings(given, "eval", EvalSettings))
+        _run(job.run(), progress)
+        return keep(Scored(folder, job.settings, dict(job.metrics), (), scores=job.scores))
+
+
+def render(
+    scene: PathLike, out: PathLike | None = None, *, progress: Progress = None, **settings: Any
+) -> RenderedScene:
+    """Film a scene, or draw it from the cameras of a capture, as ``rift render`` does.
+
+    Args:
+        scene: a fit, its folder, or a file of splats.
+        out: folder for frames, the film, transforms.json and report.html; a temporary one when not
+            given.
+        progress: is called with a report for each frame.
+        **settings: the command's options by their names in Python, such as ``frames=24`` or
+            ``size=(320, 240)``; see ``RenderSettings``.
+
+    Raises:
+        RiftError: a setting, the scene, the device or the folder cannot be used.
+    """
+    from rift_cl.commands.render.job import Render
+    from rift_cl.commands.render.settings import RenderSettings
+
+    with _folder(out) as (folder, keep):
+        given = {"scene": scene, "out": folder, **settings}
+        job = Render(_settings(given, "render", RenderSettings))
+        _run(job.run(), progress)
+        record = (folder, job.settings, dict(job.metrics), tuple(job.notes))
+        return keep(
+            RenderedScene(
+                *record,
+                cameras=tuple(job.cameras),
+                frames=tuple(folder / f"frames/{n:04}.png" for n in range(len(job.cameras))),
+                film=None if job.film is None else folder / job.film,
+                moving=job.moving,
+            )
+        )
+
+
+def analyze(
+    source: PathLike, out: PathLike | None = None, *, progress: Progress = None, **settings: Any
+) -> AnalyzedViews:
+    """Say what views sampled, what they missed and what to add, as ``rift analyze`` does.
+
+    Args:
+        source: a capture, a fit, or a scan.
+        out: folder for report.html, config.json, metrics.json and views.csv; a temporary one when
+            not given.
+        progress: is called with a report after every step.
+        **settings: the command's options by their names in Python; see ``AnalyzeSettings``.
+
+    Raises:
+        RiftError: a setting, the source, the device or the folder cannot be used.
+    """
+    from rift_cl.commands.analyze.job import Analysis
+    from rift_cl.commands.analyze.settings import AnalyzeSettings
+
+    with _folder(out) as (folder, keep):
+        given = {"source": source, "out": folder, **settings}
+        job = Analysis(_settings(given, "analyze", AnalyzeSettings))
+        _run(job.run(), progress)
+        record = (folder, job.settings, dict(job.metrics), tuple(job.notes))
+        return keep(AnalyzedViews(*record, tables=tuple(job.tables), added=tuple(job.added)))
+
+
+def plan_views(
+    views: int = 64, out: PathLike | None = None, *, progress: Progress = None, **settings: Any
+) -> PlannedViews:
+    """Plan from where to photograph a target, as ``rift plan`` does.
+
+    ``rift.plan`` is the planner itself, which takes a ``Target`` and ``Constraints`` and writes
+    nothing.
+
+    Args:
+        views: how many to plan; with ``have``, how many more.
+        out: folder for transforms.json, views.csv and report.html; a temporary one when not given.
+        progress: is called with a report after every step.
+        **settings: the command's options by their names in Python, such as ``diameter=60`` or
+            ``elevation=(0, 70)``; see ``PlanSettings``.
+
+    Raises:
+        RiftError: a setting, a file, the device or the folder cannot be used.
+    """
+    from rift_cl.commands.plan.job import Planning
+    from rift_cl.commands.plan.settings import PlanSettings
+
+    with _folder(out) as (folder, keep):
+        job = Planning(_settings({"views": views, "out": folder, **settings}, "plan", PlanSettings))
+        _run(job.run(), progress)
+        assert job.found is not None
+        record = (folder, job.settings, dict(job.metrics), tuple(job.notes))
+        return keep(PlannedViews(*record, plan=job.found))
+
+
+R = TypeVar("R", bound=Result)
+
+
+@contextmanager
+def _folder(out: PathLike | None) -> Iterator[tuple[Path, Callable[[R], R]]]:
+    """A command's folder, and what ties a temporary one to the record that is given back."""
+    if out is not None:
+        yield Path(out), lambda record: record
+        return
+    folder = Path(tempfile.mkdtemp(prefix="rift-"))
+
+    def tied(record: R) -> R:
+        record.remove_with_record()
+        return record
+
+    try:
+        yield folder, tied
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
+def _settings(given: dict[str, Any], job: str, settings: type[S]) -> S:
+    """The settings of a command.
+
+    Raises:
+        InputError: there is no such setting, or a value is none that it takes.
+    """
+    for name in _COMMAND_LINE:
+        if given.get(name):
+            raise InputError(f"{name} is for 'rift {job}' on a command line alone: leave it out")
+    plain = {
+        name: os.fspath(value) if isinstance(value, os.PathLike) else value
+        for name, value in given.items()
+    }
+    return parsed_settings(plain, job, settings)
+
+
+def _run(reports: Iterator[Report], progress: Progress) -> None:
+    for report in reports:
+        if progress is not None:
+            progress(report)

@@ -1,0 +1,102 @@
+"""The commands as functions: they make what the commands make, and give back what they made."""
+
+from __future__ import annotations
+
+import gc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.commands.cli import main
+from rift_cl.errors import InputError
+
+SMALL = {"steps": 20, "splats": 100, "hold_out": 4}
+
+
+@pytest.fixture(scope="module")
+def fitted(capture, tmp_path_factory):
+    return rift.fit(capture, tmp_path_factory.mktemp("fits") / "fit", **SMALL)
+
+
+def test_a_fit_is_the_commands_and_prints_nothing(fitted, capture, tmp_path, capsys):
+    reports = []
+    again = rift.fit(capture, tmp_path / "a", progress=reports.append, **SMALL)
+    assert capsys.readouterr() == ("", "")
+    words = [f"--{name.replace('_', '-')}={value}" for name, value in SMALL.items()]
+    assert main(["fit", str(capture), "--out", str(tmp_path / "b"), *words, "--quiet"]) == 0
+    files = [Path(made, "scene.ply").read_bytes() for made in (fitted, again, tmp_path / "b")]
+    assert files[0] == files[1] == files[2]
+    assert reports[-1].done == reports[-1].total
+    assert len(fitted.scene) == fitted.metrics["splats"] == 100
+    assert fitted.report.is_file()
+    assert fitted.settings.homogenise == 0  # decided: there are few photographs
+    assert [score.name for score in fitted.scores["held out"]] == ["0.png", "4.png"]
+
+
+def test_a_scan_file_is_fitted_as_x_rays(tmp_path):
+    grid, scan = rift.Grid((24, 24)), rift.Parallel(np.arange(16) * np.pi / 16, 24)
+    values = rift.phantom.shepp_logan_sinogram(grid, scan)
+    np.savez(tmp_path / "scan.npz", sinogram=values, angles=scan.angles)
+    made = rift.fit(tmp_path / "scan.npz", steps=5, splats=50, center=11.5)
+    assert made.scene.mode == "xray"
+    assert made.scores["held out"][0].truth.shape == (1, 24)
+    assert "held out, fit_error" in made._repr_html_()
+
+
+def test_a_result_stands_for_its_folder(fitted):
+    scores = rift.evaluate(fitted)
+    close = pytest.approx(fitted.metrics["scores"]["held out"]["fit_psnr"], abs=1e-3)
+    assert scores.metrics["scores"]["held out"]["fit_psnr"] == close
+    film = rift.render(fitted, frames=3, size=(40, 30), film="apng")
+    assert film.read(2).shape == (30, 40, 3)
+    assert len(film.frames) == len(film.cameras) == 3
+    assert film.film == film.folder / "animation.png"
+    assert film.film.is_file()
+
+
+def test_notebooks_show_pictures(fitted):
+    for made in (fitted, rift.render(fitted, frames=2, size=(40, 30))):
+        html = made._repr_html_()
+        assert "<img src='data:image/" in html
+        assert len(html) < 300_000
+    assert "splats 100" in repr(fitted)
+
+
+def test_a_temporary_folder_goes_with_its_record(fitted):
+    film = rift.render(fitted, frames=1, size=(40, 30))
+    folder = film.folder
+    assert film.report.is_file()
+    del film
+    gc.collect()
+    assert not folder.exists()
+
+
+def test_views_are_analysed_and_planned(capture):
+    analysed = rift.analyze(capture, add=1)
+    assert analysed.metrics["views"] == 8
+    assert len(analysed.added) == 1
+    assert "views to add" in analysed._repr_html_()
+    camera = rift.CameraType("any", focal_length=50, f_number=11, pixel=0.004, size=(100, 150))
+    target = rift.Target(np.zeros(3), diameter=60.0, band=0.1)
+    html = rift.plan(target, 2, cameras=[camera], method="greedy", compare=False)._repr_html_()
+    assert "data:image/svg+xml" in html
+
+
+def test_an_axis_is_shown_by_its_curve():
+    grid, angles = rift.Grid((32, 32)), np.linspace(0, np.pi, 60, endpoint=False)
+    scan = rift.Parallel(angles, 48, center=22.5)
+    found = rift.find_center(rift.phantom.shepp_logan_sinogram(grid, scan), angles)
+    assert "data:image/svg+xml" in found._repr_html_()
+
+
+def test_a_failed_command_leaves_no_folder(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with pytest.raises(InputError, match="nowhere"):
+        rift.fit(tmp_path / "nowhere")
+    with pytest.raises(InputError, match="no setting 'speed'"):
+        rift.plan_views(3, speed=2)
+    with pytest.raises(InputError, match="dry_run"):
+        rift.analyze(tmp_path, dry_run=True)
+    assert not list(tmp_path.iterdir())
