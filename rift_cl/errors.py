@@ -75,6 +75,10 @@ class DeviceMemoryError(DeviceError, MemoryError):
     """The device has too little memory, whatever the chunk size."""
 
 
+class KernelArgumentError(RiftError, TypeError):
+    """A kernel was launched with arguments that it does not take."""
+
+
 class KernelBuildError(DeviceError):
     """A kernel did not compile."""
 

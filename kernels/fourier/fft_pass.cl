@@ -37,7 +37,7 @@
 #endif
 
 KERNEL void fft_pass(
-    __global const real *restrict in, __global real *restrict out, __global const real *restrict turns,
+    __global const real *restrict source, __global real *restrict out, __global const real *restrict turns,
     __global const real *restrict weights, long re, long im, int columns, int length, int stride)
 {
   const int b = (int)get_global_id(1), p = b / stride, q = b - p * stride;
@@ -52,8 +52,8 @@ KERNEL void fft_pass(
   const int begin = (int)get_global_id(0) * RUN;
   const int end = begin + RUN < columns ? begin + RUN : columns;
   for (int c = begin; c < end; c += LANES) {
-    __global const real *restrict xr = in + re + field + from + c;
-    __global const real *restrict xi = in + im + field + from + c;
+    __global const real *restrict xr = source + re + field + from + c;
+    __global const real *restrict xi = source + im + field + from + c;
     __global real *restrict yr = out + re + to + c, *restrict yi = out + im + to + c;
 #if WEIGHTED
     __global const real *restrict weight = weights + from + c;

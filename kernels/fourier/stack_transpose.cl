@@ -1,6 +1,6 @@
 /* Exchange the first and the last axis of a stack, which turns views into detector columns and back.
  *
- *     out[j * out_pitch + slice * out_slice + i] = in[i * in_pitch + slice * in_slice + j]
+ *     out[j * out_pitch + slice * out_slice + i] = source[i * in_pitch + slice * in_slice + j]
  *
  * A column, which is what one detector bin saw in all views, is contiguous afterwards: sorting it
  * from a stack of projections would touch another page of memory for every view.
@@ -20,10 +20,10 @@
 #endif
 
 KERNEL void stack_transpose(
-    __global const float *restrict in, __global float *restrict out,
+    __global const float *restrict source, __global float *restrict out,
     int ni, int nj, long in_pitch, long in_slice, long out_pitch, long out_slice)
 {
-  in += get_global_id(2) * in_slice;
+  source += get_global_id(2) * in_slice;
   out += get_global_id(2) * out_slice;
 #if LANES == 8
   const int j0 = (int)get_global_id(0) * STRIP, i0 = (int)get_global_id(1) * STRIP;
@@ -32,13 +32,13 @@ KERNEL void stack_transpose(
     for (int j = j0; j < j1; j += LANES) {
       if (i + LANES <= i1 && j + LANES <= j1) {
         lanes block[LANES];
-        UNROLL for (int k = 0; k < LANES; k++) block[k] = LOAD(in + (i + k) * in_pitch + j);
+        UNROLL for (int k = 0; k < LANES; k++) block[k] = LOAD(source + (i + k) * in_pitch + j);
         TRANSPOSE(block)
         UNROLL for (int k = 0; k < LANES; k++) STORE(out + (j + k) * out_pitch + i, block[k]);
         continue;
       }
       for (int k = i; k < i1 && k < i + LANES; k++)
-        for (int l = j; l < j1 && l < j + LANES; l++) out[l * out_pitch + k] = in[k * in_pitch + l];
+        for (int l = j; l < j1 && l < j + LANES; l++) out[l * out_pitch + k] = source[k * in_pitch + l];
     }
 #else
   __local float tile[DEEP * (GROUP + 1)];
@@ -46,7 +46,7 @@ KERNEL void stack_transpose(
   const int j0 = (int)get_group_id(0) * GROUP, i0 = (int)get_global_id(1) * DEEP;
   for (int k = 0; k < DEEP; k++)
     if (i0 + k < ni && j0 + local_j < nj)
-      tile[k * (GROUP + 1) + local_j] = in[(i0 + k) * in_pitch + j0 + local_j];
+      tile[k * (GROUP + 1) + local_j] = source[(i0 + k) * in_pitch + j0 + local_j];
   barrier(CLK_LOCAL_MEM_FENCE);
   for (int number = local_j; number < DEEP * GROUP; number += GROUP) {
     const int i = number % DEEP, j = number / DEEP;

@@ -1,6 +1,6 @@
 /* A sliding median across detector bins, of values of one rank (or one view).
  *
- *     out[row][bin][k] = median of in[row][bin - WINDOW / 2 .. bin + WINDOW / 2][k]
+ *     out[row][bin][k] = median of source[row][bin - WINDOW / 2 .. bin + WINDOW / 2][k]
  *
  * Beyond the detector's ends the bins are those before them, mirrored (the end bin twice). The
  * window is kept sorted: from one bin to the next a value leaves and another comes, each by one
@@ -28,7 +28,7 @@ static lanes smaller(lanes a, lanes b) { return a < b ? a : b; }
 static lanes larger(lanes a, lanes b) { return a < b ? b : a; }
 
 KERNEL void column_median(
-    __global const float *restrict in, __global float *restrict out, int bins, int ranks)
+    __global const float *restrict source, __global float *restrict out, int bins, int ranks)
 {
   const int begin = (int)get_global_id(0) * LANES;
   if (begin >= ranks) return;
@@ -39,15 +39,15 @@ KERNEL void column_median(
   lanes sorted[WINDOW];
   UNROLL for (int i = 0; i < WINDOW; i++) sorted[i] = INFINITY;
   for (int bin = first - HALF; bin <= first + HALF; bin++) {
-    const lanes value = LOAD(in + row + (long)mirrored(bin, bins) * ranks);
+    const lanes value = LOAD(source + row + (long)mirrored(bin, bins) * ranks);
     UNROLL for (int i = WINDOW - 1; i > 0; i--)
       sorted[i] = larger(sorted[i - 1], smaller(sorted[i], value));
     sorted[0] = smaller(sorted[0], value);
   }
   for (int bin = first; bin < end; bin++) {
     STORE(out + row + (long)bin * ranks, sorted[HALF]);
-    const lanes old = LOAD(in + row + (long)mirrored(bin - HALF, bins) * ranks);
-    const lanes value = LOAD(in + row + (long)mirrored(bin + HALF + 1, bins) * ranks);
+    const lanes old = LOAD(source + row + (long)mirrored(bin - HALF, bins) * ranks);
+    const lanes value = LOAD(source + row + (long)mirrored(bin + HALF + 1, bins) * ranks);
     lanes before = -INFINITY;
     UNROLL for (int i = 0; i < WINDOW - 1; i++) {
       const lanes left = sorted[i] < old ? sorted[i] : sorted[i + 1];

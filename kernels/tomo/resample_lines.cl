@@ -1,6 +1,6 @@
 /* Read the rows of projections between samples, along the bins or along the rows.
  *
- *     out[view][r][k] = sum over j of weights[r][j][k] in[view][place of (r, k), tap j]
+ *     out[view][r][k] = sum over j of weights[r][j][k] stack[view][place of (r, k), tap j]
  *
  * Weights and places are those of an interpolation that is the same in every view. Tap j of
  * (r, k) is bin k + start + j of row first_row + r (ALONG_ROWS 0), or row start + j of bin k
@@ -24,14 +24,14 @@
 static int within(int i, int count) { return i < 0 ? 0 : i < count ? i : count - 1; }
 
 KERNEL void resample_lines(
-    __global const float *restrict in, __global float *restrict out,
+    __global const float *restrict stack, __global float *restrict out,
     __global const float *restrict weights, __global const int *restrict starts,
     int first_row, int rows_in, int rows, int bins, int stride)
 {
   const int begin = (int)get_global_id(0) * RUN;
   const int view = (int)get_global_id(1), r = (int)get_global_id(2);
   const int end = begin + RUN < bins ? begin + RUN : bins;
-  __global const float *source = in + (long)view * rows_in * bins;
+  __global const float *source = stack + (long)view * rows_in * bins;
   __global const float *w = weights + (long)r * TAPS * stride;
   __global float *line = out + ((long)view * rows + r) * bins;
 #if !ALONG_ROWS

@@ -1,17 +1,17 @@
 /* Copy some columns of one table into another.
  *
- *     to[row][to_first + k] = from[row][from_first + k]   for k < columns
+ *     target[row][target_first + k] = source[row][source_first + k]   for k < columns
  *
- * Index space: (rows). Tables are (rows, from_width) and (rows, to_width). */
+ * Index space: (rows). Tables are (rows, source_width) and (rows, target_width). */
 
 #include "include/portable.h"
 
 KERNEL void copy_columns(
-    __global const float *restrict from, __global float *restrict to, int rows, int columns,
-    int from_width, int from_first, int to_width, int to_first)
+    __global const float *restrict source, __global float *restrict target, int rows, int columns,
+    int source_width, int source_first, int target_width, int target_first)
 {
   const long row = get_global_id(0);
   if (row >= rows) return;
   for (int k = 0; k < columns; k++)
-    to[row * to_width + to_first + k] = from[row * from_width + from_first + k];
+    target[row * target_width + target_first + k] = source[row * source_width + source_first + k];
 }

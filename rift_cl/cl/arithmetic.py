@@ -5,26 +5,26 @@ pyopencl's own operators would build kernels that ``rift_cl.cl`` knows nothing o
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from rift_cl.cl.array import DeviceArray
     from rift_cl.cl.device import Device
 
 # Samples that one work-item of a CPU goes through; rows that one run of a column sum has.
 _CPU_RUN, _SUM_RUN = 4096, 64
 
 
-def axpby(device: Device, a: float, x: Any, b: float, y: Any) -> None:
+def axpby(device: Device, a: float, x: DeviceArray, b: float, y: DeviceArray) -> None:
     """Y = a x + b y on device arrays of the same shape and type, float32 or float64."""
     run = _CPU_RUN if device.traits.is_cpu else 1
-    size = -(-y.size // run)
     macros = {"RUN": run, "DOUBLE": int(y.dtype == np.float64)}
-    device.launch("axpby", (size,), x, y, float(a), float(b), np.uint64(y.size), **macros)
+    device.launch("axpby", (-(-y.size // run),), x=x, y=y, a=a, b=b, size=y.size, **macros)
 
 
-def sum_columns(device: Device, table: Any) -> Any:
+def sum_columns(device: Device, table: DeviceArray) -> DeviceArray:
     """Sum over the rows of a (N, C) device array, in an order that N alone decides: (C,)."""
     rows, columns = table.shape
     if rows == 0:
@@ -32,19 +32,38 @@ def sum_columns(device: Device, table: Any) -> Any:
     while rows > 1:
         runs = -(-rows // _SUM_RUN)
         sums = device.empty((runs, columns))
-        device.launch("sum_columns", (runs * columns,), table, sums, rows, columns, RUN=_SUM_RUN)
+        device.launch(
+            "sum_columns",
+            (runs * columns,),
+            table=table,
+            sums=sums,
+            rows=rows,
+            columns=columns,
+            RUN=_SUM_RUN,
+        )
         table, rows = sums, runs
     return table.reshape((columns,))
 
 
 def copy_columns(
-    device: Device, source: Any, first: int, target: Any, target_first: int, columns: int
+    device: Device,
+    source: DeviceArray,
+    first: int,
+    target: DeviceArray,
+    target_first: int,
+    columns: int,
 ) -> None:
     """Copy columns of a (N, C) device array, from ``first`` on, into another of N rows."""
     rows = source.shape[0]
-    widths = (source.size // rows if rows else 0, target.size // rows if rows else 0)
     device.launch(
         "copy_columns",
         (rows,),
-        *(source, target, rows, columns, widths[0], first, widths[1], target_first),
+        source=source,
+        target=target,
+        rows=rows,
+        columns=columns,
+        source_width=source.size // rows if rows else 0,
+        source_first=first,
+        target_width=target.size // rows if rows else 0,
+        target_first=target_first,
     )

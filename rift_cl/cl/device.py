@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import memory_budget
 from rift_cl.cl.failures import named_errors
 from rift_cl.cl.memory import as_plain, as_real_array, download, send, upload
@@ -86,7 +87,7 @@ class Device:
         """Bytes that may be used on this device now."""
         return memory_budget(self.traits, self._limit)
 
-    def empty(self, shape: int | tuple[int, ...], dtype: DTypeLike = np.float32) -> Any:
+    def empty(self, shape: int | tuple[int, ...], dtype: DTypeLike = np.float32) -> DeviceArray:
         """A new ``pyopencl.array.Array`` whose contents are not set."""
         from pyopencl.array import Array
 
@@ -98,9 +99,10 @@ class Device:
         if opened.pool.managed_bytes + wanted > room:
             opened.pool.free_held()
         with named_errors(f"allocating an array of shape {shape}", self.name):
-            return Array(opened.queue, shape, dtype, allocator=opened.pool)
+            array: DeviceArray = Array(opened.queue, shape, dtype, allocator=opened.pool)
+            return array
 
-    def zeros(self, shape: int | tuple[int, ...], dtype: DTypeLike = np.float32) -> Any:
+    def zeros(self, shape: int | tuple[int, ...], dtype: DTypeLike = np.float32) -> DeviceArray:
         """A new device array of zeros."""
         import pyopencl as cl
 
@@ -110,7 +112,7 @@ class Device:
                 cl.enqueue_fill_buffer(self.queue, array.base_data, np.uint8(0), 0, array.nbytes)
         return array
 
-    def array(self, host: ArrayLike, dtype: DTypeLike | None = None) -> Any:
+    def array(self, host: ArrayLike, dtype: DTypeLike | None = None) -> DeviceArray:
         """Copy a host array to the device.
 
         Args:
@@ -125,17 +127,21 @@ class Device:
         native = np.float32 if values.dtype.kind in "fb" else values.dtype.newbyteorder("=")
         return upload(self, as_plain(values, native if dtype is None else dtype))
 
-    def send(self, host: NDArray[np.float32]) -> Any:
+    def send(self, host: NDArray[np.float32]) -> DeviceArray:
         """As ``array``, for float32 in C order, without waiting for what was enqueued before."""
         return send(self, host)
 
-    def get(self, array: Any) -> NDArray[Any]:
+    def get(self, array: DeviceArray) -> NDArray[Any]:
         """Copy a device array to the host."""
         return download(self, array)
 
-    def launch(self, kernel: str, size: tuple[int, ...], *arguments: Any, **macros: Any) -> None:
-        """Enqueue a kernel over ``size`` work-items; see ``Programs.launch``."""
-        self._programs.launch(kernel, size, arguments, macros)
+    def launch(self, kernel: str, work: tuple[int, ...], /, *arguments: Any, **given: Any) -> None:
+        """Enqueue a kernel over ``work`` items, as in ``launch("axpby", (n,), x=x, .., RUN=1)``.
+
+        Arguments have the names that the kernel's source gives them, compile-time constants are in
+        capitals; see ``Programs.launch``.
+        """
+        self._programs.launch(kernel, work, arguments, given)
 
     def finish(self) -> None:
         """Wait until everything enqueued is done."""

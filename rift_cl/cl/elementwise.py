@@ -5,20 +5,21 @@ Sums and multiples are in ``rift_cl.cl.arithmetic``, inner products in ``rift_cl
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rift_cl.cl.failures import named_errors
 
 if TYPE_CHECKING:
+    from rift_cl.cl.array import DeviceArray
     from rift_cl.cl.device import Device
 
 # Samples that one work-item of a CPU goes through.
 _CPU_RUN = 4096
 
 
-def copy(device: Device, x: Any, y: Any) -> None:
+def copy(device: Device, x: DeviceArray, y: DeviceArray) -> None:
     """Y = x, whatever y held before."""
     import pyopencl as cl
 
@@ -27,28 +28,29 @@ def copy(device: Device, x: Any, y: Any) -> None:
             cl.enqueue_copy(device.queue, y.base_data, x.base_data, byte_count=x.nbytes)
 
 
-def multiply(device: Device, w: Any, y: Any) -> None:
+def multiply(device: Device, w: DeviceArray, y: DeviceArray) -> None:
     """Y = w y, sample by sample."""
-    _launch(device, "multiply", (w, y))
+    _launch(device, "multiply", y, w=w)
 
 
-def clip_negative(device: Device, y: Any) -> None:
+def clip_negative(device: Device, y: DeviceArray) -> None:
     """Y = max(y, 0), sample by sample."""
-    _launch(device, "clip_negative", (y,))
+    _launch(device, "clip_negative", y)
 
 
-def clip_between(device: Device, low: Any, high: Any, y: Any) -> None:
+def clip_between(device: Device, low: DeviceArray, high: DeviceArray, y: DeviceArray) -> None:
     """Y = min(max(y, low), high), sample by sample."""
-    _launch(device, "clip_between", (low, high, y))
+    _launch(device, "clip_between", y, low=low, high=high)
 
 
-def pull_to_levels(device: Device, levels: Any, strength: float, x: Any, y: Any) -> None:
+def pull_to_levels(
+    device: Device, levels: DeviceArray, strength: float, x: DeviceArray, y: DeviceArray
+) -> None:
     """Y += strength (m - x), m the middle of the two of the ascending levels about x."""
-    _launch(device, "level_pull", (levels, levels.size, float(strength), x, y))
+    _launch(device, "level_pull", y, levels=levels, count=levels.size, strength=strength, x=x)
 
 
-def _launch(device: Device, kernel: str, arrays: tuple[Any, ...]) -> None:
-    y = arrays[-1]
+def _launch(device: Device, kernel: str, y: DeviceArray, **given: DeviceArray | float) -> None:
     run = _CPU_RUN if device.traits.is_cpu else 1
     macros = {"RUN": run, "DOUBLE": int(y.dtype == np.float64)}
-    device.launch(kernel, (-(-y.size // run),), *arrays, np.uint64(y.size), **macros)
+    device.launch(kernel, (-(-y.size // run),), y=y, size=y.size, **given, **macros)

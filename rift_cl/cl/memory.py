@@ -7,7 +7,7 @@ gives back C-ordered native float32 (float64 where wanted) of the wanted shape, 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -16,6 +16,7 @@ from rift_cl.cl.failures import named_errors
 from rift_cl.errors import DeviceError, DTypeError, InputError, NonFiniteError, ShapeError
 
 if TYPE_CHECKING:
+    from rift_cl.cl.array import DeviceArray
     from rift_cl.cl.device import Device
 
 _BLOCK = 1 << 20
@@ -95,7 +96,7 @@ def check_finite(array: NDArray[Any], *, name: str) -> None:
             )
 
 
-def upload(device: Device, host: NDArray[Any]) -> Any:
+def upload(device: Device, host: NDArray[Any]) -> DeviceArray:
     """Copy a C-ordered host array into a new device array."""
     import pyopencl as cl
 
@@ -106,7 +107,7 @@ def upload(device: Device, host: NDArray[Any]) -> Any:
     return array
 
 
-def send(device: Device, host: NDArray[Any]) -> Any:
+def send(device: Device, host: NDArray[Any]) -> DeviceArray:
     """Copy a C-ordered host array into a buffer of its own, past the queue.
 
     A copy through the queue would wait for all that was enqueued before. The buffer comes from the
@@ -120,10 +121,11 @@ def send(device: Device, host: NDArray[Any]) -> Any:
     flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
     with named_errors(f"copying {host.nbytes} bytes to it", device.name):
         buffer = cl.Buffer(device.context, flags, hostbuf=host)
-        return Array(device.queue, host.shape, host.dtype, data=buffer)
+        array: DeviceArray = Array(device.queue, host.shape, host.dtype, data=buffer)
+        return array
 
 
-def share(device: Device, host: NDArray[Any]) -> Any:
+def share(device: Device, host: NDArray[Any]) -> DeviceArray:
     """Give a device a C-ordered host array to read: without a copy where memory is shared.
 
     The host array must outlive every kernel that reads the result.
@@ -136,10 +138,11 @@ def share(device: Device, host: NDArray[Any]) -> Any:
     flags = cl.mem_flags.READ_ONLY | cl.mem_flags.USE_HOST_PTR
     with named_errors(f"sharing {host.nbytes} bytes with it", device.name):
         buffer = cl.Buffer(device.context, flags, hostbuf=host)
-        return Array(device.queue, host.shape, host.dtype, data=buffer)
+        array: DeviceArray = Array(device.queue, host.shape, host.dtype, data=buffer)
+        return array
 
 
-def download(device: Device, array: Any, out: NDArray[Any] | None = None) -> NDArray[Any]:
+def download(device: Device, array: DeviceArray, out: NDArray[Any] | None = None) -> NDArray[Any]:
     """Copy a device array to the host, after everything enqueued before.
 
     Args:
@@ -168,7 +171,7 @@ def as_device_array(
     *,
     name: str,
     dtype: DTypeLike = np.float32,
-) -> Any:
+) -> DeviceArray:
     """Check a device array that a caller handed in.
 
     Raises:
@@ -189,7 +192,7 @@ def as_device_array(
     return array
 
 
-def _check_whole(device: Device, array: Any, *, name: str) -> None:
+def _check_whole(device: Device, array: DeviceArray, *, name: str) -> None:
     """Kernels and copies see buffers, and know nothing of views into them."""
     if not array.flags.c_contiguous or array.offset:
         raise ShapeError(f"{name} is a strided view on the device: pass {name}.copy()")
@@ -197,7 +200,7 @@ def _check_whole(device: Device, array: Any, *, name: str) -> None:
         raise DeviceError(f"{name} lives on another device than {device.name}: copy it over first")
 
 
-def is_device_array(value: Any) -> bool:
+def is_device_array(value: object) -> TypeGuard[DeviceArray]:
     """Whether a value is a ``pyopencl.array.Array`` (asked without importing pyopencl)."""
     return hasattr(value, "base_data") and hasattr(value, "queue")
 

@@ -2,6 +2,7 @@
 
 A program is built once per device, kernel and macros. A ``cl.Kernel`` object holds its arguments,
 so two threads that share one silently compute with each other's; each thread keeps its own.
+Arguments are named, and checked against what the kernel's source says that it takes.
 """
 
 from __future__ import annotations
@@ -10,8 +11,7 @@ import re
 import threading
 import time
 import warnings
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from rift_cl.cl.failures import named_errors
 from rift_cl.cl.kernel_cache import build_lock
 from rift_cl.cl.process import claim_process
 from rift_cl.cl.real_type import real_type
+from rift_cl.cl.signature import Parameter, check_names, check_numbers, in_order, parameters
 from rift_cl.cl.source import kernel_source
 from rift_cl.errors import KernelBuildError
 
@@ -36,12 +37,18 @@ _Key = tuple[str, tuple[tuple[str, str], ...]]
 _DOUBLE = ("DOUBLE", "1")
 
 
+class _Kernel(NamedTuple):
+    """A kernel object of one thread, and what the kernel takes."""
+
+    handle: Any
+    parameters: tuple[Parameter, ...]
+
+
 class _ThreadKernels(threading.local):
     """The calling thread's own kernel objects."""
 
     def __init__(self) -> None:
-        self.kernels: dict[_Key, Any] = {}
-        self.typed: set[_Key] = set()
+        self.kernels: dict[_Key, _Kernel] = {}
 
 
 class Programs:
@@ -57,52 +64,66 @@ class Programs:
         self._device = device
         self._programs: dict[_Key, Any] = {}
         self._started: set[tuple[_Key, bool]] = set()
+        # The macros among the names that launches give, for each set of names that was given.
+        self._macros: dict[tuple[str, ...], tuple[str, ...]] = {}
         self._own = _ThreadKernels()
 
     def launch(
-        self,
-        name: str,
-        size: tuple[int, ...],
-        arguments: tuple[Any, ...],
-        macros: Mapping[str, Any],
+        self, name: str, size: tuple[int, ...], positional: tuple[Any, ...], given: dict[str, Any]
     ) -> None:
         """Enqueue one kernel over ``size`` work-items; the first axis is rounded up to groups.
 
         Args:
             name: the kernel, which is also its file and its entry point.
             size: work-items along each axis; nothing is enqueued when one is zero.
-            arguments: device arrays, and Python ints and floats for ``int`` and ``real`` (which is
-                ``float`` unless ``DOUBLE`` is 1); NumPy scalars for what is neither.
-            macros: the compile-time constants that this variant is built with.
+            positional: arguments in the order of the kernel.
+            given: what the kernel is given, by name. Names in capitals are the compile-time
+                constants that this variant is built with. All others are the kernel's arguments,
+                as its source names them: device arrays for buffers, numbers for numbers, NumPy
+                arrays of 4 for ``float4``. None is no buffer, and may also be given for an
+                argument that this variant does not take.
 
         Raises:
+            KernelArgumentError: an argument is missing, unknown, or of another type than the
+                kernel wants.
             DeviceError: ``DOUBLE`` is 1 and the device has no doubles, or the driver failed.
         """
         claim_process()
         if 0 in size:
             return
-        key = (name, tuple(sorted((macro, _literal(value)) for macro, value in macros.items())))
+        names = tuple(given)
+        macros = self._macros.get(names)
+        if macros is None:
+            macros = self._macros[names] = tuple(sorted(filter(str.isupper, names)))
+        key = (name, tuple([(macro, _literal(given[macro])) for macro in macros]))
         kernel = self._kernel(key)
+        if positional:
+            takes = (parameter.name for parameter in kernel.parameters)
+            given |= dict(zip(takes, positional, strict=True))
+        if len(given) != len(macros) + len(kernel.parameters):
+            check_names(name, kernel.parameters, given)
+        values = in_order(name, kernel.parameters, given)
         group = self._device.traits.macros["GROUP"]
         rounded = (-(-size[0] // group) * group, *size[1:])
         local = (group,) + (1,) * (len(size) - 1)
         with named_errors(f"running {name}", self._device.name):
-            self._enqueue(key, kernel, rounded, local, arguments)
+            try:
+                kernel.handle.set_args(*values)
+            except RuntimeError:
+                check_numbers(name, kernel.parameters, values)
+                raise
+            self._enqueue((key, max(size) > _SMALL_GRID), kernel.handle, rounded, local)
 
     def _enqueue(
-        self, key: _Key, kernel: Any, size: tuple[int, ...], local: tuple[int, ...], values: Any
+        self,
+        started: tuple[_Key, bool],
+        kernel: Any,
+        size: tuple[int, ...],
+        local: tuple[int, ...],
     ) -> None:
         import pyopencl as cl
 
         queue = self._device.queue
-        if key not in self._own.typed:
-            # Numbers whose types are known beforehand are set many times faster.
-            real = np.float64 if _DOUBLE in key[1] else np.float32
-            with _building:
-                kernel.set_scalar_arg_dtypes([_scalar_type(value, real) for value in values])
-            self._own.typed.add(key)
-        kernel.set_args(*(_plain(value) for value in values))
-        started = (key, max(size) > _SMALL_GRID)
         if started in self._started:
             cl.enqueue_nd_range_kernel(queue, kernel, size, local)
             return
@@ -112,14 +133,27 @@ class Programs:
             queue.finish()
             self._started.add(started)
 
-    def _kernel(self, key: _Key) -> Any:
-        if key not in self._own.kernels:
+    def _kernel(self, key: _Key) -> _Kernel:
+        kernel = self._own.kernels.get(key)
+        if kernel is None:
             import pyopencl as cl
 
+            name, macros = key
             program = self._program(key)
-            with _building, named_errors(f"loading kernel {key[0]}", self._device.name):
-                self._own.kernels[key] = cl.Kernel(program, key[0])
-        return self._own.kernels[key]
+            with _building, named_errors(f"loading kernel {name}", self._device.name):
+                handle = cl.Kernel(program, name)
+                found = parameters(name, kernel_source(name), self._defines(macros))
+                # Numbers whose types are known beforehand are set many times faster.
+                handle.set_scalar_arg_dtypes(
+                    [each.dtype.type if each.lanes == 1 else None for each in found]
+                )
+            kernel = self._own.kernels[key] = _Kernel(handle, found)
+        return kernel
+
+    def _defines(self, macros: tuple[tuple[str, str], ...]) -> dict[str, str]:
+        """Every macro that a program is built with."""
+        device = {macro: str(value) for macro, value in self._device.traits.macros.items()}
+        return device | dict(macros)
 
     def _program(self, key: _Key) -> Any:
         with _building:
@@ -133,8 +167,8 @@ class Programs:
         name, macros = key
         if _DOUBLE in macros:
             real_type(self._device, np.float64)
-        defines = {**self._device.traits.macros, **dict(macros)}
-        options = [*OPTIONS, *(f"-D{macro}={value}" for macro, value in defines.items())]
+        defines = self._defines(macros).items()
+        options = [*OPTIONS, *(f"-D{macro}={value}" for macro, value in defines)]
         failure = ""
         for pause in _PAUSES:
             time.sleep(pause)
@@ -147,19 +181,6 @@ class Programs:
             if _log(failure):
                 break
         raise _build_error(name, failure, options, self._device.name)
-
-
-def _scalar_type(value: Any, real: Any) -> Any:
-    """The type of a number as the kernel takes it; None for what is no number."""
-    if isinstance(value, int):
-        return np.int32
-    if isinstance(value, float):
-        return real
-    return value.dtype.type if isinstance(value, np.generic) else None
-
-
-def _plain(value: Any) -> Any:
-    return value.base_data if hasattr(value, "base_data") else value
 
 
 def _literal(value: float) -> str:

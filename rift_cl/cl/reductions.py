@@ -8,13 +8,14 @@ equal bits, and devices without float64 lose nothing to the length of the sum.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rift_cl.cl.memory import download
 
 if TYPE_CHECKING:
+    from rift_cl.cl.array import DeviceArray
     from rift_cl.cl.device import Device
 
 # Partial sums: enough to keep a device busy, few enough for the host. A CPU gets runs that are
@@ -23,7 +24,7 @@ _CPU_SUMS, _GPU_SUMS = 256, 16384
 _SHORTEST_RUN = 4096
 
 
-def dot(device: Device, x: Any, y: Any) -> float:
+def dot(device: Device, x: DeviceArray, y: DeviceArray) -> float:
     """The inner product of two device arrays of the same shape and type.
 
     A NaN or an infinity in either shows in the result.
@@ -31,26 +32,35 @@ def dot(device: Device, x: Any, y: Any) -> float:
     return _reduce(device, x, y, product=True)
 
 
-def total(device: Device, x: Any) -> float:
+def total(device: Device, x: DeviceArray) -> float:
     """The sum of a device array's samples."""
     return _reduce(device, x, x, product=False)
 
 
-def norm(device: Device, x: Any) -> float:
+def norm(device: Device, x: DeviceArray) -> float:
     """The Euclidean norm of a device array."""
     return math.sqrt(dot(device, x, x))
 
 
-def _reduce(device: Device, x: Any, y: Any, *, product: bool) -> float:
+def _reduce(device: Device, x: DeviceArray, y: DeviceArray, *, product: bool) -> float:
     if x.size == 0:
         return 0.0
     cpu = device.traits.is_cpu
     length = -(-max(_SHORTEST_RUN, -(-x.size // _CPU_SUMS)) // 8) * 8
     count = -(-x.size // length) if cpu else min(x.size, _GPU_SUMS)
     sums = device.empty((2, count), x.dtype)
-    sizes = (np.uint64(x.size), np.uint64(length), np.uint64(count))
-    macros = {"PRODUCT": int(product), "DOUBLE": int(x.dtype == np.float64)}
-    device.launch("dot_product", (count,), x, y, sums, *sizes, **macros)
+    device.launch(
+        "dot_product",
+        (count,),
+        x=x,
+        y=y,
+        sums=sums,
+        size=x.size,
+        length=length,
+        count=count,
+        PRODUCT=int(product),
+        DOUBLE=int(x.dtype == np.float64),
+    )
     # Infinities of both signs make the NaN that they should, without a warning.
     with np.errstate(invalid="ignore"):
         return float(download(device, sums).sum(dtype=np.float64))

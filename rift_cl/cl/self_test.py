@@ -60,14 +60,38 @@ def _merged(device: Device, image: NDArray[np.float32]) -> NDArray[np.float32]:
     source, merged = device.array(image), device.empty(image.shape)
     by_rows, by_columns = device.zeros((rows, columns)), device.zeros((columns, rows))
     # One tile per item at most, so more items than tiles on a CPU; those outside do nothing.
-    device.launch("plane_split", (columns, rows, 1), source, by_rows, 0, rows, columns, 0)
     device.launch(
-        "plane_split", (rows, columns, 1), source, by_columns, 0, columns, rows, 0, TRANSPOSE=1
+        "plane_split",
+        (columns, rows, 1),
+        image=source,
+        plane=by_rows,
+        rows=rows,
+        width=columns,
+        slice0=0,
+        margin=0,
+    )
+    device.launch(
+        "plane_split",
+        (rows, columns, 1),
+        image=source,
+        plane=by_columns,
+        rows=columns,
+        width=rows,
+        slice0=0,
+        margin=0,
+        TRANSPOSE=1,
     )
     device.launch(
         "plane_merge",
         (columns, rows, 1),
-        *(by_rows, by_columns, merged, 0, rows, columns, columns, rows),
+        by_rows=by_rows,
+        by_columns=by_columns,
+        image=merged,
+        slice0=0,
+        ny=rows,
+        nx=columns,
+        row_pitch=columns,
+        column_pitch=rows,
     )
     result: NDArray[np.float32] = device.get(merged)
     return result

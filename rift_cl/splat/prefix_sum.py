@@ -48,9 +48,9 @@ def exclusive_scan(
     (run, sums), *above = levels
     runs = pieces(count, run)
     total = sums[:1]
+    scanning = {"values": values, "sums": sums, "count": count, "run": run}
     if runs > 1:
-        device.launch("scan_sum", (runs,), values, sums, count, run, WIDE=wide)
+        device.launch("scan_sum", (runs,), **scanning, WIDE=wide)
         total = exclusive_scan(device, sums, runs, above, wide=True)
-    scanning = (values, sums, count, run)
-    device.launch("scan_place", (runs,), *scanning, WIDE=wide, WHOLE=runs == 1)
+    device.launch("scan_place", (runs,), **scanning, WIDE=wide, WHOLE=runs == 1)
     return total

@@ -105,8 +105,17 @@ def count_tiles(device: Device, boxes: Any, depths: Any, tiles: Tiles) -> TileCo
     _check_room(device, splats, 0, tiles)
     slots, keys = device.empty(splats + 1, np.int32), device.empty(splats, np.uint32)
     run = run_length(device, splats, gpu=1)
-    counting = (boxes, depths, slots, keys, splats, run, tiles.across, tiles.first_row, tiles.rows)
-    device.launch("tile_count", (pieces(splats, run),), *counting)
+    device.launch(
+        "tile_count",
+        (pieces(splats, run),),
+        boxes=boxes,
+        depths=depths.view(np.uint32),
+        counts=slots,
+        keys=keys,
+        splats=splats,
+        run=run,
+        **_rectangle(tiles),
+    )
     total = exclusive_scan(device, slots, splats + 1, scan_levels(device, splats + 1))
     entries = int(device.get(total)[0])
     if entries > _MOST:
@@ -138,9 +147,20 @@ def list_tiles(device: Device, counts: TileCounts, *, sort: bool = True) -> Tile
     order, visible = _depth_order(device, counts.keys, slots, levels) if sort else (None, None)
     ranks, offsets = device.empty((splats, 4), np.int32), device.empty(splats + 1, np.int32)
     run = run_length(device, splats, gpu=1)
-    gathering = (counts.boxes, slots, order, visible, ranks, offsets, splats, run)
-    place = (tiles.across, tiles.first_row, tiles.rows)
-    device.launch("tile_ranks", (pieces(splats, run),), *gathering, *place, SORTED=sort)
+    device.launch(
+        "tile_ranks",
+        (pieces(splats, run),),
+        boxes=counts.boxes,
+        slots=slots,
+        order=order,
+        visible=visible,
+        ranks=ranks,
+        counts=offsets,
+        splats=splats,
+        run=run,
+        **_rectangle(tiles),
+        SORTED=sort,
+    )
     exclusive_scan(device, offsets, splats + 1, levels)
     listed, starts = _sort_by_tile(device, ranks, offsets, entries, tiles, levels)
     return TileLists(slots, listed, starts, entries, tiles)
@@ -182,6 +202,11 @@ def _longest_scan(device: Device, splats: int, tiles: Tiles) -> int:
     return max(splats + 1, tiles.count + 1, chunks << bits)
 
 
+def _rectangle(tiles: Tiles) -> dict[str, int]:
+    """Which tiles of the image are listed, as kernels are told."""
+    return {"tiles_x": tiles.across, "first_tile_row": tiles.first_row, "tiles_y": tiles.rows}
+
+
 def _depth_order(device: Device, keys: Any, slots: Any, levels: Levels) -> tuple[Any, Any]:
     """Sort the splats that have slots by key: their order (N, visible in front) and number."""
     splats = keys.size
@@ -192,12 +217,32 @@ def _depth_order(device: Device, keys: Any, slots: Any, levels: Levels) -> tuple
     # The first pass finds out how many are visible, and all later ones find the same.
     visible = None
     for shift in range(0, _KEY_BITS, bits):
+        sizes = {"splats": splats, "chunks": chunks, "shift": shift}
         macros = {"DIGIT_BITS": bits, "FIRST": shift == 0}
-        sizes = (splats, chunks, shift)
-        device.launch("radix_count", (chunks,), here[0], slots, visible, table, *sizes, **macros)
+        device.launch(
+            "radix_count",
+            (chunks,),
+            keys=here[0],
+            slots=slots,
+            visible=visible,
+            table=table,
+            **sizes,
+            **macros,
+        )
         visible = exclusive_scan(device, table, table.size, levels)
-        moving = (*here, *there, slots, visible, table, *sizes)
-        device.launch("radix_scatter", (chunks,), *moving, **macros)
+        device.launch(
+            "radix_scatter",
+            (chunks,),
+            keys=here[0],
+            order=here[1],
+            moved_keys=there[0],
+            moved_order=there[1],
+            slots=slots,
+            visible=visible,
+            table=table,
+            **sizes,
+            **macros,
+        )
         here, there = there, here
     return here[1], visible
 
@@ -218,10 +263,16 @@ def _sort_by_tile(
     table = device.empty((chunks, tiles), np.int32)
     starts = device.empty(tiles + 1, np.int32)
     entries = device.empty((pairs, 2), np.int32)
-    walk, sizes = (ranks, offsets, table), (len(ranks), pairs, chunks, tiles, place.across)
+    walk = {"ranks": ranks, "offsets": offsets, "table": table}
+    sizes = {"chunks": chunks, "tiles": tiles}
+    many = {"splats": len(ranks), "pairs": pairs, "tiles_x": place.across}
     run = run_length(device, tiles, gpu=1)
-    device.launch("tile_histogram", (chunks,), *walk, *sizes)
-    device.launch("tile_offsets", (pieces(tiles, run),), table, starts, chunks, tiles, run)
+    device.launch("tile_histogram", (chunks,), **walk, **sizes, **many)
+    device.launch(
+        "tile_offsets", (pieces(tiles, run),), table=table, counts=starts, **sizes, run=run
+    )
     exclusive_scan(device, starts, tiles + 1, levels)
-    device.launch("tile_scatter", (chunks,), *walk, starts, entries, *sizes)
+    device.launch(
+        "tile_scatter", (chunks,), **walk, starts=starts, entries=entries, **sizes, **many
+    )
     return entries, starts

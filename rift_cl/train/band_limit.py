@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Camera
 from rift_cl.train.start.points import field_diameter, focus_of
@@ -37,7 +38,7 @@ class Targets(Protocol):
 
     cameras: Sequence[Camera]
 
-    def target(self, number: int) -> object:
+    def target(self, number: int) -> DeviceArray:
         """(height, width, C) device array."""
 
 

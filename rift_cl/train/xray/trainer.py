@@ -111,7 +111,7 @@ class XrayTrainer(Trainer):
         if self.settings.solve.due(self.parameters.step):
             self._solve()
         value = super().step()
-        if self._zero is not None:
+        if self._zero is not None and self._thin is not None:
             raw = self.parameters.raw
             copy_columns(self.device, self._zero, 0, raw["means"], 2, 1)
             copy_columns(self.device, self._zero, 0, raw["quats"], 1, 2)
