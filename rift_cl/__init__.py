@@ -34,7 +34,14 @@ if TYPE_CHECKING:
     )
     from rift_cl.errors import RiftError
     from rift_cl.geometry import Aperture, Camera, CameraType, FanBeam, Grid, Parallel
-    from rift_cl.io import SplatScene, open_capture, open_lens, open_scan
+    from rift_cl.io import (
+        SplatScene,
+        open_capture,
+        open_lens,
+        open_scan,
+        register_scan_reader,
+        scan_of_arrays,
+    )
     from rift_cl.operators import (
         FastProjector,
         HighPass,
@@ -44,6 +51,7 @@ if TYPE_CHECKING:
         Response,
         cheapest_projector,
         dot_test,
+        register_filter,
     )
     from rift_cl.reconstruct import AxisEstimate, backproject, cgls, fbp, find_center, sirt, tv
     from rift_cl.sampling import Constraints, Observations, Plan, Target, next_views, plan
@@ -96,7 +104,10 @@ _HOMES = {
     "plan": "sampling",
     "plan_views": "commands.functions",
     "reconstruct_scan": "commands.functions",
+    "register_filter": "operators",
+    "register_scan_reader": "io",
     "render": "commands.functions",
+    "scan_of_arrays": "io",
     "sirt": "reconstruct",
     "tv": "reconstruct",
 }
@@ -150,7 +161,10 @@ __all__ = [
     "plan",
     "plan_views",
     "reconstruct_scan",
+    "register_filter",
+    "register_scan_reader",
     "render",
+    "scan_of_arrays",
     "sirt",
     "tv",
 ]

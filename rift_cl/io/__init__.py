@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     from rift_cl.io.images.image import read_image, write_png
     from rift_cl.io.lenses.lens_file import open_lens
     from rift_cl.io.output import atomic_path, make_folder, write_json, write_text
-    from rift_cl.io.scans.formats import open_scan
-    from rift_cl.io.scans.scan_file import ScanFile, ScanRows
+    from rift_cl.io.scans.array_scan import scan_of_arrays
+    from rift_cl.io.scans.formats import open_scan, register_scan_reader
+    from rift_cl.io.scans.scan_file import ScanFile, ScanRequest, ScanRows
     from rift_cl.io.scenes.splat_scene import SplatScene
     from rift_cl.io.volumes import VolumeWriter, open_volume, read_volume, suggested_window
 
@@ -35,6 +36,7 @@ _HOMES = {
     "Capture": "captures.capture",
     "PosedPhotographs": "captures.photographs",
     "ScanFile": "scans.scan_file",
+    "ScanRequest": "scans.scan_file",
     "ScanRows": "scans.scan_file",
     "SplatScene": "scenes.splat_scene",
     "View": "captures.capture",
@@ -52,6 +54,8 @@ _HOMES = {
     "read_image": "images.image",
     "read_view": "captures.capture",
     "read_volume": "volumes",
+    "register_scan_reader": "scans.formats",
+    "scan_of_arrays": "scans.array_scan",
     "suggested_window": "volumes",
     "write_json": "output",
     "write_png": "images.image",
@@ -62,6 +66,7 @@ __all__ = [
     "Capture",
     "PosedPhotographs",
     "ScanFile",
+    "ScanRequest",
     "ScanRows",
     "SplatScene",
     "View",
@@ -79,6 +84,8 @@ __all__ = [
     "read_image",
     "read_view",
     "read_volume",
+    "register_scan_reader",
+    "scan_of_arrays",
     "suggested_window",
     "write_json",
     "write_png",

@@ -4,12 +4,14 @@ from rift_cl.operators.adjoint_check import dot_test
 from rift_cl.operators.filters.compensation import COMPENSATIONS, Compensation
 from rift_cl.operators.filters.compensation_3d import central_planes, radial_lines
 from rift_cl.operators.filters.view_filters import (
+    FILTERS,
     Filter,
     HighPass,
     Ramp,
     Response,
     ViewFilter,
     as_filter,
+    register_filter,
 )
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.operators.projector.fast_projector import FastProjector
@@ -20,6 +22,7 @@ from rift_cl.operators.projector.projector_choice import cheapest_projector
 
 __all__ = [
     "COMPENSATIONS",
+    "FILTERS",
     "FOOTPRINTS",
     "Compensation",
     "FastProjector",
@@ -36,4 +39,5 @@ __all__ = [
     "cheapest_projector",
     "dot_test",
     "radial_lines",
+    "register_filter",
 ]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rift_cl import HighPass, Parallel, Ramp, Response, dot_test
+from rift_cl import Grid, HighPass, Parallel, Projector, Ramp, Response, dot_test, fbp
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.operators import ViewFilter, as_filter
+from rift_cl.operators import FILTERS, ViewFilter, as_filter, register_filter
 from rift_cl.reference import filter_rows, ramp_taps, response_taps, shepp_logan_taps
 
 NAMES = ("ram-lak", "shepp-logan", "cosine", "hamming", "hann", "high-pass")
@@ -169,6 +169,25 @@ def test_filters_are_taken_as_they_are():
         assert as_filter(filter) is filter
     assert as_filter("hann") == Ramp("hann")
     assert as_filter("high-pass") == HighPass()
+
+
+def test_a_filter_of_ones_own_has_a_name(device):
+    register_filter("own", np.sqrt)
+    try:
+        assert np.array_equal(as_filter("own").taps(9, 0.5), Response(np.sqrt).taps(9, 0.5))
+        A = Projector(Grid((8, 8)), Parallel(np.arange(6.0), 13), device=device)
+        y = white(6, 13)
+        assert np.array_equal(fbp(A, y, "own"), fbp(A, y, np.sqrt))
+        for name in ("own", "hann"):
+            with pytest.raises(InputError, match=f"{name}.*already"):
+                register_filter(name, np.sqrt)
+    finally:
+        FILTERS.remove("own")
+    with pytest.raises(InputError, match="own"):
+        as_filter("own")
+    for nothing in ("hann", 3):
+        with pytest.raises(InputError, match=repr(nothing)):
+            register_filter("other", nothing)
 
 
 @pytest.mark.parametrize("name", ["nope", "", "Ram-Lak", "ramp "])

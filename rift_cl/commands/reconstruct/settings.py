@@ -11,7 +11,7 @@ from rift_cl.commands.inputs.scan_input import ScanInput
 from rift_cl.errors import InputError
 
 if TYPE_CHECKING:
-    from rift_cl.operators import HighPass, Ramp
+    from rift_cl.operators import Filter
 
 SOLVERS = ("sirt", "cgls", "tv")
 ITERATIVE = (*SOLVERS, "levels")
@@ -58,10 +58,9 @@ class ReconstructSettings(ScanInput):
     """Filtered backprojection; backprojection without a filter; steps towards the slice whose
     projections are the measured ones (sirt, cgls), also with the fewest edges (tv); or, of limited
     angles, one material with holes in a disc of it (levels)."""
-    filter: Literal["ram-lak", "shepp-logan", "cosine", "hamming", "hann", "high-pass"] | None = (
-        None
-    )
-    """fbp: filter along the detector; ram-lak if not given."""
+    filter: str | None = None
+    """fbp: filter along the detector: ram-lak, shepp-logan, cosine, hamming, hann, high-pass, or
+    the name of one that was registered. Default: ram-lak."""
     cutoff: float | None = None
     """fbp: where the filter's window ends, as a fraction of the Nyquist frequency; 1 if not
     given."""
@@ -244,13 +243,13 @@ class ReconstructSettings(ScanInput):
             return _PRECONDITIONED_CGLS
         return max(_FEWEST_PASSES, -(-_STEPS[self.method] // (self.subsets or 1)))
 
-    def view_filter(self) -> Ramp | HighPass:
+    def view_filter(self) -> Filter:
         """The filter along the detector.
 
         Raises:
             InputError: its options do not fit each other.
         """
-        from rift_cl.operators import HighPass, Ramp
+        from rift_cl.operators import FILTERS, HighPass, Ramp
 
         if self.filter == "high-pass":
             if self.cutoff is not None:
@@ -258,7 +257,15 @@ class ReconstructSettings(ScanInput):
             return HighPass(1.0 if self.exponent is None else self.exponent)
         if self.exponent is not None:
             raise InputError("--exponent is the high-pass's: add --filter high-pass")
-        return Ramp(self.filter or "ram-lak", 1.0 if self.cutoff is None else self.cutoff)
+        found = FILTERS[self.filter or "ram-lak"]
+        if self.cutoff is None:
+            return found
+        if not isinstance(found, Ramp):
+            raise InputError(
+                f"--cutoff means nothing for --filter {self.filter}, which is no windowed ramp: "
+                "leave it out"
+            )
+        return Ramp(found.window, self.cutoff)
 
     def decisive(self) -> dict[str, Any]:
         """The settings on which the slices depend, as text."""

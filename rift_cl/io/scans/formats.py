@@ -7,6 +7,9 @@ agree, so that no reader ever meets a file that was not meant for it.
 from __future__ import annotations
 
 import os
+import re
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -20,6 +23,7 @@ from rift_cl.io.scans.mrc_scan import open_mrc_scan
 from rift_cl.io.scans.npz_scan import open_npz_scan
 from rift_cl.io.scans.scan_file import ScanFile, ScanRequest
 from rift_cl.io.scans.tiff_scan import open_tiff_scan
+from rift_cl.registry import Registry
 
 # What reads a file, by its extension and then by its content.
 _READERS = {
@@ -39,9 +43,37 @@ _MRC_SIGNATURE = b"MAP "
 _USER_BLOCKS = (0, 512, 1024, 2048, 4096, 8192)
 
 
+Reader = Callable[[Path, ScanRequest], ScanFile]
+# Readers of other files, by extension.
+SCAN_READERS: Registry[Reader] = Registry("scan reader", {})
+
+
+def register_scan_reader(extension: str, reader: Reader) -> None:
+    """Read scans from files of another kind, in ``open_scan`` and in every command.
+
+    Args:
+        extension: of the files, lower case with its dot, such as ``.raw``.
+        reader: takes the file and what a person said about it, and gives back its scan, as
+            ``scan_of_arrays`` makes it.
+
+    Raises:
+        InputError: the extension has no dot, is read already, or the reader is no function.
+    """
+    if not isinstance(extension, str) or not re.fullmatch(r"\.[^./\\A-Z]+", extension):
+        raise InputError(
+            f"register_scan_reader: extension is {extension!r}, wanted lower case such as '.raw'"
+        )
+    if not callable(reader):
+        raise InputError(f"register_scan_reader: reader is {reader!r}, wanted a function")
+    if extension in _READERS:
+        raise InputError(f"register_scan_reader: {extension!r} is read by the package already")
+    SCAN_READERS.add(extension, reader)
+
+
 def is_scan_file(path: Path) -> bool:
     """Whether a path is a file of a kind that holds scans, by its extension."""
-    return path.suffix.lower() in _READERS and path.is_file()
+    suffix = path.suffix.lower()
+    return (suffix in _READERS or suffix in SCAN_READERS) and path.is_file()
 
 
 def open_scan(
@@ -119,17 +151,21 @@ def open_scan(
         values=values,
     )
     suffix = path.suffix.lower()
-    if suffix not in _READERS and path.is_dir():
+    known_suffix = suffix in _READERS or suffix in SCAN_READERS
+    if not known_suffix and path.is_dir():
         return open_tiff_scan(path, request, budget=budget)
-    if suffix not in _READERS and not path.exists():
+    if not known_suffix and not path.exists():
         raise InputError(f"{path}: there is no such file or folder")
-    if suffix not in _READERS:
-        known = ", ".join(sorted(_READERS))
+    if not known_suffix:
+        known = ", ".join(sorted({*_READERS, *SCAN_READERS}))
         raise InputError(
             f"{path}: a scan is read from a folder of TIFF files, or from {known}, not from "
             f"{suffix!r}"
         )
     with reading(path, "the file"):
+        if suffix in SCAN_READERS:
+            found = SCAN_READERS[suffix](path, request)
+            return found if kind is None else replace(found, kind=kind)
         content = _content(path)
     readers = _READERS[suffix]
     if content not in readers:

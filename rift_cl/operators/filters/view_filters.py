@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -27,6 +27,7 @@ from rift_cl.geometry import Parallel
 from rift_cl.operators.filters.row_convolution import SHORT_ROW, RowConvolution
 from rift_cl.operators.fourier.row_transform import RowTransform
 from rift_cl.operators.linear import LinearOperator, Piece
+from rift_cl.registry import Registry
 
 Floats = NDArray[np.float64]
 Gains = ArrayLike | Callable[[Floats], ArrayLike]
@@ -44,6 +45,20 @@ HIGH_PASS = "high-pass"
 _OVERSAMPLING = 16
 
 
+@runtime_checkable
+class Filter(Protocol):
+    """Anything that gives its convolution kernel is a filter."""
+
+    def taps(self, bins: int, pitch: float) -> Floats:
+        """Convolution kernel h[-(bins-1)] .. h[bins-1], symmetric, in 1 / length^2.
+
+        Args:
+            bins: of the detector.
+            pitch: distance between bins.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class Ramp:
     """The ramp |f| under a window: what makes filtered backprojection quantitative.
@@ -59,8 +74,7 @@ class Ramp:
     def __post_init__(self) -> None:
         """Check the window's name and cutoff."""
         if self.window not in WINDOWS:
-            names = ", ".join([*WINDOWS, HIGH_PASS])
-            raise InputError(f"filter is {self.window!r}, wanted one of {names}")
+            raise InputError(f"window is {self.window!r}, wanted one of {', '.join(WINDOWS)}")
         if not 0 < self.cutoff <= 1:
             raise InputError(f"cutoff is {self.cutoff}, wanted a fraction of Nyquist, 0 < c <= 1")
 
@@ -126,7 +140,24 @@ class Response:
         return np.concatenate([kernel[:0:-1], kernel])
 
 
-Filter = Ramp | HighPass | Response
+FILTERS: Registry[Filter] = Registry(
+    "filter", {**{window: Ramp(window) for window in WINDOWS}, HIGH_PASS: HighPass()}
+)
+
+
+def register_filter(name: str, filter: Filter | Callable[[Floats], ArrayLike]) -> None:
+    """Make a filter known by a name, for ``fbp(filter=name)`` and ``--filter name``.
+
+    Args:
+        name: what it is called from now on, in this process.
+        filter: a filter, or a response function as ``Response`` takes it.
+
+    Raises:
+        InputError: the name is taken, or the filter is neither of the two.
+    """
+    if isinstance(filter, str):
+        raise InputError(f"register_filter: {filter!r} is a name, wanted a filter or a function")
+    FILTERS.add(name, as_filter(filter))
 
 
 def as_filter(filter: str | Filter | Callable[[Floats], ArrayLike]) -> Filter:
@@ -135,10 +166,10 @@ def as_filter(filter: str | Filter | Callable[[Floats], ArrayLike]) -> Filter:
     Raises:
         InputError: it is none of these, or the name is unknown.
     """
-    if isinstance(filter, (Ramp, HighPass, Response)):
-        return filter
     if isinstance(filter, str):
-        return HighPass() if filter == HIGH_PASS else Ramp(filter)
+        return FILTERS[filter]
+    if isinstance(filter, Filter):
+        return filter
     if callable(filter):
         return Response(filter)
     raise InputError(f"filter is {filter!r}, wanted a name, a filter or a function of frequency")
