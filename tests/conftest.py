@@ -18,7 +18,7 @@ import pytest
 
 import rift_cl as rift
 
-pytest_plugins = ["selection"]
+pytest_plugins = ["selection", "costs", "touched"]
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -8,11 +8,13 @@ they share kernels). Two marks change that:
 - ``full``: only ``pytest -m full`` runs the test; another one touches the same code at less cost.
 - ``each``: plain ``pytest`` runs it with each of its parameters, for example once per file format.
 
-Whoever names a file, a folder or a word of a test's name (``-k``) gets everything that is there.
+Whoever names a file, a folder or a word of a test's name (``-k``) gets everything that is there,
+unless ``-m plain`` asks for the short selection. Both selections run on all cores.
 """
 
 from __future__ import annotations
 
+import os
 import zlib
 from collections.abc import Iterable
 
@@ -22,30 +24,71 @@ MARKS = (
     "full: takes long, and only `pytest -m full` runs it",
     "each: plain `pytest` runs it with each of its parameters, not with the first alone",
 )
+# A worker holds its compiled kernels and its data: up to some 2 GB each.
+_WORKER_BYTES = 3 << 30
+_MOST_WORKERS = 8
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    """Declare the marks; a worker of pytest-xdist is told what was asked of its parent."""
-    for mark in MARKS:
-        config.addinivalue_line("markers", mark)
+@pytest.hookimpl(tryfirst=True)
+def pytest_cmdline_main(config: pytest.Config) -> None:
+    """Decide what was asked for; pytest-xdist tells each worker (see pytest_configure_node)."""
     option = config.option
-    config.selection = getattr(config, "workerinput", {}).get("selection") or (
-        "full" if option.markexpr == "full" else "named" if _named(config) else "plain"
-    )
-    if option.markexpr == "full":
+    told = getattr(config, "workerinput", {}).get("selection")
+    marked = option.markexpr if option.markexpr in ("plain", "full") else None
+    if marked:
         option.markexpr = ""
+    named = _named(config)
+    config.selection = told or marked or ("named" if named else "plain")
+    # Whether every test of the selection runs, so that what none of them touched is a fault.
+    config.whole = config.selection != "named" and not named
+    if config.selection != "named" and told is None:
+        _use_all_cores(config)
+
+
+def _named(config: pytest.Config) -> bool:
+    """Whether the command line says which tests it wants."""
+    option = config.option
+    by_path = config.args_source is pytest.Config.ArgsSource.ARGS
+    words = (option.keyword, option.markexpr, option.deselect, getattr(option, "lf", False))
+    return bool(by_path or any(words))
+
+
+def _use_all_cores(config: pytest.Config) -> None:
+    """Ask pytest-xdist for workers unless the command line says how many, or wants a debugger.
+
+    Files stay together: their tests share compiled kernels and what their fixtures made.
+    """
+    option = config.option
+    if getattr(option, "numprocesses", 0) is not None or option.usepdb or option.collectonly:
+        return
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    workers = max(1, min(cores or 1, _memory() // _WORKER_BYTES, _MOST_WORKERS))
+    if workers == 1:
+        return
+    # PoCL's threads of one worker would take every core from the others.
+    os.environ.setdefault("POCL_MAX_PTHREAD_COUNT", str(max(2, (cores or 1) // workers)))
+    option.numprocesses = workers
+    if option.dist == "no":
+        option.dist = "loadfile"
+
+
+def _memory() -> int:
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return 2 * _WORKER_BYTES
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node) -> None:
-    """Tell a worker what was asked; it is handed the paths of its tests in any case."""
+    """Tell a worker what was asked of its parent; it is handed its tests' paths in any case."""
     node.workerinput["selection"] = node.config.selection
 
 
-def _named(config: pytest.Config) -> bool:
-    option = config.option
-    by_path = config.args_source is pytest.Config.ArgsSource.ARGS
-    return bool(by_path or option.keyword or option.markexpr)
+def pytest_configure(config: pytest.Config) -> None:
+    """Declare the marks."""
+    for mark in MARKS:
+        config.addinivalue_line("markers", mark)
 
 
 @pytest.hookimpl(trylast=True)
@@ -70,13 +113,14 @@ def plain(items: Iterable[pytest.Item]) -> Iterable[pytest.Item]:
 
 def _one(cases: list[pytest.Item]) -> pytest.Item:
     """The first case on the kind of device that the test's file is run on."""
-    on_each = {case.callspec.id: case for case in cases if hasattr(case, "callspec")}
-    devices = dict.fromkeys(
-        case.callspec.params["device"].traits.is_cpu
-        for case in on_each.values()
-        if "device" in case.callspec.params
-    )
-    if not devices:
+    kinds = list(dict.fromkeys(kind for kind in map(_is_cpu, cases) if kind is not None))
+    if not kinds:
         return cases[0]
-    kind = list(devices)[zlib.crc32(cases[0].path.name.encode()) % len(devices)]
-    return next(c for c in cases if c.callspec.params["device"].traits.is_cpu is kind)
+    kind = kinds[zlib.crc32(cases[0].path.name.encode()) % len(kinds)]
+    return next(case for case in cases if _is_cpu(case) is kind)
+
+
+def _is_cpu(case: pytest.Item) -> bool | None:
+    """Whether a case runs as on a CPU; None where it asks for no device."""
+    parameters = case.callspec.params if hasattr(case, "callspec") else {}
+    return parameters["device"].traits.is_cpu if "device" in parameters else None

@@ -33,7 +33,7 @@ KEYS = np.array([2, 1, 0, 0, 3, 0, 1, 0])
 def nxtomo(path: Path, *, group: str = "entry1/tomo_entry", mode: str = "w") -> np.ndarray:
     data = counts(len(KEYS), ROWS, BINS)
     with h5py.File(path, mode) as file:
-        entry = file.check_group(group)
+        entry = file.require_group(group)
         entry["instrument/detector/data"] = data
         entry["instrument/detector/image_key"] = KEYS
         entry["instrument/detector/x_pixel_size"] = 3.5

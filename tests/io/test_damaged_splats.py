@@ -42,7 +42,7 @@ def test_a_file_that_shrinks_while_it_is_read(
     def shrink(*_: object) -> None:
         os.truncate(path, path.stat().st_size // 2)
 
-    monkeypatch.setattr(f"rift_cl.io.{module}.check_claim", shrink)
+    monkeypatch.setattr(f"rift_cl.io.scenes.{module}.check_claim", shrink)
     with pytest.raises(FileFormatError, match=f"{kind}: .*(cut off|no lines)"):
         rift.SplatScene.load(path)
 

@@ -18,8 +18,10 @@ from rift_cl.progress import Report
 INSTALL = "pip install pycolmap"
 
 # Modules come from where they come from here, not from the folder that we happen to be in.
-_CODE = "import sys; sys.path[:] = sys.argv[2:]; from rift_cl.io import colmap_steps as steps; "
-_CODE += "steps.pose(sys.argv[1])"
+_CODE = (
+    "import sys; sys.path[:] = sys.argv[2:]; from rift_cl.io.captures import colmap_steps; "
+    "colmap_steps.pose(sys.argv[1])"
+)
 
 _FEATURES = re.compile(r"Processed file \[(\d+)/(\d+)\]")
 _MATCHED = re.compile(r"(?:Matching|Processing) image \[(\d+)/(\d+)\]")
