@@ -1,6 +1,6 @@
 """A whole run of the tests fails where it never launched a kernel or never ran a command.
 
-Both selections are held to it (see ``selection``), so that the short one stays a test of everything:
+Both selections are held to it (see ``selection``), so that the short one goes on to touch everything:
 whoever adds a kernel or a command adds a test that plain ``pytest`` runs. What processes of their
 own do is not seen.
 """
@@ -77,6 +77,6 @@ def _left_out(config: pytest.Config) -> list[str]:
 
 
 def _kernels() -> list[str]:
-    """Every kernel but the drivers for another kind of device than there is; a CPU is both kinds."""
+    """Every kernel but the drivers for CPUs where there is none; a CPU is tested as a GPU too."""
     on_cpu = any(device.traits.is_cpu for device in rift.devices())
     return [name for name in kernel_names() if on_cpu or not name.endswith("_cpu")]
