@@ -1,8 +1,8 @@
 """A whole run of the tests fails where it never launched a kernel or never ran a command.
 
-Both selections are held to it (see ``selection``), so that the short one goes on to touch everything:
-whoever adds a kernel or a command adds a test that plain ``pytest`` runs. What processes of their
-own do is not seen.
+Both selections are held to it (see ``selection``), so that the short one goes on to touch
+everything: whoever adds a kernel or a command adds a test that plain ``pytest`` runs. What
+processes of their own do is not seen.
 """
 
 from __future__ import annotations
