@@ -221,11 +221,11 @@ def methods(options: Options) -> dict[str, Callable[[Scan], Floats]]:
     return {
         "plain TV, weight 0.2": lambda scan: plain(scan, 0.2),
         "plain TV, its best weight": best,
-        "lengths of material": lambda scan: levels(scan, "lengths"),
+        "path lengths in material": lambda scan: levels(scan, "lengths"),
         "+ bounds 0 and 1": lambda scan: levels(scan, "bounds"),
-        "+ nothing outside the disc": lambda scan: levels(scan, "disc"),
+        "+ zero outside the disc": lambda scan: levels(scan, "disc"),
         "+ direction weights": lambda scan: levels(scan, "directions"),
-        "+ pull to the levels": lambda scan: levels(scan, "pull"),
+        "+ attraction to the levels": lambda scan: levels(scan, "pull"),
     }
 
 
