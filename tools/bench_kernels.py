@@ -2,6 +2,7 @@
 
     python tools/bench_kernels.py --json bench.json
     python tools/bench_kernels.py --peers --json bench.json --markdown docs/performance.md
+    python tools/bench_kernels.py --json bench.json --keep docs/benchmarks
 
 Limits, kernels and whole operations are measured in one process on one device. A kernel that is
 shipped and not measured makes the run fail, so that none is forgotten.
@@ -53,6 +54,8 @@ class Options:
     Args:
         json: file for every figure and every raw time.
         markdown: file for the tables, ready for the documentation.
+        keep: folder for the result by date, DATE-DEVICE.json, which tools/compare_benchmarks.py
+            compares with others.
         peers: also run ASTRA, silx, gratopy, scikit-image and a rasterizer in torch, as far as
             they are installed.
         quick: one size and few repeats.
@@ -67,6 +70,7 @@ class Options:
 
     json: Path
     markdown: Path | None = None
+    keep: Path | None = None
     peers: bool = False
     quick: bool = False
     device: str | None = None
@@ -212,6 +216,7 @@ def main() -> int:
     return report(
         "bench_kernels",
         measure_all(options),
+        keep_in=options.keep,
         json_file=options.json,
         markdown_file=options.markdown,
         page=markdown,

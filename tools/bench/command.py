@@ -6,14 +6,12 @@ import json
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 import rift_cl as rift
 from bench.costs import CoverageError
+from bench.history import Record, keep
 from bench.table import Table, show
 from rift_cl.io import write_text
-
-Record = dict[str, Any]
 
 
 def say(text: str) -> None:
@@ -29,6 +27,7 @@ def report(
     markdown_file: Path | None,
     page: Callable[[Record], str],
     tables: Callable[[Record], Iterable[Table]],
+    keep_in: Path | None = None,
 ) -> int:
     """Write every record as it grows, print the tables of the last one; the exit status.
 
@@ -39,6 +38,7 @@ def report(
         markdown_file: for the page, if there is to be one.
         page: of a record.
         tables: of a record.
+        keep_in: folder for the last record by date, if it is to be kept.
     """
     record: Record = {}
     try:
@@ -49,5 +49,7 @@ def report(
     except (rift.RiftError, CoverageError) as error:
         say(f"{name}: {error}")
         return error.exit_status if isinstance(error, rift.RiftError) else 1
+    if keep_in is not None:
+        say(f"kept as {keep(record, keep_in)}")
     show(tables(record))
     return 0
