@@ -17,8 +17,14 @@ def record(date, **seconds):
         for name, least in seconds.items()
     ]
     return {
-        **{"version": "0.1.0", "date": f"{date}T12:00:00+00:00", "packages": {}, "import_s": 0.1},
-        **{"device": {"name": "Some GPU (R)"}, "host": {}, "groups": [], "splats": []},
+        "version": "0.1.0",
+        "date": f"{date}T12:00:00+00:00",
+        "packages": {},
+        "import_s": 0.1,
+        "device": {"name": "Some GPU (R)"},
+        "host": {},
+        "groups": [],
+        "splats": [],
         "limits": {"multiply_add": 1e12, "bandwidth": 1e11, "launch": 1e-5, "raw": [1, 2]},
         "cases": [{"name": "32²", "splits": [{"operation": "forward", "kernels": kernels}]}],
     }
