@@ -6,6 +6,7 @@ imports its own settings to parse or to help, and its job only to run; ``rift --
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -59,11 +60,15 @@ def _run(arguments: Sequence[str]) -> int:
     if first in ("-h", "--help", "-H", "--help-verbose"):
         print(_overview())
         return 0
-    config = (tyro.conf.OmitArgPrefixes,)
+    config: tuple[Any, ...] = (tyro.conf.OmitArgPrefixes,)
     name, rest = _named(list(arguments))
     if name in COMMANDS:
+        earlier = _earlier(name, rest)
+        if earlier is None:
+            # Without an earlier run every switch is off, and only its positive form is of use.
+            config = (*config, tyro.conf.FlagCreatePairsOff)
         chosen: Callable[[], int] = tyro.cli(
-            _command(name, _earlier(name, rest)), prog=f"rift {name}", args=rest, config=config
+            _command(name, earlier), prog=f"rift {name}", args=rest, config=config
         )
         return chosen()
     if first == "fit":
@@ -119,12 +124,13 @@ def _command(name: str, earlier: Any = None) -> Callable[..., Callable[[], int]]
 
 def _earlier(name: str, arguments: Sequence[str]) -> Any:
     """The settings of the run that ``--config`` names, which options override; else None."""
-    if name not in ("fit photos", "fit xray", "reconstruct"):
+    if not any(argument.startswith("--config") for argument in arguments):
         return None
     from rift_cl.commands.run_folder.saved_settings import named_config, saved_settings
 
-    path = named_config(arguments)
-    return None if path is None else saved_settings(path, name, COMMANDS[name].settings_class())
+    path, settings = named_config(arguments), COMMANDS[name].settings_class()
+    takes = any(field.name == "config" for field in dataclasses.fields(settings))
+    return saved_settings(path, name, settings) if path is not None and takes else None
 
 
 def _devices(settings: Any, output: Output) -> None:

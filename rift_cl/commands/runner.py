@@ -11,12 +11,14 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from inspect import Parameter, Signature
 from typing import Annotated, Any
 
 import tyro
 
 from rift_cl.commands.console_table import print_table
+from rift_cl.commands.options import option_groups
 from rift_cl.commands.progress_bar import print_line, show_progress
 from rift_cl.errors import RiftError
 from rift_cl.progress import Report
@@ -26,7 +28,7 @@ _INPUT, _OUTPUT, _INTERRUPTED = 3, 5, 130
 
 @dataclass(frozen=True)
 class Output:
-    """How a command talks."""
+    """What is printed while the command runs."""
 
     quiet: bool = False
     """Show no progress."""
@@ -63,25 +65,44 @@ def told(run: Callable[[], int]) -> int:
 def command(
     run: Callable[[Any, Output], None], settings: type, default: Any = None
 ) -> Callable[..., Callable[[], int]]:
-    """A command for tyro: it takes settings and gives back what is to be run.
+    """A command for tyro: it takes groups of options and gives back what is to be run.
 
     Args:
-        run: what to do with them.
-        settings: their class.
+        run: what to do with the settings.
+        settings: their class; the help lists its options by ``option_groups``.
         default: settings to begin with, where nothing else is given; the class's own if None.
     """
-
-    def prepared(settings: Any, output: Any = Output()) -> Callable[[], int]:
-        return lambda: _guarded(run, settings, output)
-
-    if default is not None:
-        prepared.__defaults__ = (default, Output())
-    prepared.__annotations__ = {
-        "settings": Annotated[settings, tyro.conf.arg(name="")],
-        "output": Annotated[Output, tyro.conf.arg(name="")],
+    groups = {
+        group.group if hasattr(group, "group") else "": group for group in option_groups(settings)
     }
+    parameters = [
+        Parameter(
+            title or "settings",
+            Parameter.KEYWORD_ONLY,
+            annotation=group if title else Annotated[group, tyro.conf.arg(name="")],
+            default=Parameter.empty if default is None else _part(default, group),
+        )
+        for title, group in groups.items()
+    ]
+    talk = Parameter("messages", Parameter.KEYWORD_ONLY, annotation=Output, default=Output())
+
+    def prepared(*, messages: Output, **parts: Any) -> Callable[[], int]:
+        values = {name: value for part in parts.values() for name, value in _values(part).items()}
+        return lambda: _guarded(run, settings(**values), messages)
+
+    prepared.__signature__ = Signature([*parameters, talk])  # type: ignore[attr-defined]
+    prepared.__annotations__ = {entry.name: entry.annotation for entry in (*parameters, talk)}
     prepared.__doc__ = settings.__doc__
     return prepared
+
+
+def _part(settings: Any, group: type) -> Any:
+    """The options of one group, with the values of some settings."""
+    return group(**{field.name: getattr(settings, field.name) for field in fields(group)})
+
+
+def _values(part: Any) -> dict[str, Any]:
+    return {field.name: getattr(part, field.name) for field in fields(part)}
 
 
 def watch(reports: Iterable[Report], output: Output) -> None:

@@ -113,7 +113,7 @@ def test_a_film_needs_no_photographs(alone, tmp_path):
 def test_a_scene_that_is_named_without_its_fit_is_said_to_be(home, older, tmp_path, capsys):
     small = ("--frames", 2, "--size", 40, 30)
     scene = home / "fit" / "scene.ply"
-    words = f"{scene} is taken without the fit that it lies in"
+    words = f"{scene} is read without the fit"
     assert run("render", scene, "--out", tmp_path / "film", *small) == 0
     said = capsys.readouterr().err
     assert words in said and f"name the folder instead: {home / 'fit'}" in said
@@ -157,7 +157,7 @@ def test_analysis_and_plans_take_a_fit_for_its_capture(alone, tmp_path):
 def test_an_older_fit_says_what_it_lacks_and_still_works(older, home, tmp_path, capsys):
     small = ("--frames", 2, "--size", 40, 30)
     assert run("render", older, "--out", tmp_path / "film", *small) == 0
-    assert "holds no cameras, since an older version fitted it" in capsys.readouterr().err
+    assert "holds no cameras" in capsys.readouterr().err
     words = ("--capture", home / "photographs", "--out", tmp_path / "upright", *small)
     assert run("render", older, *words) == 0
     assert "no cameras" not in capsys.readouterr().err

@@ -2,10 +2,12 @@
 
 import ast
 import re
+from dataclasses import fields
 
 import pytest
 
 from rift_cl.commands.cli import COMMANDS, main
+from rift_cl.commands.options import option_groups
 
 # What the command line and one class of settings need: far below what any job loads.
 MOST_MODULES = 24
@@ -73,3 +75,20 @@ def test_completion_knows_every_command(capsys):
     assert not end.value.code
     shown = capsys.readouterr().out
     assert all(name in shown for name in COMMANDS)
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_setting_is_an_option_in_one_group(name):
+    settings = COMMANDS[name].settings_class()
+    shown = [field.name for group in option_groups(settings) for field in fields(group)]
+    assert sorted(shown) == sorted(field.name for field in fields(settings))
+
+
+def test_help_stands_in_groups_without_negative_twins(capsys):
+    with pytest.raises(SystemExit):
+        main(["reconstruct", "--help"])
+    shown = capsys.readouterr().out
+    titles = ("input", "method", "geometry", "correction", "output", "run", "messages")
+    places = [shown.index(f" {title} options ") for title in titles]
+    assert places == sorted(places)
+    assert "--no-" not in shown and "(default: None)" not in shown

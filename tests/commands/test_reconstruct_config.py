@@ -83,7 +83,7 @@ def test_a_preview_is_always_left(first):
         ('{"job": "fit photos", "settings": {}}', "is of 'rift fit photos'"),
         ('{"job": "reconstruct", "settings": {"colour": 3}}', "no setting 'colour'"),
         (
-            '{"job": "reconstruct", "settings": {"scan": "x", "filter": "best"}}',
+            '{"job": "reconstruct", "settings": {"scan": "x", "method": "best"}}',
             "does not take all",
         ),
         ('{"job": "reconstruct", "settings": {"scan": "x", "steps": "many"}}', "does not take"),

@@ -39,7 +39,7 @@ def rift_volume(path):
         ({"method": "best"}, "method=best"),
         ({"steps": "many", "method": "sirt"}, "steps=many"),
         ({"dry_run": True}, "leave it out"),
-        ({"filter": "hann", "method": "sirt"}, "means nothing"),
+        ({"filter": "hann", "method": "sirt"}, "--filter"),
     ],
 )
 def test_what_cannot_be_used_is_told(scan, tmp_path, settings, sentence):

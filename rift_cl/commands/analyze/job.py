@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from rift_cl.cl.budget import format_bytes
-from rift_cl.cl.discovery import open_device
 from rift_cl.commands.analyze.facts import Findings, Table, missing, resolution, unknown_share
 from rift_cl.commands.analyze.input import open_sampled
 from rift_cl.commands.analyze.report import analysis_page
@@ -46,7 +45,7 @@ class Analysis:
         settings.check()
         self.settings = settings
         self.sampled, self.points = _seen(open_sampled(settings))
-        self.device = open_device(settings.device)
+        self.device = settings.open_device()
         self.folder = RunFolder(settings.out, "analyze", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
         self.tables: list[Table] = []

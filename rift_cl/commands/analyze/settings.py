@@ -1,69 +1,77 @@
-"""What ``rift analyze`` takes, checked before any work."""
+"""The settings of ``rift analyze``, checked before any work."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from tyro.conf import Positional
 
+from rift_cl.commands.inputs.scan_input import ScanArrays
+from rift_cl.commands.options import Auto, RunOptions
 from rift_cl.errors import InputError
-from rift_cl.io.scans.literals import AngleUnit
 
 _MOST_ADDED = 64
 
 
 @dataclass(frozen=True)
-class AnalyzeSettings:
+class AnalyzeInput(ScanArrays):
+    """The capture or the scan, and how to read it."""
+
+    group: ClassVar[str] = "input"
+
+    source: Annotated[Path, Positional]
+    """A capture (transforms.json, a folder with one, or a COLMAP model; its photographs need not
+    be there), or a parallel-beam or fan-beam scan."""
+    aperture: Auto[float] = None
+    """Radius of the lens aperture in world units, for cameras whose file gives none. Default:
+    pinholes."""
+    focus: Auto[float] = None
+    """With --aperture: distance in focus, in world units. Default: the target's centre."""
+    wavelength: float = 550.0
+    """Wavelength of the light in nanometres, where the file gives none; used with --unit."""
+    unit: Auto[float] = None
+    """Millimetres per world unit. Default: lengths stay in world units, without diffraction."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnalyzeTarget:
+    """What is analyzed."""
+
+    group: ClassVar[str] = "target"
+
+    mode: Auto[Literal["surface", "volume"]] = None
+    """Whether the target is opaque (surface) or transparent as for X-rays (volume). Default:
+    surface for captures, volume for scans."""
+    center: Auto[tuple[float, float, float]] = None
+    """Centre of the target in world coordinates. Default: where the cameras look."""
+    diameter: Auto[float] = None
+    """Diameter of the target in world units. Default: what the pictures or the detector show."""
+    band: Auto[float] = None
+    """Highest frequency of interest, in cycles per world unit. Default: 16 per diameter for
+    captures, half a cycle per bin for scans."""
+    add: int = 4
+    """Number of views to suggest (0 = none)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnalyzeOutput:
+    """What is written."""
+
+    group: ClassVar[str] = "output"
+
+    out: Path = Path("rift-analyze")
+    """Folder for report.html, config.json, metrics.json and views.csv."""
+
+
+@dataclass(frozen=True)
+class AnalyzeSettings(RunOptions, AnalyzeOutput, AnalyzeTarget, AnalyzeInput):
     """Analyze how views sample a target: coverage, resolution limits, and views to add.
 
     Example: rift analyze capture --out analysis --diameter 0.2 --unit 1000
     """
-
-    source: Annotated[Path, Positional]
-    """A capture (transforms.json, a folder with one, or a COLMAP model; its photographs need not
-    be there), or a scan with parallel or fan-beam rays."""
-    out: Path = Path("rift-analyze")
-    """Folder for report.html, config.json, metrics.json and views.csv."""
-    mode: Literal["surface", "volume"] | None = None
-    """Whether the target is opaque, or seen through as by X-rays; photographs are taken to show
-    surfaces, scans volumes, when not given."""
-    center: tuple[float, float, float] | None = None
-    """Middle of the target, in the capture's world; where its cameras look when not given."""
-    diameter: float | None = None
-    """Of the target; what the pictures or the detector show when not given."""
-    aperture: float | None = None
-    """Radius of the lens's opening, for cameras whose file says none, in units of the world."""
-    focus: float | None = None
-    """Distance of what is in focus, in units of the world; the target's middle when not given."""
-    wavelength: float = 550.0
-    """Of the light in nanometres, where the file says none; counts once --unit is known."""
-    unit: float | None = None
-    """Millimetres in a unit of the world; without it lengths are in units, and diffraction is left
-    out."""
-    band: float | None = None
-    """Highest frequency that is wanted of the target, in cycles per unit of the world; 16 per
-    diameter when not given."""
-    add: int = 4
-    """How many views to suggest; 0 for none."""
-    dataset: str | None = None
-    """Name of a scan's projections in its file; see 'rift reconstruct'."""
-    theta: str | None = None
-    """Name of a scan's angles, or a file of them, or a turn in degrees such as 0:180."""
-    image_key: str | None = None
-    """Name of the array that says what each frame of a scan is, as in NXtomo."""
-    axes: str | None = None
-    """Which axis of a scan's projections is which, such as angle,row,bin."""
-    angle_unit: AngleUnit | None = None
-    """Unit of a scan's angles."""
-    device: str | None = None
-    """Device to use: its number, cpu, gpu, or a part of its name; see 'rift devices'."""
-    overwrite: bool = False
-    """Replace an earlier analysis in the same folder."""
-    dry_run: bool = False
-    """Say what would be done, and stop."""
 
     def check(self) -> None:
         """Check every number's range.
@@ -80,4 +88,4 @@ class AnalyzeSettings:
         if self.center is not None and not all(map(math.isfinite, self.center)):
             raise InputError(f"--center is {self.center}, wanted finite coordinates")
         if self.focus is not None and self.aperture is None:
-            raise InputError("--focus is about --aperture: give its radius as well")
+            raise InputError("--focus needs --aperture, the radius of the lens: give both")

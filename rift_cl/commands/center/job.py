@@ -40,9 +40,9 @@ class CenterJob:
 
     def __init__(self, settings: CenterSettings) -> None:
         self.settings = settings
-        self.device = settings.open_device()
+        self.device = settings.open_device(settings.memory_limit)
         self.scan = settings.open_scan()
-        self.folder = RunFolder(settings.out, "center", overwrite=True)
+        self.folder = RunFolder(settings.out, "center", overwrite=settings.overwrite)
         self.row = self.scan.shape[1] // 2 if settings.row is None else settings.row
         if not 0 <= self.row < self.scan.shape[1]:
             raise InputError(f"--row is {self.row}, {self.scan.path} has {self.scan.shape[1]} rows")

@@ -1,25 +1,34 @@
-"""What ``rift center`` takes."""
+"""The settings of ``rift center``."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from rift_cl.commands.inputs.scan_input import ScanInput
+from rift_cl.commands.options import Auto, RunOptions
+
+
+@dataclass(frozen=True, kw_only=True)
+class CenterSearch:
+    """Where the axis is searched, and what the report shows."""
+
+    group: ClassVar[str] = "search"
+
+    span: Auto[tuple[float, float]] = None
+    """First and last detector bin of the search. Default: the middle 60 % of the detector for scans
+    over 180 degrees, all of it for full turns."""
+    row: Auto[int] = None
+    """Detector row that the pictures show; the search uses several rows, whichever this is.
+    Default: the middle row."""
+    out: Path = Path("rift-center")
+    """Folder for report.html, with pictures and the score curve, config.json and metrics.json."""
 
 
 @dataclass(frozen=True)
-class CenterSettings(ScanInput):
+class CenterSettings(RunOptions, CenterSearch, ScanInput):
     """Find the rotation axis of a parallel-beam scan.
 
     Example: rift center scan.h5 --out center
     """
-
-    out: Path = Path("rift-center")
-    """Folder for the pictures, the score curve and report.html."""
-    row: int | None = None
-    """Detector row that the pictures show; the middle one when not given. The axis is searched in
-    several rows, whichever this is."""
-    span: tuple[float, float] | None = None
-    """First and last detector bin between which to search; when not given, the middle 60 % of the
-    detector for half turns and all of it for full turns."""

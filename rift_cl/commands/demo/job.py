@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from rift_cl.cl.discovery import open_device
 from rift_cl.commands.demo.settings import DemoSettings
 from rift_cl.commands.fit_photos.job import Fit
 from rift_cl.commands.fit_photos.report import show_fit
@@ -65,7 +64,7 @@ class DemoJob:
             raise InputError(f"--size is {settings.size}, wanted {_SMALLEST} or more")
         if not settings.views or min(settings.views) < 1:
             raise InputError(f"--views is {settings.views}, wanted one number or more, each >= 1")
-        self.device = open_device(settings.device)
+        self.device = settings.open_device()
         self.folder = RunFolder(settings.out, "demo", overwrite=True)
         # Whatever else is there under a fit's name is not lost either.
         for name in FITS:

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rift_cl.cl.discovery import open_device
 from rift_cl.commands.cameras.fit_cameras import FitCameras, open_fit_cameras
 from rift_cl.commands.evaluate.report import eval_page
 from rift_cl.commands.evaluate.settings import EvalSettings
@@ -46,7 +45,7 @@ class Evaluation:
         self.seen = self._seen()
         for view in [*self.seen, *(v for views in self.groups.values() for v in views)]:
             camera_at(view, self.downscale)
-        self.device = open_device(settings.device)
+        self.device = settings.open_device()
         self.folder = RunFolder(settings.out, "eval", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
         self.scores: dict[str, list[ViewScore]] = {}

@@ -1,39 +1,51 @@
-"""What ``rift eval`` takes."""
+"""The settings of ``rift eval``."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from tyro.conf import Positional
 
 from rift_cl.commands.inputs.scene_input import SceneInput
+from rift_cl.commands.options import Auto, RunOptions
 
 
 @dataclass(frozen=True)
-class EvalSettings(SceneInput):
+class EvalInput(SceneInput):
+    """The scene, how its splats are drawn, and the photographs to score it on."""
+
+    group: ClassVar[str] = "input"
+
+    captures: Annotated[tuple[Path, ...], Positional] = ()
+    """Captures to score: each a transforms.json, a folder with one, or a COLMAP model. Default: the
+    photographs that the fit held out."""
+    train: Auto[Path] = None
+    """Capture that the scene was trained on, for the baselines (nearest training photographs) and
+    the angles to them. Default: the training photographs of the fit."""
+    photographs: Auto[Path] = None
+    """Folder of the fit's photographs, if they were moved."""
+    hold_out: int = 0
+    """Score every Nth photograph of each capture, and treat those of --train as held out, as
+    'rift fit' does (0 = score all)."""
+    downscale: Auto[int] = None
+    """Whole factor by which photographs are downscaled. Default: that of the fit, or 1."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvalOutput:
+    """What is written."""
+
+    group: ClassVar[str] = "output"
+
+    out: Path = Path("rift-eval")
+    """Folder for report.html, config.json and metrics.json."""
+
+
+@dataclass(frozen=True)
+class EvalSettings(RunOptions, EvalOutput, EvalInput):
     """Score a scene on held-out photographs, or on other captures of it.
 
     Example: rift eval fit --out scores
     """
-
-    captures: Annotated[tuple[Path, ...], Positional] = ()
-    """Captures to score: each a transforms.json, a folder with one, or a COLMAP model; the
-    photographs that the fit held out when not given."""
-    out: Path = Path("rift-eval")
-    """Folder for report.html, config.json and metrics.json."""
-    train: Path | None = None
-    """The capture that was trained on: for the scores of its nearest pictures, and the angles;
-    what the fit was trained on when not given."""
-    photographs: Path | None = None
-    """Folder of the fit's own photographs, if they have moved."""
-    hold_out: int = 0
-    """Score every so many-th photograph of each capture, and take those of --train for unseen, as
-    'rift fit' does; 0 scores all of them."""
-    downscale: int | None = None
-    """Whole factor by which photographs are made smaller; that of the fit, or 1, when not given."""
-    overwrite: bool = False
-    """Replace an earlier evaluation in the same folder."""
-    dry_run: bool = False
-    """Say what would be done, and stop."""

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.budget import format_bytes
-from rift_cl.cl.discovery import open_device
 from rift_cl.commands.export.export import output_path, write_whole
 from rift_cl.commands.export.settings import ExportSettings
 from rift_cl.commands.inputs.opened_scene import scene_file
@@ -62,7 +61,7 @@ class MeshExport:
             raise InputError(f"{path}: holds no splats, there is no surface")
         self.grid = _grid(self.scene, settings.voxels)
         self.path = output_path(settings, f".{self._name}")
-        self.device = open_device(settings.device)
+        self.device = settings.open_device()
 
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""

@@ -1,37 +1,49 @@
-"""What ``rift export`` takes."""
+"""The settings of ``rift export``."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 from rift_cl.commands.inputs.orbit_input import OrbitInput
+from rift_cl.commands.options import Auto, RunOptions
 
 Target = Literal["html", "ply", "compressed-ply", "spz", "sog", "glb", "stl", "obj"]
 
 
+@dataclass(frozen=True, kw_only=True)
+class ExportOutput:
+    """The file."""
+
+    group: ClassVar[str] = "output"
+
+    to: Auto[Target] = None
+    """File format: a web page (html), splats (ply, compressed-ply, spz, sog, glb), or with --mesh
+    triangles (ply, stl, obj, glb). Default: html; with --mesh, ply."""
+    out: Auto[Path] = None
+    """File to write. Default: the scene's name with the extension of the format, in the current
+    folder."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshOptions:
+    """Surfaces of X-ray scenes, by marching cubes."""
+
+    group: ClassVar[str] = "mesh"
+
+    mesh: bool = False
+    """Export an isosurface of an X-ray scene's density as triangles."""
+    level: Auto[float] = None
+    """With --mesh: density of the surface, per unit of length. Default: Otsu's threshold."""
+    voxels: int = 256
+    """With --mesh: number of voxels along the longest edge of the grid that is searched for the
+    surface."""
+
+
 @dataclass(frozen=True)
-class ExportSettings(OrbitInput):
+class ExportSettings(RunOptions, MeshOptions, ExportOutput, OrbitInput):
     """Write a scene as a web page, as splats or as a mesh for other software.
 
     Example: rift export fit --to spz --out scene.spz
     """
-
-    to: Target | None = None
-    """File format: a page for any browser (html, when not given), splats (ply, compressed-ply,
-    spz, sog, glb), or with --mesh triangles (ply, when not given, stl, obj, glb)."""
-    out: Path | None = None
-    """File to write; the scene's name with the format's ending, in the current folder, when not
-    given."""
-    mesh: bool = False
-    """X-rays: the surface of one density as triangles, by marching cubes."""
-    level: float | None = None
-    """With --mesh: the density of the surface, per unit of length; that which parts inside and
-    outside best (Otsu's threshold) when not given."""
-    voxels: int = 256
-    """With --mesh: voxels along the longest edge, in which the surface is looked for."""
-    overwrite: bool = False
-    """Replace a file that is there."""
-    dry_run: bool = False
-    """Say what would be written and what would be lost, and stop."""

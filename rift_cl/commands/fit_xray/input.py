@@ -61,7 +61,6 @@ class XrayInput:
             kind=settings.kind,
             axes=settings.axes,
             angle_unit=settings.angle_unit,
-            device=settings.device,
             memory=settings.memory,
         )
         self.scan: ScanFile = self.source.open_scan()

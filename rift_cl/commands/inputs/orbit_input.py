@@ -1,6 +1,6 @@
-"""A scene and what a camera turns about in it, as the commands take them.
+"""A scene and the cameras that saw it, as the commands take them.
 
-What the methods need is imported by them, so that a command's help loads neither.
+What the methods need is imported by them, so that a command's help loads no reader.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rift_cl.commands.inputs.scene_input import SceneInput
+from rift_cl.commands.options import Auto
 from rift_cl.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,21 +24,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class OrbitInput(SceneInput):
-    """Where a scene is, what a camera turns about, and which way is up."""
+    """The scene, how its splats are drawn, and the cameras that saw it."""
 
-    capture: Path | None = None
-    """A capture of the same scene (its photographs need not be there): look from where its cameras
-    did, upright and as far off. The fit's own cameras when not given."""
-    up: tuple[float, float, float] | None = None
-    """Which way is up; as the cameras of --capture or of the fit were held, or from the scene's
-    shape, when not given."""
+    capture: Auto[Path] = None
+    """A capture of the same scene (its photographs need not be there), whose cameras set height,
+    distance and up direction. Default: the cameras of the fit."""
+    up: Auto[tuple[float, float, float]] = None
+    """Up direction in the scene's coordinates. Default: that of the cameras, or estimated from the
+    splats where there are none."""
 
     def bounds(self, scene: OpenedScene) -> SceneBounds:
-        """Where the scene lies, and the cameras that it was seen by.
+        """Where the scene lies, and the cameras that saw it.
 
         Raises:
-            RiftError: the capture cannot be read, or its cameras all stand in one place, or --up
-                has no direction.
+            RiftError: the capture cannot be read, its cameras are all in one place, or --up has no
+                direction.
         """
         from rift_cl.commands.cameras.arc import check_places
         from rift_cl.commands.inputs.scene_bounds import bounds_of_cameras, bounds_of_splats
@@ -66,21 +67,21 @@ class OrbitInput(SceneInput):
         return np.array(self.up) / length
 
     def notes(self, scene: OpenedScene) -> tuple[str, ...]:
-        """What had to be guessed of a fit's cameras, a sentence each."""
+        """What had to be assumed of the cameras, a sentence each."""
         known = scene.cameras is not None or self.capture is not None
-        # A scan's views are no cameras that anybody held.
+        # The views of an X-ray scan are no photographs.
         if known or scene.splats.mode == "xray":
             return ()
         if scene.folder is None:
             return () if scene.fit is None else (self._without_fit(scene.fit),)
         return (
-            f"{self.scene} holds no cameras, since an older version fitted it: the way of the "
-            "camera and what is up are guessed from the splats (name its capture with --capture).",
+            f"{self.scene} holds no cameras, since an older version fitted it: the camera path and "
+            "the up direction are estimated from the splats (name its capture with --capture).",
         )
 
     def _without_fit(self, fit: Path) -> str:
         return (
-            f"{self.scene} is taken without the fit that it lies in: the way of the camera and "
-            "what is up are guessed from the splats, background and drawing are the usual ones "
-            f"(name the folder instead: {fit})."
+            f"{self.scene} is read without the fit that it lies in: camera path and up direction "
+            "are estimated from the splats, background and eps2d are the defaults (name the folder "
+            f"instead: {fit})."
         )

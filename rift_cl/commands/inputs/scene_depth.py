@@ -50,7 +50,7 @@ def space_of(
     """
     seen = _few(cameras)
     if seen and source.is_dir() and (source / _SCENE).is_file():
-        scene = OpenedScene(SceneInput(source, device=device))
+        scene = OpenedScene(SceneInput(source))
         maps = depth_maps(scene, cameras, open_device(device))
         return FreeSpace(maps), "the depth of the fitted splats"
     if seen and points is not None and len(points) >= _POINTS:

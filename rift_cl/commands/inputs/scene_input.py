@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional
+
+from rift_cl.commands.options import Auto
 
 if TYPE_CHECKING:
     from rift_cl.commands.inputs.opened_scene import OpenedScene
@@ -14,28 +16,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SceneInput:
-    """Where a scene is and how it is drawn."""
+    """The scene, and how its splats are drawn."""
+
+    group: ClassVar[str] = "input"
 
     scene: Annotated[Path, Positional]
     """A .ply or .splat file, or the folder of a 'rift fit'."""
-    eps2d: float | None = None
-    """Variance that splats gain on the screen, in square pixels; that of the fit, or 0.3, when not
-    given."""
-    background: tuple[float, float, float] | None = None
-    """Red, green and blue behind the splats in display light, 0 to 1; that of the fit, or black,
-    when not given."""
-    device: str | None = None
-    """Device to use: its number, cpu, gpu, or a part of its name; see 'rift devices'."""
+    eps2d: Auto[float] = None
+    """Variance added to every splat on the screen, in square pixels. Default: that of the fit, or
+    0.3 for a file."""
+    background: Auto[tuple[float, float, float]] = None
+    """Background colour: red, green and blue in display light, 0 to 1. Default: that of the fit, or
+    black for a file."""
 
     def open_scene(self, *, densities: bool = False) -> OpenedScene:
         """Read the scene.
 
         Args:
-            densities: whether it may be one of X-rays.
+            densities: whether X-ray scenes are accepted.
 
         Raises:
-            RiftError: there is none, it is damaged, or a number makes no sense.
+            RiftError: there is none, it is damaged, or a number is out of range.
         """
+        # Imported when used, so that a command's help loads no reader.
         from rift_cl.commands.inputs.opened_scene import OpenedScene
 
         return OpenedScene(self, densities=densities)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from rift_cl.cl.budget import format_bytes
-from rift_cl.cl.discovery import open_device
 from rift_cl.commands.inputs.view_set import ViewSet, place_of
 from rift_cl.commands.pictures.views_table import csv_text, view_row
 from rift_cl.commands.plan.input import plan_input
@@ -44,7 +43,7 @@ class Planning:
         self.given = plan_input(settings)
         # Cameras that cannot have the target in their picture are refused here, before any work.
         DesignSpace(self.given.target, self.given.constraints, self.given.types)
-        self.device = open_device(settings.device)
+        self.device = settings.open_device()
         self.folder = RunFolder(settings.out, "plan", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
         self.found: Plan | None = None

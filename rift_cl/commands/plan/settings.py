@@ -1,89 +1,118 @@
-"""What ``rift plan`` takes, checked before any work."""
+"""The settings of ``rift plan``, checked before any work."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
+from rift_cl.commands.options import Auto, RunOptions
 from rift_cl.errors import InputError
 
 _MOST_VIEWS = 10_000
 
 
+@dataclass(frozen=True, kw_only=True)
+class PlanTarget:
+    """What is to be seen, and what is known of it."""
+
+    group: ClassVar[str] = "target"
+
+    have: Auto[Path] = None
+    """A capture with views that are taken already: plan those that add most."""
+    unit: float = 1.0
+    """Millimetres per world unit of --have."""
+    diameter: Auto[float] = None
+    """Diameter of the target in millimetres. Default: that of --have, or 100."""
+    center: Auto[tuple[float, float, float]] = None
+    """Centre of the target in millimetres. Default: where the cameras of --have look, or 0 0 0."""
+    mode: Auto[Literal["surface", "volume"]] = None
+    """Whether the target is opaque, a sphere standing for its surface (surface), or transparent as
+    for X-rays, so that opposite views are equivalent (volume). Default: volume with --pilot,
+    otherwise surface."""
+    pilot: Auto[Path] = None
+    """A first reconstruction (a volume of 'rift reconstruct') as the prior of the target's power
+    spectrum. Default: a power law 1/k^2."""
+    pilot_spacing: Auto[float] = None
+    """Sample spacing of --pilot in millimetres. Default: such that the target fills the volume."""
+    prior_trust: float = 1.0
+    """Fraction of the spectrum of --pilot that is trusted, 0 to 1; the rest is taken to be
+    isotropic. 0.8 costs little where the pilot is right, and saves much where it is wrong."""
+    prior_blur: float = 0.0
+    """Angular uncertainty of the spectrum of --pilot in degrees; it is blurred by as much."""
+    snr: float = 1000.0
+    """Signal-to-noise ratio of one view at one cycle per diameter."""
+    band: Auto[float] = None
+    """Highest frequency of interest, in cycles per millimetre. Default: 16 per diameter."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanCameras:
+    """The cameras, and where they may stand."""
+
+    group: ClassVar[str] = "camera"
+
+    camera: tuple[Path, ...] = ()
+    """JSON files of cameras to choose from, such as {"name": "mine", "focal_length": 50,
+    "f_number": 8, "pixel_um": 3.9, "size": [6000, 4000]}, or a list of them in "cameras". Default:
+    a 24 megapixel camera with 50 mm at f/11."""
+    lens: Auto[Path] = None
+    """Lens prescription (.json or .zmx) for every camera. Default: the camera's own lens."""
+    elevation: tuple[float, float] = (0.0, 75.0)
+    """Lowest and highest elevation above the horizon in degrees; negative is from below."""
+    azimuth: tuple[float, float] = (-180.0, 180.0)
+    """First and last azimuth around the target in degrees: 0 along x, 90 along y."""
+    distance: Auto[tuple[float, float]] = None
+    """Nearest and farthest distance from the target's centre in millimetres. Default: as near as
+    the target fits into the picture."""
+    cover: float = 1.0
+    """Fraction of the target's outline that must lie in each picture, above 0, up to 1."""
+    path: Literal["free", "ring", "tilted-rings", "spline"] = "free"
+    """Shape of the camera path: free positions, one ring, several tilted rings, or a smooth
+    curve."""
+    rings: int = 2
+    """With --path tilted-rings: number of rings."""
+    keep_out: tuple[str, ...] = ()
+    """Regions without cameras: sphere:X,Y,Z,RADIUS, box:X,Y,Z,X,Y,Z (inf for unbounded), or
+    cone:X,Y,Z,DX,DY,DZ,DEGREES, in millimetres; with the prefix 'body-' they also occlude the
+    target."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanMethod:
+    """How the views are chosen."""
+
+    group: ClassVar[str] = "method"
+
+    views: int = 64
+    """Number of views to plan; with --have, in addition to those."""
+    merit: Literal["wiener", "logdet", "worst"] = "wiener"
+    """Criterion to minimize: posterior variance (wiener, A-optimal), negative information gain
+    (logdet, D-optimal), or the variance in the worst direction (worst, E-optimal)."""
+    budget: Auto[float] = None
+    """Maximum total cost of the views; a view costs 1, or what its camera file says. Default: only
+    their number is limited."""
+    seed: int = 0
+    """Random seed; the same seed gives the same plan."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanOutput:
+    """What is written."""
+
+    group: ClassVar[str] = "output"
+
+    out: Path = Path("rift-plan")
+    """Folder for transforms.json, views.csv, report.html, config.json and metrics.json."""
+
+
 @dataclass(frozen=True)
-class PlanSettings:
+class PlanSettings(RunOptions, PlanOutput, PlanCameras, PlanTarget, PlanMethod):
     """Plan camera poses that minimize what remains uncertain about a target.
 
     Example: rift plan --views 64 --diameter 60 --elevation 0 70 --out plan
     """
-
-    views: int = 64
-    """How many views to plan; with --have, how many more."""
-    out: Path = Path("rift-plan")
-    """Folder for transforms.json, views.csv, report.html, config.json and metrics.json."""
-    diameter: float | None = None
-    """Of the target in millimetres; 100, or that of --have, when not given."""
-    center: tuple[float, float, float] | None = None
-    """Middle of the target; 0 0 0, or where the cameras of --have look, when not given."""
-    elevation: tuple[float, float] = (0.0, 75.0)
-    """Lowest and highest above the horizon in degrees; below 0 is from beneath."""
-    azimuth: tuple[float, float] = (-180.0, 180.0)
-    """First and last direction round the target in degrees, 0 along x, 90 along y."""
-    distance: tuple[float, float] | None = None
-    """Nearest and farthest from the target's middle; as near as it fits into the picture when not
-    given."""
-    camera: tuple[Path, ...] = ()
-    """JSON files of cameras to choose among, such as {"name": "mine", "focal_length": 50,
-    "f_number": 8, "pixel_um": 3.9, "size": [6000, 4000]}, or a list of them in "cameras"; a 24
-    megapixel camera with 50 mm at f/11 when not given."""
-    lens: Path | None = None
-    """Prescription (.json or .zmx) of the lens of every camera, instead of its own."""
-    cover: float = 1.0
-    """Share of the target's outline that must lie in each picture."""
-    path: Literal["free", "ring", "tilted-rings", "spline"] = "free"
-    """Where cameras may stand: anywhere, on one ring, on rings that lean, or on a smooth curve."""
-    rings: int = 2
-    """How many rings of --path tilted-rings there are."""
-    keep_out: tuple[str, ...] = ()
-    """Places without cameras: sphere:X,Y,Z,RADIUS, box:X,Y,Z,X,Y,Z (inf for endless),
-    cone:X,Y,Z,DX,DY,DZ,DEGREES; with 'body-' before it the target is not seen through it either."""
-    have: Path | None = None
-    """A capture with views that are taken already: plan those that add most."""
-    unit: float = 1.0
-    """Millimetres in a unit of --have's world."""
-    pilot: Path | None = None
-    """A first reconstruction (a volume of 'rift reconstruct'): what the target's spectrum is like;
-    one that falls as 1/k^2 when not given."""
-    pilot_spacing: float | None = None
-    """Millimetres between samples of --pilot; such that the target fills it when not given."""
-    prior_trust: float = 1.0
-    """Share of --pilot's spectrum that is believed, 0 to 1; the rest is taken to be the same in all
-    directions. 0.8 costs little where the pilot is right, and saves much where it is wrong."""
-    prior_blur: float = 0.0
-    """Degrees by which directions of --pilot's spectrum may be wrong; it is blurred by as much."""
-    merit: Literal["wiener", "logdet", "worst"] = "wiener"
-    """What to make small: the unknown share of the target's power, minus the bits, or the unknown
-    share in the worst direction."""
-    mode: Literal["surface", "volume"] | None = None
-    """Whether the target is opaque, so that a sphere's surface stands for it, or seen through as by
-    X-rays, so that opposite views tell the same; opaque, but with --pilot, when not given."""
-    budget: float | None = None
-    """Most that all views may cost; a view costs 1, or what the camera's file says."""
-    snr: float = 1000.0
-    """Signal to noise of one view at one cycle per diameter."""
-    band: float | None = None
-    """Highest frequency that is wanted, in cycles per millimetre; 16 per diameter when not
-    given."""
-    seed: int = 0
-    """Of the planner's chance; the same seed gives the same plan."""
-    device: str | None = None
-    """Device to use: its number, cpu, gpu, or a part of its name; see 'rift devices'."""
-    overwrite: bool = False
-    """Replace an earlier plan in the same folder."""
-    dry_run: bool = False
-    """Say what would be done, and stop."""
 
     @property
     def opaque(self) -> bool:
@@ -101,7 +130,8 @@ class PlanSettings:
         for name in ("diameter", "unit", "budget", "snr", "band", "pilot_spacing"):
             value = getattr(self, name)
             if value is not None and not 0 < value < math.inf:
-                raise InputError(f"--{name} is {value:g}, wanted a positive number")
+                option = name.replace("_", "-")
+                raise InputError(f"--{option} is {value:g}, wanted a positive number")
         if not 0 < self.cover <= 1:
             raise InputError(f"--cover is {self.cover:g}, wanted more than 0, up to 1")
         if self.center is not None and not all(map(math.isfinite, self.center)):
@@ -116,13 +146,13 @@ class PlanSettings:
             )
         if self.path == "tilted-rings" and last - first < 360:
             raise InputError(
-                f"--path tilted-rings goes all the way round, but --azimuth is {first:g} {last:g}: "
-                "take another path, or the full circle"
+                f"--path tilted-rings needs the full circle, but --azimuth is {first:g} {last:g}: "
+                "choose another path, or leave --azimuth out"
             )
         if self.seed < 0:
             raise InputError(f"--seed is {self.seed}, wanted 0 or more")
         if self.unit != 1 and self.have is None:
-            raise InputError("--unit is about the world of --have: name a capture")
+            raise InputError("--unit applies to --have: name a capture")
         self._check_pilot()
 
     def _check_pilot(self) -> None:
@@ -131,9 +161,9 @@ class PlanSettings:
         if not 0 <= self.prior_blur <= 90:
             raise InputError(f"--prior-blur is {self.prior_blur:g}, wanted 0 to 90 degrees")
         if self.pilot is None and (self.prior_trust != 1 or self.prior_blur != 0):
-            raise InputError("--prior-trust and --prior-blur are about --pilot: name a volume")
+            raise InputError("--prior-trust and --prior-blur apply to --pilot: name a volume")
         if self.pilot_spacing is not None and self.pilot is None:
-            raise InputError("--pilot-spacing is about --pilot: name a volume")
+            raise InputError("--pilot-spacing applies to --pilot: name a volume")
 
     def _check_range(self, name: str, least: float, most: float) -> None:
         pair = getattr(self, name)

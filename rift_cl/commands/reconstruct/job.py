@@ -63,7 +63,7 @@ class Reconstruction:
     def __init__(self, settings: ReconstructSettings) -> None:
         settings.check()
         self.settings = settings
-        self.device: Device = settings.open_device()
+        self.device: Device = settings.open_device(settings.memory_limit)
         self.source = SliceInput(settings, self.device)
         self.inversion = Inversion(settings, self.source, self.device)
         # Made now, so that a part that is not inside the slice is told before any work.

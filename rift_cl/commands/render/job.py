@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.budget import format_bytes
-from rift_cl.cl.discovery import open_device
 from rift_cl.commands.cameras.film import capture_arc, farthest_from_cameras, film, frame_of
 from rift_cl.commands.cameras.subject import subject_of
 from rift_cl.commands.inputs.opened_scene import in_display_light
@@ -59,7 +58,7 @@ class Render:
         self.settings = settings
         self.scene = settings.open_scene()
         self.bounds = settings.bounds(self.scene)
-        self.device = open_device(settings.device)
+        self.device = settings.open_device()
         cameras = self._path() if settings.path is not None else self._film()
         self.cameras = [
             opened(camera, settings.aperture, settings.focus, self.bounds.center)
@@ -67,7 +66,7 @@ class Render:
         ]
         lenses = [camera.aperture for camera in self.cameras if camera.aperture is not None]
         if settings.focus is not None and not lenses:
-            raise InputError("--focus is about a lens with an opening: give its --aperture as well")
+            raise InputError("--focus needs a lens with an aperture: give --aperture as well")
         self._kind = chosen_film(settings.film, [camera.size for camera in self.cameras])
         self.folder = RunFolder(settings.out, "render", overwrite=settings.overwrite)
         for name, read in (("path", settings.path), ("capture", settings.capture)):

@@ -1,13 +1,14 @@
-"""What ``rift render`` takes, checked before any work."""
+"""The settings of ``rift render``, checked before any work."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 from rift_cl.commands.inputs.orbit_input import OrbitInput
+from rift_cl.commands.options import Auto, RunOptions
 from rift_cl.errors import InputError
 
 FilmChoice = Literal["auto", "webm", "mp4", "mp4-h264", "apng"]
@@ -16,8 +17,60 @@ _STEEPEST, _WIDEST = 89.0, 170.0
 _LONGEST, MOST_FRAMES = 16384, 100_000
 
 
+@dataclass(frozen=True, kw_only=True)
+class CameraOptions:
+    """The cameras to render from."""
+
+    group: ClassVar[str] = "camera"
+
+    path: Auto[Path] = None
+    """Render the views of this capture (a transforms.json, a COLMAP model, or a fit), in its order,
+    instead of a film. With --between, the key_frames.json of an earlier film, edited, gives
+    another film."""
+    between: int = 0
+    """Number of frames to interpolate between consecutive views of --path."""
+    frames: Auto[int] = None
+    """Number of frames of the film. Default: 96."""
+    elevation: Auto[float] = None
+    """Elevation of the film's camera above the horizon, in degrees. Default: that of the
+    photographs, or 20."""
+    distance: Auto[float] = None
+    """Distance of the film's camera from the scene's centre, in scene units. Default: that of the
+    photographs, or such that the whole scene is visible."""
+    fov: Auto[float] = None
+    """Vertical field of view of the film, in degrees. Default: that of the photographs, or 45."""
+    aperture: Auto[float] = None
+    """Radius of the lens aperture, in scene units (0 = pinhole). Default: that of the views of
+    --path, or 0."""
+    focus: Auto[float] = None
+    """Depth in focus, in scene units. Default: that of the views of --path, or of the scene's
+    centre."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrameOutput:
+    """What is written."""
+
+    group: ClassVar[str] = "output"
+
+    out: Path = Path("rift-render")
+    """Folder for the frames, film.webm, film.mp4 or animation.png, contact.png, transforms.json,
+    key_frames.json and report.html."""
+    size: Auto[tuple[int, int]] = None
+    """Width and height of a frame in pixels. Default: those of the views of --path; for a film 640
+    pixels along the longer edge, in the shape of the photographs, or 640 480."""
+    rate: float = 24.0
+    """Frame rate of the film, in frames per second."""
+    film: FilmChoice = "auto"
+    """Format of the film: webm (VP9), mp4 (AV1), mp4-h264 (for older players; its encoder is under
+    the GPL), or apng (a smaller animated PNG). Videos need PyAV (pip install av); auto is webm
+    where it is installed, otherwise apng."""
+    depth: bool = False
+    """Also write the expected depth along the camera's axis, in scene units."""
+
+
 @dataclass(frozen=True)
-class RenderSettings(OrbitInput):
+class RenderSettings(RunOptions, FrameOutput, CameraOptions, OrbitInput):
     """Render a film of a scene, or the views of a capture.
 
     The film follows the cameras of the photographs: an orbit if they surround the scene, else
@@ -25,47 +78,6 @@ class RenderSettings(OrbitInput):
 
     Example: rift render fit --out film --frames 120 --depth
     """
-
-    out: Path = Path("rift-render")
-    """Folder for frames, film.webm, film.mp4 or animation.png, contact.png, transforms.json,
-    key_frames.json and report.html."""
-    path: Path | None = None
-    """A transforms.json, a COLMAP model, or a fit: draw each of its views, in its order, instead of
-    the film; key_frames.json of an earlier film, changed at will, with --between, for another."""
-    between: int = 0
-    """Frames between each two views of --path."""
-    frames: int | None = None
-    """Frames of the film; 96 when not given."""
-    elevation: float | None = None
-    """Of the film's camera above the horizon, in degrees; as the photographs' cameras, or 20, when
-    not given."""
-    distance: float | None = None
-    """Of the film's camera from the scene's middle, in scene units; as the photographs' cameras, or
-    so that all is seen, when not given."""
-    fov: float | None = None
-    """Vertical field of view of the film in degrees; that of the photographs, or 45, when not
-    given."""
-    aperture: float | None = None
-    """Radius of the lens's opening, in scene units, so that one depth alone is sharp; 0 for a
-    pinhole. That of the views of --path, or 0, when not given."""
-    focus: float | None = None
-    """Depth that is sharp, in scene units; that of the views of --path, or of the scene's middle,
-    when not given."""
-    size: tuple[int, int] | None = None
-    """Width and height in pixels; when not given the views' own, or for a film the photographs'
-    shape with 640 pixels along its longer edge, or 640 480."""
-    rate: float = 24.0
-    """Frames of the film in a second."""
-    film: FilmChoice = "auto"
-    """The film's kind: webm (VP9), mp4 (AV1), mp4-h264 (plays on older machines; its encoder is
-    under the GPL), or apng, smaller pictures in an animated PNG. Videos want PyAV (pip install av);
-    auto is webm with it and apng without."""
-    depth: bool = False
-    """Write the expected depth as well: along the camera's axis, in scene units."""
-    overwrite: bool = False
-    """Replace an earlier rendering in the same folder."""
-    dry_run: bool = False
-    """Say what would be done, and stop."""
 
     def check(self) -> None:
         """Check every number's range.
@@ -93,12 +105,12 @@ class RenderSettings(OrbitInput):
             shown = " ".join(map(str, self.size))
             raise InputError(f"--size is {shown}, wanted 1 to {_LONGEST} pixels each")
         if self.path is None and self.between:
-            raise InputError("--between is about the views of --path: name one")
+            raise InputError("--between interpolates the views of --path: add --path")
         if self.path is not None:
             self._check_path()
 
     def _check_path(self) -> None:
-        """What makes a film has no meaning along a path."""
+        """Options of a film do not apply to the views of a capture."""
         for name in ("capture", "frames", "elevation", "distance", "up", "fov"):
             if getattr(self, name) is not None:
-                raise InputError(f"--{name} is about a film, --path names cameras: leave one out")
+                raise InputError(f"--{name} applies to a film, --path names cameras: leave one out")

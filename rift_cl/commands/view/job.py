@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from rift_cl.cl.discovery import open_device
 from rift_cl.commands.cameras.film import first_view
 from rift_cl.commands.inputs.opened_scene import OpenedScene
 from rift_cl.commands.inputs.scene_bounds import SceneBounds
@@ -37,7 +36,7 @@ class ViewJob:
         scene = settings.open_scene(densities=True)
         self.notes = settings.notes(scene)
         bounds = settings.bounds(scene)
-        device = open_device(settings.device)
+        device = settings.open_device()
         self._renderer = Renderer(scene.drawing, device=device)
         self._splats = scene.splats.upload(device)
         # Kernels are built before anybody waits for a picture.

@@ -1,0 +1,77 @@
+"""Options that several commands share, and how a command's options fall into groups.
+
+A command's settings are one flat frozen dataclass: what Python passes, what ``config.json`` holds
+and what the command line shows. It inherits its fields from a few classes that each name a
+``group``, under whose title the help lists them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar, TypeVar
+
+import tyro
+
+if TYPE_CHECKING:
+    from rift_cl.cl.device import Device
+
+T = TypeVar("T")
+# An option that the run decides where it is not given: its help says how, "None" would not.
+Auto = Annotated[T | None, tyro.conf.arg(help_behavior_hint="")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeviceOption:
+    """On what the command computes."""
+
+    group: ClassVar[str] = "run"
+
+    device: Auto[str] = None
+    """OpenCL device: its number, cpu, gpu, or part of its name (see 'rift devices'). Default: the
+    environment variable RIFT_DEVICE, otherwise the star of 'rift devices'."""
+
+    def open_device(self, memory: int | None = None) -> Device:
+        """The chosen device.
+
+        Args:
+            memory: most bytes to use on it; see ``rift_cl.open_device``.
+
+        Raises:
+            NoDeviceError: there is none, or none that matches.
+        """
+        # Imported when used, so that a command's help loads no device layer.
+        from rift_cl.cl.discovery import open_device
+
+        return open_device(self.device, memory)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions(DeviceOption):
+    """How the command runs; none of these changes a result."""
+
+    group: ClassVar[str] = "run"
+
+    overwrite: bool = False
+    """Replace the results of an earlier run at the same place."""
+    dry_run: bool = False
+    """Print what would be done, and write nothing."""
+    config: Auto[Path] = None
+    """config.json of an earlier run of this command. Its settings, with every value that was
+    decided in that run, become the defaults of this one."""
+
+
+def option_groups(settings: type) -> list[type]:
+    """The classes that a command's settings consist of, in the order of the fields.
+
+    Args:
+        settings: the class of a command's settings.
+
+    Returns:
+        Its most derived bases that name a ``group``; the class itself where none does.
+    """
+    found: list[type] = []
+    for base in settings.__mro__[1:]:
+        if hasattr(base, "group") and not any(issubclass(other, base) for other in found):
+            found.append(base)
+    return found[::-1] or [settings]
