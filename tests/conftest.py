@@ -50,9 +50,14 @@ def _label(device: rift.Device) -> str:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Run a test that asks for ``device`` on each of them; they are opened but once."""
+    """Run a test that asks for ``device`` on each of them; they are opened but once.
+
+    A test that is marked ``once`` is spared a CPU's second kind.
+    """
     if "device" in metafunc.fixturenames:
-        metafunc.parametrize("device", _variants(), ids=_label, scope="session")
+        once = metafunc.definition.get_closest_marker("once") is not None
+        chosen = rift.devices() if once else _variants()
+        metafunc.parametrize("device", chosen, ids=_label, scope="session")
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,7 @@
 A test with many parameters proves most of what it proves with the first of them, and every one of
 them costs time, above all where each needs kernels of its own. So plain ``pytest`` runs each test
 with the first of its parameters, on one kind of device (a file's tests all on the same one, so that
-they share kernels). Two marks change that:
+they share kernels). Marks change that:
 
 - ``full``: only ``pytest -m full`` runs the test; another one touches the same code at less cost.
 - ``each``: plain ``pytest`` runs it with each of its parameters, for example once per file format.
@@ -23,6 +23,7 @@ import pytest
 MARKS = (
     "full: takes long, and only `pytest -m full` runs it",
     "each: plain `pytest` runs it with each of its parameters, not with the first alone",
+    "once: a CPU runs it as a CPU alone, for its kernels are the same for every kind of device",
 )
 # A worker holds its compiled kernels and its data: up to some 2 GB each.
 _WORKER_BYTES = 3 << 30

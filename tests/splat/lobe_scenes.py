@@ -13,7 +13,9 @@ from rift_cl.reference.lobes import shade_lobes, shade_lobes_grad
 from rift_cl.splat.features import shade, shade_grad
 from rift_cl.splat.projected import SplatGradients
 
-CASES = [("hg", 8), ("hg", 36), ("lg", 9), ("lg", 36), ("sg", 4), ("asg", 4)]
+CASES = [("hg", 8), ("lg", 9), ("sg", 4), ("asg", 4)]
+# Each takes the compiler a quarter of a minute.
+MOST_MODES = [("hg", 36), ("lg", 36)]
 CAMERA = camera_of("pinhole")
 
 

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lobe_scenes import CAMERA, CASES, Lobes, error, facing, random_lobes, seen, seen_grad
+from lobe_scenes import (
+    CAMERA,
+    CASES,
+    MOST_MODES,
+    Lobes,
+    error,
+    facing,
+    random_lobes,
+    seen,
+    seen_grad,
+)
 
 from rift_cl.basis.angular import SphericalHarmonics
 from rift_cl.reference.lobes import shade_lobes, shade_lobes_grad
@@ -17,8 +27,19 @@ def incoming_for(given, seed=2):
     return random.standard_normal((len(given.means), 3)).astype(np.float32)
 
 
+@pytest.mark.full
+@pytest.mark.once
+@pytest.mark.parametrize("kind, count", MOST_MODES)
+def test_gradients_of_most_modes_are_the_twins(device, kind, count):
+    check_gradients(device, kind, count)
+
+
 @pytest.mark.parametrize("kind, count", CASES)
 def test_gradients_are_the_twins(device, kind, count):
+    check_gradients(device, kind, count)
+
+
+def check_gradients(device, kind, count):
     for given in (random_lobes(kind, count), facing(random_lobes(kind, count))):
         incoming = incoming_for(given)
         found, twin = seen_grad(device, given, incoming), given.gradients(incoming)
@@ -47,7 +68,7 @@ def test_splats_that_are_not_drawn_have_no_gradient(device):
         assert not found[name][1::2].any() and found[name][::2].any()
 
 
-@pytest.mark.parametrize("kind, count", CASES)
+@pytest.mark.parametrize("kind, count", CASES + MOST_MODES)
 def test_gradients_of_the_twin_are_its_differences(kind, count):
     given = bright(facing(random_lobes(kind, count, 8), aside=0.3))
     arrays, incoming = list(given.exact()), incoming_for(given).astype(float)
