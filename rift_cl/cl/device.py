@@ -135,13 +135,13 @@ class Device:
         """Copy a device array to the host."""
         return download(self, array)
 
-    def launch(self, kernel: str, work: tuple[int, ...], /, *arguments: Any, **given: Any) -> None:
+    def launch(self, kernel: str, work: tuple[int, ...], /, **given: Any) -> None:
         """Enqueue a kernel over ``work`` items, as in ``launch("axpby", (n,), x=x, .., RUN=1)``.
 
         Arguments have the names that the kernel's source gives them, compile-time constants are in
         capitals; see ``Programs.launch``.
         """
-        self._programs.launch(kernel, work, arguments, given)
+        self._programs.launch(kernel, work, given)
 
     def finish(self) -> None:
         """Wait until everything enqueued is done."""

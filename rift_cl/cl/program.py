@@ -68,15 +68,12 @@ class Programs:
         self._macros: dict[tuple[str, ...], tuple[str, ...]] = {}
         self._own = _ThreadKernels()
 
-    def launch(
-        self, name: str, size: tuple[int, ...], positional: tuple[Any, ...], given: dict[str, Any]
-    ) -> None:
+    def launch(self, name: str, size: tuple[int, ...], given: dict[str, Any]) -> None:
         """Enqueue one kernel over ``size`` work-items; the first axis is rounded up to groups.
 
         Args:
             name: the kernel, which is also its file and its entry point.
             size: work-items along each axis; nothing is enqueued when one is zero.
-            positional: arguments in the order of the kernel.
             given: what the kernel is given, by name. Names in capitals are the compile-time
                 constants that this variant is built with. All others are the kernel's arguments,
                 as its source names them: device arrays for buffers, numbers for numbers, NumPy
@@ -97,9 +94,6 @@ class Programs:
             macros = self._macros[names] = tuple(sorted(filter(str.isupper, names)))
         key = (name, tuple([(macro, _literal(given[macro])) for macro in macros]))
         kernel = self._kernel(key)
-        if positional:
-            takes = (parameter.name for parameter in kernel.parameters)
-            given |= dict(zip(takes, positional, strict=True))
         if len(given) != len(macros) + len(kernel.parameters):
             check_names(name, kernel.parameters, given)
         values = in_order(name, kernel.parameters, given)

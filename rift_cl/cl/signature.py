@@ -73,7 +73,7 @@ def parameters(name: str, source: str, macros: Mapping[str, str]) -> tuple[Param
         if alias:
             aliases[alias[2]] = alias[1]
         lines.append(line)
-    match = re.search(rf"\bKERNEL\s+void\s+{name}\s*\(([^)]*)\)", "\n".join(lines))
+    match = re.search(rf"\b(?:KERNEL|__kernel)\s+void\s+{name}\s*\(([^)]*)\)", "\n".join(lines))
     if match is None:
         raise ValueError(f"no kernel {name} in its source")
     listed = _expanded(match[1], defined).split(",")

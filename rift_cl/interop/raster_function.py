@@ -94,10 +94,11 @@ def _draw(how: Drawer, arrays: list[Any], background: Any) -> Drawing:
     screen, depths, boxes, features = arrays
     pixels = how.size[0] * how.size[1]
     absgrad = how.settings.absgrad
+    culled = how.device.zeros((len(depths),), np.uint8)
     memory = FrameMemory(len(depths), 0, pixels, features.shape[1], absgrad=absgrad)
     return draw(
         how.device,
-        *(Projected(screen, depths, boxes, None), features, how.size),
+        *(Projected(screen, depths, boxes, culled), features, how.size),
         settings=how.settings,
         memory=memory,
         background=background,

@@ -61,7 +61,7 @@ class Project(torch.autograd.Function):
     def forward(ctx: Any, how: Drawer, *tensors: Any) -> tuple[torch.Tensor, ...]:
         """Takes means, quats, scales, covars, opacities, viewmats (V, 4, 4) and Ks (V, 3, 3)."""
         device, like, cameras = how.device, tensors[0], how.cameras(*tensors[5:])
-        arrays = [None if t is None else to_device(device, t) for t in tensors[:5]]
+        arrays: list[Any] = [None if t is None else to_device(device, t) for t in tensors[:5]]
         splats = Splats(arrays[0], arrays[1], arrays[2], arrays[4], covars=arrays[3])
         views = [project(device, splats, camera, how.settings) for camera in cameras]
         ctx.how, ctx.splats, ctx.cameras, ctx.views, ctx.like = how, splats, cameras, views, like
@@ -98,6 +98,7 @@ class Project(torch.autograd.Function):
             )
             for name in ("means", "quats", "scales", "covars", "opacities"):
                 _add(total, name, how.device, getattr(found, name), like)
+            assert found.camera is not None
             lenses.append(to_tensor(how.device, sum_columns(how.device, found.camera), like))
         names = ("means", "quats", "scales", "covars", "opacities")
         return (None, *(total.get(name) for name in names), *_camera_grads(lenses))
@@ -132,9 +133,10 @@ class Shade(torch.autograd.Function):
             given = to_device(device, sh[view] if ctx.each else sh)
             into = _only_features(device, to_device(device, incoming[0][view]))
             features = to_device(device, out[view])
-            by_sh = shade_grad(device, places, given, camera, features=features, gradients=into)
-            each.append(to_tensor(device, by_sh, means))
+            found = shade_grad(device, places, given, camera, features=features, gradients=into)
+            each.append(to_tensor(device, found, means))
             _add(total, "means", device, into.means, means)
+            assert into.camera is not None
             lenses.append(to_tensor(device, sum_columns(device, into.camera), means))
         by_sh = torch.stack(each) if ctx.each else sum(each[1:], each[0])
         return None, total["means"], by_sh, _camera_grads(lenses)[0], None, None
@@ -143,7 +145,8 @@ class Shade(torch.autograd.Function):
 def _only_features(device: Device, features: Any) -> SplatGradients:
     count = features.shape[0]
     means, camera = device.zeros((count, 3)), device.zeros((count, 16))
-    return SplatGradients(means, None, None, None, None, features, None, None, camera)
+    no: Any = None
+    return SplatGradients(means, no, no, no, no, features, no, no, camera)
 
 
 def _add(

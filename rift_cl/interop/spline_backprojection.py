@@ -33,9 +33,17 @@ def backproject_spline(
     views, bins = sinogram.shape
     image = device.empty(A.domain)
     lanes = device.traits.macros["LANES"]
-    arguments = (device.array(_coefficients(sinogram, degree)), device.array(_lines(A)), image)
-    size = (-(-nx // lanes), ny)
-    device.launch("backproject_spline", size, *arguments, views, bins, nx, DEGREE=degree)
+    device.launch(
+        "backproject_spline",
+        (-(-nx // lanes), ny),
+        coefficients=device.array(_coefficients(sinogram, degree)),
+        lines=device.array(_lines(A)),
+        image=image,
+        views=views,
+        bins=bins,
+        nx=nx,
+        DEGREE=degree,
+    )
     return device.get(image)
 
 

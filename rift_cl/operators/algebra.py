@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rift_cl.cl.arithmetic import axpby
+from rift_cl.cl.array import DeviceArray
 from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
 from rift_cl.operators.linear import LinearOperator, Piece
 
@@ -31,10 +32,10 @@ class Adjoint(LinearOperator):
         """The operator that this is the adjoint of."""
         return self._forward
 
-    def _apply(self, x: Any, out: Any) -> None:
+    def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
         self._forward._apply_adjoint(x, out)
 
-    def _apply_adjoint(self, y: Any, out: Any) -> None:
+    def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
         self._forward._apply(y, out)
 
     @property
@@ -61,11 +62,11 @@ class Scaled(LinearOperator):
     def __reduce__(self) -> tuple[Any, ...]:
         return Scaled, (self._inner, self._factor)
 
-    def _apply(self, x: Any, out: Any) -> None:
+    def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
         self._inner._apply(x, out)
         axpby(self.device, 0.0, out, self._factor, out)
 
-    def _apply_adjoint(self, y: Any, out: Any) -> None:
+    def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
         self._inner._apply_adjoint(y, out)
         axpby(self.device, 0.0, out, self._factor, out)
 
@@ -106,14 +107,14 @@ class Sum(LinearOperator):
         other = self.dtype.itemsize * max(math.prod(self.domain), math.prod(self.range))
         return other + max(term.scratch for term in self._terms)
 
-    def _apply(self, x: Any, out: Any) -> None:
+    def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
         left, right = self._terms
         left._apply(x, out)
         other = self.device.empty(out.shape, self.dtype)
         right._apply(x, other)
         axpby(self.device, 1.0, other, 1.0, out)
 
-    def _apply_adjoint(self, y: Any, out: Any) -> None:
+    def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
         left, right = self._terms
         left._apply_adjoint(y, out)
         other = self.device.empty(out.shape, self.dtype)
@@ -147,12 +148,12 @@ class Product(LinearOperator):
         between = self.dtype.itemsize * math.prod(self._inner.range)
         return between + max(self._outer.scratch, self._inner.scratch)
 
-    def _apply(self, x: Any, out: Any) -> None:
+    def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
         between = self.device.empty(self._inner.range, self.dtype)
         self._inner._apply(x, between)
         self._outer._apply(between, out)
 
-    def _apply_adjoint(self, y: Any, out: Any) -> None:
+    def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
         between = self.device.empty(self._inner.range, self.dtype)
         self._outer._apply_adjoint(y, between)
         self._inner._apply_adjoint(between, out)

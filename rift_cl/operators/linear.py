@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import (
@@ -248,9 +249,9 @@ class LinearOperator(ABC):
         return [((), ())]
 
     @abstractmethod
-    def _apply(self, x: Any, out: Any) -> None:
+    def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
         """Fill ``out`` with the image of ``x``; device arrays, of a piece's shapes."""
 
     @abstractmethod
-    def _apply_adjoint(self, y: Any, out: Any) -> None:
+    def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
         """Fill ``out`` with the adjoint's image of ``y``; device arrays, of a piece's shapes."""

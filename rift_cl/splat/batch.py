@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from rift_cl.cl.arithmetic import axpby
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.errors import ShapeError
 from rift_cl.geometry import Camera
@@ -32,27 +33,27 @@ class ViewGradients:
         background: by its background; None where there was none.
     """
 
-    means2d: Any
-    means2d_abs: Any
-    camera: Any
-    aperture: Any
-    background: Any
+    means2d: DeviceArray
+    means2d_abs: DeviceArray | None
+    camera: DeviceArray | None
+    aperture: DeviceArray | None
+    background: DeviceArray | None
 
 
 @dataclass(frozen=True, eq=False)
 class SplatSums:
     """Gradients of a loss by the splats' parameters, summed over cameras; see ``Splats``."""
 
-    means: Any
-    quats: Any
-    scales: Any
-    covars: Any
-    opacities: Any
-    colors: Any
-    sh: Any
-    shape_modes: Any
-    color_modes: Any
-    lobes: Any
+    means: DeviceArray
+    quats: DeviceArray | None
+    scales: DeviceArray | None
+    covars: DeviceArray | None
+    opacities: DeviceArray
+    colors: DeviceArray | None
+    sh: DeviceArray | None
+    shape_modes: DeviceArray | None
+    color_modes: DeviceArray | None
+    lobes: DeviceArray | None
 
 
 def draw_views(
@@ -60,7 +61,7 @@ def draw_views(
     splats: Splats,
     cameras: Sequence[Camera],
     *,
-    backgrounds: Sequence[Any] | None = None,
+    backgrounds: Sequence[DeviceArray] | None = None,
     depth: DepthKind | None = None,
 ) -> list[Frame]:
     """Draw the same splats for every camera; see ``Renderer.forward``.
@@ -86,8 +87,8 @@ def draw_views(
 def views_grad(
     renderer: Renderer,
     frames: Sequence[Frame],
-    grad_images: Sequence[Any],
-    grad_transmittances: Sequence[Any] | None = None,
+    grad_images: Sequence[DeviceArray],
+    grad_transmittances: Sequence[DeviceArray] | None = None,
     *,
     with_camera: bool = False,
 ) -> tuple[SplatSums, list[ViewGradients]]:

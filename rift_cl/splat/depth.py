@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.splat.raster import Raster
@@ -12,13 +11,23 @@ from rift_cl.splat.raster import Raster
 def expected_depth(device: Device, raster: Raster) -> None:
     """Turn the last channel from accumulated into expected depth, in place."""
     height, width, channels = raster.image.shape
-    sizes = (height * width, channels)
-    device.launch("expected_depth", sizes[:1], raster.image, raster.transmittance, *sizes)
+    pixels = height * width
+    device.launch(
+        "expected_depth",
+        (pixels,),
+        image=raster.image,
+        transmittance=raster.transmittance,
+        pixels=pixels,
+        channels=channels,
+    )
 
 
 def expected_depth_grad(
-    device: Device, raster: Raster, grad_image: Any, grad_transmittance: Any = None
-) -> tuple[Any, Any]:
+    device: Device,
+    raster: Raster,
+    grad_image: DeviceArray,
+    grad_transmittance: DeviceArray | None = None,
+) -> tuple[DeviceArray, DeviceArray]:
     """The gradient by the image with accumulated depth, and by the transmittance.
 
     Args:
@@ -35,7 +44,13 @@ def expected_depth_grad(
     device.launch(
         "expected_depth_grad",
         (height * width,),
-        *(raster.image, raster.transmittance, grad_image, grad_transmittance),
-        *(by_image, by_transmittance, height * width, channels),
+        image=raster.image,
+        transmittance=raster.transmittance,
+        grad_image=grad_image,
+        grad_transmittance=grad_transmittance,
+        by_image=by_image,
+        by_transmittance=by_transmittance,
+        pixels=height * width,
+        channels=channels,
     )
     return by_image, by_transmittance

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.splat.bands import FrameMemory, plan_bands
 from rift_cl.splat.projected import Projected
@@ -40,10 +40,10 @@ class Drawing:
     """
 
     projected: Projected
-    features: Any
+    features: DeviceArray
     size: tuple[int, int]
     settings: SplatSettings
-    background: Any
+    background: DeviceArray | None
     memory: FrameMemory
     lists: TileLists | None
     raster: Raster
@@ -63,12 +63,12 @@ class Drawing:
 def draw(
     device: Device,
     projected: Projected,
-    features: Any,
+    features: DeviceArray,
     size: tuple[int, int],
     *,
     settings: SplatSettings,
     memory: FrameMemory,
-    background: Any = None,
+    background: DeviceArray | None = None,
     modes: ScreenModes | None = None,
 ) -> Drawing:
     """Draw splats, at once if they fit the budget.
@@ -106,8 +106,11 @@ def draw(
 
 
 def draw_grad(
-    device: Device, drawing: Drawing, grad_image: Any, grad_transmittance: Any = None
-) -> Any:
+    device: Device,
+    drawing: Drawing,
+    grad_image: DeviceArray,
+    grad_transmittance: DeviceArray | None = None,
+) -> DeviceArray:
     """Each splat's sums over its tiles of what the raster's gradient leaves.
 
     (N, 6 + D [+ 2]), or with modes (N, P): see ``raster_grad``.
@@ -122,7 +125,7 @@ def draw_grad(
         ShapeError: a gradient does not fit the image.
         ResourceLimitError: not even one row of tiles fits the budget.
     """
-    sums = None
+    sums: DeviceArray | None = None
     for lists in _lists_again(device, drawing):
         records = raster_grad(
             device,
@@ -131,6 +134,7 @@ def draw_grad(
             background=drawing.background,
         )
         sums = sum_slots(device, lists, records, onto=sums)
+    assert sums is not None
     return sums
 
 

@@ -12,11 +12,11 @@ as their geometry.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from rift_cl.cl.arithmetic import copy_columns
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError, ShapeError
@@ -75,22 +75,22 @@ def gather_features(
     channels: Channels,
     *,
     angular: str = "sh",
-) -> Any:
+) -> DeviceArray:
     """The table of features, (N, D), as seen from the camera; see ``shade`` for the errors."""
-    if channels.total == channels.own:
+    if splats.colors is not None and channels.total == channels.own:
         return splats.colors
     features = device.empty((len(splats), channels.total))
     if channels.shaded:
         given = (splats.means, splats.sh, camera, projected.culled)
         shade(device, *given, into=features, lobes=splats.lobes, angular=angular)
-    if channels.own:
+    if splats.colors is not None:
         copy_columns(device, splats.colors, 0, features, channels.shaded, channels.own)
     if channels.depth:
         copy_columns(device, projected.depths, 0, features, channels.color, 1)
     return features
 
 
-def own_columns(device: Device, table: Any, channels: Channels) -> Any:
+def own_columns(device: Device, table: DeviceArray, channels: Channels) -> DeviceArray | None:
     """The columns of a table of features that belong to the splats' ``colors``; None if none."""
     if not channels.own or channels.total == channels.own:
         return table if channels.own else None
@@ -101,15 +101,15 @@ def own_columns(device: Device, table: Any, channels: Channels) -> Any:
 
 def shade(
     device: Device,
-    means: Any,
-    sh: Any,
+    means: DeviceArray,
+    sh: DeviceArray | None,
     camera: Camera,
-    culled: Any,
+    culled: DeviceArray,
     *,
-    into: Any = None,
-    lobes: Any = None,
+    into: DeviceArray | None = None,
+    lobes: DeviceArray | None = None,
     angular: str = "sh",
-) -> Any:
+) -> DeviceArray:
     """Colours of splats as seen from the camera's centre.
 
     Args:
@@ -136,7 +136,12 @@ def shade(
     device.launch(
         shading.kernel,
         (count,),
-        *(means, *shading.parameters, culled, features, center, count),
+        means=means,
+        **shading.parameters,
+        culled=culled,
+        features=features,
+        center=center,
+        count=count,
         STRIDE=features.shape[1],
         **shading.sizes,
     )
@@ -145,16 +150,16 @@ def shade(
 
 def shade_grad(
     device: Device,
-    means: Any,
-    sh: Any,
+    means: DeviceArray,
+    sh: DeviceArray | None,
     camera: Camera,
     *,
-    features: Any,
+    features: DeviceArray,
     gradients: SplatGradients,
-    lobes: Any = None,
+    lobes: DeviceArray | None = None,
     angular: str = "sh",
-    grad_lobes: Any = None,
-) -> Any:
+    grad_lobes: DeviceArray | None = None,
+) -> DeviceArray:
     """The gradient of ``shade``.
 
     Args:
@@ -181,24 +186,35 @@ def shade_grad(
     shading = Shading.of(means, sh, lobes, angular)
     count = means.shape[0]
     _check_incoming(gradients.features, features)
-    found = [device.empty(array.shape) for array in shading.parameters]
+    found = {
+        f"grad_{name}": device.empty(array.shape) for name, array in shading.parameters.items()
+    }
     if grad_lobes is not None and lobes is not None:
-        found[1] = as_device_array(device, grad_lobes, lobes.shape, name="shade_grad: grad_lobes")
+        found["grad_lobes"] = as_device_array(
+            device, grad_lobes, lobes.shape, name="shade_grad: grad_lobes"
+        )
     inverse = np.linalg.inv(camera.view[:3, :3]).T
     rows = np.column_stack([inverse, camera.center]).astype(np.float32, order="C")
     device.launch(
         f"{shading.kernel}_grad",
         (count,),
-        *(means, *shading.parameters, features, gradients.features, *rows, count),
-        *(*found, gradients.means, gradients.camera),
+        means=means,
+        **shading.parameters,
+        features=features,
+        grad_features=gradients.features,
+        **{f"inverse_{axis}": row for axis, row in zip("xyz", rows, strict=True)},
+        count=count,
+        **found,
+        grad_means=gradients.means,
+        camera_parts=gradients.camera,
         STRIDE=features.shape[1],
         CAMERA_GRADIENT=gradients.camera is not None,
         **shading.sizes,
     )
-    return found[0]
+    return next(iter(found.values()))
 
 
-def _check_incoming(incoming: Any, features: Any) -> None:
+def _check_incoming(incoming: DeviceArray, features: DeviceArray) -> None:
     if incoming.shape != features.shape or features.shape[1] < 3:
         raise ShapeError(
             f"shade_grad: gradients.features has shape {incoming.shape}, wanted that of "

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.geometry import Camera
 from rift_cl.splat.drawing import Drawing
 from rift_cl.splat.features import Channels
@@ -33,12 +33,12 @@ class Frame:
     drawing: Drawing
 
     @property
-    def image(self) -> Any:
+    def image(self) -> DeviceArray:
         """(height, width, D) device array, the background included."""
         return self.drawing.raster.image
 
     @property
-    def transmittance(self) -> Any:
+    def transmittance(self) -> DeviceArray:
         """(height, width) device array, what of the background is seen; alpha is one minus it."""
         return self.drawing.raster.transmittance
 
@@ -77,11 +77,11 @@ class FrameGradients:
     """
 
     splats: SplatGradients
-    colors: Any
-    sh: Any
-    camera: Any
-    aperture: Any
-    background: Any
-    shape_modes: Any = None
-    color_modes: Any = None
-    lobes: Any = None
+    colors: DeviceArray | None
+    sh: DeviceArray | None
+    camera: DeviceArray | None
+    aperture: DeviceArray | None
+    background: DeviceArray | None
+    shape_modes: DeviceArray | None = None
+    color_modes: DeviceArray | None = None
+    lobes: DeviceArray | None = None

@@ -12,8 +12,8 @@ every mode, activation and camera; ``project_modes`` and its gradient are the pa
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError
@@ -22,11 +22,9 @@ from rift_cl.splat.orders import HIGHEST, ModeOrders, count_of, order_of
 from rift_cl.splat.projected import Projected
 from rift_cl.splat.projection import (
     MOMENTS,
-    camera_arguments,
     is_modal,
     mode_macros,
-    projection_macros,
-    shape_arguments,
+    projection_arguments,
 )
 from rift_cl.splat.screen_modes import ScreenModes
 from rift_cl.splat.settings import SplatSettings
@@ -57,10 +55,10 @@ class ModeGradients:
         color_modes: (N, K - 1, C) by those of the colours; None where there are none.
     """
 
-    sums: Any
-    view_parts: Any
-    shape_modes: Any
-    color_modes: Any
+    sums: DeviceArray
+    view_parts: DeviceArray
+    shape_modes: DeviceArray | None
+    color_modes: DeviceArray | None
 
 
 def check_modal(splats: Splats, settings: SplatSettings) -> None:
@@ -97,11 +95,11 @@ def project_modes(
     device.launch(
         "hermite_project",
         (len(splats),),
-        *(splats.means, *shape_arguments(splats), splats.shape_modes, splats.color_modes),
-        *(projected.culled, table),
-        *camera_arguments(camera),
-        *(float(settings.near), float(settings.far), float(settings.eps2d), len(splats)),
-        **projection_macros(splats, camera, settings),
+        **projection_arguments(splats, camera, settings),
+        shape_modes=splats.shape_modes,
+        color_modes=splats.color_modes,
+        culled=projected.culled,
+        screen_modes=table,
         **macros,
     )
     return ScreenModes(table, *orders, channels)
@@ -115,7 +113,7 @@ def project_modes_grad(
     *,
     projected: Projected,
     modes: ScreenModes,
-    moments: Any,
+    moments: DeviceArray,
     channels: int,
 ) -> ModeGradients:
     """The gradient of ``project_modes``, and what ``project_grad`` goes on with.
@@ -144,12 +142,16 @@ def project_modes_grad(
     device.launch(
         "hermite_project_grad",
         (count,),
-        *(splats.means, *shape_arguments(splats), splats.shape_modes, splats.color_modes),
-        *(projected.culled, modes.table, moments),
-        *camera_arguments(camera),
-        *(float(settings.near), float(settings.far), float(settings.eps2d), count),
-        *(out.sums, out.view_parts, out.shape_modes, out.color_modes),
-        **projection_macros(splats, camera, settings),
+        **projection_arguments(splats, camera, settings),
+        shape_modes=splats.shape_modes,
+        color_modes=splats.color_modes,
+        culled=projected.culled,
+        screen_modes=modes.table,
+        moments=moments,
+        sums=out.sums,
+        view_parts=out.view_parts,
+        grad_shape_modes=out.shape_modes,
+        grad_color_modes=out.color_modes,
         **mode_macros(splats, settings),
         CHANNELS=channels,
     )

@@ -6,10 +6,9 @@ one step each way. Integers are exact, so the result does not depend on how the 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 
 # A CPU's cores take so many chunks each, which evens their loads, of at least so many elements,
@@ -19,7 +18,7 @@ _CPU_CHUNKS, _CPU_LEAST = 4, 4096
 GPU_RUN = 64
 
 # For each level of the pyramid: the run that it sums up, and its sums.
-Levels = list[tuple[int, Any]]
+Levels = list[tuple[int, DeviceArray]]
 
 
 def run_length(device: Device, count: int, *, gpu: int) -> int:
@@ -42,8 +41,8 @@ def scan_levels(device: Device, most: int) -> Levels:
 
 
 def exclusive_scan(
-    device: Device, values: Any, count: int, levels: Levels, *, wide: bool = False
-) -> Any:
+    device: Device, values: DeviceArray, count: int, levels: Levels, *, wide: bool = False
+) -> DeviceArray:
     """Replace int32 numbers (``wide``: int64) by the sum of all before; (1,) int64, the total."""
     (run, sums), *above = levels
     runs = pieces(count, run)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+
+from rift_cl.cl.array import DeviceArray
 
 # The meaning of the codes in ``Projected.culled``.
 CULL_REASONS = (
@@ -33,10 +34,10 @@ class Projected:
             zeros everywhere.
     """
 
-    screen: Any
-    depths: Any
-    boxes: Any
-    culled: Any
+    screen: DeviceArray
+    depths: DeviceArray
+    boxes: DeviceArray
+    culled: DeviceArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +55,13 @@ class SplatGradients:
             None as with the camera, and for a camera without aperture.
     """
 
-    means: Any
-    quats: Any
-    scales: Any
-    covars: Any
-    opacities: Any
-    features: Any
-    means2d: Any
-    means2d_abs: Any
-    camera: Any
-    aperture: Any = None
+    means: DeviceArray
+    quats: DeviceArray | None
+    scales: DeviceArray | None
+    covars: DeviceArray | None
+    opacities: DeviceArray
+    features: DeviceArray
+    means2d: DeviceArray
+    means2d_abs: DeviceArray | None
+    camera: DeviceArray | None
+    aperture: DeviceArray | None = None

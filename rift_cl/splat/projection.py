@@ -7,11 +7,11 @@ The drivers of ``kernels/splat/splat_project.cl`` and its gradient, which say wh
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError, ShapeError
@@ -48,13 +48,15 @@ def project(device: Device, splats: Splats, camera: Camera, settings: SplatSetti
     device.launch(
         "splat_project",
         (count,),
-        *(splats.means, *shape_arguments(splats), splats.opacities),
-        *(projected.screen, projected.depths, projected.boxes, projected.culled),
-        *camera_arguments(camera),
-        *(float(settings.near), float(settings.far), float(settings.radius_clip)),
-        *(float(settings.eps2d), count),
-        *((splats.shape_modes, splats.color_modes) if is_modal(splats, settings) else ()),
-        **projection_macros(splats, camera, settings),
+        **projection_arguments(splats, camera, settings),
+        opacities=splats.opacities,
+        screen=projected.screen,
+        depths=projected.depths,
+        boxes=projected.boxes,
+        culled=projected.culled,
+        radius_clip=settings.radius_clip,
+        shape_modes=splats.shape_modes,
+        color_modes=splats.color_modes,
         **mode_macros(splats, settings),
         TILE=settings.tile,
         SMOOTH=settings.smooth_cutoff,
@@ -69,11 +71,11 @@ def project_grad(
     settings: SplatSettings,
     *,
     projected: Projected,
-    sums: Any,
+    sums: DeviceArray,
     with_camera: bool = True,
     depth_channel: bool = False,
     first_moments: bool = True,
-    view_parts: Any = None,
+    view_parts: DeviceArray | None = None,
 ) -> SplatGradients:
     """The gradient of ``project``.
 
@@ -108,14 +110,21 @@ def project_grad(
     device.launch(
         "splat_project_grad",
         (len(splats),),
-        *(splats.means, *shape_arguments(splats), splats.opacities, projected.culled, sums),
-        *camera_arguments(camera),
-        *(float(settings.near), float(settings.far), float(settings.eps2d), len(splats)),
-        *(out.means, *((out.quats, out.scales) if splats.covars is None else (out.covars,))),
-        *(out.opacities, out.features, out.means2d, out.means2d_abs, out.camera),
-        *(() if camera.aperture is None else (out.aperture,)),
-        *(() if view_parts is None else (view_parts,)),
-        **projection_macros(splats, camera, settings),
+        **projection_arguments(splats, camera, settings),
+        opacities=splats.opacities,
+        culled=projected.culled,
+        sums=sums,
+        grad_means=out.means,
+        grad_quats=out.quats,
+        grad_scales=out.scales,
+        grad_covars=out.covars,
+        grad_opacities=out.opacities,
+        grad_features=out.features,
+        grad_means2d=out.means2d,
+        grad_means2d_abs=out.means2d_abs,
+        camera_parts=out.camera,
+        aperture_parts=out.aperture,
+        view_parts=view_parts,
         CHANNELS=channels,
         ABSGRAD=settings.absgrad,
         DEPTH=depth_channel,
@@ -163,27 +172,34 @@ def mode_macros(splats: Splats, settings: SplatSettings) -> dict[str, int]:
     }
 
 
-def projection_macros(splats: Splats, camera: Camera, settings: SplatSettings) -> dict[str, int]:
-    """What ``gaussian.h`` and ``camera.h`` are told."""
+def projection_arguments(
+    splats: Splats, camera: Camera, settings: SplatSettings
+) -> dict[str, DeviceArray]:
+    """What every kernel is told that includes ``gaussian.h`` and ``camera.h``.
+
+    The camera goes by value, so that no copy waits for the queue.
+    """
+    view: NDArray[np.float32] = camera.view[:3].astype(np.float32, order="C")
     return {
+        "means": splats.means,
+        "quats": splats.quats,
+        "scales": splats.scales,
+        "covars": splats.covars,
+        "count": len(splats),
+        **{f"view_{axis}": row for axis, row in zip("xyz", view, strict=True)},
+        "intrinsics": np.array(camera.intrinsics, np.float32),
+        "width": camera.width,
+        "height": camera.height,
+        "aperture": None if camera.aperture is None else _of_aperture(camera.aperture),
+        "near_plane": settings.near,
+        "far_plane": settings.far,
+        "eps2d": settings.eps2d,
         "MODEL": _MODELS[camera.model],
         "XRAY": settings.mode == "xray",
         "ANTIALIASED": settings.antialiased,
         "COVARIANCES": splats.covars is not None,
         "DEFOCUS": camera.aperture is not None,
     }
-
-
-def shape_arguments(splats: Splats) -> tuple[Any, ...]:
-    """What ``gaussian.h`` wants: a splat's shape."""
-    return (splats.quats, splats.scales) if splats.covars is None else (splats.covars,)
-
-
-def camera_arguments(camera: Camera) -> tuple[Any, ...]:
-    """What ``camera.h`` wants: by value, so that no copy waits for the queue."""
-    rows: NDArray[np.float32] = camera.view[:3].astype(np.float32, order="C")
-    pinhole = (*rows, np.array(camera.intrinsics, np.float32), camera.width, camera.height)
-    return pinhole if camera.aperture is None else (*pinhole, _of_aperture(camera.aperture))
 
 
 def _of_aperture(aperture: Aperture) -> NDArray[np.float32]:

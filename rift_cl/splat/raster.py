@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError, ShapeError
@@ -37,8 +37,8 @@ class ScreenSplats:
         modes: the polynomials of splats that have some; None for Gaussians.
     """
 
-    screen: Any
-    features: Any
+    screen: DeviceArray
+    features: DeviceArray
     modes: ScreenModes | None = None
 
 
@@ -52,9 +52,9 @@ class Raster:
         last: (height, width) int32, how many of its tile's entries were looked at.
     """
 
-    image: Any
-    transmittance: Any
-    last: Any
+    image: DeviceArray
+    transmittance: DeviceArray
+    last: DeviceArray
 
 
 def rasterize(
@@ -64,7 +64,7 @@ def rasterize(
     size: tuple[int, int],
     *,
     settings: SplatSettings,
-    background: Any = None,
+    background: DeviceArray | None = None,
     into: Raster | None = None,
 ) -> Raster:
     """Draw splats.
@@ -96,8 +96,11 @@ def rasterize(
         device.launch(
             _kernel(device, splats, "raster"),
             _work(device, lists, settings, per_pixel=True),
-            *(raster.image, raster.transmittance, raster.last),
-            *_drawn(splats, background, lists, size, settings, first),
+            image=raster.image,
+            transmittance=raster.transmittance,
+            last=raster.last,
+            **_drawn(splats, background, lists, size, settings),
+            first=None if splats.modes else first,
             **_macros(splats, settings, count),
         )
     return raster
@@ -108,12 +111,12 @@ def raster_grad(
     splats: ScreenSplats,
     lists: TileLists,
     raster: Raster,
-    grad_image: Any,
-    grad_transmittance: Any = None,
+    grad_image: DeviceArray,
+    grad_transmittance: DeviceArray | None = None,
     *,
     settings: SplatSettings,
-    background: Any = None,
-) -> Any:
+    background: DeviceArray | None = None,
+) -> DeviceArray:
     """The gradient of a loss, as a record for every (splat, tile) pair.
 
     Args:
@@ -148,16 +151,22 @@ def raster_grad(
         device.launch(
             _kernel(device, splats, "raster_grad"),
             _work(device, lists, settings, per_pixel=False),
-            *(slots, grad_image, nothing if first else grad_transmittance),
-            *(raster.transmittance, raster.last),
-            *_drawn(splats, background, lists, (height, width), settings, first),
+            slots=slots,
+            grad_image=grad_image,
+            grad_transmittance=nothing if first else grad_transmittance,
+            transmittance=raster.transmittance,
+            last=raster.last,
+            **_drawn(splats, background, lists, (height, width), settings),
+            first=None if splats.modes else first,
             **_macros(splats, settings, count),
             ABSGRAD=int(settings.absgrad),
         )
     return slots
 
 
-def sum_slots(device: Device, lists: TileLists, records: Any, *, onto: Any = None) -> Any:
+def sum_slots(
+    device: Device, lists: TileLists, records: DeviceArray, *, onto: DeviceArray | None = None
+) -> DeviceArray:
     """Sum each splat's records over its tiles: (N, 6 + D [+ 2]), or (N, P) with modes.
 
     Args:
@@ -171,7 +180,10 @@ def sum_slots(device: Device, lists: TileLists, records: Any, *, onto: Any = Non
     device.launch(
         "splat_sum_slots",
         (count,),
-        *(lists.slots, records, sums, count),
+        slots=lists.slots,
+        records=records,
+        sums=sums,
+        count=count,
         RECORD=record,
         CONTINUED=onto is not None,
     )
@@ -197,7 +209,7 @@ def _check(
         splats.modes.check_fit(*splats.features.shape)
 
 
-def _background(device: Device, background: Any, channels: int) -> Any:
+def _background(device: Device, background: DeviceArray | None, channels: int) -> DeviceArray:
     if background is None:
         return device.zeros(channels)
     return as_device_array(device, background, (channels,), name="background")
@@ -225,19 +237,26 @@ def _work(
 
 def _drawn(
     splats: ScreenSplats,
-    background: Any,
+    background: DeviceArray,
     lists: TileLists,
     size: tuple[int, int],
     settings: SplatSettings,
-    first: int,
-) -> tuple[Any, ...]:
+) -> dict[str, DeviceArray | float | None]:
     """The arguments that compositing and its gradient share."""
-    modes = () if splats.modes is None else (splats.modes.table,)
-    return (
-        *(splats.screen, *modes, splats.features, background, lists.entries, lists.starts),
-        *(*size, lists.tiles.across, lists.tiles.first_row, settings.alpha_cap),
-        *(() if modes else (splats.features.shape[1], first)),
-    )
+    return {
+        "screen": splats.screen,
+        "modes": splats.modes.table if splats.modes else None,
+        "features": splats.features,
+        "background": background,
+        "entries": lists.entries,
+        "starts": lists.starts,
+        "height": size[0],
+        "width": size[1],
+        "tiles_x": lists.tiles.across,
+        "first_tile_row": lists.tiles.first_row,
+        "cap": settings.alpha_cap,
+        "stride": None if splats.modes else splats.features.shape[1],
+    }
 
 
 def _macros(splats: ScreenSplats, settings: SplatSettings, channels: int) -> dict[str, int]:

@@ -7,11 +7,12 @@ and so it does in a smaller memory budget, in which the image is drawn in bands.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from rift_cl.cl.arithmetic import copy_columns, sum_columns
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.cl.memory import as_device_array
@@ -68,7 +69,7 @@ class Renderer:
         splats: Splats,
         camera: Camera,
         *,
-        background: Any = None,
+        background: DeviceArray | None = None,
         depth: DepthKind | None = None,
     ) -> Frame:
         """Draw splats.
@@ -115,8 +116,8 @@ class Renderer:
     def backward(
         self,
         frame: Frame,
-        grad_image: Any,
-        grad_transmittance: Any = None,
+        grad_image: DeviceArray,
+        grad_transmittance: DeviceArray | None = None,
         *,
         with_camera: bool = False,
         with_background: bool = True,
@@ -157,10 +158,8 @@ class Renderer:
             splats=gradients,
             colors=own_columns(device, gradients.features, frame.channels),
             sh=sh,
-            camera=sum_columns(device, gradients.camera) if with_camera else None,
-            aperture=None
-            if gradients.aperture is None
-            else sum_columns(device, gradients.aperture),
+            camera=_summed(device, gradients.camera),
+            aperture=_summed(device, gradients.aperture),
             background=self._background_grad(frame, grad_image) if with_background else None,
             shape_modes=modes.shape_modes if modes else None,
             color_modes=modes.color_modes if modes else None,
@@ -174,7 +173,7 @@ class Renderer:
             reason: int(count) for reason, count in zip(CULL_REASONS, codes, strict=True) if count
         }
 
-    def _modes_grad(self, frame: Frame, moments: Any) -> ModeGradients | None:
+    def _modes_grad(self, frame: Frame, moments: DeviceArray) -> ModeGradients | None:
         """What the raster's moments mean; None for plain splats, whose sums say it themselves."""
         modes = frame.drawing.modes
         if modes is None:
@@ -188,7 +187,9 @@ class Renderer:
             channels=frame.channels.total,
         )
 
-    def _shade_grad(self, frame: Frame, gradients: SplatGradients) -> tuple[Any, Any]:
+    def _shade_grad(
+        self, frame: Frame, gradients: SplatGradients
+    ) -> tuple[DeviceArray | None, DeviceArray | None]:
         """By the coefficients of shaded colours and by their lobes; None where there are none."""
         splats, device = frame.splats, self.device
         if splats.sh is None:
@@ -209,7 +210,7 @@ class Renderer:
         check_depth(depth, self.settings)
         return Channels.of(splats, depth=depth is not None)
 
-    def _behind(self, background: Any, channels: Channels) -> Any:
+    def _behind(self, background: DeviceArray | None, channels: Channels) -> DeviceArray | None:
         """The background of all channels; None where there is none."""
         if background is None or self.settings.mode == "xray":
             return None
@@ -221,7 +222,7 @@ class Renderer:
         copy_columns(self.device, row, 0, behind, 0, channels.color)
         return behind.reshape((channels.total,))
 
-    def _background_grad(self, frame: Frame, grad_image: Any) -> Any:
+    def _background_grad(self, frame: Frame, grad_image: DeviceArray) -> DeviceArray | None:
         if frame.drawing.background is None:
             return None
         height, width, channels = frame.image.shape
@@ -229,7 +230,11 @@ class Renderer:
         self.device.launch(
             "background_grad",
             (height * width,),
-            *(grad_image, frame.transmittance, seen, height * width, channels),
+            grad_image=grad_image,
+            transmittance=frame.transmittance,
+            parts=seen,
+            pixels=height * width,
+            channels=channels,
         )
         total, color = sum_columns(self.device, seen), frame.channels.color
         if color == channels:
@@ -237,3 +242,8 @@ class Renderer:
         ours = self.device.empty((1, color))
         copy_columns(self.device, total.reshape((1, channels)), 0, ours, 0, color)
         return ours.reshape((color,))
+
+
+def _summed(device: Device, table: DeviceArray | None) -> DeviceArray | None:
+    """The sum over all splats' parts; None where there are none."""
+    return None if table is None else sum_columns(device, table)

@@ -7,8 +7,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.splat.orders import ModeOrders, check_order
@@ -37,7 +37,7 @@ class ScreenModes:
         ShapeError: the table's rows are not as long as the orders say.
     """
 
-    table: Any
+    table: DeviceArray
     shape_order: int
     color_order: int = 0
     channels: int = 0

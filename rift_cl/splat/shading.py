@@ -7,9 +7,9 @@ their kind and number (``rift_cl.basis.angular``).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from rift_cl.basis.angular import ANGULAR_KINDS, angular_basis
+from rift_cl.cl.array import DeviceArray
 from rift_cl.errors import InputError, ShapeError
 
 # The numbers that kernels/include/lobe.h knows the kinds of lobes by.
@@ -22,16 +22,19 @@ class Shading:
 
     Args:
         kernel: its name; that of its gradient is the same with ``_grad``.
-        parameters: the arrays it reads besides means, in which its gradient is taken.
+        parameters: the arrays it reads besides means, by its names, in which its gradient is
+            taken.
         sizes: what it is built for.
     """
 
     kernel: str
-    parameters: tuple[Any, ...]
+    parameters: dict[str, DeviceArray]
     sizes: dict[str, int]
 
     @classmethod
-    def of(cls, means: Any, sh: Any, lobes: Any, angular: str) -> Shading:
+    def of(
+        cls, means: DeviceArray, sh: DeviceArray | None, lobes: DeviceArray | None, angular: str
+    ) -> Shading:
         """See that coefficients and lobes fit the functions, and choose; see ``shade``.
 
         Raises:
@@ -49,7 +52,7 @@ class Shading:
                     "shade: these splats have lobes, which angular='sh' would leave out: say which "
                     f"lobes they are, one of {', '.join(_LOBES)}"
                 )
-            return cls("splat_shade", (sh,), {"COEFFICIENTS": sh.shape[1]})
+            return cls("splat_shade", {"sh": sh}, {"COEFFICIENTS": sh.shape[1]})
         if lobes is None:
             raise InputError(
                 f"shade: angular is {angular!r}, but these splats have no lobes: give lobes, or "
@@ -62,4 +65,4 @@ class Shading:
                 f"functions of {angular!r}"
             )
         sizes = {"LOBES": _LOBES[angular], "FUNCTIONS": sh.shape[1]}
-        return cls("lobe_shade", (sh, lobes), sizes)
+        return cls("lobe_shade", {"linear": sh, "lobes": lobes}, sizes)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_plain, as_real_array, upload
 from rift_cl.errors import DTypeError, InputError, ShapeError
@@ -54,16 +55,16 @@ class Splats:
             have no coefficients, or a number of modes belongs to no order.
     """
 
-    means: Any
-    quats: Any
-    scales: Any
-    opacities: Any
-    colors: Any = None
-    sh: Any = None
-    covars: Any = None
-    shape_modes: Any = None
-    color_modes: Any = None
-    lobes: Any = None
+    means: DeviceArray
+    quats: DeviceArray | None
+    scales: DeviceArray | None
+    opacities: DeviceArray
+    colors: DeviceArray | None = None
+    sh: DeviceArray | None = None
+    covars: DeviceArray | None = None
+    shape_modes: DeviceArray | None = None
+    color_modes: DeviceArray | None = None
+    lobes: DeviceArray | None = None
 
     def __post_init__(self) -> None:
         """Check that the arrays fit each other."""

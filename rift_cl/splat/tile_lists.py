@@ -11,10 +11,10 @@ Only M, the number of entries, comes to the host on the way: it is needed to all
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
@@ -52,9 +52,9 @@ class TileLists:
         tiles: the tiles that were listed.
     """
 
-    slots: Any
-    entries: Any
-    starts: Any
+    slots: DeviceArray
+    entries: DeviceArray
+    starts: DeviceArray
     n_entries: int
     tiles: Tiles
 
@@ -71,21 +71,23 @@ class TileCounts:
         tiles: the tiles that are to be listed.
     """
 
-    boxes: Any
-    slots: Any
-    keys: Any
+    boxes: DeviceArray
+    slots: DeviceArray
+    keys: DeviceArray
     n_entries: int
     tiles: Tiles
 
 
 def tile_lists(
-    device: Device, boxes: Any, depths: Any, tiles: Tiles, *, sort: bool = True
+    device: Device, boxes: DeviceArray, depths: DeviceArray, tiles: Tiles, *, sort: bool = True
 ) -> TileLists:
     """List the splats of every tile: ``count_tiles`` and ``list_tiles``, which say more."""
     return list_tiles(device, count_tiles(device, boxes, depths, tiles), sort=sort)
 
 
-def count_tiles(device: Device, boxes: Any, depths: Any, tiles: Tiles) -> TileCounts:
+def count_tiles(
+    device: Device, boxes: DeviceArray, depths: DeviceArray, tiles: Tiles
+) -> TileCounts:
     """Count the tiles of every splat.
 
     Args:
@@ -179,7 +181,7 @@ def tile_lists_bytes(n: int, m: int, *, tiles: int = 0) -> int:
     return 42 * n + 8 * m + 4 * max(_TABLE_SHARE * m, tiles) + 5 * tiles + (1 << 14)
 
 
-def _checked_splats(device: Device, boxes: Any, depths: Any) -> int:
+def _checked_splats(device: Device, boxes: DeviceArray, depths: DeviceArray) -> int:
     if len(boxes.shape) != 2 or boxes.shape[1] != 4:
         raise ShapeError(f"boxes has shape {boxes.shape}, wanted (splats, 4)")
     if boxes.dtype != np.int32:
@@ -207,7 +209,9 @@ def _rectangle(tiles: Tiles) -> dict[str, int]:
     return {"tiles_x": tiles.across, "first_tile_row": tiles.first_row, "tiles_y": tiles.rows}
 
 
-def _depth_order(device: Device, keys: Any, slots: Any, levels: Levels) -> tuple[Any, Any]:
+def _depth_order(
+    device: Device, keys: DeviceArray, slots: DeviceArray, levels: Levels
+) -> tuple[DeviceArray, DeviceArray | None]:
     """Sort the splats that have slots by key: their order (N, visible in front) and number."""
     splats = keys.size
     bits, chunks = _radix(device, splats)
@@ -254,8 +258,13 @@ def _radix(device: Device, splats: int) -> tuple[int, int]:
 
 
 def _sort_by_tile(
-    device: Device, ranks: Any, offsets: Any, pairs: int, place: Tiles, levels: Levels
-) -> tuple[Any, Any]:
+    device: Device,
+    ranks: DeviceArray,
+    offsets: DeviceArray,
+    pairs: int,
+    place: Tiles,
+    levels: Levels,
+) -> tuple[DeviceArray, DeviceArray]:
     """Place the pairs of all ranks by tile: entries and starts."""
     tiles = place.count
     chunks = pieces(pairs, run_length(device, pairs, gpu=_GPU_PAIRS))

@@ -15,11 +15,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import prod
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
@@ -53,7 +53,7 @@ def voxelise(
     grid: Grid,
     *,
     dilation: float | Sequence[float] = 0.0,
-) -> Any:
+) -> DeviceArray:
     """Sum splats at the samples of a grid.
 
     Splats that the rasterizer would not draw (not finite, without a direction or a size) are left
@@ -112,7 +112,7 @@ class _Work:
     """
 
     grid: Grid
-    table: Any
+    table: DeviceArray
     low: Ints
     high: Ints
     order: int
@@ -123,21 +123,26 @@ class _Work:
         places, anchors = _places(device, splats, grid)
         table = device.empty((count, _SHAPE_NUMBERS + count_of(order)))
         sides = device.empty((count, 3))
-        given = splats.covars is not None
         device.launch(
             "hermite_dilate",
             (count,),
-            *((splats.covars,) if given else (splats.quats, splats.scales)),
-            *(splats.opacities, splats.shape_modes, device.array(anchors), table, sides),
-            *(float(1 / step) for step in _steps(grid)),
-            *(float(root) for root in np.sqrt(blur)),
-            count,
-            COVARIANCES=given,
+            quats=splats.quats,
+            scales=splats.scales,
+            covars=splats.covars,
+            opacities=splats.opacities,
+            shape_modes=splats.shape_modes,
+            places=device.array(anchors),
+            table=table,
+            extents=sides,
+            **{f"per_{axis}": 1 / step for axis, step in zip("xyz", _steps(grid), strict=True)},
+            **{f"blur_{axis}": root for axis, root in zip("xyz", np.sqrt(blur), strict=True)},
+            count=count,
+            COVARIANCES=splats.covars is not None,
             ORDER=order,
         )
         return cls(grid, table, *_boxes(places, device.get(sides), grid), order)
 
-    def fill(self, device: Device, volume: Any, layer: int, shared: int) -> None:
+    def fill(self, device: Device, volume: DeviceArray, layer: int, shared: int) -> None:
         """Sum the splats that touch a layer of bricks there."""
         touch = (self.low[:, 2] <= layer) & (layer < self.high[:, 2])
         chosen = np.flatnonzero(touch & (self.low < self.high)[:, :2].all(axis=1))
@@ -152,7 +157,12 @@ class _Work:
             self._fill_band(device, volume, layer, band, listing)
 
     def _fill_band(
-        self, device: Device, volume: Any, layer: int, band: Tiles, listing: tuple[Any, Any, Any]
+        self,
+        device: Device,
+        volume: DeviceArray,
+        layer: int,
+        band: Tiles,
+        listing: tuple[DeviceArray, DeviceArray, DeviceArray],
     ) -> None:
         chosen, boxes, depths = listing
         lists = tile_lists(device, boxes, depths, band, sort=False)
@@ -160,8 +170,16 @@ class _Work:
         device.launch(
             "hermite_voxelise",
             (band.count * items,),
-            *(volume, self.table, chosen, lists.entries, lists.starts, *self.grid.shape),
-            *(band.across, band.first_row, layer, band.count),
+            volume=volume,
+            table=self.table,
+            chosen=chosen,
+            entries=lists.entries,
+            starts=lists.starts,
+            **dict(zip(("nz", "ny", "nx"), self.grid.shape, strict=True)),
+            bricks_x=band.across,
+            first_row=band.first_row,
+            layer=layer,
+            bricks=band.count,
             **{f"BRICK_{axis}": int(n) for axis, n in zip("XYZ", _BRICK, strict=True)},
             ORDER=self.order,
         )

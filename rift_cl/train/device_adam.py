@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 
 _BETA1, _BETA2, _EPSILON = 0.9, 0.999, 1e-15
@@ -22,10 +21,18 @@ class DeviceAdam:
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        self._sent: dict[tuple[int, float], Any] = {}
+        self._sent: dict[tuple[int, float], DeviceArray] = {}
 
     def step(
-        self, x: Any, first: Any, second: Any, gradient: Any, *, rate: float, rest: float, step: int
+        self,
+        x: DeviceArray,
+        first: DeviceArray,
+        second: DeviceArray,
+        gradient: DeviceArray,
+        *,
+        rate: float,
+        rest: float,
+        step: int,
     ) -> None:
         """Move parameters and their moments, in place.
 
@@ -44,13 +51,23 @@ class DeviceAdam:
         device.launch(
             "adam",
             (-(-size // run),),
-            *(x, first, second, gradient, self._shares(period, rest), period, float(rate)),
-            *(_BETA1, _BETA2, 1 / (1 - _BETA1**step), 1 / (1 - _BETA2**step), _EPSILON),
-            np.uint64(size),
+            x=x,
+            m=first,
+            v=second,
+            g=gradient,
+            shares=self._shares(period, rest),
+            period=period,
+            rate=rate,
+            beta1=_BETA1,
+            beta2=_BETA2,
+            c1=1 / (1 - _BETA1**step),
+            c2=1 / (1 - _BETA2**step),
+            epsilon=_EPSILON,
+            size=size,
             RUN=run,
         )
 
-    def _shares(self, period: int, rest: float) -> Any:
+    def _shares(self, period: int, rest: float) -> DeviceArray:
         """Shares of the rate along a period, one for the first three; sent to the device once."""
         if (period, rest) not in self._sent:
             shares = np.where(np.arange(period) < 3, 1.0, rest)

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.arithmetic import axpby, copy_columns
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.elementwise import multiply
 from rift_cl.splat.frame import FrameGradients
@@ -49,15 +49,15 @@ class Parameters:
     """
 
     device: Device
-    raw: dict[str, Any]
-    first: dict[str, Any]
-    second: dict[str, Any]
+    raw: dict[str, DeviceArray]
+    first: dict[str, DeviceArray]
+    second: dict[str, DeviceArray]
     drawn: Splats
     step: int = 0
     density: bool = False
     amplitude: bool = False
-    band: Any = None
-    free: dict[str, Any] = field(default_factory=dict)
+    band: DeviceArray | None = None
+    free: dict[str, DeviceArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Make what takes the steps."""
@@ -145,8 +145,12 @@ class Parameters:
         self.device.launch(
             "splat_activate_grad",
             (count,),
-            *(*self._before(), found.scales, found.opacities),
-            *(scale_penalty / (3 * count), opacity_penalty / count, count),
+            **self._before(),
+            by_scales=found.scales,
+            by_opacities=found.opacities,
+            each_scale=scale_penalty / (3 * count),
+            each_opacity=opacity_penalty / count,
+            count=count,
             **self._kind(),
         )
         by = (found.means, found.quats, found.scales, found.opacities, gradients.sh)
@@ -166,20 +170,28 @@ class Parameters:
     def activate(self) -> None:
         """Make what is drawn of what is trained."""
         drawn, count = self.drawn, len(self)
-        given = (*self._before(), drawn.scales, drawn.opacities, count)
-        self.device.launch("splat_activate", (count,), *given, **self._kind())
+        self.device.launch(
+            "splat_activate",
+            (count,),
+            **self._before(),
+            scales=drawn.scales,
+            opacities=drawn.opacities,
+            count=count,
+            **self._kind(),
+        )
 
-    def _before(self) -> tuple[Any, Any, Any]:
+    def _before(self) -> dict[str, DeviceArray]:
         """What is activated; a kernel without a band takes any array in its place."""
-        logits = self.raw["logits"]
-        return self.raw["log_scales"], logits, logits if self.band is None else self.band
+        scales, logits = self.raw["log_scales"], self.raw["logits"]
+        band = logits if self.band is None else self.band
+        return {"log_scales": scales, "logits": logits, "band": band}
 
     def _kind(self) -> dict[str, bool]:
         kind = {"DENSITY": self.density, "BAND": self.band is not None}
         return kind | ({"AMPLITUDE": True} if self.amplitude else {})
 
     def limit_band(
-        self, cameras: Any, *, near: float, unseen: float, detail: Detail | None = None
+        self, cameras: DeviceArray, *, near: float, unseen: float, detail: Detail | None = None
     ) -> None:
         """Let no splat be finer than what the cameras resolve where it is now.
 
@@ -191,12 +203,13 @@ class Parameters:
         """
         device, count, views = self.device, len(self), cameras.shape[0]
         self.band = device.empty((count,))
-        given = (self.raw["means"], cameras, self.band, float(near), float(unseen))
+        given = {"means": self.raw["means"], "cameras": cameras, "band": self.band}
+        limits = {"near_plane": near, "unseen": unseen, "views": views, "count": count}
         if detail is None:
-            device.launch("splat_band", (count,), *given, views, count)
+            device.launch("splat_band", (count,), **given, **limits)
         else:
             runs = -(-count // device.traits.macros["LANES"])
-            device.launch("splat_band_coverage", (runs,), *given, *detail, views, count)
+            device.launch("splat_band_coverage", (runs,), **given, **limits, **detail._asdict())
         self.activate()
 
     def shake(self, amount: float, seed: int) -> None:
@@ -205,8 +218,14 @@ class Parameters:
         self.device.launch(
             "splat_noise",
             (count,),
-            *(drawn.means, drawn.quats, drawn.scales, drawn.opacities),
-            *(float(amount), np.uint32(seed & 0xFFFFFFFF), np.uint32(self.step), count),
+            means=drawn.means,
+            quats=drawn.quats,
+            scales=drawn.scales,
+            opacities=drawn.opacities,
+            amount=amount,
+            seed=seed & 0xFFFFFFFF,
+            step=self.step,
+            count=count,
         )
 
     def add_degree(self) -> None:
@@ -236,13 +255,15 @@ class Parameters:
         self.activate()
 
 
-def _moments(device: Device, sent: Mapping[str, Any], given: Arrays | None) -> dict[str, Any]:
+def _moments(
+    device: Device, sent: Mapping[str, DeviceArray], given: Arrays | None
+) -> dict[str, DeviceArray]:
     if given is None:
         return {name: device.zeros(array.shape) for name, array in sent.items()}
     return {name: device.array(given[name]) for name in sent}
 
 
-def _undrawn(device: Device, raw: Mapping[str, Any]) -> Splats:
+def _undrawn(device: Device, raw: Mapping[str, DeviceArray]) -> Splats:
     """Splats whose scales and opacities are still to be made."""
     count = raw["means"].shape[0]
     scales, opacities = device.empty((count, 3)), device.empty((count,))

@@ -157,7 +157,7 @@ class Trainer:
         gradients = self.renderer.backward(
             frame, by_image, with_camera=self.poses is not None, with_background=False
         )
-        if self.poses is not None:
+        if self.poses is not None and gradients.camera is not None:
             by_view = self.device.get(gradients.camera)[:12].reshape(3, 4).astype(float)
             self.poses.update(number, by_view, rates["poses"])
         penalties = self.strategy.penalties(step)

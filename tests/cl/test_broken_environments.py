@@ -13,7 +13,8 @@ import numpy as np, rift_cl as rift
 try:
     device = rift.default_device()
     x, y = device.array(np.ones((4, 4))), device.empty((4, 4))
-    device.launch("plane_merge", (4, 4, 1), x, x, y, 0, 4, 4, 4, 4)
+    planes = {"by_rows": x, "by_columns": x, "row_pitch": 4, "column_pitch": 4}
+    device.launch("plane_merge", (4, 4, 1), **planes, image=y, slice0=0, ny=4, nx=4)
     print("sum", float(device.get(y).sum()))
 except rift.RiftError as error:
     print(type(error).__name__, error)

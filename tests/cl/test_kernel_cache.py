@@ -21,8 +21,9 @@ PROGRAM = """
 import numpy as np, rift_cl as rift
 def works(device):
     x, y = device.array(np.ones((4, 4))), device.zeros((4, 4))
-    device.launch("plane_split", (4, 4, 1), x, y, 0, 4, 4, 0)
-    device.launch("plane_merge", (4, 4, 1), x, x, y, 0, 4, 4, 4, 4)
+    device.launch("plane_split", (4, 4, 1), image=x, plane=y, slice0=0, rows=4, width=4, margin=0)
+    planes = {"by_rows": x, "by_columns": x, "row_pitch": 4, "column_pitch": 4}
+    device.launch("plane_merge", (4, 4, 1), **planes, image=y, slice0=0, ny=4, nx=4)
     return bool((device.get(y) == 2).all())
 device = rift.open_device("pocl")
 print(works(device))

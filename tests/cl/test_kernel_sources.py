@@ -184,7 +184,7 @@ def test_kernel_without_its_entry_point_is_a_named_error(fresh, kernels):
 
     (kernels / "probe.cl").write_text("__kernel void something_else(__global int *p) { *p = 1; }\n")
     with pytest.raises(DeviceError, match="probe"):
-        fresh.launch("probe", (1,), fresh.zeros(1, np.int32))
+        fresh.launch("probe", (1,), p=fresh.zeros(1, np.int32))
 
 
 def test_failed_build_leaves_the_device_usable(fresh, kernels):
@@ -201,5 +201,5 @@ def test_macros_reach_the_kernel_with_their_type(device, kernels):
     )
     target = device.zeros(device.traits.macros["GROUP"])
     for value, wanted in ((3, 1.0), (3.0, 1.5), (np.float32(3), 1.5), (np.int64(3), 1.0)):
-        device.launch("probe", (1,), target, VALUE=value)
+        device.launch("probe", (1,), p=target, VALUE=value)
         assert device.get(target)[0] == wanted, value

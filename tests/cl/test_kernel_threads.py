@@ -50,8 +50,8 @@ def _transposer(device, number):
 
     def launch():
         size = (rows, columns, 1)
-        arguments = (source, plane, 0, columns, rows, 0)
-        device.launch("plane_split", size, *arguments, TRANSPOSE=1)
+        sizes = {"slice0": 0, "rows": columns, "width": rows, "margin": 0}
+        device.launch("plane_split", size, image=source, plane=plane, **sizes, TRANSPOSE=1)
         return device.get(plane)
 
     return launch, image.T
@@ -78,7 +78,7 @@ def test_every_thread_has_a_kernel_of_its_own(device):
         made.extend(device._programs._own.kernels.values())
 
     _in_threads(work)
-    assert len({id(kernel) for kernel in made}) == len(made) >= THREADS
+    assert len({id(kernel.handle) for kernel in made}) == len(made) >= THREADS
 
 
 def test_threads_that_build_first_share_one_program(device, restless):

@@ -41,7 +41,8 @@ def test_launches_leave_nothing_behind(device):
     image, plane = device.zeros((4, 4)), device.zeros((4, 4))
 
     def launch():
-        device.launch("plane_split", (4, 4, 1), image, plane, 0, 4, 4, 0)
+        size = {"rows": 4, "width": 4, "margin": 0}
+        device.launch("plane_split", (4, 4, 1), image=image, plane=plane, slice0=0, **size)
 
     assert _grown(device, launch) < MOST
 

@@ -24,8 +24,17 @@ def test_split(device, tiles, shape, transpose):
     image = np.random.default_rng(1).standard_normal((4, *shape)).astype(np.float32)
     rows, width = shape[::-1] if transpose else shape
     plane = device.zeros((SLICES, rows, width + 2 * margin))
-    arguments = (device.array(image), plane, FIRST, rows, width, margin)
-    device.launch("plane_split", tiles(width, rows), *arguments, TRANSPOSE=transpose)
+    device.launch(
+        "plane_split",
+        tiles(width, rows),
+        image=device.array(image),
+        plane=plane,
+        slice0=FIRST,
+        rows=rows,
+        width=width,
+        margin=margin,
+        TRANSPOSE=transpose,
+    )
     expected = split(image[FIRST : FIRST + SLICES], margin=margin, transpose=bool(transpose))
     assert np.array_equal(device.get(plane), expected)
 
@@ -37,9 +46,18 @@ def test_merge(device, tiles, shape):
     by_rows = random.standard_normal((SLICES, ny, nx + 5)).astype(np.float32)
     by_columns = random.standard_normal((SLICES, nx, ny + 2)).astype(np.float32)
     image = device.zeros((4, ny, nx))
-    planes = (device.array(by_rows), device.array(by_columns))
-    pitches = (nx + 5, ny + 2)
-    device.launch("plane_merge", tiles(nx, ny), *planes, image, FIRST, ny, nx, *pitches)
+    device.launch(
+        "plane_merge",
+        tiles(nx, ny),
+        by_rows=device.array(by_rows),
+        by_columns=device.array(by_columns),
+        image=image,
+        slice0=FIRST,
+        ny=ny,
+        nx=nx,
+        row_pitch=nx + 5,
+        column_pitch=ny + 2,
+    )
     expected = np.zeros((4, ny, nx), np.float32)
     expected[FIRST : FIRST + SLICES] = merge(by_rows, by_columns, ny=ny, nx=nx)
     assert np.array_equal(device.get(image), expected)

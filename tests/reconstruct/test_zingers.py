@@ -165,7 +165,8 @@ def test_the_median_round_a_pixel_equals_its_twin(device, shape, reach):
     out, run = device.empty(shape), 4096 if device.traits.is_cpu else 1
     size = (-(-shape[2] // run), shape[1], shape[0])
     macros = dict(zip(("VIEWS_AWAY", "ROWS_AWAY", "BINS_AWAY"), reach, strict=True))
-    device.launch("local_median", size, device.array(x), out, *shape, RUN=run, **macros)
+    sizes = dict(zip(("views", "rows", "bins"), shape, strict=True))
+    device.launch("local_median", size, x=device.array(x), out=out, **sizes, RUN=run, **macros)
     np.testing.assert_array_equal(device.get(out), twin.local_median(x, reach))
 
 
@@ -181,9 +182,11 @@ def test_replacement_equals_its_twin(device, shape, dark, alone):
     levels = np.full((shape[1], 2), (1.5, 0.5), np.float32)
     out, run = device.empty(shape), 4096 if device.traits.is_cpu else 1
     size = (-(-shape[2] // run), shape[1], shape[0])
-    arrays = (device.array(values) for values in (x, medians, limits, levels))
+    given = {"x": x, "medians": medians, "limits": limits, "levels": levels}
+    arrays = {name: device.array(values) for name, values in given.items()}
+    sizes = dict(zip(("views", "rows", "bins"), shape, strict=True))
     macros = {"DARK": int(dark), "ALONE": int(alone), "BINS_BESIDE": beside, "RUN": run}
-    device.launch("zinger_replace", size, *arrays, out, *shape, **macros)
+    device.launch("zinger_replace", size, **arrays, out=out, **sizes, **macros)
     expected = twin.replaced(x, medians, limits, levels, dark=dark, alone=alone, beside=beside)
     np.testing.assert_array_equal(device.get(out), expected)
     assert 0 < np.mean(expected != x) < 1

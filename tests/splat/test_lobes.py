@@ -62,7 +62,8 @@ def test_harmonics_are_shaded_as_ever(device):
     direct = device.empty((200, 3))
     center = np.array([*CAMERA.center, 0], np.float32)
     sizes = {"COEFFICIENTS": 16, "STRIDE": 3}
-    device.launch("splat_shade", (200,), *arrays, culled, direct, center, 200, **sizes)
+    given = {"means": arrays[0], "sh": arrays[1], "culled": culled, "features": direct}
+    device.launch("splat_shade", (200,), **given, center=center, count=200, **sizes)
     assert plain.tobytes() == named.tobytes() == device.get(direct).tobytes()
 
 

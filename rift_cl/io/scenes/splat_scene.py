@@ -210,7 +210,12 @@ class SplatScene:
                 an opacity that no file can hold.
             NonFiniteError: an array holds NaN, or positions, rotations or harmonics infinity.
         """
-        if splats.quats is None or splats.sh is None or splats.colors is not None:
+        if (
+            splats.scales is None
+            or splats.quats is None
+            or splats.sh is None
+            or splats.colors is not None
+        ):
             raise InputError("SplatScene: wants splats with quats, scales and sh, and no colors")
         scales = device.get(splats.scales)
         check_range("scales", scales, np.inf)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 
 # Bins up to which a row is convolved; beyond, transforms are quicker. Measured with 3072 rows on
@@ -40,7 +39,7 @@ class RowConvolution:
         """Bytes of the device besides the rows."""
         return int(self._taps.nbytes)
 
-    def __call__(self, x: Any, out: Any, gains: Any, per_view: int) -> None:
+    def __call__(self, x: DeviceArray, out: DeviceArray, gains: DeviceArray, per_view: int) -> None:
         """Fill ``out`` with the filtered rows.
 
         Args:
@@ -54,7 +53,13 @@ class RowConvolution:
         self.device.launch(
             "filter_views",
             (-(-bins // self._segment), -(-rows // self._run)),
-            *(x, out, self._taps, gains, rows, per_view, bins),
+            sinogram=x,
+            filtered=out,
+            taps=self._taps,
+            gains=gains,
+            rows=rows,
+            rows_per_view=per_view,
+            bins=bins,
             BLOCKS=self._blocks,
             ROWS=self._run,
             DOUBLE=self._double,

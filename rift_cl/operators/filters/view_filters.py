@@ -18,6 +18,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
@@ -236,10 +237,10 @@ class ViewFilter(LinearOperator):
         gains = [] if self._given_gains is None else ["gains of each view"]
         return [repr(self.filter), *gains]
 
-    def _apply(self, x: Any, out: Any) -> None:
+    def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
         self._convolve(x, out, self._gains, x.shape[1] if len(x.shape) == 3 else 1)
 
-    def _apply_adjoint(self, y: Any, out: Any) -> None:
+    def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
         self._apply(y, out)
 
     @property

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.operators.fourier.column_transform import turns
 
@@ -36,11 +37,11 @@ class BlockTransform:
         self._items = _ITEMS_PER_UNIT * device.traits.compute_units
 
     @cached_property
-    def _turns(self) -> Any:
+    def _turns(self) -> DeviceArray:
         return self.device.array(turns(self.length, self.length), self._dtype)
 
     @cached_property
-    def _scratch(self) -> Any:
+    def _scratch(self) -> DeviceArray:
         return self.device.empty((self._items, 2, 2, self.length, BLOCK), self._dtype)
 
     @property
@@ -48,12 +49,19 @@ class BlockTransform:
         """Bytes that are kept on the device: two blocks of every item, and the table of turns."""
         return self._dtype.itemsize * self.length * (4 * BLOCK * self._items + 2)
 
-    def launch(self, kernel: str, columns: int, *arguments: Any, **macros: Any) -> None:
-        """Enqueue a kernel for so many columns, with what transforms need behind its arguments."""
+    def launch(self, kernel: str, columns: int, /, **given: Any) -> None:
+        """Enqueue a kernel for so many columns, with what transforms need besides."""
         blocks = -(-columns // BLOCK)
         items = min(self._items, blocks)
-        transform = (self._scratch, self._turns, self.length, blocks, items)
-        double = int(self._dtype == np.float64)
         self.device.launch(
-            kernel, (items,), *arguments, *transform, BLOCK=BLOCK, DOUBLE=double, **macros
+            kernel,
+            (items,),
+            **given,
+            scratch=self._scratch,
+            turns=self._turns,
+            length=self.length,
+            blocks=blocks,
+            items=items,
+            BLOCK=BLOCK,
+            DOUBLE=int(self._dtype == np.float64),
         )

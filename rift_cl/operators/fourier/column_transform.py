@@ -7,11 +7,10 @@ transpose, detector rows by one.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 
 # Columns that one work-item of a CPU goes through.
@@ -39,13 +38,13 @@ class ColumnTransform:
 
     def __call__(
         self,
-        planes: Any,
-        spare: Any,
+        planes: DeviceArray,
+        spare: DeviceArray,
         columns: int | None = None,
         *,
-        weights: Any = None,
+        weights: DeviceArray | None = None,
         inverse: bool = False,
-    ) -> tuple[Any, Any]:
+    ) -> tuple[DeviceArray, DeviceArray]:
         """Transform fields, without a factor.
 
         Args:
@@ -65,17 +64,32 @@ class ColumnTransform:
         columns = planes.shape[-1] if columns is None else columns
         run = _CPU_RUN if device.traits.is_cpu else 1
         fields = planes.size // (2 * length * columns)
-        parts = [np.int64(0), np.int64(fields * length * columns)]
+        # Where the real and the imaginary parts begin; to change places is to conjugate.
+        re, im = 0, fields * length * columns
         if inverse or weights is not None:
-            parts.reverse()
+            re, im = im, re
         while stride < length:
             left = length // stride
             radix = next(radix for radix in (9, 8, 4, 3, 2) if left % radix == 0)
             weighted = weights is not None and stride == 1
             size = (-(-columns // run), length // radix, fields)
-            arrays = (planes, spare, self._turns, weights if weighted else planes)
-            macros = {"RADIX": radix, "RUN": run, "WEIGHTED": weighted, "DOUBLE": self._double}
-            device.launch("fft_pass", size, *arrays, *parts, columns, length, stride, **macros)
+            device.launch(
+                "fft_pass",
+                size,
+                source=planes,
+                out=spare,
+                turns=self._turns,
+                weights=weights if weighted else planes,
+                re=re,
+                im=im,
+                columns=columns,
+                length=length,
+                stride=stride,
+                RADIX=radix,
+                RUN=run,
+                WEIGHTED=weighted,
+                DOUBLE=self._double,
+            )
             planes, spare, stride = spare, planes, stride * radix
         return planes, spare
 

@@ -7,10 +7,10 @@ The transform along x takes two rows of the image as the real and the imaginary 
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.operators.fourier.block_transform import BLOCK, BlockTransform
@@ -46,12 +46,12 @@ class PaddedSpectrum:
             self.width = BLOCK * -(-self.width // BLOCK)
 
     @cached_property
-    def _weights(self) -> tuple[Any, Any]:
+    def _weights(self) -> dict[str, DeviceArray]:
         rows, columns = (
             self._gridding.compensation(axis, np.arange(n, dtype=np.float64) - n // 2)
             for axis, n in enumerate(self._grid.shape)
         )
-        return self.device.array(self._scale * rows), self.device.array(columns)
+        return {"down": self.device.array(self._scale * rows), "across": self.device.array(columns)}
 
     @cached_property
     def _down(self) -> ColumnTransform:
@@ -85,53 +85,93 @@ class PaddedSpectrum:
         folded = 2 * self._edges[1] * self.pairs
         return max(2 * self.entries + folded, 2 * folded + self.entries)
 
-    def empty_grid(self) -> Any:
+    def empty_grid(self) -> DeviceArray:
         """A grid for ``crop``, whose cells are where kernels/include/fourier_rays.h puts them."""
         if self.device.traits.is_cpu:
             return self.device.empty((self.width // BLOCK, 2, self._edges[0], BLOCK))
         return self.device.empty((2, self._edges[0], self.across))
 
-    def crop(self, grid: Any, image: Any, k: int) -> None:
+    def crop(self, grid: DeviceArray, image: DeviceArray, k: int) -> None:
         """Transform a grid back, and crop it to slice k of the image; the grid is written to."""
-        (rows, edge), (height, width) = self._edges, image.shape[-2:]
+        edge, (height, width) = self._edges[1], image.shape[-2:]
         if self.device.traits.is_cpu:
             self._crop_blocks(grid, image, k)
             return
         grid, spare = self._down(grid, self.device.empty(grid.shape), inverse=True)
         fields = self.device.empty((2, edge, self.pairs))
-        sizes = (height, height // 2, rows, self.across, edge, self.pairs)
         tiles = self._tiles(self.pairs, edge // 2 + 1)
-        self.device.launch("spectrum_fold_gpu", tiles, grid, fields, *sizes)
+        sizes = self._grid_sizes(height)
+        self.device.launch("spectrum_fold_gpu", tiles, grid=grid, fields=fields, **sizes)
         del grid, spare
         fields = self._along(fields, self.device.empty(fields.shape), inverse=True)[0]
-        sizes = (k, height, width, width // 2, edge, self.pairs)
         size = (*self._tiles(width, self.pairs), 2)
-        self.device.launch("slice_crop_gpu", size, fields, image, *self._weights, *sizes)
+        place = {"slice": k, "height": height, "width": width, "middle": width // 2, "edge": edge}
+        self.device.launch(
+            "slice_crop_gpu",
+            size,
+            fields=fields,
+            image=image,
+            **self._weights,
+            **place,
+            pairs=self.pairs,
+        )
 
-    def _crop_blocks(self, grid: Any, image: Any, k: int) -> None:
+    def _crop_blocks(self, grid: DeviceArray, image: DeviceArray, k: int) -> None:
         (down, along), (height, width) = self._blocks, image.shape[-2:]
         edge, pairs = self._edges[1], self.pairs
         fields = self.device.empty((pairs // BLOCK, 2, edge, BLOCK))
-        sizes = (height, height // 2, edge, pairs)
-        down.launch("pairs_of_spectrum_cpu", self.width, grid, fields, *sizes)
-        place = (k, height, width, width // 2, pairs)
-        along.launch("slice_of_pairs_cpu", pairs, fields, image, *self._weights, *place)
+        down.launch(
+            "pairs_of_spectrum_cpu",
+            self.width,
+            grid=grid,
+            fields=fields,
+            height=height,
+            middle=height // 2,
+            edge=edge,
+            pairs=pairs,
+        )
+        along.launch(
+            "slice_of_pairs_cpu",
+            pairs,
+            fields=fields,
+            image=image,
+            **self._weights,
+            slice=k,
+            height=height,
+            width=width,
+            middle=width // 2,
+            pairs=pairs,
+        )
 
-    def of(self, image: Any, k: int) -> Any:
+    def of(self, image: DeviceArray, k: int) -> DeviceArray:
         """The grid of slice k of the image, (2, rows, columns) with margins, to be read from."""
         (rows, edge), (height, width) = self._edges, image.shape[-2:]
         fields = self.device.empty((2, edge, self.pairs))
         spare = self.device.empty(fields.shape)
-        sizes = (k, height, width, width // 2, edge, self.pairs)
         size = (*self._tiles(self.pairs, edge), 2)
-        self.device.launch("slice_place", size, image, fields, *self._weights, *sizes)
+        place = {"slice": k, "height": height, "width": width, "middle": width // 2, "edge": edge}
+        self.device.launch(
+            "slice_place",
+            size,
+            image=image,
+            fields=fields,
+            **self._weights,
+            **place,
+            pairs=self.pairs,
+        )
         fields, spare = self._along(fields, spare)
         grid = self.device.empty((2, rows, self.across))
-        sizes = (height, height // 2, rows, self.across, edge, self.pairs)
         tiles = self._tiles(self.across, rows)
-        self.device.launch("spectrum_unfold", tiles, fields, grid, *sizes)
+        sizes = self._grid_sizes(height)
+        self.device.launch("spectrum_unfold", tiles, fields=fields, grid=grid, **sizes)
         del fields, spare
         return self._down(grid, self.device.empty(grid.shape))[0]
+
+    def _grid_sizes(self, height: int) -> dict[str, int]:
+        """Sizes of a grid with margins, of an image with so many rows, as kernels are told."""
+        rows, edge = self._edges
+        sizes = {"height": height, "middle": height // 2, "rows": rows, "columns": self.across}
+        return sizes | {"edge": edge, "pairs": self.pairs}
 
     def _tiles(self, width: int, height: int) -> tuple[int, int]:
         lanes = self.device.traits.macros["LANES"]

@@ -9,11 +9,12 @@ kernels/tomo/rows_weigh_gpu.cl): what stands beside it does not change a bit of 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.operators.fourier.block_transform import BlockTransform
 from rift_cl.operators.fourier.column_transform import ColumnTransform, turns
@@ -67,7 +68,7 @@ class RowTransform:
             return responses + self._blocks.nbytes
         return responses + 4 * self.dtype.itemsize * self.length * self._columns
 
-    def __call__(self, x: Any, out: Any, gains: Any, per_view: int) -> None:
+    def __call__(self, x: DeviceArray, out: DeviceArray, gains: DeviceArray, per_view: int) -> None:
         """Fill ``out`` with the filtered rows.
 
         Args:
@@ -78,10 +79,21 @@ class RowTransform:
         """
         rows, filters = x.size // self.bins, self._weights[0].shape[1]
         if self._blocks is not None:
-            arguments = (x, out, gains, *self._weights, self._half_turns)
-            sizes = (rows, per_view, filters, self.bins)
-            shared = int(filters == 1)
-            self._blocks.launch("rows_filter_cpu", rows, *arguments, *sizes, SHARED=shared)
+            self._blocks.launch(
+                "rows_filter_cpu",
+                rows,
+                rows=x,
+                out=out,
+                gains=gains,
+                sums=self._weights[0],
+                differences=self._weights[1],
+                half_turns=self._half_turns,
+                count=rows,
+                rows_per_view=per_view,
+                filters=filters,
+                bins=self.bins,
+                SHARED=int(filters == 1),
+            )
             return
         columns = min(self._columns, rows)
         planes = self.device.empty((2, self.length, columns), self.dtype)
@@ -94,26 +106,55 @@ class RowTransform:
             planes, spare = self._transform(planes, spare, columns, inverse=True)
             self._unpack(planes, out, gains, slab, per_view)
 
-    def _pack(self, x: Any, planes: Any, slab: _Slab) -> None:
-        sizes = (slab.first, slab.rows, self.bins, self.length, slab.columns)
-        size = (2 * self.length, slab.columns)
-        self.device.launch("rows_pack_gpu", size, x, planes, *sizes, DOUBLE=self._double)
+    def _pack(self, x: DeviceArray, planes: DeviceArray, slab: _Slab) -> None:
+        self.device.launch(
+            "rows_pack_gpu",
+            (2 * self.length, slab.columns),
+            rows=x,
+            planes=planes,
+            first=slab.first,
+            count=slab.rows,
+            bins=self.bins,
+            length=self.length,
+            columns=slab.columns,
+            DOUBLE=self._double,
+        )
 
-    def _weigh(self, planes: Any, slab: _Slab, per_view: int) -> None:
+    def _weigh(self, planes: DeviceArray, slab: _Slab, per_view: int) -> None:
         filters = self._weights[0].shape[1]
         self.device.launch(
             "rows_weigh_gpu",
             (slab.columns, self.length // 2 + 1),
-            *(planes, *self._weights, self._half_turns),
-            *(slab.first, per_view, filters, self.length, slab.columns),
+            planes=planes,
+            sums=self._weights[0],
+            differences=self._weights[1],
+            half_turns=self._half_turns,
+            first=slab.first,
+            rows_per_filter=per_view,
+            filters=filters,
+            length=self.length,
+            columns=slab.columns,
             SHARED=int(filters == 1),
             DOUBLE=self._double,
         )
 
-    def _unpack(self, planes: Any, out: Any, gains: Any, slab: _Slab, per_view: int) -> None:
-        sizes = (slab.first, slab.rows, per_view, self.bins, self.length, slab.columns)
-        size = (self.bins, slab.columns)
-        self.device.launch("rows_unpack_gpu", size, planes, out, gains, *sizes, DOUBLE=self._double)
+    def _unpack(
+        self, planes: DeviceArray, out: DeviceArray, gains: DeviceArray, slab: _Slab, per_view: int
+    ) -> None:
+        self.device.launch(
+            "rows_unpack_gpu",
+            (self.bins, slab.columns),
+            planes=planes,
+            rows=out,
+            gains=gains,
+            first=slab.first,
+            count=slab.rows,
+            rows_per_view=per_view,
+            bins=self.bins,
+            length=self.length,
+            columns=slab.columns,
+            DOUBLE=self._double,
+        )
 
 
 class _Slab(NamedTuple):

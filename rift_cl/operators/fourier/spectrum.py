@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.arithmetic import sum_columns
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import NonFiniteError, ShapeError
@@ -76,12 +76,12 @@ class SpectralFilter:
 
     def __call__(
         self,
-        image: Any,
+        image: DeviceArray,
         *,
         channels: int | None = None,
-        mask: Any = None,
+        mask: DeviceArray | None = None,
         keep_norm: bool = False,
-    ) -> Any:
+    ) -> DeviceArray:
         """The filtered image, a new (height, width, D) device array.
 
         Args:
@@ -101,7 +101,7 @@ class SpectralFilter:
         fields = self._weighted(image, count)
         return self._unpacked(*fields, mask, shape, count, keep_norm=keep_norm)
 
-    def _sampled(self, response: Response) -> Any:
+    def _sampled(self, response: Response) -> DeviceArray:
         """The response at the transform's frequencies, transposed as the spectrum then stands."""
         along_y, along_x = (np.asarray(np.fft.fftfreq(n), np.float64) for n in self.padded)
         weights = np.broadcast_to(response(along_y[None, :], along_x[:, None]), self.padded[::-1])
@@ -109,14 +109,25 @@ class SpectralFilter:
             raise NonFiniteError("SpectralFilter: the response is not finite everywhere")
         return self.device.array(np.ascontiguousarray(weights, np.float32))
 
-    def _weighted(self, image: Any, count: int) -> tuple[Any, Any]:
+    def _weighted(self, image: DeviceArray, count: int) -> tuple[DeviceArray, DeviceArray]:
         """The filtered fields in space, and the sums of squares of the image's rows."""
         device, (rows, columns) = self.device, self.padded
         fields = device.empty((2 * -(-count // 2), rows, columns))
         spare = device.empty(fields.shape)
         squares = device.empty((self.size[0], 1))
-        sizes = (*self.size, image.shape[2], rows, columns)
-        device.launch("fft_pack", (rows,), image, fields, squares, *sizes, CHANNELS=count)
+        device.launch(
+            "fft_pack",
+            (rows,),
+            image=image,
+            fields=fields,
+            squares=squares,
+            height=self.size[0],
+            width=self.size[1],
+            depth=image.shape[2],
+            rows=rows,
+            columns=columns,
+            CHANNELS=count,
+        )
         down, along = self._transforms[rows], self._transforms[columns]
         fields, spare = down(fields, spare, columns)
         self._transpose(fields, spare, rows, columns)
@@ -127,28 +138,48 @@ class SpectralFilter:
 
     def _unpacked(
         self,
-        fields: Any,
-        squares: Any,
-        mask: Any,
+        fields: DeviceArray,
+        squares: DeviceArray,
+        mask: DeviceArray | None,
         shape: tuple[int, ...],
         count: int,
         *,
         keep_norm: bool,
-    ) -> Any:
+    ) -> DeviceArray:
         device, (height, width, depth), (rows, columns) = self.device, shape, self.padded
         out, found = device.empty(shape), device.empty((height, 1))
-        sizes = (height, width, depth, rows, columns, 1 / (rows * columns))
-        masked = mask is not None
-        given = (fields, mask if masked else fields, out, found, *sizes)
-        device.launch("fft_unpack", (height,), *given, CHANNELS=count, MASKED=masked)
+        device.launch(
+            "fft_unpack",
+            (height,),
+            fields=fields,
+            mask=fields if mask is None else mask,
+            image=out,
+            squares=found,
+            height=height,
+            width=width,
+            depth=depth,
+            rows=rows,
+            columns=columns,
+            scale=1 / (rows * columns),
+            CHANNELS=count,
+            MASKED=mask is not None,
+        )
         if keep_norm:
             run = _CPU_RUN if device.traits.is_cpu else 1
-            sums = (sum_columns(device, table) for table in (squares, found))
-            items, size = -(-out.size // run), np.uint64(out.size)
-            device.launch("keep_norm", (items,), out, *sums, size, RUN=run)
+            device.launch(
+                "keep_norm",
+                (-(-out.size // run),),
+                x=out,
+                wanted=sum_columns(device, squares),
+                found=sum_columns(device, found),
+                size=out.size,
+                RUN=run,
+            )
         return out
 
-    def _transpose(self, fields: Any, spare: Any, rows: int, columns: int) -> None:
+    def _transpose(self, fields: DeviceArray, spare: DeviceArray, rows: int, columns: int) -> None:
         lanes = self.device.traits.macros["LANES"]
         blocks = (columns // lanes, rows // lanes, fields.shape[0])
-        self.device.launch("fft_transpose", blocks, fields, spare, rows, columns)
+        self.device.launch(
+            "fft_transpose", blocks, source=fields, out=spare, rows=rows, columns=columns
+        )

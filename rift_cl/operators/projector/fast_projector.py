@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
@@ -117,14 +118,14 @@ class FastProjector(ParallelProjector):
     def _tables(self) -> RayTables:
         return RayTables(self.device, self._rays, self.gridding, self._columns, self._samples)
 
-    def _apply(self, x: Any, out: Any) -> None:
+    def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
         for k in range(x.shape[0] if len(x.shape) == 3 else 1):
             grid = self._spectrum.of(x, k)
             values = self._read(grid)
             del grid
             self._views_of(values, out, k)
 
-    def _apply_adjoint(self, y: Any, out: Any) -> None:
+    def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
         slices = out.shape[0] if len(out.shape) == 3 else 1
         for first in range(0, slices, self._together):
             run = range(first, min(first + self._together, slices))
@@ -134,90 +135,155 @@ class FastProjector(ParallelProjector):
             for k in run:
                 self._spectrum.crop(grids.pop(0), out, k)
 
-    def _rays_of(self, views: Any, k: int) -> Any:
+    def _rays_of(self, views: DeviceArray, k: int) -> DeviceArray:
         """Transforms of the views of slice k, as rays (2, n, samples)."""
         found, tables, device = self._rays, self._tables, self.device
         count, length, columns = len(found.order), found.length, self._columns
         values = device.empty((2, count, self._samples))
         if tables.blocks is not None:
-            where = (tables.order, tables.starts, *tables.factors, tables.ends)
-            sizes = (count, *self._slice_sizes(views, k), found.window, self._samples, columns)
-            tables.blocks.launch("rays_of_views_cpu", columns, views, values, *where, *sizes)
+            tables.blocks.launch(
+                "rays_of_views_cpu",
+                columns,
+                views=views,
+                rays=values,
+                **self._places(views, k),
+                offsets=tables.factors["turns"],
+                shadows=tables.factors["shadows"],
+                signs=tables.factors["signs"],
+                bin_response=tables.factors["bins"],
+                ends=tables.ends,
+                count=count,
+                samples=self._samples,
+            )
             return values
         fields, spare = self._planes(length, columns)
-        arguments = self._view_arguments(views, k)
         device.launch(
-            "rays_pack_gpu", (*self._blocks(columns, length), 2), views, fields, *arguments
+            "rays_pack_gpu",
+            (*self._blocks(columns, length), 2),
+            views=views,
+            fields=fields,
+            **self._places(views, k),
+            rays=count,
+            length=length,
         )
         fields, spare = tables.views(fields, spare)
-        size = (*self._blocks(columns, self._samples), 2)
-        arrays = (fields, values, *tables.factors, tables.ends)
-        device.launch("rays_weigh_gpu", size, *arrays, count, self._samples, length, columns)
+        device.launch(
+            "rays_weigh_gpu",
+            (*self._blocks(columns, self._samples), 2),
+            fields=fields,
+            rays=values,
+            **tables.factors,
+            ends=tables.ends,
+            count=count,
+            samples=self._samples,
+            length=length,
+            columns=columns,
+        )
         return values
 
-    def _views_of(self, values: Any, views: Any, k: int) -> None:
+    def _views_of(self, values: DeviceArray, views: DeviceArray, k: int) -> None:
         """The transpose of ``_rays_of``."""
         found, tables, device = self._rays, self._tables, self.device
         count, length, columns = len(found.order), found.length, self._columns
         fields, spare = self._planes(length, columns)
-        blocks = self._blocks(columns, length // 2 + 1)
-        sizes = (count, self._samples, length, columns)
-        factors = tables.factors
-        device.launch("rays_unweigh", blocks, values, fields, *factors, *sizes, RUN=self._run)
+        device.launch(
+            "rays_unweigh",
+            self._blocks(columns, length // 2 + 1),
+            rays=values,
+            fields=fields,
+            **tables.factors,
+            count=count,
+            samples=self._samples,
+            length=length,
+            columns=columns,
+            RUN=self._run,
+        )
         fields, spare = tables.views(fields, spare, inverse=True)
-        size = (*self._blocks(columns, found.window), 2)
-        arguments = self._view_arguments(views, k)
-        device.launch("rays_unpack", size, fields, views, *arguments, RUN=self._run)
+        device.launch(
+            "rays_unpack",
+            (*self._blocks(columns, found.window), 2),
+            fields=fields,
+            views=views,
+            **self._places(views, k),
+            rays=count,
+            length=length,
+            RUN=self._run,
+        )
 
-    def _view_arguments(self, views: Any, k: int) -> tuple[Any, ...]:
-        found, tables = self._rays, self._tables
-        sizes = (len(found.order), *self._slice_sizes(views, k))
-        return (tables.order, tables.starts, *sizes, found.window, found.length, self._columns)
+    def _places(self, views: DeviceArray, k: int) -> dict[str, DeviceArray | int]:
+        """Where the rays of slice k are among the views, and where they are laid out."""
+        return {
+            "order": self._tables.order,
+            "starts": self._tables.starts,
+            "slice": k,
+            "slices": views.shape[1] if len(views.shape) == 3 else 1,
+            "bins": self.scan.bins,
+            "window": self._rays.window,
+            "columns": self._columns,
+        }
 
-    def _slice_sizes(self, views: Any, k: int) -> tuple[int, int, int]:
-        """Slice k, of how many, and its bins."""
-        return k, views.shape[1] if len(views.shape) == 3 else 1, self.scan.bins
-
-    def _spread(self, values: list[Any]) -> list[Any]:
+    def _spread(self, values: list[DeviceArray]) -> list[DeviceArray]:
         """Rays of some slices to grids of frequencies, as ``crop`` takes them."""
         tables, (rows, edge) = self._tables, self.gridding.edges
         across, tiles = self._spectrum.across, len(tables.tiles) - 1
         grids = [self._spectrum.empty_grid() for _ in values]
         macros = {**self._macros, "TILE": tables.tile}
-        kernel, arrays = "rays_spread", [*values, *grids]
+        kernel, slices = "rays_spread", {"rays": values[0], "grid": grids[0]}
         if len(values) > 1:
             kernel, macros["SLICES"] = "rays_spread_stack_cpu", len(values)
-            spare = [values[0]] * (_TOGETHER - len(values))
-            arrays = [*values, *spare, *grids, *([grids[0]] * len(spare))]
+            spare = _TOGETHER - len(values)
+            rays, cells = [*values, *values[:1] * spare], [*grids, *grids[:1] * spare]
+            slices = {f"rays{i}": array for i, array in enumerate(rays)}
+            slices |= {f"grid{i}": array for i, array in enumerate(cells)}
         self.device.launch(
             kernel,
             (tiles,),
-            *(*arrays, tables.kernel, tables.steps, tables.inverses, tables.ends),
-            *(tables.visits, tables.tiles, *values[0].shape[1:], tiles),
-            *(-(-(edge // 2 + 1) // tables.tile), self._spectrum.width, rows, across),
+            **slices,
+            table=tables.kernel,
+            steps=tables.steps,
+            inverses=tables.inverses,
+            ends=tables.ends,
+            visits=tables.visits,
+            starts=tables.tiles,
+            count=values[0].shape[1],
+            samples=values[0].shape[2],
+            tiles=tiles,
+            across=-(-(edge // 2 + 1) // tables.tile),
+            width=self._spectrum.width,
+            rows=rows,
+            columns=across,
             **macros,
         )
         return grids
 
-    def _read(self, grid: Any) -> Any:
+    def _read(self, grid: DeviceArray) -> DeviceArray:
         """The transpose of ``_spread``."""
         tables, (rows, edge) = self._tables, self.gridding.edges
         values = self.device.empty((2, len(self._rays.order), self._samples))
         count, samples = values.shape[1:]
         width = self.gridding.width
-        self.device.launch(
-            "spectrum_mirror", (rows, 2 * width), grid, rows, self._spectrum.across, edge
-        )
+        sizes = {"rows": rows, "columns": self._spectrum.across, "edge": edge}
+        self.device.launch("spectrum_mirror", (rows, 2 * width), grid=grid, **sizes)
         cpu = self.device.traits.is_cpu
         run = 64 if cpu else 1
-        arguments = (grid, values, tables.kernel, tables.steps, tables.ends)
-        sizes = (count, samples, rows, self._spectrum.across, edge)
         runs = -(-samples // run)
-        size = (count, runs) if cpu else (runs, count)
-        self.device.launch("rays_read", size, *arguments, *sizes, RUN=run, **self._macros)
+        self.device.launch(
+            "rays_read",
+            (count, runs) if cpu else (runs, count),
+            grid=grid,
+            rays=values,
+            table=tables.kernel,
+            steps=tables.steps,
+            ends=tables.ends,
+            count=count,
+            samples=samples,
+            **sizes,
+            RUN=run,
+            **self._macros,
+        )
         return values
 
-    def _planes(self, rows: int, columns: int) -> tuple[Any, Any]:
+    def _planes(self, rows: int, columns: int) -> tuple[DeviceArray, DeviceArray]:
         shape = (2, rows, columns)
         return self.device.empty(shape), self.device.empty(shape)
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.operators.projector.footprint import check_footprint
@@ -90,7 +91,7 @@ class Projector(ParallelProjector):
     def _facts(self) -> list[str]:
         return [*super()._facts(), f"footprint {self.footprint}"]
 
-    def _apply(self, x: Any, out: Any) -> None:
+    def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
         for slab in _slabs(x):
             for transpose, walk in enumerate(self._walks):
                 if walk.count:
@@ -98,17 +99,28 @@ class Projector(ParallelProjector):
                     for run in self._runs(walk, slab):
                         self._project(walk, plane, out, slab, run)
 
-    def _split(self, walk: _Walk, image: Any, slab: _Slab, transpose: int) -> Any:
+    def _split(self, walk: _Walk, image: DeviceArray, slab: _Slab, transpose: int) -> DeviceArray:
         table, margin = walk.table, self._segment
         shape = (slab.slices, table.rows, table.width + 2 * margin)
         plane = self.device.zeros(shape, self.dtype)
         tiles = (*self._tiles(table.width, table.rows), slab.slices)
-        arguments = (image, plane, slab.first, table.rows, table.width, margin)
-        macros = {"TRANSPOSE": transpose, **self._precision}
-        self.device.launch("plane_split", tiles, *arguments, **macros)
+        self.device.launch(
+            "plane_split",
+            tiles,
+            image=image,
+            plane=plane,
+            slice0=slab.first,
+            rows=table.rows,
+            width=table.width,
+            margin=margin,
+            TRANSPOSE=transpose,
+            **self._precision,
+        )
         return plane
 
-    def _project(self, walk: _Walk, plane: Any, out: Any, slab: _Slab, run: _Run) -> None:
+    def _project(
+        self, walk: _Walk, plane: DeviceArray, out: DeviceArray, slab: _Slab, run: _Run
+    ) -> None:
         table, (first, count) = walk.table, run
         entries = self.device.empty((slab.slices, count, table.entries), self.dtype)
         segments = table.columns // self._segment
@@ -116,30 +128,50 @@ class Projector(ParallelProjector):
         self.device.launch(
             "radon_project",
             (*work, slab.slices),
-            *(entries, plane, walk.geometry, walk.orders, walk.starts, walk.views),
-            *(first, table.columns, table.rows, table.width),
+            table=entries,
+            plane=plane,
+            geometry=walk.geometry,
+            orders=walk.orders,
+            all_starts=walk.starts,
+            views=walk.views,
+            first=first,
+            columns=table.columns,
+            rows=table.rows,
+            width=table.width,
             **self._macros,
         )
         bins = 64 if self.device.traits.is_cpu else 1
         self.device.launch(
             f"{walk.resample}_adjoint",
             (-(-self.scan.bins // bins), count, slab.slices),
-            *(out, entries, walk.geometry, walk.footprints, walk.views),
-            *(first, slab.first, slab.total, self.scan.bins, table.columns),
+            sinogram=out,
+            table=entries,
+            first=first,
+            **self._resampled(walk, slab),
             BINS=bins,
-            **self._resampling,
         )
 
-    def _apply_adjoint(self, y: Any, out: Any) -> None:
+    def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
         for slab in _slabs(out):
             planes = [self._backproject(walk, y, slab) for walk in self._walks]
             ny, nx = self.grid.shape[-2:]
             tiles = (*self._tiles(nx, ny), slab.slices)
-            pitches = [walk.table.padded for walk in self._walks]
-            arguments = (*planes, out, slab.first, ny, nx, *pitches)
-            self.device.launch("plane_merge", tiles, *arguments, **self._precision)
+            by_rows, by_columns = self._walks
+            self.device.launch(
+                "plane_merge",
+                tiles,
+                by_rows=planes[0],
+                by_columns=planes[1],
+                image=out,
+                slice0=slab.first,
+                ny=ny,
+                nx=nx,
+                row_pitch=by_rows.table.padded,
+                column_pitch=by_columns.table.padded,
+                **self._precision,
+            )
 
-    def _backproject(self, walk: _Walk, y: Any, slab: _Slab) -> Any:
+    def _backproject(self, walk: _Walk, y: DeviceArray, slab: _Slab) -> DeviceArray:
         table = walk.table
         shape = (slab.slices, table.rows, table.padded)
         plane = (self.device.empty if walk.count else self.device.zeros)(shape, self.dtype)
@@ -149,19 +181,40 @@ class Projector(ParallelProjector):
             self.device.launch(
                 walk.resample,
                 (table.columns // self.device.traits.macros["LANES"], count, slab.slices),
-                *(y, entries, walk.geometry, walk.footprints, walk.views),
-                *(first, slab.first, slab.total, self.scan.bins, table.columns),
-                **self._resampling,
+                sinogram=y,
+                table=entries,
+                first=first,
+                **self._resampled(walk, slab),
             )
             self.device.launch(
                 "radon_backproject",
                 (table.padded // self._segment, -(-table.rows // rows), slab.slices),
-                *(entries, plane, walk.geometry),
-                *(first, count, table.columns, table.rows, table.padded, int(first > 0)),
+                table=entries,
+                plane=plane,
+                geometry=walk.geometry,
+                first=first,
+                count=count,
+                columns=table.columns,
+                rows=table.rows,
+                width=table.padded,
+                add=first > 0,
                 ROWS=rows,
                 **self._macros,
             )
         return plane
+
+    def _resampled(self, walk: _Walk, slab: _Slab) -> dict[str, DeviceArray | int]:
+        """What resampling views to a phase table and its transpose are told alike."""
+        return {
+            "geometry": walk.geometry,
+            "footprints": walk.footprints,
+            "views": walk.views,
+            "slice0": slab.first,
+            "slices": slab.total,
+            "bins": self.scan.bins,
+            "columns": walk.table.columns,
+            **self._resampling,
+        }
 
     def _row_run(self, slices: int, table: PhaseTable) -> int:
         """Rows that one work-item backprojects onto: many, but work for every compute unit."""
@@ -226,7 +279,7 @@ class _Run(NamedTuple):
     views: int
 
 
-def _slabs(image: Any) -> Iterator[_Slab]:
+def _slabs(image: DeviceArray) -> Iterator[_Slab]:
     total = image.shape[0] if len(image.shape) == 3 else 1
     for first in range(0, total, _SLAB):
         yield _Slab(first, min(_SLAB, total - first), total)

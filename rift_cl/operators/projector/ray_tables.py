@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.operators.fourier.block_transform import BlockTransform
 from rift_cl.operators.fourier.column_transform import ColumnTransform
@@ -40,12 +39,12 @@ class RayTables:
         self.order, self.starts = device.array(rays.order), device.array(rays.starts)
         self.ends = device.array(rays.ends)
         padding = (0, 2 * columns - len(rays.order))
-        self.factors = (
-            device.array(np.pad(rays.turns, padding)),
-            device.array(np.pad(rays.shadows, ((0, 0), padding))),
-            device.array(np.pad(rays.signs, padding)),
-            device.array(np.sinc(np.arange(samples) / rays.length)),
-        )
+        self.factors = {
+            "turns": device.array(np.pad(rays.turns, padding)),
+            "shadows": device.array(np.pad(rays.shadows, ((0, 0), padding))),
+            "signs": device.array(np.pad(rays.signs, padding)),
+            "bins": device.array(np.sinc(np.arange(samples) / rays.length)),
+        }
         self.steps, self.inverses = device.array(steps), device.array(inverse_steps(steps))
         self.visits, self.tiles = device.array(visits), device.array(tiles)
         self.kernel = device.array(gridding.table())
@@ -56,11 +55,11 @@ class RayTables:
     @property
     def nbytes(self) -> int:
         """Bytes of the device that these take."""
-        arrays: list[Any] = [
+        arrays: list[DeviceArray] = [
             self.order,
             self.starts,
             self.ends,
-            *self.factors,
+            *self.factors.values(),
             self.steps,
             self.inverses,
         ]

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 
@@ -41,8 +42,8 @@ class DetectorColumns:
         self.device = device
         self.views, self.rows, self.bins = projections.shape
         self._values = self._empty()
-        self._other: Any = None
-        self._order: Any = None
+        self._other: DeviceArray | None = None
+        self._order: DeviceArray | None = None
         row, projection = self.bins * self.views, self.rows * self.bins
         pitches = (projection, self.bins, self.views, row)
         stack = device.array(np.ascontiguousarray(projections))
@@ -65,11 +66,15 @@ class DetectorColumns:
 
     def roughness(self) -> Floats:
         """Mean distance of each column from its running mean over ten views, (row, bin)."""
-        return self._profile("column_roughness")
+        found = self.device.empty((self.rows, self.bins))
+        self._profile("column_roughness", values=self._values, rough=found)
+        return self.device.get(found)
 
     def levels(self, dropped: int) -> Floats:
         """Mean of each sorted column without so many values at either end, (row, bin)."""
-        return self._profile("column_level", dropped)
+        found = self.device.empty((self.rows, self.bins))
+        self._profile("column_level", ranked=self._values, level=found, dropped=dropped)
+        return self.device.get(found)
 
     def sort(self) -> None:
         """Sort every column, stably; ``unsort`` puts the values back to their views."""
@@ -78,16 +83,32 @@ class DetectorColumns:
         items = -(-columns // run)
         lists = self.device.empty((items, 2, self.views, 2), np.uint32)
         self._order = self._empty(np.int32)
-        arrays = (self._values, self._values, self._order, lists)
-        self.device.launch("column_sort", (items,), *arrays, columns, self.views, RUN=run)
+        self.device.launch(
+            "column_sort",
+            (items,),
+            values=self._values,
+            ranked=self._values,
+            order=self._order,
+            spare=lists,
+            columns=columns,
+            views=self.views,
+            RUN=run,
+        )
 
     def unsort(self) -> None:
         """Put ranked values back to the views that ``sort`` took them from."""
         run = _CPU_RUN if self.device.traits.is_cpu else 1
         size = (-(-self.views // run), self.bins, self.rows)
         other = self._spare()
-        arrays = (self._values, self._order, other)
-        self.device.launch("column_unsort", size, *arrays, self.views, RUN=run)
+        self.device.launch(
+            "column_unsort",
+            size,
+            ranked=self._values,
+            order=self._order,
+            values=other,
+            views=self.views,
+            RUN=run,
+        )
         self._values, self._other, self._order = other, self._values, None
 
     def median(self, window: int) -> None:
@@ -98,10 +119,17 @@ class DetectorColumns:
         traits = self.device.traits
         segment = _CPU_SEGMENT if traits.is_cpu else _GPU_SEGMENT
         blocks, segments = -(-self.views // traits.macros["LANES"]), -(-self.bins // segment)
-        other, macros = self._spare(), {"WINDOW": window, "SEGMENT": segment}
-        size = (blocks, segments, self.rows)
-        arguments = (self._values, other, self.bins, self.views)
-        self.device.launch("column_median", size, *arguments, **macros)
+        other = self._spare()
+        self.device.launch(
+            "column_median",
+            (blocks, segments, self.rows),
+            source=self._values,
+            out=other,
+            bins=self.bins,
+            ranks=self.views,
+            WINDOW=window,
+            SEGMENT=segment,
+        )
         self._values, self._other = other, self._values
 
     def interpolate(self, bad: Mask) -> None:
@@ -115,39 +143,61 @@ class DetectorColumns:
             return
         table = np.ascontiguousarray(np.stack([holes, lefts, rights], axis=1), np.int32)
         run = _CPU_RUN if self.device.traits.is_cpu else 1
-        size = (-(-self.views // run), holes.size)
-        arrays = (self._values, self.device.array(table), self.device.array(shares))
-        self.device.launch("column_blend", size, *arrays, self.views, RUN=run)
+        self.device.launch(
+            "column_blend",
+            (-(-self.views // run), holes.size),
+            x=self._values,
+            table=self.device.array(table),
+            shares=self.device.array(shares),
+            views=self.views,
+            RUN=run,
+        )
 
     def subtract(self, levels: NDArray[Any]) -> None:
         """Subtract a number from each column, (row, bin)."""
         run = _CPU_RUN if self.device.traits.is_cpu else 1
-        size = (-(-self.views // run), self.bins, self.rows)
-        shift = self.device.array(levels, np.float32)
-        self.device.launch("column_shift", size, self._values, shift, self.views, RUN=run)
+        self.device.launch(
+            "column_shift",
+            (-(-self.views // run), self.bins, self.rows),
+            x=self._values,
+            shift=self.device.array(levels, np.float32),
+            views=self.views,
+            RUN=run,
+        )
 
-    def _profile(self, kernel: str, *arguments: int) -> Floats:
+    def _profile(self, kernel: str, **given: DeviceArray | int) -> None:
+        """Reduce every column to a number."""
         columns = self.rows * self.bins
-        found = self.device.empty((self.rows, self.bins))
-        self.device.launch(kernel, (columns,), self._values, found, columns, self.views, *arguments)
-        profile: Floats = self.device.get(found)
-        return profile
+        self.device.launch(kernel, (columns,), **given, columns=columns, views=self.views)
 
     def _transpose(
-        self, source: Any, target: Any, shape: tuple[int, int], pitches: tuple[int, ...]
+        self,
+        source: DeviceArray,
+        target: DeviceArray,
+        shape: tuple[int, int],
+        pitches: tuple[int, ...],
     ) -> None:
         cpu = self.device.traits.is_cpu
         strips = -(-shape[1] // _CPU_STRIP) if cpu else shape[1]
         strip = _CPU_STRIP if cpu else _GPU_STRIP
         size = (strips, -(-shape[0] // strip), self.rows)
-        longs = (np.int64(pitch) for pitch in pitches)
-        macros = {"STRIP": _CPU_STRIP, "DEEP": _GPU_STRIP}
-        self.device.launch("stack_transpose", size, source, target, *shape, *longs, **macros)
+        names = ("in_pitch", "in_slice", "out_pitch", "out_slice")
+        self.device.launch(
+            "stack_transpose",
+            size,
+            source=source,
+            out=target,
+            ni=shape[0],
+            nj=shape[1],
+            **dict(zip(names, pitches, strict=True)),
+            STRIP=_CPU_STRIP,
+            DEEP=_GPU_STRIP,
+        )
 
-    def _empty(self, dtype: type = np.float32) -> Any:
+    def _empty(self, dtype: type = np.float32) -> DeviceArray:
         return self.device.empty((self.rows, self.bins, self.views), dtype)
 
-    def _spare(self) -> Any:
+    def _spare(self) -> DeviceArray:
         if self._other is None:
             self._other = self._empty()
         return self._other

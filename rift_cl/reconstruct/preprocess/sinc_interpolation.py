@@ -65,17 +65,28 @@ def resampled(
     weights, starts = _tables(shifts)
     if along == "rows":
         starts += first_row + np.arange(rows, dtype=np.int32)[:, None]
-    on_device = device.array(weights), device.array(starts)
+    tables = {"weights": device.array(weights), "starts": device.array(starts)}
     out = np.empty((views, rows, bins), np.float32)
     run = 4096 if device.traits.is_cpu else 1
-    macros = {"RUN": run, "TAPS": TAPS + 1, "ALONG_ROWS": int(along == "rows")}
     step = min(_VIEWS, max(1, _CHUNK // (4 * bins * max(rows_in, rows))))
-    sizes = [np.int32(n) for n in (first_row, rows_in, rows, bins, weights.shape[-1])]
     for start in range(0, views, step):
         source = device.array(np.ascontiguousarray(stack[start : start + step], np.float32))
         result = device.empty((source.shape[0], rows, bins))
-        size = (-(-bins // run), source.shape[0], rows)
-        device.launch("resample_lines", size, source, result, *on_device, *sizes, **macros)
+        device.launch(
+            "resample_lines",
+            (-(-bins // run), source.shape[0], rows),
+            stack=source,
+            out=result,
+            **tables,
+            first_row=first_row,
+            rows_in=rows_in,
+            rows=rows,
+            bins=bins,
+            stride=weights.shape[-1],
+            RUN=run,
+            TAPS=TAPS + 1,
+            ALONG_ROWS=int(along == "rows"),
+        )
         out[start : start + step] = device.get(result)
     return out
 

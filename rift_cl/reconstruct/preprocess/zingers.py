@@ -133,7 +133,8 @@ def _cleaned_slab(slab: Floats, rule: _Rule, device: Device, *, sinogram: bool) 
     size, away = (-(-bins // run), rows, views), rule.size // 2
     x, medians = device.array(slab), device.empty(slab.shape)
     reach = {"VIEWS_AWAY": int(sinogram), "ROWS_AWAY": 0 if sinogram else away, "BINS_AWAY": away}
-    device.launch("local_median", size, x, medians, *slab.shape, RUN=run, **reach)
+    shape = {"views": views, "rows": rows, "bins": bins}
+    device.launch("local_median", size, x=x, out=medians, **shape, RUN=run, **reach)
     if rule.excess is None:
         some = slice(None, None, -(-views // _NOISE_VIEWS))
         levels = _row_means(slab[some])[:, None] * np.array([_LEAST, _FLOOR])
@@ -142,11 +143,21 @@ def _cleaned_slab(slab: Floats, rule: _Rule, device: Device, *, sinogram: bool) 
     else:
         levels = np.repeat([[rule.excess, 0.0]], rows, axis=0)
         limits = np.zeros((rows, bins))
-    tables = device.array(limits, np.float32), device.array(levels, np.float32)
     out = device.empty(slab.shape)
-    alone = {"ALONE": int(rule.excess is None), "BINS_BESIDE": _bins_beside(views, bins)}
-    macros = {"DARK": int(rule.dark), **alone, "RUN": run}
-    device.launch("zinger_replace", size, x, medians, *tables, out, *slab.shape, **macros)
+    device.launch(
+        "zinger_replace",
+        size,
+        x=x,
+        medians=medians,
+        limits=device.array(limits, np.float32),
+        levels=device.array(levels, np.float32),
+        out=out,
+        **shape,
+        DARK=int(rule.dark),
+        ALONE=int(rule.excess is None),
+        BINS_BESIDE=_bins_beside(views, bins),
+        RUN=run,
+    )
     found: Floats = device.get(out)
     return found
 

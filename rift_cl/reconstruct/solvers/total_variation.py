@@ -16,12 +16,12 @@ constraint x >= 0 in its stride.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
 
 from rift_cl.cl.arithmetic import axpby
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.elementwise import copy
 from rift_cl.cl.reductions import total
@@ -69,42 +69,85 @@ class TotalVariation:
         self.norm_squared = heaviest**2 * 4 * sum(1 / h**2 for n, h in lengths if n > 1)
         """An upper bound of |D|^2, next to attained; 0 for a single sample."""
         full = (1,) * (3 - len(shape)) + shape
-        self._sizes = full
         self._inverse = tuple(1 / h for h in (1.0,) * (3 - len(shape)) + tuple(spacing))
         run = _CPU_RUN if device.traits.is_cpu else 1
         self._items = (-(-full[2] // run), full[1], full[0])
-        self._matrix = (1.0, 0.0, 1.0) if directions is None else directions.matrix
-        self._macros = {
+        matrix = (1.0, 0.0, 1.0) if directions is None else directions.matrix
+        # What all three kernels are told alike.
+        self._common = {
+            **dict(zip(("nz", "ny", "nx"), full, strict=True)),
+            **dict(zip(("m_yy", "m_yx", "m_xx"), matrix, strict=True)),
             "AXES": len(shape),
             "RUN": run,
             "DOUBLE": int(self.dtype == np.float64),
             "DIRECTIONAL": int(directions is not None),
         }
 
-    def value(self, image: Any) -> float:
+    def value(self, image: DeviceArray) -> float:
         """TV of a device array."""
         lengths = self.device.empty(self.shape, self.dtype)
-        arguments = (image, lengths, *self._sizes, *self._inverse, *self._matrix)
-        self.device.launch("tv_magnitude", self._items, *arguments, **self._macros)
+        self.device.launch(
+            "tv_magnitude",
+            self._items,
+            image=image,
+            magnitude=lengths,
+            **self._along("step"),
+            **self._common,
+        )
         return self.cell * total(self.device, lengths)
 
-    def dual_step(self, u: Any, image: Any, moved: Any, *, step: float, radius: float) -> None:
+    def dual_step(
+        self, u: DeviceArray, image: DeviceArray, moved: DeviceArray, *, step: float, radius: float
+    ) -> None:
         """``moved`` = u + step D image, each sample's vector shortened to the radius."""
-        scales = (step * inverse for inverse in self._inverse)
-        arguments = (u, image, moved, *self._sizes, *scales, float(radius), *self._matrix)
-        self.device.launch("tv_dual_step", self._items, *arguments, **self._macros)
+        self.device.launch(
+            "tv_dual_step",
+            self._items,
+            u=u,
+            image=image,
+            moved=moved,
+            radius=radius,
+            **self._along("step", step),
+            **self._common,
+        )
 
     def add_adjoint(
-        self, a: float, image: Any, scale: float, u: Any, out: Any, *, nonnegative: bool = False
+        self,
+        a: float,
+        image: DeviceArray,
+        scale: float,
+        u: DeviceArray,
+        out: DeviceArray,
+        *,
+        nonnegative: bool = False,
     ) -> None:
         """``out`` = a image + scale D' u, with negative values cut off if asked for."""
-        scales = (scale * inverse for inverse in self._inverse)
-        arguments = (image, u, out, float(a), *self._sizes, *scales, *self._matrix)
-        macros = {**self._macros, "NONNEGATIVE": int(nonnegative)}
-        self.device.launch("tv_adjoint", self._items, *arguments, **macros)
+        self.device.launch(
+            "tv_adjoint",
+            self._items,
+            image=image,
+            u=u,
+            out=out,
+            a=a,
+            **self._along("scale", scale),
+            **self._common,
+            NONNEGATIVE=int(nonnegative),
+        )
+
+    def _along(self, name: str, factor: float = 1.0) -> dict[str, float]:
+        """A factor over the spacing of each axis, as kernels are told."""
+        axes = zip("zyx", self._inverse, strict=True)
+        return {f"{name}_{axis}": factor * inverse for axis, inverse in axes}
 
     def denoise(
-        self, image: Any, u: Any, out: Any, *, weight: float, steps: int, nonnegative: bool
+        self,
+        image: DeviceArray,
+        u: DeviceArray,
+        out: DeviceArray,
+        *,
+        weight: float,
+        steps: int,
+        nonnegative: bool,
     ) -> None:
         """``out`` = argmin over x (of x >= 0) of |x - image|^2 / 2 + weight TV(x), nearly.
 

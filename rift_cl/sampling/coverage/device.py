@@ -8,11 +8,12 @@ beyond.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.errors import NonFiniteError, ShapeError
@@ -60,8 +61,7 @@ def coverage(
             at = slice(run.start * work.lanes, run.stop * work.lanes)
             part = work.device.empty((len(table), at.stop - at.start))
             size = (run.stop - run.start, len(table))
-            given = (*work.send(at), table, part)
-            work.device.launch("coverage", size, *given, part.shape[1], work.views)
+            work.device.launch("coverage", size, **work.send(at), views=table, covered=part)
             found[points, at] = work.device.get(part)
     return found[:, : work.wanted]
 
@@ -105,17 +105,24 @@ def coverage_grad(
     return work.in_world(total.transpose(1, 0, 2))
 
 
-def _parts(work: CoverageWork, table: Any, upstream: NDArray[np.float32]) -> Any:
+def _parts(
+    work: CoverageWork, table: DeviceArray, upstream: NDArray[np.float32]
+) -> Iterator[DeviceArray]:
     """The gradients by runs of frequencies, in their order: (runs, points, V, 8) at a time."""
     each = _RUN * 4 * (3 + len(table)) + _RUN // work.lanes * 4 * BOX + table.nbytes
     runs, room = -(-work.padded // _RUN), work.device.budget
     for run in plan_chunks(runs, each, table.nbytes, room, what="run of frequencies"):
         at = slice(run.start * _RUN, min(run.stop * _RUN, work.padded))
         parts = work.device.empty((run.stop - run.start, *table.shape))
-        given = work.device.array(np.ascontiguousarray(upstream[:, at]))
-        size = (work.views, len(table), run.stop - run.start)
-        arguments = (*work.send(at), table, given, parts, at.stop - at.start, work.views)
-        work.device.launch("coverage_grad", size, *arguments, RUN=_RUN)
+        work.device.launch(
+            "coverage_grad",
+            (work.views, len(table), run.stop - run.start),
+            **work.send(at),
+            views=table,
+            upstream=work.device.array(np.ascontiguousarray(upstream[:, at])),
+            parts=parts,
+            RUN=_RUN,
+        )
         yield parts
 
 

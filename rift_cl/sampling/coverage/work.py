@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
@@ -117,10 +118,15 @@ class CoverageWork:
         for run in plan_chunks(self.points, each, 0, room, what="point's views"):
             yield run, self.device.array(self.rows[run])
 
-    def send(self, at: slice) -> tuple[Any, Any]:
-        """Some frequencies and their boxes."""
+    def send(self, at: slice) -> dict[str, DeviceArray | int]:
+        """Some frequencies and their boxes, as kernels are told."""
         boxes = self.boxes[at.start // self.lanes : at.stop // self.lanes]
-        return self.device.array(np.ascontiguousarray(self.k[:, at])), self.device.array(boxes)
+        return {
+            "frequencies": self.device.array(np.ascontiguousarray(self.k[:, at])),
+            "boxes": self.device.array(boxes),
+            "count": at.stop - at.start,
+            "view_count": self.views,
+        }
 
     def in_world(self, total: Floats) -> ObservationsGradient:
         """The gradient (V, P, 8) by the kernel's numbers, in the unit of the world."""

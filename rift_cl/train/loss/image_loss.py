@@ -7,9 +7,10 @@ gradient, ``kernels/train/loss_grad.cl`` finishes it. Nothing waits for the devi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import get_args
 
 from rift_cl.cl.arithmetic import sum_columns
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError, ShapeError
@@ -50,8 +51,13 @@ class ImageLoss:
             raise InputError(f"ImageLoss: kind is {self.kind!r}, wanted {wanted}")
 
     def __call__(
-        self, device: Device, image: Any, target: Any, *, weights: Any = None
-    ) -> tuple[Any, Any]:
+        self,
+        device: Device,
+        image: DeviceArray,
+        target: DeviceArray,
+        *,
+        weights: DeviceArray | None = None,
+    ) -> tuple[DeviceArray, DeviceArray]:
         """The loss and its gradient, as device arrays whose bits do not depend on timing.
 
         Args:
@@ -74,7 +80,9 @@ class ImageLoss:
         _check_window(target.shape[:2], self.ssim_weight)
         return self._launch(device, image, target, weights)
 
-    def _launch(self, device: Device, image: Any, target: Any, weights: Any) -> tuple[Any, Any]:
+    def _launch(
+        self, device: Device, image: DeviceArray, target: DeviceArray, weights: DeviceArray | None
+    ) -> tuple[DeviceArray, DeviceArray]:
         height, width, channels = target.shape
         floats, w, n = width * channels, float(self.ssim_weight), target.size
         tiles = -(-floats // _STRIP), -(-height // _ROWS)
@@ -83,16 +91,31 @@ class ImageLoss:
         macros = {"CHANNELS": channels, "IMAGE_CHANNELS": image.shape[2]}
         macros |= {"ROWS": _ROWS, "STRIP": _STRIP, "WEIGHTED": weights is not None}
         # Kernels that have no weights or maps still take an array in their place.
-        arrays, maps = [image, target, target if weights is None else weights], target
+        arrays, maps = {"image": image, "target": target}, target
+        arrays["weights"] = target if weights is None else weights
         grad, parts = device.empty(image.shape), device.empty(((2 if w else 1) * items, 1))
         pitch, first = _pitch(floats), 0
+        sizes = {"height": height, "width": floats, "pitch": pitch}
         if w:
             maps, first = device.empty((_MAPS, height, pitch)), items
-            ends = (maps, parts, height, floats, pitch, w / n)
-            device.launch("ssim_map", size, *arrays, *ends, **macros)
-        macros |= {"SSIM": w > 0, "SQUARED": self.kind == "l2"}
-        sizes = (first, height, floats, pitch, (1 - w) / n, w / n)
-        device.launch("loss_grad", size, *arrays, maps, grad, parts, *sizes, **macros)
+            device.launch(
+                "ssim_map", size, **arrays, maps=maps, parts=parts, **sizes, scale=w / n, **macros
+            )
+        device.launch(
+            "loss_grad",
+            size,
+            **arrays,
+            maps=maps,
+            grad=grad,
+            parts=parts,
+            first_part=first,
+            **sizes,
+            pixel_scale=(1 - w) / n,
+            ssim_scale=w / n,
+            **macros,
+            SSIM=w > 0,
+            SQUARED=self.kind == "l2",
+        )
         return sum_columns(device, parts), grad
 
 
@@ -104,7 +127,9 @@ def _pitch(floats: int) -> int:
     return (-(-floats // 16) | 1) * 16
 
 
-def _check(device: Device, image: Any, target: Any, weights: Any) -> None:
+def _check(
+    device: Device, image: DeviceArray, target: DeviceArray, weights: DeviceArray | None
+) -> None:
     for name, array in (("image", image), ("target", target)):
         shape = getattr(array, "shape", ())
         as_device_array(device, array, shape, name=name)
@@ -122,7 +147,7 @@ def _check(device: Device, image: Any, target: Any, weights: Any) -> None:
         as_device_array(device, weights, tuple(size), name="weights")
 
 
-def _check_window(size: tuple[int, int], ssim_weight: float) -> None:
+def _check_window(size: tuple[int, ...], ssim_weight: float) -> None:
     if ssim_weight and min(size) < _WINDOW:
         raise ShapeError(
             f"image has {size[0]} x {size[1]} pixels, SSIM wants {_WINDOW} or more along each "

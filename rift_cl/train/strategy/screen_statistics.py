@@ -68,8 +68,14 @@ class ScreenStatistics:
         self.device.launch(
             "splat_statistics",
             (len(self),),
-            *(by, frame.projected.screen, frame.projected.culled, self._table),
-            *(width / 2, height / 2, 1 / max(width, height), len(self)),
+            grad_means2d=by,
+            screen=frame.projected.screen,
+            culled=frame.projected.culled,
+            statistics=self._table,
+            half_width=width / 2,
+            half_height=height / 2,
+            radius_share=1 / max(width, height),
+            count=len(self),
         )
 
     def host(self) -> NDArray[np.float32]:

@@ -8,12 +8,12 @@ factor with the splats, so their mean stays one and that of the offsets zero.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.arithmetic import sum_columns
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.train.views.host_adam import HostAdam
 
@@ -36,18 +36,31 @@ class Exposures:
         self.values[:, 0] = 1
         self._adam = HostAdam(self.values.shape)
 
-    def applied(self, image: Any, number: int) -> Any:
+    def applied(self, image: DeviceArray, number: int) -> DeviceArray:
         """The (height, width, 3) image as view ``number`` would have exposed it; a new array."""
         exposed, size = self.device.empty(image.shape), image.size // _COLORS
-        self.device.launch("expose", (size,), image, exposed, *self._row(number), size)
+        gain, offset = self._row(number)
+        self.device.launch(
+            "expose", (size,), image=image, exposed=exposed, gain=gain, offset=offset, pixels=size
+        )
         return exposed
 
-    def pulled_back(self, image: Any, by_exposed: Any, number: int, rate: float) -> Any:
+    def pulled_back(
+        self, image: DeviceArray, by_exposed: DeviceArray, number: int, rate: float
+    ) -> DeviceArray:
         """The gradient by the image, of that by the exposed one; takes a step with the exposure."""
         by_image, size = self.device.empty(image.shape), image.size // _COLORS
         parts = self.device.empty((size, 2 * _COLORS))
-        given = (image, by_exposed, by_image, parts)
-        self.device.launch("expose_grad", (size,), *given, *self._row(number)[:1], size)
+        self.device.launch(
+            "expose_grad",
+            (size,),
+            image=image,
+            by_exposed=by_exposed,
+            by_image=by_image,
+            parts=parts,
+            gain=self._row(number)[0],
+            pixels=size,
+        )
         gradient = self.device.get(sum_columns(self.device, parts)).astype(float)
         step = self._adam.step(number, gradient.reshape(2, _COLORS), rate)
         self.values[number] -= step

@@ -116,8 +116,8 @@ class Additive:
         settings, drawing = self.renderer.settings, frame.drawing
         if splats.color_modes is not None:
             modes = project_modes(self.device, splats, frame.camera, settings, frame.projected)
+        assert drawing.lists is not None and splats.colors is not None
         screen = replace(drawing.screen, features=splats.colors, modes=modes)
-        assert drawing.lists is not None
         size = drawing.size
         return rasterize(self.device, screen, drawing.lists, size, settings=settings).image
 

@@ -188,7 +188,7 @@ def _coefficients(parameters: Parameters) -> Floats:
 def _put(parameters: Parameters, c: Floats) -> None:
     device, raw = parameters.device, parameters.raw
     logarithms = np.log(c[:, 0, 0])
-    if parameters.band is not None:
+    if parameters.band is not None and parameters.drawn.scales is not None:
         # What the band's limit takes of a density when it is drawn, the wider splat has not lost.
         scales = device.get(parameters.drawn.scales).astype(float)
         logarithms += np.log(scales).sum(axis=1) - device.get(raw["log_scales"]).sum(axis=1)
