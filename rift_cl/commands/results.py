@@ -53,7 +53,10 @@ class Result:
         return str(self.folder)
 
     def __repr__(self) -> str:
-        facts = [f"{name} {value}" for name, value in self._facts().items()]
+        facts = [
+            f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}"
+            for name, value in self._facts().items()
+        ]
         return f"<{type(self).__name__} in {self.folder}: {', '.join(facts)}>"
 
     def _repr_html_(self) -> str:
