@@ -7,9 +7,10 @@ and what the command line shows. It inherits its fields from a few classes that 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, TypeVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_type_hints
 
 import tyro
 
@@ -75,3 +76,24 @@ def option_groups(settings: type) -> list[type]:
         if hasattr(base, "group") and not any(issubclass(other, base) for other in found):
             found.append(base)
     return found[::-1] or [settings]
+
+
+def join_help_lines(settings: Any) -> None:
+    """Have tyro wrap the docstring of each option as one paragraph.
+
+    It keeps the line breaks of docstrings that are indented, but takes a field's help from the
+    metadata as it stands. Classes of fields that are dataclasses themselves are gone through, too.
+    """
+    import docstring_parser
+
+    described: dict[str, str] = {}
+    for base in reversed(settings.__mro__[:-1]):
+        for entry in docstring_parser.parse_from_object(base).params:
+            described[entry.arg_name] = " ".join((entry.description or "").split())
+    kinds = get_type_hints(settings)
+    for field in fields(settings):
+        if described.get(field.name) and "help" not in field.metadata:
+            field.metadata = MappingProxyType({**field.metadata, "help": described[field.name]})
+        for kind in getattr(kinds[field.name], "__args__", (kinds[field.name],)):
+            if isinstance(kind, type) and is_dataclass(kind):
+                join_help_lines(kind)

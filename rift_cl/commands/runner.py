@@ -18,7 +18,7 @@ from typing import Annotated, Any
 import tyro
 
 from rift_cl.commands.console_table import print_table
-from rift_cl.commands.options import option_groups
+from rift_cl.commands.options import join_help_lines, option_groups
 from rift_cl.commands.progress_bar import print_line, show_progress
 from rift_cl.errors import RiftError
 from rift_cl.progress import Report
@@ -75,6 +75,8 @@ def command(
     groups = {
         group.group if hasattr(group, "group") else "": group for group in option_groups(settings)
     }
+    for group in (*groups.values(), Output):
+        join_help_lines(group)
     parameters = [
         Parameter(
             title or "settings",
