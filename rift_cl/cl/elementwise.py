@@ -21,11 +21,34 @@ _CPU_RUN = 4096
 
 def copy(device: Device, x: DeviceArray, y: DeviceArray) -> None:
     """Y = x, whatever y held before."""
+    _copy_bytes(device, x, 0, y, 0, x.nbytes)
+
+
+def take(device: Device, x: DeviceArray, index: int, y: DeviceArray) -> None:
+    """Y = x[index]."""
+    _copy_bytes(device, x, index * y.nbytes, y, 0, y.nbytes)
+
+
+def put(device: Device, x: DeviceArray, y: DeviceArray, index: int) -> None:
+    """Y[index] = x."""
+    _copy_bytes(device, x, 0, y, index * x.nbytes, x.nbytes)
+
+
+def _copy_bytes(
+    device: Device, x: DeviceArray, x_first: int, y: DeviceArray, y_first: int, count: int
+) -> None:
     import pyopencl as cl
 
-    if x.nbytes:
+    if count:
         with named_errors("copying an array", device.name):
-            cl.enqueue_copy(device.queue, y.base_data, x.base_data, byte_count=x.nbytes)
+            cl.enqueue_copy(
+                device.queue,
+                y.base_data,
+                x.base_data,
+                byte_count=count,
+                src_offset=x_first,
+                dst_offset=y_first,
+            )
 
 
 def multiply(device: Device, w: DeviceArray, y: DeviceArray) -> None:

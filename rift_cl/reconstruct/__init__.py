@@ -11,7 +11,7 @@ from rift_cl.reconstruct.direct.offset_axis import widened
 from rift_cl.reconstruct.direct.padding import extended
 from rift_cl.reconstruct.preprocess import remove_rings
 from rift_cl.reconstruct.preprocess.flatfield import Attenuation, attenuation
-from rift_cl.reconstruct.solvers.conjugate_gradients import Cgls, cgls
+from rift_cl.reconstruct.solvers.conjugate_gradients import Cgls, cgls, mean_diagonal
 from rift_cl.reconstruct.solvers.direction_weights import DirectionWeights
 from rift_cl.reconstruct.solvers.disc_prior import Disc, find_disc, material_lengths
 from rift_cl.reconstruct.solvers.few_levels import FewLevels
@@ -45,6 +45,7 @@ __all__ = [
     "find_center",
     "find_disc",
     "material_lengths",
+    "mean_diagonal",
     "poisson_weights",
     "rebin_fan",
     "remove_rings",

@@ -9,8 +9,17 @@ from solver_cases import GRID, METHODS, SCAN, Matrix, finished, problem, twin_ma
 
 from rift_cl import FastProjector, Grid, Parallel, Projector, metrics
 from rift_cl.errors import CheckpointError, InputError, NonFiniteError, RiftError, ShapeError
-from rift_cl.reconstruct import Cgls, Fista, MeasuredRays, Pdhg, Sirt, cgls, sirt, tv
-from rift_cl.reconstruct.solvers import poisson_weights
+from rift_cl.reconstruct import (
+    Cgls,
+    Fista,
+    MeasuredRays,
+    Pdhg,
+    Sirt,
+    cgls,
+    poisson_weights,
+    sirt,
+    tv,
+)
 from rift_cl.reference import total_variation as twin
 
 RANDOM = np.random.default_rng(11)

@@ -50,7 +50,7 @@ def test_the_start_that_is_best_after_its_polish_wins_not_the_best_before(monkey
         return planner.ViewTable(layout.begin.kind, layout.begin.table + 0.5)
 
     monkeypatch.setattr(Objective, "value", worth)
-    monkeypatch.setattr(planner, "polish", move)
+    monkeypatch.setattr(planner, "refine", move)
     monkeypatch.setattr(planner, "parted", lambda design, views, spacing: views)
     chosen = starts.pop("first").view_table
     found = planner._moved(objective, chosen, starts)

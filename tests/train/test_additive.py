@@ -27,12 +27,12 @@ def additive_of(device, order, rows=SIZE):
 def test_pictures_are_those_of_densities_with_modes(device, order):
     additive, parameters = additive_of(device, order)
     densities = device.get(parameters.drawn.opacities).astype(float)
-    c = densities[:, None, None] * np.ones(additive.shape)
+    c = densities[:, None, None] * np.ones(additive.domain)
     if order:
         c[:, 1:, 0] *= device.get(parameters.raw["shape_modes"])
     frames = [additive.renderer.forward(parameters.drawn, camera) for camera in additive.cameras]
     wanted = np.stack([device.get(frame.image)[..., :1] for frame in frames])
-    np.testing.assert_allclose(additive.render(c), wanted, atol=1e-5 * wanted.max())
+    np.testing.assert_allclose(additive(c), wanted, atol=1e-5 * wanted.max())
 
 
 @pytest.mark.parametrize("order", [0, 1, 3])
@@ -40,36 +40,37 @@ def test_pictures_are_those_of_densities_with_modes(device, order):
 def test_the_adjoint_is_the_transpose(device, order, rows):
     additive, _ = additive_of(device, order, rows)
     random = np.random.default_rng(order)
-    c = random.normal(size=additive.shape)
-    seen = additive.render(c)
+    c = random.normal(size=additive.domain)
+    seen = additive(c)
     assert seen.shape == (VIEWS, rows, SIZE, 1)
     other = random.normal(size=seen.shape)
     scale = np.linalg.norm(seen) * np.linalg.norm(other)
     assert scale > 1
     wanted = pytest.approx(np.vdot(seen, other), abs=1e-6 * scale)
-    assert np.vdot(c, additive.adjoint(other)) == wanted
+    assert np.vdot(c, additive.T(other)) == wanted
 
 
 @pytest.mark.parametrize("kept", [0, 1])
 def test_what_is_not_kept_is_drawn_anew_to_the_same_bits(device, monkeypatch, kept):
     additive, parameters = additive_of(device, 1)
-    c = np.random.default_rng(0).normal(size=additive.shape)
-    seen = additive.render(c)
+    c = np.random.default_rng(0).normal(size=additive.domain)
+    seen = additive(c)
+    back = additive.T(seen)
     frame = additive._kept[0]
     one = frame.drawing.memory.fixed
     one += frame.drawing.memory.lists(frame.lists.n_entries, frame.lists.tiles.count)
     monkeypatch.setattr(rift.Device, "budget", (2 * kept + 1) * one + one // 2)
     few = Additive(additive.renderer, additive.cameras, parameters.drawn, modes=4)
     assert bool(few._kept) == (kept > 0) and len(few._kept) < VIEWS
-    assert few.render(c).tobytes() == seen.tobytes()
-    assert few.adjoint(seen).tobytes() == additive.adjoint(seen).tobytes()
+    assert few(c).tobytes() == seen.tobytes()
+    assert few.T(seen).tobytes() == back.tobytes()
     assert few.energies().tobytes() == additive.energies().tobytes()
 
 
 def test_energies_are_about_the_squared_norms_of_pictures(device):
     additive, _ = additive_of(device, 0)
     found = additive.energies()
-    for number in range(additive.shape[0]):
-        one = np.zeros(additive.shape)
+    for number in range(additive.domain[0]):
+        one = np.zeros(additive.domain)
         one[number] = 1
-        assert found[number] == pytest.approx(np.square(additive.render(one)).sum(), rel=0.1)
+        assert found[number] == pytest.approx(np.square(additive(one)).sum(), rel=0.1)

@@ -65,8 +65,9 @@ def problem_of(device, targets, *, least, ridge):
     parameters = Parameters.of(device, scene(1), density=True)
     renderer = Renderer(DRAWING, device=device)
     operator = Additive(renderer, cameras_of(4, SIZE), parameters.drawn, modes=4)
-    free = np.ones(operator.shape, bool)
-    return DensityProblem(operator, targets, 1.0, free, ridge=ridge, least=least)
+    free = np.ones(operator.domain, bool)
+    given = operator, device.array(targets, np.float32), operator.energies(), free
+    return DensityProblem(*given, ridge=ridge, least=least)
 
 
 @pytest.mark.parametrize("iterations", [1, 2, 9])
@@ -77,7 +78,7 @@ def test_no_solve_raises_the_loss_or_goes_below_the_least(device, iterations, ri
     targets = random.normal(size=(4, SIZE, SIZE, 1))
     targets = {"noise": targets, "nothing": 0 * targets, "less than nothing": -abs(targets)}[wanted]
     problem = problem_of(device, targets, least=0.01, ridge=ridge)
-    start = np.abs(random.normal(size=problem.operator.shape)) + 0.02
+    start = np.abs(random.normal(size=problem.operator.domain)) + 0.02
     found = problem.solved(start, iterations)
     assert problem.loss(found) < problem.loss(start)
     assert found[:, 0].min() >= 0.01
@@ -145,7 +146,7 @@ def test_splats_that_no_view_sees_and_hardly_dense_ones_do_no_harm(device):
     spoilt = pictures.projections.values.copy()
     spoilt[2, 3, 4] = np.nan
     pictures = XrayPictures(device, replace(pictures.projections, values=spoilt))
-    with pytest.raises(NonFiniteError, match="solve: targets"):
+    with pytest.raises(NonFiniteError, match="y holds NaN"):
         solved(device, raw, pictures)
 
 

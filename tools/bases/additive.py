@@ -19,8 +19,10 @@ from numpy.typing import NDArray
 
 from bases.mode_sets import ModeSet
 from bases.mosaic import Mosaic
+from rift_cl.cl.elementwise import copy
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
+from rift_cl.operators import LinearOperator
 from rift_cl.splat.hermite import project_modes, project_modes_grad
 from rift_cl.splat.orders import WHITENING
 from rift_cl.splat.projected import SplatGradients
@@ -62,8 +64,11 @@ class Geometry:
         return cls(numbers[:, :3], quats, numbers[:, 7:])
 
 
-class Placed:
+class Placed(LinearOperator):
     """Splats of one geometry, seen by all cameras at once (``bases.mosaic``).
+
+    A linear map from coefficients (N, K, C) to pictures (V, height, width, C), in float64 where the
+    device has it, since coefficients of nearly equal splats cancel; pictures are drawn in float32.
 
     Args:
         renderer: in xray mode.
@@ -81,10 +86,14 @@ class Placed:
         geometry: Geometry,
         channels: int,
     ) -> None:
-        self.renderer, self.device, self.modes = renderer, renderer.device, modes
+        device, count = renderer.device, len(geometry.means)
+        pictures = (len(cameras), *cameras[0].size, channels)
+        dtype = np.float64 if device.traits.fp64 else np.float32
+        super().__init__((count, modes.count, channels), pictures, device, dtype)
+        self.renderer, self.modes = renderer, modes
         self._mosaic = Mosaic(cameras, renderer.settings.tile)
         self._camera, self._views = self._mosaic.camera, len(cameras)
-        self._count, self._channels = len(geometry.means), channels
+        self._count, self._channels = count, channels
         self._scales = np.exp(geometry.log_scales)
         self._splats = self._everywhere(geometry)
         given = (self.device, self._splats, self._camera, renderer.settings)
@@ -132,6 +141,14 @@ class Placed:
     def modal(self) -> bool:
         """Whether there are modes beside the constant."""
         return len(self.modes.matrix) > 1
+
+    def _apply(self, x: Any, out: Any) -> None:
+        pictures = self.render(self.device.get(x).astype(np.float64))
+        copy(self.device, self.device.array(pictures, self.dtype), out)
+
+    def _apply_adjoint(self, y: Any, out: Any) -> None:
+        found = self.adjoint(self.device.get(y).astype(np.float64))
+        copy(self.device, self.device.array(found, self.dtype), out)
 
     def render(self, coefficients: Floats) -> Floats:
         """Pictures (V, height, width, C) of coefficients (N, K, C)."""

@@ -1,7 +1,7 @@
 """A fit of additive splats: geometry by Adam, all coefficients by ridge least squares inside it.
 
 Each step places the splats, solves for the coefficients by a few conjugate gradients from the last
-ones (``rift_cl.train.xray.variable_projection``) or exactly (``bases.exact``), and moves means,
+ones (``rift_cl.reconstruct.Cgls``) or exactly (``bases.exact``), and moves means,
 rotations and scales along the gradient at those coefficients. Bases differ in nothing but their
 modes and the number of splats that a budget buys: they start from the first of the same places, at
 a size that fills the gaps.
@@ -20,9 +20,9 @@ from bases.additive import Floats, Geometry, Placed
 from bases.exact import solved
 from bases.mode_sets import ModeSet, seen_gram
 from rift_cl.geometry import Camera
+from rift_cl.reconstruct import Cgls, mean_diagonal
 from rift_cl.splat.renderer import Renderer
 from rift_cl.train.views.host_adam import HostAdam
-from rift_cl.train.xray.variable_projection import mean_curvature, solve
 
 # Steps of means in widths of the first splats, of quaternions, of logarithms of scales.
 RATES = (0.08, 0.03, 0.04)
@@ -127,7 +127,7 @@ class AdditiveFit:
         channels = task.targets.shape[-1]
         placed = Placed(task.renderer, task.cameras, self._solved, self.geometry, channels)
         if not self._ridge:
-            self._ridge = RIDGE * mean_curvature(placed.render, self._c.shape)
+            self._ridge = RIDGE * mean_diagonal(placed)
         residual = self._solve(placed, iterations)
         self.pairs = placed.pairs_per_pixel()
         return residual, placed.geometry_gradient(self._c, -residual)
@@ -138,17 +138,18 @@ class AdditiveFit:
         if self.solve == EXACT:
             self._c = solved(placed, task.targets, self._ridge, task.stack)
             return task.targets - placed.render(self._c)
-        found = solve(
-            placed.render,
-            placed.adjoint,
+        solver = Cgls(
+            placed,
             task.targets,
             ridge=self._ridge,
-            iterations=iterations,
             start=self._c,
             diagonal=self._diagonal(),
         )
-        self._c = found.coefficients
-        return found.residual
+        for _ in solver.run(iterations):
+            pass
+        get = placed.device.get
+        self._c = get(solver.image).astype(np.float64)
+        return -get(solver.residual).astype(np.float64)
 
     def _diagonal(self) -> Floats:
         """How strongly coefficients show, by the size of their splats."""

@@ -74,6 +74,11 @@ class Solver(ABC):
         return self._now.image
 
     @property
+    def residual(self) -> Any:
+        """``A image - y`` so far, a device array that the next step may change."""
+        return self._now.residual
+
+    @property
     def finished(self) -> bool:
         """Whether the residual is down to the noise, or no step changes the image any more."""
         met = self._target is not None and self._now.rms <= self._target

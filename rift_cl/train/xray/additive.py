@@ -18,8 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.cl.arithmetic import axpby
+from rift_cl.cl.arithmetic import axpby, copy_columns
+from rift_cl.cl.elementwise import put, take
 from rift_cl.geometry import Camera
+from rift_cl.operators.linear import LinearOperator
 from rift_cl.splat.drawing import draw_grad
 from rift_cl.splat.frame import Frame
 from rift_cl.splat.hermite import project_modes, project_modes_grad
@@ -31,8 +33,8 @@ from rift_cl.splat.splats import Splats
 Floats = NDArray[np.float64]
 
 
-class Additive:
-    """A linear map from coefficients to line integrals, and its transpose.
+class Additive(LinearOperator):
+    """A linear map from coefficients (N, K, 1) to line integrals (V, height, width, 1).
 
     Frames are kept while they take no more than half of the device's memory budget; others are
     drawn anew for each picture, to the same bits.
@@ -47,37 +49,45 @@ class Additive:
     def __init__(
         self, renderer: Renderer, cameras: Sequence[Camera], splats: Splats, *, modes: int = 1
     ) -> None:
-        self.renderer, self.device, self.cameras = renderer, renderer.device, cameras
-        self.shape = (len(splats), modes, 1)
+        pictures = (len(cameras), *cameras[0].size, 1)
+        super().__init__((len(splats), modes, 1), pictures, renderer.device)
+        self.renderer, self.cameras = renderer, cameras
         self._shapes = (splats.means, splats.quats, splats.scales)
         self._ones = self.device.array(np.ones(len(splats), np.float32))
-        self._black = self._colored(np.zeros(self.shape))
+        self._black = self._colored(self.device.zeros(self.domain))
         self._kept: dict[int, Frame] = {}
-        self._keep_frames()
+        self._memory = self._keep_frames()
 
-    def render(self, coefficients: Floats) -> Floats:
-        """Pictures (V, height, width, 1) of coefficients (N, K, 1)."""
-        splats = self._colored(coefficients)
-        drawn = [self._drawn(splats, number) for number in range(len(self.cameras))]
-        return np.stack([self.device.get(image) for image in drawn]).astype(np.float64)
+    @property
+    def scratch(self) -> int:
+        """Bytes of the frames that are kept; a renderer sees to those that are drawn anew."""
+        return self._memory
 
-    def adjoint(self, pictures: Floats) -> Floats:
-        """The transpose of ``render``: (V, height, width, 1) to (N, K, 1)."""
+    def _apply(self, x: Any, out: Any) -> None:
+        splats = self._colored(x)
+        for number in range(len(self.cameras)):
+            put(self.device, self._drawn(splats, number), out, number)
+
+    def _apply_adjoint(self, y: Any, out: Any) -> None:
         total: list[Any] = []
-        for number, picture in enumerate(pictures):
-            parts = self._pulled_back(self._frame(number), self._sent(picture))
+        picture = self.device.empty(self.range[1:])
+        for number in range(len(self.cameras)):
+            take(self.device, y, number, picture)
+            parts = self._pulled_back(self._frame(number), picture)
             for before, part in zip(total, parts, strict=False):
                 axpby(self.device, 1.0, part, 1.0, before)
             total = total or parts
-        sums, *rest = (np.asarray(self.device.get(part), np.float64) for part in total)
-        return np.concatenate([sums[:, None, MOMENTS:], *rest], axis=1)
+        modes = self.domain[1]
+        copy_columns(self.device, total[0], MOMENTS, out, 0, 1)
+        if modes > 1:
+            copy_columns(self.device, total[1], 0, out, 1, modes - 1)
 
     def energies(self) -> Floats:
         """(N,) about the squared norm of what the cameras see of each splat's constant.
 
         A Gaussian of peak w and conic (a, b; b, c) has w^2 pi / sqrt(a c - b^2) on a plane.
         """
-        total = np.zeros(self.shape[0])
+        total = np.zeros(self.domain[0])
         for number in range(len(self.cameras)):
             screen = self.device.get(self._frame(number).projected.screen).astype(np.float64)
             conic = screen[:, 2] * screen[:, 4] - screen[:, 3] ** 2
@@ -85,28 +95,36 @@ class Additive:
             total[seen] += np.pi * screen[seen, 5] ** 2 / np.sqrt(conic[seen])
         return total
 
-    def _keep_frames(self) -> None:
-        room = self.device.budget // 2
+    def _keep_frames(self) -> int:
+        """Keep the frames that there is room for; their bytes."""
+        room, kept = self.device.budget // 2, 0
         for number in range(len(self.cameras)):
             frame = self._frame(number)
-            if frame.lists is None:
-                return
             memory, lists = frame.drawing.memory, frame.lists
-            room -= memory.fixed + memory.lists(lists.n_entries, lists.tiles.count)
-            if room < 0:
-                return
+            if lists is None:
+                return kept
+            one = memory.fixed + memory.lists(lists.n_entries, lists.tiles.count)
+            if kept + one > room:
+                return kept
             self._kept[number] = frame
+            kept += one
+        return kept
 
     def _frame(self, number: int) -> Frame:
         """What a camera sees of coefficients of zero."""
         found = self._kept.get(number)
         return found or self.renderer.forward(self._black, self.cameras[number])
 
-    def _colored(self, coefficients: Floats) -> Splats:
-        colors = {"colors": self._sent(coefficients[:, 0])}
-        if self.shape[1] > 1:
-            colors["color_modes"] = self._sent(coefficients[:, 1:])
-        return Splats(*self._shapes, self._ones, **colors)
+    def _colored(self, coefficients: Any) -> Splats:
+        """The splats in the colours that coefficients (N, K, 1) on the device give them."""
+        splats, modes, _ = self.domain
+        if modes == 1:
+            return Splats(*self._shapes, self._ones, coefficients.reshape((splats, 1)))
+        colors = self.device.empty((splats, 1))
+        color_modes = self.device.empty((splats, modes - 1, 1))
+        copy_columns(self.device, coefficients, 0, colors, 0, 1)
+        copy_columns(self.device, coefficients, 1, color_modes, 0, modes - 1)
+        return Splats(*self._shapes, self._ones, colors, color_modes=color_modes)
 
     def _drawn(self, splats: Splats, number: int) -> Any:
         """A picture, through the kept frame if there is one."""
@@ -135,6 +153,3 @@ class Additive:
             channels=frame.channels.total,
         )
         return [found.sums, found.color_modes]
-
-    def _sent(self, values: Floats) -> Any:
-        return self.device.array(np.ascontiguousarray(values, np.float32))

@@ -1,7 +1,11 @@
 """Densities of X-ray splats by least squares, while Adam moves only what is not linear in them.
 
-Line integrals are linear in densities and in densities times modes. Now and then these are solved
-for from a draw of the views, beginning where they are (``rift_cl.train.xray.variable_projection``).
+Line integrals are linear in densities and in densities times modes, so that for every geometry
+there is a best choice, which needs no steps of an optimizer. Its residual is orthogonal to what the
+splats can show: the loss, as a function of the geometry alone, has the partial gradient at fixed
+coefficients (variable projection, Golub and Pereyra 1973; the shortened gradient is Kaufman's,
+1975). Every few steps the coefficients are solved for by ridge least squares from some of the
+views, beginning where they are, so that a few conjugate gradients are enough.
 A density below zero is none: those that come out so are held at the least one, their modes at zero,
 and the others are solved for once more. Since even that may end worse than it began, the change is
 then halved until it does not.
@@ -11,17 +15,23 @@ All of it follows from the splats, the seed and the step, so that no checkpoint 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.cl.arithmetic import axpby
+from rift_cl.cl.elementwise import put
+from rift_cl.cl.reductions import dot
+from rift_cl.operators.linear import LinearOperator
+from rift_cl.reconstruct.solvers.conjugate_gradients import Cgls, mean_diagonal
+from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays
 from rift_cl.splat.renderer import Renderer
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.xray.additive import Additive, Floats
 from rift_cl.train.xray.solve_settings import SolveSettings
-from rift_cl.train.xray.variable_projection import Solution, mean_curvature, solve
 
 # The least density, as a share of the mean one: logarithms want more than zero.
 _LEAST = 1e-3
@@ -50,59 +60,64 @@ class DensityProblem:
     """The best coefficients (N, K, 1) that have no density below the least.
 
     Args:
-        operator: coefficients to pictures.
-        targets: (V, height, width, 1) what they are to be.
-        roots: (V, height, width, 1) square roots of how much each pixel counts; 1 where all do.
+        operator: coefficients to pictures (V, height, width, 1), times the roots of how much each
+            pixel counts if they do not count alike.
+        targets: device array, what these are to be, times the same roots.
+        energies: (N,) about the squared norm of the pictures of each splat's constant.
         free: (N, K, 1) whether a coefficient is solved for.
         ridge: weight of the squared coefficients.
         least: density, above 0.
     """
 
-    operator: Additive
-    targets: Floats
-    roots: Floats | float
+    operator: LinearOperator
+    targets: Any
+    energies: Floats
     free: NDArray[np.bool_]
     ridge: float
     least: float
 
     def loss(self, c: Floats) -> float:
         """What is to be small: weighted squares of the residual, and the ridge."""
-        error = self._render(c) - self.roots * self.targets
-        return float(np.vdot(error, error) + self.ridge * np.vdot(c, c))
+        device = self.operator.device
+        coefficients = device.array(c, np.float32)
+        error = self.operator(coefficients)
+        axpby(device, -1.0, self.targets, 1.0, error)
+        squares = dot(device, error, error)
+        return squares + self.ridge * dot(device, coefficients, coefficients)
 
     def solved(self, start: Floats, iterations: int) -> Floats:
         """Coefficients of no larger loss than these, which keep to the least density."""
-        energies = self.operator.energies()
-        energies = np.maximum(energies, max(_HARDLY_SEEN * energies.mean(), _TINY))
-        diagonal = np.broadcast_to(energies[:, None, None], start.shape)
-        first = self._solve(start, self.free, diagonal, iterations)
-        c = self._held(first.coefficients)
-        if c is first.coefficients:
+        before, found = self._solve(start, self.free, iterations)
+        c = self._held(found)
+        if c is found:
             return c
-        free = self.free & (c[:, :1] > self.least)
-        c = self._held(self._solve(c, free, diagonal, iterations).coefficients)
+        _, found = self._solve(c, self.free & (c[:, :1] > self.least), iterations)
+        c = self._held(found)
         for _ in range(_TRIES):
-            if self.loss(c) <= first.loss_before:
+            if self.loss(c) <= before:
                 return c
             c = (start + c) / 2
         return start
 
     def _solve(
-        self, start: Floats, free: NDArray[np.bool_], diagonal: Floats, iterations: int
-    ) -> Solution:
-        return solve(
-            self._render,
-            lambda pictures: self.operator.adjoint(self.roots * pictures),
-            self.roots * self.targets,
-            ridge=self.ridge,
-            iterations=iterations,
+        self, start: Floats, free: NDArray[np.bool_], iterations: int
+    ) -> tuple[float, Floats]:
+        """The loss before, and better coefficients."""
+        energies = np.maximum(self.energies, max(_HARDLY_SEEN * self.energies.mean(), _TINY))
+        solver = Cgls(
+            self.operator,
+            self.targets,
             start=start,
-            diagonal=diagonal,
+            ridge=self.ridge,
+            diagonal=np.broadcast_to(energies[:, None, None], start.shape),
             free=free,
         )
-
-    def _render(self, c: Floats) -> Floats:
-        return np.asarray(self.roots * self.operator.render(c))
+        before = solver.loss
+        for _ in solver.run(iterations):
+            pass
+        found = self.operator.device.get(solver.image).astype(np.float64)
+        # What is held keeps the digits that a device does not.
+        return before, np.where(free, found, start)
 
     def _held(self, c: Floats) -> Floats:
         """No density below the least, and no modes there; ``c`` itself if all are above."""
@@ -138,19 +153,21 @@ def solve_densities(
         NonFiniteError: the pictures, or what is drawn, hold NaN or infinity.
     """
     numbers = _views(len(pictures.cameras), settings.views, (seed, parameters.step, 0x501))
-    start, get = _coefficients(parameters), parameters.device.get
+    start, device = _coefficients(parameters), parameters.device
     cameras = [pictures.cameras[number] for number in numbers]
     operator = Additive(renderer, cameras, parameters.drawn, modes=start.shape[1])
-    targets = np.stack([get(pictures.target(k)).astype(float) for k in numbers])
+    targets = device.empty(operator.range)
+    for place, number in enumerate(numbers):
+        put(device, pictures.target(number), targets, place)
     free = np.ones(start.shape, bool)
     if "shape_modes" in parameters.free:
-        free[:, 1:, 0] = get(parameters.free["shape_modes"]) > 0
+        free[:, 1:, 0] = device.get(parameters.free["shape_modes"]) > 0
     problem = DensityProblem(
-        operator,
+        _weighted(operator, targets, [pictures.weights(number) for number in numbers]),
         targets,
-        _roots(parameters, pictures, numbers, targets.shape),
+        operator.energies(),
         free,
-        ridge=settings.ridge * mean_curvature(operator.render, operator.shape),
+        ridge=settings.ridge * mean_diagonal(operator),
         least=max(_LEAST * float(start[:, 0].mean()), _TINY),
     )
     _put(parameters, problem.solved(start, settings.iterations))
@@ -161,17 +178,23 @@ def _views(count: int, most: int, seed: tuple[int, ...]) -> NDArray[np.int64]:
     return np.sort(np.random.default_rng(seed).permutation(count)[:most])
 
 
-def _roots(
-    parameters: Parameters, pictures: Views, numbers: NDArray[np.int64], shape: tuple[int, ...]
-) -> Floats | float:
-    weights = [pictures.weights(number) for number in numbers]
+def _weighted(operator: Additive, targets: Any, weights: Sequence[Any]) -> LinearOperator:
+    """The operator whose pixels count by their weights, if there are any; so do the targets then.
+
+    Args:
+        operator: coefficients to V pictures.
+        targets: device array of the pictures; multiplied in place.
+        weights: (height, width) device array of each picture, or None where all pixels count.
+    """
     if all(each is None for each in weights):
-        return 1.0
-    found = np.ones(shape)
-    for row, each in zip(found, weights, strict=True):
+        return operator
+    host = np.ones(operator.range)
+    for row, each in zip(host, weights, strict=True):
         if each is not None:
-            row[...] = np.sqrt(parameters.device.get(each).astype(float))[..., None]
-    return found
+            row[...] = operator.device.get(each)[..., None]
+    weighted = WeightedRays(operator, host)
+    weighted.weigh(targets)
+    return weighted
 
 
 def _coefficients(parameters: Parameters) -> Floats:
