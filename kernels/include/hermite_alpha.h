@@ -22,7 +22,7 @@
 #if SMOOTH
 #define LEAST_DENSITY 0
 #elif ACTIVATION == CLAMP
-#define LEAST_DENSITY FAINTEST
+#define LEAST_DENSITY ALPHA_THRESHOLD
 #else
 /* -log(1 - 1/255) */
 #define LEAST_DENSITY 0.0039292923f
@@ -55,4 +55,4 @@ static lanes hidden_by(lanes density) {
 }
 
 /* No splat counts where not even the cap does. */
-static float cap_that_counts(float cap) { return SMOOTH || cap >= FAINTEST ? cap : 0; }
+static float cap_that_counts(float cap) { return SMOOTH || cap >= ALPHA_THRESHOLD ? cap : 0; }

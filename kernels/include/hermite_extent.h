@@ -87,7 +87,7 @@ static float modal_extent(const ModeNorms *norms, float weight) {
   float r = MOST_RADIUS;
   for (int step = 0; step < EXTENT_STEPS; step++) {
     const float steady = larger(r, STEADY_RADIUS);
-    const float over = weight / FAINTEST * polynomial_bound(norms, steady);
+    const float over = weight / ALPHA_THRESHOLD * polynomial_bound(norms, steady);
     /* Not a number or too large for one: as wide as any. */
     if (not_finite(over)) return MOST_RADIUS;
     if (!(over >= 1)) return -1;

@@ -3,7 +3,7 @@
  * For compositing a pixel's state is its transmittance and CHANNELS sums; a finished pixel has the
  * sign of its transmittance turned. On the way back it is T, the colour q that lies behind, and v =
  * dL/dC. `end` is where a pixel's list of entries was left. An image has `stride` channels, of
- * which CHANNELS from `first` on are looked at. Include splat.h before it. */
+ * which CHANNELS from `first` on are looked at. Include alpha.h before it. */
 
 #define STRIPS (TILE / LANES)
 #define PIXELS (STRIPS * TILE)

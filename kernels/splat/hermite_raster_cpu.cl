@@ -15,7 +15,7 @@
 
 #include "include/portable.h"
 #include "include/exponential.h"
-#include "include/splat.h"
+#include "include/alpha.h"
 #include "include/tile_pixels.h"
 #include "include/hermite_edge.h"
 #include "include/hermite_modes.h"
@@ -83,7 +83,7 @@ KERNEL void hermite_raster_cpu(
         here[0] = here[0] - w;
 #else
         const lanes t = here[0], share = alpha * t, rest = t - share;
-        const lanes_int goes_on = rest > OPAQUE;
+        const lanes_int goes_on = rest > TRANSMITTANCE_THRESHOLD;
         const lanes w = goes_on ? share : 0;
         const lanes after = goes_on ? rest : AS_LANES(AS_INT(t) | SIGN_BIT);
         turned |= AS_INT(t) ^ AS_INT(after);

@@ -5,7 +5,7 @@
 
 #include "include/portable.h"
 #include "include/exponential.h"
-#include "include/splat.h"
+#include "include/alpha.h"
 #include "include/hermite_edge.h"
 #include "include/hermite_modes.h"
 #include "include/hermite_alpha.h"
@@ -46,7 +46,7 @@ KERNEL void hermite_raster_gpu(
     const float hidden = hidden_by(w), alpha = hidden < most ? hidden : most;
     if (!SMOOTH && !(alpha > 0)) continue;
     w = alpha * left;
-    if (!SMOOTH && left - w <= OPAQUE) {
+    if (!SMOOTH && left - w <= TRANSMITTANCE_THRESHOLD) {
       end = entry;
       break;
     }

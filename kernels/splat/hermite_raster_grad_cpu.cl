@@ -13,7 +13,7 @@
 
 #include "include/portable.h"
 #include "include/exponential.h"
-#include "include/splat.h"
+#include "include/alpha.h"
 #include "include/tile_pixels.h"
 #include "include/transpose.h"
 #include "include/hermite_edge.h"

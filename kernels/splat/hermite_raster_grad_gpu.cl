@@ -7,7 +7,7 @@
 
 #include "include/portable.h"
 #include "include/exponential.h"
-#include "include/splat.h"
+#include "include/alpha.h"
 #include "include/hermite_edge.h"
 #include "include/hermite_modes.h"
 #include "include/hermite_alpha.h"

@@ -19,6 +19,7 @@
  * clipped for its radius (5), off the screen (4). Index space: splats. */
 
 #include "include/portable.h"
+#include "include/alpha_threshold.h"
 #include "include/small_matrix.h"
 #include "include/camera.h"
 #include "include/aperture.h"
@@ -30,7 +31,7 @@
 #ifndef SMOOTH
 #define SMOOTH 0
 #endif
-/* Standard deviations; splat.h stops adding line integrals there as well. */
+/* Standard deviations; alpha.h stops adding line integrals there as well. */
 #define EXTENT (XRAY ? 4.0f : 3.33f)
 /* Whether splats have Hermite modes or another activation. */
 #ifndef MODAL
@@ -38,7 +39,6 @@
 #endif
 /* Extents are held at this, so that rounded up they fit an int with room to add. */
 #define MOST_PIXELS 1e9f
-#define FAINTEST (1.0f / 255.0f)
 /* Below it some devices take a number for zero. */
 #define LEAST_NORMAL 1.2e-38f
 
@@ -85,9 +85,9 @@ static int bound(
   if (extent < 0) return TOO_FAINT;
 #else
   float extent = EXTENT;
-  if (!(weight >= (XRAY ? LEAST_NORMAL : FAINTEST))) return TOO_FAINT;
+  if (!(weight >= (XRAY ? LEAST_NORMAL : ALPHA_THRESHOLD))) return TOO_FAINT;
   if (!XRAY && !SMOOTH) {
-    const float at_threshold = sqrt(2 * natural_log(larger(weight / FAINTEST, 1)));
+    const float at_threshold = sqrt(2 * natural_log(larger(weight / ALPHA_THRESHOLD, 1)));
     extent = at_threshold < EXTENT ? at_threshold : EXTENT;
   }
 #endif

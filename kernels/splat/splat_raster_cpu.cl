@@ -1,4 +1,4 @@
-/* Composite the splats of a tile front to back; driver for CPUs (see include/splat.h).
+/* Composite the splats of a tile front to back; driver for CPUs (see include/alpha.h).
  *
  *     light: C = sum of w c + T background,  w = alpha T,  T the product of (1 - alpha) so far;
  *     ADDITIVE: C = sum of weight exp(-sigma) c, whatever the order (line integrals of X-rays).
@@ -16,7 +16,7 @@
 
 #include "include/portable.h"
 #include "include/exponential.h"
-#include "include/splat.h"
+#include "include/alpha.h"
 #include "include/tile_pixels.h"
 
 KERNEL void splat_raster_cpu(
@@ -58,9 +58,9 @@ KERNEL void splat_raster_cpu(
         here[0] = here[0] - w;
 #else
         lanes alpha = raw < cap ? raw : cap;
-        alpha = alpha < FAINTEST ? 0 : alpha;
+        alpha = alpha < ALPHA_THRESHOLD ? 0 : alpha;
         const lanes t = here[0], share = alpha * t, rest = t - share;
-        const lanes_int goes_on = rest > OPAQUE;
+        const lanes_int goes_on = rest > TRANSMITTANCE_THRESHOLD;
         const lanes w = goes_on ? share : 0, after = goes_on ? rest : AS_LANES(AS_INT(t) | SIGN_BIT);
         turned |= AS_INT(t) ^ AS_INT(after);
         here[0] = after;

@@ -6,7 +6,7 @@
 
 #include "include/portable.h"
 #include "include/exponential.h"
-#include "include/splat.h"
+#include "include/alpha.h"
 
 KERNEL void splat_raster_gpu(
     __global float *restrict image, __global float *restrict transmittance,
@@ -31,9 +31,9 @@ KERNEL void splat_raster_gpu(
     float w = s[5] * falloff(TO_POWER * sigma);
 #if !ADDITIVE
     const float alpha = SMOOTH || w < cap ? w : cap;
-    if (!SMOOTH && alpha < FAINTEST) continue;
+    if (!SMOOTH && alpha < ALPHA_THRESHOLD) continue;
     w = alpha * left;
-    if (!SMOOTH && left - w <= OPAQUE) {
+    if (!SMOOTH && left - w <= TRANSMITTANCE_THRESHOLD) {
       end = entry;
       break;
     }

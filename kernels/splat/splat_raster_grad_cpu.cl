@@ -17,7 +17,7 @@
 
 #include "include/portable.h"
 #include "include/exponential.h"
-#include "include/splat.h"
+#include "include/alpha.h"
 #include "include/tile_pixels.h"
 #include "include/splat_slots.h"
 #include "include/transpose.h"
@@ -73,7 +73,7 @@ KERNEL void splat_raster_grad_cpu(
         lanes alpha = raw;
 #if !SMOOTH
         alpha = alpha < cap ? alpha : cap;
-        alpha = alpha < FAINTEST ? 0 : alpha;
+        alpha = alpha < ALPHA_THRESHOLD ? 0 : alpha;
         alpha = entry < end[p] ? alpha : 0;
 #endif
         const lanes t = here[0] / (1.0f - alpha);

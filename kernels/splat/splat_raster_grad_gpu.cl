@@ -7,7 +7,7 @@
 
 #include "include/portable.h"
 #include "include/exponential.h"
-#include "include/splat.h"
+#include "include/alpha.h"
 #include "include/splat_slots.h"
 
 #define PIXELS (TILE * TILE / GROUP)
@@ -69,7 +69,7 @@ KERNEL void splat_raster_grad_gpu(
           float g = -raw * cv;
 #else
           const float alpha = SMOOTH || raw < cap ? raw : cap;
-          if (!SMOOTH && (alpha < FAINTEST || entry >= end[p])) continue;
+          if (!SMOOTH && (alpha < ALPHA_THRESHOLD || entry >= end[p])) continue;
           const float t = left[p] / (1.0f - alpha), difference = cv - behind[p], w = alpha * t;
           left[p] = t;
           behind[p] += alpha * difference;

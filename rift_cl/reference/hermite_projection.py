@@ -17,7 +17,7 @@ from rift_cl.geometry import Camera
 from rift_cl.reference.splat_projection import screen_map
 
 Floats = NDArray[np.float64]
-_FAINTEST, _FARTHEST = 1 / 255, 6.0
+_ALPHA_THRESHOLD, _FARTHEST = 1 / 255, 6.0
 
 
 class ScreenPolynomials(NamedTuple):
@@ -96,7 +96,7 @@ def reach(weights: Floats, shape_modes: Floats, *, squared: bool = False) -> Flo
         here = shape_modes[:, part.start - 1 : part.stop - 1]
         bound += np.linalg.norm(here, axis=1)[:, None] * np.sqrt(squares_of_order(n, radii))
     bound = weights[:, None] * bound ** (2 if squared else 1) * np.exp(-(radii**2) / 2)
-    above = bound >= _FAINTEST
+    above = bound >= _ALPHA_THRESHOLD
     last = radii.size - 1 - above[:, ::-1].argmax(1)
     return np.where(above.any(1), radii[last], 0.0)
 

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.reference.splat_raster import FAINTEST, OPAQUE, Rules
+from rift_cl.reference.splat_raster import ALPHA_THRESHOLD, TRANSMITTANCE_THRESHOLD, Rules
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -160,8 +160,8 @@ def look_through(
         lever = peak * q if how.activation == "square" else peak
         alpha, bend = _alpha(lever * q, how)
         if not rules.smooth:
-            counts = (alpha >= FAINTEST) & ~finished
-            finished |= counts & (left * (1 - alpha) <= OPAQUE)
+            counts = (alpha >= ALPHA_THRESHOLD) & ~finished
+            finished |= counts & (left * (1 - alpha) <= TRANSMITTANCE_THRESHOLD)
             alpha, bend = (np.where(counts & ~finished, v, 0) for v in (alpha, bend))
         yield Seen(splat, modes, lever, bend, alpha, left, alpha * left, color)
         left = left * (1 - alpha)

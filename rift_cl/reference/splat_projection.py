@@ -19,7 +19,7 @@ from rift_cl.geometry import Camera
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 _EXTENT, _XRAY_EXTENT = 3.33, 4.0
-_FAINTEST = 1 / 255
+_ALPHA_THRESHOLD = 1 / 255
 _LEAST_COMPENSATION = 0.005
 _MARGIN = 0.15
 
@@ -100,7 +100,7 @@ def project_splats(
         extents = _reach(weights, mode)[:, None] * np.sqrt(wide[:, [0, 1], [0, 1]])
         radii = np.ceil(extents)
         culled, boxes = _cull(camera, tile, centers, radii, radius_clip)
-        culled[weights < _FAINTEST if mode == "light" else ~(weights > 0)] = 3
+        culled[weights < _ALPHA_THRESHOLD if mode == "light" else ~(weights > 0)] = 3
         culled[(points[:, 2] < near) | (points[:, 2] > far)] = 1
     boxes[culled > 0] = 0
     return ProjectedSplats(
@@ -136,7 +136,7 @@ def _reach(weights: Floats, mode: str) -> Floats:
     """Standard deviations at which a splat ends."""
     if mode == "xray":
         return np.full(len(weights), _XRAY_EXTENT)
-    at_threshold = np.sqrt(2 * np.log(np.maximum(weights / _FAINTEST, 1)))
+    at_threshold = np.sqrt(2 * np.log(np.maximum(weights / _ALPHA_THRESHOLD, 1)))
     return np.asarray(np.minimum(_EXTENT, at_threshold))
 
 

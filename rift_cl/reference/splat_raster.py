@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-FAINTEST, OPAQUE = 1 / 255, 1e-4
+ALPHA_THRESHOLD, TRANSMITTANCE_THRESHOLD = 1 / 255, 1e-4
 SMOOTH_EDGE, ADDED_EDGE = 4.5, 8.0
 
 
@@ -47,7 +47,7 @@ def raster(
     """The image (height, width, D) and what of the background is seen (height, width).
 
     Args:
-        screen: (N, 8), see ``kernels/include/splat.h``.
+        screen: (N, 8), see ``kernels/include/alpha.h``.
         features: (N, D).
         entries: (M, 2), of which the first is the splat.
         starts: (tiles + 1,), where each tile's entries begin.
@@ -87,8 +87,8 @@ def _tile(
         alpha = weight * _falloff(sigma, rules)
         if not rules.smooth:
             alpha = np.minimum(alpha, rules.cap)
-            counts = (alpha >= FAINTEST) & ~finished
-            finished |= counts & (left * (1 - alpha) <= OPAQUE)
+            counts = (alpha >= ALPHA_THRESHOLD) & ~finished
+            finished |= counts & (left * (1 - alpha) <= TRANSMITTANCE_THRESHOLD)
             alpha = np.where(counts & ~finished, alpha, 0)
         color += (alpha * left)[..., None] * features[splat]
         left = left * (1 - alpha)

@@ -2,7 +2,12 @@
 
 import torch
 
-from rift_cl.reference.splat_raster import ADDED_EDGE, FAINTEST, OPAQUE, SMOOTH_EDGE
+from rift_cl.reference.splat_raster import (
+    ADDED_EDGE,
+    ALPHA_THRESHOLD,
+    SMOOTH_EDGE,
+    TRANSMITTANCE_THRESHOLD,
+)
 
 
 def raster_torch(scene, screen, features, rules, background):
@@ -44,8 +49,8 @@ def _tile(screen, features, order, place, rules):
         alpha = value
         if not rules.smooth:
             alpha = torch.clamp(value, max=rules.cap)
-            counts = alive & (alpha >= FAINTEST)
-            alive = alive & ~(counts & (left * (1 - alpha) <= OPAQUE))
+            counts = alive & (alpha >= ALPHA_THRESHOLD)
+            alive = alive & ~(counts & (left * (1 - alpha) <= TRANSMITTANCE_THRESHOLD))
             alpha = torch.where(counts & alive, alpha, 0.0)
         color = color + (alpha * left)[..., None] * features[splat]
         left = left * (1 - alpha)

@@ -10,7 +10,7 @@ are autograd's. What makes it fast:
 - pixels come before splats, because torch multiplies cumulatively fast along the last axis alone;
 - thresholds are ``threshold`` and not ``where``, which is many times slower.
 
-Conventions are those of ``kernels/include/splat.h``: the same thresholds, extents and tiles, so
+Conventions are those of ``kernels/include/alpha.h``: the same thresholds, extents and tiles, so
 that equal work is compared. Numbers that are not finite are not looked for.
 """
 
@@ -30,7 +30,7 @@ from rift_cl.geometry import Camera
 
 TILE = 16
 _PIXELS = TILE * TILE
-_FAINTEST, _OPAQUE, _CAP = 1 / 255, 1e-4, 0.99
+_ALPHA_THRESHOLD, _TRANSMITTANCE_THRESHOLD, _CAP = 1 / 255, 1e-4, 0.99
 _EPS2D, _EXTENT, _MARGIN, _NEAR = 0.3, 3.33, 0.15, 0.01
 # exp of it is nothing beside 1 in float32; the exponential of less takes ten times as long.
 _NOTHING = -80.0
@@ -104,7 +104,7 @@ def draw(
     away = parameters["means"] - torch.tensor(camera.center, dtype=torch.float32)
     basis = harmonics(normalize(away, dim=1))
     colors = ((basis[:, :, None] * parameters["sh"]).sum(1) + 0.5).clamp(min=0)
-    weights = seen.opacities.clamp(min=_FAINTEST).log()[:, None]
+    weights = seen.opacities.clamp(min=_ALPHA_THRESHOLD).log()[:, None]
     table = torch.cat([seen.centers, seen.conics, weights, colors], 1)
     # A last row that is nowhere fills up the tiles that have fewer splats than others.
     nobody = torch.tensor([[0, 0, 0, 0, 0, 2 * _NOTHING, 0, 0, 0]])
@@ -148,11 +148,11 @@ def _tile_lists(seen: _Seen, camera: Camera) -> _Lists:
     size = torch.tensor([camera.width, camera.height])
     tiles = -(-size // TILE)
     across, down = tiles.tolist()
-    reach = (2 * (seen.opacities / _FAINTEST).clamp(min=1).log()).sqrt().clamp(max=_EXTENT)
+    reach = (2 * (seen.opacities / _ALPHA_THRESHOLD).clamp(min=1).log()).sqrt().clamp(max=_EXTENT)
     radii = (reach[:, None] * seen.variances.sqrt()).ceil()
     first, last = seen.centers - radii, seen.centers + radii
     drawn = ((last > 0) & (first < size)).all(1)
-    drawn &= (seen.depths > _NEAR) & (seen.opacities >= _FAINTEST)
+    drawn &= (seen.depths > _NEAR) & (seen.opacities >= _ALPHA_THRESHOLD)
     corner = (first / TILE).floor().clamp(min=0).minimum(tiles).long()
     sides = (last / TILE).ceil().clamp(min=0).minimum(tiles).long() - corner
     order = seen.depths.argsort(stable=True)
@@ -201,7 +201,7 @@ def _tiles(
         rows = table[torch.where(number < counts, lists.splats[entry], len(table) - 1)]
         color, left = _some_splats(rows, middle, left, background)
         image = image + color
-        if float(left.detach().max()) <= _OPAQUE:
+        if float(left.detach().max()) <= _TRANSMITTANCE_THRESHOLD:
             break
     return image
 
@@ -211,16 +211,16 @@ def _some_splats(
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """What splats add to the background, and what they leave of it, (tiles, pixels, 1)."""
     exponents = _QUADRATIC @ _coefficients(rows, middle)
-    alpha = threshold(exponents, math.log(_FAINTEST), _NOTHING).exp().clamp(max=_CAP)
+    alpha = threshold(exponents, math.log(_ALPHA_THRESHOLD), _NOTHING).exp().clamp(max=_CAP)
     passed = torch.cat([left, 1 - alpha], -1).cumprod(-1)
     shares, left = alpha * passed[..., :-1], passed[..., -1:]
-    if float(left.detach().min()) <= _OPAQUE:
+    if float(left.detach().min()) <= _TRANSMITTANCE_THRESHOLD:
         # No share for the splat that finishes a pixel, nor for any behind it.
-        shares = shares * threshold(passed[..., 1:].detach(), _OPAQUE, 0).sign()
+        shares = shares * threshold(passed[..., 1:].detach(), _TRANSMITTANCE_THRESHOLD, 0).sign()
     # In this order in memory the product takes a quarter of the time.
     colors = (rows[..., 6:] - background).transpose(1, 2).contiguous()
     # A zero would send the gradient of cumprod the slow way; half is as finished.
-    return shares @ colors.transpose(1, 2), left.clamp(min=_OPAQUE / 2)
+    return shares @ colors.transpose(1, 2), left.clamp(min=_TRANSMITTANCE_THRESHOLD / 2)
 
 
 def _coefficients(rows: torch.Tensor, middle: torch.Tensor) -> torch.Tensor:

@@ -12,6 +12,8 @@
  * screen[splat] = (mean_x, mean_y, a, b, c, weight, extent_x, extent_y): a splat counts nowhere
  * farther from its mean than its extents. */
 
+#include "include/alpha_threshold.h"
+
 #ifndef TILE
 #define TILE 16
 #endif
@@ -25,8 +27,6 @@
 #define ADDITIVE 0
 #endif
 
-#define FAINTEST (1.0f / 255.0f)
-#define OPAQUE 1e-4f
 #define SMOOTH_EDGE 4.5f
 /* What sigma is multiplied with to be an exponent of two. */
 #define TO_POWER -1.44269504f
