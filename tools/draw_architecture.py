@@ -40,6 +40,7 @@ _SUBJECTS = {
     "cl": "devices, kernels, memory",
     "geometry": "grids, scans, cameras",
     "basis": "Gaussians, Hermite modes, lobes",
+    "registry": "filters ... by name",
     "errors": "named errors",
     "progress": "reports of long work",
     "sample": "embedded captures",
@@ -57,7 +58,7 @@ _STYLE = """
     .arrow { stroke: #d9b44a } .head { fill: #d9b44a }
   }
 """
-_WIDTH, _ROW, _BOX_HEIGHT, _GAP = 1180.0, 122.0, 48.0, 26.0
+_WIDTH, _ROW, _BOX_HEIGHT, _GAP, _ASIDE = 1180.0, 122.0, 48.0, 26.0, 230.0
 
 
 @dataclass(frozen=True)
@@ -127,11 +128,14 @@ def files(root: Path = _ROOT) -> Counter[str]:
 
 def picture(root: Path = _ROOT, least: int = 3) -> str:
     """The SVG text: boxes in layers, and an arrow for every pair with at least so many files."""
-    rows, sizes = layers(root), files(root)
-    boxes = _boxes(rows)
-    known = {pair: count for pair, count in imports(root).items() if {*pair} <= boxes.keys()}
+    rows, sizes, counted = layers(root), files(root), imports(root)
+    if len(rows) > 1 and all(sizes[name] == 1 for name in rows[-2]):
+        rows = [*rows[:-2], [*rows[-2], *rows[-1]]]
+    names = {name for row in rows for name in row}
+    known = {pair: count for pair, count in counted.items() if {*pair} <= names}
     lowest = {(upper, lower) for upper, lower in known if lower in rows[-1]}
     drawn = {pair: known[pair] for pair in known.keys() - lowest if known[pair] >= least}
+    boxes = _boxes(rows, Counter(lower for _, lower in drawn))
     height = len(rows) * _ROW - (_ROW - _BOX_HEIGHT) + 20
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH:.0f} {height:.0f}" '
@@ -155,22 +159,26 @@ def picture(root: Path = _ROOT, least: int = 3) -> str:
     return "\n".join([*lines, "</svg>"]) + "\n"
 
 
-def _boxes(rows: list[list[str]]) -> dict[str, Box]:
+def _boxes(rows: list[list[str]], arrows: Counter[str]) -> dict[str, Box]:
+    """Places in the picture; the lone box of a layer stands aside, so that arrows pass it."""
     found = {}
     for number, row in enumerate(rows):
-        widths = [_width(name) for name in row]
+        widths = [_width(name, arrows[name]) for name in row]
         spread = (_WIDTH - sum(widths)) / (len(row) + 1)
         gap = max(_GAP, spread)
         left = (_WIDTH - sum(widths) - gap * (len(row) - 1)) / 2
+        if len(row) == 1:
+            left += _ASIDE if number % 2 else -_ASIDE
         for name, width in zip(row, widths, strict=True):
             found[name] = Box(left, 10 + number * _ROW, width)
             left += width + gap
     return found
 
 
-def _width(name: str) -> float:
-    """Of the box that a package's name and subject fit into."""
-    return max(7.2 * len(_SUBJECTS.get(name, "")), 9.0 * len(name) + 70) + 26
+def _width(name: str, arrows: int) -> float:
+    """Of the box that a package's name, its subject and the numbers of its arrows fit into."""
+    text = max(7.2 * len(_SUBJECTS.get(name, "")), 9.0 * len(name) + 70) + 26
+    return max(text, 24.0 * (arrows + 1))
 
 
 def _arrows(boxes: dict[str, Box], drawn: dict[tuple[str, str], int]) -> Iterator[str]:

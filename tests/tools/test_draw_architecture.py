@@ -48,6 +48,7 @@ def test_files_that_import_a_package_are_counted_once(drawing, tmp_path):
         "high/two.py": "def f():\n    import rift_cl.low\n",
         "high/three.py": "from rift_cl import low\nfrom rift_cl.high import one\n",
         "low/deep.py": "import numpy\n",
+        "low/shallow.py": "import numpy\n",
         "lowest/one.py": "from rift_cl.lowest import one\n",
     }.items():
         path = tmp_path / "rift_cl" / name
