@@ -174,9 +174,9 @@ def _center(settings: Any, output: Output) -> None:
 
     job = CenterJob(settings)
     if not output.quiet:
-        for note in job.scan.notes:
-            print_line(note)
-    watch(job.run(), output)
+        _print_notes(job.notes)
+    if not ran(job, settings, output):
+        return
     print(f"{job.metrics['center']:.2f}")
     print(f"contact sheet and report.html are in {settings.out}", file=sys.stderr)
 
@@ -223,7 +223,7 @@ def _render(settings: Any, output: Output) -> None:
     from rift_cl.commands.render.job import Render
 
     job = Render(settings)
-    _say_assumed(job.notes)
+    _print_notes(job.notes)
     if not ran(job, settings, output):
         return
     shown = ", ".join(filter(None, ["frames", job.film]))
@@ -235,7 +235,7 @@ def _view(settings: Any, output: Output) -> None:
 
     # Ctrl-C is the usual way to end it, and nothing is lost by it.
     with ViewJob(settings) as job, suppress(KeyboardInterrupt):
-        _say_assumed(job.notes)
+        _print_notes(job.notes)
         print(f"{job.url} shows {settings.scene}; Ctrl-C ends it", flush=True)
         watch(job.run(), Output(quiet=True))
 
@@ -255,7 +255,7 @@ def _analyze(settings: Any, output: Output) -> None:
     from rift_cl.commands.analyze.job import Analysis
 
     job = Analysis(settings)
-    _say_assumed(job.notes)
+    _print_notes(job.notes)
     if not ran(job, settings, output):
         return
     for columns, rows, caption in job.tables:
@@ -268,7 +268,7 @@ def _plan(settings: Any, output: Output) -> None:
     from rift_cl.commands.plan.report import caption_of, worth_table
 
     job = Planning(settings)
-    _say_assumed(job.notes)
+    _print_notes(job.notes)
     if not ran(job, settings, output):
         return
     print_table(*worth_table(job.metrics), caption=caption_of(job.metrics))
@@ -276,7 +276,7 @@ def _plan(settings: Any, output: Output) -> None:
     print(f"transforms.json, views.csv and report.html are in {settings.out}")
 
 
-def _say_assumed(notes: Sequence[str]) -> None:
+def _print_notes(notes: Sequence[str]) -> None:
     for note in notes:
         print_line(f"rift: {note}")
 

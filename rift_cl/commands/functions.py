@@ -136,7 +136,7 @@ def evaluate(
         given = {"scene": scene, "captures": tuple(captures), "out": folder, **settings}
         job = Evaluation(_settings(given, "eval", EvalSettings))
         _run(job.run(), progress)
-        return keep(Scored(folder, job.settings, dict(job.metrics), (), scores=job.scores))
+        return keep(Scored(folder, job.decided, dict(job.metrics), (), scores=job.scores))
 
 
 def render(
@@ -162,7 +162,7 @@ def render(
         given = {"scene": scene, "out": folder, **settings}
         job = Render(_settings(given, "render", RenderSettings))
         _run(job.run(), progress)
-        record = (folder, job.settings, dict(job.metrics), tuple(job.notes))
+        record = (folder, job.decided, dict(job.metrics), tuple(job.notes))
         return keep(
             RenderedScene(
                 *record,
@@ -196,7 +196,7 @@ def analyze(
         given = {"source": source, "out": folder, **settings}
         job = Analysis(_settings(given, "analyze", AnalyzeSettings))
         _run(job.run(), progress)
-        record = (folder, job.settings, dict(job.metrics), tuple(job.notes))
+        record = (folder, job.decided, dict(job.metrics), tuple(job.notes))
         return keep(AnalyzedViews(*record, tables=tuple(job.tables), added=tuple(job.added)))
 
 
@@ -225,7 +225,7 @@ def plan_views(
         job = Planning(_settings({"views": views, "out": folder, **settings}, "plan", PlanSettings))
         _run(job.run(), progress)
         assert job.found is not None
-        record = (folder, job.settings, dict(job.metrics), tuple(job.notes))
+        record = (folder, job.given.decided, dict(job.metrics), tuple(job.notes))
         return keep(PlannedViews(*record, plan=job.found))
 
 

@@ -7,7 +7,7 @@ and what the command line shows. It inherits its fields from a few classes that 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_type_hints
@@ -60,6 +60,21 @@ class RunOptions(DeviceOption):
     config: Auto[Path] = None
     """config.json of an earlier run of this command. Its settings, with every value that was
     decided in that run, become the defaults of this one."""
+
+
+S = TypeVar("S")
+
+
+def absolute_paths(settings: S) -> S:
+    """The same settings with every path from the root, for a file that is read elsewhere."""
+    changed: dict[str, Any] = {}
+    for field in fields(settings):  # type: ignore[arg-type]
+        value = getattr(settings, field.name)
+        if isinstance(value, Path):
+            changed[field.name] = value.absolute()
+        elif isinstance(value, tuple) and any(isinstance(entry, Path) for entry in value):
+            changed[field.name] = tuple(entry.absolute() for entry in value)
+    return replace(settings, **changed)  # type: ignore[type-var]
 
 
 def option_groups(settings: type) -> list[type]:

@@ -15,6 +15,7 @@ from rift_cl.commands.inputs.scene_bounds import SceneBounds, bounds_of_cameras
 from rift_cl.commands.inputs.scene_depth import space_of
 from rift_cl.commands.inputs.surfaces import trusted
 from rift_cl.commands.inputs.view_set import Floats, ViewSet, points_of
+from rift_cl.commands.options import absolute_paths
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera, Parallel
 from rift_cl.geometry.aperture import Aperture
@@ -35,7 +36,14 @@ _NANO = 1e6
 
 
 def open_sampled(settings: AnalyzeSettings) -> ViewSet:
-    """The views of a capture or of a scan, and their target.
+    """The views that the settings name; see ``open_views``."""
+    return open_views(settings)[0]
+
+
+def open_views(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
+    """The views of a capture or of a scan with their target, and the settings as decided.
+
+    The settings have a value for everything that was left open and is one number for all views.
 
     Raises:
         RiftError: the file cannot be read, or an option does not belong to it.
@@ -44,11 +52,11 @@ def open_sampled(settings: AnalyzeSettings) -> ViewSet:
     return _capture(settings) if holds_capture(path) else _scan(settings)
 
 
-def _capture(settings: AnalyzeSettings) -> ViewSet:
+def _capture(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
     for name in ("dataset", "theta", "image_key", "axes", "angle_unit"):
         if getattr(settings, name) is not None:
             option = name.replace("_", "-")
-            raise InputError(f"--{option} is about a scan, {settings.source} is a capture")
+            raise InputError(f"--{option} applies to scans, {settings.source} is a capture")
     capture = open_capture(settings.source, photographs=False)
     cameras = [view.camera for view in capture.views]
     check_places(cameras, settings.source)
@@ -67,7 +75,16 @@ def _capture(settings: AnalyzeSettings) -> ViewSet:
     )
     if sampled.opaque:
         sampled = _with_space(sampled, settings, capture)
-    return sampled if settings.unit is None else in_millimetres(sampled, settings.unit)
+    x, y, z = center.tolist()
+    decided = replace(
+        absolute_paths(settings),
+        mode="surface" if sampled.opaque else "volume",
+        center=(x, y, z),
+        diameter=diameter,
+    )
+    if settings.unit is None:
+        return sampled, replace(decided, band=sampled.target.highest)
+    return in_millimetres(sampled, settings.unit), decided
 
 
 def _with_space(sampled: ViewSet, settings: AnalyzeSettings, capture: Capture) -> ViewSet:
@@ -180,13 +197,12 @@ def _target(
     return Target(center=center, diameter=diameter, points=points, band=settings.band)
 
 
-def _scan(settings: AnalyzeSettings) -> ViewSet:
+def _scan(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
     if settings.mode == "surface":
-        raise InputError(f"--mode surface is about photographs, {settings.source} is a scan")
+        raise InputError(f"--mode surface applies to captures, {settings.source} is a scan")
     for name in ("center", "aperture", "focus", "unit"):
         if getattr(settings, name) is not None:
-            raise InputError(f"--{name} is about the cameras of a capture, {settings.source} is a "
-                             "scan")  # fmt: skip
+            raise InputError(f"--{name} applies to captures, {settings.source} is a scan")
     file = _opened(settings, values=False)
     up = np.array([0.0, 0, 1])
     pitch, unit = (file.pitch, file.unit or "unit") if file.pitch else (1.0, "bin")
@@ -200,11 +216,16 @@ def _scan(settings: AnalyzeSettings) -> ViewSet:
             f"The target's diameter, {diameter:.4g} {unit}, is taken to be what the detector shows "
             "(--diameter)."
         )
-    # What a scan can tell ends at half a cycle a bin.
-    wanted = replace(settings, band=settings.band or 0.5 / edge)
-    return ViewSet(
+    # A scan resolves half a cycle per bin at most.
+    decided = replace(
+        absolute_paths(settings),
+        mode="volume",
+        diameter=diameter,
+        band=settings.band or 0.5 / edge,
+    )
+    sampled = ViewSet(
         name=Path(file.path).name,
-        target=_target(wanted, np.zeros(3), diameter, up, flat=True),
+        target=_target(decided, np.zeros(3), diameter, up, flat=True),
         up=up,
         unit=unit,
         cameras=cameras,
@@ -212,6 +233,7 @@ def _scan(settings: AnalyzeSettings) -> ViewSet:
         facts={"projections": file.shape[0], "rows": file.shape[1], "bins": file.shape[2]},
         notes=tuple(notes),
     )
+    return sampled, decided
 
 
 def _opened(settings: AnalyzeSettings, *, values: bool) -> ScanFile:

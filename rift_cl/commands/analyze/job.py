@@ -10,7 +10,7 @@ import numpy as np
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.commands.analyze.facts import Findings, Table, missing, resolution, unknown_share
-from rift_cl.commands.analyze.input import open_sampled
+from rift_cl.commands.analyze.input import open_views
 from rift_cl.commands.analyze.report import analysis_page
 from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.analyze.suggestions import angles_to_add, cameras_to_add, usual_distance
@@ -44,7 +44,8 @@ class Analysis:
     def __init__(self, settings: AnalyzeSettings) -> None:
         settings.check()
         self.settings = settings
-        self.sampled, self.points = _seen(open_sampled(settings))
+        views, self.decided = open_views(settings)
+        self.sampled, self.points = _seen(views)
         self.device = settings.open_device()
         self.folder = RunFolder(settings.out, "analyze", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
@@ -95,7 +96,7 @@ class Analysis:
         page = analysis_page(sampled, self.points, findings, self.metrics, self.added, self.device)
         yield Report(3, _STEPS, "steps")
         self._write()
-        self.folder.finish(self.settings, self.metrics, page, self.device)
+        self.folder.finish(self.decided, self.metrics, page, self.device, asked=self.settings)
         yield Report(_STEPS, _STEPS, "steps")
 
     def _found(self) -> list[Findings]:

@@ -53,14 +53,8 @@ def film(
     """
     arc = capture_arc(bounds)
     if arc is None or arc.closed:
-        return orbit(
-            bounds,
-            frames=frames,
-            elevation=_usual(elevation, _usual(bounds.elevation, _ELEVATION)),
-            distance=distance or orbit_distance(bounds, size, fov),
-            size=size,
-            fov=fov,
-        )
+        rise, away = orbit_place(bounds, size, fov, elevation, distance)
+        return orbit(bounds, frames=frames, elevation=rise, distance=away, size=size, fov=fov)
     route = route_through(bounds.cameras, bounds.center, about=arc.inward)
     # There and back, slower at the ends, and not up to them: from there few others looked.
     shares = 0.5 - (0.5 - _ENDS) * np.cos(2 * np.pi * np.arange(frames) / frames)
@@ -75,6 +69,18 @@ def film(
         pinhole(size, fov, _upright(at, target, bounds))
         for at, target in zip(places, targets, strict=True)
     ]
+
+
+def orbit_place(
+    bounds: SceneBounds,
+    size: tuple[int, int],
+    fov: float,
+    elevation: float | None,
+    distance: float | None,
+) -> tuple[float, float]:
+    """Elevation in degrees and distance of an orbit; those of the cameras if not given."""
+    rise = _usual(elevation, _usual(bounds.elevation, _ELEVATION))
+    return rise, distance or orbit_distance(bounds, size, fov)
 
 
 def capture_arc(bounds: SceneBounds) -> Arc | None:

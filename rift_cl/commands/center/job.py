@@ -1,8 +1,9 @@
-"""``rift center``: where the rotation axis is, with the pictures to believe it by."""
+"""``rift center``: estimate the rotation axis, with a contact sheet to check it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from rift_cl.commands.center.axis_search import find_axis
 from rift_cl.commands.center.settings import CenterSettings
 from rift_cl.commands.inputs.scan_rows import read_attenuation
+from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
@@ -48,6 +50,22 @@ class CenterJob:
             raise InputError(f"--row is {self.row}, {self.scan.path} has {self.scan.shape[1]} rows")
         self.metrics: dict[str, Any] = {}
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was assumed of the scan, a sentence each."""
+        return tuple(self.scan.notes)
+
+    def plan(self) -> dict[str, str]:
+        """What would be done, by name."""
+        views, rows, bins = self.scan.shape
+        span = self.settings.span
+        return {
+            "scan": f"{self.scan.path}, {views} views of {rows} x {bins} pixels",
+            "search": "default bins" if span is None else f"bins {span[0]:g} to {span[1]:g}",
+            "pictures": f"{len(_SLIDER)} slices of row {self.row}",
+            "device": self.device.name,
+        }
+
     def run(self) -> Iterator[Report]:
         """Do it: the search, then a slice for each centre of the slider."""
         total = 1 + len(_SLIDER)
@@ -63,7 +81,8 @@ class CenterJob:
             slices[offset] = self._slice(sinogram, here + offset)
         self.folder.make()
         page = self._page(found, here, slices)
-        self.folder.finish(self.settings, self.metrics, page, self.device)
+        decided = replace(absolute_paths(self.settings), kind=self.scan.kind, row=self.row)
+        self.folder.finish(decided, self.metrics, page, self.device, asked=self.settings)
         yield Report(total, total, "steps", {"center": found.center})
 
     def _slice(self, sinogram: NDArray[np.float32], center: float) -> NDArray[np.float32]:

@@ -1,8 +1,9 @@
-"""``rift eval``: how good a scene is, by pictures that somebody took of it."""
+"""``rift eval``: score a scene on held-out photographs, or on other captures of it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from rift_cl.commands.evaluate.settings import EvalSettings
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.scores import ViewScore, score_record, score_views
 from rift_cl.commands.fit_photos.view_split import open_seen, split_views
+from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import InputError
 from rift_cl.io.captures.capture import View, camera_at, capture_name, holds_bare_photographs
@@ -49,6 +51,12 @@ class Evaluation:
         self.folder = RunFolder(settings.out, "eval", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
         self.scores: dict[str, list[ViewScore]] = {}
+
+    @property
+    def decided(self) -> EvalSettings:
+        """The settings with the values that were decided."""
+        eps2d = self.scene.drawing.eps2d
+        return replace(absolute_paths(self.settings), eps2d=eps2d, downscale=self.downscale)
 
     def _scored(self, path: Path) -> tuple[View, ...]:
         """The views of a capture that are scored.
@@ -152,7 +160,7 @@ class Evaluation:
             **score_record(self.scores),
         }
         page = eval_page(self.scene.name, self.scores, self.metrics)
-        self.folder.finish(self.settings, self.metrics, page, self.device)
+        self.folder.finish(self.decided, self.metrics, page, self.device, asked=self.settings)
 
     def _pictures(
         self, views: tuple[View, ...], like: CapturePictures | None = None

@@ -1,17 +1,20 @@
-"""What is planned for: the target, the cameras to choose among, and what they have to keep to."""
+"""The input of a plan: the target, the cameras to choose from, and their constraints."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rift_cl.commands.analyze.input import open_sampled
 from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.inputs.surfaces import SURFACE, hidden_places, surface_of
 from rift_cl.commands.inputs.view_set import Floats, ViewSet
+from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.plan.keep_out_words import keep_out_of
 from rift_cl.commands.plan.settings import PlanSettings
 from rift_cl.errors import InputError
@@ -29,6 +32,7 @@ from rift_cl.sampling.targets.pilot import Pilot
 from rift_cl.sampling.targets.prior import PowerLaw, Prior, directions_for
 from rift_cl.sampling.targets.target import Target
 
+Samples = NDArray[np.float32]
 DIAMETER = 100.0
 # What most people have: 24 megapixels of 3.9 micrometres, 50 mm, closed far enough for depth.
 USUAL = CameraChoice(CameraType("24 MP, 50 mm, f/11", 50.0, 11.0, 3.9e-3, (4000, 6000)))
@@ -44,6 +48,7 @@ class PlanInput:
         choices: cameras that may be used.
         have: views that are taken already, or None.
         notes: what had to be assumed, a sentence each.
+        decided: the settings with the values that were decided.
     """
 
     target: Target
@@ -51,6 +56,7 @@ class PlanInput:
     choices: tuple[CameraChoice, ...]
     have: ViewSet | None
     notes: tuple[str, ...]
+    decided: PlanSettings
 
     @property
     def types(self) -> tuple[CameraType, ...]:
@@ -66,12 +72,34 @@ def plan_input(settings: PlanSettings) -> PlanInput:
     """
     notes: list[str] = []
     have = None if settings.have is None else _have(settings, settings.have)
-    target = _target(settings, have, notes)
+    volume = None if settings.pilot is None else read_volume(settings.pilot)
+    target = _target(settings, have, volume, notes)
     choices = _choices(settings, notes)
     constraints = _constraints(settings, choices, have)
     if have is not None and have.space is not None:
         constraints, target = _in_sight(have, target, constraints, choices)
-    return PlanInput(target, constraints, choices, have, tuple(notes))
+    decided = _decided(settings, target, volume)
+    return PlanInput(target, constraints, choices, have, tuple(notes), decided)
+
+
+def _decided(settings: PlanSettings, target: Target, volume: Samples | None) -> PlanSettings:
+    """The settings with a value for everything that was left open.
+
+    Where the target is that of ``--have``, centre and diameter are left to it: they are found in
+    its units.
+    """
+    decided: dict[str, Any] = {"mode": target.mode, "band": target.highest}
+    if settings.have is None:
+        x, y, z = target.center.tolist()
+        decided |= {"center": (x, y, z), "diameter": target.diameter}
+    if volume is not None:
+        decided["pilot_spacing"] = _spacing(settings, target.diameter, volume)
+    return replace(absolute_paths(settings), **decided)
+
+
+def _spacing(settings: PlanSettings, diameter: float, volume: Samples) -> float:
+    """Millimetres between the samples of the pilot."""
+    return settings.pilot_spacing or diameter / max(volume.shape)
 
 
 def _in_sight(
@@ -90,7 +118,7 @@ def _in_sight(
 
 def _have(settings: PlanSettings, path: Path) -> ViewSet:
     if not holds_capture(path):
-        raise InputError(f"--have {path} is no capture, wanted photographs and their cameras")
+        raise InputError(f"--have {path} is no capture, wanted photographs with camera poses")
     asked = AnalyzeSettings(
         source=path, center=_in_units(settings), diameter=_over(settings.diameter, settings.unit),
         unit=settings.unit, mode="surface" if settings.opaque else "volume", device=settings.device,
@@ -110,7 +138,9 @@ def _over(length: float | None, unit: float) -> float | None:
     return None if length is None else length / unit
 
 
-def _target(settings: PlanSettings, have: ViewSet | None, notes: list[str]) -> Target:
+def _target(
+    settings: PlanSettings, have: ViewSet | None, volume: Samples | None, notes: list[str]
+) -> Target:
     if have is not None:
         center, diameter = have.target.center, have.target.diameter
         notes.extend(have.notes)
@@ -118,8 +148,8 @@ def _target(settings: PlanSettings, have: ViewSet | None, notes: list[str]) -> T
         center = np.array(settings.center or (0.0, 0.0, 0.0))
         diameter = settings.diameter or DIAMETER
         if settings.diameter is None:
-            notes.append(f"The target is taken to be {DIAMETER:g} mm across (--diameter).")
-    prior = _prior(settings, diameter, notes)
+            notes.append(f"The target's diameter is taken to be {DIAMETER:g} mm (--diameter).")
+    prior = _prior(settings, diameter, volume, notes)
     points, normals = center[None], None
     if settings.opaque:
         ways = directions_for(3, SURFACE // 2)
@@ -128,17 +158,17 @@ def _target(settings: PlanSettings, have: ViewSet | None, notes: list[str]) -> T
         if have is None:
             notes.append(
                 "The target is taken to be opaque: a sphere stands for its surface, and nothing "
-                "else is in the way (--mode volume is for X-rays)."
+                "else occludes it (--mode volume is for X-rays)."
             )
         elif have.space is None:
             notes.append(
-                "What stands in the way is not known: name places to keep out of (--keep-out), or "
-                "give the folder of a fit."
+                "Occlusion is not known: name regions to keep out of (--keep-out), or give the "
+                "folder of a fit."
             )
     else:
         notes.append(
-            "The target is taken to be seen through, so that opposite views tell the same and one "
-            "side may go unseen; an opaque one wants --mode surface."
+            "The target is taken to be transparent, so that opposite views are equivalent and one "
+            "side may stay without views; for an opaque one use --mode surface."
         )
     return Target(
         center=center,
@@ -152,18 +182,18 @@ def _target(settings: PlanSettings, have: ViewSet | None, notes: list[str]) -> T
     )
 
 
-def _prior(settings: PlanSettings, diameter: float, notes: list[str]) -> Prior:
-    if settings.pilot is None:
+def _prior(
+    settings: PlanSettings, diameter: float, volume: Samples | None, notes: list[str]
+) -> Prior:
+    if volume is None:
         notes.append(
-            "The target's power is taken to fall as 1/k^2, alike in all directions (--pilot)."
+            "The target's power spectrum is taken to be isotropic and to fall as 1/k^2 (--pilot)."
         )
         return PowerLaw(2.0)
-    volume = read_volume(settings.pilot)
-    spacing = settings.pilot_spacing
-    if spacing is None:
-        spacing = diameter / max(volume.shape)
+    spacing = _spacing(settings, diameter, volume)
+    if settings.pilot_spacing is None:
         notes.append(
-            f"Samples of the pilot are taken to lie {spacing:.4g} mm apart, so that the target "
+            f"The sample spacing of the pilot is taken to be {spacing:.4g} mm, so that the target "
             "fills it (--pilot-spacing)."
         )
     pilot = Pilot(volume, spacing)
@@ -177,7 +207,7 @@ def _choices(settings: PlanSettings, notes: list[str]) -> tuple[CameraChoice, ..
     if not choices:
         choices = [USUAL]
         notes.append(
-            f"The camera is taken to be one with {USUAL.kind.name}, pixels of "
+            f"The camera is taken to be {USUAL.kind.name}, with pixels of "
             f"{USUAL.kind.pixel * 1e3:g} micrometres (--camera)."
         )
     if settings.lens is not None:

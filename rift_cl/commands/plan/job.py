@@ -107,7 +107,7 @@ class Planning:
         page = plan_page(given, found, diminishing_returns, sampled, self.metrics, self.device)
         yield Report(3, _STEPS, "steps", {"merit": found.elsewhere})
         self._write(found)
-        self.folder.finish(settings, self.metrics, page, self.device)
+        self.folder.finish(given.decided, self.metrics, page, self.device, asked=settings)
         yield Report(_STEPS, _STEPS, "steps", {"merit": found.elsewhere})
 
     def _sampled(self, found: Plan) -> ViewSet:

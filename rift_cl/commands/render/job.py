@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,16 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.budget import format_bytes
-from rift_cl.commands.cameras.film import capture_arc, farthest_from_cameras, film, frame_of
+from rift_cl.commands.cameras.film import (
+    capture_arc,
+    farthest_from_cameras,
+    film,
+    frame_of,
+    orbit_place,
+)
 from rift_cl.commands.cameras.subject import subject_of
 from rift_cl.commands.inputs.opened_scene import in_display_light
 from rift_cl.commands.inputs.scene_depth import depth_maps
+from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.pictures.depth_picture import LEAST_ALPHA, depth_picture, depth_window
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.commands.render.animation import chosen_film, shrunk
 from rift_cl.commands.render.camera_path import opened, resized, smooth_path
 from rift_cl.commands.render.report import Sheet, render_page, write_bytes
-from rift_cl.commands.render.settings import MOST_FRAMES, RenderSettings
+from rift_cl.commands.render.settings import LIMITS, MOST_FRAMES, RenderSettings
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
@@ -82,6 +90,35 @@ class Render:
         return () if self.settings.path is not None else self.settings.notes(self.scene)
 
     @property
+    def decided(self) -> RenderSettings:
+        """The settings with a value for what was left open and is one number for all frames.
+
+        Elevation and distance stay open along a path of photographs, where they change.
+        """
+        settings = self.settings
+        decided: dict[str, Any] = {"eps2d": self.scene.drawing.eps2d, "film": self._kind or "auto"}
+        if self.scene.light == "display":
+            decided["background"] = tuple(float(value) for value in self.scene.background)
+        if settings.path is None:
+            size, fov = self._frame
+            decided |= {
+                "frames": len(self.cameras),
+                "size": size[::-1],
+                "fov": fov,
+                "aperture": settings.aperture or 0.0,
+            }
+            arc = capture_arc(self.bounds)
+            if arc is None or arc.closed:
+                elevation, distance = orbit_place(
+                    self.bounds, *self._frame, settings.elevation, settings.distance
+                )
+                low, high = LIMITS["elevation"]
+                decided |= {"distance": distance}
+                # A steeper orbit of a capture's own cameras cannot be asked for by number.
+                decided |= {"elevation": elevation} if low <= elevation <= high else {}
+        return replace(absolute_paths(settings), **decided)
+
+    @property
     def film(self) -> str | None:
         """The name of the film's file; None where nothing moves."""
         if self._kind is None or self._kind == "apng":
@@ -97,8 +134,7 @@ class Render:
 
     def _film(self) -> list[Camera]:
         """Cameras round the scene or along its capture; what is not set comes from there."""
-        settings, asked = self.settings, self.settings.size
-        size, fov = frame_of(self.bounds, asked and (asked[1], asked[0]), settings.fov)
+        settings, (size, fov) = self.settings, self._frame
         return film(
             self.bounds,
             frames=settings.frames or _FRAMES,
@@ -108,6 +144,12 @@ class Render:
             distance=settings.distance,
             subject=self.subject,
         )
+
+    @cached_property
+    def _frame(self) -> tuple[tuple[int, int], float]:
+        """(height, width) of a film's frames, and their vertical field of view in degrees."""
+        asked = self.settings.size
+        return frame_of(self.bounds, asked and (asked[1], asked[0]), self.settings.fov)
 
     @cached_property
     def subject(self) -> NDArray[np.float64] | None:
@@ -231,4 +273,4 @@ class Render:
             write_bytes(folder / str(self.film), sheet.moving(rate))
         self.moving = None if self._kind is None else sheet.embedded(rate)
         page = render_page(self.scene.name, sheet, self.moving, self.metrics)
-        self.folder.finish(self.settings, self.metrics, page, self.device)
+        self.folder.finish(self.decided, self.metrics, page, self.device, asked=self.settings)

@@ -12,9 +12,16 @@ from rift_cl.commands.options import Auto, RunOptions
 from rift_cl.errors import InputError
 
 FilmChoice = Literal["auto", "webm", "mp4", "mp4-h264", "apng"]
-_STEEPEST, _WIDEST = 89.0, 170.0
 # Pixels along an edge, and frames; more is a slip of the hand.
 _LONGEST, MOST_FRAMES = 16384, 100_000
+# Least and greatest values, elevation and field of view in degrees.
+LIMITS = {
+    "between": (0.0, MOST_FRAMES),
+    "frames": (1.0, MOST_FRAMES),
+    "elevation": (-89.0, 89.0),
+    "fov": (1.0, 170.0),
+    "rate": (0.1, 100.0),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,13 +92,7 @@ class RenderSettings(RunOptions, FrameOutput, CameraOptions, OrbitInput):
         Raises:
             InputError: one is out of it, or two options contradict each other.
         """
-        for name, low, high in (
-            ("between", 0, MOST_FRAMES),
-            ("frames", 1, MOST_FRAMES),
-            ("elevation", -_STEEPEST, _STEEPEST),
-            ("fov", 1, _WIDEST),
-            ("rate", 0.1, 100),
-        ):
+        for name, (low, high) in LIMITS.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
                 raise InputError(f"--{name} is {value}, wanted {low:g} to {high:g}")

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
+import numpy as np
 import tyro
 from tyro.conf import Positional
 
+from rift_cl import __version__
 from rift_cl.errors import InputError
 
 S = TypeVar("S")
@@ -57,7 +60,9 @@ def saved_settings(path: Path, job: str, settings: type[S]) -> S:
     if name != job:
         raise InputError(f"--config {path}: is of 'rift {name}', not of 'rift {job}'")
     repeated = {name: value for name, value in values.items() if name not in _NOT_REPEATED}
-    return parsed_settings(repeated, job, settings, where=f"--config {path}: ")
+    version = record.get("rift_cl", __version__)
+    by = "" if version == __version__ else f" (written by rift_cl {version})"
+    return parsed_settings(repeated, job, settings, where=f"--config {path}{by}: ")
 
 
 def parsed_settings(values: dict[str, Any], job: str, settings: type[S], *, where: str = "") -> S:
@@ -96,11 +101,18 @@ def _as_arguments(values: dict[str, Any], settings: type) -> list[str]:
             continue
         option = "--" + name.replace("_", "-")
         if Positional in getattr(hints[name], "__metadata__", ()):
-            positional += map(str, value if isinstance(value, tuple) else (value,))
+            positional += map(_word, value if isinstance(value, (list, tuple)) else (value,))
         elif isinstance(value, bool):
             options.append(option if value else f"--no-{option[2:]}")
         elif isinstance(value, (list, tuple)):
-            options += [option, *map(str, value)]
+            options += [option, *map(_word, value)]
         else:
-            options.append(f"{option}={value}")
+            options.append(f"{option}={_word(value)}")
     return [*positional, *options]
+
+
+def _word(value: Any) -> str:
+    """A value as it is typed; -1e-05 would be taken for an option, -0.00001 is not."""
+    if isinstance(value, float) and math.isfinite(value):
+        return np.format_float_positional(value, trim="0")
+    return str(value)

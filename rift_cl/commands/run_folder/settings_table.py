@@ -52,6 +52,8 @@ def _alike(one: Any, other: Any) -> bool:
     """Whether two values mean the same."""
     if isinstance(one, Path) and isinstance(other, Path):
         return one.absolute() == other.absolute()
+    if isinstance(one, tuple) and isinstance(other, tuple) and len(one) == len(other):
+        return all(map(_alike, one, other))
     return bool(one == other)
 
 
