@@ -20,6 +20,7 @@ RUNS = {
     "own_filter": ("32", "butterworth: "),
     "own_reader": ("", "(4, 96, 96) voxels"),
     "own_solver": ("32", "SciPy's LSQR: "),
+    "own_strategy": ("30", "step 30: loss "),
     "plan_views": ("3", "Plan(3 views"),
     "tomography": ("32", "total variation"),
 }

@@ -20,12 +20,16 @@ from rift_cl.cl.elementwise import multiply
 from rift_cl.splat.frame import FrameGradients
 from rift_cl.splat.splats import Splats
 from rift_cl.train.band_limit import Detail
-from rift_cl.train.device_adam import DeviceAdam
 
 # What all splats have, and what some have as well.
 GROUPS = ("means", "quats", "log_scales", "logits", "sh")
 MODES = ("shape_modes", "color_modes")
 MORE = (*MODES, "lobes")
+
+# Adam's constants, and parameters that one work-item of a CPU goes through, as
+# kernels/train/adam.cl has it.
+_BETA1, _BETA2, _EPSILON = 0.9, 0.999, 1e-15
+_CPU_RUN = 4096
 
 Arrays = Mapping[str, NDArray[np.float32]]
 
@@ -61,7 +65,7 @@ class Parameters:
 
     def __post_init__(self) -> None:
         """Make what takes the steps."""
-        self._adam = DeviceAdam(self.device)
+        self._adam = _DeviceAdam(self.device)
 
     @classmethod
     def of(
@@ -120,6 +124,11 @@ class Parameters:
             density=self.density,
             amplitude=self.amplitude,
         )
+
+    def selected(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Parameters:
+        """Some of these splats with their moments, by index or mask; see ``replaced``."""
+        groups = ({name: array[rows] for name, array in group.items()} for group in self.host())
+        return self.replaced(*groups)
 
     def update(
         self,
@@ -253,6 +262,72 @@ class Parameters:
         """Make what is drawn anew, after arrays of ``raw`` were put in the place of others."""
         self.drawn = _undrawn(self.device, self.raw)
         self.activate()
+
+
+class _DeviceAdam:
+    """Steps of Adam on one device; ``kernels/train/adam.cl`` says what a step is.
+
+    Args:
+        device: where the parameters are.
+    """
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self._sent: dict[tuple[int, float], DeviceArray] = {}
+
+    def step(
+        self,
+        x: DeviceArray,
+        first: DeviceArray,
+        second: DeviceArray,
+        gradient: DeviceArray,
+        *,
+        rate: float,
+        rest: float,
+        step: int,
+    ) -> None:
+        """Move parameters and their moments, in place.
+
+        Args:
+            x: (N, ...) the parameters; the other arrays have their shape.
+            first: means of gradients.
+            second: means of their squares.
+            gradient: of the loss.
+            rate: of the first three numbers of a splat.
+            rest: rate of its other numbers, as a share of that.
+            step: number of the step, counted from 1.
+        """
+        device, size = self.device, x.size
+        period = 1 if rest == 1.0 else size // x.shape[0]
+        run = _CPU_RUN if device.traits.is_cpu else 1
+        device.launch(
+            "adam",
+            (-(-size // run),),
+            x=x,
+            m=first,
+            v=second,
+            g=gradient,
+            shares=self._shares(period, rest),
+            period=period,
+            rate=rate,
+            beta1=_BETA1,
+            beta2=_BETA2,
+            c1=1 / (1 - _BETA1**step),
+            c2=1 / (1 - _BETA2**step),
+            epsilon=_EPSILON,
+            size=size,
+            RUN=run,
+        )
+
+    def _shares(self, period: int, rest: float) -> DeviceArray:
+        """Shares of the rate along a period, one for the first three; sent to the device once."""
+        if (period, rest) not in self._sent:
+            shares = np.where(np.arange(period) < 3, 1.0, rest)
+            # Two periods and a run more, so that shares can be read from any place on.
+            length = 2 * period + self.device.traits.macros["LANES"]
+            table = np.resize(shares, length).astype(np.float32)
+            self._sent[period, rest] = self.device.array(table)
+        return self._sent[period, rest]
 
 
 def _moments(

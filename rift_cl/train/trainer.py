@@ -1,11 +1,11 @@
-"""Fitting splats to posed pictures: one picture a step, everything on the device.
+"""Fitting splats to posed images: one image a step, everything on the device.
 
-A step draws a view, takes the gradient of the loss, and moves the splats by Adam, and the view's
-pose and exposure if they are fitted too. Between steps the set of splats changes
+A step renders a training view, takes the gradient of the loss, and moves the splats by Adam, and
+the view's pose and exposure if they are refined too. Between steps the set of splats changes
 (``rift_cl.train.strategy``); in the last part of the run, the cooldown, nothing walks at random and
-all learning rates fall, so that the picture settles.
+all learning rates fall, so that the image settles.
 
-What a run does depends on its settings, its pictures and the device alone: the order of the views
+What a run does depends on its settings, its views and the device alone: the order of the views
 and all that is random come from the seed and the number of the step. So ``state``, taken between
 any two steps, is all that a run needs to go on to the same bits.
 """
@@ -13,13 +13,14 @@ any two steps, is all that a run needs to go on to the same bits.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
-from rift_cl.errors import CheckpointError, ShapeError
+from rift_cl.errors import CheckpointError, InputError, ShapeError
 from rift_cl.geometry import Camera
 from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
@@ -29,7 +30,6 @@ from rift_cl.train.coefficient_schedule import CoefficientSchedule
 from rift_cl.train.loss.coverage_weight import weight_of
 from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.run_state import flattened, grouped
 from rift_cl.train.schedule import Schedule
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import scene_extent
@@ -47,40 +47,52 @@ _BAND_EVERY = 100
 _PIXELS, _FIRST_DEGREE, _NEXT_DEGREE = 0.4, 0.5, 0.25
 
 
-class Pictures(Protocol):
-    """What a trainer looks at: cameras, and what each of them saw."""
+Group = Mapping[str, NDArray[Any]]
+
+
+class TrainingViews(Protocol):
+    """What a trainer fits: cameras, and the image that each of them took.
+
+    ``ImageViews`` is one for arrays in memory.
+    """
 
     cameras: Sequence[Camera]
 
     def begin(self, step: int) -> None:
-        """Called before each step."""
+        """Called before each step, with the number of steps that were taken."""
 
     def target(self, number: int) -> Any:
-        """(height, width, 3) device array in display light, over the background."""
+        """The image of a view, (height, width, C) device array of float32, over the background."""
 
     def weights(self, number: int) -> Any:
-        """(height, width) device array, how much each pixel counts; None where all do."""
+        """Weights of the pixels in the loss, (height, width) device array; None where all are 1."""
 
     def background(self, number: int) -> Any:
-        """(3,) device array: what is behind the splats in that picture."""
+        """What is behind the splats in that image, (C,) device array."""
 
 
 class Trainer:
     """A fit in progress.
 
+    A subclass may give the fit more to do around each step, in ``_before_step``
+    and ``_after_step``.
+
     Args:
-        pictures: what is fitted.
-        parameters: the splats to begin with.
+        pictures: the training views.
+        parameters: the splats to begin with; the trainer changes them in place.
         settings: of the fit.
-        drawing: of the rasterizer; its activation is that of the settings.
+        drawing: how splats are rendered; the activation is that of the settings.
         flat: whether all splats lie in one slice.
+
+    Raises:
+        InputError: the strategy is not for such splats, or ``settings.solve`` not for this trainer.
     """
 
     solves = False  # Whether steps heed ``settings.solve``.
 
     def __init__(
         self,
-        pictures: Pictures,
+        pictures: TrainingViews,
         parameters: Parameters,
         settings: TrainSettings,
         drawing: SplatSettings | None = None,
@@ -102,7 +114,7 @@ class Trainer:
         drawing = self.strategy.render_settings(drawing or SplatSettings())
         self.renderer = Renderer(drawing, device=self.device)
         self.coefficient_schedule = CoefficientSchedule(settings, pictures.cameras, flat=flat)
-        self._join()
+        self._add_coefficients()
         self.poses = Poses(pictures.cameras, extent) if settings.learning_rates.poses else None
         self.exposures = (
             Exposures(self.device, views) if settings.learning_rates.exposures else None
@@ -127,10 +139,10 @@ class Trainer:
         """Fit until all steps are done, from where the parameters stand.
 
         Args:
-            stopped: asked after each step whether to leave it at that.
+            stopped: asked after each step whether to stop there.
 
         Yields:
-            A report now and then, and one after the last step.
+            A report every 25 steps, and one after the last step: the loss, the number of splats.
         """
         total, worked = self.settings.steps, 0.0
         while self.parameters.step < total:
@@ -144,8 +156,21 @@ class Trainer:
             if stop:
                 return
 
-    def step(self) -> Any:
-        """One picture; the loss as a (1,) device array."""
+    @final
+    def step(self) -> DeviceArray:
+        """One optimization step, on one training view; the loss as a (1,) device array."""
+        self._before_step()
+        value = self._step()
+        self._after_step()
+        return value
+
+    def _before_step(self) -> None:
+        """What a subclass does before a step: nothing here."""
+
+    def _after_step(self) -> None:
+        """What a subclass does after a step: nothing here."""
+
+    def _step(self) -> DeviceArray:
         settings, parameters = self.settings, self.parameters
         step = parameters.step
         number, rates = self.view_at(step), self.schedule.learning_rates(step)
@@ -161,20 +186,19 @@ class Trainer:
             by_view = self.device.get(gradients.camera)[:12].reshape(3, 4).astype(float)
             self.poses.update(number, by_view, rates["poses"])
         penalties = self.strategy.penalties(step)
-        lobed = "lobes" in parameters.raw
-        rates_of = settings.learning_rates
-        rest = rates_of.lobes_rest if lobed else rates_of.sh_rest
-        ridge = settings.basis.ridge
+        shares = settings.learning_rates
         parameters.update(
             gradients,
             rates,
-            sh_rest=rest,
+            sh_rest=shares.lobes_rest if "lobes" in parameters.raw else shares.sh_rest,
             opacity_penalty=penalties.opacity,
             scale_penalty=penalties.scale,
-            ridge=ridge,
+            ridge=settings.basis.ridge,
         )
-        self._join()
+        self._add_coefficients()
         self.parameters = self.strategy.after_step(parameters, frame, gradients, rates["means"])
+        if not len(self.parameters):
+            raise InputError(f"step {step + 1}: the strategy has removed every splat")
         relocated = self.parameters is not parameters
         if relocated:
             self.coefficient_schedule.hold(self.parameters)
@@ -205,19 +229,19 @@ class Trainer:
         return left
 
     def alike(self, parameters: Parameters) -> Trainer:
-        """A fit of the same pictures by the same settings that begins with other splats."""
+        """A fit of the same views by the same settings that begins with other splats."""
         drawing = self.renderer.settings
         return type(self)(self.pictures, parameters, self.settings, drawing, flat=self.flat)
 
     def camera(self, number: int) -> Camera:
-        """The camera of a view, where it is believed to be by now."""
+        """The camera of a view, with its pose as refined so far."""
         return self.pictures.cameras[number] if self.poses is None else self.poses.camera(number)
 
     def state(self) -> dict[str, NDArray[Any]]:
         """All that changes from step to step, as host arrays by name."""
         parameters = self.parameters
         raw, first, second = parameters.host()
-        groups: dict[str, Mapping[str, NDArray[Any]]] = {
+        groups: dict[str, Group] = {
             "raw": raw,
             "first": first,
             "second": second,
@@ -229,15 +253,15 @@ class Trainer:
         for name, refined in (("poses", self.poses), ("exposures", self.exposures)):
             if refined is not None:
                 groups[name] = refined.state()
-        return {"step": np.array(parameters.step), **flattened(groups)}
+        return {"step": np.array(parameters.step), **_flattened(groups)}
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from a state of a run with the same settings and pictures.
+        """Go on from a state of a run with the same settings and views.
 
         Raises:
             CheckpointError: it is of another run.
         """
-        groups = grouped(state)
+        groups = _grouped(state)
         try:
             self.parameters = Parameters.of(
                 self.device,
@@ -259,8 +283,8 @@ class Trainer:
         except (KeyError, ShapeError) as error:
             raise CheckpointError(f"the checkpoint is of another run ({error})") from error
 
-    def _compared(self, image: Any, number: int, rate: float) -> tuple[Any, Any]:
-        """The loss of a picture and its gradient by what was drawn."""
+    def _compared(self, image: Any, number: int, rate: float) -> tuple[DeviceArray, DeviceArray]:
+        """The loss of a rendered image and its gradient."""
         pictures, exposures = self.pictures, self.exposures
         target, weights = pictures.target(number), pictures.weights(number)
         exposed = image if exposures is None else exposures.applied(image, number)
@@ -271,13 +295,13 @@ class Trainer:
             return value, by_exposed
         return value, exposures.pulled_back(image, by_exposed, number, rate)
 
-    def _join(self) -> None:
-        """Let join what is due, and draw it."""
+    def _add_coefficients(self) -> None:
+        """Add coefficients scheduled for this step; rebuild the renderer if needed."""
         self.coefficient_schedule.after_step(self.parameters)
         self._fit_drawing()
 
     def _fit_drawing(self) -> None:
-        """Draw the splats as what they are by now."""
+        """Rebuild the renderer where splats have become others than it renders."""
         drawing = self.coefficient_schedule.drawing(self.parameters, self.renderer.settings)
         if drawing != self.renderer.settings:
             self.renderer = Renderer(drawing, device=self.device)
@@ -287,7 +311,21 @@ class Trainer:
             self._band.limit(self.parameters, near=self.renderer.settings.near)
 
     def view_at(self, step: int) -> int:
-        """The picture that is looked at in a step: all of them once, in a new order every time."""
+        """The view of a step: all of them once, then all again in another random order."""
         count = len(self.pictures.cameras)
         order = np.random.default_rng((self.settings.seed, step // count, 0x0DE)).permutation(count)
         return int(order[step % count])
+
+
+def _flattened(groups: Mapping[str, Group]) -> dict[str, NDArray[Any]]:
+    """One level of named arrays, which is what a checkpoint holds: "group.name"."""
+    return {f"{group}.{key}": array for group in groups for key, array in groups[group].items()}
+
+
+def _grouped(state: Group) -> dict[str, dict[str, NDArray[Any]]]:
+    """Undoes ``_flattened``."""
+    groups: dict[str, dict[str, NDArray[Any]]] = {}
+    for name, array in state.items():
+        group, _, key = name.partition(".")
+        groups.setdefault(group, {})[key] = array
+    return groups

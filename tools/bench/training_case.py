@@ -32,7 +32,7 @@ from rift_cl.splat.splats import Splats
 from rift_cl.train.parameters import Arrays, Parameters
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.strategy import McmcSettings
-from rift_cl.train.trainer import Pictures, Trainer
+from rift_cl.train.trainer import Trainer, TrainingViews
 
 # Views that are looked at; each has its turn in every pass.
 VIEWS = 8
@@ -102,7 +102,7 @@ class TrainingCase:
         )
 
     @cached_property
-    def pictures(self) -> Pictures:
+    def pictures(self) -> TrainingViews:
         """What is fitted."""
         if not self.ornament:
             return DrawnPictures(self.device, self.count, self.size)
@@ -130,7 +130,7 @@ class TrainingCase:
 
 
 class DrawnPictures:
-    """Pictures of a cube of splats from a ring of cameras; see ``rift_cl.train.trainer.Pictures``.
+    """Pictures of a cube of splats from a ring of cameras; see ``rift_cl.train.TrainingViews``.
 
     Args:
         device: where they are drawn and sent to.

@@ -26,7 +26,7 @@ from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.settings import LearningRates
 from rift_cl.train.strategy.mcmc import McmcSettings, relocate
-from rift_cl.train.trainer import Pictures, Trainer
+from rift_cl.train.trainer import Trainer, TrainingViews
 
 _STAGES = {
     "project and shade": ("splat_project", "splat_shade"),
@@ -149,7 +149,7 @@ def _each_part(trainer: Trainer) -> Iterator[list[tuple[str, float]]]:
 class _Decoding:
     """Pictures whose decoding is timed, uploads and waits left out."""
 
-    def __init__(self, pictures: Pictures, log: list[tuple[str, float]]) -> None:
+    def __init__(self, pictures: TrainingViews, log: list[tuple[str, float]]) -> None:
         self._pictures, self._log = pictures, log
 
     def __getattr__(self, name: str) -> Any:

@@ -41,7 +41,7 @@ Light = Literal["display", "linear"]
 
 
 class CapturePictures:
-    """What a trainer looks at; see ``rift_cl.train.trainer.Pictures``.
+    """Training views; see ``rift_cl.train.TrainingViews``.
 
     Args:
         device: where pictures are sent.

@@ -155,7 +155,7 @@ class Projections:
 
 
 class XrayPictures:
-    """What a trainer looks at; see ``rift_cl.train.trainer.Pictures``.
+    """Training views; see ``rift_cl.train.TrainingViews``.
 
     Args:
         device: where projections are sent.

@@ -154,14 +154,14 @@ def _seen_by(cameras: Sequence[Camera], points: Floats) -> Floats:
 
 
 def start_splats(
-    points: Floats, colors: Floats | None, *, seed: int
+    points: Floats, colors: Floats | None = None, *, seed: int = 0
 ) -> dict[str, NDArray[np.float32]]:
     """Round, faint splats at (N, 3) points, as large as the gaps between them.
 
     Args:
         points: (N, 3) positions.
-        colors: (N, 3) in display light, 0 to 1; grey of some variety if not given.
-        seed: of that variety.
+        colors: (N, 3) in display light, 0 to 1; random greys if not given.
+        seed: random seed of those greys.
 
     Returns:
         Raw values with harmonics of degree 0, as ``Parameters.of`` takes them.

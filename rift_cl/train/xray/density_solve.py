@@ -44,7 +44,7 @@ _TINY = float(np.finfo(np.float32).tiny)
 
 
 class Views(Protocol):
-    """What is solved for; see ``rift_cl.train.trainer.Pictures``."""
+    """What is solved for; see ``rift_cl.train.TrainingViews``."""
 
     cameras: Any
 

@@ -9,7 +9,6 @@ into their slice; modes of their shapes that vary across it stay at zero.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from rift_cl.train.parameters import Parameters
 from rift_cl.train.settings import BandLimit, LearningRates, TrainSettings
 from rift_cl.train.start.xray import FLAT
 from rift_cl.train.strategy import XraySettings
-from rift_cl.train.trainer import Pictures, Trainer
+from rift_cl.train.trainer import Trainer, TrainingViews
 from rift_cl.train.xray.density_solve import solve_densities
 from rift_cl.train.xray.solve_settings import SolveSettings
 
@@ -93,7 +92,7 @@ class XrayTrainer(Trainer):
 
     def __init__(
         self,
-        pictures: Pictures,
+        pictures: TrainingViews,
         parameters: Parameters,
         settings: TrainSettings,
         drawing: SplatSettings,
@@ -106,11 +105,13 @@ class XrayTrainer(Trainer):
         thin = np.full((count, 1), np.log(FLAT), np.float32)
         self._thin = self.device.array(thin) if flat else None
 
-    def step(self) -> Any:
-        """One projection; the loss as a (1,) device array."""
+    def _before_step(self) -> None:
+        """Solve where it is due."""
         if self.settings.solve.due(self.parameters.step):
             self._solve()
-        value = super().step()
+
+    def _after_step(self) -> None:
+        """Put splats of a single slice back into it, and solve after the last step."""
         if self._zero is not None and self._thin is not None:
             raw = self.parameters.raw
             copy_columns(self.device, self._zero, 0, raw["means"], 2, 1)
@@ -119,10 +120,9 @@ class XrayTrainer(Trainer):
             self.parameters.activate()
         if self.settings.solve.every and self.parameters.step == self.settings.steps:
             self._solve()
-        return value
 
     def _solve(self) -> None:
-        """Give the splats the densities and modes that serve best where they are."""
+        """Solve for the densities and shape modes of the splats where they are."""
         settings = self.settings
         solve_densities(
             *(self.parameters, self.renderer, self.pictures, settings.solve), seed=settings.seed
