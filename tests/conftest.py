@@ -14,11 +14,16 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 import rift_cl as rift
 
 pytest_plugins = ["selection", "costs", "touched"]
+
+# The same examples every time; a failure is then there again tomorrow.
+hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None)
+hypothesis.settings.load_profile("repeatable")
 
 
 def pytest_configure(config: pytest.Config) -> None:

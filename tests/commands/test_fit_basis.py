@@ -46,6 +46,7 @@ def fit(capture, out, *more, splats="60"):
     return main([*arguments, "--hold-out", "4", "--quiet", *more])
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_fit_is_drawn_by_every_command_as_it_was_scored(capture, tmp_path, kind):
     out = tmp_path / "fit"
@@ -78,6 +79,7 @@ def test_a_fit_is_drawn_by_every_command_as_it_was_scored(capture, tmp_path, kin
         assert job.url.startswith("http://127.0.0.1:")
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "more",
     [{"basis": "hermite", "order": 1, "activation": "exp"}, {"angular": "sg", "modes": 2}],

@@ -90,6 +90,7 @@ def test_other_settings_cannot_go_on(capture, tmp_path, capsys):
         assert contents(tmp_path / "fit") == before
 
 
+@pytest.mark.full
 def test_resuming_what_never_began_begins(capture, tmp_path):
     assert fit(capture, tmp_path / "fit", "--resume") == 0
     assert fit(capture, tmp_path / "other") == 0
@@ -104,6 +105,7 @@ def test_an_earlier_fit_is_neither_resumed_nor_lost_by_itself(capture, tmp_path,
     assert fit(capture, tmp_path / "fit", "--resume", "--overwrite") == 3
 
 
+@pytest.mark.full
 def test_one_that_is_killed_goes_on_to_the_same_bits(capture, tmp_path):
     """Killed without a warning, at moments drawn by chance; tools/stress_kills.py does it often."""
     whole, cut = tmp_path / "whole", tmp_path / "cut"
@@ -124,6 +126,7 @@ def test_one_that_is_killed_goes_on_to_the_same_bits(capture, tmp_path):
     assert digest(cut) == digest(whole)
 
 
+@pytest.mark.full
 def test_few_photographs_are_fitted_without_the_ramp_unless_it_is_asked_for(capture, tmp_path):
     found = {}
     for name, homogenise in (("none", None), ("zero", 0.0), ("half", 0.5)):
@@ -146,6 +149,7 @@ def metrics_of(folder):
     return json.loads((folder / "metrics.json").read_text())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("more", [{}, VARIANTS["default"]], ids=["mcmc", "default"])
 def test_a_finished_fit_is_trained_on_to_the_same_bits(capture, tmp_path, more):
     found = []
@@ -166,6 +170,7 @@ def test_a_finished_fit_is_trained_on_to_the_same_bits(capture, tmp_path, more):
     assert bool(more) == any(name.startswith("poses.") for name in state.arrays)
 
 
+@pytest.mark.full
 def test_the_second_part_may_be_broken_off_as_well(capture, tmp_path):
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     for out in (whole, cut):
@@ -186,6 +191,7 @@ def test_a_fit_that_was_broken_off_may_become_longer(capture, tmp_path):
     assert 50 <= until < 100 and of == 100 and last == (125, 125)
 
 
+@pytest.mark.full
 def test_fewer_steps_and_no_checkpoints_are_told(capture, tmp_path, capsys):
     out = tmp_path / "fit"
     assert fit(capture, out) == 0

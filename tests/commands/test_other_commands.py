@@ -34,6 +34,7 @@ def test_demo(tmp_path, capsys):
     assert "PSNR filtered" in capsys.readouterr().out
 
 
+@pytest.mark.full
 def test_demo_fits_the_sample_and_shows_both_ways(tmp_path, capsys):
     out = tmp_path / "demo"
     arguments = ["demo", "--out", str(out), "--size", "32", "--views", "4", "--splats", "300"]

@@ -139,6 +139,7 @@ def test_each_vector_has_the_nearest_entry_of_its_group_however_few_share_it() -
         np.testing.assert_allclose(found, apart.min(axis=1), rtol=1e-3)
 
 
+@pytest.mark.each
 @pytest.mark.parametrize("name", list(FORMATS))
 def test_the_same_splats_are_the_same_bytes(name: str) -> None:
     assert FORMATS[name].encode(scene(300)) == FORMATS[name].encode(scene(300))
@@ -158,6 +159,7 @@ def test_few_splats_and_splats_in_one_place_are_written(name: str, count: int) -
     assert FORMATS[name].encode(given) and FORMATS[name].encode(flat)
 
 
+@pytest.mark.each
 @pytest.mark.parametrize("name", list(FORMATS))
 def test_what_a_format_cannot_hold_is_refused_in_a_sentence(name: str) -> None:
     plain = scene(4, 0)

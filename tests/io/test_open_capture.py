@@ -72,6 +72,7 @@ def test_a_transforms_json_of_nerf(tmp_path: Path, name: str) -> None:
         np.testing.assert_allclose(view.camera.K, [[20, 0, 6], [0, 20, 4], [0, 0, 1]])
 
 
+@pytest.mark.each
 @pytest.mark.parametrize("folder", ["sparse/0", "sparse", "."])
 @pytest.mark.parametrize("write", [made.colmap_binary, made.colmap_text])
 def test_a_colmap_model(tmp_path: Path, folder: str, write: type) -> None:

@@ -73,6 +73,7 @@ LAYOUTS = {
 KINDS = {"text": (True, "="), "little-endian": (False, "<"), "big-endian": (False, ">")}
 
 
+@pytest.mark.each
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_every_layout_of_the_same_numbers_is_the_same_scene(

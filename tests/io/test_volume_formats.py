@@ -381,6 +381,7 @@ def test_stores_of_others(tmp_path: Path) -> None:
         read_volume(tmp_path / "z2")
 
 
+@pytest.mark.each
 @pytest.mark.parametrize("format", ["tiff-stack", "mrc", "h5"])
 def test_files_that_were_cut_off(tmp_path: Path, format: str) -> None:
     write(tmp_path / "v", format)

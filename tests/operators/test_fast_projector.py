@@ -81,6 +81,7 @@ def weight(grid, scan):
     return dx * dy / max(scan.pitch, min(dx, dy))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("lobes", ["image", 0, 1, 3])
 def test_the_named_error_is_met_on_any_geometry(device, scene, lobes):
     grid, scan = scene

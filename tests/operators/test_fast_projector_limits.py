@@ -12,6 +12,7 @@ from rift_cl.operators import LinearOperator
 from rift_cl.operators.projector.fast_projector import FastProjector
 
 
+@pytest.mark.full
 def test_any_budget_gives_the_same_bits(device, monkeypatch):
     grid, scan = Grid((9, 14, 21)), Parallel(np.linspace(0, 3, 40), bins=27)
     A = FastProjector(grid, scan, device=device)

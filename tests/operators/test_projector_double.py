@@ -52,6 +52,7 @@ def test_it_equals_its_twin_as_far_as_places_are_exact(device, geometry):
     assert relative(A.T(y), geometry.twin.backproject(y)) <= 1e-7
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("footprint", FOOTPRINTS)
 def test_it_is_linear_to_rounding(device, footprint):
     A = rift.Projector(GRID, SCAN, footprint, device=device, dtype="float64")

@@ -136,6 +136,7 @@ def test_bounds_give_the_bounded_least_squares_solution(device):
     np.testing.assert_allclose(device.get(solver.image).ravel(), expected, atol=1e-5)
 
 
+@pytest.mark.full
 def test_fista_and_pdhg_reach_the_same_directional_minimum(device):
     A, _, _, y = problem(device, noise=0.1)
     values = [
@@ -188,6 +189,7 @@ def test_images_stay_within_their_levels_and_support(device):
     np.testing.assert_array_equal(labels, np.digitize(image, [0.1, 0.55], right=True))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["fast", "volume", "matrix"])
 def test_any_operator_will_do(device, kind):
     A, matrix, truth, y = problem(device)
@@ -206,6 +208,7 @@ def test_any_operator_will_do(device, kind):
     assert reports[-1].values["residual"] < 0.2 * reports[0].values["residual"]
 
 
+@pytest.mark.full
 def test_bounds_directions_and_a_pull_gain_where_directions_are_missing(device):
     """A disc with holes, seen over thirty degrees."""
     grid = Grid((48, 48))
@@ -273,6 +276,7 @@ def test_bounds_that_cannot_be_are_refused(device, bounds, message):
         Pdhg(A, y, 0.1, bounds=(0, 1), nonnegative=True)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("name", "least"), [("ta", 0.88), ("tb", 0.75)])
 def test_the_wedge_of_the_helsinki_challenge(shared_data, name, least):
     """Plain total variation reaches 0.78 and 0.57 with the best of its weights."""

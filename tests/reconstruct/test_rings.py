@@ -53,6 +53,7 @@ def striped(sinogram, kind):
     return copy.astype(np.float32), bins
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["full", "partial", "varying", "wide", "dead", "fluctuating"])
 @pytest.mark.parametrize("noise", ["clean", "noisy"])
 def test_a_stripe_is_taken_out(request, kind, noise):

@@ -62,6 +62,7 @@ def test_every_order_has_the_moments_of_its_twin(device, kind, orders):
     assert_like_the_twin(device, hermite_scene(50, SIZE, orders), KINDS[kind], 3)
 
 
+@pytest.mark.full
 def test_the_highest_order_has_the_moments_of_its_twin(device):
     given = hermite_scene(15, SIZE, (8, 8), colored=1, strength=0.1, farthest=9)
     assert_like_the_twin(device, given, KINDS["exp"], 3)

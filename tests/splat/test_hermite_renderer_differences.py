@@ -162,6 +162,7 @@ def test_gradients_are_differences(device, way):
         assert abs((gradient * along).sum() - slope(way, name)) < 1e-3 * scale, name
 
 
+@pytest.mark.full
 def test_depth_is_a_channel_without_polynomial(device):
     """It comes after the channels that have one, and its gradient finds its place."""
     values = values_of("clamp")

@@ -14,6 +14,7 @@ from rift_cl.splat.hermite import count_of, order_of
 from rift_cl.splat.projected import CULL_REASONS
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 1e30])
 @pytest.mark.parametrize("name", ["shape_modes", "color_modes"])
 def test_splats_whose_modes_are_no_numbers_are_left_out(device, name, number):
@@ -106,6 +107,7 @@ def test_orders_and_counts_undo_each_other(dim):
     assert [order_of(count_of(n, dim), dim) for n in range(9)] == list(range(9))
 
 
+@pytest.mark.full
 def test_covariances_take_an_activation(device):
     values = random_splats(30, coefficients=4, wide=1.0)
     roots = splat_roots(values["quats"].astype(float), values["scales"].astype(float))

@@ -49,6 +49,7 @@ def test_gradients_of_lobes_are_differences(device, kind):
         assert abs((gradient * way).sum() - right) < 3e-3 * scale, name
 
 
+@pytest.mark.full
 def test_gradients_of_several_views_add_up(device):
     """Of modes and lobes too, to the bit of a sum in the order of the cameras."""
     renderer = Renderer(SplatSettings(angular="lg"), device=device)

@@ -31,6 +31,7 @@ def test_colors_of_most_modes_are_the_twins(device, kind, count):
     check_colors(device, kind, count)
 
 
+@pytest.mark.each
 @pytest.mark.parametrize("kind, count", CASES)
 def test_colors_are_the_twins(device, kind, count):
     check_colors(device, kind, count)

@@ -34,6 +34,7 @@ def test_gradients_of_most_modes_are_the_twins(device, kind, count):
     check_gradients(device, kind, count)
 
 
+@pytest.mark.each
 @pytest.mark.parametrize("kind, count", CASES)
 def test_gradients_are_the_twins(device, kind, count):
     check_gradients(device, kind, count)

@@ -86,6 +86,7 @@ def test_another_run_gives_the_same_bits(device):
     assert digest(renderer, frame) == digest(renderer, frame) == digest(*drawn(device))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("threads", ["1", "2", "3"])
 def test_another_process_gives_the_same_bits_whatever_its_threads(device, python, threads):
     found = digests_elsewhere(python, threads)
@@ -143,6 +144,7 @@ def test_lists_are_cut_again_where_records_do_not_fit(device, monkeypatch):
     assert len(plans) == 1 and len(plans[0]) > 1
 
 
+@pytest.mark.full
 def test_device_with_little_memory_gives_the_same_bits(device):
     renderer, frame = drawn(device)
     memory = needs(device, frame, gradient=False)[0] - 1

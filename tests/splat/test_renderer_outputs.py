@@ -35,6 +35,7 @@ def gradients_of(device, found):
     return {name: device.get(array) for name, array in arrays.items() if array is not None}
 
 
+@pytest.mark.full
 def test_features_stand_behind_the_colours_of_harmonics(device):
     renderer, camera = Renderer(device=device), camera_of("pinhole")
     behind = np.linspace(0.1, 0.9, 8).astype(np.float32)

@@ -219,6 +219,7 @@ def test_lenses_beyond_float32_are_refused_by_name(device, aperture):
         projected_on(device, plain(), Kind(aperture=aperture))
 
 
+@pytest.mark.full
 def test_a_wrong_radius_and_focus_are_found_by_their_gradient(device):
     """From a picture through the true lens, with splats that are known: Adam on logarithms."""
     kind, values = Kind(aperture=Aperture(0.2, 3.4)), random_splats(150, seed=9)

@@ -103,6 +103,7 @@ def projector_errors(device, spacing):
     )
 
 
+@pytest.mark.full
 def test_parallel_views_are_the_projections_of_fine_voxels(device):
     coarse, fine = projector_errors(device, 0.1), projector_errors(device, 0.05)
     assert fine.max() < 4e-3
