@@ -16,6 +16,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
+import numpy as np
+
 from rift_cl.commands.results import (
     AnalyzedViews,
     FittedScene,
@@ -260,11 +262,16 @@ def _settings(given: dict[str, Any], job: str, settings: type[S]) -> S:
     for name in _COMMAND_LINE:
         if given.get(name):
             raise InputError(f"{name} is for 'rift {job}' on a command line alone: leave it out")
-    plain = {
-        name: os.fspath(value) if isinstance(value, os.PathLike) else value
-        for name, value in given.items()
-    }
-    return parsed_settings(plain, job, settings)
+    return parsed_settings({name: _plain(value) for name, value in given.items()}, job, settings)
+
+
+def _plain(value: Any) -> Any:
+    """A value as a command line could have it: records are their folders, arrays lists."""
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    return tuple(map(_plain, value)) if isinstance(value, (list, tuple)) else value
 
 
 def _run(reports: Iterator[Report], progress: Progress) -> None:

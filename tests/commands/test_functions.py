@@ -45,8 +45,9 @@ def test_a_scan_file_is_fitted_as_x_rays(tmp_path):
     assert "held out, fit_error" in made._repr_html_()
 
 
-def test_a_result_stands_for_its_folder(fitted):
+def test_a_result_stands_for_its_folder(fitted, capture):
     scores = rift.evaluate(fitted)
+    assert list(rift.evaluate(fitted, [capture]).scores) == [capture.name]
     close = pytest.approx(fitted.metrics["scores"]["held out"]["fit_psnr"], abs=1e-3)
     assert scores.metrics["scores"]["held out"]["fit_psnr"] == close
     film = rift.render(fitted, frames=3, size=(40, 30), film="apng")
@@ -74,7 +75,8 @@ def test_a_temporary_folder_goes_with_its_record(fitted):
 
 
 def test_views_are_analysed_and_planned(capture):
-    analysed = rift.analyze(capture, add=1)
+    analysed = rift.analyze(capture, add=np.int64(1), center=np.zeros(3))
+    assert analysed.settings.center == (0, 0, 0)
     assert analysed.metrics["views"] == 8
     assert len(analysed.added) == 1
     assert "views to add" in analysed._repr_html_()
