@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from density_scenes import SIZE, cameras_of, scene
@@ -65,6 +67,14 @@ def test_what_is_not_kept_is_drawn_anew_to_the_same_bits(device, monkeypatch, ke
     assert few(c).tobytes() == seen.tobytes()
     assert few.T(seen).tobytes() == back.tobytes()
     assert few.energies().tobytes() == additive.energies().tobytes()
+
+
+def test_a_pickle_gives_the_same_bits():
+    additive, _ = additive_of(rift.default_device(), 1)
+    again = pickle.loads(pickle.dumps(additive))
+    c = np.random.default_rng(0).normal(size=additive.domain)
+    assert again(c).tobytes() == additive(c).tobytes()
+    assert repr(again) == repr(additive)
 
 
 def test_energies_are_about_the_squared_norms_of_pictures(device):

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.arithmetic import axpby, copy_columns
+from rift_cl.cl.device import Device
 from rift_cl.cl.elementwise import put, take
 from rift_cl.geometry import Camera
 from rift_cl.operators.linear import LinearOperator
@@ -28,6 +29,7 @@ from rift_cl.splat.hermite import project_modes, project_modes_grad
 from rift_cl.splat.projection import MOMENTS
 from rift_cl.splat.raster import rasterize
 from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 
 Floats = NDArray[np.float64]
@@ -57,6 +59,14 @@ class Additive(LinearOperator):
         self._black = self._colored(self.device.zeros(self.domain))
         self._kept: dict[int, Frame] = {}
         self._memory = self._keep_frames()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        shapes = tuple(self.device.get(array) for array in self._shapes if array is not None)
+        settings, cameras = self.renderer.settings, tuple(self.cameras)
+        return _of_settings, (settings, self.device, cameras, shapes, self.domain[1])
+
+    def _facts(self) -> list[str]:
+        return [f"{self.domain[0]} splats of {self.domain[1]} modes", f"{len(self.cameras)} views"]
 
     @property
     def scratch(self) -> int:
@@ -153,3 +163,17 @@ class Additive(LinearOperator):
             channels=frame.channels.total,
         )
         return [found.sums, found.color_modes]
+
+
+def _of_settings(
+    settings: SplatSettings,
+    device: Device,
+    cameras: Sequence[Camera],
+    shapes: tuple[NDArray[np.float32], ...],
+    modes: int,
+) -> Additive:
+    """The operator again, from what it was pickled as."""
+    means, quats, scales = shapes
+    ones = np.ones(len(means), np.float32)
+    splats = Splats.upload(device, means=means, quats=quats, scales=scales, opacities=ones)
+    return Additive(Renderer(settings, device=device), cameras, splats, modes=modes)
