@@ -12,7 +12,7 @@ import pytest
 
 from rift_cl.commands.cli import main
 from rift_cl.io.scans.formats import SCAN_READERS
-from rift_cl.operators.filters.view_filters import FILTERS
+from rift_cl.operators.filters.ramp_filters import FILTERS
 from rift_cl.train.strategy import STRATEGIES
 
 ROOT = Path(__file__).parents[1]

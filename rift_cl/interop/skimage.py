@@ -37,7 +37,7 @@ from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.geometry.numbers import real_numbers
 from rift_cl.interop.spline_backprojection import backproject_spline
-from rift_cl.operators.filters.view_filters import Ramp, ViewFilter
+from rift_cl.operators.filters.ramp_filters import Ramp, ViewFilter
 from rift_cl.operators.projector.phase_projector import Projector
 
 __all__ = ["iradon", "radon"]

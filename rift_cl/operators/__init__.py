@@ -3,7 +3,7 @@
 from rift_cl.operators.adjoint_check import dot_test
 from rift_cl.operators.filters.compensation import COMPENSATIONS, Compensation
 from rift_cl.operators.filters.compensation_3d import central_planes, radial_lines
-from rift_cl.operators.filters.view_filters import (
+from rift_cl.operators.filters.ramp_filters import (
     FILTERS,
     Filter,
     HighPass,

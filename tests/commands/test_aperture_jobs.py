@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from test_start import ring
 
+from rift_cl.commands.cameras.camera_path import opened, smooth_path
 from rift_cl.commands.cli import main
-from rift_cl.commands.render.camera_path import opened, smooth_path
 from rift_cl.errors import InputError
 from rift_cl.geometry import Aperture, Camera
 from rift_cl.io.captures.capture import open_capture

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 from test_start import MIDDLE_OF_RING, ring
 
-from rift_cl.commands.inputs.scene_bounds import (
-    SceneBounds,
-    bounds_of_cameras,
-    bounds_of_splats,
-    weighted_quantile,
-)
-from rift_cl.commands.render.camera_path import (
+from rift_cl.commands.cameras.camera_path import (
     orbit,
     orbit_distance,
     pinhole,
     resized,
     smooth_path,
+)
+from rift_cl.commands.inputs.scene_bounds import (
+    SceneBounds,
+    bounds_of_cameras,
+    bounds_of_splats,
+    weighted_quantile,
 )
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from test_start import ring
 
-from rift_cl.commands.cameras.film import (
+from rift_cl.commands.cameras.camera_path import orbit, pinhole
+from rift_cl.commands.cameras.film_path import (
     capture_arc,
     farthest_from_cameras,
     film,
@@ -18,7 +19,6 @@ from rift_cl.commands.cameras.film import (
 from rift_cl.commands.cameras.focus import focus_among
 from rift_cl.commands.cameras.route import route_through
 from rift_cl.commands.inputs.scene_bounds import bounds_of_cameras
-from rift_cl.commands.render.camera_path import orbit, pinhole
 from rift_cl.geometry import Camera
 from rift_cl.geometry.pose import look_at
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from browser import CHROMIUM, command, opened, until
 
-from rift_cl.commands.cameras.film import first_view
+from rift_cl.commands.cameras.camera_path import pinhole
+from rift_cl.commands.cameras.film_path import first_view
 from rift_cl.commands.inputs.scene_bounds import bounds_of_cameras
-from rift_cl.commands.render.camera_path import pinhole
 from rift_cl.commands.view.photographs import photographs_of, seen_by
 from rift_cl.commands.view.standpoint import standpoint_of
 from rift_cl.io.captures.capture import open_capture

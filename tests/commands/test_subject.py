@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from rift_cl.commands.cameras.film import film
+from rift_cl.commands.cameras.camera_path import pinhole
+from rift_cl.commands.cameras.film_path import film
 from rift_cl.commands.cameras.subject import subject_of
 from rift_cl.commands.inputs.scene_bounds import bounds_of_cameras
-from rift_cl.commands.render.camera_path import pinhole
 from rift_cl.geometry.pose import look_at
 from rift_cl.sampling.targets.free_space import DepthMap
 

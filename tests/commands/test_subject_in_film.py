@@ -14,7 +14,7 @@ from skimage.feature import match_template
 from skimage.transform import resize
 
 import rift_cl as rift
-from rift_cl.commands.cameras.film import first_view
+from rift_cl.commands.cameras.film_path import first_view
 from rift_cl.commands.cli import main
 from rift_cl.commands.render.settings import RenderSettings
 from rift_cl.geometry import Camera

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from browser import CHROMIUM, command, opened, until
 
-from rift_cl.commands.cameras.film import first_view
+from rift_cl.commands.cameras.camera_path import resized
+from rift_cl.commands.cameras.film_path import first_view
 from rift_cl.commands.inputs.scene_bounds import bounds_of_splats
-from rift_cl.commands.render.camera_path import resized
 from rift_cl.io.scenes.splat_scene import SplatScene
 
 # Red above the middle, the others round it: where neither panel nor notes are.

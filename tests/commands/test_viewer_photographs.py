@@ -11,9 +11,9 @@ import pytest
 from viewer_wire import Wire, dialled, until
 
 import rift_cl as rift
-from rift_cl.commands.cameras.film import first_view
+from rift_cl.commands.cameras.camera_path import pinhole
+from rift_cl.commands.cameras.film_path import first_view
 from rift_cl.commands.inputs.scene_bounds import SceneBounds, bounds_of_cameras
-from rift_cl.commands.render.camera_path import pinhole
 from rift_cl.commands.view import path_panel
 from rift_cl.commands.view.crop import Crop, cropped
 from rift_cl.commands.view.key_frames import KeyFrame, path_file, way_through

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
+from rift_cl.commands.cameras.camera_path import pinhole
 from rift_cl.commands.inputs.scene_bounds import bounds_of_cameras
-from rift_cl.commands.render.camera_path import pinhole
 from rift_cl.commands.view.photographs import photographs_of
 from rift_cl.commands.view.picture import Painter
 from rift_cl.commands.view.settings import ViewSettings

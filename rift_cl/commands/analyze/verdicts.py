@@ -19,7 +19,7 @@ from rift_cl.commands.inputs.view_set import Floats, ViewSet
 from rift_cl.geometry import Camera
 from rift_cl.sampling.coverage.host import host_coverage
 from rift_cl.sampling.criteria.appearance import appearance_error
-from rift_cl.sampling.criteria.functionals import wiener
+from rift_cl.sampling.criteria.optimality import wiener
 from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target, half_disc
 

@@ -1,6 +1,7 @@
-"""The cameras of a fit: kept in its folder, and what they say of how a scene is to be looked at.
+"""The cameras of a fit, kept in its folder, and camera paths of films derived from them.
 
-``fit_cameras`` is what every command asks, ``photograph_place`` how photographs are found again;
-``focus`` says what cameras look at, ``arc`` from where; ``film`` is the way of a film's camera,
-along a ``route`` where the cameras stood on one side.
+``fit_cameras`` reads them for every command, ``photograph_place`` finds photographs that have
+moved; ``focus`` is the point that the cameras look at, ``arc`` the directions that they cover;
+``film_path`` is the camera path of a film: an orbit (``camera_path``), or a ``route`` along the
+cameras of a capture from one side.
 """

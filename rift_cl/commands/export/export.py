@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rift_cl.cl.budget import format_bytes
-from rift_cl.commands.cameras.film import first_view
+from rift_cl.commands.cameras.film_path import first_view
 from rift_cl.commands.export.axes import turn_between, turned
 from rift_cl.commands.export.plain_scene import plain_scene
 from rift_cl.commands.export.settings import ExportSettings

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.commands.cameras.film import first_view
+from rift_cl.commands.cameras.film_path import first_view
 from rift_cl.commands.export.plain_scene import plain_scene
 from rift_cl.commands.export.web_page import FirstView, web_page
 from rift_cl.commands.fit_photos.pictures import CapturePictures

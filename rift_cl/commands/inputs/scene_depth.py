@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import open_device
+from rift_cl.commands.cameras.camera_path import resized
 from rift_cl.commands.inputs.opened_scene import OpenedScene
 from rift_cl.commands.inputs.scene_input import SceneInput
 from rift_cl.commands.pictures.depth_picture import depth_and_alpha
 from rift_cl.commands.pictures.evenly_spaced import evenly
-from rift_cl.commands.render.camera_path import resized
 from rift_cl.geometry import Camera
 from rift_cl.sampling.targets.free_space import DepthMap, FreeSpace, depth_of_points
 from rift_cl.splat.renderer import Renderer

@@ -12,8 +12,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.commands.cameras.camera_path import resized
 from rift_cl.commands.pictures.evenly_spaced import evenly
-from rift_cl.commands.render.camera_path import resized
 from rift_cl.geometry import Camera
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.budget import format_bytes
-from rift_cl.commands.cameras.film import (
+from rift_cl.commands.cameras.camera_path import opened, resized, smooth_path
+from rift_cl.commands.cameras.film_path import (
     capture_arc,
     farthest_from_cameras,
     film,
@@ -27,7 +28,6 @@ from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.pictures.depth_picture import LEAST_ALPHA, depth_picture, depth_window
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.commands.render.animation import chosen_film, shrunk
-from rift_cl.commands.render.camera_path import opened, resized, smooth_path
 from rift_cl.commands.render.report import Sheet, render_page, write_bytes
 from rift_cl.commands.render.settings import LIMITS, MOST_FRAMES, RenderSettings
 from rift_cl.commands.run_folder.run_folder import RunFolder

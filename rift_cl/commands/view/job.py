@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from rift_cl.commands.cameras.film import first_view
+from rift_cl.commands.cameras.camera_path import resized
+from rift_cl.commands.cameras.film_path import first_view
 from rift_cl.commands.inputs.opened_scene import OpenedScene
 from rift_cl.commands.inputs.scene_bounds import SceneBounds
-from rift_cl.commands.render.camera_path import resized
 from rift_cl.commands.view.browser_splats import MovingSplats, browser_can
 from rift_cl.commands.view.photographs import photographs_of
 from rift_cl.commands.view.settings import ViewSettings

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rift_cl.commands.render.camera_path import smooth_path
+from rift_cl.commands.cameras.camera_path import smooth_path
 from rift_cl.commands.view.pose import Pose
 from rift_cl.geometry import Aperture, Camera
 from rift_cl.io.captures.transforms_record import transforms_of

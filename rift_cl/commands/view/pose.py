@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rift_cl.commands.render.camera_path import pinhole
+from rift_cl.commands.cameras.camera_path import pinhole
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.io.captures.poses import view_of_quaternion

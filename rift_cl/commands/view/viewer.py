@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rift_cl.commands.cameras.film import first_view
+from rift_cl.commands.cameras.film_path import first_view
 from rift_cl.commands.fit_photos.pictures import Light
 from rift_cl.commands.inputs.scene_bounds import SceneBounds
 from rift_cl.commands.view.browser_splats import MovingSplats

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.filters.compensation import Compensation
-from rift_cl.operators.filters.view_filters import Filter, Gains, ViewFilter, as_filter
+from rift_cl.operators.filters.ramp_filters import Filter, Gains, ViewFilter, as_filter
 from rift_cl.operators.linear import LinearOperator, Piece
 from rift_cl.operators.projector.parallel_projector import ParallelProjector
 from rift_cl.reconstruct.direct.view_weights import view_gains

@@ -36,7 +36,7 @@ from rift_cl.cl.memory import download
 from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
 from rift_cl.geometry import Parallel
 from rift_cl.operators.filters.compensation import COMPENSATIONS, Compensation
-from rift_cl.operators.filters.view_filters import Ramp, Response, ViewFilter
+from rift_cl.operators.filters.ramp_filters import Ramp, Response, ViewFilter
 from rift_cl.operators.linear import LinearOperator
 
 Floats = NDArray[np.float64]

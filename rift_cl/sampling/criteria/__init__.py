@@ -1,1 +1,1 @@
-"""From coverage to a number: optimality criteria, sufficiency, limits of resolution."""
+"""From coverage to a number: optimality criteria (``optimality``, called by ``merit``), limits."""

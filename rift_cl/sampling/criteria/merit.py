@@ -13,8 +13,8 @@ from rift_cl.geometry import Camera
 from rift_cl.geometry.numbers import real_numbers
 from rift_cl.sampling.coverage.host import host_coverage, host_coverage_grad
 from rift_cl.sampling.criteria.exact import exact
-from rift_cl.sampling.criteria.functionals import Floats, Scored, scored
 from rift_cl.sampling.criteria.kriging import kriging
+from rift_cl.sampling.criteria.optimality import Floats, Scored, scored
 from rift_cl.sampling.criteria.surface import surface_merit
 from rift_cl.sampling.targets.camera_gradients import CameraGradients, camera_gradients
 from rift_cl.sampling.targets.observations import Observations, ObservationsGradient
@@ -108,7 +108,7 @@ def merit_of_coverage(kind: CoverageMerit, coverage: Any, target: Target) -> Sco
     """Score the coverage of a target's frequencies.
 
     Args:
-        kind: ``wiener``, ``logdet`` or ``worst``; see ``functionals``.
+        kind: ``wiener``, ``logdet`` or ``worst``; see ``optimality``.
         coverage: (P, K) L at each of the target's points and frequencies ``target.k``.
         target: what is looked at: its prior and its signal-to-noise ratio count.
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from rift_cl.errors import InputError
 from rift_cl.optics.optical_transfer import Floats, Transfer, optical_transfer
-from rift_cl.sampling.criteria import functionals as criteria
+from rift_cl.sampling.criteria import optimality as criteria
 from rift_cl.sampling.criteria.appearance import appearance_error
 from rift_cl.sampling.targets.observations import Observations, ObservationsGradient
 from rift_cl.sampling.targets.prior import checked_power

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.sampling.coverage.host import host_coverage, host_coverage_grad
-from rift_cl.sampling.criteria import functionals as criteria
+from rift_cl.sampling.criteria import optimality as criteria
 from rift_cl.sampling.criteria.merit import CoverageMerit
 from rift_cl.sampling.criteria.surface import surface_merit
 from rift_cl.sampling.planning.design_space import (

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.sampling.criteria import functionals as criteria
+from rift_cl.sampling.criteria import optimality as criteria
 from rift_cl.sampling.criteria.appearance import covariance, light_of, shown, wanted_of
 from rift_cl.sampling.criteria.surface import texture_coverage
 from rift_cl.sampling.planning.objective import Objective, joined, some

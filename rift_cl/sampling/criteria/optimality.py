@@ -1,7 +1,8 @@
-"""From coverage to one number: three ways to say how much of a target stays unknown.
+"""The criteria of a plan: A-optimal (``wiener``), D-optimal (``logdet``), E-optimal (``worst``).
 
+Each turns coverage into one number that says how much of a target stays unknown; lower is better.
 All are functions of the coverage at each frequency alone (the diagonal approximation), with a
-derivative by it, so that views can be moved along it. Lower is better.
+derivative by it, along which views can be moved.
 """
 
 from __future__ import annotations

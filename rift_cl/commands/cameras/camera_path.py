@@ -1,4 +1,7 @@
-"""Ways of a camera through a scene: round it, or from pose to pose of a capture."""
+"""Camera paths in general: an orbit round a scene, and a smooth path from pose to pose.
+
+Which of them a film takes is decided in ``film_path``.
+"""
 
 from __future__ import annotations
 

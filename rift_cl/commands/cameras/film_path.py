@@ -1,7 +1,7 @@
-"""The way of a film's camera, and where a viewer begins: from where photographs were taken.
+"""The camera path of a film, and the first view of a viewer: close to the capture's cameras.
 
-A ring of cameras gives an orbit at their distance and elevation. Cameras on one side give a way
-there and back along them, which never goes where nobody looked from: what is behind is unknown.
+A ring of cameras gives an orbit at their distance and elevation. Cameras on one side give a path
+there and back along them, which never leaves the region that they cover: what is behind is unknown.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.commands.cameras.arc import Arc, arc_of
+from rift_cl.commands.cameras.camera_path import orbit, orbit_distance, pinhole
 from rift_cl.commands.cameras.route import looked_at, route_through
 from rift_cl.commands.inputs.scene_bounds import SceneBounds
-from rift_cl.commands.render.camera_path import orbit, orbit_distance, pinhole
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.geometry.pose import look_at
