@@ -84,7 +84,7 @@ def _measure(case: TrainingCase, options: Options, skipped: dict[str, str]) -> d
         **lead,
         "stages": {way: stages(fit, passes=rounds) for way, fit in ways(case).items()},
         "host": host_work(case, passes=2 * rounds),
-        "renewal": relocation_price(case, passes=rounds),
+        "relocation": relocation_price(case, passes=rounds),
     }
 
 

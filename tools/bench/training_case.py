@@ -39,7 +39,7 @@ VIEWS = 8
 _COEFFICIENTS, _Y0 = 16, 0.28209479177387814
 # How far splats are moved from where they belong, and what they all hide at first.
 _MOVED, _LOGIT = 0.02, -1.0
-# A run that is much longer than what is measured, without renewals: they are measured apart.
+# A run that is much longer than what is measured, without relocations: they are measured apart.
 _STEPS = 30_000
 _ORNAMENT = "ornament"
 

@@ -42,7 +42,7 @@ _STAGES = {
     "random walk": ("splat_noise",),
 }
 DECODING, UPLOAD = "decoding of the picture", "upload"
-# Share of the splats that have faded when the price of a renewal is taken.
+# Share of the splats that have faded when the price of a relocation is taken.
 _FADED, _FADED_LOGIT = 0.05, -7.0
 # Fits of more than splats, whose waits are looked at as well.
 _REFINED = LearningRates(poses=1e-4, exposures=1e-3)

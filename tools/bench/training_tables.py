@@ -25,7 +25,7 @@ _STAGES = (
 )
 _HOST = (
     "A step as it is, nothing waited for but what the trainer waits for itself. Host: processor "
-    "time of the thread that enqueues. A renewal happens on the host, seldom; its share is of a "
+    "time of the thread that enqueues. A relocation happens on the host, seldom; its share is of a "
     "step as it is."
 )
 _WAITS = (
@@ -98,7 +98,7 @@ def _difference(scene: dict[str, Any], entry: dict[str, Any]) -> str:
 def _host(record: dict[str, Any]) -> Table:
     rows = []
     for scene in record["scenes"]:
-        host, relocation = scene["host"], scene["renewal"]
+        host, relocation = scene["host"], scene["relocation"]
         step, busy, waits = host["step"], host["host"], host["waits"]["plain"]
         waited = sum(wait["seconds"] for wait in waits)
         each = relocation["min_s"] / relocation["every"] / step["min_s"]
@@ -115,7 +115,7 @@ def _host(record: dict[str, Any]) -> Table:
             )
         )
     columns = ("scene", "a step, ms", "host, ms", "of the step", "waits in a step", "waited, ms")
-    columns += ("a renewal, ms", "of a step")
+    columns += ("a relocation, ms", "of a step")
     return Table("What the host does", columns, rows, (_HOST,))
 
 

@@ -127,7 +127,7 @@ def show(page: Page, result: dict[str, Any]) -> None:
         ("views at", "count", *_SCORES, "unknown as a volume", "unknown as a surface"),
         cells,
         caption="Scores, and the planner's merit of each set, lower is better: the share that "
-        "stays unknown of a volume, and of a surface's texture and sheen, added.",
+        "stays unknown of a volume, and of a surface's texture and appearance, added.",
     )
     groups = {}
     for row in rows:

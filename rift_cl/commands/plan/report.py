@@ -63,7 +63,7 @@ def merit_name(metrics: Mapping[str, Any]) -> str:
     """What the merit is, for people."""
     kind = metrics["kind"]
     if metrics["mode"] == "surface" and kind != "logdet":
-        return "texture and sheen that stay unknown, added"
+        return "unknown share of texture and appearance, added"
     return _MERITS[kind]
 
 

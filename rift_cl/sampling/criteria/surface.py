@@ -1,4 +1,4 @@
-"""Opaque targets: what views know of the texture and the sheen of a surface.
+"""Opaque targets: what views tell about the texture and the appearance of a surface.
 
 A picture of a surface is no projection of a volume, so the slice theorem says nothing about it. At
 each point, the texture of the tangent plane has frequencies of its own; a view at an angle squeezes
@@ -47,10 +47,10 @@ class _Seen(NamedTuple):
 def surface_merit(
     observations: Observations, target: Target, kind: str = "wiener"
 ) -> tuple[float, ObservationsGradient]:
-    """Errors of a surface's texture and of its sheen, added; each from 0 to 1.
+    """Errors of a surface's texture and of its appearance, added; each from 0 to 1.
 
-    The texture's coverage is ``sum w cos MTF^2``, scored by ``criteria``; what is unknown of the
-    sheen says ``rift_cl.sampling.criteria.appearance``.
+    The texture's coverage is ``sum w cos MTF^2``, scored by ``optimality``; the posterior
+    variance of the appearance is that of ``rift_cl.sampling.criteria.appearance``.
 
     Args:
         observations: V views of the target's points.

@@ -1,7 +1,7 @@
-"""Part views that stand at the same place, so that they can move away from each other.
+"""Separates coincident views, so that gradient steps can move them apart.
 
-A greedy choice may take a candidate twice. Coincident have equal derivatives: whatever moves them
-by those moves them together. So do views that lie opposite each other, which see the same slices.
+A greedy choice may take a candidate twice. Coincident views have identical gradients, so gradient
+steps never separate them. The same holds for opposite views, which sample the same slices.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from rift_cl.sampling.planning.design_space import AZIMUTH, ELEVATION, DesignSpa
 from rift_cl.sampling.planning.view_table import ViewTable
 
 Floats = NDArray[np.float64]
-# How far twins are moved at first, in spacings of evenly spread views, and in which ways: towards
-# sides that a golden angle parts, for as long as one is allowed. What is nearer than
-# a part of that step belongs to twins.
+# The step that separates coincident views, in spacings of evenly spread views, and the number of
+# directions that are tried, a golden angle apart, until one is allowed. Views that are nearer than
+# a fraction _NEAR of that step are coincident.
 _STEP, _WAYS, _NEAR, _GOLDEN = 0.05, 8, 0.25, math.pi * (3 - math.sqrt(5))
 
 
 def parted(design: DesignSpace, views: ViewTable, spacing: float) -> ViewTable:
-    """The views, each that stands where one before it does (or opposite) a little aside.
+    """The views, each that coincides with an earlier one (or is opposite to it) moved a little.
 
     Args:
         design: whose elevations, azimuths and keep-outs are kept to.
@@ -31,14 +31,14 @@ def parted(design: DesignSpace, views: ViewTable, spacing: float) -> ViewTable:
         spacing: radians from a view to the next where they are spread evenly.
 
     Returns:
-        As many views; the very same ones if no two are twins. A twin with no room stays.
+        As many views; the same ones if no two coincide. One that has no room to move stays.
     """
     near = _NEAR * _STEP * spacing
-    twins = np.flatnonzero(np.tril(_like(design, views, near)).any(1)).tolist()
-    if not twins:
+    coincident = np.flatnonzero(np.tril(_like(design, views, near)).any(1)).tolist()
+    if not coincident:
         return views
     table = views.table
-    for count, index in enumerate(twins):
+    for count, index in enumerate(coincident):
         for way in range(_WAYS):
             trial = table.copy()
             trial[index] = _aside(design, table[index], spacing * _STEP, (count + way) * _GOLDEN)
@@ -53,7 +53,7 @@ def parted(design: DesignSpace, views: ViewTable, spacing: float) -> ViewTable:
 
 
 def _like(design: DesignSpace, views: ViewTable, near: float) -> NDArray[np.bool_]:
-    """(V, V) which stand nearer to another, or to what is opposite, than some radians."""
+    """(V, V) which are nearer to another, or to its opposite, than ``near`` radians."""
     outward = views.frames(design)[:, 0]
     same = np.abs(outward @ outward.T) > math.cos(near)
     np.fill_diagonal(same, False)

@@ -1,4 +1,4 @@
-"""Views that move each for itself: what the polish turns when there is no path."""
+"""Views that move each for itself: what the refinement moves if there is no path."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ class FreeLayout:
 
     @property
     def start(self) -> Floats:
-        """(n,) where the polish begins."""
+        """(n,) where the refinement begins."""
         return self._all[self._moved]
 
     @property

@@ -1,7 +1,7 @@
 """Places where no camera may stand, and bodies through which the target is not seen.
 
 A shape answers how far points lie outside it (negative inside) and in which direction that grows,
-so that the planner's polish can walk along its surface instead of only rejecting what is inside.
+so that refinement can move along its surface instead of only rejecting what is inside.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ class PathLayout:
 
     @property
     def start(self) -> Floats:
-        """(n,) where the polish begins."""
+        """(n,) where the refinement begins."""
         return self.numbers[self._moved]
 
     @property

@@ -36,7 +36,7 @@ def best_path(objective: Objective, views: int, *, moved: bool) -> ViewTable:
     Args:
         objective: what is to be small, and where.
         views: how many.
-        moved: whether the best starts are polished.
+        moved: whether the best starts are refined.
 
     Raises:
         InputError: no path that was tried keeps to the constraints.

@@ -190,7 +190,7 @@ def _chosen(
 
 
 def _moved(objective: Objective, chosen: ViewTable, simple: Mapping[str, Baseline]) -> ViewTable:
-    """The best of what was chosen and of simple arrangements, polished."""
+    """The best of what was chosen and of simple arrangements, refined."""
     design, spacing = objective.design, FreeLayout(objective.design, chosen).trust
     starts = [chosen, *(baseline.view_table for baseline in simple.values())]
     values = [objective.value(start) for start in starts]

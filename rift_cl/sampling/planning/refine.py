@@ -41,7 +41,7 @@ class Layout(Protocol):
 
     @property
     def start(self) -> Floats:
-        """(n,) where the polish begins."""
+        """(n,) where the refinement begins."""
 
     @property
     def box(self) -> tuple[Floats, Floats]:

@@ -1,4 +1,4 @@
-"""Candidates for a surface: what views know of its texture and its sheen, added up view by view.
+"""Candidates for a surface: what views know of its texture and appearance, added up view by view.
 
 ``surface_merit`` scores a set of views; a greedy choice asks for thousands of sets that differ by
 one. Here every candidate's part is kept: the coverage of the texture's frequencies, and how its

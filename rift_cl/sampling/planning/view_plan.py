@@ -56,8 +56,9 @@ class Plan:
     """Views that a planner chose.
 
     ``merit``, ``bound`` and each baseline's ``merit`` are at the frequencies that were planned with
-    (``objective.site.target``); ``elsewhere``, the knee and the verdict at others, so that none of
-    what is compared was favoured. They are the same where the target came with frequencies.
+    (``objective.design.target``); ``elsewhere``, diminishing returns and the verdict are at others,
+    so that nothing compared was optimized on them. Both sets are the same if the target came with
+    frequencies of its own.
 
     Args:
         objective: what was to be small, and where.
@@ -164,7 +165,7 @@ class Plan:
             InputError: the share is not between 0 and 1.
         """
         if not 0 < one_number(share) < 1:
-            raise InputError(f"knee: share is {share!r}, wanted a number between 0 and 1")
+            raise InputError(f"diminishing_returns: share is {share!r}, wanted a number, 0 to 1")
         merits = np.array(self._ordered.merits)
         gains = -np.diff(merits)
         average = np.cumsum(gains) / np.arange(1, len(gains) + 1)

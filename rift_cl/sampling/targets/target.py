@@ -47,11 +47,11 @@ class Target:
             default the merit counts the tails of its smooth slabs as known.
         band: the highest frequency that is wanted; 16 / diameter by default.
         degree: of the spherical harmonics of a surface's brightness, for the mode ``surface``, 0
-            to 32; 0 for what looks the same from all sides. Views that lie closer than half a turn
-            by the degree tell the same.
-        seen_from: (D, 3) directions, from the target, that a surface will be looked at from: what
-            is unknown of its sheen counts there alone. All directions alike when not given; a
-            planner takes those in which its cameras may stand.
+            to 32; 0 for a surface that looks the same from all sides. Views closer together than
+            half a turn divided by the degree carry the same information.
+        seen_from: (D, 3) directions, from the target, from which a surface will be seen: the
+            variance of its appearance counts in these alone. Default: all directions; a planner
+            takes those in which its cameras may stand.
         frequencies: (K, 3) the frequencies to count with; by default ``k`` is a set that fills the
             half-ball of the band evenly (coverage at -k is that at k).
 
