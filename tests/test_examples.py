@@ -18,6 +18,7 @@ RUNS = {
     "fit_photographs": ("20", "<RenderedScene in "),
     "fit_xray": ("20", "<XrayScene: 1000 splats"),
     "own_filter": ("32", "butterworth: "),
+    "own_loss": ("", "charbonnier: "),
     "own_reader": ("", "(4, 96, 96) voxels"),
     "own_solver": ("32", "SciPy's LSQR: "),
     "own_strategy": ("30", "step 30: loss "),

@@ -5,9 +5,10 @@
  *
  *     (1 - w)/n m sign(x - y) + w/n (E(m0) + (x - y) E(m1) + (x + y - 1) E(m2)),
  *
- * with the maps and the blur E of ssim_map.cl. With SQUARED the magnitude is a square, 2 (x - y)
- * its slope. Without SSIM there are no maps and the second part is left out. The image may have
- * more channels than the target; the gradient is zero there.
+ * with the maps and the blur E of ssim_map.cl. In place of the magnitude stands PIXEL_LOSS, an
+ * expression of d = x - y, and in place of its slope times m PIXEL_GRADIENT, one of d and m. Without
+ * SSIM there are no maps and the second part is left out. The image may have more channels than the
+ * target; the gradient is zero there.
  *
  * `parts` gets the sum of the first part over each item's floats, one number for each item from
  * `first_part` on. Index space: (strips of floats, runs of rows), a group for each tile. */
@@ -19,8 +20,9 @@
 #ifndef SSIM
 #define SSIM 1
 #endif
-#ifndef SQUARED
-#define SQUARED 0
+#ifndef PIXEL_LOSS
+#define PIXEL_LOSS absolute(d)
+#define PIXEL_GRADIENT d > 0 ? m : d < 0 ? -m : 0
 #endif
 
 #define MAPS 3
@@ -80,8 +82,8 @@ KERNEL void loss_grad(
 #if WEIGHTED
       m = m * load_weights(weights + row * (width / CHANNELS), f, width);
 #endif
-      const lanes error = SQUARED ? d * d : absolute(d);
-      lanes g = SQUARED ? 2 * d * m : d > 0 ? m : d < 0 ? -m : 0;
+      const lanes error = PIXEL_LOSS;
+      lanes g = PIXEL_GRADIENT;
 #if SSIM
       const lanes E0 = blurred_along(rows[0][o] + HALO + n);
       const lanes E1 = blurred_along(rows[1][o] + HALO + n);

@@ -177,7 +177,10 @@ class Programs:
         raise _build_error(name, failure, options, self._device.name)
 
 
-def _literal(value: float) -> str:
+def _literal(value: float | str) -> str:
+    """A compile-time constant as the compiler sees it; a text is an expression without spaces."""
+    if isinstance(value, str):
+        return value
     return f"{float(value)!r}f" if isinstance(value, (float, np.floating)) else str(int(value))
 
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rift_cl.train.basis_settings import AngularSettings, BasisSettings
     from rift_cl.train.loss.homogenisation import Homogenisation
     from rift_cl.train.loss.image_loss import ImageLoss
+    from rift_cl.train.loss.pixel_loss import PIXEL_LOSSES, PixelLoss, register_loss
     from rift_cl.train.parameters import Parameters
     from rift_cl.train.settings import LearningRates, TrainSettings
     from rift_cl.train.start.points import random_points, start_splats
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
     from rift_cl.train.xray.trainer import XrayTrainer, xray_settings
 
 _HOMES = {
+    "PIXEL_LOSSES": "loss.pixel_loss",
     "STRATEGIES": "strategy",
     "AngularSettings": "basis_settings",
     "BasisSettings": "basis_settings",
@@ -57,6 +59,7 @@ _HOMES = {
     "McmcSettings": "strategy",
     "Parameters": "parameters",
     "Penalties": "strategy",
+    "PixelLoss": "loss.pixel_loss",
     "SolveSettings": "xray.solve_settings",
     "Strategy": "strategy",
     "StrategySettings": "strategy",
@@ -67,12 +70,14 @@ _HOMES = {
     "XraySettings": "strategy",
     "XrayTrainer": "xray.trainer",
     "random_points": "start.points",
+    "register_loss": "loss.pixel_loss",
     "register_strategy": "strategy",
     "start_splats": "start.points",
     "xray_settings": "xray.trainer",
 }
 
 __all__ = [
+    "PIXEL_LOSSES",
     "STRATEGIES",
     "AngularSettings",
     "BasisSettings",
@@ -84,6 +89,7 @@ __all__ = [
     "McmcSettings",
     "Parameters",
     "Penalties",
+    "PixelLoss",
     "SolveSettings",
     "Strategy",
     "StrategySettings",
@@ -94,6 +100,7 @@ __all__ = [
     "XraySettings",
     "XrayTrainer",
     "random_points",
+    "register_loss",
     "register_strategy",
     "start_splats",
     "xray_settings",

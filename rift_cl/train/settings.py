@@ -12,6 +12,7 @@ from rift_cl.errors import InputError
 from rift_cl.splat.orders import count_of
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
+from rift_cl.train.loss.pixel_loss import PIXEL_LOSSES
 from rift_cl.train.ranges import check_choice, check_number, check_whole
 from rift_cl.train.strategy import DefaultSettings, McmcSettings, StrategySettings
 from rift_cl.train.xray.solve_settings import SolveSettings
@@ -120,7 +121,7 @@ class TrainSettings:
             check_number(self, name, most=1)
         if self.noise is not None:
             check_number(self, "noise")
-        check_choice(self, "loss", get_args(LossKind))
+        check_choice(self, "loss", PIXEL_LOSSES.names)
         if self.band_limit is not None and self.band_limit not in get_args(BandLimit):
             wanted = "None, " + " or ".join(get_args(BandLimit))
             raise InputError(f"TrainSettings: band_limit is {self.band_limit!r}, wanted {wanted}")

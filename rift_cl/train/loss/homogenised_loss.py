@@ -19,7 +19,6 @@ from rift_cl.operators.fourier.spectrum import Response, SpectralFilter
 from rift_cl.train.loss.coverage_weight import CoverageWeight
 from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.loss.image_loss import ImageLoss
-from rift_cl.train.settings import LossKind
 
 # Exponents are rounded to so many parts of the largest, so that responses can be kept.
 _PARTS = 32
@@ -50,7 +49,7 @@ class HomogenisedLoss:
         settings: Homogenisation,
         *,
         ssim_weight: float,
-        kind: LossKind,
+        kind: str,
         noise: float = 0.0,
         coverage: CoverageWeight | None = None,
     ) -> None:

@@ -1,0 +1,59 @@
+"""Pixel losses by name: what the difference of one pixel and one channel costs.
+
+A pixel loss is two expressions in OpenCL C, which become a part of ``kernels/train/loss_grad.cl``:
+so one of a user's own is as fast as those of the package.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rift_cl.errors import InputError
+from rift_cl.registry import Registry
+
+
+@dataclass(frozen=True)
+class PixelLoss:
+    """A loss of the difference d = image - target, both float32.
+
+    Numbers in the expressions want an f behind them (``0.5f``); functions are OpenCL's (``sqrt``).
+
+    Args:
+        value: the loss, an expression of ``d``.
+        gradient: ``m`` times the derivative of the loss by d, an expression of ``d`` and ``m``.
+
+    Raises:
+        InputError: an expression is empty or no text.
+    """
+
+    value: str
+    gradient: str
+
+    def __post_init__(self) -> None:
+        """Check both expressions."""
+        for name in ("value", "gradient"):
+            given = getattr(self, name)
+            if not isinstance(given, str) or not given.strip():
+                raise InputError(f"PixelLoss: {name} is {given!r}, wanted an expression of d")
+
+    def macros(self) -> dict[str, str]:
+        """The expressions as compile-time constants, without spaces: drivers split at them."""
+        expressions = {"PIXEL_LOSS": self.value, "PIXEL_GRADIENT": self.gradient}
+        return {name: "".join(text.split()) for name, text in expressions.items()}
+
+
+PIXEL_LOSSES = Registry(
+    "pixel loss",
+    {"l1": PixelLoss("absolute(d)", "d > 0 ? m : d < 0 ? -m : 0"), "l2": PixelLoss("d*d", "2*d*m")},
+)
+
+
+def register_loss(name: str, loss: PixelLoss) -> None:
+    """Make a pixel loss known by a name, for ``TrainSettings(loss=name)`` and ``ImageLoss``.
+
+    Raises:
+        InputError: the name is taken, or it is no ``PixelLoss``.
+    """
+    if not isinstance(loss, PixelLoss):
+        raise InputError(f"register_loss: {loss!r} is not a PixelLoss")
+    PIXEL_LOSSES.add(name, loss)
