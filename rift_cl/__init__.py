@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from rift_cl.commands.functions import (
         analyze,
         evaluate,
+        export,
         fit,
         plan_views,
         reconstruct_scan,
@@ -92,6 +93,7 @@ _HOMES = {
     "devices": "cl",
     "dot_test": "operators",
     "evaluate": "commands.functions",
+    "export": "commands.functions",
     "fbp": "reconstruct",
     "find_center": "reconstruct",
     "fit": "commands.functions",
@@ -147,6 +149,7 @@ __all__ = [
     "devices",
     "dot_test",
     "evaluate",
+    "export",
     "fbp",
     "find_center",
     "fit",

@@ -2,8 +2,9 @@
 
 Each takes what its command takes, by the same names with underscores, checked by the same parser;
 runs the same job; and gives back a record of what came out. Nothing is printed: ``progress`` is
-called with each ``Report``. Without ``out`` the files go to a temporary folder, which is removed
-with the record that is given back.
+called with each ``Report``. ``config="run/config.json"`` repeats an earlier run, whose settings
+other arguments override. Without ``out`` the files go to a temporary folder, which is removed with
+the record that is given back.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from rift_cl.commands.results import (
     Result,
     Scored,
 )
-from rift_cl.commands.run_folder.saved_settings import parsed_settings
+from rift_cl.commands.run_folder.saved_settings import parsed_settings, saved_settings
 from rift_cl.errors import InputError
 from rift_cl.progress import Report
 
@@ -35,7 +36,7 @@ PathLike = str | os.PathLike[str]
 Progress = Callable[[Report], None] | None
 S = TypeVar("S")
 # Options that have a meaning on a command line alone.
-_COMMAND_LINE = ("config", "dry_run", "preview")
+_COMMAND_LINE = ("dry_run", "preview")
 
 
 def reconstruct_scan(
@@ -231,6 +232,34 @@ def plan_views(
         return keep(PlannedViews(*record, plan=job.found))
 
 
+def export(
+    scene: PathLike, out: PathLike | None = None, *, progress: Progress = None, **settings: Any
+) -> Path:
+    """Write a scene as one file for other software, as ``rift export`` does.
+
+    Args:
+        scene: a fit, its folder, or a file of splats.
+        out: the file; the scene's name in the current folder when not given.
+        progress: is called with a report now and then.
+        **settings: the command's options by their names in Python, such as ``to="spz"`` or
+            ``mesh=True``; see ``ExportSettings``.
+
+    Returns:
+        The file.
+
+    Raises:
+        RiftError: a setting or the scene cannot be used, or the file is there already.
+    """
+    from rift_cl.commands.export.export import Export
+    from rift_cl.commands.export.mesh import MeshExport
+    from rift_cl.commands.export.settings import ExportSettings
+
+    parsed = _settings({"scene": scene, "out": out, **settings}, "export", ExportSettings)
+    job = MeshExport(parsed) if parsed.mesh else Export(parsed)
+    _run(job.run(), progress)
+    return job.path
+
+
 R = TypeVar("R", bound=Result)
 
 
@@ -262,7 +291,10 @@ def _settings(given: dict[str, Any], job: str, settings: type[S]) -> S:
     for name in _COMMAND_LINE:
         if given.get(name):
             raise InputError(f"{name} is for 'rift {job}' on a command line alone: leave it out")
-    return parsed_settings({name: _plain(value) for name, value in given.items()}, job, settings)
+    plain = {name: _plain(value) for name, value in given.items()}
+    config = plain.pop("config", None)
+    earlier = None if config is None else saved_settings(Path(config), job, settings)
+    return parsed_settings(plain, job, settings, earlier=earlier)
 
 
 def _plain(value: Any) -> Any:

@@ -38,7 +38,7 @@ class Result:
 
     Args:
         folder: what was written, with report.html, config.json and metrics.json.
-        settings: the command's settings.
+        settings: the command's settings, with the values that were decided.
         metrics: figures by name, as in metrics.json.
         notes: what was assumed or decided, a sentence each.
     """
@@ -83,7 +83,7 @@ class Result:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ReconstructedScan(Result):
-    """A reconstruction; its settings hold every value that was decided.
+    """A reconstruction.
 
     Args:
         path: the volume: a folder of slices, a file or a store, by the format asked for.

@@ -51,10 +51,19 @@ def test_a_result_stands_for_its_folder(fitted, capture):
     close = pytest.approx(fitted.metrics["scores"]["held out"]["fit_psnr"], abs=1e-3)
     assert scores.metrics["scores"]["held out"]["fit_psnr"] == close
     film = rift.render(fitted, frames=3, size=(40, 30), film="apng")
+    again = rift.render(fitted, config=film.folder / "config.json", frames=2)
+    assert again.read(0).shape == (30, 40, 3)
+    assert len(again.frames) == 2
     assert film.read(2).shape == (30, 40, 3)
     assert len(film.frames) == len(film.cameras) == 3
     assert film.film == film.folder / "animation.png"
     assert film.film.is_file()
+
+
+def test_an_export_gives_back_its_file(fitted, tmp_path):
+    made = rift.export(fitted, tmp_path / "scene.spz", to="spz")
+    assert made == tmp_path / "scene.spz"
+    assert made.stat().st_size
 
 
 def test_notebooks_show_pictures(fitted):
@@ -99,6 +108,8 @@ def test_a_failed_command_leaves_no_folder(tmp_path, monkeypatch):
         rift.fit(tmp_path / "nowhere")
     with pytest.raises(InputError, match="no setting 'speed'"):
         rift.plan_views(3, speed=2)
+    with pytest.raises(InputError, match=r"config\.json"):
+        rift.plan_views(3, config=tmp_path / "config.json")
     with pytest.raises(InputError, match="dry_run"):
         rift.analyze(tmp_path, dry_run=True)
     assert not list(tmp_path.iterdir())

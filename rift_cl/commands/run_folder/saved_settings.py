@@ -65,13 +65,21 @@ def saved_settings(path: Path, job: str, settings: type[S]) -> S:
     return parsed_settings(repeated, job, settings, where=f"--config {path}{by}: ")
 
 
-def parsed_settings(values: dict[str, Any], job: str, settings: type[S], *, where: str = "") -> S:
+def parsed_settings(
+    values: dict[str, Any],
+    job: str,
+    settings: type[S],
+    *,
+    earlier: S | None = None,
+    where: str = "",
+) -> S:
     """Settings of values by their names, which the command line's parser checks.
 
     Args:
         values: what is given; the rest has its defaults, and so has what is None.
         job: the command.
         settings: its settings.
+        earlier: those to begin with, in place of the defaults.
         where: what a sentence about a mistake begins with.
 
     Raises:
@@ -83,6 +91,8 @@ def parsed_settings(values: dict[str, Any], job: str, settings: type[S], *, wher
         raise InputError(f"{where}'rift {job}' has no setting {unknown[0]!r}")
     arguments = _as_arguments(values, settings)
     try:
+        if earlier is not None:
+            return tyro.cli(settings, default=earlier, args=arguments, console_outputs=False)
         return tyro.cli(settings, args=arguments, console_outputs=False)
     except SystemExit as error:
         raise InputError(
