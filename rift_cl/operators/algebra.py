@@ -40,7 +40,7 @@ class Adjoint(LinearOperator):
 
     @property
     def scratch(self) -> int:
-        """What the operator itself needs."""
+        """Bytes of device memory that the operator needs."""
         return self._forward.scratch
 
     def _pieces(self, budget: int) -> Iterable[Piece]:
@@ -72,7 +72,7 @@ class Scaled(LinearOperator):
 
     @property
     def scratch(self) -> int:
-        """What the operator itself needs."""
+        """Bytes of device memory that the operator needs."""
         return self._inner.scratch
 
     def _pieces(self, budget: int) -> Iterable[Piece]:
@@ -103,7 +103,7 @@ class Sum(LinearOperator):
 
     @property
     def scratch(self) -> int:
-        """The second term's result, besides what the terms need themselves."""
+        """Bytes of the second term's result, and of what the terms need."""
         other = self.dtype.itemsize * max(math.prod(self.domain), math.prod(self.range))
         return other + max(term.scratch for term in self._terms)
 
@@ -144,7 +144,7 @@ class Product(LinearOperator):
 
     @property
     def scratch(self) -> int:
-        """What passes between the two, besides what they need themselves."""
+        """Bytes of the inner operator's result, and of what the two operators need."""
         between = self.dtype.itemsize * math.prod(self._inner.range)
         return between + max(self._outer.scratch, self._inner.scratch)
 
@@ -168,7 +168,7 @@ def _finite(factor: float, dtype: np.dtype[Any]) -> float:
 
 
 def check_one_kind(first: LinearOperator, second: LinearOperator) -> None:
-    """Refuse to combine operators whose arrays cannot be the same.
+    """Check that two operators have one type and one device.
 
     Raises:
         DTypeError: one works in float32, the other in float64.

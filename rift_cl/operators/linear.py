@@ -3,14 +3,14 @@
 An operator maps arrays of shape ``domain`` to arrays of shape ``range``, both of type ``dtype``.
 NumPy in gives NumPy out; a device array in gives a device array out, without a copy; a torch
 tensor, or a batch of them, gives a tensor that passes gradients on. The adjoint is an operator like
-any other, ``A.T.T is A``, and solvers need to know nothing else.
+any other, ``A.T.T is A``, and solvers need nothing else.
 
 Operators do not change once they are made. They are pickled and copied as the arguments that make
 them again, the device as its selector, so that no device memory travels and the copy gives the
 same bits.
 
-Host arrays that are too large for the device are taken in pieces where the operator says how
-(``_pieces``); the result is the same to the bit.
+Host arrays that are too large for the device are processed in pieces, which an operator defines by
+``_pieces``; the result is the same to the bit.
 """
 
 from __future__ import annotations
@@ -54,13 +54,13 @@ _TENSOR_BRIDGE = "rift_cl.interop.linear_torch"
 class LinearOperator(ABC):
     """A linear map between arrays on one device.
 
-    ``grid`` and ``scan`` are those of what it takes and gives, where it knows them.
+    ``grid`` describes its domain and ``scan`` its range; either is None where it is not known.
 
     Args:
-        domain: shape of what it takes.
-        range: shape of what it gives.
-        device: where it works.
-        dtype: type of what it takes and gives, float32 or float64.
+        domain: shape of the input.
+        range: shape of the output.
+        device: the device that it runs on.
+        dtype: type of input and output, float32 or float64.
 
     Raises:
         DeviceError: ``dtype`` is float64 and the device has none.
@@ -85,12 +85,12 @@ class LinearOperator(ABC):
         return f"<{type(self).__name__} {self.domain} -> {self.range}: {', '.join(facts)}>"
 
     def _facts(self) -> list[str]:
-        """What tells it from others of its class, for its repr."""
+        """What its repr says of it besides shapes, type and device."""
         return []
 
     @property
     def shape(self) -> tuple[int, int]:
-        """(rows, columns) of the matrix that it is: samples of its range, and of its domain."""
+        """(rows, columns) of its matrix: number of samples in its range, and in its domain."""
         return math.prod(self.range), math.prod(self.domain)
 
     @cached_property
@@ -113,14 +113,14 @@ class LinearOperator(ABC):
                 real numbers; or a torch tensor of shape (..., *domain) and type ``dtype``.
             out: where to put the result, of the same kind as ``x`` and not ``x`` itself; a new
                 array if not given. Not for tensors.
-            name: what the caller calls ``x``, for the sentence of an error.
+            name: the caller's name for ``x``, for error messages.
 
         Returns:
-            Array of shape ``range`` and type ``dtype``, on the side where ``x`` is.
+            Array of shape ``range`` and type ``dtype``, of the same kind as ``x``.
 
         Raises:
             InputError: ``x`` or ``out`` has the wrong shape or type, or an ``x`` on the host
-                holds NaN or infinity; what is on a device is not looked at.
+                holds NaN or infinity; device arrays are not searched for these.
             DeviceMemoryError: not even the smallest piece fits the device.
         """
         if is_tensor(x):
@@ -209,11 +209,11 @@ class LinearOperator(ABC):
                     self._apply_piece(x, y, inside, outside)
                 return
             except DeviceMemoryError as failure:
-                # The driver had less than it said: take smaller pieces while there are smaller.
+                # The driver had less memory than it reported: retry with smaller pieces.
                 if halving == _HALVINGS:
                     raise
                 lack = failure
-                # What still runs may read the host's memory, so it comes to its end first.
+                # Kernels that still run may read the host's memory: wait for them first.
                 self.device.finish()
                 self.device.release()
             except ResourceLimitError:
@@ -239,19 +239,19 @@ class LinearOperator(ABC):
 
     @property
     def scratch(self) -> int:
-        """Bytes needed on the device besides what goes in and what comes out."""
+        """Bytes of device memory needed besides the input and the output."""
         return 0
 
     def _pieces(self, budget: int) -> Iterable[Piece]:
-        """How to cut the work to fit a budget in bytes: in one, unless the operator knows how."""
+        """Pieces that fit a budget in bytes; one for the whole unless a subclass overrides it."""
         arrays = self.dtype.itemsize * (math.prod(self.domain) + math.prod(self.range))
         plan_chunks(1, arrays, self.scratch, budget, what=f"{type(self).__name__} application")
         return [((), ())]
 
     @abstractmethod
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
-        """Fill ``out`` with the image of ``x``; device arrays, of a piece's shapes."""
+        """Write A x to ``out``; device arrays with the shapes of a piece."""
 
     @abstractmethod
     def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
-        """Fill ``out`` with the adjoint's image of ``y``; device arrays, of a piece's shapes."""
+        """Write A' y to ``out``; device arrays with the shapes of a piece."""

@@ -95,7 +95,7 @@ class Ramp:
 class HighPass:
     """The tunable high-pass |f|^exponent: 1 is the ramp, 0 passes everything alike.
 
-    Between the two it takes away a part of the low-frequency bias that an orbit's views have.
+    Between the two it removes a part of the low-frequency bias of views on an orbit.
     The response is scaled to meet the ramp at the Nyquist frequency, where both pass the most.
 
     Args:
@@ -187,12 +187,12 @@ class ViewFilter(LinearOperator):
             function that takes frequencies, (n,) from 0 to the detector's Nyquist in cycles per
             unit of length, to gains of (angles, n); what it gives at zero is the gain of the
             filter's exact value there.
-        device: where to work; the default device if not given.
+        device: the device to use; the default device if not given.
         dtype: float32 or float64.
 
     Domain and range are (angles, bins) or (angles, rows, bins). The operator is its own adjoint.
-    A filter that all views share is applied in real space to short rows; long rows, and those
-    whose views have responses of their own, take the way through the Fourier domain.
+    A filter that all views share is applied in real space to short rows; long rows, and views with
+    responses of their own, are filtered in the Fourier domain.
 
     Raises:
         InputError: gains have another shape or are not finite.

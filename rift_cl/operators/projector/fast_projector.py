@@ -1,4 +1,4 @@
-"""The X-ray transform of a parallel scan by the Fourier slice theorem, with an error that is named.
+"""The X-ray transform of a parallel scan by the Fourier slice theorem, to a given error.
 
 The transform of a view is the image's spectrum along a ray (R. N. Bracewell, Australian J. Physics
 9, 198, 1956). So a projection is a transform of the padded image, a reading of its rays between the
@@ -35,7 +35,7 @@ _TOGETHER, _TOGETHER_BYTES = 4, 512 << 20
 
 
 class FastProjector(ParallelProjector):
-    """Line integrals of an image, or of every slice of a volume, with an error that is named.
+    """Line integrals of an image, or of every slice of a volume, to a given relative error.
 
     It approximates the transform with the footprint ``strip`` of ``Projector``, which counts the
     area that pixel and bin share. The spectrum of that never ends: that of the bins, repeated,
@@ -46,18 +46,18 @@ class FastProjector(ParallelProjector):
     two projectors differ on sharp data; reconstructions are as good.
 
     Args:
-        grid: where the image lives, (ny, nx) or (nz, ny, nx).
-        scan: how it is looked at.
-        error: what the result may differ by from that transform's, the norm of the difference
-            over the norm of the result: for data as rough as white noise or smoother, on a detector
-            that sees the image. Rougher data (a checkerboard, a lone corner pixel) may differ by a
-            little more, and float32 rounds at 1e-6.
+        grid: the grid of the image, (ny, nx), or of the volume, (nz, ny, nx).
+        scan: angles and detector.
+        error: largest difference from that transform, the norm of the difference over the norm of
+            the result: for data as rough as white noise or smoother, on a detector that covers the
+            image. Rougher data (a checkerboard, a single corner pixel) may differ by a little more,
+            and float32 rounds at 1e-6.
         lobes: ``image``, or how many lobes of the bin's sinc are kept, folded or not. 0: nothing
             beyond the detector's Nyquist frequency; edges ring. 3: nearly the values that
             phase tables give.
-        device: where to work; the default device if not given.
+        device: the device to use; the default device if not given.
 
-    Bins further from the image's shadow than a pixel's own and eight bins are taken for zero.
+    Bins farther from the image's shadow than a pixel's shadow and eight bins are set to zero.
 
     Raises:
         InputError: the error is smaller than this method allows, or bins are very much finer than
@@ -92,7 +92,7 @@ class FastProjector(ParallelProjector):
         self._together = min(self._slices_together(), grid.slices)
 
     def prepare(self) -> None:
-        """Make the tables now, which is otherwise left to the first application."""
+        """Build the tables now instead of at the first application."""
         _ = self._tables.nbytes
 
     @property

@@ -1,4 +1,4 @@
-"""What all projectors of parallel beams have in common, however they compute."""
+"""The base class of parallel-beam projectors: geometry, shapes, and the cutting of stacks."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from rift_cl.operators.linear import LinearOperator, Piece
 
 
 class ParallelProjector(LinearOperator):
-    """Line integrals of an image, or of every slice of a volume; slices do not depend on others.
+    """Line integrals of an image, or of every slice of a volume independently.
 
     Args:
-        grid: where the image lives, (ny, nx) or (nz, ny, nx).
-        scan: how it is looked at.
-        device: where to work; the default device if not given.
-        dtype: of its arrays.
+        grid: the grid of the image, (ny, nx), or of the volume, (nz, ny, nx).
+        scan: angles and detector.
+        device: the device to use; the default device if not given.
+        dtype: type of its arrays.
 
     The domain is ``grid.shape``; the range is (angles, bins), or (angles, nz, bins) for a volume.
     Values of the range are in the image's unit times the grid's unit of length.
@@ -68,12 +68,12 @@ class ParallelProjector(LinearOperator):
         return self.pieces(budget)
 
     def pieces(self, budget: int, *, sinograms: int = 1, fixed: int = 0) -> list[Piece]:
-        """How to cut the slices to fit a budget in bytes.
+        """Runs of slices that fit a budget in bytes.
 
         Args:
-            budget: bytes there are.
-            sinograms: how many a slice needs at a time; more than one where others are made of it.
-            fixed: bytes needed besides, whatever the number of slices.
+            budget: bytes of memory available.
+            sinograms: sinograms that a slice needs at the same time.
+            fixed: further bytes needed, whatever the number of slices.
         """
         views, bins = len(self.scan.angles), self.scan.bins
         numbers = math.prod(self.grid.shape[-2:]) + sinograms * views * bins

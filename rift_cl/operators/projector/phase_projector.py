@@ -34,11 +34,11 @@ class Projector(ParallelProjector):
     """Line integrals of an image, or of every slice of a volume.
 
     Args:
-        grid: where the image lives, (ny, nx) or (nz, ny, nx).
-        scan: how it is looked at.
-        footprint: what a pixel leaves on the detector. ``strip``: the area that the pixel shares
-            with the strip of rays that a bin collects. Every view then holds the whole mass, and
-            ``fbp(A, A(x))`` of a uniform object is flat. ``joseph``: rays through the bins'
+        grid: the grid of the image, (ny, nx), or of the volume, (nz, ny, nx).
+        scan: angles and detector.
+        footprint: the projection of a pixel onto the detector. ``strip``: the area that the pixel
+            shares with the strip of rays that a bin collects. Every view then holds the whole mass,
+            and ``fbp(A, A(x))`` of a uniform object is flat. ``joseph``: rays through the bins'
             centres interpolate linearly between the pixels of each row or column they cross
             (Joseph 1982); the result is flat to about 1 %, and worse where bins are wider than
             samples, since rays miss what lies between them. ``linear``: the pixel is spread by
@@ -46,7 +46,7 @@ class Projector(ParallelProjector):
             finer than its shadow the hat widens to that shadow. Its projections of a uniform
             object ripple in views near 45 and 135 degrees, and ``fbp(A, A(x))`` varies by
             several per cent; reconstructions of measured data do not suffer.
-        device: where to work; the default device if not given.
+        device: the device to use; the default device if not given.
         dtype: ``float32``, or ``float64`` where the device has it: for an adjoint that is matched
             to 1e-15 and for solvers that run far. Both types read one geometry, in which a step
             from row to row is exact to 2^-33 of a column: projections are off by 2e-9 (smooth

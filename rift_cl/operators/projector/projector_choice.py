@@ -67,13 +67,13 @@ def cheapest_projector(
     """The projector of a parallel scan that costs least, by a fixed model of what each costs.
 
     Args:
-        grid: where the image lives, (ny, nx) or (nz, ny, nx).
-        scan: how it is looked at.
+        grid: the grid of the image, (ny, nx), or of the volume, (nz, ny, nx).
+        scan: angles and detector.
         iterative: whether a solver will use it, rather than ``fbp`` or ``backproject``.
-        error: what ``FastProjector`` may differ by in norm; 1e-3 if not given, by which filtered
-            backprojection loses less than 0.05 dB.
-        footprint: of ``Projector``; whoever names one wants that projector.
-        device: where to work; the default device if not given.
+        error: relative error of ``FastProjector``; 1e-3 if not given, which costs filtered
+            backprojection less than 0.05 dB.
+        footprint: of ``Projector``, which is then the one that is returned.
+        device: the device to use; the default device if not given.
 
     Raises:
         InputError: footprint and error are both given, or one of them cannot be.
