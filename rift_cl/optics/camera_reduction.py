@@ -17,8 +17,8 @@ from rift_cl.geometry.camera_type import CameraType
 from rift_cl.optics.depth_of_field import diffraction_depth, sharp_range
 from rift_cl.optics.gaussian_lens import GaussianLens, gaussian_lens
 from rift_cl.optics.lens_prescription import LensPrescription
+from rift_cl.optics.optical_transfer import check_positive, incoherent_cutoff
 from rift_cl.optics.real_rays import chief_ray, pupil_rays, trace
-from rift_cl.optics.transfer import check_positive, incoherent_cutoff
 
 # Rings of the pupil for the spot on the axis, each of the same area.
 _RINGS = 24

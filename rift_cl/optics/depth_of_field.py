@@ -10,12 +10,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from rift_cl.errors import InputError
-from rift_cl.geometry.numbers import one_number, positive_or_infinite
-from rift_cl.optics.pupil import defocused_otf
-from rift_cl.optics.transfer import check_positive, incoherent_cutoff
+from rift_cl.geometry.numbers import positive_or_infinite
+from rift_cl.optics.optical_transfer import check_positive
 
 # Best aperture over z sqrt(2 wavelength / depth), and the cut-off there over
 # 1 / sqrt(wavelength depth); found with the exact OTF, which has no other scale.
@@ -77,16 +74,6 @@ def sharp_range(diameter: float, focus: float, blur: float, focal_pixels: float)
     return SharpRange(1 / (1 / distance + step), 1 / far if far > 0 else math.inf)
 
 
-def hyperfocal(diameter: float, blur: float, focal_pixels: float) -> float:
-    """The focus from which on everything to infinity is sharp; arguments of ``sharp_range``.
-
-    Raises:
-        InputError: an argument is not positive.
-    """
-    check_positive(diameter=diameter, blur=blur, focal_pixels=focal_pixels)
-    return diameter * focal_pixels / blur
-
-
 def diffraction_depth(diameter: float, distance: float, wavelength: float) -> float:
     """Depth of field that diffraction grants: wavelength / (1 - cos theta).
 
@@ -137,38 +124,3 @@ def finite_depth_optimum(
     return FiniteDepth(
         width * distance * math.sqrt(2 * wavelength / share), cutoff / math.sqrt(wavelength * share)
     )
-
-
-def worst_depth_cutoff(
-    diameter: float, distance: float, depth: float, wavelength: float, level: float = 0.1
-) -> float:
-    """Frequency at which the MTF at a target's worst depth first falls to a level.
-
-    By the exact OTF, in focus at ``distance`` and with the defocus that both ends of the target
-    have to first order in depth / distance: A^2 depth / (16 wavelength z^2).
-
-    Args:
-        diameter: A, of the entrance pupil.
-        distance: z of the target's middle.
-        depth: of the target.
-        wavelength: of the light.
-        level: of the MTF, between 0 and 1.
-
-    Returns:
-        The frequency, in cycles per unit of length of the object.
-
-    Raises:
-        InputError: an argument is out of its range.
-    """
-    check_positive(diameter=diameter, distance=distance, depth=depth, wavelength=wavelength)
-    if not 0 < one_number(level) < 1:
-        raise InputError(f"level is {level!r}, wanted a number between 0 and 1")
-    waves = diameter**2 * depth / (16 * wavelength * distance**2)
-    # The OTF has its first zero before 1 / waves, at 0.15 / waves where there are many.
-    v = np.linspace(0, min(1, 1 / waves), 2001)
-    otf = defocused_otf(v, waves)
-    first = int(np.argmax(otf < level))
-    # Between the two samples, along the straight line through them.
-    step = (otf[first - 1] - level) / (otf[first - 1] - otf[first])
-    found = v[first - 1] + step * (v[first] - v[first - 1])
-    return float(found) * incoherent_cutoff(diameter, distance, wavelength)

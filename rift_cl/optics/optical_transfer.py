@@ -18,9 +18,48 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import j0, j1
 
+from rift_cl.errors import InputError
+from rift_cl.geometry.numbers import one_number
+
 Floats = NDArray[np.float64]
 # Arguments below which quotients by them are taken from their series.
 _SMALL = 1e-4
+
+
+def coherent_cutoff(diameter: float, distance: float, wavelength: float) -> float:
+    """Highest frequency that passes in coherent light: A / (2 wavelength z).
+
+    That is the paper's equation 2 on the axis, the tilt of the ray to the pupil's edge.
+
+    Args:
+        diameter: A, of the entrance pupil.
+        distance: z, from the entrance pupil to the object.
+        wavelength: of the light.
+
+    Raises:
+        InputError: one of them is not positive.
+    """
+    check_positive(diameter=diameter, distance=distance, wavelength=wavelength)
+    return diameter / (2 * wavelength * distance)
+
+
+def incoherent_cutoff(diameter: float, distance: float, wavelength: float) -> float:
+    """Highest frequency that passes in light of scenes: A / (wavelength z), twice the coherent one.
+
+    Arguments and errors are those of ``coherent_cutoff``.
+    """
+    return 2 * coherent_cutoff(diameter, distance, wavelength)
+
+
+def check_positive(**values: float) -> None:
+    """Refuse a value that is no positive finite number, by its name.
+
+    Raises:
+        InputError: one is not.
+    """
+    for name, value in values.items():
+        if not one_number(value) > 0:
+            raise InputError(f"{name} is {value!r}, wanted a positive number")
 
 
 class Transfer(NamedTuple):

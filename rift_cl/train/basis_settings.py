@@ -34,9 +34,6 @@ class BasisSettings:
         ridge: weight in the loss of the mean over splats of their modes' squares. Modes of orders
             1 and 2 of a shape do nearly what a shift and another covariance do, and polynomials
             of colours have no bound: without it they wander where nothing holds them.
-        least: an experiment: splats whose modes, all together, have a smaller norm than this at
-            ``settle`` are Gaussians from then on; 0 for none.
-        settle: share of the steps at which that is decided.
 
     Raises:
         InputError: a number is out of its range, or a choice is unknown, or Gaussians have orders.
@@ -49,8 +46,6 @@ class BasisSettings:
     first: float = 0.1
     every: float = 0.1
     ridge: float = 1e-3
-    least: float = 0.0
-    settle: float = 0.6
 
     def __post_init__(self) -> None:
         """Check every number's range, and that they agree."""
@@ -63,10 +58,9 @@ class BasisSettings:
                     f"BasisSettings: {name} is {getattr(self, name)} and kind is 'gaussian', whose "
                     "splats have no orders: use 'hermite' or 'laguerre'"
                 )
-        for name in ("first", "every", "settle"):
+        for name in ("first", "every"):
             check_number(self, name, most=1)
-        for name in ("ridge", "least"):
-            check_number(self, name)
+        check_number(self, "ridge")
 
     @property
     def plain(self) -> bool:

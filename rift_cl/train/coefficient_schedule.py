@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rift_cl.basis.angular import angular_basis
 from rift_cl.basis.indices import graded
@@ -57,29 +56,17 @@ class CoefficientSchedule:
         elif "lobes" not in parameters.raw:
             self._add_lobes(parameters)
         self._add_orders(parameters)
-        if step and step == self._settled:
-            self._settle(parameters)
 
     def hold(self, parameters: Parameters) -> None:
         """Say which modes are trained; to be asked whenever the splats are others."""
         parameters.free = {}
-        settled = bool(self._settled) and parameters.step >= self._settled
-        if not (self._flat or settled):
+        if not self._flat:
             return
-        rows = self._with_modes(parameters) if settled else np.ones(len(parameters), bool)
         for name in (name for name in MODES if name in parameters.raw):
             shape = parameters.raw[name].shape
-            free = np.broadcast_to(rows.reshape(-1, *[1] * (len(shape) - 1)), shape)
-            if self._flat:
-                across = graded(order_of(shape[1] + 1), 3)[1:, 2] > 0
-                free = free & ~across.reshape(-1, *[1] * (len(shape) - 2))
+            along = graded(order_of(shape[1] + 1), 3)[1:, 2] == 0
+            free = np.broadcast_to(along.reshape(-1, *[1] * (len(shape) - 2)), shape)
             parameters.free[name] = parameters.device.array(free.astype(np.float32))
-
-    @property
-    def _settled(self) -> int:
-        """The step at which splats of hardly any modes become Gaussians; 0 for never."""
-        basis = self.settings.basis
-        return round(basis.settle * self.settings.steps) if basis.least else 0
 
     def _add_orders(self, parameters: Parameters) -> None:
         basis, joined = self.settings.basis, False
@@ -103,22 +90,3 @@ class CoefficientSchedule:
         for moments in (parameters.first, parameters.second):
             moments["lobes"] = device.zeros(geometry.shape)
         parameters.widen("sh", basis.n_linear)
-
-    def _settle(self, parameters: Parameters) -> None:
-        """Make Gaussians of the splats whose modes do the least."""
-        kept = self._with_modes(parameters, self.settings.basis.least)
-        for name in (name for name in MODES if name in parameters.raw):
-            for group in (parameters.raw, parameters.first, parameters.second):
-                array = parameters.device.get(group[name])
-                array[~kept] = 0
-                group[name] = parameters.device.array(array)
-        parameters.redraw()
-        self.hold(parameters)
-
-    def _with_modes(self, parameters: Parameters, least: float = 0.0) -> NDArray[np.bool_]:
-        """(N,) splats whose modes have a larger norm."""
-        square = np.zeros(len(parameters))
-        for name in (name for name in MODES if name in parameters.raw):
-            modes = parameters.device.get(parameters.raw[name]).astype(float)
-            square += np.square(modes).reshape(len(square), -1).sum(axis=1)
-        return np.asarray(square > least**2)

@@ -16,12 +16,15 @@ from rift_cl.optics.depth_of_field import (
     SAFE_CUTOFF,
     diffraction_depth,
     finite_depth_optimum,
-    hyperfocal,
     sharp_range,
+)
+from rift_cl.optics.optical_transfer import incoherent_cutoff
+from rift_cl.reference.pupil import (
+    defocus_mtf,
+    defocused_otf,
+    diffraction_mtf,
     worst_depth_cutoff,
 )
-from rift_cl.optics.pupil import defocused_otf
-from rift_cl.optics.transfer import defocus_mtf, diffraction_mtf, incoherent_cutoff
 
 GREEN = 550e-6
 
@@ -34,13 +37,6 @@ def test_blur_at_the_limits_is_what_was_allowed(focus: float) -> None:
     for z in found:
         assert aperture.blur(z) * focal / z == pytest.approx(1.5)
     assert found.depth == found.far - found.near
-
-
-def test_from_the_hyperfocal_distance_on_all_is_sharp() -> None:
-    far = hyperfocal(4.0, 1.0, 8000.0)
-    assert sharp_range(4.0, far, 1.0, 8000.0) == pytest.approx((far / 2, math.inf))
-    assert sharp_range(4.0, math.inf, 1.0, 8000.0) == pytest.approx((far, math.inf))
-    assert sharp_range(4.0, far * 0.99, 1.0, 8000.0).far < math.inf
 
 
 @pytest.mark.parametrize(("N", "depth"), [(4, 20), (8, 80), (16, 321)])
@@ -111,7 +107,6 @@ def test_lengths_are_positive(bad: float) -> None:
         lambda: sharp_range(bad, 100, 1, 100),
         lambda: sharp_range(1, bad, 1, 100),
         lambda: sharp_range(1, np.array([1.0, 2.0]), 1, 100),  # type: ignore[arg-type]
-        lambda: hyperfocal(1, bad, 100),
         lambda: diffraction_depth(1, bad, GREEN),
         lambda: finite_depth_optimum(bad, 270, GREEN),
         lambda: finite_depth_optimum(60, 270, GREEN, planes=bad),  # type: ignore[arg-type]

@@ -9,21 +9,14 @@ import pytest
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Aperture
-from rift_cl.optics.optical_transfer import optical_transfer
-from rift_cl.optics.pupil import (
+from rift_cl.optics.optical_transfer import coherent_cutoff, incoherent_cutoff, optical_transfer
+from rift_cl.reference.pupil import (
     annular_mtf,
+    defocus_mtf,
     defocus_waves,
     defocused_otf,
-    numerical_otf,
-)
-from rift_cl.optics.transfer import (
-    coherent_cutoff,
-    defocus_mtf,
     diffraction_mtf,
-    incoherent_cutoff,
-    pixel_mtf,
-    polychromatic_mtf,
-    system_mtf,
+    numerical_otf,
 )
 
 SHARE = np.linspace(0, 1, 1001)
@@ -49,25 +42,15 @@ def test_cutoffs_are_those_of_the_papers_camera(N: float, coherent: float) -> No
 def test_mtfs_begin_at_one_and_end_at_their_cutoffs() -> None:
     assert diffraction_mtf([0, 1, 1.5]).tolist() == [1, 0, 0]
     assert diffraction_mtf(0.5) == pytest.approx(0.39100, abs=1e-5)
-    assert pixel_mtf([0.0, 100.0], 0.01) == pytest.approx([1, 0])
-    assert pixel_mtf(50.0, 0.01) == pytest.approx(2 / math.pi)
     assert defocus_mtf([0.0, 3.8317059702 / math.pi], 1.0) == pytest.approx([1, 0], abs=1e-9)
     np.testing.assert_array_equal(diffraction_mtf(-SHARE), diffraction_mtf(SHARE))
-
-
-def test_the_system_is_the_product_and_each_part_may_be_left_out() -> None:
-    k = np.linspace(0, 40, 101)
-    np.testing.assert_array_equal(system_mtf(k), 1)
-    whole = system_mtf(k, cutoff=30.0, pixel=0.02, blur=0.05)
-    parts = diffraction_mtf(k / 30) * pixel_mtf(k, 0.02) * defocus_mtf(k, 0.05, 30.0)
-    np.testing.assert_allclose(whole, parts, rtol=1e-14)
-    np.testing.assert_array_equal(system_mtf(k, pixel=0.02), pixel_mtf(k, 0.02))
 
 
 def test_coverage_counts_with_the_same_mtf() -> None:
     k = np.linspace(0, 60, 241)
     for cutoff, pixel, blur in ((30.0, 0.02, 0.05), (math.inf, 0.03, 0.0), (50.0, 0.0, 0.4)):
-        here = system_mtf(k, cutoff=cutoff, pixel=pixel, blur=blur)
+        lens = diffraction_mtf(k / cutoff) * defocus_mtf(k, blur, cutoff)
+        here = lens * np.abs(np.sinc(k * pixel))
         there = optical_transfer(k, pixel, cutoff, blur).value
         np.testing.assert_allclose(there, here, atol=1e-9)
 
@@ -150,18 +133,6 @@ def test_full_minus_half_the_aperture_is_a_band_pass() -> None:
     assert band == pytest.approx([0, 0.126, 0.294, 0.391, 0.188], abs=1e-3)
 
 
-def test_colours_add_each_with_its_own_cutoff() -> None:
-    k = np.linspace(0, 40, 81)
-    mono = polychromatic_mtf(k, 4.0, 270.0, [550e-6])
-    cutoff = incoherent_cutoff(4.0, 270.0, 550e-6)
-    np.testing.assert_allclose(mono, diffraction_mtf(k / cutoff))
-    both = polychromatic_mtf(k, 4.0, 270.0, [450e-6, 650e-6], [3, 1])
-    blue, red = (polychromatic_mtf(k, 4.0, 270.0, [w]) for w in (450e-6, 650e-6))
-    np.testing.assert_allclose(both, 0.75 * blue + 0.25 * red)
-    beyond = incoherent_cutoff(4.0, 270.0, 650e-6) * 1.1
-    assert polychromatic_mtf(beyond, 4.0, 270.0, [450e-6, 650e-6]) > 0
-
-
 @pytest.mark.parametrize("bad", [0, -1, math.nan, math.inf, "wide", None])
 def test_lengths_are_positive(bad: float) -> None:
     for arguments in ((bad, 1, 1), (1, bad, 1), (1, 1, bad)):
@@ -176,12 +147,10 @@ def test_hostile_values_are_refused_in_words() -> None:
         diffraction_mtf([math.nan])
     with pytest.raises(InputError, match="frequencies"):
         defocused_otf(["much"], 1.0)
-    with pytest.raises(InputError, match="pixel"):
-        pixel_mtf(1.0, -1)
     with pytest.raises(InputError, match="blur"):
         defocus_mtf(1.0, math.nan)
     with pytest.raises(InputError, match="cutoff"):
-        system_mtf(1.0, cutoff=0)
+        defocus_mtf(1.0, 1.0, 0)
     with pytest.raises(InputError, match="cutoff"):
         defocus_mtf(1.0, 1.0, np.array([1.0, 2.0]))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="waves"):
@@ -192,10 +161,6 @@ def test_hostile_values_are_refused_in_words() -> None:
         numerical_otf(np.ones((4, 5)))
     with pytest.raises(InputError, match="zero"):
         numerical_otf(np.zeros((4, 4)))
-    with pytest.raises(ShapeError, match="weights"):
-        polychromatic_mtf(1.0, 1, 1, [])
-    with pytest.raises(InputError, match="weights"):
-        polychromatic_mtf(1.0, 1, 1, [1e-3, 2e-3], [1, -1])
 
 
 def test_strong_defocus_is_the_blur_disc_of_geometry() -> None:

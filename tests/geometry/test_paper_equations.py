@@ -10,7 +10,7 @@ import pytest
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.optics.depth_of_field import diffraction_depth
-from rift_cl.optics.paper_equations import (
+from rift_cl.reference.paper_equations import (
     axial_band,
     axial_frequency,
     chief_ray,

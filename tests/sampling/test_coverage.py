@@ -11,7 +11,6 @@ from observations_of_all_kinds import random_observations, ring_of_cameras
 import rift_cl as rift
 from rift_cl.errors import InputError, ResourceLimitError, ShapeError
 from rift_cl.geometry import Parallel
-from rift_cl.sampling.coverage.cube import coverage_cube, cube_axis
 from rift_cl.sampling.coverage.device import coverage, coverage_grad
 from rift_cl.sampling.coverage.host import host_coverage, host_coverage_grad
 from rift_cl.sampling.targets.observations import Observations
@@ -63,7 +62,7 @@ def test_any_number_of_frequencies_will_do(device, observations, target, count):
 def test_a_view_that_is_skipped_adds_nothing(device):
     """Rows of a cube lie in long boxes that most slabs miss; in another order hardly any is."""
     target, observations = Target((0, 0, 0), 1.0), random_observations(40, 1)
-    axis = cube_axis(16.0, 16)
+    axis = np.linspace(-16, 16, 16)
     z, y, x = np.meshgrid(axis, axis, axis, indexing="ij")
     k = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
     order = np.random.default_rng(0).permutation(len(k))
@@ -130,17 +129,6 @@ def test_a_scan_covers_what_its_directions_do(device):
     np.testing.assert_allclose(found, bare, atol=1e-3 * bare.max())
 
 
-def test_half_a_cube_tells_the_other(device, observations, target):
-    for count in (5, 6):
-        cube = coverage_cube(observations, target, count, device=device)
-        axis = cube_axis(target.highest, count)
-        z, y, x = np.meshgrid(axis, axis, axis, indexing="ij")
-        whole = coverage(
-            observations, target, np.stack([x, y, z], -1).reshape(-1, 3), device=device
-        )
-        np.testing.assert_allclose(cube.reshape(2, -1), whole, atol=1e-5)
-
-
 def test_what_no_view_sees_is_not_covered(device):
     cameras = ring_of_cameras(4)
     target = Target((100, 0, 0), 1.0)
@@ -171,9 +159,6 @@ def test_bad_views_and_gradients_are_refused(observations, target):
         coverage(observations, target, weights=[1.0])
     with pytest.raises(InputError, match="too large for float32"):
         coverage(ring_of_cameras(1), Target((0, 0, 0), 1.0), weights=[1e39])
-    for count in (1, 2.5, "five"):
-        with pytest.raises(InputError, match="count is"):
-            coverage_cube(observations, target, count)
     with pytest.raises(ShapeError, match="grad has shape"):
         coverage_grad(observations, target, np.zeros((1, 3)))
     with pytest.raises(InputError, match="NaN"):

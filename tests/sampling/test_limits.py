@@ -9,7 +9,7 @@ from observations_of_all_kinds import ring_of_cameras
 from rift_cl.errors import InputError
 from rift_cl.geometry import Aperture
 from rift_cl.optics.optical_transfer import optical_transfer
-from rift_cl.optics.pupil import defocused_otf
+from rift_cl.reference.pupil import defocused_otf
 from rift_cl.sampling.coverage.density import half_sphere
 from rift_cl.sampling.criteria.limits import limits
 from rift_cl.sampling.targets.observations import Observations

@@ -25,7 +25,6 @@ KINDS = {
     "color": {"basis": BasisSettings("laguerre", 0, 1, first=0.2), "strategy": DefaultSettings()},
     "exp": {"basis": BasisSettings("hermite", 1, 1, "exp", first=0.2)},
     "square": {"basis": BasisSettings(activation="square")},
-    "settled": {"basis": replace(BOTH, least=0.05, settle=0.5)},
     "lg": {"angular": AngularSettings("lg", 5, first=0.2)},
     "asg": {"angular": AngularSettings("asg", 2, first=0.2), "strategy": DefaultSettings()},
 }
@@ -107,24 +106,6 @@ def test_lobes_join_with_their_own_geometry(device):
     assert not raw["sh"][:, 1:].any()
     run_to(trainer, STEPS)
     assert trainer.parameters.host()[0]["sh"][:, 1:].any()
-
-
-def test_settled_splats_are_gaussians_for_good(device):
-    def norms(trainer):
-        raw = trainer.parameters.host()[0]
-        return np.sqrt((raw["shape_modes"] ** 2).sum(1) + (raw["color_modes"] ** 2).sum((1, 2)))
-
-    ball, still = Ball(device), McmcSettings(first=STEPS)
-    free = trainer_of(device, "settled", ball, strategy=still, basis=BOTH)
-    run_to(free, 15)
-    least = float(np.median(norms(free)))
-    basis = replace(BOTH, least=least, settle=0.5)
-    trainer = trainer_of(device, "settled", ball, strategy=still, basis=basis)
-    run_to(trainer, 15)
-    held = norms(trainer) == 0
-    assert 20 < held.sum() < 40 and (norms(trainer)[~held] > least).all()
-    run_to(trainer, STEPS)
-    assert not norms(trainer)[held].any() and norms(trainer)[~held].all()
 
 
 def test_a_state_of_splats_without_modes_is_one_to_begin_with(device):

@@ -30,7 +30,7 @@ NAN = float("nan")
         (BasisSettings, {"first": 1.1}, "first is 1.1, wanted 0 to 1"),
         (BasisSettings, {"every": NAN}, "every is nan"),
         (BasisSettings, {"ridge": -1}, "ridge is -1"),
-        (BasisSettings, {"least": "much"}, "least is 'much'"),
+        (BasisSettings, {"ridge": "much"}, "ridge is 'much'"),
         (AngularSettings, {"kind": "cubes"}, "kind is 'cubes', wanted sh or hg"),
         (AngularSettings, {"modes": 0}, "modes is 0, wanted 1 to 35"),
         (AngularSettings, {"kind": "sg", "modes": 36}, "modes is 36"),

@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 
 from figures.images import decode, encode
 from figures.plan import Plan
+from figures.slice_theorem import slice_comparison
 from rift_cl import Device, Grid, Parallel, Projector, backproject
 from rift_cl.phantom import shepp_logan
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import FrequencySlice, curves, figure_png, frequency_maps, image_grid
-from rift_cl.sampling.coverage.cube import cube_axis
 from rift_cl.sampling.coverage.density import density, half_sphere, mean_density, power_slope
-from rift_cl.sampling.coverage.slice_theorem import slice_comparison
 from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
@@ -89,7 +88,7 @@ def _slice(size: int, device: Device) -> dict[str, Any]:
 
 def _orbit(size: int, device: Device) -> dict[str, Any]:
     grid, target = Grid((size, size)), Target.flat(1.0, band=_BAND)
-    image, axis = shepp_logan(grid), cube_axis(_BAND, 192)
+    image, axis = shepp_logan(grid), np.linspace(-_BAND, _BAND, 192)
     x, y = np.meshgrid(axis, axis)
     k = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
     maps, spectra = [], []

@@ -11,7 +11,7 @@ from figures.images import decode, encode
 from figures.plan import Plan
 from rift_cl import Device
 from rift_cl.commands.demo.job import COLUMNS, SCORING, study_panels, study_row
-from rift_cl.commands.view_study import ViewScore, view_study
+from rift_cl.commands.demo.view_study import ViewScore, view_study
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_png
 

@@ -8,7 +8,7 @@ from typing import Any
 from figures.plan import Plan
 from rift_cl import Device
 from rift_cl.commands.demo.job import COLUMNS, SCORES, SCORING, study_curves
-from rift_cl.commands.view_study import view_study
+from rift_cl.commands.demo.view_study import view_study
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_png
 

@@ -23,10 +23,9 @@ from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.pose import look_at
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import FrequencySlice, curves, figure_png, frequency_maps
-from rift_cl.sampling.coverage.cube import cube_axis
 from rift_cl.sampling.coverage.density import density, half_circle, ring_density
+from rift_cl.sampling.criteria.crowther import crowther
 from rift_cl.sampling.criteria.limits import limits
-from rift_cl.sampling.criteria.sufficiency import crowther
 from rift_cl.sampling.targets.target import Target
 
 NAME = "figure_07"
@@ -143,7 +142,7 @@ def _measured(count: int, distance: float, edge: int, device: Device) -> dict[st
 
 def _in_the_plane(cameras: list[Camera], target: Target, edge: int, device: Device) -> NDArray[Any]:
     """Density over the plane of the ring, (ky, kx)."""
-    axis = cube_axis(_BAND, _FINE * edge)
+    axis = np.linspace(-_BAND, _BAND, _FINE * edge)
     x, y = np.meshgrid(axis, axis)
     k = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
     found = density(cameras, target, k, device=device)[0]
@@ -154,7 +153,7 @@ def _beside_the_axis(
     cameras: list[Camera], target: Target, edge: int, device: Device
 ) -> NDArray[Any]:
     """Density over an upright plane, (kz, kr), the mean over all such planes."""
-    half = cube_axis(_BAND, edge)[edge // 2 :]
+    half = np.linspace(-_BAND, _BAND, edge)[edge // 2 :]
     turn = np.pi * (np.arange(_AZIMUTHS) + 0.5) / _AZIMUTHS
     z, r, a = (part.ravel() for part in np.meshgrid(half, half, turn, indexing="ij"))
     k = np.stack([r * np.cos(a), r * np.sin(a), z], axis=1)

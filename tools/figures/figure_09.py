@@ -18,11 +18,16 @@ from figures.plan import Plan
 from rift_cl import Device
 from rift_cl.io.lenses.lens_file import open_lens
 from rift_cl.optics.camera_reduction import Reduction, reduce_camera
-from rift_cl.optics.depth_of_field import finite_depth_optimum, worst_depth_cutoff
+from rift_cl.optics.depth_of_field import finite_depth_optimum
 from rift_cl.optics.lens_prescription import LensPrescription
-from rift_cl.optics.pupil import defocused_otf
+from rift_cl.optics.optical_transfer import incoherent_cutoff
 from rift_cl.optics.real_rays import pupil_rays, trace
-from rift_cl.optics.transfer import defocus_mtf, diffraction_mtf, incoherent_cutoff
+from rift_cl.reference.pupil import (
+    defocus_mtf,
+    defocused_otf,
+    diffraction_mtf,
+    worst_depth_cutoff,
+)
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import curves, figure_png
 from rift_cl.sample.stock_lenses import STOCK_LENSES, stock_lens

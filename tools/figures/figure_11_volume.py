@@ -13,7 +13,7 @@ from figures.plan import Plan
 from figures.radial_kspace import measure
 from rift_cl import Device, Grid, Parallel, Projector
 from rift_cl.commands.demo.job import COLUMNS, SCORES, study_curves
-from rift_cl.commands.view_study import ViewScore, detector_bins, score_views
+from rift_cl.commands.demo.view_study import ViewScore, detector_bins, score_views
 from rift_cl.phantom import head, project, shepp_logan
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_png, image_grid

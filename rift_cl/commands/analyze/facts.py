@@ -10,10 +10,10 @@ import numpy as np
 
 from rift_cl.commands.inputs.view_set import ViewSet
 from rift_cl.sampling.coverage.host import host_coverage
+from rift_cl.sampling.criteria.crowther import crowther, crowther_views
 from rift_cl.sampling.criteria.limits import CAUSES, Limits, limits
 from rift_cl.sampling.criteria.merit import merit_of_coverage
 from rift_cl.sampling.criteria.orlov import Orlov, orlov
-from rift_cl.sampling.criteria.sufficiency import crowther, crowther_views
 from rift_cl.sampling.criteria.tuy import tuy
 
 Table = tuple[tuple[str, ...], list[tuple[Any, ...]], str]

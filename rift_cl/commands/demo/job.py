@@ -12,13 +12,13 @@ from functools import partial
 from typing import Any
 
 from rift_cl.commands.demo.settings import DemoSettings
+from rift_cl.commands.demo.view_study import ViewScore, view_study
 from rift_cl.commands.fit_photos.job import Fit
 from rift_cl.commands.fit_photos.report import show_fit
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.render.job import Render
 from rift_cl.commands.render.settings import RenderSettings
 from rift_cl.commands.run_folder.run_folder import RunFolder
-from rift_cl.commands.view_study import ViewScore, view_study
 from rift_cl.errors import InputError
 from rift_cl.io.images.image import write_png
 from rift_cl.progress import Report

@@ -16,13 +16,13 @@ from numpy.typing import ArrayLike
 
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.geometry.numbers import one_number, real_numbers
-from rift_cl.optics.transfer import (
+from rift_cl.optics.optical_transfer import (
     Floats,
     check_positive,
     coherent_cutoff,
-    frequencies,
     incoherent_cutoff,
 )
+from rift_cl.reference.pupil import frequencies
 
 
 class PassedBand(NamedTuple):

@@ -1,4 +1,4 @@
-"""Do these views suffice? Orlov's and Tuy's conditions, and how many views it takes.
+"""How many views it takes for a resolution, and what resolution the views at hand give.
 
 Crowther, DeRosier and Klug (1970): K >= pi D / d even views of a target of diameter D for a
 resolution d. The converse is taken for the set at hand: up to which frequency are its slices no
@@ -13,19 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from rift_cl.errors import InputError
-from rift_cl.geometry import Parallel
 from rift_cl.geometry.numbers import one_number
 from rift_cl.sampling.coverage.work import Views
 from rift_cl.sampling.criteria.orlov import (
-    Orlov,
     frequency_directions,
-    orlov,
     seen_directions,
     slice_gaps,
     wanted_frequency,
 )
-from rift_cl.sampling.criteria.tuy import Tuy, tuy
-from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
 # Share of directions that the converse of Crowther's count asks for: a small hole is left to
@@ -60,25 +55,10 @@ class Crowther:
         )
 
 
-@dataclass(frozen=True)
-class Sufficiency:
-    """The three conditions together; ``tuy`` is None for parallel rays."""
-
-    orlov: Orlov
-    tuy: Tuy | None
-    crowther: Crowther
-
-    @property
-    def sentence(self) -> str:
-        """All findings for a reader."""
-        parts = (self.orlov, self.tuy, self.crowther)
-        return " ".join(part.sentence for part in parts if part is not None)
-
-
-def sufficiency(
+def crowther(
     views: Views, target: Target, *, frequency: float | None = None, point: int = 0
-) -> Sufficiency:
-    """Whether views suffice for a target, at one of its points.
+) -> Crowther:
+    """Crowther's count and its converse for these views, at one of the target's points.
 
     Args:
         views: cameras, a parallel scan about z, or ``Observations`` at the target's points.
@@ -90,20 +70,6 @@ def sufficiency(
         ShapeError: there is no view.
         InputError: the point lies outside every picture, or the frequency is no frequency.
     """
-    found = Sufficiency(
-        orlov(views, target, frequency=frequency, point=point),
-        None,
-        crowther(views, target, frequency=frequency, point=point),
-    )
-    if isinstance(views, (Observations, Parallel)) or all(c.model == "ortho" for c in views):
-        return found
-    return Sufficiency(found.orlov, tuy(views, target), found.crowther)
-
-
-def crowther(
-    views: Views, target: Target, *, frequency: float | None = None, point: int = 0
-) -> Crowther:
-    """Crowther's count and its converse for these views; arguments as ``sufficiency``."""
     wanted = wanted_frequency(frequency, target)
     seen = seen_directions(views, target, point)
     gap = float(np.quantile(slice_gaps(seen, frequency_directions(target)), _MOST))
@@ -125,14 +91,3 @@ def crowther_views(diameter: float, resolution: float) -> int:
         )
     # Not one more where rounding puts a whole number a hair above itself.
     return math.ceil(math.pi * ratio * (1 - 1e-12))
-
-
-def crowther_resolution(diameter: float, views: int) -> float:
-    """The resolution that so many even views over half a turn give: d = pi D / K.
-
-    Raises:
-        InputError: the diameter or the number is not positive.
-    """
-    if not (one_number(diameter) > 0 and one_number(views) >= 1):
-        raise InputError(f"diameter is {diameter!r}, views {views!r}; wanted positive numbers")
-    return math.pi * diameter / views

@@ -12,18 +12,50 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.geometry.numbers import one_number, positive_or_infinite
-from rift_cl.optics.transfer import (
-    Floats,
-    check_positive,
-    diffraction_mtf,
-    frequencies,
-)
+from rift_cl.geometry.numbers import one_number, positive_or_infinite, real_numbers
+from rift_cl.optics.optical_transfer import Floats, check_positive, incoherent_cutoff
 
 # A pupil of this many samples across is an autocorrelation of 1 GiB.
 _MOST_SAMPLES = 4096
 # Beyond, a camera sees only a blur; bounds the quadrature.
 _MOST_WAVES = 1e4
+
+
+def diffraction_mtf(v: ArrayLike) -> Floats:
+    """MTF of a round pupil in focus at a share of the incoherent cut-off.
+
+    (2 / pi) (acos v - v sqrt(1 - v^2)), 0 beyond the cut-off: the overlap of two discs.
+
+    Args:
+        v: frequencies over the cut-off, any shape; the sign does not count.
+    """
+    share = np.minimum(np.abs(frequencies("diffraction_mtf", v)), 1)
+    return np.asarray(2 / np.pi * (np.arccos(share) - share * np.sqrt(1 - share**2)))
+
+
+def defocus_mtf(k: ArrayLike, blur: float, cutoff: float = np.inf) -> Floats:
+    """MTF of defocus alone: |2 J1(x) / x| with x = pi b k (1 - k / cutoff).
+
+    Without a cut-off that is the geometric blur disc, right for large defocus and low frequencies.
+    With it, it is P. A. Stokseth's approximation (J. Opt. Soc. Am. 59, 1314, 1969): times the
+    diffraction MTF it is within 0.017 of the exact one for any defocus, where the blur disc is 0.25
+    below it (at 0.35 wavelengths). ``pupil.defocused_otf`` is exact.
+
+    Args:
+        k: frequencies, any shape.
+        blur: b, diameter of the disc where the frequencies are measured; 0 leaves it out.
+        cutoff: the incoherent cut-off.
+
+    Raises:
+        InputError: a frequency is no number, blur is negative or cutoff not positive.
+    """
+    from scipy.special import j1
+
+    wide = np.abs(frequencies("defocus_mtf", k))
+    left = np.maximum(1 - wide / _cutoff(cutoff), 0)
+    x = np.pi * _length("blur", blur) * wide * left
+    safe = np.where(x > 1e-6, x, 1)
+    return np.asarray(np.where(x > 1e-6, np.abs(2 * j1(safe) / safe), 1))
 
 
 def defocus_waves(diameter: float, depth: ArrayLike, focus: float, wavelength: float) -> Floats:
@@ -134,3 +166,64 @@ def numerical_otf(pupil: NDArray[np.complex128] | Floats) -> NDArray[np.complex1
     spread = np.fft.fft2(field, [2 * side for side in field.shape])
     overlap = np.fft.ifft2(np.abs(spread) ** 2)
     return np.asarray(overlap / overlap[0, 0].real, np.complex128)
+
+
+def worst_depth_cutoff(
+    diameter: float, distance: float, depth: float, wavelength: float, level: float = 0.1
+) -> float:
+    """Frequency at which the MTF at a target's worst depth first falls to a level.
+
+    By the exact OTF, in focus at ``distance`` and with the defocus that both ends of the target
+    have to first order in depth / distance: A^2 depth / (16 wavelength z^2).
+
+    Args:
+        diameter: A, of the entrance pupil.
+        distance: z of the target's middle.
+        depth: of the target.
+        wavelength: of the light.
+        level: of the MTF, between 0 and 1.
+
+    Returns:
+        The frequency, in cycles per unit of length of the object.
+
+    Raises:
+        InputError: an argument is out of its range.
+    """
+    check_positive(diameter=diameter, distance=distance, depth=depth, wavelength=wavelength)
+    if not 0 < one_number(level) < 1:
+        raise InputError(f"level is {level!r}, wanted a number between 0 and 1")
+    waves = diameter**2 * depth / (16 * wavelength * distance**2)
+    # The OTF has its first zero before 1 / waves, at 0.15 / waves where there are many.
+    v = np.linspace(0, min(1, 1 / waves), 2001)
+    otf = defocused_otf(v, waves)
+    first = int(np.argmax(otf < level))
+    # Between the two samples, along the straight line through them.
+    step = (otf[first - 1] - level) / (otf[first - 1] - otf[first])
+    found = v[first - 1] + step * (v[first] - v[first - 1])
+    return float(found) * incoherent_cutoff(diameter, distance, wavelength)
+
+
+def frequencies(what: str, values: ArrayLike) -> Floats:
+    """Frequencies as float64.
+
+    Raises:
+        InputError: they are no finite real numbers.
+    """
+    numbers = real_numbers(values)
+    if numbers is None or not np.isfinite(numbers).all():
+        raise InputError(f"{what}: frequencies are wanted as finite real numbers")
+    return numbers
+
+
+def _cutoff(value: float) -> float:
+    number = positive_or_infinite(value)
+    if not number > 0:
+        raise InputError(f"cutoff is {value!r}, wanted a positive frequency or infinity")
+    return number
+
+
+def _length(name: str, value: float) -> float:
+    number = one_number(value)
+    if not number >= 0:
+        raise InputError(f"{name} is {value!r}, wanted 0 or a length")
+    return number
