@@ -84,7 +84,7 @@ def test_who_names_the_photographs_or_the_fit_is_told_that_the_fit_knows_them(
     shutil.copy(home / "photographs" / "0.png", bare)
     for name in (bare, home / "fit", home / "fit" / "poses"):
         assert run("eval", home / "fit", name, "--out", tmp_path / "scores") == 3
-        assert f"name the fit alone: rift eval {home / 'fit'}" in capsys.readouterr().err
+        assert f"only the fit: rift eval {home / 'fit'}" in capsys.readouterr().err
 
 
 def test_photographs_that_have_moved_are_named(home, alone, tmp_path, capsys):

@@ -95,7 +95,7 @@ def test_a_dry_run_says_what_would_be_scored(capture, fitted, tmp_path, capsys):
     [
         (("--hold-out", 2), "knows what it held out"),
         (("CAPTURE", "CAPTURE"), "same name"),
-        (("CAPTURE", "--train", "CAPTURE"), "its own nearest"),
+        (("CAPTURE", "--train", "CAPTURE"), "--train"),
         (("CAPTURE", "--hold-out", -1), "--hold-out is -1"),
         (("CAPTURE", "--downscale", 0), "downscale is 0"),
         (("CAPTURE", "--downscale", 100), "downscale is 100"),

@@ -11,7 +11,6 @@ from mat_files import write_mat
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
-from rift_cl.commands.inputs import scan_input
 from rift_cl.commands.inputs.scan_input import ScanInput
 from rift_cl.commands.reconstruct import report as reconstruct_report
 from rift_cl.commands.reconstruct.job import Reconstruction
@@ -19,6 +18,7 @@ from rift_cl.commands.reconstruct.kept_slabs import SlabFolder
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.geometry.fan import FanBeam
 from rift_cl.io import read_volume
+from rift_cl.io.scans import formats
 
 INPUT, INTERRUPTED, OUTPUT = 3, 130, 5
 HALF, FULL = np.arange(90) * np.pi / 90, np.arange(180) * np.pi / 90
@@ -151,11 +151,11 @@ def test_a_part_of_an_offset_slice_may_lie_beyond_the_detector(tmp_path, capsys)
 def test_the_axis_of_a_fan_is_not_searched_and_that_is_said(tmp_path, monkeypatch):
     path = tmp_path / "fan.npz"
     save_phantom(path, FULL, 72)
-    fan, opened = FanBeam(200, 300, 1.5, 35.5), scan_input.open_scan
+    fan, opened = FanBeam(200, 300, 1.5, 35.5), formats.open_scan
     monkeypatch.setattr(
-        scan_input, "open_scan", lambda *a, **k: dataclasses.replace(opened(*a, **k), fan=fan)
+        formats, "open_scan", lambda *a, **k: dataclasses.replace(opened(*a, **k), fan=fan)
     )
-    said = "The axis was taken at the detector's middle, bin 35.50"
+    said = "The axis was taken to be at the detector's middle, bin 35.50"
     for name, center in (("not", ()), ("given", ("--center", 35.5))):
         assert run("reconstruct", path, "--out", tmp_path / name, *center) == 0
         assert (said in assumed(tmp_path / name)) == (not center)

@@ -187,7 +187,7 @@ def test_half_acquisitions_may_be_stitched(half_acquisition, tmp_path, options):
     errors = [np.linalg.norm(image - truth) / np.linalg.norm(truth) for image in ways]
     assert max(errors) < 0.35
     assert errors[1] < errors[0] + 0.05
-    assert "stitched to views of half a turn" in notes(tmp_path / "stitched")
+    assert "stitched into wider views" in notes(tmp_path / "stitched")
 
 
 def test_subsets_take_fewer_steps(half_acquisition, tmp_path):

@@ -1,4 +1,4 @@
-"""What views miss, and what limits their detail, as figures, tables and sentences."""
+"""Missing directions and resolution limits of views, as figures, tables and sentences."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ Table = tuple[tuple[str, ...], list[tuple[Any, ...]], str]
 # Frequencies, in cycles per diameter, at which holes are looked for.
 _CYCLES, _DETAIL = (2, 4, 8, 16, 64, 256), 8
 _ONE = (
-    "One view samples a single slice: it tells nothing of where along its line of sight anything "
-    "lies, and no angle between views can be given."
+    "A single view samples one slice: it does not resolve depth along its line of sight, and there "
+    "is no angle between views."
 )
-# Degrees between the views that lie farthest apart, up to which they stand at one place.
+# Views within so many degrees of each other count as taken from one place.
 _ONE_PLACE = 2.0
-# So much finer than pixels, a limit is none: what is in focus to rounding.
+# A limit so much finer than pixels is none: the target is in focus to rounding.
 _ENDLESS = 1e6
 _KEYS = (*(cause.replace(" ", "_") for cause in CAUSES), "reached")
 WHY = {
-    "pixel": "get nearer, take a longer lens, or smaller pixels",
+    "pixel": "move closer, use a longer lens, or smaller pixels",
     "diffraction": "open the aperture",
-    "depth of field": "close the aperture, or focus where it matters",
-    "number of views": "take more views, or spread them better",
+    "depth of field": "close the aperture, or change the focus",
+    "number of views": "add views, or distribute them more evenly",
 }
 
 
@@ -43,7 +43,7 @@ class Findings:
     Args:
         figures: for metrics.json.
         tables: columns, rows and caption of each, for people.
-        sentences: what it comes to.
+        sentences: conclusions, for people.
     """
 
     figures: dict[str, Any]
@@ -80,26 +80,26 @@ def missing(sampled: ViewSet) -> Findings:
 
 
 def one_place(sampled: ViewSet) -> tuple[str, ...]:
-    """A sentence if several views look from one and the same side; none otherwise."""
+    """A sentence if all views are taken from the same place; none otherwise."""
     ways = sampled.directions()
     if len(ways) < 2:
         return ()
-    # Opposite views of what is seen through tell the same.
+    # Opposite views of a transparent target are equivalent.
     near = ways @ ways.T if sampled.opaque else np.abs(ways @ ways.T)
     apart = math.degrees(math.acos(min(1.0, float(near.min()))))
     if apart > _ONE_PLACE:
         return ()
     return (
-        f"All {len(ways)} views that see the target look from one place, {apart:.2g} degrees apart "
-        "at the most: they tell no more of it than one view does, and nothing of its depth.",
+        f"All {len(ways)} views that see the target are taken from one place, at most {apart:.2g} "
+        "degrees apart: they add nothing to a single view, and do not resolve depth.",
     )
 
 
-def _told_by(frequency: float, sampled: ViewSet) -> str:
-    """What a set's slices tell in nine tenths of all directions, if that is less than the whole."""
+def _resolved_by(frequency: float, sampled: ViewSet) -> str:
+    """The resolution of the slices in nine tenths of all directions, as part of a sentence."""
     if frequency * sampled.target.diameter < 1:
-        return ", and leave more than a tenth of all directions without any detail"
-    return f", and tell {1 / frequency:.3g} {sampled.units}"
+        return ", and leave more than a tenth of all directions unresolved"
+    return f", and resolve {1 / frequency:.3g} {sampled.units}"
 
 
 def _holes(found: dict[int, Orlov], unit: str) -> Table:
@@ -113,10 +113,10 @@ def _holes(found: dict[int, Orlov], unit: str) -> Table:
         )
         for n, entry in found.items()
     ]
-    columns = ("detail of", f"cycles per {unit}", "on no slice", "largest hole", "about")
+    columns = ("frequency", f"cycles per {unit}", "missing", "largest hole", "axis")
     caption = (
-        "Directions of detail that no view samples (Orlov's condition), and the largest hole among "
-        "them: from its middle to the nearest slice."
+        "Fraction of the directions of detail that no view samples (Orlov's condition), and the "
+        "largest hole among them: the angle from its axis to the nearest slice."
     )
     return columns, rows, caption
 
@@ -127,11 +127,11 @@ def _axis(entry: Orlov) -> str:
 
 def _hole(entry: Orlov) -> str:
     if entry.satisfied:
-        return "At 8 cycles per diameter every direction of detail lies on a slice: no cone misses."
+        return "At 8 cycles per diameter every direction of detail is sampled: no missing cone."
     return (
-        f"At 8 cycles per diameter {entry.missing:.1%} of all directions of detail lie on no "
-        f"slice. The largest hole is a cone of {math.degrees(entry.angle):.3g} degrees about "
-        f"{_axis(entry)}: detail along it is guessed, not measured."
+        f"At 8 cycles per diameter {entry.missing:.1%} of all directions of detail are not "
+        f"sampled. The largest missing cone has a half-angle of {math.degrees(entry.angle):.3g} "
+        f"degrees about {_axis(entry)}: detail along it is not measured."
     )
 
 
@@ -145,7 +145,7 @@ def _planes(unmet: float, near: str) -> str:
 
 
 def resolution(sampled: ViewSet, names: tuple[str, ...]) -> Findings:
-    """What ends detail at each point of the target, with lengths, and Crowther's count.
+    """The resolution limits at each point of the target, and Crowther's number of views.
 
     Args:
         sampled: the views.
@@ -162,18 +162,18 @@ def resolution(sampled: ViewSet, names: tuple[str, ...]) -> Findings:
         )
         for point in points
     ]
-    heads = ("point", *CAUSES, "all together", "limited by")
+    heads = ("point", *CAUSES, "combined", "limited by")
     caption = (
-        f"One cycle of the finest detail, in {units}: by each cause alone (of cameras, the middle "
-        "one), and by all together in nine tenths of all directions. A dash is no limit; none is "
-        "no detail, since a cycle is longer than the target."
+        f"Period of the finest resolved detail, in {units}: by each cause alone (median over the "
+        "cameras), and combined, in nine tenths of all directions. A dash means no limit; none "
+        "means no detail, since the period exceeds the target."
     )
     needed = crowther_views(target.diameter, 1 / target.highest)
     sentences = (
         _ended(found, names[0], sampled),
-        f"By Crowther's count {needed} views evenly round a circle tell detail of "
-        f"{1 / target.highest:.3g} {units} a cycle; {count.views} of these see the target's "
-        f"middle{_told_by(count.frequency, sampled)}.",
+        f"By Crowther's criterion {needed} views evenly spaced on a circle resolve periods of "
+        f"{1 / target.highest:.3g} {units}; {count.views} of these views see the target's "
+        f"centre{_resolved_by(count.frequency, sampled)}.",
     )
     reached = {"needed": needed, "wanted": target.highest, "frequency": count.frequency}
     record = {"limits": points, "crowther": {"views": count.views, **reached}}
@@ -181,22 +181,22 @@ def resolution(sampled: ViewSet, names: tuple[str, ...]) -> Findings:
 
 
 def _ended(found: Limits, name: str, sampled: ViewSet) -> str:
-    """What ends detail at the first point; within the directions seen, where many are not."""
+    """The limit at the first point; within the sampled directions, where many are missing."""
     units, cause = sampled.units, found.cause[0]
     if found.reached[0] * sampled.target.diameter >= 1 or not found.within[0]:
         return (
-            f"The {cause} limits detail at the {name}, to a cycle of {1 / found.reached[0]:.3g} "
-            f"{units}: {WHY[cause]}."
+            f"The {cause} limits resolution at the {name}, to a period of "
+            f"{1 / found.reached[0]:.3g} {units}: {WHY[cause]}."
         )
     return (
-        f"{found.unseen[0]:.0%} of all directions of detail are not seen at the {name}: "
-        f"{WHY['number of views']}. Within those that are seen, detail ends at a cycle of "
-        f"{1 / found.within[0]:.3g} {units} in the median."
+        f"{found.unseen[0]:.0%} of all directions of detail are not sampled at the {name}: "
+        f"{WHY['number of views']}. Within those that are, the median resolution is a period of "
+        f"{1 / found.within[0]:.3g} {units}."
     )
 
 
 def _ends(found: Limits, p: int, name: str) -> dict[str, Any]:
-    """The frequencies at which detail ends at a point, by cause."""
+    """The limiting frequencies at a point, by cause."""
     seen = found.camera[:, p] > 0
     parts = [
         float(np.median(end[seen, p])) for end in (found.pixel, found.diffraction, found.focus)
@@ -212,14 +212,14 @@ def _ends(found: Limits, p: int, name: str) -> dict[str, Any]:
 
 
 def length_in_words(frequency: float, sampled: ViewSet) -> str:
-    """One cycle at which detail ends; a dash where it does not, none where nothing is told."""
+    """The period at a limit; a dash where there is none, ``none`` where nothing is resolved."""
     if frequency * sampled.target.diameter < 1:
         return "none"
     return f"{1 / frequency:.3g}" if frequency < _ENDLESS * sampled.finest else "–"
 
 
 def unknown_share(sampled: ViewSet) -> float:
-    """The share of the target's power that stays unknown, if it falls as 1/k^2."""
+    """The posterior variance as a fraction of the prior, for a power spectrum 1/k^2."""
     target = sampled.target
     found = host_coverage(sampled.observations(), target.k, target.diameter)
     return merit_of_coverage("wiener", found, target).value

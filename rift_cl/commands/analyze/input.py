@@ -28,8 +28,8 @@ from rift_cl.sampling.targets.target import Target
 _INSIDE = 0.9
 _SEEN_THROUGH = "What views sample is counted as for a target that is seen through."
 _OPAQUE = (
-    "The target is taken to be opaque, and a sphere to stand for its surface (--mode volume is for "
-    "what is seen through)."
+    "The target is taken to be opaque, with a sphere for its surface (--mode volume is for "
+    "transparent ones)."
 )
 # Nanometres in a millimetre.
 _NANO = 1e6
@@ -93,9 +93,9 @@ def _with_space(sampled: ViewSet, settings: AnalyzeSettings, capture: Capture) -
     if space is None:
         return sampled
     if not trusted(space, sampled):
-        note = f"By {known} many cameras do not see the target: they are not made use of."
+        note = f"According to {known} many cameras do not see the target: they are not used."
         return replace(sampled, notes=(*sampled.notes, note))
-    note = f"What stands where, and what is in the way, is known from {known}."
+    note = f"Geometry and occlusion are known from {known}."
     return replace(sampled, space=space, notes=(*sampled.notes, note))
 
 
@@ -108,12 +108,12 @@ def _ball(
     if settings.center is not None:
         center = np.array(settings.center)
     else:
-        notes.append("The target's middle is taken to be where the cameras look (--center).")
+        notes.append("The target's centre is taken to be where the cameras look (--center).")
         if len(cameras) == 1:
-            notes.append("One camera does not tell how far off that is: name it with --center.")
+            notes.append("A single camera does not determine its distance: give --center.")
     if settings.diameter is not None:
         return center, settings.diameter, notes
-    diameter, why = shown_diameter(cameras, center), "what the pictures show of it"
+    diameter, why = shown_diameter(cameras, center), "what the pictures show"
     if capture.points is not None:
         away = np.linalg.norm(capture.points - center, axis=1)
         extent = 2 * float(np.quantile(away, _INSIDE))
@@ -153,11 +153,11 @@ def _with_lens(
         made.append(Camera(camera.size, camera.K, camera.view, camera.model, lens))
     if all(camera.aperture is None for camera in made):
         notes.append(
-            "The cameras are taken as pinholes, sharp everywhere: give the radius of the lens's "
-            "opening (--aperture) to count depth of field and diffraction."
+            "The cameras are taken as pinholes: give the radius of the lens aperture (--aperture) "
+            "to include depth of field and diffraction."
         )
     elif not wavelength and not any(c.aperture and c.aperture.wavelength for c in made):
-        notes.append("Diffraction is left out: it wants millimetres per unit (--unit).")
+        notes.append("Diffraction is left out: it needs millimetres per unit (--unit).")
     return made, notes
 
 
@@ -208,7 +208,7 @@ def _scan(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
     pitch, unit = (file.pitch, file.unit or "unit") if file.pitch else (1.0, "bin")
     notes = list(file.notes)
     if file.pitch is None:
-        notes.append("The file gives no pitch of the detector: lengths are in bins.")
+        notes.append("The file gives no detector pitch: lengths are in bins.")
     cameras, scan, edge = _rays(settings, file, pitch, notes)
     diameter = edge * file.shape[2] if settings.diameter is None else settings.diameter
     if settings.diameter is None:
@@ -264,7 +264,7 @@ def _axis(settings: AnalyzeSettings, notes: list[str]) -> float | None:
         found = find_axis(_opened(settings, values=True))
     except InputError as error:
         notes.append(
-            "The rotation axis is taken to be seen in the middle of the detector, as it was not "
+            "The rotation axis is taken to be at the middle of the detector, since it was not "
             f"found: {error}"
         )
         return None

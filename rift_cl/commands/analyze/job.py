@@ -1,4 +1,4 @@
-"""``rift analyze``: what views sampled, what they missed, what limits detail, what to add."""
+"""``rift analyze``: coverage, missing directions, resolution limits, and views to add."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Analysis:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What had to be assumed, a sentence each."""
+        """Assumptions, a sentence each."""
         return self.sampled.notes
 
     def plan(self) -> dict[str, str]:
@@ -115,7 +115,7 @@ class Analysis:
         if not count:
             return (), Findings({"add": []}, (), ())
         if any(camera.model != "pinhole" for camera in sampled.cameras):
-            text = "No views are suggested: that is for cameras with a pinhole's perspective."
+            text = "No views are suggested: that needs pinhole cameras."
             return (), Findings({"add": []}, (), (text,))
         try:
             cameras = cameras_to_add(sampled, count)
@@ -139,17 +139,17 @@ class Analysis:
         rows = [(row[0], *(round(float(n), 6) for n in row[1:4])) for row in self._rows(cameras)]
         columns = ("add", "azimuth, °", "elevation, °", f"distance, {sampled.units}")
         more = sampled.with_cameras(cameras)
-        start = f"With {len(cameras)} more views like those at hand"
+        start = f"With {len(cameras)} more such views"
         if sampled.opaque:
             far = usual_distance(sampled)
             gaps = [sides_of(one, far).gap for one in (more, sampled)]
             text = (
-                f"{start} the side that is farthest from all views would lie {gaps[0]:.3g} degrees "
-                f"from the nearest, instead of {gaps[1]:.3g}."
+                f"{start} the side farthest from all views would be {gaps[0]:.3g} degrees from the "
+                f"nearest, instead of {gaps[1]:.3g}."
             )
         else:
             text = (
-                f"{start} {self._unknown(more):.3%} of the target's power would stay unknown, "
+                f"{start} the posterior variance would be {self._unknown(more):.3%} of the prior, "
                 f"instead of {self._unknown(sampled):.3%}."
             )
         names = ("azimuth", "elevation", "distance")
@@ -157,7 +157,7 @@ class Analysis:
             "add": [dict(zip(names, row[1:], strict=True)) for row in rows],
             "unknown_with_added": self._unknown(more),
         }
-        caption = "The most useful first, each given those before it."
+        caption = "The most informative first, each given those before it."
         return Findings(figures, ((columns, rows, caption),), (text,))
 
     @staticmethod
@@ -196,7 +196,7 @@ def _seen(sampled: ViewSet) -> tuple[ViewSet, dict[str, Floats]]:
         lost = ", ".join(sorted(set(points) - set(kept)))
         notes = (
             *notes,
-            f"No view sees {lost} by 0.7 of the target's radius: that point is left out.",
+            f"No view sees the point {lost} by 0.7 of the target's radius: it is left out.",
         )
     found = dataclasses.replace(target, points=np.array(list(kept.values())))
     return dataclasses.replace(sampled, target=found, notes=notes), kept

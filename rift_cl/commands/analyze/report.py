@@ -1,4 +1,4 @@
-"""What ``rift analyze`` shows: figures first, then the pictures that they come from."""
+"""The report of ``rift analyze``: figures first, then the plots behind them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rift_cl.geometry import Camera
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_svg
 
-_HEADINGS = ("What is missing", "What limits detail", "What to add")
+_HEADINGS = ("Missing directions", "Resolution limits", "Views to add")
 
 
 def analysis_page(
@@ -30,11 +30,11 @@ def analysis_page(
 ) -> Page:
     """The report of a finished analysis."""
     target = sampled.target
-    page = Page(f"What {sampled.name} sampled", findings[0].sentences[0])
+    page = Page(f"Sampling of {sampled.name}", findings[0].sentences[0])
     page.facts(
         {
             **sampled.facts,
-            "views that see the target's middle": metrics["seen_by"],
+            "views that see the target's centre": metrics["seen_by"],
             "target": f"{target.diameter:.4g} {sampled.units} about {place_of(target)}",
             **_unknown(sampled, metrics["unknown"]),
         }
@@ -51,7 +51,7 @@ def analysis_page(
         for columns, rows, caption in found.tables:
             page.table(columns, rows, caption=caption)
     if not sampled.opaque:
-        page.section("What the views sample")
+        page.section("Coverage")
         add_coverage(page, sampled, points, device)
     return page
 
@@ -61,18 +61,18 @@ def _unknown(sampled: ViewSet, value: float) -> dict[str, str]:
         return {}
     target = sampled.target
     return {
-        "power that stays unknown": f"{value:.3%}, of a target whose power falls as 1/k^2 up to "
+        "posterior variance": f"{value:.3%} of the prior, for a power spectrum 1/k^2 up to "
         f"{target.highest:.3g} cycles per {sampled.unit}"
     }
 
 
 def _views(page: Page, sampled: ViewSet, added: Sequence[Camera], device: Device) -> None:
     if sampled.cameras:
-        page.section("Where the cameras stand")
+        page.section("Camera poses")
         groups = {"at hand": sampled.cameras, "to add": tuple(added)}
         page.figure(
             figure_svg(camera_figure(groups, sampled)),
-            caption="The target is the grey disc; lines point where the cameras look.",
+            caption="The grey disc is the target; lines show the viewing directions.",
             alt="Cameras from above and from the side",
         )
     if sampled.is_flat:
@@ -80,9 +80,9 @@ def _views(page: Page, sampled: ViewSet, added: Sequence[Camera], device: Device
     page.section("Directions")
     page.figure(
         figure_svg(direction_figure(sampled, device, added)),
-        caption="The upper hemisphere, up in the middle; opposite directions count as one, so "
-        "that a view from below is shown above. Left, lines of sight. Right, how many views see "
-        "detail along each direction, at 8 cycles per diameter; hatched is what lies on no view's "
-        "slice.",
+        caption="The upper hemisphere, seen from above; opposite directions count as one, so "
+        "that a view from below is shown above. Left: lines of sight. Right: how many views "
+        "sample detail along each direction, at 8 cycles per diameter; hatched directions lie on "
+        "no view's slice.",
         alt="Hemispheres of lines of sight and of directions of detail",
     )

@@ -1,4 +1,4 @@
-"""Views to add to those that were taken: where they leave most unknown, and the target shows."""
+"""Views to add to those that were taken: the most informative ones that see the target."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rift_cl.geometry.camera_type import CameraType
 from rift_cl.sampling.planning.constraints import Constraints
 from rift_cl.sampling.planning.planner import next_views
 
-# As high as people get a camera above a target, in degrees.
+# Highest elevation that is suggested, in degrees.
 _HIGH = 75.0
 # A pinhole of CameraType's: so small that everything is sharp.
 _PINHOLE = 1e4
@@ -23,10 +23,10 @@ _COVER = 0.05
 
 
 def cameras_to_add(sampled: ViewSet, count: int) -> tuple[Camera, ...]:
-    """Cameras like those at hand, as far away, between their elevations or 0 to 75 degrees.
+    """Cameras like the existing ones, as far away, between their elevations or 0 to 75 degrees.
 
-    Of an opaque target none stands in or behind what the views show, or where that hides the
-    target; where nothing tells what stands where, none stands far from those at hand.
+    For an opaque target none is placed inside or behind the geometry that the views show, or where
+    it occludes the target; where the geometry is unknown, none is far from the existing ones.
 
     Raises:
         InputError: no camera fits there.
@@ -57,7 +57,7 @@ def cameras_to_add(sampled: ViewSet, count: int) -> tuple[Camera, ...]:
 
 
 def usual_distance(sampled: ViewSet) -> float:
-    """How far off the target's middle cameras stand, in the median."""
+    """Median distance of the cameras from the target's centre."""
     away = np.array([camera.center for camera in sampled.cameras]) - sampled.target.center
     return float(np.median(np.linalg.norm(away, axis=1)))
 

@@ -1,7 +1,7 @@
-"""What views of an opaque target miss, and what limits their detail: figures and sentences.
+"""Missing sides and resolution limits of views of an opaque target: figures and sentences.
 
-Sentences are of verdicts that hold against errors of held-out photographs (``verdicts``); the rest
-are figures in metrics.json.
+Sentences are of predictors that hold against errors of held-out photographs (``verdicts``); the
+rest are figures in metrics.json.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from rift_cl.commands.inputs.view_set import ViewSet
 from rift_cl.sampling.criteria.surface_limits import SurfaceLimits, surface_limits
 
 _KEYS = ("pixel", "diffraction", "depth_of_field", "reached")
-_HEADS = ("point", "pixel", "diffraction", "depth of field", "all together", "limited by")
+_HEADS = ("point", "pixel", "diffraction", "depth of field", "combined", "limited by")
 
 
 def surface_missing(sampled: ViewSet, distance: float) -> Findings:
-    """Which sides of the target no view shows, and which cannot be looked at.
+    """Which sides of the target no view sees, and which are occluded.
 
     Args:
         sampled: the views.
@@ -39,27 +39,26 @@ def surface_missing(sampled: ViewSet, distance: float) -> Findings:
     way = "({:.2f}, {:.2f}, {:.2f})".format(*(sides.farthest + 0.0))
     sentences = said(
         {
-            "angle": f"The side of the target that is farthest from all views, {way}, lies "
-            f"{sides.gap:.3g} degrees from the nearest of them.",
+            "angle": f"The side of the target farthest from all views, {way}, is {sides.gap:.3g} "
+            "degrees from the nearest of them.",
             "sides": f"{sides.unseen:.1%} of the target's sides are seen by no view within "
-            f"{SQUARE:.0f} degrees of straight on, {sides.seen_once:.1%} by one alone.",
+            f"{SQUARE:.0f} degrees of their normal, {sides.seen_once:.1%} by only one.",
         }
     )
     if sampled.space is None:
         sentences.append(
-            "What stands in the way is not known: analyse the folder of a fit, or a COLMAP model "
-            "with its points."
+            "Occlusion is not known: analyze the folder of a fit, or a COLMAP model with its "
+            "points."
         )
     elif sides.shut > 0:
         sentences.append(
-            f"A further {sides.shut:.1%} of all sides cannot be looked at, since something stands "
-            "before them; they are not counted."
+            f"A further {sides.shut:.1%} of all sides are occluded; they are not counted."
         )
     return Findings(figures, (), (*sentences, *one_place(sampled)))
 
 
 def surface_resolution(sampled: ViewSet, names: tuple[str, ...]) -> Findings:
-    """What ends detail at each point of the target, and how well parallax tells its depth.
+    """The resolution limits at each point of the target, and the depth resolution of parallax.
 
     Args:
         sampled: the views.
@@ -76,20 +75,22 @@ def surface_resolution(sampled: ViewSet, names: tuple[str, ...]) -> Findings:
         for point in points
     ]
     caption = (
-        f"One cycle of the finest detail, in {units}, as the middle one of the cameras tells it; a "
-        "dash is no limit."
+        f"Period of the finest resolved detail, in {units}, for the median camera; a dash means no "
+        "limit."
     )
     first = points[0]
     sentences = said(
         {
-            "pixel": f"The {first['limited_by']} limits detail at the {names[0]}, to a cycle of "
-            f"{length_in_words(first['reached'], sampled)} {units}: {WHY[first['limited_by']]}.",
-            "parallax": f"The views that see it lie up to {first['parallax_degrees']:.3g} degrees "
+            "pixel": f"The {first['limited_by']} limits resolution at the {names[0]}, to a period "
+            f"of {length_in_words(first['reached'], sampled)} {units}: {WHY[first['limited_by']]}.",
+            "parallax": f"The views that see it are up to {first['parallax_degrees']:.3g} degrees "
             f"apart, so that a pixel of parallax is {first['depth']:.3g} {units} of depth.",
         }
     )
     if not np.isfinite(first["depth"]):
-        sentences.append("No two views see it from different sides: nothing tells its depth.")
+        sentences.append(
+            "No two views see it from different directions: its depth is not resolved."
+        )
     return Findings({"limits": points}, ((_HEADS, rows, caption),), tuple(sentences))
 
 

@@ -1,8 +1,7 @@
-"""What is foretold of a view that nobody took, by each verdict on an opaque target.
+"""Predictors of the error of a novel view of an opaque target.
 
-A verdict is worth saying if views of which it says worse are predicted worse: that is checked
-against the errors of held-out photographs by ``tools/check_verdicts.py``, and what does not hold
-there is not said.
+A predictor is reported only if it ranks held-out photographs by their error: that is checked by
+``tools/check_verdicts.py``, and what does not hold there is not reported.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ _FACING = 0.3
 
 
 def said(sentences: Mapping[str, str]) -> list[str]:
-    """Those sentences, by the names of their verdicts, that may be said."""
+    """Those sentences, by the names of their predictors, that are reported."""
     return [sentence for name, sentence in sentences.items() if name in HELD]
 
 

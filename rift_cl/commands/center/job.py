@@ -31,7 +31,7 @@ _WINDOW = (0.5, 99.5)
 
 
 class CenterJob:
-    """A search that is planned: the input is open, nothing is written yet.
+    """A search that is prepared: the input is open, nothing is written yet.
 
     Args:
         settings: what to do.
@@ -67,7 +67,7 @@ class CenterJob:
         }
 
     def run(self) -> Iterator[Report]:
-        """Do it: the search, then a slice for each centre of the slider."""
+        """Run the search, then reconstruct a slice for each axis position of the slider."""
         total = 1 + len(_SLIDER)
         yield Report(0, total, "steps")
         found = find_axis(self.scan, self.device, span=self.settings.span)
@@ -94,7 +94,7 @@ class CenterJob:
     def _page(
         self, found: AxisEstimate, here: float, slices: dict[float, NDArray[np.float32]]
     ) -> Page:
-        page = Page(f"Centre of rotation of {self.scan.path.name}", found.in_words())
+        page = Page(f"Rotation axis of {self.scan.path.name}", found.in_words())
         black, white = (float(level) for level in np.percentile(slices[0.0], _WINDOW))
         white = white if white > black else black + 1
         files, _ = framed(list(slices.values()), window=(black, white))
@@ -102,8 +102,8 @@ class CenterJob:
             files,
             labels=[f"bin {here + offset:.2f}" for offset in slices],
             start=_SLIDER.index(0.0),
-            caption=f"The middle of the slice at row {self.row} for the chosen centre; a wrong one "
-            "shows arcs and doubled edges.",
+            caption=f"Centre of the slice at row {self.row} for the chosen axis; a wrong one shows "
+            "arcs and doubled edges.",
             alt="Slice with the centre at",
         )
         page.facts(_facts(found))
@@ -112,26 +112,26 @@ class CenterJob:
             [by_offset[offset] for offset in _SHEET],
             titles=[f"{here + offset:.2f}" for offset in _SHEET],
             columns=3,
-            caption="The same side by side, about the best one, which is in the middle.",
+            caption="The same slices side by side; the best one is in the middle.",
             alt="Slice with the centre at",
         )
         draw = partial(
             curves,
             {"all rows": (found.scores[0], found.scores[1])},
-            xlabel="centre at the middle row, bins",
+            xlabel="axis at the middle row, bins",
             ylabel="log-likelihood",
             mark=round(found.center, 2),
         )
         page.figure(
             figure_svgs(lambda width: draw(width=width)),
-            caption=f"How likely each centre is by the {found.by}, all rows together; 0 is what "
-            "data without any sign of the axis would give.",
-            alt="Curve of the log-likelihood against the centre",
+            caption=f"Log-likelihood of each axis position by the {found.by}, summed over the "
+            "rows; 0 is expected for data without information on the axis.",
+            alt="Log-likelihood against the axis position",
         )
         page.table(
-            ["row", "centre, bins", "standard error"],
+            ["row", "axis, bins", "standard error"],
             [list(row) for row in zip(found.rows, found.centers, found.errors, strict=True)],
-            caption="The rows that were looked at",
+            caption="The rows that were used",
         )
         return page
 
@@ -139,7 +139,7 @@ class CenterJob:
 def _facts(found: AxisEstimate) -> dict[str, object]:
     low, high = found.interval
     return {
-        "centre, bins": f"{found.center:.2f}, at the middle row",
+        "axis, bins": f"{found.center:.2f}, at the middle row",
         "95 % interval": f"{low:.2f} to {high:.2f}",
         "tilt, bins per row": found.tilt,
         "spread between rows, bins": found.spread,

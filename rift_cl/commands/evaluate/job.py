@@ -68,8 +68,8 @@ class Evaluation:
         inside = fit is not None and path.resolve().is_relative_to(fit.resolve())
         if self.cameras is not None and (inside or holds_bare_photographs(path)):
             raise InputError(
-                f"{path}: is no capture with photographs; to score what the fit held out, name "
-                f"the fit alone: rift eval {scene}"
+                f"{path}: is no capture with photographs; to score the held-out photographs, name "
+                f"only the fit: rift eval {scene}"
             )
         views = open_seen(path, pinhole=self.scene.pinhole).views
         every = self.settings.hold_out
@@ -84,8 +84,8 @@ class Evaluation:
         both = self._in_both(seen)
         if both is not None:
             raise InputError(
-                f"{both} is a photograph of --train, which is its own nearest: leave --train out, "
-                "or hold the scored ones out (--hold-out)"
+                f"{both} is also a training photograph (--train): leave --train out, or hold the "
+                "scored ones out (--hold-out)"
             )
         return seen
 
@@ -100,7 +100,7 @@ class Evaluation:
         """The photographs that the fit held out."""
         where, cameras = self.settings.scene, self.cameras
         if self.settings.hold_out:
-            raise InputError("--hold-out is about captures: the fit knows what it held out")
+            raise InputError("--hold-out applies to captures: the fit knows what it held out")
         if cameras is None or self.scene.folder is None:
             why = "is no fit's folder" if self.scene.folder is None else "is of an older version"
             raise InputError(
@@ -131,7 +131,7 @@ class Evaluation:
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""
         scored = {f"score {name}": f"{len(views)} views" for name, views in self.groups.items()}
-        trained = f"{len(self.seen)} views" if self.seen else "not named: no baselines"
+        trained = f"{len(self.seen)} views" if self.seen else "not given: no baselines"
         return {
             "scene": f"{self.scene.name}, {len(self.scene.splats)} splats",
             **scored,

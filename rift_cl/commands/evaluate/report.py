@@ -1,4 +1,4 @@
-"""What ``rift eval`` shows: scores, the best and the worst pictures beside the truth, errors."""
+"""The report of ``rift eval``: scores, and the best and worst views beside the photographs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pictures of what views sample: planes of frequencies, density, directions, cameras."""
+"""Plots of coverage: planes of frequencies, spectra, directions, cameras."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def _maps(sampled: ViewSet, wanted: list[tuple[str, Floats, float]], device: Dev
         slices,
         columns=3,
         window=(LEAST * thin, max(float(sampled.views), 1.0)),
-        label="views that see it",
+        label="views",
         unit=sampled.unit,
     )
 
@@ -109,7 +109,7 @@ def density_curves(sampled: ViewSet, device: Device) -> Figure:
     mean, least = found.mean(axis=1), np.quantile(found, 0.1, axis=1)
     floor = LEAST / 10
     series = {}
-    for name, values in (("mean", mean), ("least seen tenth", least)):
+    for name, values in (("mean", mean), ("least covered tenth", least)):
         kept = values > floor
         if kept.any():
             series[name] = (radii[kept], values[kept])
@@ -122,7 +122,7 @@ def density_curves(sampled: ViewSet, device: Device) -> Figure:
     return curves(
         series,
         xlabel=f"|k|, cycles per {sampled.unit}",
-        ylabel="views that see it",
+        ylabel="views",
         log_x=True,
         log_y=True,
     )
@@ -144,7 +144,7 @@ def direction_figure(sampled: ViewSet, device: Device, added: Sequence[Camera] =
         lambda ways: sampled.coverage(fine * ways, device, points=center)[0],
         lambda ways: slice_gaps(sampled.directions(), ways) > 0.5 / (target.diameter * fine),
         up=sampled.up,
-        label="views that see it",
+        label="views",
     )
 
 
@@ -170,21 +170,21 @@ def add_coverage(
     """Add the maps of density near and far, and density against frequency, to a report."""
     page.figure(
         figure_svg(slice_maps(sampled, points, device)),
-        caption="Planes of the target's Fourier domain: how many views see each frequency. White "
-        "is what hardly any sees.",
+        caption="Planes of the target's Fourier domain: how many views sample each frequency; "
+        "white is close to none.",
         alt="Maps of density over planes of frequencies",
     )
     support = support_maps(sampled, device)
     if support is not None:
         page.figure(
             figure_svg(support),
-            caption="The same about the middle, out to what the finest of the views passes; "
-            "slices thinner than a sample count for the part of it that they fill.",
+            caption="The same about the centre, out to the highest frequency that any view passes; "
+            "slices thinner than a sample count by the fraction that they fill.",
             alt="Maps of density out to the finest detail",
         )
     page.figure(
         figure_svg(density_curves(sampled, device)),
-        caption="Mean density over all directions, that of the least seen tenth, and the law that "
-        "views without pixels and lenses follow in the mean.",
+        caption="Mean coverage over all directions, that of the least covered tenth, and the 1/k "
+        "law of ideal views (no pixels, no lens).",
         alt="Density against frequency",
     )

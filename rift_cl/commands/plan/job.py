@@ -1,4 +1,4 @@
-"""``rift plan``: from where to photograph a target, beside what people do without a plan."""
+"""``rift plan``: camera poses for a target, compared with common arrangements."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ class Planning:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What had to be assumed, a sentence each."""
+        """Assumptions, a sentence each."""
         return self.given.notes
 
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""
         given, settings = self.given, self.settings
-        have = "" if given.have is None else f", besides {given.have.views} that were taken"
+        have = "" if given.have is None else f", in addition to {given.have.views} taken"
         low, high = settings.elevation
         first, last = settings.azimuth
         distance = settings.distance
@@ -66,14 +66,14 @@ class Planning:
             "views": f"{settings.views}{have}",
             "target": f"{given.target.diameter:.4g} mm about {place_of(given.target)}",
             "frequencies": f"{len(given.target.k)} up to {given.target.highest:.4g} cycles per mm",
-            "memory": f"{format_bytes(self._memory())} at most, of candidates' coverage",
+            "memory": f"{format_bytes(self._memory())} at most, for the coverage of the candidates",
             "cameras": "; ".join(kind.name for kind in given.types),
             "elevation": f"{low:g} to {high:g} degrees",
             "azimuth": f"{first:g} to {last:g} degrees",
             "distance": "as near as it fits" if distance is None else "{:g} to {:g} mm".format(
                 *distance),
             "path": settings.path,
-            "merit": settings.merit,
+            "criterion": settings.merit,
             "assumed": " ".join(given.notes) or "nothing",
             "device": self.device.name,
         }  # fmt: skip

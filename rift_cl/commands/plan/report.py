@@ -1,4 +1,4 @@
-"""What ``rift plan`` shows: where the cameras stand, what they sample, what each brings."""
+"""The report of ``rift plan``: camera poses, coverage, and what each view adds."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from rift_cl.report.html_page import Page
 from rift_cl.report.plot import curves, figure_svg
 from rift_cl.sampling.planning.view_plan import DiminishingReturns, Plan
 
-# What a merit is, for people.
+# The criterion that is minimized, for people.
 _MERITS = {
-    "wiener": "power that stays unknown",
-    "logdet": "bits per frequency, less than none",
-    "worst": "power that stays unknown, worst direction",
+    "wiener": "posterior variance (A-optimal)",
+    "logdet": "negative information, bits per frequency (D-optimal)",
+    "worst": "posterior variance, worst direction (E-optimal)",
 }
 _NAMES = {
     "ring": "a ring",
     "arc": "a single arc",
     "fibonacci": "evenly spread",
     "zigzag": "a zigzag",
-    "quantiles": "by the root of the power",
+    "quantiles": "by the square root of the power",
     "random": "random",
 }
 
@@ -49,7 +49,7 @@ def plan_page(
     noun = "view" if len(found) == 1 else "views"
     page = Page(f"Plan of {len(found)} {noun}{more}", metrics["verdict"])
     _cameras(page, given, found, sampled)
-    page.section("What planning is worth")
+    page.section("Comparison with other arrangements")
     page.table(*worth_table(metrics), caption=caption_of(metrics))
     page.paragraph(metrics["verdict"])
     page.paragraph(bound_words(metrics))
@@ -60,20 +60,20 @@ def plan_page(
 
 
 def merit_name(metrics: Mapping[str, Any]) -> str:
-    """What the merit is, for people."""
+    """The criterion, for people."""
     kind = metrics["kind"]
     if metrics["mode"] == "surface" and kind != "logdet":
-        return "unknown share of texture and appearance, added"
+        return "posterior variance of texture and appearance, added"
     return _MERITS[kind]
 
 
 def worth_table(metrics: Mapping[str, Any]) -> tuple[tuple[str, ...], list[tuple[Any, ...]]]:
-    """Columns and rows: the merit of the plan, and of what people do without one."""
+    """Columns and rows: the criterion of the plan and of common arrangements of as many views."""
     own, kind = metrics["merit"], metrics["kind"]
     columns = (
         "views",
         merit_name(metrics),
-        "more when planned" if kind == "logdet" else "less when planned",
+        "gain of the plan",
     )
     rows: list[tuple[Any, ...]] = [("planned", _shown(own, kind), "")]
     for name, value in metrics["baselines"].items():
@@ -82,13 +82,13 @@ def worth_table(metrics: Mapping[str, Any]) -> tuple[tuple[str, ...], list[tuple
 
 
 def caption_of(metrics: Mapping[str, Any]) -> str:
-    """What the table of worth compares."""
+    """The caption of the table of baselines."""
     views, wanted = metrics["views"], metrics["wanted"]
-    paid = f" (the budget ends before the {wanted} that were wanted)" if views < wanted else ""
+    paid = f" (the budget does not allow the {wanted} asked for)" if views < wanted else ""
     noun = "view" if views == 1 else "views"
     return (
-        f"{views} {noun} each{paid}, under the same constraints, with the cameras and settings "
-        "that do best. Lower is better."
+        f"{views} {noun} each{paid}, under the same constraints, with the best cameras and "
+        "settings. Lower is better."
     )
 
 
@@ -97,50 +97,50 @@ def _shown(value: float, kind: str) -> str:
 
 
 def bound_words(metrics: Mapping[str, Any]) -> str:
-    """How much a better choice could bring at the most."""
+    """How far from the optimum the plan may be."""
     kind, own = metrics["kind"], metrics["planned_with"]
-    # A surface's bound may be too weak to say anything.
+    # The bound of a surface may be too weak to be of use.
     if kind != "logdet" and own["bound"] <= 0:
-        return "How much better another choice could be is not known."
+        return "The distance to the optimum is not known."
     return (
-        f"At the frequencies that it was planned with, the plan comes to "
-        f"{_shown(own['merit'], kind)}; no choice of as many views among the candidates and these "
-        f"gets below {_shown(own['bound'], kind)} there."
+        f"At the frequencies used for planning the criterion is {_shown(own['merit'], kind)}; no "
+        f"choice of as many views among the candidates and these can be below "
+        f"{_shown(own['bound'], kind)}."
     )
 
 
 def _against(value: float, own: float) -> str:
-    """By which share the plan is below a value, as ``Plan.gain`` has it."""
+    """By which fraction the plan is below a value, as ``Plan.gain`` has it."""
     return f"{(value - own) / max(abs(value), 1e-300):.1%}"
 
 
 def _assumed(page: Page, given: PlanInput) -> None:
-    page.section("What was assumed")
+    page.section("Assumptions")
     for note in given.notes:
         page.paragraph(note)
     low, high = (math.degrees(angle) for angle in given.constraints.elevation)
     first, last = (math.degrees(angle) for angle in given.constraints.azimuth)
     page.facts(
         {
-            "target": f"{given.target.diameter:.4g} mm across, {given.target.mode}",
-            "finest frequency wanted": f"{given.target.highest:.4g} cycles per mm",
-            "signal to noise": f"{given.target.snr:g} for one view at one cycle per diameter",
+            "target": f"{given.target.diameter:.4g} mm in diameter, {given.target.mode}",
+            "highest frequency of interest": f"{given.target.highest:.4g} cycles per mm",
+            "signal-to-noise ratio": f"{given.target.snr:g} for one view at one cycle per diameter",
             "elevation": f"{low:g} to {high:g} degrees",
             "azimuth": f"{first:g} to {last:g} degrees",
             "path": type(given.constraints.path).__name__.lower(),
-            "places kept out": len(given.constraints.keepouts),
+            "regions kept out": len(given.constraints.keepouts),
         }
     )
 
 
 def _cameras(page: Page, given: PlanInput, found: Plan, sampled: ViewSet) -> None:
-    page.section("Where the cameras stand")
+    page.section("Camera poses")
     groups = {"taken already": found.fixed, "planned": found.cameras}
     page.figure(
         figure_svg(camera_figure(groups, sampled)),
-        caption="The target is the grey disc; lines point where the cameras look. views.csv has "
-        "the angles, distances and settings, the most useful view first, so that the first views "
-        "of the list are themselves a good plan of fewer.",
+        caption="The grey disc is the target; lines show the viewing directions. views.csv lists "
+        "angles, distances and settings, the most informative view first, so that its first rows "
+        "are a good plan of fewer views.",
         alt=f"{len(found)} planned cameras from above and from the side",
     )
     rows = []
@@ -158,7 +158,7 @@ def _range(values: Any) -> str:
 
 
 def _gains(page: Page, found: Plan, diminishing_returns: DiminishingReturns, name: str) -> None:
-    page.section("What each view brings")
+    page.section("Gain of each view")
     views = np.arange(len(diminishing_returns.merits)) + len(found.fixed)
     figure = curves(
         {"planned": (views, diminishing_returns.merits)},
@@ -170,27 +170,27 @@ def _gains(page: Page, found: Plan, diminishing_returns: DiminishingReturns, nam
     )
     page.figure(
         figure_svg(figure),
-        caption="The merit as views are added, the most useful first.",
-        alt="Merit against the number of views",
+        caption="The criterion as views are added, the most informative first.",
+        alt="Criterion against the number of views",
     )
-    average = "of what those before it brought on average"
+    average = "of the average gain of those before it"
     share = f"{diminishing_returns.share:.0%}"
     page.paragraph(
-        f"Every view still brings more than {share} {average}: more would help."
+        f"Every view still gains more than {share} {average}: more views would help."
         if diminishing_returns.views is None
-        else f"After {diminishing_returns.views} views the returns diminish: the next brings less "
+        else f"After {diminishing_returns.views} views the returns diminish: the next gains less "
         f"than {share} {average}."
     )
 
 
 def _coverage(page: Page, sampled: ViewSet, device: Device) -> None:
     target = sampled.target
-    page.section("What the views sample")
+    page.section("Coverage")
     page.figure(
         figure_svg(direction_figure(sampled, device)),
-        caption="Left, lines of sight on the upper hemisphere, up in the middle; opposite ones "
-        "count as one. Right, how many views see detail along each direction, at 8 cycles per "
-        "diameter; hatched is what lies on no view's slice.",
+        caption="Left: lines of sight on the upper hemisphere, seen from above; opposite ones "
+        "count as one. Right: how many views sample detail along each direction, at 8 cycles "
+        "per diameter; hatched directions lie on no view's slice.",
         alt="Hemispheres of lines of sight and of directions of detail",
     )
     points = points_of(target.center, target.diameter, sampled.up, flat=sampled.is_flat)

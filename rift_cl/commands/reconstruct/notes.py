@@ -1,4 +1,4 @@
-"""What ``rift reconstruct`` assumed of a scan and mended in it, in sentences for people."""
+"""Assumptions and corrections of ``rift reconstruct``, a sentence each."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def notes_of(source: SliceInput) -> list[str]:
         notes.append(_stitched(source))
     elif source.settings.half_acquisition == "stitched":
         notes.append(
-            "Nothing was stitched: the views are no full turn with the axis off the detector's "
-            "middle."
+            "Nothing was stitched: this is no full turn with the axis off the middle of the "
+            "detector."
         )
     if source.offset:
         notes.append(_offset(source))
@@ -45,14 +45,15 @@ def notes_of(source: SliceInput) -> list[str]:
     notes += source.clean.notes()
     if source.scan.background:
         notes.append(
-            f"Air was brought to zero by the outermost {source.scan.background} bins of each end."
+            f"The mean of the outermost {source.scan.background} bins at each end (air) was "
+            "subtracted."
         )
     if source.pad:
         notes.append(_wide(source))
     if source.settings.method == "levels":
         notes.append(
-            "The object was taken for a disc of one material with holes, whose rim is solid; its "
-            "rim also told the air's level and the beam's hardening."
+            "The object was taken to be a disc of one material with holes and a solid rim; the rim "
+            "also gave the level of air and the beam hardening."
         )
     return notes
 
@@ -66,9 +67,7 @@ def _axis(source: SliceInput) -> list[str]:
         center = source.file.fan.center
         middle = center == (source.file.shape[2] - 1) / 2
         where = "at the detector's middle" if middle else "where the file says"
-        return [
-            f"The axis was taken {where}, bin {center:.2f}; give it with --center if it is not."
-        ]
+        return [f"The axis was taken to be {where}, bin {center:.2f}; if it is not, give --center."]
     if source.estimate is None:
         return [f"The rotation axis was found before, at bin {source.center:.2f}."]
     return [f"The rotation axis was found {source.estimate.in_words()}."]
@@ -86,31 +85,31 @@ def _binning(source: SliceInput) -> str:
 
 def _stitched(source: SliceInput) -> str:
     return (
-        f"The axis, bin {source.axis['center']:.2f}, lies off the middle of the detector in a full "
-        "turn: opposite views were stitched to views of half a turn."
+        f"The axis, bin {source.axis['center']:.2f}, is off the middle of the detector in a full "
+        "turn: opposite views were stitched into wider views over 180 degrees."
     )
 
 
 def _offset(source: SliceInput) -> str:
     off = (
-        f"The axis, bin {source.axis['center']:.2f}, lies off the middle of the detector in a "
+        f"The axis, bin {source.axis['center']:.2f}, is off the middle of the detector in a "
         "full turn"
     )
-    # Steps explain every view as it is: nothing is joined for them.
-    joined = "" if source.settings.iterative else "opposite views were joined, and "
-    return f"{off}: {joined}slices reach to the farther end."
+    # Iterative methods use every view as it is.
+    joined = "" if source.settings.iterative else "opposite views were combined, and "
+    return f"{off}: {joined}slices extend to the farther end."
 
 
 def _wide(source: SliceInput) -> str:
-    wide = "The object is wider than the detector, or was said to be"
+    wide = "The object is wider than the detector (--pad)"
     if source.settings.iterative:
         return (
-            f"{wide}: slices were worked on with a margin of {source.pad} bins on each side, and "
-            "what lies there is a guess."
+            f"{wide}: slices were computed with a margin of {source.pad} bins on each side, whose "
+            "values are an extrapolation."
         )
     return (
-        f"{wide}: projections were continued smoothly beyond its ends, and what lies outside is "
-        "a guess."
+        f"{wide}: projections were extrapolated smoothly beyond its ends; values outside the "
+        "field of view are not measured."
     )
 
 
@@ -121,6 +120,6 @@ def _gap(angles: NDArray[np.float64]) -> list[str]:
     if gap <= max(_GAP_STEPS * np.pi / len(angles), _GAP):
         return []
     return [
-        f"No view looks along {np.rad2deg(gap):.0f} degrees of the half-circle: edges in these "
+        f"{np.rad2deg(gap):.0f} of 180 degrees have no view (limited angle): edges in these "
         "directions are blurred."
     ]

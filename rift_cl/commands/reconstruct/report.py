@@ -1,4 +1,4 @@
-"""What ``rift reconstruct`` shows: a few slices, their histogram of values, the run's figures."""
+"""The report of ``rift reconstruct``: slices, a histogram of values, the figures of the run."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def reconstruction_page(job: Reconstruction, preview: Preview) -> Page:
             what=f"Attenuation per {unit}, planes along the axis",
         )
     if job.source.notes:
-        page.section("What was assumed and mended")
+        page.section("Assumptions and corrections")
         for note in job.source.notes:
             page.paragraph(note)
     _residuals(page, job.inversion.residuals)
@@ -147,7 +147,7 @@ def reconstruction_page(job: Reconstruction, preview: Preview) -> Page:
 
 
 def _residuals(page: Page, residuals: Mapping[int, list[float]]) -> None:
-    """Curves of the residual, where the method took steps."""
+    """Curves of the residual of an iterative method."""
     curves_of = {number: curve for number, curve in sorted(residuals.items()) if curve}
     if not curves_of:
         return
@@ -157,13 +157,13 @@ def _residuals(page: Page, residuals: Mapping[int, list[float]]) -> None:
         for number in few
     }
     title = "residual, root mean square"
-    draw = partial(curves, series, xlabel="step", ylabel=title, log_x=True)
-    page.section("Steps")
+    draw = partial(curves, series, xlabel="iteration", ylabel=title, log_x=True)
+    page.section("Convergence")
     page.figure(
         figure_svgs(lambda width: draw(width=width)),
-        caption="How far the projections of the slice are from the measured ones, in the unit of "
-        "a line integral.",
-        alt="Curves of the residual over the steps",
+        caption="Difference between the forward projection of the slice and the measurement, in "
+        "the unit of a line integral.",
+        alt="Residual against iterations",
     )
 
 
@@ -181,7 +181,7 @@ def _histogram(page: Page, images: list[NDArray[np.float32]], unit: str) -> None
     page.section("Values")
     page.figure(
         figure_svgs(lambda width: draw(width=width)),
-        caption=f"How often each value occurs in {len(images)} of the slices.",
+        caption=f"Histogram of the values in {len(images)} of the slices.",
         alt="Histogram of the values",
     )
 

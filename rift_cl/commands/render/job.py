@@ -1,4 +1,4 @@
-"""``rift render``: pictures of a scene, in a film or from a capture's cameras."""
+"""``rift render``: frames of a film, or the views of a capture."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class Render:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What had to be guessed, a sentence each."""
+        """Assumptions, a sentence each."""
         return () if self.settings.path is not None else self.settings.notes(self.scene)
 
     @property
@@ -195,7 +195,7 @@ class Render:
             "up": "({:.3g}, {:.3g}, {:.3g})".format(*bounds.up),
             "cameras": self._way(),
             "frames": f"{len(self.cameras)}, at most {largest[1]} x {largest[0]} pixels",
-            "film": self.film or "none, since frames differ in size or there is one alone",
+            "film": self.film or "none, since frames differ in size or there is only one",
             "eps2d": f"{self.scene.drawing.eps2d:g}",
             "device memory": f"{format_bytes(memory.fixed)} and the tile lists",
             "device": self.device.name,

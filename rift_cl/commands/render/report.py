@@ -1,4 +1,4 @@
-"""What ``rift render`` shows: a contact sheet of its frames, and some of them in motion."""
+"""The report of ``rift render``: a contact sheet of the frames, and an animation of some."""
 
 from __future__ import annotations
 
@@ -77,17 +77,17 @@ class Sheet:
 
 def render_page(name: str, sheet: Sheet, moving: bytes | None, metrics: Mapping[str, Any]) -> Page:
     """The report of a finished rendering; ``moving`` is a small copy of its film."""
-    page = Page(f"Pictures of {name}", f"{metrics['frames']} frames, {metrics['splats']} splats")
+    page = Page(f"Rendering of {name}", f"{metrics['frames']} frames, {metrics['splats']} splats")
     if moving is not None and len(moving) <= _EMBEDDED:
-        caption = f"Frames in motion, made smaller; {metrics['film']} is the film."
+        caption = f"A smaller copy of the film, {metrics['film']}."
         page.figure(moving, caption=caption, alt="Animation of the frames")
     depth = metrics["depth_window"]
-    caption = "Some frames by their numbers."
+    caption = "Some of the frames, by number."
     if depth is not None:
         caption += f" Depth beside: bright at {depth[0]:.4g}, dark at {depth[1]:.4g} scene units."
     cells, titles = sheet.panels()
     page.panels(cells, titles=titles, columns=_ROW, caption=caption, alt="Frame")
-    facts = {"middle": metrics["center"], "up": metrics["up"]}
+    facts = {"centre": metrics["center"], "up": metrics["up"]}
     page.section("Scene")
     page.facts(
         {"radius": metrics["radius"], "eps2d": metrics["eps2d"]}
@@ -96,7 +96,7 @@ def render_page(name: str, sheet: Sheet, moving: bytes | None, metrics: Mapping[
     if depth is not None:
         page.paragraph(
             "depth/*.exr hold the expected depth along the camera's axis in scene units as "
-            "float32, 0 where nothing is seen; depth/*.png show it in colours."
+            "float32, 0 where there is nothing; depth/*.png show it in colour."
         )
     return page
 
