@@ -17,6 +17,7 @@ RUNS = {
     "find_axis": ("64", "found at bin 35."),
     "fit_photographs": ("20", "<RenderedScene in "),
     "fit_xray": ("20", "<XrayScene: 1000 splats"),
+    "own_angular_basis": ("", "mean of the image: "),
     "own_filter": ("32", "butterworth: "),
     "own_loss": ("", "charbonnier: "),
     "own_reader": ("", "(4, 96, 96) voxels"),

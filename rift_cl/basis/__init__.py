@@ -5,27 +5,30 @@ Over space (``Basis``): Gaussian, Hermite, Laguerre, SquaredHermite. Over direct
 """
 
 from rift_cl.basis.angular import (
-    ANGULAR_KINDS,
+    ANGULAR_BASES,
     AngularBasis,
+    AngularFunctions,
     AnisotropicSphericalGaussians,
     HGLobe,
     LGLobe,
     SphericalGaussians,
     SphericalHarmonics,
     angular_basis,
+    register_angular_basis,
 )
 from rift_cl.basis.footprint import Footprint, footprint
 from rift_cl.basis.gaussian import Gaussian
 from rift_cl.basis.hermite import Hermite
 from rift_cl.basis.laguerre import Laguerre
 from rift_cl.basis.protocol import Basis, Evaluation
-from rift_cl.basis.registry import BASES, basis_named
+from rift_cl.basis.registry import BASES
 from rift_cl.basis.squared_hermite import SquaredHermite
 
 __all__ = [
-    "ANGULAR_KINDS",
+    "ANGULAR_BASES",
     "BASES",
     "AngularBasis",
+    "AngularFunctions",
     "AnisotropicSphericalGaussians",
     "Basis",
     "Evaluation",
@@ -39,6 +42,6 @@ __all__ = [
     "SphericalHarmonics",
     "SquaredHermite",
     "angular_basis",
-    "basis_named",
     "footprint",
+    "register_angular_basis",
 ]

@@ -21,6 +21,7 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Camera
+from rift_cl.splat.host_shading import shade_on_host, shade_on_host_grad
 from rift_cl.splat.projected import Projected, SplatGradients
 from rift_cl.splat.shading import Shading
 from rift_cl.splat.splats import Splats
@@ -132,6 +133,10 @@ def shade(
     shading = Shading.of(means, sh, lobes, angular)
     count = means.shape[0]
     features = device.empty((count, 3)) if into is None else into
+    if shading.on_host is not None:
+        linear, geometry = shading.parameters["linear"], shading.parameters["lobes"]
+        shade_on_host(device, shading.on_host, means, linear, geometry, camera, culled, features)
+        return features
     center = np.array([*camera.center, 0], np.float32)
     device.launch(
         shading.kernel,
@@ -186,6 +191,14 @@ def shade_grad(
     shading = Shading.of(means, sh, lobes, angular)
     count = means.shape[0]
     _check_incoming(gradients.features, features)
+    if shading.on_host is not None:
+        linear, geometry = shading.parameters["linear"], shading.parameters["lobes"]
+        by_linear, by_lobes = shade_on_host_grad(
+            device, shading.on_host, means, linear, geometry, camera, features, gradients
+        )
+        if grad_lobes is not None:
+            copy_columns(device, by_lobes, 0, grad_lobes, 0, by_lobes.shape[1])
+        return by_linear
     found = {
         f"grad_{name}": device.empty(array.shape) for name, array in shading.parameters.items()
     }

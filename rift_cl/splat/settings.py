@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from rift_cl.basis.angular import ANGULAR_BASES
 from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
 
@@ -80,12 +81,12 @@ class SplatSettings:
         if not 0 < one_number(self.alpha_cap) < 1:
             raise InputError(f"SplatSettings: alpha_cap is {self.alpha_cap!r}, wanted 0 < cap < 1")
         for name, choices in (
-            ("mode", SplatMode),
-            ("activation", Activation),
-            ("angular", Angular),
+            ("mode", get_args(SplatMode)),
+            ("activation", get_args(Activation)),
+            ("angular", ANGULAR_BASES.names),
         ):
-            if getattr(self, name) not in get_args(choices):
-                wanted = " or ".join(get_args(choices))
+            if getattr(self, name) not in choices:
+                wanted = " or ".join(choices)
                 raise InputError(
                     f"SplatSettings: {name} is {getattr(self, name)!r}, wanted {wanted}"
                 )

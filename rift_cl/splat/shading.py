@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rift_cl.basis.angular import ANGULAR_KINDS, angular_basis
+from rift_cl.basis.angular import ANGULAR_BASES, AngularBasis, angular_basis
 from rift_cl.cl.array import DeviceArray
 from rift_cl.errors import InputError, ShapeError
 
@@ -25,11 +25,13 @@ class Shading:
         parameters: the arrays it reads besides means, by its names, in which its gradient is
             taken.
         sizes: what it is built for.
+        on_host: the basis, where it has no kernel and is evaluated on the host.
     """
 
     kernel: str
     parameters: dict[str, DeviceArray]
     sizes: dict[str, int]
+    on_host: AngularBasis | None = None
 
     @classmethod
     def of(
@@ -41,9 +43,7 @@ class Shading:
             InputError: there are none, or the functions are unknown.
             ShapeError: they do not fit.
         """
-        if angular not in ANGULAR_KINDS:
-            wanted = ", ".join(ANGULAR_KINDS)
-            raise InputError(f"shade: angular is {angular!r}, wanted one of {wanted}")
+        ANGULAR_BASES[angular]
         if sh is None:
             raise InputError("shade: these splats have no spherical harmonics; draw their colors")
         if angular == "sh":
@@ -58,11 +58,15 @@ class Shading:
                 f"shade: angular is {angular!r}, but these splats have no lobes: give lobes, or "
                 "draw them with angular='sh'"
             )
-        wanted_shape = (means.shape[0], angular_basis(angular, sh.shape[1]).n_geometry)
+        basis = angular_basis(angular, sh.shape[1])
+        wanted_shape = (means.shape[0], basis.n_geometry)
         if lobes.shape != wanted_shape:
             raise ShapeError(
                 f"shade: lobes has shape {lobes.shape}, wanted {wanted_shape} for {sh.shape[1]} "
                 f"functions of {angular!r}"
             )
+        parameters = {"linear": sh, "lobes": lobes}
+        if angular not in _LOBES:
+            return cls("", parameters, {}, basis)
         sizes = {"LOBES": _LOBES[angular], "FUNCTIONS": sh.shape[1]}
-        return cls("lobe_shade", {"linear": sh, "lobes": lobes}, sizes)
+        return cls("lobe_shade", parameters, sizes)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from rift_cl.basis.angular import angular_basis
+from rift_cl.basis.angular import ANGULAR_BASES, angular_basis
 from rift_cl.errors import InputError
 from rift_cl.splat.orders import HIGHEST
 from rift_cl.splat.settings import Activation, Angular
@@ -98,7 +98,7 @@ class AngularSettings:
 
     def __post_init__(self) -> None:
         """Check every number's range."""
-        check_choice(self, "kind", get_args(Angular))
+        check_choice(self, "kind", ANGULAR_BASES.names)
         check_whole(self, "modes", 1, 35)
         check_number(self, "first", most=1)
 

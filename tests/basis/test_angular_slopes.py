@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rift_cl.basis.angular import (
-    ANGULAR_KINDS,
+    ANGULAR_BASES,
     HGLobe,
     LGLobe,
     SphericalGaussians,
@@ -169,9 +169,9 @@ def test_lobes_begin_along_their_axes_and_apart(kind, count):
 
 
 def test_bases_are_found_by_name_and_count():
-    assert ANGULAR_KINDS == ("sh", "hg", "lg", "sg", "asg")
+    assert ANGULAR_BASES.names == ("sh", "hg", "lg", "sg", "asg")
     assert [angular_basis("sh", (k + 1) ** 2).degree for k in range(5)] == [0, 1, 2, 3, 4]
-    assert [angular_basis(kind, 8).n_geometry for kind in ANGULAR_KINDS[1:]] == [6, 5, 28, 42]
+    assert [angular_basis(kind, 8).n_geometry for kind in ANGULAR_BASES.names[1:]] == [6, 5, 28, 42]
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pickle
 import numpy as np
 import pytest
 
-from rift_cl.basis import BASES, Gaussian, Hermite, Laguerre, SquaredHermite, basis_named
+from rift_cl.basis import BASES, Gaussian, Hermite, Laguerre, SquaredHermite
 from rift_cl.errors import BasisSpanError, DTypeError, InputError, NonFiniteError, ShapeError
 
 
@@ -30,7 +30,7 @@ from rift_cl.errors import BasisSpanError, DTypeError, InputError, NonFiniteErro
         (lambda: SquaredHermite(9), "from 0 to 8: its square has order 2 N"),
         (lambda: SquaredHermite(2, 0), "SquaredHermite: dim is 0"),
         (lambda: Gaussian(4), "Gaussian: dim is 4"),
-        (lambda: basis_named("gabor"), "wanted one of gaussian, hermite, laguerre"),
+        (lambda: BASES["gabor"], "wanted one of gaussian, hermite, laguerre"),
     ],
 )
 def test_impossible_settings_are_refused(make, words: str) -> None:
@@ -73,7 +73,7 @@ def test_no_points_are_no_values() -> None:
 
 @pytest.mark.parametrize("name", sorted(BASES))
 def test_every_basis_is_found_by_its_name_and_does_all_of_the_protocol(name: str) -> None:
-    kind = basis_named(name)
+    kind = BASES[name]
     basis = kind() if name == "gaussian" else kind(2)
     assert basis.name == name
     assert (basis.dim, basis.truncation, basis.form) == (2, "total", "der")

@@ -1,22 +1,33 @@
 """Functions of the viewing direction, behind one interface: what a splat's colour is made of.
 
-Five kinds, by the name that settings, files and commands know them by; ``protocol`` says what
-they have in common.
+Five kinds, by the name that settings, files and commands know them by, and those that a user
+registers; ``protocol`` says what they have in common.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 from rift_cl.basis.angular.chart import HGLobe, LGLobe
+from rift_cl.basis.angular.frame import unit_axes, unit_directions
 from rift_cl.basis.angular.gaussians import AnisotropicSphericalGaussians, SphericalGaussians
 from rift_cl.basis.angular.harmonics import SphericalHarmonics
-from rift_cl.basis.angular.protocol import AngularBasis, AngularGradients, Slopes
+from rift_cl.basis.angular.protocol import (
+    CONSTANT,
+    AngularBasis,
+    AngularFunctions,
+    AngularGradients,
+    Slopes,
+)
 from rift_cl.errors import InputError
+from rift_cl.registry import Registry
 
 __all__ = [
-    "ANGULAR_KINDS",
+    "ANGULAR_BASES",
+    "CONSTANT",
     "AngularBasis",
+    "AngularFunctions",
     "AngularGradients",
     "AnisotropicSphericalGaussians",
     "HGLobe",
@@ -25,31 +36,55 @@ __all__ = [
     "SphericalGaussians",
     "SphericalHarmonics",
     "angular_basis",
+    "register_angular_basis",
+    "unit_axes",
+    "unit_directions",
 ]
 
-_WITH: dict[str, Callable[[int], AngularBasis]] = {
-    "sh": SphericalHarmonics.of_count,
-    "hg": HGLobe,
-    "lg": LGLobe,
-    "sg": SphericalGaussians.of_count,
-    "asg": AnisotropicSphericalGaussians.of_count,
-}
-ANGULAR_KINDS = tuple(_WITH)
+ANGULAR_BASES: Registry[Callable[[int], AngularBasis]] = Registry(
+    "angular basis",
+    {
+        "sh": SphericalHarmonics.of_count,
+        "hg": HGLobe,
+        "lg": LGLobe,
+        "sg": SphericalGaussians.of_count,
+        "asg": AnisotropicSphericalGaussians.of_count,
+    },
+)
+# What the comment of a file of splats can hold.
+_NAME = re.compile(r"[a-z0-9]+")
+
+
+def register_angular_basis(name: str, basis: Callable[[int], AngularBasis]) -> None:
+    """Make an angular basis known by a name, for ``AngularSettings`` and ``SplatSettings``.
+
+    Its colours are computed on the host, in NumPy, which is slower than the kernels that the
+    package's own bases have.
+
+    Args:
+        name: small letters and digits.
+        basis: makes the basis of so many functions, the constant included; one derived from
+            ``AngularFunctions``, with at least one number of geometry.
+
+    Raises:
+        InputError: the name is taken or has other characters.
+    """
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise InputError(
+            f"register_angular_basis: the name is {name!r}, wanted small letters and digits"
+        )
+    ANGULAR_BASES.add(name, basis)
 
 
 def angular_basis(kind: str, n_linear: int) -> AngularBasis:
     """The basis of a kind that has this many functions.
 
     Args:
-        kind: ``sh``, ``hg``, ``lg``, ``sg`` or ``asg``.
+        kind: ``sh``, ``hg``, ``lg``, ``sg``, ``asg``, or one that was registered.
         n_linear: all functions, the constant included: 1, 4, 9, 16 or 25 harmonics; 1 to 36 of a
             chart lobe; 2 to 36 of spherical Gaussians, which is one more than there are lobes.
 
     Raises:
         InputError: the kind is unknown, or has no such number of functions.
     """
-    if kind not in _WITH:
-        raise InputError(
-            f"angular_basis: kind is {kind!r}, wanted one of {', '.join(ANGULAR_KINDS)}"
-        )
-    return _WITH[kind](n_linear)
+    return ANGULAR_BASES[kind](n_linear)

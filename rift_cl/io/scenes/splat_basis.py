@@ -24,7 +24,7 @@ from typing import Any, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.basis.angular import AngularBasis, angular_basis
+from rift_cl.basis.angular import ANGULAR_BASES, AngularBasis, angular_basis
 from rift_cl.errors import FileFormatError, InputError, ShapeError
 from rift_cl.splat.orders import HIGHEST, count_of, order_of
 from rift_cl.splat.settings import Activation, Angular
@@ -63,9 +63,10 @@ class SceneBasis:
             InputError: a choice is unknown, or belongs to no scene of this mode.
             ShapeError: a number of modes, or of lobes, does not exist.
         """
-        for name, choices in (("activation", Activation), ("angular", Angular)):
-            if getattr(scene, name) not in get_args(choices):
-                wanted = " or ".join(get_args(choices))
+        kinds = ("activation", get_args(Activation)), ("angular", ANGULAR_BASES.names)
+        for name, choices in kinds:
+            if getattr(scene, name) not in choices:
+                wanted = " or ".join(choices)
                 raise InputError(f"SplatScene: {name} is {getattr(scene, name)!r}, wanted {wanted}")
         linear = 0 if scene.angular == "sh" else (*np.shape(scene.sh), 0, 0)[1]
         orders = [_order_of(scene, name) for name in ("shape_modes", "color_modes")]
@@ -200,7 +201,7 @@ def _parsed(path: Path, said: str, rest: int) -> SceneBasis:
         found[match[1]] = match[2]
     activation, angular = found.get("activation", "clamp"), found.get("angular", "sh")
     orders = [found.get(f"{name} order", "0") for name in ("shape", "color")]
-    known = activation in get_args(Activation) and angular in get_args(Angular)
+    known = activation in get_args(Activation) and angular in ANGULAR_BASES
     if not known or any(order not in map(str, range(HIGHEST + 1)) for order in orders):
         raise _meaningless(path, said)
     linear = 0 if angular == "sh" else 1 + rest // 3

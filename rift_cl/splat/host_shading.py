@@ -1,0 +1,73 @@
+"""Colours of splats by an angular basis that has no kernel: one of a user's own, in NumPy.
+
+The sums are those of ``kernels/splat/lobe_shade.cl`` and ``lobe_shade_grad.cl``, taken on the host
+in float64. That costs copies from and to the device in each frame, and holds for any basis.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.basis.angular import AngularBasis
+from rift_cl.cl.arithmetic import axpby, copy_columns
+from rift_cl.cl.array import DeviceArray
+from rift_cl.cl.device import Device
+from rift_cl.geometry import Camera
+from rift_cl.splat.projected import SplatGradients
+
+Floats = NDArray[np.float64]
+
+
+def shade_on_host(
+    device: Device,
+    basis: AngularBasis,
+    means: DeviceArray,
+    linear: DeviceArray,
+    lobes: DeviceArray,
+    camera: Camera,
+    culled: DeviceArray,
+    features: DeviceArray,
+) -> None:
+    """Write the colours of splats into the first three columns of ``features``; see ``shade``."""
+    away = device.get(means).astype(float) - camera.center
+    colors = basis.evaluate(device.get(linear), device.get(lobes), away) + 0.5
+    drawn = np.isfinite(colors).all(axis=1) & (device.get(culled) == 0)
+    shown = np.where(drawn[:, None], np.maximum(colors, 0), 0)
+    copy_columns(device, device.array(shown), 0, features, 0, 3)
+
+
+def shade_on_host_grad(
+    device: Device,
+    basis: AngularBasis,
+    means: DeviceArray,
+    linear: DeviceArray,
+    lobes: DeviceArray,
+    camera: Camera,
+    features: DeviceArray,
+    gradients: SplatGradients,
+) -> tuple[DeviceArray, DeviceArray]:
+    """The gradient of ``shade_on_host``, as ``shade_grad`` has it.
+
+    Returns:
+        The gradients by the coefficients, (N, L, 3), and by the geometry, (N, G); those by means
+        and camera are added to ``gradients``.
+    """
+    away = device.get(means).astype(float) - camera.center
+    colors, incoming = (device.get(a)[:, :3] for a in (features, gradients.features))
+    incoming = np.where(colors > 0, incoming, 0).astype(float)
+    found = basis.evaluate(device.get(linear), device.get(lobes), away, grad=True)
+    black = ~incoming.any(axis=1)
+    by_linear = found.by_coeff[:, :, None] * incoming[:, None, :]
+    by_lobes = np.einsum("ngc,nc->ng", found.by_geometry, incoming)
+    by_mean = np.einsum("nic,nc->ni", found.by_directions, incoming)
+    for array in (by_linear, by_lobes, by_mean):
+        array[black] = 0
+    axpby(device, 1.0, device.array(by_mean), 1.0, gradients.means)
+    if gradients.camera is not None:
+        shift = by_mean @ np.linalg.inv(camera.view[:3, :3])
+        parts = np.zeros((len(shift), 4, 4))
+        parts[:, :3, :3] = shift[:, :, None] * camera.center
+        parts[:, :3, 3] = shift
+        axpby(device, 1.0, device.array(parts.reshape(-1, 16)), 1.0, gradients.camera)
+    return device.array(by_linear), device.array(by_lobes)
