@@ -8,6 +8,7 @@ removed and built again. What is damaged while a process runs is found by the ne
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
@@ -18,6 +19,8 @@ from pathlib import Path
 _RECORD = "checksums.json"
 # A driver touches this file to say when it used a program; it holds nothing.
 _TOUCHED = "last_accessed"
+# Folders down to a program's own: PoCL names it by a hash that is cut in two.
+_PROGRAM_DEPTH = 2
 _UNKNOWN, _UNREADABLE = -1, -2
 
 
@@ -51,28 +54,32 @@ def record(folder: Path) -> None:
         _write(folder, {**known, **new})
 
 
-def _files(folder: Path) -> Iterator[tuple[str, Path]]:
-    """Every file of every program, by its name inside the cache; two folders hold nothing else.
+def _files(folder: Path) -> Iterator[tuple[str, str]]:
+    """Every file of every program: its name inside the cache, and its path.
 
-    It is walked at every build, and pathlib would take longer over it than the compiler.
+    The cache is walked at every build, and os.walk would take twice as long over it. What lies
+    outside of a program (two folders deep) is not its file.
     """
-    root = os.fspath(folder)
-    for place, _, names in os.walk(root):
-        inside = place[len(root) + 1 :].replace(os.sep, "/")
-        if "/" in inside:
-            for name in names:
-                if name != _TOUCHED:
-                    yield f"{inside}/{name}", Path(place, name)
+    pending = [(os.fspath(folder), "", 0)]
+    while pending:
+        place, inside, depth = pending.pop()
+        # A folder that another process removed meanwhile has no files.
+        with contextlib.suppress(OSError), os.scandir(place) as entries:
+            for entry in entries:
+                if entry.is_dir(follow_symlinks=False):
+                    pending.append((entry.path, f"{inside}{entry.name}/", depth + 1))
+                elif depth >= _PROGRAM_DEPTH and entry.name != _TOUCHED:
+                    yield f"{inside}{entry.name}", entry.path
 
 
 def _program(name: str) -> str:
-    """The folder of one program: PoCL names it by a hash that is cut in two."""
-    return "/".join(name.split("/")[:2])
+    """The folder of the program that a file belongs to."""
+    return "/".join(name.split("/")[:_PROGRAM_DEPTH])
 
 
-def _checksum(path: Path) -> int:
+def _checksum(path: str) -> int:
     try:
-        return zlib.crc32(path.read_bytes())
+        return zlib.crc32(Path(path).read_bytes())
     except OSError:
         return _UNREADABLE
 
