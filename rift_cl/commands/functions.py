@@ -97,6 +97,8 @@ def fit(
     from rift_cl.commands.fit_xray.settings import FitXraySettings
     from rift_cl.io.scans.formats import is_scan_file
 
+    if kind not in (None, "photos", "xray"):
+        raise InputError(f"kind is {kind!r}, wanted 'photos' or 'xray'")
     xray = is_scan_file(Path(capture)) if kind is None else kind == "xray"
     with _folder(out) as (folder, keep):
         given = {"capture": capture, "out": folder, **settings}

@@ -102,12 +102,20 @@ def test_an_axis_is_shown_by_its_curve():
     assert "data:image/svg+xml" in found._repr_html_()
 
 
-def test_a_failed_command_leaves_no_folder(tmp_path, monkeypatch):
+def test_a_failed_command_leaves_no_folder(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     with pytest.raises(InputError, match="nowhere"):
         rift.fit(tmp_path / "nowhere")
     with pytest.raises(InputError, match="no setting 'speed'"):
         rift.plan_views(3, speed=2)
+    for settings, words in (
+        ({"steps": "many"}, "take --steps=many$"),
+        ({"test": 3, "strategy": "best"}, "take --strategy=best$"),
+        ({"kind": "xrays"}, "kind"),
+    ):
+        with pytest.raises(InputError, match=words):
+            rift.fit(tmp_path, **settings)
+    assert capsys.readouterr() == ("", "")
     with pytest.raises(InputError, match=r"config\.json"):
         rift.plan_views(3, config=tmp_path / "config.json")
     with pytest.raises(InputError, match="dry_run"):

@@ -84,7 +84,7 @@ def test_a_preview_is_always_left(first):
         ('{"job": "reconstruct", "settings": {"colour": 3}}', "no setting 'colour'"),
         (
             '{"job": "reconstruct", "settings": {"scan": "x", "method": "best"}}',
-            "does not take all",
+            "does not take",
         ),
         ('{"job": "reconstruct", "settings": {"scan": "x", "steps": "many"}}', "does not take"),
     ],

@@ -7,9 +7,12 @@ goes through the same parser, so that a value that cannot be used is refused as 
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import math
+import re
 from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
@@ -90,15 +93,18 @@ def parsed_settings(
     if unknown:
         raise InputError(f"{where}'rift {job}' has no setting {unknown[0]!r}")
     arguments = _as_arguments(values, settings)
+    said = io.StringIO()
     try:
-        if earlier is not None:
-            return tyro.cli(settings, default=earlier, args=arguments, console_outputs=False)
-        return tyro.cli(settings, args=arguments, console_outputs=False)
+        # The parser prints what is wrong before it gives up.
+        with redirect_stderr(said), redirect_stdout(said):
+            if earlier is not None:
+                return tyro.cli(settings, default=earlier, args=arguments)
+            return tyro.cli(settings, args=arguments)
     except SystemExit as error:
-        raise InputError(
-            f"{where}'rift {job}' does not take all of these values: rift {job} "
-            f"{' '.join(arguments)}"
-        ) from error
+        named = re.search(r"(?:Error parsing|for argument) '?--([\w-]+)", said.getvalue())
+        name = "" if named is None else named[1].replace("-", "_")
+        wrong = _as_arguments({name: values[name]}, settings) if name in values else arguments
+        raise InputError(f"{where}'rift {job}' does not take {' '.join(wrong)}") from error
 
 
 def _as_arguments(values: dict[str, Any], settings: type) -> list[str]:
