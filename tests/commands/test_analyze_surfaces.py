@@ -101,6 +101,7 @@ def test_where_nothing_tells_what_stands_where_suggestions_stay_near(tmp_path):
         assert (sampled.directions() @ way).max() > math.cos(math.radians(ASTRAY + 3))
 
 
+@pytest.mark.full
 def test_a_plan_besides_such_views_says_that_nothing_is_known(tmp_path, walled):
     bare = capture(tmp_path / "bare", arc())
     for folder, known in ((bare, False), (walled, True)):
@@ -130,12 +131,14 @@ def largest_gap(**settings):
     return float(np.diff([*turns, turns[0] + 360]).max())
 
 
+@pytest.mark.full
 def test_the_back_of_an_opaque_target_is_planned_for():
     assert largest_gap() < 100
     # Seen through, opposite views tell the same.
     assert largest_gap(mode="volume") > largest_gap()
 
 
+@pytest.mark.full
 def test_views_besides_those_that_were_taken_keep_off_the_wall(walled, tmp_path):
     out = tmp_path / "plan"
     words = ["plan", "--have", str(walled), "--views", "4", "--unit", "100", "--diameter", "120"]

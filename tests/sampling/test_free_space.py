@@ -66,6 +66,7 @@ def test_a_ball_in_the_open_is_seen_from_all_sides_though_its_back_never_was():
     assert FreeSpace(pillar).in_sight([(4, 0, 1)], ORIGIN, 0.6)[0] == 0
 
 
+@pytest.mark.full
 def test_further_views_of_an_opaque_target_stand_before_the_wall():
     space, taken = walled("points"), arc(3, 10)
     ways = all_round(1.0)

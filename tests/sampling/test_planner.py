@@ -64,6 +64,7 @@ def test_free_views_of_an_isotropic_target_gain_little_and_the_plan_says_so(snr)
     assert "(isotropic target, free cameras): " in verdict
 
 
+@pytest.mark.full
 def test_a_plan_is_not_beaten_by_an_arrangement_that_needs_none():
     # A half ring knows all that these bands ask for; a greedy choice among directions does not
     # come to it.
