@@ -13,6 +13,7 @@ import pytest
 from rift_cl.commands.cli import main
 from rift_cl.io.scans.formats import SCAN_READERS
 from rift_cl.operators.filters.ramp_filters import FILTERS
+from rift_cl.train.loss.pixel_loss import PIXEL_LOSSES
 from rift_cl.train.strategy import STRATEGIES
 
 ROOT = Path(__file__).parents[1]
@@ -52,9 +53,14 @@ def test_code_runs(capsys):
 
 
 def test_what_contributors_are_shown_runs(tmp_path):
-    """A filter, a reader of scans and a strategy of one's own, each by its name."""
+    """A filter, a reader of scans, a loss and a strategy of one's own, each by its name."""
     code = re.findall(r"```python\n(.*?)```", (ROOT / "CONTRIBUTING.md").read_text(), re.DOTALL)
-    added = [(FILTERS, "soft"), (SCAN_READERS, ".raw16"), (STRATEGIES, "fixed")]
+    added = [
+        (FILTERS, "soft"),
+        (SCAN_READERS, ".raw16"),
+        (PIXEL_LOSSES, "charbonnier"),
+        (STRATEGIES, "fixed"),
+    ]
     try:
         names = {}
         for block in code:
