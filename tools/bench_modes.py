@@ -26,8 +26,7 @@ from bench.splats import SplatCase
 from bench.surroundings import surroundings
 from bench.tables import Table
 from rift_cl.basis.indices import n_coeff
-from rift_cl.splat.raster import ScreenSplats, raster_grad, rasterize
-from rift_cl.splat.screen_modes import ScreenModes
+from rift_cl.splat.raster import ScreenModes, ScreenSplats, raster_grad, rasterize
 from rift_cl.splat.settings import SplatSettings
 
 _GAUSSIAN = "Gaussian"
@@ -87,7 +86,7 @@ def _case(device: rift.Device, options: Options, settings: SplatSettings) -> dic
     splats = replace(case.splats, scales=device.array(options.widen * case.parameters["scales"]))
     plain = SplatSettings(mode=settings.mode)
     frame = rift.Renderer(plain, device=device).forward(splats, case.camera)
-    screen = ScreenSplats(frame.projected.screen, frame.drawing.features)
+    screen = ScreenSplats(frame.projection.screen, frame.drawing.screen.features)
     kinds = {_GAUSSIAN: (screen, plain)}
     for name, orders in _KINDS.items():
         modes = _modes(device, device.get(screen.screen), *orders)

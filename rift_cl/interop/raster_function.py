@@ -14,8 +14,7 @@ from rift_cl.interop.splat_functions import Drawer
 from rift_cl.interop.tensors import to_device, to_tensor
 from rift_cl.splat.bands import FrameMemory
 from rift_cl.splat.drawing import Drawing, draw, draw_grad, listed
-from rift_cl.splat.projected import Projected
-from rift_cl.splat.projection import MOMENTS
+from rift_cl.splat.raster import MOMENTS, ScreenSplats
 
 
 class Parts(NamedTuple):
@@ -94,11 +93,11 @@ def _draw(how: Drawer, arrays: list[Any], background: Any) -> Drawing:
     screen, depths, boxes, features = arrays
     pixels = how.size[0] * how.size[1]
     absgrad = how.settings.absgrad
-    culled = how.device.zeros((len(depths),), np.uint8)
     memory = FrameMemory(len(depths), 0, pixels, features.shape[1], absgrad=absgrad)
     return draw(
         how.device,
-        *(Projected(screen, depths, boxes, culled), features, how.size),
+        ScreenSplats(screen, features),
+        *(boxes, depths, how.size),
         settings=how.settings,
         memory=memory,
         background=background,

@@ -22,8 +22,7 @@ from rift_cl.geometry import Camera
 from rift_cl.geometry.camera import CameraModel
 from rift_cl.interop.tensors import to_device, to_host, to_tensor
 from rift_cl.splat.features import shade, shade_grad
-from rift_cl.splat.projected import SplatGradients
-from rift_cl.splat.projection import project, project_grad
+from rift_cl.splat.projection import SplatGradients, project, project_grad
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 
@@ -64,7 +63,7 @@ class Project(torch.autograd.Function):
         arrays: list[Any] = [None if t is None else to_device(device, t) for t in tensors[:5]]
         splats = Splats(arrays[0], arrays[1], arrays[2], arrays[4], covars=arrays[3])
         views = [project(device, splats, camera, how.settings) for camera in cameras]
-        ctx.how, ctx.splats, ctx.cameras, ctx.views, ctx.like = how, splats, cameras, views, like
+        ctx.how, ctx.views, ctx.like = how, views, like
         screens = torch.stack([to_tensor(device, view.screen, like) for view in views])
         rest = [
             torch.stack([to_tensor(device, getattr(view, name), like) for view in views])
@@ -87,12 +86,11 @@ class Project(torch.autograd.Function):
         sums = torch.cat([first[..., None], means2d, twice, depths[..., None]], dim=-1)
         total: dict[str, torch.Tensor] = {}
         lenses = []
-        for camera, projected, own in zip(ctx.cameras, ctx.views, sums, strict=True):
+        signed = replace(how.settings, absgrad=False)
+        for projection, own in zip(ctx.views, sums, strict=True):
             found = project_grad(
-                how.device,
-                *(ctx.splats, camera, replace(how.settings, absgrad=False)),
-                projected=projected,
-                sums=to_device(how.device, own),
+                replace(projection, settings=signed),
+                to_device(how.device, own),
                 depth_channel=True,
                 first_moments=False,
             )

@@ -1,8 +1,7 @@
 """Splats: project, sort into tiles, rasterize, and the gradients of all of it."""
 
 from rift_cl.splat.batch import draw_views, views_grad
-from rift_cl.splat.frame import Frame, FrameGradients
-from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.renderer import Frame, FrameGradients, Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 

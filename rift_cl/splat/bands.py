@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from rift_cl.cl.budget import format_bytes
 from rift_cl.errors import ResourceLimitError
 from rift_cl.splat.orders import Modal, ModeOrders
-from rift_cl.splat.projection import MOMENTS, is_modal
+from rift_cl.splat.projection import is_modal
+from rift_cl.splat.raster import MOMENTS
 from rift_cl.splat.settings import SplatSettings
-from rift_cl.splat.tile_lists import tile_lists_bytes
-from rift_cl.splat.tiles import Tiles
+from rift_cl.splat.tile_lists import Tiles, tile_lists_bytes
 
 # Bytes of a splat on the screen: screen, depth, box, code.
 _PROJECTED = 32 + 4 + 16 + 1

@@ -16,8 +16,7 @@ from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.errors import ShapeError
 from rift_cl.geometry import Camera
-from rift_cl.splat.frame import Frame, FrameGradients
-from rift_cl.splat.renderer import DepthKind, Renderer
+from rift_cl.splat.renderer import DepthKind, Frame, FrameGradients, Renderer
 from rift_cl.splat.splats import Splats
 
 

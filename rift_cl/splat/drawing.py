@@ -15,12 +15,9 @@ from numpy.typing import NDArray
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.splat.bands import FrameMemory, plan_bands
-from rift_cl.splat.projected import Projected
 from rift_cl.splat.raster import Raster, ScreenSplats, raster_grad, rasterize, sum_slots
-from rift_cl.splat.screen_modes import ScreenModes
 from rift_cl.splat.settings import SplatSettings
-from rift_cl.splat.tile_lists import TileLists, count_tiles, list_tiles, tile_lists
-from rift_cl.splat.tiles import Tiles
+from rift_cl.splat.tile_lists import TileLists, Tiles, count_tiles, list_tiles, tile_lists
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,81 +25,73 @@ class Drawing:
     """What was drawn, with what its gradient needs; arrays are device arrays.
 
     Args:
-        projected: the splats on the screen.
-        features: (N, D) what they show.
+        screen: the splats on the screen, and what they show.
+        boxes: (N, 4) int32, their tiles; see ``Projection``.
+        depths: (N,) along the camera's axis.
         size: (height, width) in pixels.
         settings: how it was drawn.
         background: (D,) or None.
         memory: what it takes.
         lists: the tile lists; None where they did not fit and the image was drawn in bands.
         raster: the image, and what the raster left for its gradient.
-        modes: the splats' polynomials on the screen; None for plain splats.
     """
 
-    projected: Projected
-    features: DeviceArray
+    screen: ScreenSplats
+    boxes: DeviceArray
+    depths: DeviceArray
     size: tuple[int, int]
     settings: SplatSettings
     background: DeviceArray | None
     memory: FrameMemory
     lists: TileLists | None
     raster: Raster
-    modes: ScreenModes | None = None
 
     @property
     def tiles(self) -> Tiles:
         """All tiles of the image."""
         return Tiles.of(self.size, self.settings.tile)
 
-    @property
-    def screen(self) -> ScreenSplats:
-        """The splats as the raster takes them."""
-        return ScreenSplats(self.projected.screen, self.features, self.modes)
-
 
 def draw(
     device: Device,
-    projected: Projected,
-    features: DeviceArray,
+    screen: ScreenSplats,
+    boxes: DeviceArray,
+    depths: DeviceArray,
     size: tuple[int, int],
     *,
     settings: SplatSettings,
     memory: FrameMemory,
     background: DeviceArray | None = None,
-    modes: ScreenModes | None = None,
 ) -> Drawing:
     """Draw splats, at once if they fit the budget.
 
     Args:
         device: where the arrays are.
-        projected: the splats on the screen; what was culled is not asked for.
-        features: (N, D) what they show.
+        screen: the splats on the screen, and what they show.
+        boxes: (N, 4) int32, their tiles; see ``Projection``.
+        depths: (N,) along the camera's axis.
         size: (height, width) in pixels.
         settings: how to draw.
         memory: what a frame takes.
         background: (D,); black if not given.
-        modes: the splats' polynomials on the screen, if they have any.
 
     Raises:
         ResourceLimitError: not even one row of tiles fits the budget.
     """
     tiles, sort = Tiles.of(size, settings.tile), settings.mode == "light"
-    screen = ScreenSplats(projected.screen, features, modes)
-    counts = count_tiles(device, projected.boxes, projected.depths, tiles)
+    counts = count_tiles(device, boxes, depths, tiles)
     lists, raster = None, None
     if _fits(memory, counts.n_entries, tiles, device.budget):
         lists = list_tiles(device, counts, sort=sort)
         raster = rasterize(device, screen, lists, size, settings=settings, background=background)
-        return Drawing(
-            projected, features, size, settings, background, memory, lists, raster, modes
-        )
+        return Drawing(screen, boxes, depths, size, settings, background, memory, lists, raster)
     del counts
-    for band in _bands(device, projected, tiles, memory, sort=sort):
+    for band in _bands(device, boxes, depths, tiles, memory, sort=sort):
         raster = rasterize(
             device, screen, band, size, settings=settings, background=background, into=raster
         )
     assert raster is not None
-    return Drawing(projected, features, size, settings, background, memory, None, raster, modes)
+    return Drawing(screen, boxes, depths, size, settings, background, memory, None, raster)
 
 
 def draw_grad(
@@ -147,10 +136,10 @@ def listed(
         Tiles of every splat (N,), the splats of all entries (M,), and where each tile's entries
         begin (tiles,).
     """
-    sort, memory = drawing.settings.mode == "light", drawing.memory
+    memory = drawing.memory
     kept = [drawing.lists] if drawing.lists else None
-    bands = kept or _bands(device, drawing.projected, drawing.tiles, memory, sort=sort)
-    of_each = np.zeros(len(drawing.features), np.int32)
+    bands = kept or _bands_of(device, drawing, memory)
+    of_each = np.zeros(len(drawing.depths), np.int32)
     owners, begins, before = [], [], 0
     for lists in bands:
         of_each += np.diff(device.get(lists.slots))
@@ -165,10 +154,21 @@ def _fits(memory: FrameMemory, entries: int, tiles: Tiles, budget: int) -> bool:
 
 
 def _bands(
-    device: Device, projected: Projected, tiles: Tiles, memory: FrameMemory, *, sort: bool
+    device: Device,
+    boxes: DeviceArray,
+    depths: DeviceArray,
+    tiles: Tiles,
+    memory: FrameMemory,
+    *,
+    sort: bool,
 ) -> Iterator[TileLists]:
-    for band in plan_bands(device.get(projected.boxes), tiles, memory, device.budget):
-        yield tile_lists(device, projected.boxes, projected.depths, band, sort=sort)
+    for band in plan_bands(device.get(boxes), tiles, memory, device.budget):
+        yield tile_lists(device, boxes, depths, band, sort=sort)
+
+
+def _bands_of(device: Device, drawing: Drawing, memory: FrameMemory) -> Iterator[TileLists]:
+    where = (drawing.boxes, drawing.depths, drawing.tiles)
+    return _bands(device, *where, memory, sort=drawing.settings.mode == "light")
 
 
 def _lists_again(device: Device, drawing: Drawing) -> Iterator[TileLists]:
@@ -178,5 +178,4 @@ def _lists_again(device: Device, drawing: Drawing) -> Iterator[TileLists]:
     if kept is not None and _fits(memory, kept.n_entries, drawing.tiles, device.budget):
         yield kept
         return
-    sort = drawing.settings.mode == "light"
-    yield from _bands(device, drawing.projected, drawing.tiles, memory, sort=sort)
+    yield from _bands_of(device, drawing, memory)

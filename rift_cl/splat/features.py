@@ -22,7 +22,7 @@ from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Camera
 from rift_cl.splat.host_shading import shade_on_host, shade_on_host_grad
-from rift_cl.splat.projected import Projected, SplatGradients
+from rift_cl.splat.projection import Projection, SplatGradients
 from rift_cl.splat.shading import Shading
 from rift_cl.splat.splats import Splats
 
@@ -68,26 +68,19 @@ class Channels:
         return self.shaded + self.own + self.depth
 
 
-def gather_features(
-    device: Device,
-    splats: Splats,
-    camera: Camera,
-    projected: Projected,
-    channels: Channels,
-    *,
-    angular: str = "sh",
-) -> DeviceArray:
+def gather_features(projection: Projection, channels: Channels) -> DeviceArray:
     """The table of features, (N, D), as seen from the camera; see ``shade`` for the errors."""
+    device, splats, angular = projection.device, projection.splats, projection.settings.angular
     if splats.colors is not None and channels.total == channels.own:
         return splats.colors
     features = device.empty((len(splats), channels.total))
     if channels.shaded:
-        given = (splats.means, splats.sh, camera, projected.culled)
+        given = (splats.means, splats.sh, projection.camera, projection.culled)
         shade(device, *given, into=features, lobes=splats.lobes, angular=angular)
     if splats.colors is not None:
         copy_columns(device, splats.colors, 0, features, channels.shaded, channels.own)
     if channels.depth:
-        copy_columns(device, projected.depths, 0, features, channels.color, 1)
+        copy_columns(device, projection.depths, 0, features, channels.color, 1)
     return features
 
 

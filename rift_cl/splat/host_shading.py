@@ -14,7 +14,7 @@ from rift_cl.cl.arithmetic import axpby, copy_columns
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Camera
-from rift_cl.splat.projected import SplatGradients
+from rift_cl.splat.projection import SplatGradients
 
 Floats = NDArray[np.float64]
 

@@ -7,6 +7,7 @@ and so it does in a smaller memory budget, in which the image is drawn in bands.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -19,23 +20,98 @@ from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.splat.bands import FrameMemory, check_fixed
-from rift_cl.splat.depth import expected_depth, expected_depth_grad
-from rift_cl.splat.drawing import draw, draw_grad
+from rift_cl.splat.drawing import Drawing, draw, draw_grad
 from rift_cl.splat.features import Channels, gather_features, own_columns, shade_grad
-from rift_cl.splat.frame import Frame, FrameGradients
-from rift_cl.splat.hermite import (
-    ModeGradients,
+from rift_cl.splat.projection import (
+    CULL_REASONS,
+    Projection,
+    SplatGradients,
     check_modal,
-    is_modal,
-    project_modes,
-    project_modes_grad,
+    project,
+    project_grad,
 )
-from rift_cl.splat.projected import CULL_REASONS, SplatGradients
-from rift_cl.splat.projection import project, project_grad
+from rift_cl.splat.raster import Raster, ScreenSplats
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
+from rift_cl.splat.tile_lists import TileLists
 
 DepthKind = Literal["accumulated", "expected"]
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A drawn image with what its gradient needs.
+
+    Args:
+        projection: what was drawn, and how the camera sees it.
+        depth: ``accumulated``, ``expected``, or None.
+        channels: what the image's channels are.
+        drawing: the splats on the screen, the image, and what the raster left for its gradient.
+    """
+
+    projection: Projection
+    depth: str | None
+    channels: Channels
+    drawing: Drawing
+
+    @property
+    def image(self) -> DeviceArray:
+        """(height, width, D) device array, the background included."""
+        return self.drawing.raster.image
+
+    @property
+    def transmittance(self) -> DeviceArray:
+        """(height, width) device array, what of the background is seen; alpha is one minus it."""
+        return self.drawing.raster.transmittance
+
+    @property
+    def splats(self) -> Splats:
+        """What was drawn."""
+        return self.projection.splats
+
+    @property
+    def camera(self) -> Camera:
+        """What drew it."""
+        return self.projection.camera
+
+    @property
+    def lists(self) -> TileLists | None:
+        """The tile lists; None where the image was drawn in bands."""
+        return self.drawing.lists
+
+    @property
+    def raster(self) -> Raster:
+        """The image, and what the raster left for its gradient."""
+        return self.drawing.raster
+
+
+@dataclass(frozen=True, eq=False)
+class FrameGradients:
+    """Gradients of a loss by everything that a frame was made of; device arrays.
+
+    Args:
+        splats: by the splats' parameters and their positions on the screen.
+        colors: (N, D) by the splats' own colours; None where they have none.
+        sh: (N, K, 3) by the spherical harmonics; None where there are none.
+        camera: (16,): by the upper three rows of the view matrix, then fx, fy, cx, cy; None if
+            not asked for.
+        aperture: (2,): by the aperture's radius and focus; None if the camera's is not asked
+            for, or has none.
+        background: by the background as it was given; None where there was none.
+        shape_modes: (N, K - 1) by the modes of the densities; None where there are none.
+        color_modes: (N, K - 1, C) by those of the colours; None where there are none.
+        lobes: (N, G) by the geometry of the lobes; None where there are none.
+    """
+
+    splats: SplatGradients
+    colors: DeviceArray | None
+    sh: DeviceArray | None
+    camera: DeviceArray | None
+    aperture: DeviceArray | None
+    background: DeviceArray | None
+    shape_modes: DeviceArray | None = None
+    color_modes: DeviceArray | None = None
+    lobes: DeviceArray | None = None
 
 
 def check_depth(depth: str | None, settings: SplatSettings) -> None:
@@ -97,21 +173,19 @@ class Renderer:
         behind = self._behind(background, channels)
         memory = FrameMemory.of(splats, camera.size, channels.total, settings)
         check_fixed(memory, device.budget)
-        projected = project(device, splats, camera, settings)
-        given = (device, splats, camera)
-        features = gather_features(*given, projected, channels, angular=settings.angular)
-        modal = is_modal(splats, settings)
+        projection = project(device, splats, camera, settings)
+        features = gather_features(projection, channels)
         drawing = draw(
             device,
-            *(projected, features, camera.size),
+            ScreenSplats(projection.screen, features, projection.modes),
+            *(projection.boxes, projection.depths, camera.size),
             settings=settings,
             memory=memory,
             background=behind,
-            modes=project_modes(*given, settings, projected) if modal else None,
         )
         if depth == "expected":
-            expected_depth(device, drawing.raster)
-        return Frame(splats, camera, depth, channels, drawing)
+            _expected_depth(device, drawing.raster)
+        return Frame(projection, depth, channels, drawing)
 
     def backward(
         self,
@@ -135,23 +209,18 @@ class Renderer:
             ShapeError: a gradient does not fit the frame.
             ResourceLimitError: not even one row of tiles fits the memory budget.
         """
-        device, splats, camera = self.device, frame.splats, frame.camera
+        device = self.device
         as_device_array(device, grad_image, frame.image.shape, name="grad_image")
         if frame.depth == "expected":
-            grad_image, grad_transmittance = expected_depth_grad(
+            grad_image, grad_transmittance = _expected_depth_grad(
                 device, frame.raster, grad_image, grad_transmittance
             )
         sums = draw_grad(device, frame.drawing, grad_image, grad_transmittance)
-        modes = self._modes_grad(frame, sums)
         gradients = project_grad(
-            device,
-            *(splats, camera, self.settings),
-            projected=frame.projected,
-            sums=modes.sums if modes else sums,
+            frame.projection,
+            sums,
             with_camera=with_camera,
             depth_channel=frame.depth is not None,
-            first_moments=modes is None,
-            view_parts=modes.view_parts if modes else None,
         )
         sh, lobes = self._shade_grad(frame, gradients)
         return FrameGradients(
@@ -161,31 +230,17 @@ class Renderer:
             camera=_summed(device, gradients.camera),
             aperture=_summed(device, gradients.aperture),
             background=self._background_grad(frame, grad_image) if with_background else None,
-            shape_modes=modes.shape_modes if modes else None,
-            color_modes=modes.color_modes if modes else None,
+            shape_modes=gradients.shape_modes,
+            color_modes=gradients.color_modes,
             lobes=lobes,
         )
 
     def culled(self, frame: Frame) -> dict[str, int]:
         """How many splats were left out of a frame, by reason."""
-        codes = np.bincount(self.device.get(frame.projected.culled), minlength=len(CULL_REASONS))
+        codes = np.bincount(self.device.get(frame.projection.culled), minlength=len(CULL_REASONS))
         return {
             reason: int(count) for reason, count in zip(CULL_REASONS, codes, strict=True) if count
         }
-
-    def _modes_grad(self, frame: Frame, moments: DeviceArray) -> ModeGradients | None:
-        """What the raster's moments mean; None for plain splats, whose sums say it themselves."""
-        modes = frame.drawing.modes
-        if modes is None:
-            return None
-        return project_modes_grad(
-            self.device,
-            *(frame.splats, frame.camera, self.settings),
-            projected=frame.projected,
-            modes=modes,
-            moments=moments,
-            channels=frame.channels.total,
-        )
 
     def _shade_grad(
         self, frame: Frame, gradients: SplatGradients
@@ -198,7 +253,7 @@ class Renderer:
         sh = shade_grad(
             device,
             *(splats.means, splats.sh, frame.camera),
-            features=frame.drawing.features,
+            features=frame.drawing.screen.features,
             gradients=gradients,
             lobes=splats.lobes,
             angular=self.settings.angular,
@@ -247,3 +302,51 @@ class Renderer:
 def _summed(device: Device, table: DeviceArray | None) -> DeviceArray | None:
     """The sum over all splats' parts; None where there are none."""
     return None if table is None else sum_columns(device, table)
+
+
+def _expected_depth(device: Device, raster: Raster) -> None:
+    """Turn the last channel from accumulated into expected depth, in place."""
+    height, width, channels = raster.image.shape
+    pixels = height * width
+    device.launch(
+        "expected_depth",
+        (pixels,),
+        image=raster.image,
+        transmittance=raster.transmittance,
+        pixels=pixels,
+        channels=channels,
+    )
+
+
+def _expected_depth_grad(
+    device: Device,
+    raster: Raster,
+    grad_image: DeviceArray,
+    grad_transmittance: DeviceArray | None = None,
+) -> tuple[DeviceArray, DeviceArray]:
+    """The gradient by the image with accumulated depth, and by the transmittance.
+
+    Args:
+        device: where the arrays are.
+        raster: after ``_expected_depth``.
+        grad_image: (height, width, D) by the image.
+        grad_transmittance: (height, width); zero if not given.
+    """
+    height, width, channels = raster.image.shape
+    if grad_transmittance is None:
+        grad_transmittance = device.zeros((height, width))
+    as_device_array(device, grad_transmittance, (height, width), name="grad_transmittance")
+    by_image, by_transmittance = device.empty(raster.image.shape), device.empty((height, width))
+    device.launch(
+        "expected_depth_grad",
+        (height * width,),
+        image=raster.image,
+        transmittance=raster.transmittance,
+        grad_image=grad_image,
+        grad_transmittance=grad_transmittance,
+        by_image=by_image,
+        by_transmittance=by_transmittance,
+        pixels=height * width,
+        channels=channels,
+    )
+    return by_image, by_transmittance

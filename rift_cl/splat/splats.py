@@ -41,8 +41,8 @@ class Splats:
         covars: (N, 6) upper triangles xx, xy, xz, yy, yz, zz of covariance matrices, in place
             of ``quats`` and ``scales``.
         shape_modes: (N, K - 1) coefficients of the density's modes of order 1 and more, in
-            graded order (see ``rift_cl.splat.hermite``), K = 4, 10, 20, 35.. for the orders to 1,
-            2, 3, 4..; None for Gaussians.
+            graded order (see ``rift_cl.splat.projection``), K = 4, 10, 20, 35.. for the orders to
+            1, 2, 3, 4..; None for Gaussians.
         color_modes: (N, K - 1, C) coefficients of the colours' modes, C = all channels but
             depth; None for splats of one colour.
         lobes: (N, G) geometry of the splats' angular lobes, in place of spherical harmonics (see

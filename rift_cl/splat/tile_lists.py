@@ -18,7 +18,7 @@ from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.memory import as_device_array
-from rift_cl.errors import DTypeError, ResourceLimitError, ShapeError
+from rift_cl.errors import DTypeError, InputError, ResourceLimitError, ShapeError
 from rift_cl.splat.prefix_sum import (
     GPU_RUN,
     Levels,
@@ -27,7 +27,6 @@ from rift_cl.splat.prefix_sum import (
     run_length,
     scan_levels,
 )
-from rift_cl.splat.tiles import Tiles
 
 _MOST = 2**31 - 1
 _KEY_BITS = 32
@@ -37,6 +36,48 @@ _GPU_PAIRS = 256
 _CPU_DIGIT, _GPU_DIGIT = 8, 4
 # The chunks' histograms over tiles may have so many numbers for each entry of the lists.
 _TABLE_SHARE = 2
+
+
+@dataclass(frozen=True)
+class Tiles:
+    """Rows of an image's tiles; tile t is in row ``first_row + t // across``.
+
+    Args:
+        across: tiles in a row.
+        rows: rows of tiles.
+        first_row: the image's row of tiles that they begin with.
+
+    Raises:
+        InputError: there are no tiles.
+        ResourceLimitError: there are more than can be numbered.
+    """
+
+    across: int
+    rows: int
+    first_row: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if self.across < 1 or self.rows < 1 or self.first_row < 0:
+            raise InputError(
+                f"Tiles: across, rows, first_row are {self.across}, {self.rows}, "
+                f"{self.first_row}, wanted at least one tile"
+            )
+        if self.across * (self.first_row + self.rows) >= _MOST:
+            raise ResourceLimitError(
+                f"Tiles: {self.across} x {self.first_row + self.rows} are too many, wanted less "
+                f"than {_MOST}: use larger tiles"
+            )
+
+    @classmethod
+    def of(cls, size: tuple[int, int], edge: int) -> Tiles:
+        """All tiles of an image of (height, width) pixels."""
+        return cls(-(-size[1] // edge), -(-size[0] // edge))
+
+    @property
+    def count(self) -> int:
+        """How many tiles there are."""
+        return self.across * self.rows
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,8 +29,7 @@ from rift_cl.geometry.numbers import real_numbers
 from rift_cl.splat.bands import FrameMemory, plan_bands
 from rift_cl.splat.orders import count_of
 from rift_cl.splat.splats import Splats
-from rift_cl.splat.tile_lists import tile_lists
-from rift_cl.splat.tiles import Tiles
+from rift_cl.splat.tile_lists import Tiles, tile_lists
 
 # Voxels of a brick along x, y, z; items that a GPU has for one (BLOCK_X of the kernel is 4).
 _BRICK = np.array([16, 8, 8])

@@ -17,7 +17,7 @@ from rift_cl.cl.arithmetic import axpby, copy_columns
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.elementwise import multiply
-from rift_cl.splat.frame import FrameGradients
+from rift_cl.splat.renderer import FrameGradients
 from rift_cl.splat.splats import Splats
 from rift_cl.train.band_limit import Detail
 

@@ -11,7 +11,7 @@ from rift_cl.geometry import Aperture, Camera
 from rift_cl.reference.hermite_projection import project_modes, splat_roots
 from rift_cl.reference.hermite_raster import hermite_modes
 from rift_cl.reference.splat_projection import project_splats
-from rift_cl.splat.hermite import count_of
+from rift_cl.splat.orders import count_of
 from rift_cl.splat.settings import SplatSettings
 
 

@@ -13,9 +13,8 @@ from rift_cl.reference.hermite_raster import (
     hermite_raster,
 )
 from rift_cl.reference.splat_raster import Rules
-from rift_cl.splat.raster import raster_grad, rasterize
-from rift_cl.splat.screen_modes import ScreenModes
-from rift_cl.splat.tiles import Tiles
+from rift_cl.splat.raster import ScreenModes, raster_grad, rasterize
+from rift_cl.splat.tile_lists import Tiles
 
 
 @dataclasses.dataclass(frozen=True)

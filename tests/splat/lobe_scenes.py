@@ -11,7 +11,7 @@ from rift_cl.basis.angular import angular_basis
 from rift_cl.cl.arithmetic import sum_columns
 from rift_cl.reference.lobes import shade_lobes, shade_lobes_grad
 from rift_cl.splat.features import shade, shade_grad
-from rift_cl.splat.projected import SplatGradients
+from rift_cl.splat.projection import SplatGradients
 
 CASES = [("hg", 8), ("lg", 9), ("sg", 4), ("asg", 4)]
 # Each takes the compiler a quarter of a minute.

@@ -50,12 +50,8 @@ def run(device, values, kind, *, channels=3, depth_channel=False, shaded=True, o
     counts = np.minimum(counts, 1) if one_tile else counts
     slots, records = random_records(counts, covars, channels, absgrad=settings.absgrad)
     gradients = project_grad(
-        device,
-        splats,
-        camera,
-        settings,
-        projected=projected,
-        sums=sums_of(device, slots, records),
+        projected,
+        sums_of(device, slots, records),
         depth_channel=depth_channel,
     )
     by_sh = None

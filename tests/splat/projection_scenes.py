@@ -117,10 +117,15 @@ def twin_of(values, kind, camera=None, covars=None):
     )
 
 
+def arrays_of(projection):
+    """The device arrays of a projection, by name."""
+    return {name: getattr(projection, name) for name in ("screen", "depths", "boxes", "culled")}
+
+
 def projected_on(device, values, kind, camera=None):
     """What the device gives, on the host."""
     projected = project(device, upload(device, values, kind), camera or kind.camera, kind.settings)
-    found = {name: device.get(array) for name, array in vars(projected).items()}
+    found = {name: device.get(array) for name, array in arrays_of(projected).items()}
     return found | {"radii": np.ceil(found["screen"][:, 6:])}
 
 

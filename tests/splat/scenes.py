@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rift_cl.splat.raster import ScreenSplats
-from rift_cl.splat.tile_lists import TileLists
-from rift_cl.splat.tiles import Tiles
+from rift_cl.splat.tile_lists import TileLists, Tiles
 
 FARTHEST = 4.0
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hermite_projection_scenes import MODALS, Modal, in_double, modal_splats, twin_of
+from projection_scenes import arrays_of
 
 from rift_cl.reference.hermite_projection import reach, squares_of_order
-from rift_cl.splat.hermite import project_modes
 from rift_cl.splat.projection import project
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
@@ -17,9 +17,8 @@ def projected_on(device, values, modal):
     """What projection gives, and the table of modes, on the host."""
     splats, given = Splats.upload(device, **values), (modal.camera, modal.settings)
     projected = project(device, splats, *given)
-    modes = project_modes(device, splats, *given, projected)
-    found = {name: device.get(array) for name, array in vars(projected).items()}
-    return found | {"table": device.get(modes.table)}
+    found = {name: device.get(array) for name, array in arrays_of(projected).items()}
+    return found | {"table": device.get(projected.modes.table)}
 
 
 @pytest.mark.parametrize("name", MODALS)

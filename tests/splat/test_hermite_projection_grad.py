@@ -22,7 +22,6 @@ import rift_cl as rift
 from rift_cl.cl.arithmetic import sum_columns
 from rift_cl.errors import ShapeError
 from rift_cl.geometry import Aperture
-from rift_cl.splat.hermite import project_modes, project_modes_grad
 from rift_cl.splat.projection import project, project_grad
 from rift_cl.splat.splats import Splats
 
@@ -82,28 +81,10 @@ def run(device, values, modal, moments):
     """All gradients on the device, on the host; and which splats are drawn."""
     splats, given = Splats.upload(device, **values), (modal.camera, modal.settings)
     projected = project(device, splats, *given)
-    modes = project_modes(device, splats, *given, projected)
-    found = project_modes_grad(
-        device,
-        *(splats, *given),
-        projected=projected,
-        modes=modes,
-        moments=device.array(moments.astype(np.float32)),
-        channels=CHANNELS,
-    )
-    gradients = project_grad(
-        device,
-        *(splats, *given),
-        projected=projected,
-        sums=found.sums,
-        first_moments=False,
-        view_parts=found.view_parts,
-    )
+    gradients = project_grad(projected, device.array(moments.astype(np.float32)))
     host = {name: device.get(array) for name, array in vars(gradients).items() if array is not None}
     for name in {"camera", "aperture"} & set(host):
         host[name] = device.get(sum_columns(device, getattr(gradients, name)))
-    for name in {"shape_modes", "color_modes"} & set(values):
-        host[name] = device.get(getattr(found, name))
     return host, device.get(projected.culled) == 0
 
 

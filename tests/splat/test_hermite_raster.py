@@ -12,8 +12,7 @@ from scenes import random_scene
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.reference.hermite_raster import EDGES, hermite_modes
-from rift_cl.splat.raster import rasterize
-from rift_cl.splat.screen_modes import ScreenModes
+from rift_cl.splat.raster import ScreenModes, rasterize
 from rift_cl.splat.settings import SplatSettings
 
 SIZE = (50, 70)

@@ -10,8 +10,7 @@ from hermite_scenes import draw_twin, hermite_scene, moments, moments_twin, whit
 from scenes import random_scene
 
 from rift_cl.errors import InputError
-from rift_cl.splat.raster import raster_grad, rasterize, sum_slots
-from rift_cl.splat.screen_modes import ScreenModes
+from rift_cl.splat.raster import ScreenModes, raster_grad, rasterize, sum_slots
 from rift_cl.splat.settings import SplatSettings
 
 SIZE = (50, 70)

@@ -12,7 +12,7 @@ from projection_scenes import random_splats, turned
 from rift_cl.basis.projection import gamma_matrix
 from rift_cl.reference.hermite_projection import splat_roots
 from rift_cl.splat.drawing import draw
-from rift_cl.splat.hermite import order_of
+from rift_cl.splat.orders import order_of
 
 
 def same_but_for_thresholds(found, right):
@@ -162,24 +162,21 @@ def test_what_lies_beyond_a_splats_rectangle_is_not_seen(device):
     """With extents at six standard deviations the picture is the same: the bound is one."""
     values = few(60, shape=4, color=0, strength=1.0)
     renderer, frame = drawn(device, values)
-    wide = device.get(frame.projected.screen)
+    wide = device.get(frame.projection.screen)
     g = gaussian_reach(wide)
     edge = np.floor((wide[:, :2] + 6 * g) / 16 + 1), np.floor((wide[:, :2] - 6 * g) / 16)
     boxes = np.concatenate([edge[1], edge[0]], axis=1)
     boxes = np.clip(boxes, 0, [4, 3, 4, 3]).astype(np.int32)
-    boxes[device.get(frame.projected.culled) > 0] = 0
+    boxes[device.get(frame.projection.culled) > 0] = 0
     wide[:, 6:] = 6 * g
-    given = dataclasses.replace(
-        frame.projected, screen=device.array(wide), boxes=device.array(boxes, np.int32)
-    )
     again = draw(
         device,
-        *(given, frame.drawing.features, SIZE),
+        dataclasses.replace(frame.drawing.screen, screen=device.array(wide)),
+        *(device.array(boxes, np.int32), frame.projection.depths, SIZE),
         settings=renderer.settings,
         memory=frame.drawing.memory,
-        modes=frame.drawing.modes,
     )
-    assert (wide[:, 6:] >= device.get(frame.projected.screen)[:, 6:]).all()
+    assert (wide[:, 6:] >= device.get(frame.projection.screen)[:, 6:]).all()
     away = np.abs(device.get(again.raster.image) - device.get(frame.image))
     assert away.max() < 1e-6
 

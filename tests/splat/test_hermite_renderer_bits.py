@@ -13,7 +13,7 @@ from hermite_frames import SIZE, camera, drawn, few
 import rift_cl as rift
 from rift_cl.splat import Renderer, Splats, SplatSettings
 from rift_cl.splat.bands import FrameMemory, entries_per_row
-from rift_cl.splat.tiles import Tiles
+from rift_cl.splat.tile_lists import Tiles
 
 DRAWING = importlib.import_module("rift_cl.splat.drawing")
 
@@ -40,7 +40,7 @@ def needs(device, frame, *, gradient):
     given = (frame.splats, frame.camera.size, frame.image.shape[2], frame.drawing.settings)
     memory = dataclasses.replace(FrameMemory.of(*given), gradient=gradient)
     tiles = Tiles.of(SIZE, 8)
-    rows = entries_per_row(device.get(frame.projected.boxes), tiles)
+    rows = entries_per_row(device.get(frame.projection.boxes), tiles)
     whole = memory.lists(int(rows.sum()), tiles.count)
     return memory.fixed + whole, memory.fixed + memory.lists(int(rows.max()), tiles.across)
 

@@ -19,7 +19,7 @@ from rift_cl.reference.hermite_raster import HermiteRules, HermiteSplats, hermit
 from rift_cl.reference.splat_projection import project_splats, shade_splats
 from rift_cl.reference.splat_raster import Rules
 from rift_cl.reference.tile_lists import tile_lists
-from rift_cl.splat.hermite import count_of
+from rift_cl.splat.orders import count_of
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats

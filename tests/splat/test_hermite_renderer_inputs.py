@@ -10,8 +10,8 @@ from projection_scenes import random_splats
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.reference.hermite_projection import splat_roots
 from rift_cl.splat import Splats, SplatSettings
-from rift_cl.splat.hermite import count_of, order_of
-from rift_cl.splat.projected import CULL_REASONS
+from rift_cl.splat.orders import count_of, order_of
+from rift_cl.splat.projection import CULL_REASONS
 
 
 @pytest.mark.full
@@ -22,7 +22,7 @@ def test_splats_whose_modes_are_no_numbers_are_left_out(device, name, number):
     without = {n: np.delete(v, [3, 17], axis=0) for n, v in values.items()}
     values[name][3].flat[1], values[name][17].flat[-1] = number, number
     renderer, frame = drawn(device, values)
-    codes = device.get(frame.projected.culled)
+    codes = device.get(frame.projection.culled)
     assert [CULL_REASONS[codes[i]] for i in (3, 17)] == ["not finite or degenerate"] * 2
     found = renderer.backward(frame, device.array(np.ones((*SIZE, 3), np.float32)))
     np.testing.assert_array_equal(device.get(frame.image), image(device, without))

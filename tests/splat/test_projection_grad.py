@@ -156,13 +156,7 @@ def test_without_the_camera_the_rest_is_the_same(device):
     twin_covars = twin_of(values, Kind()).covars
     slots, records = made.random_records(made.tiles_of(device.get(projected.boxes)), twin_covars, 3)
     sums = made.sums_of(device, slots, records)
-    with_it, without = (
-        project_grad(
-            device, splats, camera, SplatSettings(), projected=projected, sums=sums,
-            with_camera=flag,
-        )
-        for flag in (True, False)
-    )  # fmt: skip
+    with_it, without = (project_grad(projected, sums, with_camera=flag) for flag in (True, False))
     assert without.camera is None
     features = shade(device, splats.means, splats.sh, camera, projected.culled)
     for gradients in (with_it, without):
@@ -199,10 +193,8 @@ def test_splats_without_slots_and_no_splats_at_all(device):
         values = {name: value[:count] for name, value in random_splats(4, wide=0.2).items()}
         splats = upload(device, values, Kind())
         projected = project(device, splats, camera, SplatSettings())
-        gradients = project_grad(
-            device, splats, camera, SplatSettings(), projected=projected,
-            sums=made.sums_of(device, np.zeros(count + 1, np.int32), np.zeros((0, 9), np.float32)),
-        )  # fmt: skip
+        nothing = np.zeros(count + 1, np.int32), np.zeros((0, 9), np.float32)
+        gradients = project_grad(projected, made.sums_of(device, *nothing))
         assert not device.get(gradients.means).any()
         assert not device.get(sum_columns(device, gradients.camera)).any()
 
@@ -222,10 +214,7 @@ def test_position_gradients_may_come_in_place_of_first_moments(device):
     splats = upload(device, values, kind)
     projected = project(device, splats, kind.camera, kind.settings)
     sums[:, 1:3] = found["means2d"]
-    direct = project_grad(
-        device, splats, kind.camera, kind.settings, projected=projected,
-        sums=device.array(sums), first_moments=False,
-    )  # fmt: skip
+    direct = project_grad(projected, device.array(sums), first_moments=False)
     assert drawn.sum() > 60
     np.testing.assert_allclose(device.get(direct.means), found["means"], rtol=1e-4, atol=1e-3)
 
@@ -235,7 +224,7 @@ def test_sums_must_fit(device):
     projected = project(device, splats, Kind().camera, SplatSettings())
 
     def attempt(sums):
-        project_grad(device, splats, Kind().camera, SplatSettings(), projected=projected, sums=sums)
+        project_grad(projected, sums)
 
     attempt(device.zeros((4, 9)))
     for bad in (device.zeros((4, 6)), device.zeros((3, 9)), device.zeros((4,))):

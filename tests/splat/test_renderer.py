@@ -12,7 +12,7 @@ from rift_cl.reference.splat_raster import Rules
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
-from rift_cl.splat.tiles import Tiles
+from rift_cl.splat.tile_lists import Tiles
 
 SIZE = (45, 61)
 BACKGROUND = np.float32([0.2, 0.5, 0.9])

@@ -23,7 +23,7 @@ import rift_cl as rift
 from rift_cl.errors import ResourceLimitError
 from rift_cl.splat import Renderer, Splats, SplatSettings
 from rift_cl.splat.bands import FrameMemory, check_fixed, entries_per_row, plan_bands
-from rift_cl.splat.tiles import Tiles
+from rift_cl.splat.tile_lists import Tiles
 
 DRAWING = importlib.import_module("rift_cl.splat.drawing")
 SIZE, TILE = (120, 160), 8
@@ -104,7 +104,7 @@ def memory_of(frame, *, gradient):
 def needs(device, frame, *, gradient):
     """Bytes for the image at once, and bytes for its fullest row of tiles."""
     memory, tiles = memory_of(frame, gradient=gradient), Tiles.of(SIZE, TILE)
-    rows = entries_per_row(device.get(frame.projected.boxes), tiles)
+    rows = entries_per_row(device.get(frame.projection.boxes), tiles)
     whole = memory.lists(int(rows.sum()), tiles.count)
     return memory.fixed + whole, memory.fixed + memory.lists(int(rows.max()), tiles.across)
 

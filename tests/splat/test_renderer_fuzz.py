@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from projection_scenes import LENS, Kind, random_splats, shaped, turned
+from projection_scenes import LENS, Kind, arrays_of, random_splats, shaped, turned
 
 import rift_cl as rift
 from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
@@ -124,7 +124,8 @@ def run(device, chosen, scene, values):
     random = np.random.default_rng(scene.seed)
     coming = [device.array(random.normal(size=a.shape)) for a in (frame.image, frame.transmittance)]
     found = renderer.backward(frame, *coming, with_camera=True)
-    arrays = vars(frame.projected) | vars(frame.raster) | {"features": frame.drawing.features}
+    arrays = arrays_of(frame.projection) | vars(frame.raster)
+    arrays |= {"features": frame.drawing.screen.features}
     arrays |= {"coming": coming[0], "by camera": found.camera, "by background": found.background}
     gradients = vars(found.splats) | {"colors": found.colors, "sh": found.sh}
     hosts = [

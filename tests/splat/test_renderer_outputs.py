@@ -69,7 +69,7 @@ def test_depth_is_the_last_channel(device, channels):
     alpha = 1 - device.get(deep.transmittance)
     held = np.maximum(alpha, np.float32(1e-10))
     np.testing.assert_allclose(quotient[..., -1], image[..., -1] / held, rtol=1e-6)
-    depths = device.get(deep.projected.depths)
+    depths = device.get(deep.projection.depths)
     seen = alpha > 0.5
     assert seen.sum() > 100
     nearest, farthest = depths[depths > 0].min(), depths.max()
@@ -83,7 +83,7 @@ def test_depth_of_one_splat_is_its_own(device):
     )
     frame = Renderer(device=device).forward(splats, camera_of("pinhole"), depth="expected")
     depth, alpha = device.get(frame.image)[..., 0], 1 - device.get(frame.transmittance)
-    wanted = device.get(frame.projected.depths)[0]
+    wanted = device.get(frame.projection.depths)[0]
     np.testing.assert_allclose(depth[alpha > 0.01], wanted, rtol=1e-4)
     assert not depth[alpha == 0].any()
 

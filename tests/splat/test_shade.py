@@ -89,12 +89,8 @@ def grad_of_ones(device, splats, projected, channels=3):
     sums = np.zeros((len(splats), 6 + channels), np.float32)
     sums[:, 6:] = 1
     return project_grad(
-        device,
-        splats,
-        Kind().camera,
-        SplatSettings(),
-        projected=projected,
-        sums=device.array(sums),
+        projected,
+        device.array(sums),
     )
 
 

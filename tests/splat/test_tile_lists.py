@@ -13,8 +13,7 @@ import rift_cl as rift
 from rift_cl.errors import DTypeError, InputError, ResourceLimitError, ShapeError
 from rift_cl.reference.tile_lists import tile_lists as twin
 from rift_cl.splat import prefix_sum
-from rift_cl.splat.tile_lists import tile_lists, tile_lists_bytes
-from rift_cl.splat.tiles import Tiles
+from rift_cl.splat.tile_lists import Tiles, tile_lists, tile_lists_bytes
 
 MODULE = importlib.import_module("rift_cl.splat.tile_lists")
 FIELDS = ("slots", "entries", "starts")

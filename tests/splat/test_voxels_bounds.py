@@ -28,9 +28,9 @@ def test_a_small_budget_gives_the_same_bits_in_more_bands(device, monkeypatch):
     small = rift.Device(device._handle, device.selector, traits=device.traits, memory=need + 60_000)
     launch = small.launch
 
-    def counted(kernel, *arguments, **macros):
+    def counted(kernel, work, /, **given):
         bands.append(kernel)
-        launch(kernel, *arguments, **macros)
+        launch(kernel, work, **given)
 
     monkeypatch.setattr(small, "launch", counted)
     assert np.array_equal(drawn(small, values, GRID), whole)

@@ -38,11 +38,11 @@ def launched(device, run):
     """The arrays of every launch of an operation, by kernel."""
     plain, found = device.launch, defaultdict(list)
 
-    def launch(kernel, size, *arguments, **macros):
+    def launch(kernel, work, /, **given):
         # Blocks that stay in a core's caches, the only arrays of five axes, are nothing handed.
-        arrays = [each for each in arguments if is_device_array(each) and each.ndim < 5]
+        arrays = [each for each in given.values() if is_device_array(each) and each.ndim < 5]
         found[kernel].append({array.base_data.int_ptr: array for array in arrays}.values())
-        plain(kernel, size, *arguments, **macros)
+        plain(kernel, work, **given)
 
     with mock.patch.object(device, "launch", launch):
         run()

@@ -25,8 +25,8 @@ def made_up(device, seed):
     grad = (1e-3 * random.normal(size=(COUNT, 2))).astype(np.float32)
     screen = random.uniform(0, 200, (COUNT, 8)).astype(np.float32)
     culled = random.integers(0, 2, COUNT).astype(np.uint8)
-    projected = SimpleNamespace(screen=device.array(screen), culled=device.array(culled))
-    frame = SimpleNamespace(camera=SimpleNamespace(size=SIZE), projected=projected)
+    projection = SimpleNamespace(screen=device.array(screen), culled=device.array(culled))
+    frame = SimpleNamespace(camera=SimpleNamespace(size=SIZE), projection=projection)
     return grad, screen, culled, frame
 
 
@@ -73,7 +73,7 @@ def test_a_gradient_that_is_no_number_is_not_counted(device):
     statistics = ScreenStatistics(device, COUNT)
     grad, screen, culled, frame = made_up(device, 0)
     culled[:] = 0
-    frame.projected.culled = device.array(culled)
+    frame.projection.culled = device.array(culled)
     hostile = np.float32([np.nan, np.inf, -np.inf, 1e30])
     grad[:4, 0], grad[4:8, 1] = hostile, hostile
     before = np.zeros((COUNT, 3))
@@ -106,8 +106,8 @@ def test_it_is_the_gradient_by_a_place_from_minus_one_to_one(device):
     statistics.add(frame, gradients)
     statistics.add(frame, gradients)
     by = device.get(gradients.splats.means2d).astype(float)
-    extents = device.get(frame.projected.screen)[:, 6:]
-    drawn = device.get(frame.projected.culled) == 0
+    extents = device.get(frame.projection.screen)[:, 6:]
+    drawn = device.get(frame.projection.culled) == 0
     found = statistics.host()
     # 120 x 80 pixels: a step of one pixel is 1/60 and 1/40 of half the image.
     wanted = 2 * np.hypot(60 * by[:, 0], 40 * by[:, 1]) * drawn

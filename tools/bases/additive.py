@@ -23,16 +23,24 @@ from rift_cl.cl.elementwise import copy
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.operators import LinearOperator
-from rift_cl.splat.hermite import project_modes, project_modes_grad
 from rift_cl.splat.orders import WHITENING
-from rift_cl.splat.projected import SplatGradients
-from rift_cl.splat.projection import MOMENTS, project, project_grad
-from rift_cl.splat.raster import Raster, ScreenSplats, raster_grad, rasterize, sum_slots
+from rift_cl.splat.projection import (
+    SplatGradients,
+    project,
+    project_grad,
+)
+from rift_cl.splat.raster import (
+    MOMENTS,
+    Raster,
+    ScreenModes,
+    ScreenSplats,
+    raster_grad,
+    rasterize,
+    sum_slots,
+)
 from rift_cl.splat.renderer import Renderer
-from rift_cl.splat.screen_modes import ScreenModes
 from rift_cl.splat.splats import Splats
-from rift_cl.splat.tile_lists import tile_lists
-from rift_cl.splat.tiles import Tiles
+from rift_cl.splat.tile_lists import Tiles, tile_lists
 
 Floats = NDArray[np.float64]
 # Channels of a picture, and so columns that are drawn at once.
@@ -96,13 +104,12 @@ class Placed(LinearOperator):
         self._count, self._channels = count, channels
         self._scales = np.exp(geometry.log_scales)
         self._splats = self._everywhere(geometry)
-        given = (self.device, self._splats, self._camera, renderer.settings)
-        projected = project(*given)
+        projected = project(self.device, self._splats, self._camera, renderer.settings)
         boxes = self.device.array(self._mosaic.cut_boxes(self.device.get(projected.boxes)))
         self._projected = replace(projected, boxes=boxes)
         tiles = Tiles.of(self._camera.size, renderer.settings.tile)
         self._lists = tile_lists(self.device, boxes, projected.depths, tiles, sort=False)
-        self._whitening, self._to_screen = self._mode_maps(given)
+        self._whitening, self._to_screen = self._mode_maps()
         self._raster: Raster | None = None
 
     def _everywhere(self, geometry: Geometry) -> Splats:
@@ -124,14 +131,15 @@ class Placed(LinearOperator):
             given["color_modes"] = np.broadcast_to(np.eye(modes), (rows, modes, modes))
         return Splats.upload(self.device, **given)
 
-    def _mode_maps(self, given: Any) -> tuple[NDArray[np.float32], Floats]:
+    def _mode_maps(self) -> tuple[NDArray[np.float32], Floats]:
         """Whitenings (V N, 3), and (N, V M, K) what own coefficients become on the screen."""
         views, count, matrix = self._views, self._count, self.modes.matrix
         constant = np.broadcast_to(matrix[:1], (views, count, 1, matrix.shape[1]))
         if not self.modal:
             flat = np.zeros((0, 3), np.float32)
             return flat, np.ascontiguousarray(constant[:, :, 0].transpose(1, 0, 2))
-        table = self.device.get(project_modes(*given, self._projected).table)
+        assert self._projected.modes is not None
+        table = self.device.get(self._projected.modes.table)
         modes = len(matrix) - 1
         units = table[:, WHITENING:].reshape(views, count, -1, modes).astype(np.float64)
         maps = np.concatenate([constant, units @ matrix[1:]], axis=2).transpose(1, 0, 2, 3)
@@ -189,25 +197,9 @@ class Placed(LinearOperator):
     def geometry_gradient(self, coefficients: Floats, grad_pictures: Floats) -> Floats:
         """dL/d geometry as ``Geometry.flat`` has it, at these coefficients."""
         screen, splats = self._screen(coefficients), self._coloured(coefficients)
-        given = (self.device, splats, self._camera, self.renderer.settings)
-        sums, parts = self._sums(screen, grad_pictures), None
-        if screen.modes is not None:
-            found = project_modes_grad(
-                *given,
-                projected=self._projected,
-                modes=screen.modes,
-                moments=sums,
-                channels=self._channels,
-            )
-            sums, parts = found.sums, found.view_parts
-        gradients = project_grad(
-            *given,
-            projected=self._projected,
-            sums=sums,
-            with_camera=False,
-            first_moments=parts is None,
-            view_parts=parts,
-        )
+        projection = replace(self._projected, splats=splats, modes=screen.modes)
+        sums = self._sums(screen, grad_pictures)
+        gradients = project_grad(projection, sums, with_camera=False)
         return self._pulled_back(gradients)
 
     def _pulled_back(self, gradients: SplatGradients) -> Floats:

@@ -58,11 +58,11 @@ def each_launch(device: rift.Device) -> Iterator[list[tuple[str, float]]]:
     """Time every kernel that is launched on a device while this lasts: (name, seconds) each."""
     plain, log = device.launch, []
 
-    def launch(kernel: str, size: tuple[int, ...], *arguments: Any, **macros: Any) -> None:
+    def launch(kernel: str, work: tuple[int, ...], /, **given: Any) -> None:
         device.finish()
 
         def run() -> None:
-            plain(kernel, size, *arguments, **macros)
+            plain(kernel, work, **given)
             device.finish()
 
         log.append((kernel, timed(run)[0]))

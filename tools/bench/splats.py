@@ -21,9 +21,8 @@ from bench.costs import Cost
 from bench.operations import Task
 from bench.training import TRAINING_COSTS, training_operations
 from rift_cl.geometry import Camera
-from rift_cl.splat.frame import Frame, FrameGradients
-from rift_cl.splat.projection import MOMENTS
-from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.raster import MOMENTS
+from rift_cl.splat.renderer import Frame, FrameGradients, Renderer
 from rift_cl.splat.splats import Splats
 
 # Operations per lane, forward and backward: the count that the design's prototype used.
@@ -151,7 +150,7 @@ def _count_lanes(device: rift.Device, frame: Frame) -> tuple[int, int]:
     lists, tile = frame.lists, 16
     starts, splat = device.get(lists.starts), device.get(lists.entries)[:, 0]
     last, height, width = device.get(frame.raster.last), *frame.camera.size
-    screen = device.get(frame.projected.screen)
+    screen = device.get(frame.projection.screen)
     evaluated = used = 0
     for number in range(len(starts) - 1):
         y0, x0 = number // lists.tiles.across * tile, number % lists.tiles.across * tile

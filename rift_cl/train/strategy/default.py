@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.splat.frame import Frame, FrameGradients
+from rift_cl.splat.renderer import Frame, FrameGradients
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.ranges import check_number, check_whole

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from numpy.typing import NDArray
 
 from rift_cl.errors import CheckpointError
-from rift_cl.splat.frame import Frame, FrameGradients
+from rift_cl.splat.renderer import Frame, FrameGradients
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import Parameters
 

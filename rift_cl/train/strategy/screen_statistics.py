@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.errors import CheckpointError, InputError
-from rift_cl.splat.frame import Frame, FrameGradients
+from rift_cl.splat.renderer import Frame, FrameGradients
 from rift_cl.train.strategy.protocol import Strategy, TrainingRun, check_names
 
 _COLUMNS = 3
@@ -69,8 +69,8 @@ class ScreenStatistics:
             "splat_statistics",
             (len(self),),
             grad_means2d=by,
-            screen=frame.projected.screen,
-            culled=frame.projected.culled,
+            screen=frame.projection.screen,
+            culled=frame.projection.culled,
             statistics=self._table,
             half_width=width / 2,
             half_height=height / 2,

@@ -24,11 +24,9 @@ from rift_cl.cl.elementwise import put, take
 from rift_cl.geometry import Camera
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.splat.drawing import draw_grad
-from rift_cl.splat.frame import Frame
-from rift_cl.splat.hermite import project_modes, project_modes_grad
-from rift_cl.splat.projection import MOMENTS
-from rift_cl.splat.raster import rasterize
-from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.projection import project_modes, project_modes_grad
+from rift_cl.splat.raster import MOMENTS, rasterize
+from rift_cl.splat.renderer import Frame, Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 
@@ -99,7 +97,7 @@ class Additive(LinearOperator):
         """
         total = np.zeros(self.domain[0])
         for number in range(len(self.cameras)):
-            screen = self.device.get(self._frame(number).projected.screen).astype(np.float64)
+            screen = self.device.get(self._frame(number).projection.screen).astype(np.float64)
             conic = screen[:, 2] * screen[:, 4] - screen[:, 3] ** 2
             seen = conic > 0
             total[seen] += np.pi * screen[seen, 5] ** 2 / np.sqrt(conic[seen])
@@ -143,7 +141,7 @@ class Additive(LinearOperator):
             return self.renderer.forward(splats, self.cameras[number]).image
         settings, drawing = self.renderer.settings, frame.drawing
         if splats.color_modes is not None:
-            modes = project_modes(self.device, splats, frame.camera, settings, frame.projected)
+            modes = project_modes(replace(frame.projection, splats=splats))
         assert drawing.lists is not None and splats.colors is not None
         screen = replace(drawing.screen, features=splats.colors, modes=modes)
         size = drawing.size
@@ -152,16 +150,9 @@ class Additive(LinearOperator):
     def _pulled_back(self, frame: Frame, grad_image: Any) -> list[Any]:
         """The gradient by the constants, behind other sums, and by the modes if there are any."""
         sums = draw_grad(self.device, frame.drawing, grad_image)
-        if frame.drawing.modes is None:
+        if frame.drawing.screen.modes is None:
             return [sums]
-        found = project_modes_grad(
-            self.device,
-            *(frame.splats, frame.camera, self.renderer.settings),
-            projected=frame.projected,
-            modes=frame.drawing.modes,
-            moments=sums,
-            channels=frame.channels.total,
-        )
+        found = project_modes_grad(frame.projection, sums)
         return [found.sums, found.color_modes]
 
 
