@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 # An option that the run decides where it is not given: its help says how, "None" would not.
 Auto = Annotated[T | None, tyro.conf.arg(help_behavior_hint="")]
+# Any number of values, none where it is not given.
+Several = Annotated[tuple[T, ...], tyro.conf.arg(help_behavior_hint="")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +32,7 @@ class DeviceOption:
 
     device: Auto[str] = None
     """OpenCL device: its number, cpu, gpu, or part of its name (see 'rift devices'). Default: the
-    environment variable RIFT_DEVICE, otherwise the star of 'rift devices'."""
+    environment variable RIFT_DEVICE, otherwise the one that 'rift devices' marks with a star."""
 
     def open_device(self, memory: int | None = None) -> Device:
         """The chosen device.
@@ -49,7 +51,7 @@ class DeviceOption:
 
 @dataclass(frozen=True, kw_only=True)
 class RunOptions(DeviceOption):
-    """How the command runs; none of these changes a result."""
+    """How the command runs."""
 
     group: ClassVar[str] = "run"
 

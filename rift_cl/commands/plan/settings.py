@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal
 
-from rift_cl.commands.options import Auto, RunOptions
+from rift_cl.commands.options import Auto, RunOptions, Several
 from rift_cl.errors import InputError
 
 _MOST_VIEWS = 10_000
@@ -53,7 +53,7 @@ class PlanCameras:
 
     group: ClassVar[str] = "camera"
 
-    camera: tuple[Path, ...] = ()
+    camera: Several[Path] = ()
     """JSON files of cameras to choose from, such as {"name": "mine", "focal_length": 50,
     "f_number": 8, "pixel_um": 3.9, "size": [6000, 4000]}, or a list of them in "cameras". Default:
     a 24 megapixel camera with 50 mm at f/11."""
@@ -73,10 +73,10 @@ class PlanCameras:
     curve."""
     rings: int = 2
     """With --path tilted-rings: number of rings."""
-    keep_out: tuple[str, ...] = ()
+    keep_out: Several[str] = ()
     """Regions without cameras: sphere:X,Y,Z,RADIUS, box:X,Y,Z,X,Y,Z (inf for unbounded), or
     cone:X,Y,Z,DX,DY,DZ,DEGREES, in millimetres; with the prefix 'body-' they also occlude the
-    target."""
+    target. Default: none."""
 
 
 @dataclass(frozen=True, kw_only=True)

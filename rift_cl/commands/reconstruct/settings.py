@@ -190,7 +190,7 @@ class VolumeOutput:
 
 @dataclass(frozen=True, kw_only=True)
 class ResumableRun(RunOptions):
-    """How the command runs; none of these changes a result."""
+    """How the command runs."""
 
     group: ClassVar[str] = "run"
 
