@@ -1,4 +1,4 @@
-"""Where things are: grids of samples, scans and cameras that look at them. Values, no OpenCL."""
+"""Grids of samples, scans, cameras and poses: frozen values that are checked, without OpenCL."""
 
 from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.camera import Camera

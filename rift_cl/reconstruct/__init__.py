@@ -1,4 +1,7 @@
-"""Reconstruction methods, one file each; they see operators only."""
+"""From projections to images: preprocessing, the rotation axis, direct and iterative methods.
+
+Methods see linear operators only.
+"""
 
 from rift_cl.reconstruct.axis import AxisEstimate, find_center
 from rift_cl.reconstruct.direct.fan_rebin import rebin_fan

@@ -1,4 +1,4 @@
-"""Where to look from: what frequencies of a target views sample, and what views to take.
+"""Which frequencies of a target a set of views samples (coverage), and which views to take (plans).
 
 ``coverage`` and ``merit`` are in modules of these names, and in ``rift_cl`` itself.
 """

@@ -1,1 +1,1 @@
-"""``rift center``: where the rotation axis of a scan is."""
+"""``rift center``: estimates the rotation axis of a scan."""

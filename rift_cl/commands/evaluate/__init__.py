@@ -1,1 +1,1 @@
-"""``rift eval``: the quality of a scene, measured against photographs of it."""
+"""``rift eval``: scores of a scene on held-out photographs, beside baselines."""

@@ -1,1 +1,1 @@
-"""``rift export``: a scene in the files that other people's viewers, editors and printers read."""
+"""``rift export``: a scene in the file formats of other viewers, editors and printers."""

@@ -1,1 +1,1 @@
-"""``rift plan``: where to take photographs from."""
+"""``rift plan``: views of a target that minimize its posterior uncertainty."""

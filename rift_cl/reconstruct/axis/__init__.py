@@ -1,4 +1,4 @@
-"""The rotation axis: where on the detector it is seen, how surely, and whether it is tilted.
+"""The rotation axis: its detector bin, a confidence interval, and its tilt.
 
 ``search`` asks several rows and draws a line through their answers; ``measures`` says how one row
 is searched, by a measure that the directions of its views allow. The measures are

@@ -1,1 +1,1 @@
-"""Reconstruction by integration: filtered backprojection, and what makes scans fit for it."""
+"""Filtered backprojection, with view weights, padding, offset axes and fan-beam rebinning."""

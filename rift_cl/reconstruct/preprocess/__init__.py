@@ -1,4 +1,4 @@
-"""What is mended in projections before they are reconstructed.
+"""Corrections of projections before reconstruction: flat field, rings, zingers, phase, alignment.
 
 Stripes, zingers and phase; binning, a tilted axis, and half acquisitions.
 """

@@ -1,1 +1,1 @@
-"""Choose views: what a plan has to keep to, where views may stand, and how they are found."""
+"""The planner: constraints, candidate views, greedy selection and refinement by gradients."""

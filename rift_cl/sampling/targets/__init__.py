@@ -1,1 +1,1 @@
-"""What is to be known: a target, what is believed of it, and how views observe its points."""
+"""Targets of a plan: extent, prior spectrum, free space, and observations of points by views."""
