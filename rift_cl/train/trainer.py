@@ -26,11 +26,10 @@ from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.band_limit import BandLimiter
-from rift_cl.train.coefficient_schedule import CoefficientSchedule
 from rift_cl.train.loss.coverage_weight import weight_of
 from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.schedule import Schedule
+from rift_cl.train.schedules import CoefficientSchedule, LearningRateSchedule
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import scene_extent
 from rift_cl.train.strategy import TrainingRun
@@ -105,7 +104,7 @@ class Trainer:
         self.flat = flat
         settings.solve.check_heed(self.solves)
         self.device: Device = parameters.device
-        self.schedule = Schedule(settings, scene_extent(pictures.cameras))
+        self.schedule = LearningRateSchedule(settings, scene_extent(pictures.cameras))
         extent, views = self.schedule.extent, len(pictures.cameras)
         run = TrainingRun(
             settings.steps, settings.splats, settings.seed, extent, self.schedule.cooldown

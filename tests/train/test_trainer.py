@@ -12,7 +12,7 @@ from rift_cl.errors import InputError
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import GROUPS, Parameters
-from rift_cl.train.schedule import Schedule
+from rift_cl.train.schedules import LearningRateSchedule
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import hull_points, random_points, start_splats
 from rift_cl.train.strategy import McmcSettings
@@ -95,7 +95,7 @@ def test_every_picture_is_looked_at_once_before_any_is_again(device):
 
 
 def test_learning_rates_fall_and_fall_further_in_the_cooldown():
-    schedule = Schedule(TrainSettings(steps=1000, cooldown=0.2), extent=2.0)
+    schedule = LearningRateSchedule(TrainSettings(steps=1000, cooldown=0.2), extent=2.0)
     assert schedule.cooldown == 800
     first, middle, last = (schedule.learning_rates(step) for step in (0, 800, 1000))
     assert first["means"] == pytest.approx(2 * 1.6e-4)

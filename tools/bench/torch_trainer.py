@@ -16,7 +16,7 @@ from torch.nn.functional import conv2d, normalize
 
 from bench.torch_tiles import draw, flushed_denormals, on_threads
 from rift_cl.geometry import Camera
-from rift_cl.train.schedule import Schedule
+from rift_cl.train.schedules import LearningRateSchedule
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.strategy import McmcSettings
 
@@ -44,7 +44,7 @@ class TorchTrainer:
         extent: float,
         threads: int | None = None,
     ) -> None:
-        self._settings, self._schedule = settings, Schedule(settings, extent)
+        self._settings, self._schedule = settings, LearningRateSchedule(settings, extent)
         self._threads, self._step = threads, 0
         assert isinstance(settings.strategy, McmcSettings)
         self._strategy = settings.strategy

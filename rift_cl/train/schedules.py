@@ -1,13 +1,14 @@
-"""What joins a fit as it goes on: degrees of harmonics, orders of modes, lobes; and what is held.
+"""What changes from step to step of a fit: learning rates, and which coefficients there are.
 
-All of it begins with zeros, so that no picture jumps. What is there follows from the step and the
-settings, and what is held from the modes themselves, so that no checkpoint needs to know of it.
+Degrees of harmonics, orders of modes and lobes are added as a fit goes on, with coefficients of
+zero, so that no image jumps. Which of them there are follows from the step and the settings, so
+that no checkpoint needs to know of it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,13 +21,55 @@ from rift_cl.train.parameters import MODES, Parameters
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.lobes import lobe_axes
 
+# Learning rates at the very end of the cooldown, as a fraction of those at its beginning.
+_LAST_SHARE = 0.05
 
-class CoefficientSchedule:
-    """Lets coefficients join the parameters of a run, and holds some at zero.
+
+@dataclass(frozen=True)
+class LearningRateSchedule:
+    """Learning rates of a run.
 
     Args:
         settings: of the run.
-        cameras: that its pictures are from.
+        extent: size of the scene, in its units.
+    """
+
+    settings: TrainSettings
+    extent: float
+
+    @property
+    def cooldown(self) -> int:
+        """The step with which the cooldown begins."""
+        return round(self.settings.steps * (1 - self.settings.cooldown))
+
+    def learning_rates(self, step: int) -> dict[str, float]:
+        """Adam's learning rates at a step, by group; of positions in units of the scene."""
+        rates, settings = self.settings.learning_rates, self.settings
+        way = min(step / max(self.cooldown, 1), 1.0)
+        falling, fade = rates.means_last**way, 1.0
+        if step >= self.cooldown:
+            into = (step - self.cooldown) / max(settings.steps - self.cooldown, 1)
+            fade = _LAST_SHARE**into
+        return {
+            "means": fade * self.extent * rates.means * falling,
+            "quats": fade * rates.quats,
+            "log_scales": fade * rates.log_scales,
+            "logits": fade * rates.logits,
+            "sh": fade * rates.sh,
+            "shape_modes": fade * rates.shape_modes,
+            "color_modes": fade * rates.color_modes,
+            "lobes": fade * rates.lobes,
+            "poses": fade * rates.poses * falling,
+            "exposures": fade * rates.exposures * falling,
+        }
+
+
+class CoefficientSchedule:
+    """Adds coefficients to the parameters of a run, and holds some at zero.
+
+    Args:
+        settings: of the run.
+        cameras: of its training views.
         flat: whether all splats lie in one slice, and modes across it are held.
     """
 
@@ -58,7 +101,7 @@ class CoefficientSchedule:
         self._add_orders(parameters)
 
     def hold(self, parameters: Parameters) -> None:
-        """Say which modes are trained; to be asked whenever the splats are others."""
+        """Update which modes are trained. Call whenever the splats are others."""
         parameters.free = {}
         if not self._flat:
             return
