@@ -77,20 +77,20 @@ def memory_budget(traits: Traits, limit: int | None = None) -> int:
 
 
 def plan_chunks(count: int, each: int, fixed: int, budget: int, *, what: str) -> list[slice]:
-    """Cut ``count`` equal pieces of work into runs that fit the budget.
+    """Cut work into chunks that fit the memory budget: the one way in which work is cut to memory.
 
     Args:
-        count: number of pieces.
-        each: bytes that one piece needs.
-        fixed: bytes needed whatever the number of pieces.
+        count: how many equal items of work there are, such as slices or rows.
+        each: bytes that one item needs.
+        fixed: bytes needed whatever the number of items.
         budget: bytes there are.
-        what: the name of one piece, for the error.
+        what: the name of one item, for the error.
 
     Returns:
-        Slices over the pieces, as even as can be.
+        Slices over the items, as even as can be, one for each chunk.
 
     Raises:
-        ResourceLimitError: not even one piece fits.
+        ResourceLimitError: not even one item fits.
     """
     most = (budget - fixed) // max(each, 1)
     if most < 1:
@@ -99,8 +99,8 @@ def plan_chunks(count: int, each: int, fixed: int, budget: int, *, what: str) ->
             f"{format_bytes(budget)}: raise the budget (RIFT_MEMORY or --memory), use a device "
             "with more memory, or make the problem smaller"
         )
-    runs = -(-count // most)
-    return [slice(count * run // runs, count * (run + 1) // runs) for run in range(runs)]
+    chunks = -(-count // most)
+    return [slice(count * k // chunks, count * (k + 1) // chunks) for k in range(chunks)]
 
 
 def format_bytes(amount: float) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.array import DeviceArray
 from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
-from rift_cl.operators.linear import LinearOperator, Piece
+from rift_cl.operators.linear import Chunk, LinearOperator
 
 
 class Adjoint(LinearOperator):
@@ -43,8 +43,8 @@ class Adjoint(LinearOperator):
         """Bytes of device memory that the operator needs."""
         return self._forward.scratch
 
-    def _pieces(self, budget: int) -> Iterable[Piece]:
-        return [(inside, outside) for outside, inside in self._forward._pieces(budget)]
+    def _chunks(self, budget: int) -> Iterable[Chunk]:
+        return [(inside, outside) for outside, inside in self._forward._chunks(budget)]
 
 
 class Scaled(LinearOperator):
@@ -75,8 +75,8 @@ class Scaled(LinearOperator):
         """Bytes of device memory that the operator needs."""
         return self._inner.scratch
 
-    def _pieces(self, budget: int) -> Iterable[Piece]:
-        return self._inner._pieces(budget)
+    def _chunks(self, budget: int) -> Iterable[Chunk]:
+        return self._inner._chunks(budget)
 
 
 class Sum(LinearOperator):

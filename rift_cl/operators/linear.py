@@ -9,8 +9,8 @@ Operators do not change once they are made. They are pickled and copied as the a
 them again, the device as its selector, so that no device memory travels and the copy gives the
 same bits.
 
-Host arrays that are too large for the device are processed in pieces, which an operator defines by
-``_pieces``; the result is the same to the bit.
+Host arrays that are too large for the device are processed in chunks, which an operator defines by
+``_chunks``; the result is the same to the bit.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from rift_cl.geometry import Grid, Parallel
 
 Shape = tuple[int, ...]
 # An index into an operator's domain and the index into its range that depends on it alone.
-Piece = tuple[tuple[slice, ...], tuple[slice, ...]]
+Chunk = tuple[tuple[slice, ...], tuple[slice, ...]]
 _HALVINGS = 6
 # What applies an operator to tensors; loaded when the first one comes, by its name, since an
 # operator knows nothing of torch.
@@ -121,7 +121,7 @@ class LinearOperator(ABC):
         Raises:
             InputError: ``x`` or ``out`` has the wrong shape or type, or an ``x`` on the host
                 holds NaN or infinity; device arrays are not searched for these.
-            DeviceMemoryError: not even the smallest piece fits the device.
+            DeviceMemoryError: not even the smallest chunk fits the device.
         """
         if is_tensor(x):
             if out is not None:
@@ -205,11 +205,11 @@ class LinearOperator(ABC):
         lack: DeviceMemoryError | None = None
         for halving in range(_HALVINGS + 1):
             try:
-                for inside, outside in self._pieces(budget >> halving):
-                    self._apply_piece(x, y, inside, outside)
+                for inside, outside in self._chunks(budget >> halving):
+                    self._apply_chunk(x, y, inside, outside)
                 return
             except DeviceMemoryError as failure:
-                # The driver had less memory than it reported: retry with smaller pieces.
+                # The driver had less memory than it reported: retry with smaller chunks.
                 if halving == _HALVINGS:
                     raise
                 lack = failure
@@ -221,17 +221,17 @@ class LinearOperator(ABC):
                     raise lack from None
                 raise
 
-    def _apply_piece(
+    def _apply_chunk(
         self,
         x: NDArray[Any],
         y: NDArray[Any],
         inside: tuple[slice, ...],
         outside: tuple[slice, ...],
     ) -> None:
-        piece = np.ascontiguousarray(x[inside])
+        chunk = np.ascontiguousarray(x[inside])
         part = y[outside]
         target = self.device.empty(part.shape, self.dtype)
-        self._apply(share(self.device, piece), target)
+        self._apply(share(self.device, chunk), target)
         if part.flags.c_contiguous:
             download(self.device, target, part)
         else:
@@ -242,16 +242,16 @@ class LinearOperator(ABC):
         """Bytes of device memory needed besides the input and the output."""
         return 0
 
-    def _pieces(self, budget: int) -> Iterable[Piece]:
-        """Pieces that fit a budget in bytes; one for the whole unless a subclass overrides it."""
+    def _chunks(self, budget: int) -> Iterable[Chunk]:
+        """Chunks that fit a budget in bytes; one for the whole unless a subclass overrides it."""
         arrays = self.dtype.itemsize * (math.prod(self.domain) + math.prod(self.range))
         plan_chunks(1, arrays, self.scratch, budget, what=f"{type(self).__name__} application")
         return [((), ())]
 
     @abstractmethod
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
-        """Write A x to ``out``; device arrays with the shapes of a piece."""
+        """Write A x to ``out``; device arrays with the shapes of a chunk."""
 
     @abstractmethod
     def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
-        """Write A' y to ``out``; device arrays with the shapes of a piece."""
+        """Write A' y to ``out``; device arrays with the shapes of a chunk."""

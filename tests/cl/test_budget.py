@@ -99,7 +99,7 @@ def test_chunks_cover_everything_in_order_and_fit(count, each, fixed, room):
     assert len(chunks) == -(-count // most), "no more chunks than it takes"
 
 
-def test_piece_that_cannot_fit_names_need_and_have():
+def test_a_part_that_cannot_fit_names_need_and_have():
     with pytest.raises(ResourceLimitError) as caught:
         plan_chunks(10, 3 << 20, 1 << 20, 2 << 20, what="slice")
     for part in ("one slice needs 4 MiB", "budget is 2 MiB", "RIFT_MEMORY", "--memory"):

@@ -146,7 +146,7 @@ def test_smaller_budgets_give_the_same_bits(device, part):
     room = fixed + 4 * (x.size + y.size) // part
     small = Device(device._handle, device.selector, traits=device.traits, memory=room)
     B = rift.Projector(grid, scan, device=small)
-    assert len(list(B._pieces(small.budget))) >= part
+    assert len(list(B._chunks(small.budget))) >= part
     np.testing.assert_array_equal(B(x), y)
     np.testing.assert_array_equal(B.T(y), A.T(y))
 

@@ -1,4 +1,4 @@
-"""The fast projector in pieces, within the memory it says, and with settings that cannot be."""
+"""The fast projector in chunks, within the memory it says, and with settings that cannot be."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ def test_any_budget_gives_the_same_bits(device, monkeypatch):
     x = np.random.default_rng(1).standard_normal(A.domain).astype(np.float32)
     y = np.random.default_rng(2).standard_normal(A.range).astype(np.float32)
     whole = A(x), A.T(y)
-    pieces = []
-    apply_piece = LinearOperator._apply_piece
+    chunks = []
+    apply_chunk = LinearOperator._apply_chunk
 
     def counted(self, *arguments):
-        pieces.append(self)
-        apply_piece(self, *arguments)
+        chunks.append(self)
+        apply_chunk(self, *arguments)
 
-    monkeypatch.setattr(LinearOperator, "_apply_piece", counted)
+    monkeypatch.setattr(LinearOperator, "_apply_chunk", counted)
     budget = A.scratch + (x.nbytes + y.nbytes) // 3
     monkeypatch.setattr(rift.Device, "budget", budget)
     assert np.array_equal(A(x), whole[0])
     assert np.array_equal(A.T(y), whole[1])
-    assert len(pieces) >= 6
+    assert len(chunks) >= 6
     monkeypatch.setattr(rift.Device, "budget", A.scratch)
     with pytest.raises(ResourceLimitError, match="one slice needs"):
         A(x)

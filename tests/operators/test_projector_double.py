@@ -122,18 +122,18 @@ def test_twice_the_bytes_are_counted(device, monkeypatch):
     assert doubles.scratch > singles.scratch
     monkeypatch.setattr(rift.Projector, "scratch", 0)
     budget = 4 * 7 * (12 * 15 + 8 * 21)
-    assert len(singles.pieces(budget)) == 6
-    assert len(doubles.pieces(budget)) == 14
+    assert len(singles.chunks(budget)) == 6
+    assert len(doubles.chunks(budget)) == 14
     with pytest.raises(ResourceLimitError):
-        doubles.pieces(4 * (12 * 15 + 8 * 21))
+        doubles.chunks(4 * (12 * 15 + 8 * 21))
 
 
-def test_pieces_give_the_same_bits(device, monkeypatch):
+def test_chunks_give_the_same_bits(device, monkeypatch):
     A = rift.Projector(rift.Grid((33, 12, 15)), SCAN, "strip", device=device, dtype="float64")
     x = np.random.default_rng(5).standard_normal(A.domain)
     whole = A(x), A.T(A(x))
     monkeypatch.setattr(rift.Projector, "scratch", 0)
     monkeypatch.setattr(rift.Device, "budget", whole[0].nbytes // 3)
-    assert len(A.pieces(whole[0].nbytes // 3)) > 3
+    assert len(A.chunks(whole[0].nbytes // 3)) > 3
     assert np.array_equal(A(x), whole[0])
     assert np.array_equal(A.T(whole[0]), whole[1])

@@ -150,16 +150,16 @@ def test_slabs_give_the_same_bits(device, monkeypatch):
     assert np.array_equal(seven(5, device)(y), F(y))
 
 
-def test_pieces_give_the_same_bits(device, monkeypatch):
+def test_chunks_give_the_same_bits(device, monkeypatch):
     monkeypatch.setattr(row_transform, "_SLAB_BYTES", {"cpu": 1, "gpu": 4096})
     F = seven(40, device)
     y = RANDOM.standard_normal(F.domain).astype(np.float32)
     whole = F(y)
     monkeypatch.setattr(rift.Device, "budget", F.scratch + y.nbytes // 2)
-    assert len(list(F._pieces(F.scratch + y.nbytes // 2))) >= 4
+    assert len(list(F._chunks(F.scratch + y.nbytes // 2))) >= 4
     assert np.array_equal(F(y), whole)
     with pytest.raises(ResourceLimitError):
-        list(F._pieces(F.scratch))
+        list(F._chunks(F.scratch))
 
 
 @pytest.mark.parametrize("bins", [97, 500])

@@ -27,7 +27,7 @@ from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
 from rift_cl.operators.filters.row_convolution import SHORT_ROW, RowConvolution
 from rift_cl.operators.fourier.row_transform import RowTransform
-from rift_cl.operators.linear import LinearOperator, Piece
+from rift_cl.operators.linear import Chunk, LinearOperator
 from rift_cl.registry import Registry
 
 Floats = NDArray[np.float64]
@@ -248,12 +248,12 @@ class ViewFilter(LinearOperator):
         """Bytes needed besides the views that go in and come out."""
         return self._convolve.scratch
 
-    def _pieces(self, budget: int) -> Iterable[Piece]:
+    def _chunks(self, budget: int) -> Iterable[Chunk]:
         if len(self.domain) == 2:
-            return super()._pieces(budget)
+            return super()._chunks(budget)
         each = 2 * self.dtype.itemsize * self.domain[0] * self.domain[2]
-        runs = plan_chunks(self.domain[1], each, self.scratch, budget, what="row of every view")
-        return [((slice(None), run), (slice(None), run)) for run in runs]
+        chunks = plan_chunks(self.domain[1], each, self.scratch, budget, what="row of every view")
+        return [((slice(None), chunk), (slice(None), chunk)) for chunk in chunks]
 
 
 def _factors_and_taps(scan: Parallel, filter: Filter, gains: Gains | None) -> tuple[Floats, Floats]:

@@ -13,7 +13,7 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError
 from rift_cl.geometry import FanBeam, Grid, Parallel
-from rift_cl.operators.linear import LinearOperator, Piece
+from rift_cl.operators.linear import Chunk, LinearOperator
 
 
 class ParallelProjector(LinearOperator):
@@ -64,11 +64,11 @@ class ParallelProjector(LinearOperator):
             f"pitch {self.scan.pitch:g}",
         ]
 
-    def _pieces(self, budget: int) -> Iterable[Piece]:
-        return self.pieces(budget)
+    def _chunks(self, budget: int) -> Iterable[Chunk]:
+        return self.chunks(budget)
 
-    def pieces(self, budget: int, *, sinograms: int = 1, fixed: int = 0) -> list[Piece]:
-        """Runs of slices that fit a budget in bytes.
+    def chunks(self, budget: int, *, sinograms: int = 1, fixed: int = 0) -> list[Chunk]:
+        """Chunks of slices that fit a budget in bytes.
 
         Args:
             budget: bytes of memory available.
@@ -79,7 +79,7 @@ class ParallelProjector(LinearOperator):
         numbers = math.prod(self.grid.shape[-2:]) + sinograms * views * bins
         each = self.dtype.itemsize * numbers
         needed = self.scratch + fixed
-        runs = plan_chunks(self.grid.slices, each, needed, budget, what="slice")
+        chunks = plan_chunks(self.grid.slices, each, needed, budget, what="slice")
         if len(self.grid.shape) == 2:
             return [((), ())]
-        return [((run,), (slice(None), run)) for run in runs]
+        return [((chunk,), (slice(None), chunk)) for chunk in chunks]

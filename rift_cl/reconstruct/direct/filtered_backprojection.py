@@ -24,7 +24,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.filters.compensation import Compensation
 from rift_cl.operators.filters.ramp_filters import Filter, Gains, ViewFilter, as_filter
-from rift_cl.operators.linear import LinearOperator, Piece
+from rift_cl.operators.linear import Chunk, LinearOperator
 from rift_cl.operators.projector.parallel_projector import ParallelProjector
 from rift_cl.reconstruct.direct.view_weights import view_gains
 
@@ -100,10 +100,10 @@ class FilteredBackprojection(LinearOperator):
         views = self.dtype.itemsize * math.prod(self.domain)
         return views + self._filter.scratch + self._A.scratch
 
-    def _pieces(self, budget: int) -> Iterable[Piece]:
+    def _chunks(self, budget: int) -> Iterable[Chunk]:
         # The sinogram and the filtered one.
-        pieces = self._A.pieces(budget, sinograms=2, fixed=self._filter.scratch)
-        return [(inside, outside) for outside, inside in pieces]
+        chunks = self._A.chunks(budget, sinograms=2, fixed=self._filter.scratch)
+        return [(inside, outside) for outside, inside in chunks]
 
 
 def fbp(

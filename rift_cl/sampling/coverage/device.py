@@ -54,13 +54,13 @@ def coverage(
     """
     work = CoverageWork.of(views, target, k, weights, device)
     found = np.empty((work.points, work.padded), np.float32)
-    for points, table in work.point_runs():
+    for points, table in work.point_chunks():
         each = work.lanes * 4 * (3 + len(table)) + 4 * BOX
         room = work.device.budget
-        for run in plan_chunks(len(work.boxes), each, table.nbytes, room, what="few frequencies"):
-            at = slice(run.start * work.lanes, run.stop * work.lanes)
+        for chunk in plan_chunks(len(work.boxes), each, table.nbytes, room, what="few frequencies"):
+            at = slice(chunk.start * work.lanes, chunk.stop * work.lanes)
             part = work.device.empty((len(table), at.stop - at.start))
-            size = (run.stop - run.start, len(table))
+            size = (chunk.stop - chunk.start, len(table))
             work.device.launch("coverage", size, **work.send(at), views=table, covered=part)
             found[points, at] = work.device.get(part)
     return found[:, : work.wanted]
@@ -97,7 +97,7 @@ def coverage_grad(
     upstream = np.zeros((work.points, work.padded), np.float32)
     upstream[:, : work.wanted] = _upstream(grad, (work.points, work.wanted))
     total = np.zeros((work.points, work.views, ROW))
-    for points, table in work.point_runs():
+    for points, table in work.point_chunks():
         for parts in _parts(work, table, upstream[points]):
             # One by one, so that the order of the sum is that of the runs however they are cut.
             for part in work.device.get(parts):
@@ -111,12 +111,12 @@ def _parts(
     """The gradients by runs of frequencies, in their order: (runs, points, V, 8) at a time."""
     each = _RUN * 4 * (3 + len(table)) + _RUN // work.lanes * 4 * BOX + table.nbytes
     runs, room = -(-work.padded // _RUN), work.device.budget
-    for run in plan_chunks(runs, each, table.nbytes, room, what="run of frequencies"):
-        at = slice(run.start * _RUN, min(run.stop * _RUN, work.padded))
-        parts = work.device.empty((run.stop - run.start, *table.shape))
+    for chunk in plan_chunks(runs, each, table.nbytes, room, what="run of frequencies"):
+        at = slice(chunk.start * _RUN, min(chunk.stop * _RUN, work.padded))
+        parts = work.device.empty((chunk.stop - chunk.start, *table.shape))
         work.device.launch(
             "coverage_grad",
-            (work.views, len(table), run.stop - run.start),
+            (work.views, len(table), chunk.stop - chunk.start),
             **work.send(at),
             views=table,
             upstream=work.device.array(np.ascontiguousarray(upstream[:, at])),

@@ -112,11 +112,11 @@ class CoverageWork:
         """Frequencies of a block."""
         return self.padded // len(self.boxes)
 
-    def point_runs(self) -> Iterator[tuple[slice, Any]]:
+    def point_chunks(self) -> Iterator[tuple[slice, Any]]:
         """Points whose views fill no more than a quarter of the memory, with those views."""
         each, room = self.views * ROW * 4, self.device.budget // 4
-        for run in plan_chunks(self.points, each, 0, room, what="point's views"):
-            yield run, self.device.array(self.rows[run])
+        for chunk in plan_chunks(self.points, each, 0, room, what="point's views"):
+            yield chunk, self.device.array(self.rows[chunk])
 
     def send(self, at: slice) -> dict[str, DeviceArray | int]:
         """Some frequencies and their boxes, as kernels are told."""

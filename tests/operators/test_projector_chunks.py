@@ -30,16 +30,16 @@ def volume(device):
 
 
 def counted(monkeypatch):
-    """Record how many pieces operators cut their work into."""
-    pieces = []
-    whole = LinearOperator._apply_piece
+    """Record how many chunks operators cut their work into."""
+    chunks = []
+    whole = LinearOperator._apply_chunk
 
-    def apply_piece(self, *arguments):
-        pieces.append(self)
+    def apply_chunk(self, *arguments):
+        chunks.append(self)
         whole(self, *arguments)
 
-    monkeypatch.setattr(LinearOperator, "_apply_piece", apply_piece)
-    return pieces
+    monkeypatch.setattr(LinearOperator, "_apply_chunk", apply_chunk)
+    return chunks
 
 
 @pytest.mark.parametrize("share", [2, 4, 8, 16])
@@ -51,22 +51,22 @@ def test_any_budget_gives_the_same_bits(device, monkeypatch, share):
     # Scratch has a floor that is far above so small a volume: only what is cut counts here.
     monkeypatch.setattr(rift.Projector, "scratch", 0)
     monkeypatch.setattr(rift.Device, "budget", (x.nbytes + y.nbytes) // share)
-    pieces = counted(monkeypatch)
+    chunks = counted(monkeypatch)
     for (B, argument), expected in zip(operators, whole, strict=True):
-        pieces.clear()
+        chunks.clear()
         assert np.array_equal(B(argument), expected)
-        assert len(pieces) >= share
+        assert len(chunks) >= share
 
 
-def test_filtering_in_pieces_gives_the_same_bits(device, monkeypatch):
+def test_filtering_in_chunks_gives_the_same_bits(device, monkeypatch):
     scan = rift.Parallel(np.arange(7.0), bins=30)
     F = ViewFilter(scan, rift.Ramp(), rows=13, gains=np.arange(7), device=device)
     y = np.random.default_rng(2).standard_normal(F.domain).astype(np.float32)
     whole = F(y)
     monkeypatch.setattr(rift.Device, "budget", 2 * y.nbytes // 5)
-    pieces = counted(monkeypatch)
+    chunks = counted(monkeypatch)
     assert np.array_equal(F(y), whole)
-    assert len(pieces) >= 5
+    assert len(chunks) >= 5
 
 
 def test_more_views_than_one_run_of_tables(device, monkeypatch):
