@@ -46,7 +46,7 @@ class Asked:
 def main(asked: Asked) -> None:
     """Fit, and print the table."""
     with tempfile.TemporaryDirectory() as folder:
-        settings = FitPhotosSettings(
+        settings = FitPhotosSettings.of(
             asked.capture,
             Path(folder) / "fit",
             steps=asked.steps,

@@ -19,7 +19,7 @@ from rift_cl import __version__
 from rift_cl.commands.console_table import print_table
 from rift_cl.commands.interruption import gentle_interrupt
 from rift_cl.commands.progress_bar import print_line
-from rift_cl.commands.runner import Output, command, exit_status, ran, told, watch
+from rift_cl.commands.runner import Output, command, exit_status, parsed, ran, told, watch
 
 _USAGE = 2
 
@@ -60,24 +60,20 @@ def _run(arguments: Sequence[str]) -> int:
     if first in ("-h", "--help", "-H", "--help-verbose"):
         print(_overview())
         return 0
-    config: tuple[Any, ...] = (tyro.conf.OmitArgPrefixes,)
     name, rest = _named(list(arguments))
     if name in COMMANDS:
         earlier = _earlier(name, rest)
-        if earlier is None:
-            # Without an earlier run every switch is off, and only its positive form is of use.
-            config = (*config, tyro.conf.FlagCreatePairsOff)
-        chosen: Callable[[], int] = tyro.cli(
-            _command(name, earlier), prog=f"rift {name}", args=rest, config=config
-        )
-        return chosen()
+        # Without an earlier run only one form of a switch is of use: that which its default is not.
+        config = (tyro.conf.FlagCreatePairsOff,) if earlier is None else ()
+        entry = _command(name, earlier, rest)
+        return parsed(lambda: tyro.cli(entry, prog=f"rift {name}", args=rest, config=config))()
     if first == "fit":
         print(_FIT_HELP)
         return 0 if rest else _USAGE
     if first.startswith("--tyro-"):
         # Shell completion needs the options of every command.
         tyro.extras.subcommand_cli_from_dict(
-            {name: _command(name) for name in COMMANDS}, prog="rift", args=arguments, config=config
+            {name: _command(name) for name in COMMANDS}, prog="rift", args=arguments
         )
     what = f"there is no command {first!r}" if first else "a command is missing"
     print_line(f"rift: {what}; 'rift --help' lists the commands")
@@ -117,9 +113,17 @@ def _overview() -> str:
     )
 
 
-def _command(name: str, earlier: Any = None) -> Callable[..., Callable[[], int]]:
+def _command(
+    name: str, earlier: Any = None, arguments: Sequence[str] = ()
+) -> Callable[..., Callable[[], int]]:
     """A command for tyro; of all the commands' modules, only its own settings are imported."""
-    return command(COMMANDS[name].run, COMMANDS[name].settings_class(), earlier)
+    run, settings = COMMANDS[name].run, COMMANDS[name].settings_class()
+    if not name.startswith("fit "):
+        return command(run, settings, earlier)
+    from rift_cl.commands.run_folder.saved_settings import chosen, kinds
+
+    first = chosen(settings, earlier, arguments)
+    return command(run, settings, first, kinds(settings, first))
 
 
 def _earlier(name: str, arguments: Sequence[str]) -> Any:

@@ -6,14 +6,16 @@ or a value that cannot be used), 4 device, 5 output, 130 interrupted.
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from inspect import Parameter, Signature
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -24,6 +26,8 @@ from rift_cl.errors import RiftError
 from rift_cl.progress import Report
 
 _INPUT, _OUTPUT, _INTERRUPTED = 3, 5, 130
+# Groups of values, and one of further groups, whose options have names of their own.
+_OMITTED, _UNNAMED = tyro.conf.OmitArgPrefixes, tyro.conf.arg(name="")
 
 
 @dataclass(frozen=True)
@@ -62,8 +66,32 @@ def told(run: Callable[[], int]) -> int:
         return _say(f"rift: {error}", error.exit_status)
 
 
+def parsed(parse: Callable[[], Callable[[], int]]) -> Callable[[], int]:
+    """What a command line means; what settings refuse is raised as they say it.
+
+    Raises:
+        RiftError: a value is out of its range.
+        SystemExit: help was shown, or an option is unknown; that was said.
+    """
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            return parse()
+    except SystemExit as end:
+        error: BaseException | None = end
+        while error is not None and not isinstance(error, RiftError):
+            error = error.__context__
+        if error is not None:
+            raise error from None
+        print(said.getvalue(), end="", file=sys.stderr)
+        raise
+
+
 def command(
-    run: Callable[[Any, Output], None], settings: type, default: Any = None
+    run: Callable[[Any, Output], None],
+    settings: type,
+    default: Any = None,
+    kinds: Iterable[tuple[str, Sequence[str], str, str]] = (),
 ) -> Callable[..., Callable[[], int]]:
     """A command for tyro: it takes groups of options and gives back what is to be run.
 
@@ -71,6 +99,8 @@ def command(
         run: what to do with the settings.
         settings: their class; the help lists its options by ``option_groups``.
         default: settings to begin with, where nothing else is given; the class's own if None.
+        kinds: options that were heeded already, in ``default``: their name, choices, what was
+            chosen, and help.
     """
     groups = {
         group.group if hasattr(group, "group") else "": group for group in option_groups(settings)
@@ -81,19 +111,33 @@ def command(
         Parameter(
             title or "settings",
             Parameter.KEYWORD_ONLY,
-            annotation=group if title else Annotated[group, tyro.conf.arg(name="")],
+            annotation=Annotated[group, _OMITTED if title else _UNNAMED],
             default=Parameter.empty if default is None else _part(default, group),
         )
         for title, group in groups.items()
     ]
-    talk = Parameter("messages", Parameter.KEYWORD_ONLY, annotation=Output, default=Output())
+    talk = Parameter(
+        "messages", Parameter.KEYWORD_ONLY, annotation=Annotated[Output, _OMITTED], default=Output()
+    )
+
+    heeded = [
+        Parameter(
+            name,
+            Parameter.KEYWORD_ONLY,
+            annotation=Annotated[Literal[tuple(choices)], tyro.conf.arg(help=text)],
+            default=usual,
+        )
+        for name, choices, usual, text in kinds
+    ]
+    names = [parameter.name for parameter in parameters]
 
     def prepared(*, messages: Output, **parts: Any) -> Callable[[], int]:
-        values = {name: value for part in parts.values() for name, value in _values(part).items()}
+        values = {name: value for part in names for name, value in _values(parts[part]).items()}
         return lambda: _guarded(run, settings(**values), messages)
 
-    prepared.__signature__ = Signature([*parameters, talk])  # type: ignore[attr-defined]
-    prepared.__annotations__ = {entry.name: entry.annotation for entry in (*parameters, talk)}
+    every = (*parameters, *heeded, talk)
+    prepared.__signature__ = Signature(every)  # type: ignore[attr-defined]
+    prepared.__annotations__ = {entry.name: entry.annotation for entry in every}
     prepared.__doc__ = settings.__doc__
     return prepared
 

@@ -1,4 +1,4 @@
-"""How splats are drawn: every switch of the rasterizer, in one value."""
+"""Settings of the rasterizer, in one value."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Literal, get_args
 from rift_cl.basis.angular import ANGULAR_BASES
 from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
+from rift_cl.option_marks import NoOption, Short
 
 SplatMode = Literal["light", "xray"]
 Activation = Literal["clamp", "exp", "square"]
@@ -20,44 +21,41 @@ _LARGEST = 3.4028234e38
 class SplatSettings:
     """Settings of the rasterizer; those of gsplat have its names' meaning and its defaults.
 
-    Args:
-        near: splats with a smaller depth are left out, in scene units; positive for a pinhole.
-        far: splats with a larger depth are left out.
-        radius_clip: splats whose radii are not larger than this are left out, in pixels.
-        eps2d: variance that every splat gains on the screen, in square pixels.
-        tile: edge of a tile in pixels.
-        alpha_cap: most that one splat may hide, 0 < cap < 1 (0.999 in gsplat 1.5).
-        antialiased: dim splats as dilation widens them (Mip-Splatting), in light mode alone:
-            in xray mode dilation never changes a splat's mass.
-        mode: ``light`` composites front to back; ``xray`` adds line integrals, with opacities
-            as densities.
-        absgrad: sum magnitudes of screen-position gradients as well, for densification.
-        smooth_cutoff: replace thresholds by smooth ones, so that finite differences hold; for
-            tests alone.
-        activation: how a splat's density E = weight * Q * Gaussian, Q the polynomial of its
-            modes, becomes an alpha in light mode: ``clamp`` max(E, 0), ``exp``
-            1 - exp(-max(E, 0)), ``square`` 1 - exp(-weight Q^2 Gaussian). With the last two
-            opacities are optical depths at the peak, any number >= 0.
-        angular: what colours vary with the viewing direction in: spherical harmonics, or
-            ``hg``, ``lg`` (Hermite- and Laguerre-Gaussian lobes), ``sg``, ``asg`` (isotropic and
-            anisotropic spherical Gaussians), which want ``Splats.lobes``.
-
     Raises:
         InputError: a number is out of its range, or a choice is unknown.
     """
 
     near: float = 0.01
+    """Depth below which splats are left out, in scene units; above 0 for a pinhole."""
     far: float = 1e10
+    """Depth above which splats are left out, in scene units."""
     radius_clip: float = 0.0
-    eps2d: float = 0.3
+    """Radius up to which splats are left out, in pixels."""
+    eps2d: Short[float] = 0.3
+    """Variance added to every splat on the screen, in square pixels. 0.3 blurs small images; 0.05
+    to 0.1 suits cameras at one distance."""
     tile: int = 16
+    """Edge of a tile in pixels."""
     alpha_cap: float = 0.99
+    """Largest alpha of one splat, above 0 and below 1."""
     antialiased: bool = False
-    mode: SplatMode = "light"
-    absgrad: bool = False
-    smooth_cutoff: bool = False
-    activation: Activation = "clamp"
-    angular: Angular = "sh"
+    """Dim splats as eps2d widens them (Mip-Splatting)."""
+    mode: NoOption[SplatMode] = "light"
+    """``light`` composites front to back; ``xray`` adds line integrals, with opacities as densities
+    whose mass ``eps2d`` does not change."""
+    absgrad: NoOption[bool] = False
+    """Sum magnitudes of screen-position gradients as well, for densification."""
+    smooth_cutoff: NoOption[bool] = False
+    """Replace thresholds by smooth ones, so that finite differences hold; for tests alone."""
+    activation: NoOption[Activation] = "clamp"
+    """How a splat's density E = weight * Q * Gaussian, Q the polynomial of its modes, becomes an
+    alpha in light mode: ``clamp`` max(E, 0), ``exp`` 1 - exp(-max(E, 0)), ``square``
+    1 - exp(-weight Q^2 Gaussian). With the last two opacities are optical depths at the peak, any
+    number >= 0."""
+    angular: NoOption[Angular] = "sh"
+    """Functions of the viewing direction that colours are made of: spherical harmonics, or ``hg``,
+    ``lg`` (Hermite- and Laguerre-Gaussian lobes), ``sg``, ``asg`` (isotropic and anisotropic
+    spherical Gaussians), which want ``Splats.lobes``."""
 
     def __post_init__(self) -> None:
         """Check every number's range."""

@@ -43,8 +43,9 @@ if TYPE_CHECKING:
     )
     from rift_cl.train.trainer import Trainer, TrainingViews
     from rift_cl.train.views.images import ImageViews
+    from rift_cl.train.xray.settings import XrayTrainSettings
     from rift_cl.train.xray.solve_settings import SolveSettings
-    from rift_cl.train.xray.trainer import XrayTrainer, xray_settings
+    from rift_cl.train.xray.trainer import XrayTrainer
 
 _HOMES = {
     "PIXEL_LOSSES": "loss.pixel_loss",
@@ -73,7 +74,7 @@ _HOMES = {
     "register_loss": "loss.pixel_loss",
     "register_strategy": "strategy",
     "start_splats": "start.points",
-    "xray_settings": "xray.trainer",
+    "XrayTrainSettings": "xray.settings",
 }
 
 __all__ = [
@@ -98,12 +99,12 @@ __all__ = [
     "TrainingRun",
     "TrainingViews",
     "XraySettings",
+    "XrayTrainSettings",
     "XrayTrainer",
     "random_points",
     "register_loss",
     "register_strategy",
     "start_splats",
-    "xray_settings",
 ]
 
 

@@ -8,11 +8,14 @@ do: what is coarse should stand before what is fine begins to move.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, get_args
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal, get_args
+
+from tyro.conf import arg
 
 from rift_cl.basis.angular import ANGULAR_BASES, angular_basis
 from rift_cl.errors import InputError
+from rift_cl.option_marks import Short, ShortAuto
 from rift_cl.splat.orders import HIGHEST
 from rift_cl.splat.settings import Activation, Angular
 from rift_cl.train.ranges import check_choice, check_number, check_whole
@@ -20,39 +23,45 @@ from rift_cl.train.ranges import check_choice, check_number, check_whole
 BasisKind = Literal["gaussian", "hermite", "laguerre"]
 
 
+# Order of the modes where a kind that has some is chosen, and no order.
+_USUAL_ORDER = 1
+
+
 @dataclass(frozen=True)
 class BasisSettings:
-    """Modes of the splats' shapes and colours.
-
-    Args:
-        kind: ``gaussian`` splats have none; ``hermite`` and ``laguerre`` are stored alike.
-        order: highest total order of the shape's modes, 0 to 8.
-        color_order: the same of the colours' modes; 0 for X-rays.
-        activation: how densities become opacities; see ``SplatSettings``.
-        first: share of the steps after which order 1 joins, with zeros.
-        every: share of the steps between an order and the next.
-        ridge: weight in the loss of the mean over splats of their modes' squares. Modes of orders
-            1 and 2 of a shape do nearly what a shift and another covariance do, and polynomials
-            of colours have no bound: without it they wander where nothing holds them.
+    """Hermite modes of the splats' shapes and colours.
 
     Raises:
         InputError: a number is out of its range, or a choice is unknown, or Gaussians have orders.
     """
 
-    kind: BasisKind = "gaussian"
-    order: int = 0
-    color_order: int = 0
-    activation: Activation = "clamp"
+    kind: Annotated[BasisKind, arg(name="basis", prefix_name=False)] = "gaussian"
+    """Kind of splats: plain (gaussian), or with Hermite- or Laguerre-Gaussian modes up to --order,
+    which span the same functions and are stored alike."""
+    order: ShortAuto[int] = 0
+    """Highest total order of the modes of a splat's shape, 0 to 8. Default: 1 with --basis hermite
+    or laguerre."""
+    color_order: ShortAuto[int] = 0
+    """Highest total order of the modes of a splat's colour, 0 to 8. Default: that of --order."""
+    activation: Short[Activation] = "clamp"
+    """How a splat's density E becomes its alpha: max(E, 0) (clamp), 1 - exp(-max(E, 0)) (exp), or
+    1 - exp(-E) with the polynomial squared, so that E is never negative (square)."""
     first: float = 0.1
+    """Fraction of the run after which order 1 is added, with coefficients of zero."""
     every: float = 0.1
+    """Fraction of the run between one order and the next."""
+    # Modes of orders 1 and 2 of a shape do nearly what a shift and another covariance do, and
+    # polynomials of colours have no bound: without it they wander where nothing holds them.
     ridge: float = 1e-3
+    """Weight in the loss of the modes' squares, a mean over splats."""
 
     def __post_init__(self) -> None:
         """Check every number's range, and that they agree."""
         check_choice(self, "kind", get_args(BasisKind))
         check_choice(self, "activation", get_args(Activation))
         for name in ("order", "color_order"):
-            check_whole(self, name, 0, HIGHEST)
+            if getattr(self, name) is not None:
+                check_whole(self, name, 0, HIGHEST)
             if self.kind == "gaussian" and getattr(self, name):
                 raise InputError(
                     f"BasisSettings: {name} is {getattr(self, name)} and kind is 'gaussian', whose "
@@ -65,11 +74,23 @@ class BasisSettings:
     @property
     def plain(self) -> bool:
         """Whether splats are Gaussians of one colour, drawn as they always were."""
-        return not (self.order or self.color_order) and self.activation == "clamp"
+        return not any(self.orders) and self.activation == "clamp"
+
+    @property
+    def orders(self) -> tuple[int, int]:
+        """Orders of shape and colour; of what is None, those that are usual."""
+        usual = 0 if self.kind == "gaussian" else _USUAL_ORDER
+        order = usual if self.order is None else self.order
+        return order, order if self.color_order is None else self.color_order
+
+    def decided(self) -> BasisSettings:
+        """These settings, with a value for what was left open."""
+        order, color_order = self.orders
+        return replace(self, order=order, color_order=color_order)
 
     def order_at(self, step: int, steps: int) -> int:
         """The highest order that has joined by a step of a run, of shapes or colours."""
-        highest, first = max(self.order, self.color_order), round(self.first * steps)
+        highest, first = max(self.orders), round(self.first * steps)
         if step < first or not highest:
             return 0
         between = round(self.every * steps)
@@ -78,23 +99,20 @@ class BasisSettings:
 
 @dataclass(frozen=True)
 class AngularSettings:
-    """What colours vary in with the direction that they are seen from.
-
-    Args:
-        kind: spherical harmonics (``sh``), lobes with an axis and a width in Hermite- or
-            Laguerre-Gaussian modes (``hg``, ``lg``), or isotropic or anisotropic spherical
-            Gaussians (``sg``, ``asg``).
-        modes: functions besides the constant: 1 to 35 modes or spherical Gaussians. Harmonics
-            count by ``TrainSettings.sh_degree``.
-        first: share of the steps after which they join, with coefficients of zero.
+    """Functions of the viewing direction that colours are made of.
 
     Raises:
         InputError: a number is out of its range, or the kind is unknown.
     """
 
-    kind: Angular = "sh"
-    modes: int = 8
+    kind: Annotated[Angular, arg(name="angular", prefix_name=False)] = "sh"
+    """Functions of the viewing direction for colours: spherical harmonics (sh), Hermite- or
+    Laguerre-Gaussian lobes with an axis and a width (hg, lg), or isotropic or anisotropic spherical
+    Gaussians (sg, asg)."""
+    modes: Short[int] = 8
+    """Number of lobe modes or spherical Gaussians besides the constant, 1 to 35; not for sh."""
     first: float = 0.15
+    """Fraction of the run after which they are added, with coefficients of zero; not for sh."""
 
     def __post_init__(self) -> None:
         """Check every number's range."""

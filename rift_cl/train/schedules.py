@@ -114,7 +114,7 @@ class CoefficientSchedule:
     def _add_orders(self, parameters: Parameters) -> None:
         basis, joined = self.settings.basis, False
         reached = basis.order_at(parameters.step, self.settings.steps)
-        for name, highest in zip(MODES, (basis.order, basis.color_order), strict=True):
+        for name, highest in zip(MODES, basis.orders, strict=True):
             wanted = count_of(min(reached, highest)) - 1
             had = parameters.raw[name].shape[1] if name in parameters.raw else 0
             if wanted > had:

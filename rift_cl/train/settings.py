@@ -5,20 +5,29 @@ The settings of strategies stand beside their strategies, in ``rift_cl.train.str
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from typing import Literal, get_args
+from dataclasses import dataclass, field, fields, replace
+from typing import Literal, TypeVar, get_args
 
 from rift_cl.errors import InputError
+from rift_cl.option_marks import NoOption, Short, ShortAuto
 from rift_cl.splat.orders import count_of
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.loss.pixel_loss import PIXEL_LOSSES
 from rift_cl.train.ranges import check_choice, check_number, check_whole
-from rift_cl.train.strategy import DefaultSettings, McmcSettings, StrategySettings
+from rift_cl.train.strategy import STRATEGIES, DefaultSettings, McmcSettings, StrategySettings
 from rift_cl.train.xray.solve_settings import SolveSettings
 
 LossKind = Literal["l1", "l2"]
 BandLimit = Literal["pixels", "coverage"]
+
+
+T = TypeVar("T", bound="TrainSettings")
+_STRATEGY_HELP = (
+    "How splats are added, moved and removed: relocation with random walks (mcmc), or cloning, "
+    "splitting and pruning as in the original 3D Gaussian splatting (default). Each has options of "
+    "its own, which --help lists with it."
+)
 
 
 @dataclass(frozen=True)
@@ -44,11 +53,11 @@ class LearningRates:
     """Learning rate of the constant colour (spherical harmonic of degree 0)."""
     sh_rest: float = 0.2
     """Learning rate of harmonics of degree 1 and above, as a fraction of ``sh``."""
-    poses: float = 0.0
-    """Learning rate of camera poses: of rotations in radians, of positions as a fraction of the
-    scene's extent; it falls as that of the splats' positions does. 0 = poses are fixed."""
-    exposures: float = 0.0
-    """Learning rate of each image's gains and offsets; it falls likewise. 0 = there are none."""
+    poses: float = 1e-3
+    """Learning rate of camera poses, if they are refined: of rotations in radians, of positions as
+    a fraction of the scene's extent; it falls as that of the splats' positions does."""
+    exposures: float = 1e-2
+    """Learning rate of each image's gains and offsets, if they are refined; it falls likewise."""
     shape_modes: float = 2.5e-3
     """Learning rate of the Hermite modes of splats' shapes."""
     # At 1e-2 both serve short fits better, but fits of order 2 were lost after some 1,500 steps.
@@ -75,41 +84,48 @@ class TrainSettings:
         InputError: a number is out of its range.
     """
 
-    steps: int = 3000
+    steps: Short[int] = 3000
     """Number of optimization steps (one training image each)."""
-    seed: int = 0
-    """Random seed."""
-    splats: int = 20_000
+    splats: Short[int] = 20_000
     """Largest number of splats."""
-    sh_degree: int = 3
+    seed: Short[int] = 0
+    """Random seed; the same seed gives the same splats, bit by bit."""
+    sh_degree: Short[int] = 3
     """Highest degree of the spherical harmonics of colours, 0 to 4."""
-    sh_every: int = 500
+    sh_every: Short[int] = 500
     """Steps after which the next degree of harmonics is added."""
-    loss: LossKind = "l1"
+    loss: Short[LossKind] = "l1"
     """Pixel loss: absolute (l1) or squared (l2) differences."""
-    ssim_weight: float = 0.2
+    ssim_weight: Short[float] = 0.2
     """Fraction of 1 - SSIM in the loss; the rest is the pixel loss."""
-    homogenisation: Homogenisation = field(default_factory=Homogenisation)
-    """Weight of spatial frequencies in the gradient of the pixel loss."""
-    noise: float | None = None
+    noise: ShortAuto[float] = None
     """Standard deviation of the noise in the training images, in units of the image. Default:
-    none."""
-    band_limit: BandLimit | None = None
+    estimated from a few images where it matters, else none."""
+    band_limit: ShortAuto[BandLimit] = None
     """Keep splats no finer than the cameras resolve: half a pixel of the finest camera (pixels,
     Mip-Splatting), or what all views determine above noise (coverage). Default: no limit."""
-    cooldown: float = 0.12
+    cooldown: Short[float] = 0.12
     """Fraction of the run, at its end, without random walks and penalties and with falling
     learning rates."""
-    learning_rates: LearningRates = field(default_factory=LearningRates)
-    """Adam's learning rates."""
-    strategy: StrategySettings = field(default_factory=McmcSettings)
-    """How splats are added, moved and removed."""
-    basis: BasisSettings = field(default_factory=BasisSettings)
+    refine_poses: Short[bool] = False
+    """Optimize the camera poses."""
+    refine_exposures: Short[bool] = False
+    """Fit a gain and an offset of each image's colours."""
+    basis: Short[BasisSettings] = field(default_factory=BasisSettings)
     """Hermite modes of the splats' shapes and colours, and how densities become opacities."""
-    angular: AngularSettings = field(default_factory=AngularSettings)
-    """Functions of the viewing direction that colours are made of; other kinds than ``sh`` take the
+    angular: Short[AngularSettings] = field(default_factory=AngularSettings)
+    """Functions of the viewing direction that colours are made of; other kinds than sh take the
     place of all harmonics but the constant one."""
-    solve: SolveSettings = field(default_factory=SolveSettings)
+    strategy: Short[StrategySettings] = field(
+        default_factory=McmcSettings,
+        metadata={"registry": STRATEGIES, "without": ("xray",), "help": _STRATEGY_HELP},
+    )
+    """How splats are added, moved and removed."""
+    homogenisation: Short[Homogenisation] = field(default_factory=Homogenisation)
+    """Weight of spatial frequencies in the gradient of the pixel loss."""
+    learning_rates: Short[LearningRates] = field(default_factory=LearningRates)
+    """Adam's learning rates at the first step (0 = not trained)."""
+    solve: NoOption[SolveSettings] = field(default_factory=SolveSettings)
     """Periodic least-squares solve for densities and shape modes (X-rays only)."""
 
     def __post_init__(self) -> None:
@@ -141,5 +157,25 @@ class TrainSettings:
     def numbers(self) -> int:
         """Trained numbers of a splat at the end of the run."""
         basis, colors = self.basis, 3 * (self.sh_degree + 1) ** 2
-        modes = count_of(basis.order) - 1 + 3 * (count_of(basis.color_order) - 1)
+        shape, color = basis.orders
+        modes = count_of(shape) - 1 + 3 * (count_of(color) - 1)
         return 11 + modes + (self.angular.numbers or colors)
+
+    @property
+    def needs_noise(self) -> bool:
+        """Whether the noise of the training images decides something, and is not known."""
+        heeded = bool(self.homogenisation.exponent) or self.band_limit == "coverage"
+        return heeded and self.noise is None
+
+    def decided(self: T, views: int) -> T:
+        """These settings, with a value for what was left open.
+
+        Args:
+            views: number of training views.
+        """
+        return replace(
+            self,
+            basis=self.basis.decided(),
+            homogenisation=self.homogenisation.decided(views),
+            strategy=self.strategy.decided(),
+        )

@@ -100,6 +100,7 @@ class Trainer:
     ) -> None:
         self.pictures = pictures
         self.parameters = parameters
+        settings = settings.decided(len(pictures.cameras))
         self.settings = settings
         self.flat = flat
         settings.solve.check_heed(self.solves)
@@ -114,10 +115,8 @@ class Trainer:
         self.renderer = Renderer(drawing, device=self.device)
         self.coefficient_schedule = CoefficientSchedule(settings, pictures.cameras, flat=flat)
         self._add_coefficients()
-        self.poses = Poses(pictures.cameras, extent) if settings.learning_rates.poses else None
-        self.exposures = (
-            Exposures(self.device, views) if settings.learning_rates.exposures else None
-        )
+        self.poses = Poses(pictures.cameras, extent) if settings.refine_poses else None
+        self.exposures = Exposures(self.device, views) if settings.refine_exposures else None
         self.loss = HomogenisedLoss(
             self.device,
             settings.homogenisation,

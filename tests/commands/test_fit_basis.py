@@ -28,7 +28,7 @@ KINDS = {
 
 def settings(capture, out, **more):
     given = {"steps": 60, "splats": 60, "hold_out": 4, "checkpoint_every": 25}
-    return FitPhotosSettings(capture, out, **(given | more))
+    return FitPhotosSettings.of(capture, out, **(given | more))
 
 
 def broken_off(given, after):
@@ -64,7 +64,7 @@ def test_a_fit_is_drawn_by_every_command_as_it_was_scored(capture, tmp_path, kin
     metrics = json.loads((out / "metrics.json").read_text())
     config = json.loads((out / "config.json").read_text())
     assert metrics["basis"] and metrics["basis"] in (out / "report.html").read_text()
-    assert config["settings"]["angular"] == scene.angular
+    assert config["settings"]["training"]["angular"]["kind"] == scene.angular
     scored = ["eval", str(out), str(capture), "--hold-out", "4", "--out", str(tmp_path / "eval")]
     assert main([*scored, "--train", str(capture), "--quiet"]) == 0
     again = json.loads((tmp_path / "eval" / "metrics.json").read_text())["scores"]
@@ -111,16 +111,16 @@ def test_another_basis_cannot_go_on(capture, tmp_path, capsys):
     ],
 )
 def test_one_order_is_that_of_shape_and_colour(options, orders):
-    found = FitPhotosSettings(Path("capture"), **options).training().basis
+    found = FitPhotosSettings.of(Path("capture"), Path("out"), **options).decided(9).training.basis
     assert (found.order, found.color_order) == orders
     options.pop("color_order", None)
-    found = FitXraySettings(Path("scan"), **options).training().basis
+    found = FitXraySettings.of(Path("scan"), Path("out"), **options).decided(9).training.basis
     assert (found.order, found.color_order) == (orders[0], 0)
 
 
 def test_words_say_what_splats_are():
     def words(**options):
-        return FitPhotosSettings(Path("capture"), **options).basis_words()
+        return FitPhotosSettings.of(Path("capture"), Path("out"), **options).basis_words()
 
     assert words() == ""
     found = words(basis="hermite", order=2, color_order=1, activation="exp")
@@ -138,7 +138,10 @@ def test_words_say_what_splats_are():
         (["--modes", "4"], "--modes counts lobes: add --angular"),
         (["--angular", "lg", "--modes", "36"], "modes is 36, wanted 1 to 35"),
         (["--angular", "lg", "--sh-degree", "2"], "--sh-degree is about harmonics"),
-        (["--basis", "hermite", "--absgrad", "--strategy", "default"], "absgrad wants magnitudes"),
+        (
+            ["--basis", "hermite", "--strategy.absgrad", "--strategy", "default"],
+            "absgrad wants magnitudes",
+        ),
     ],
 )
 def test_what_makes_no_sense_is_named_and_leaves_nothing(capture, tmp_path, capsys, more, words):

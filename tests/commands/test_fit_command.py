@@ -33,7 +33,7 @@ def test_a_fit_leaves_splats_scores_and_a_report(capture, tmp_path, capsys):
     page = (tmp_path / "fit" / "report.html").read_text()
     assert "Splats fitted to" in page and page.count("<img") >= 2
     config = json.loads((tmp_path / "fit" / "config.json").read_text())
-    assert config["complete"] and config["settings"]["steps"] == 60
+    assert config["complete"] and config["settings"]["training"]["steps"] == 60
 
 
 def test_the_same_seed_gives_the_same_file(capture, tmp_path):
@@ -70,7 +70,7 @@ def test_more_captures_are_scored_beside_it(capture, tmp_path):
         (["--eps2d", "-1"], "eps2d is -1"),
         (["--sh-degree", "9"], "sh_degree is 9"),
         (["--test", "nowhere"], "nowhere"),
-        (["--homogenise", "0", "--homogenise-by", "coverage"], "--homogenise-by coverage weighs"),
+        (["--homogenise", "0", "--homogenise-by", "coverage"], "--homogenise-by coverage has no"),
     ],
 )
 def test_what_makes_no_sense_is_named_and_leaves_nothing(capture, tmp_path, capsys, more, words):

@@ -119,10 +119,10 @@ def test_a_size_that_is_asked_for_is_kept(capture, tmp_path, monkeypatch):
     monkeypatch.setattr(
         "rift_cl.commands.fit_photos.photograph_size.MOST_PIXELS", {True: 400, False: 400}
     )
-    asked = FitPhotosSettings(capture=capture, out=tmp_path / "fit", downscale=1)
+    asked = FitPhotosSettings.of(capture=capture, out=tmp_path / "fit", downscale=1)
     assert Fit(asked).downscale == 1
-    decided = Fit(FitPhotosSettings(capture=capture, out=tmp_path / "fit"))
+    decided = Fit(FitPhotosSettings.of(capture=capture, out=tmp_path / "fit"))
     assert decided.downscale > 1 and "made smaller by" in decided.plan()["largest photograph"]
     assert "--downscale 1 fits them as they are" in decided._notes()[0]
     with pytest.raises(InputError, match="--frames is 2"):
-        FitPhotosSettings(capture=capture, frames=2).check()
+        FitPhotosSettings.of(capture=capture, frames=2).check()

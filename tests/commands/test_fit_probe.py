@@ -12,7 +12,7 @@ from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 
 
 def trainer_of(capture, out, **more):
-    job = Fit(FitPhotosSettings(capture, out, steps=600, splats=200, **more))
+    job = Fit(FitPhotosSettings.of(capture, out, steps=600, splats=200, **more))
     return job._trainer(job.source, job._pictures(job.seen))
 
 
@@ -55,7 +55,7 @@ def test_times_are_said_in_two_figures():
 def test_a_dry_run_leaves_the_fit_as_it_would_be(capture, tmp_path):
     scenes = []
     for name in ("tried", "not"):
-        job = Fit(FitPhotosSettings(capture, tmp_path / name, steps=12, splats=100, hold_out=4))
+        job = Fit(FitPhotosSettings.of(capture, tmp_path / name, steps=12, splats=100, hold_out=4))
         if name == "tried":
             plan = job.plan()
             assert "MiB of tile lists" in plan["device memory"]

@@ -29,7 +29,7 @@ VARIANTS = {
 
 def settings(capture, out, **more):
     given = {"steps": 150, "splats": 200, "hold_out": 4, "checkpoint_every": 25}
-    return FitPhotosSettings(capture, out, **(given | more))
+    return FitPhotosSettings.of(capture, out, **(given | more))
 
 
 def fit(capture, out, *more):
@@ -134,9 +134,11 @@ def test_few_photographs_are_fitted_without_the_ramp_unless_it_is_asked_for(capt
         list(Fit(given).run())
         found[name] = digest(tmp_path / name)
     assert found["none"] == found["zero"] != found["half"]
-    assert [settings(capture, tmp_path).exponent_for(views) for views in (39, 40)] == [0.0, 0.5]
+    asked = settings(capture, tmp_path)
+    found = [asked.decided(views).training.homogenisation.exponent for views in (39, 40)]
+    assert found == [0.0, 0.5]
     for more in ({"homogenise": 0.3}, {"homogenise_by": "coverage"}):
-        assert settings(capture, tmp_path, **more).exponent_for(8) > 0
+        assert settings(capture, tmp_path, **more).decided(8).training.homogenisation.exponent > 0
 
 
 def run(given):
@@ -211,7 +213,10 @@ def test_the_report_says_what_was_decided_and_folds_defaults_away(capture, tmp_p
     page = (tmp_path / "fit" / "report.html").read_text()
     assert "was off: with 6 photographs, fewer than 40" in page
     config = json.loads((tmp_path / "fit" / "config.json").read_text())
-    assert config["settings"]["homogenise"] == 0.0 and "homogenise" not in config["asked"]
+    assert (
+        config["settings"]["training"]["homogenisation"]["exponent"] == 0.0
+        and "homogenise" not in config["asked"]
+    )
     table = page[page.index(">Settings<") : page.index("settings at their defaults")]
     assert '>homogenise</th><td class="number">' not in table
     assert ">homogenise</th><td>0</td><td>decided</td>" in table
@@ -224,14 +229,14 @@ def test_the_report_says_what_was_decided_and_folds_defaults_away(capture, tmp_p
 
 def test_a_config_repeats_a_fit_and_trains_it_on(capture, tmp_path, capsys):
     out, again = tmp_path / "fit", tmp_path / "again"
-    assert fit(capture, out, "--absgrad", "--strategy", "default") == 0
+    assert fit(capture, out, "--strategy.absgrad", "--strategy", "default") == 0
     config = str(out / "config.json")
     assert main(["fit", "--config", config, "--out", str(again), "--quiet"]) == 0
     assert digest(again) == digest(out)
     # What was decided then is now said, and is the same.
     assert main(["fit", "--config", config, "--resume", "--steps", "80", "--quiet"]) == 0
     assert metrics_of(out)["history"] == [[60, 60], [80, 80]]
-    more = ["--absgrad", "--strategy", "default", "--resume", "--steps", "90"]
+    more = ["--strategy.absgrad", "--strategy", "default", "--resume", "--steps", "90"]
     assert fit(capture, out, *more) == 0, "as it was asked for at first, it goes on as well"
     more = ["--homogenise", "0.5", "--resume", "--steps", "100"]
     assert main(["fit", "--config", config, *more]) == 3

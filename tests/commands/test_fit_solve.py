@@ -34,7 +34,7 @@ def fit(path, out, *more):
 def settings(path, out, **more):
     center = (SIZE - 1) / 2
     given = {"steps": 90, "splats": 200, "center": center, "checkpoint_every": 20, "solve": 20}
-    return FitXraySettings(path, out, basis="hermite", **(given | more))
+    return FitXraySettings.of(path, out, basis="hermite", **(given | more))
 
 
 def test_solving_serves_projections_that_were_not_looked_at(scan, tmp_path):
@@ -44,7 +44,7 @@ def test_solving_serves_projections_that_were_not_looked_at(scan, tmp_path):
         metrics = json.loads((tmp_path / every / "metrics.json").read_text())
         found.append(metrics["scores"]["held out"]["fit_psnr"])
         config = json.loads((tmp_path / every / "config.json").read_text())
-        assert config["settings"]["solve"] == int(every)
+        assert config["settings"]["training"]["solve"]["every"] == int(every)
     assert found[1] > found[0] + 0.1
 
 
@@ -62,7 +62,7 @@ def test_a_fit_that_was_broken_off_goes_on_to_the_same_bits(scan, tmp_path):
 
 def test_negative_steps_between_solves_are_refused(scan, tmp_path, capsys):
     assert fit(scan, tmp_path / "fit", "--solve", "-5") == 3
-    assert "--solve is -5, wanted 0 or more" in capsys.readouterr().err
+    assert "every is -5, wanted a whole number >= 0" in capsys.readouterr().err
     assert fit(scan, tmp_path / "fit", "--solve", "9" * 20) == 3
-    assert "--solve is 99999999999999999999, wanted at most" in capsys.readouterr().err
+    assert "every is 99999999999999999999, wanted a whole number up to" in capsys.readouterr().err
     assert not (tmp_path / "fit").exists()

@@ -36,7 +36,7 @@ def scans(tmp_path_factory):
 
 def settings(path, out, **more):
     given = {"steps": 60, "splats": 400, "center": (SIZE - 1) / 2, "checkpoint_every": 20}
-    return FitXraySettings(path, out, **(given | more))
+    return FitXraySettings.of(path, out, **(given | more))
 
 
 def fit(path, out, *more, splats=400):

@@ -31,7 +31,9 @@ def test_a_fit_is_the_commands_and_prints_nothing(fitted, capture, tmp_path, cap
     assert reports[-1].done == reports[-1].total
     assert len(fitted.scene) == fitted.metrics["splats"] == 100
     assert fitted.report.is_file()
-    assert fitted.settings.homogenise == 0  # decided: there are few photographs
+    assert (
+        fitted.settings.training.homogenisation.exponent == 0
+    )  # decided: there are few photographs
     assert [score.name for score in fitted.scores["held out"]] == ["0.png", "4.png"]
 
 
@@ -109,8 +111,8 @@ def test_a_failed_command_leaves_no_folder(tmp_path, monkeypatch, capsys):
     with pytest.raises(InputError, match="no setting 'speed'"):
         rift.plan_views(3, speed=2)
     for settings, words in (
-        ({"steps": "many"}, "take --steps=many$"),
-        ({"test": 3, "strategy": "best"}, "take --strategy=best$"),
+        ({"steps": "many"}, "steps is 'many', wanted a whole number$"),
+        ({"strategy": "best"}, "strategy is 'best', wanted one of mcmc"),
         ({"kind": "xrays"}, "kind"),
     ):
         with pytest.raises(InputError, match=words):

@@ -17,11 +17,12 @@ from rift_cl.commands.render.job import Render
 from rift_cl.commands.render.settings import RenderSettings
 from rift_cl.splat.bands import FrameMemory
 from rift_cl.splat.settings import SplatSettings
+from rift_cl.train.strategy import DefaultSettings
 
 MANY = 10**6
 # Degrees of harmonics would join in fits too long for a test.
 KINDS = {
-    "magnitudes": {"sh_degree": 0, "strategy": "default", "absgrad": True},
+    "magnitudes": {"sh_degree": 0, "strategy": "default", "strategy.absgrad": True},
     "modes": {"sh_degree": 0, "basis": "hermite", "order": 2, "color_order": 1},
     "activation": {"sh_degree": 0, "activation": "exp"},
     "lobes": {"angular": "lg", "modes": 4, "basis": "hermite", "order": 1, "color_order": 0},
@@ -33,20 +34,22 @@ def fitted(request, capture, tmp_path_factory):
     """A little fit: its settings, and the scene that it left."""
     given = {"steps": 12, "splats": 30, "hold_out": 0, "checkpoint_every": 0}
     out = tmp_path_factory.mktemp("fit") / "fit"
-    settings = FitPhotosSettings(capture, out, **given, **KINDS[request.param])
+    settings = FitPhotosSettings.of(capture, out, **given, **KINDS[request.param])
     list(Fit(settings).run())
     return settings, rift.SplatScene.load(out / "scene.ply")
 
 
 def test_a_fit_wants_what_frames_of_its_splats_take(fitted, tmp_path):
     settings, scene = fitted
-    job = Fit(replace(settings, out=tmp_path / "none", splats=MANY))
+    training = replace(settings.training, splats=MANY)
+    job = Fit(replace(settings, out=tmp_path / "none", training=training))
     size = job.seen[0].camera.size
-    drawing = SplatSettings(absgrad=settings.absgrad, activation=scene.activation)
+    absgrad = isinstance(training.strategy, DefaultSettings)
+    drawing = SplatSettings(absgrad=absgrad, activation=scene.activation)
     frame = FrameMemory.of(scene.upload(rift.default_device()), size, 3, drawing)
     need = replace(frame, splats=MANY, gradient=True).fixed + 8 * frame.parameters * MANY
     assert job.plan()["device memory"].startswith(f"{need / 2**20:.0f} MiB, and about ")
-    assert frame.parameters == job.training.numbers
+    assert frame.parameters == training.numbers
 
 
 @pytest.mark.parametrize("depth", [False, True])

@@ -84,9 +84,9 @@ def test_a_preview_is_always_left(first):
         ('{"job": "reconstruct", "settings": {"colour": 3}}', "no setting 'colour'"),
         (
             '{"job": "reconstruct", "settings": {"scan": "x", "method": "best"}}',
-            "does not take",
+            "wanted one of fbp",
         ),
-        ('{"job": "reconstruct", "settings": {"scan": "x", "steps": "many"}}', "does not take"),
+        ('{"job": "reconstruct", "settings": {"scan": "x", "steps": "many"}}', "wanted a whole"),
     ],
 )
 def test_a_configuration_that_cannot_be_used_is_told(text, sentence, tmp_path, capsys):

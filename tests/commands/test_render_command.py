@@ -130,7 +130,9 @@ def test_the_folder_of_a_fit_brings_its_drawing_and_background_along(scene, tmp_
     fit = tmp_path / "fit"
     fit.mkdir()
     SplatScene.load(scene).save(fit / "scene.ply")
-    write_json(fit / "config.json", {"job": "fit photos", "settings": {"eps2d": 0.05}})
+    write_json(
+        fit / "config.json", {"job": "fit photos", "settings": {"rendering": {"eps2d": 0.05}}}
+    )
     write_json(fit / "metrics.json", {"background": [0, 1, 0]})
     assert render(fit, tmp_path / "film", *small()) == 0
     np.testing.assert_allclose(read_image(tmp_path / "film/frames/0000.png")[0, 0], (0, 1, 0))
@@ -223,8 +225,8 @@ def test_what_is_no_scene_is_named(tmp_path, capsys):
     ("name", "value", "words"),
     [
         ("config.json", {"job": "fit photos"}, "no settings"),
-        ("config.json", {"settings": {"eps2d": "wide"}}, "wanted a number"),
-        ("config.json", {"settings": {"eps2d": -3}}, "eps2d is -3"),
+        ("config.json", {"settings": {"rendering": {"eps2d": "wide"}}}, "wanted a number"),
+        ("config.json", {"settings": {"rendering": {"eps2d": -3}}}, "eps2d is -3"),
         ("config.json", {"settings": {"light": "candle"}}, "'candle'"),
         ("metrics.json", {"background": 7}, "no red, green and blue"),
         ("metrics.json", {"background": ["x", 0, 0]}, "'background' is x 0 0"),

@@ -147,7 +147,7 @@ class Broken:
 def fitted(capture, out, announce=lambda line: None, **more):
     """The bytes of the scene of a short fit."""
     given = {"steps": 30, "splats": 100, "hold_out": 4, "checkpoint_every": 0}
-    job = Fit(FitPhotosSettings(capture, out, **given, **more))
+    job = Fit(FitPhotosSettings.of(capture, out, **given, **more))
     job.announce = announce
     list(job.run())
     return (out / "scene.ply").read_bytes()

@@ -16,7 +16,8 @@ from rift_cl.train.parameters import Parameters
 from rift_cl.train.start.points import random_points, start_splats
 from rift_cl.train.strategy import DefaultSettings, McmcSettings
 from rift_cl.train.trainer import Trainer
-from rift_cl.train.xray.trainer import XrayTrainer, xray_settings
+from rift_cl.train.xray.settings import XrayTrainSettings
+from rift_cl.train.xray.trainer import XrayTrainer
 
 STEPS = 30
 BOTH = BasisSettings("hermite", 1, 1, first=0, ridge=0)
@@ -129,7 +130,7 @@ def test_flat_scans_have_no_modes_across_their_slice(device):
     means[:, 2] = 0
     raw = start_splats(means, np.ones((30, 3)), seed=0)
     basis = BasisSettings("hermite", 2, first=0, every=0, ridge=0)
-    settings = xray_settings(steps=STEPS, seed=0, splats=30, exponent=0.0, basis=basis)
+    settings = XrayTrainSettings(steps=STEPS, splats=30, basis=basis)
     drawing = SplatSettings(mode="xray")
     trainer = XrayTrainer(
         pictures, Parameters.of(device, raw, density=True), settings, drawing, flat=True

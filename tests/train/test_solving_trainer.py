@@ -14,8 +14,9 @@ from rift_cl.train.parameters import Parameters
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import start_splats
 from rift_cl.train.strategy import XraySettings
+from rift_cl.train.xray.settings import XrayTrainSettings
 from rift_cl.train.xray.solve_settings import SolveSettings
-from rift_cl.train.xray.trainer import XrayTrainer, xray_settings
+from rift_cl.train.xray.trainer import XrayTrainer
 
 STEPS = 24
 
@@ -25,11 +26,10 @@ def trainer_of(device, pictures, *, rows, every=5, first=4):
     means = random.uniform(-8, 8, (30, 3)) * (1, 1, rows > 1)
     raw = start_splats(means, np.ones((30, 3)), seed=1)
     raw["logits"] -= 2
-    settings = xray_settings(
+    settings = XrayTrainSettings(
         steps=STEPS,
         seed=4,
         splats=30,
-        exponent=0.0,
         basis=BasisSettings("hermite", 2, first=0.2, every=0.2),
         solve=SolveSettings(every, views=4),
     )
@@ -97,12 +97,7 @@ def test_solves_serve_short_fits(device):
 
 
 def test_settings_say_what_moves():
-    assert xray_settings(steps=9, seed=0, splats=1, exponent=0.0).learning_rates.logits > 0
-    solving = xray_settings(steps=9, seed=0, splats=1, exponent=0.0, solve=SolveSettings(3))
-    assert (
-        solving.learning_rates.logits
-        == solving.learning_rates.shape_modes
-        == 0
-        < solving.learning_rates.means
-    )
+    assert XrayTrainSettings().decided(9).learning_rates.logits > 0
+    rates = XrayTrainSettings(solve=SolveSettings(3)).decided(9).learning_rates
+    assert rates.logits == rates.shape_modes == 0 < rates.means
     assert TrainSettings().solve == SolveSettings(0)

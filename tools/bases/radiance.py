@@ -138,8 +138,8 @@ def _settings(
         "device": device,
         **KINDS[kind],
     }
-    numbers = FitPhotosSettings(**given).training().numbers
-    return FitPhotosSettings(**given, splats=asked["parameters"] // numbers)
+    numbers = FitPhotosSettings.of(**given).training.numbers
+    return FitPhotosSettings.of(**given, splats=asked["parameters"] // numbers)
 
 
 def _record(one: _Running, seed: int) -> dict[str, Any]:

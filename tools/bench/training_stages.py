@@ -172,7 +172,9 @@ def host_work(case: TrainingCase, *, passes: int) -> dict[str, Any]:
 
     Waits are those of plain steps, and for what poses and exposures ask when they are fitted too.
     """
-    refined = case.trainer(replace(case.settings, learning_rates=_REFINED))
+    refined = case.trainer(
+        replace(case.settings, learning_rates=_REFINED, refine_poses=True, refine_exposures=True)
+    )
     plain = case.trainer()
     _pass(plain)
     busy, whole = [], []

@@ -106,7 +106,7 @@ def _of_sharp_splats(drawn: Drawn, unseen: Path) -> tuple[dict[str, Any], dict[s
 def _fit_scores(plan: Plan, seen: Path, unseen: Path, place: Path, way: str) -> dict[str, Any]:
     """PSNR of a fit to the pictures through the lens, by radius, and of sharp pictures."""
     (steps, splats), sharp = _length(plan), plan.captures.test or plan.captures.off_path
-    job = FitPhotosSettings(
+    job = FitPhotosSettings.of(
         capture=seen,
         test=(unseen, sharp, seen),
         out=place / f"aperture_{way.replace(' ', '_')}_{steps}_steps_{splats}_splats",

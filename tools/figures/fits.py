@@ -64,7 +64,7 @@ def fit_settings(
     held_out = write_capture(ring, choice.held_out, place / HELD_OUT)
     noisy = f"_noise_{noise:g}" if noise else ""
     name = f"fit_{plan.steps}_steps_{plan.splats}_splats_ramp_{exponent:g}_seed_{seed}{noisy}"
-    return FitPhotosSettings(
+    return FitPhotosSettings.of(
         capture=write_capture(ring, choice.trained, place / f"trained{noisy}", noise=noise),
         test=(held_out, test, captures.off_path),
         out=place / name,

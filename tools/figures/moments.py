@@ -44,7 +44,7 @@ def watched(settings: FitPhotosSettings, test: Any, device: Device) -> dict[str,
     edges, frequency = ring_edges(unseen.cameras[0].size)
     moments = []
     for share in SHARES:
-        step = max(1, round(share * settings.steps))
+        step = max(1, round(share * settings.training.steps))
         show_progress(_until(trainer, step), quiet=False)
         moments.append({"step": step, **_spectra(trainer, unseen, edges)})
     return {"frequency": frequency, "pictures": len(few), "moments": moments}
@@ -52,21 +52,21 @@ def watched(settings: FitPhotosSettings, test: Any, device: Device) -> dict[str,
 
 def _trainer(settings: FitPhotosSettings, device: Device) -> tuple[Trainer, CapturePictures]:
     capture = open_capture(settings.capture)
-    pictures = CapturePictures(device, capture.views, seed=settings.seed)
+    pictures = CapturePictures(device, capture.views, seed=settings.training.seed)
     first = first_splats(
         device,
         capture,
         pictures,
-        count=settings.splats,
+        count=settings.training.splats,
         guessed=settings.first_count,
-        seed=settings.seed,
+        seed=settings.training.seed,
     )
-    training = settings.training()
-    if settings.exponent:
+    training = settings.training.decided(len(capture.views))
+    if training.needs_noise:
         few = np.linspace(0, len(capture.views) - 1, _NOISE_VIEWS).round().astype(int)
         noise = noise_of([pictures.image(k)[..., :3] for k in np.unique(few).tolist()])
         training = dataclasses.replace(training, noise=noise)
-    return Trainer(pictures, first, training, settings.drawing()), pictures
+    return Trainer(pictures, first, training, settings.rendering), pictures
 
 
 def _until(trainer: Trainer, step: int) -> Iterator[Any]:

@@ -226,7 +226,7 @@ def _is_there(file: Path, shots: Sequence[Shot]) -> bool:
 def _fitted(plan: Plan, name: str, capture: Path) -> dict[str, dict[str, float]]:
     """Mean scores by scored set, of a fit that is done, now or by an earlier run."""
     seed = plan.seeds[0]
-    asked = FitPhotosSettings(
+    asked = FitPhotosSettings.of(
         capture=capture,
         test=(_rendered(plan, ON_RING), _rendered(plan, OFF_RING)),
         out=_folder(plan) / f"{name}_{plan.steps}_steps_{plan.splats}_splats_seed_{seed}",

@@ -75,7 +75,7 @@ class DemoJob:
 
     def _fit_settings(self, name: str) -> FitPhotosSettings:
         settings, ring = self.settings, name == "ornament"
-        return FitPhotosSettings(
+        return FitPhotosSettings.of(
             capture=ornament() if ring else wall(),
             test=(ornament_off_path(),) if ring else (),
             out=settings.out / name,
@@ -142,7 +142,7 @@ def _show_study(page: Page, scores: list[ViewScore], rows: list[tuple[float, ...
 def _show_regression(page: Page, name: str, fit: Fit) -> None:
     page.section(f"Regression: splats fitted to pictures of the {name}")
     page.paragraph(
-        f"{fit.metrics['splats']} splats after {fit.settings.steps} steps on path-traced pictures "
+        f"{fit.metrics['splats']} splats after {fit.steps} steps on path-traced pictures "
         f"of {FITS[name]}. This is a beginning: 'rift fit' takes more steps and more splats. "
         f"'rift view' shows the splats, which are in the folder {name}."
     )

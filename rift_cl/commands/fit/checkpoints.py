@@ -98,10 +98,10 @@ class FitCheckpoints:
     def _compare(self, facts: Any) -> None:
         before, now = facts.get("settings", {}), self._facts["settings"]
         names = (before.keys() | now.keys()) - {"steps"}
-        # What was left open may be said now, if it is what was decided then.
-        open_then = {k: v for k, v in facts.get("decided", {}).items() if before.get(k) is None}
+        # What was decided then may be said now.
+        decided = facts.get("decided", {})
         differing = sorted(
-            k for k in names if now.get(k) not in (before.get(k), open_then.get(k, before.get(k)))
+            k for k in names if now.get(k) not in (before.get(k), decided.get(k, before.get(k)))
         )
         if differing:
             name = differing[0]

@@ -36,7 +36,6 @@ class FitRun(Generic[S]):
         self.settings = settings
         # With a value for all that was left open, once it is decided.
         self.settled = settings
-        self.training, self.drawing = settings.training(), settings.drawing()
         self.folder = RunFolder(
             settings.out, settings.job, overwrite=settings.overwrite, resume=settings.resume
         )
@@ -89,9 +88,14 @@ class FitRun(Generic[S]):
             )
 
     @property
+    def steps(self) -> int:
+        """Steps that the fit will have in the end."""
+        return self.settings.training.steps
+
+    @property
     def _history(self) -> list[tuple[int, int]]:
         """The stages of the fit; see ``fit_checkpoints.History``."""
-        return [*self.checkpoints.history, (self.settings.steps, self.settings.steps)]
+        return [*self.checkpoints.history, (self.steps, self.steps)]
 
     def _reports(self, trainer: Trainer, pictures: Any) -> Iterator[Report]:
         """The trainer's reports, in a browser as well if that was asked for."""
@@ -107,7 +111,7 @@ class FitRun(Generic[S]):
         """Break off if that was asked for."""
         if not self._stopping:
             return
-        where = f"interrupted after step {step} of {self.settings.steps}"
+        where = f"interrupted after step {step} of {self.steps}"
         if not self.settings.checkpoint_every:
             raise StoppedError(f"{where}; nothing was kept, since --checkpoint-every is 0")
         raise StoppedError(f"{where}; to go on: {self.settings.command()}")

@@ -33,6 +33,7 @@ from rift_cl.progress import Report
 from rift_cl.splat.bands import FrameMemory
 from rift_cl.splat.orders import ModeOrders
 from rift_cl.train.loss.homogenisation import noise_of
+from rift_cl.train.strategy import DefaultSettings
 from rift_cl.train.trainer import Trainer
 
 # Photographs from which the noise is estimated.
@@ -55,7 +56,7 @@ class Fit(FitRun[FitPhotosSettings]):
         if BareInput.fits(settings.capture):
             # Poses are looked for when the work begins, or were found before.
             self.source = BareInput(
-                settings.capture, settings.out, frames=settings.frames, seed=settings.seed
+                settings.capture, settings.out, frames=settings.frames, seed=settings.training.seed
             )
         else:
             self.source = open_seen(settings.capture, pinhole=settings.pinhole)
@@ -96,13 +97,15 @@ class Fit(FitRun[FitPhotosSettings]):
         """Memory and time, from a few steps that leave no trace."""
         settings = self.settings
         pictures, reading = self._timed_reading()
-        count = min(settings.splats, TRIED)
-        trainer = self._trainer(capture, pictures, dataclasses.replace(settings, splats=count))
+        most = settings.training.splats
+        count = min(most, TRIED)
+        few = dataclasses.replace(settings.training, splats=count)
+        trainer = self._trainer(capture, pictures, dataclasses.replace(settings, training=few))
         probe, frame = probed(trainer, count), self._frame(pixels)
-        first = round(len(trainer.parameters) * settings.splats / count)
+        first = round(len(trainer.parameters) * most / count)
         ahead = trainer.strategy.forecast(0, first)
         seconds = reading * len(self.seen) + probe.steps(ahead)
-        lists = min(probe.lists(frame, self.drawing.tile), self.device.budget)
+        lists = min(probe.lists(frame, settings.rendering.tile), self.device.budget)
         return {
             "device memory": f"{self._need(frame) / 2**20:.0f} MiB, and about "
             f"{lists / 2**20:.0f} MiB of tile lists",
@@ -118,12 +121,13 @@ class Fit(FitRun[FitPhotosSettings]):
 
     def _frame(self, pixels: int) -> FrameMemory:
         """What a frame of so many pixels takes on the device, but for its tile lists."""
-        count, parameters, basis = self.settings.splats, self.training.numbers, self.training.basis
-        channels = 3 if basis.color_order else 0
-        modes = None if basis.plain else ModeOrders(basis.order, basis.color_order, channels)
-        return FrameMemory(
-            count, parameters, pixels, 3, gradient=True, absgrad=self.drawing.absgrad, modes=modes
-        )
+        training = self.settings.training
+        order, color_order = training.basis.orders
+        channels = 3 if color_order else 0
+        modes = None if training.basis.plain else ModeOrders(order, color_order, channels)
+        absgrad = isinstance(training.strategy, DefaultSettings) and training.strategy.absgrad
+        numbers = (training.splats, training.numbers, pixels, 3)
+        return FrameMemory(*numbers, gradient=True, absgrad=absgrad, modes=modes)
 
     @staticmethod
     def _need(frame: FrameMemory) -> int:
@@ -133,10 +137,10 @@ class Fit(FitRun[FitPhotosSettings]):
     @property
     def _splats(self) -> str:
         """How many splats, and what they are."""
-        settings, words = self.settings, [f"at most {self.settings.splats}"]
-        if settings.angular == "sh":
-            words.append(f"harmonics of degree {settings.sh_degree}")
-        return ", ".join([*words, *filter(None, [settings.basis_words()])])
+        training, words = self.settings.training, [f"at most {self.settings.training.splats}"]
+        if training.angular.kind == "sh":
+            words.append(f"harmonics of degree {training.sh_degree}")
+        return ", ".join([*words, *filter(None, [self.settings.basis_words()])])
 
     def run(self) -> Iterator[Report]:
         """Do it; a report now and then.
@@ -153,7 +157,7 @@ class Fit(FitRun[FitPhotosSettings]):
         for note in self._notes():
             self.announce(f"rift: {note}")
         pictures = self._pictures(self.seen)
-        if settings.refine_exposures and pictures.any_cut_out():
+        if settings.training.refine_exposures and pictures.any_cut_out():
             raise InputError(
                 "--refine-exposures wants photographs of a whole scene: these are cut out, and "
                 "what stands behind them was never exposed"
@@ -161,9 +165,10 @@ class Fit(FitRun[FitPhotosSettings]):
         trainer = self._trainer(capture, pictures)
         yield from self._read_ahead(trainer, pictures)
         self.settled = dataclasses.replace(
-            settings,
-            homogenise=settings.exponent_for(len(self.seen)),
+            settings.decided(len(self.seen)),
+            training=trainer.settings,
             downscale=self.downscale,
+            first_splats=settings.first_share,
         )
         self.decided = {"photographs": place_record([*self.seen, *self.unseen], settings.out)}
         self._begin(trainer)
@@ -205,7 +210,7 @@ class Fit(FitRun[FitPhotosSettings]):
 
         Those for which there is no room are read whenever they are asked for.
         """
-        count = min(len(pictures.views), self.settings.steps)
+        count = min(len(pictures.views), self.steps)
         for step in range(count):
             if not pictures.keep(trainer.view_at(step)):
                 return
@@ -242,22 +247,20 @@ class Fit(FitRun[FitPhotosSettings]):
         self, capture: Capture, pictures: CapturePictures, given: FitPhotosSettings | None = None
     ) -> Trainer:
         settings = given or self.settings
-        exponent = settings.exponent_for(len(pictures.views))
-        ramp = dataclasses.replace(self.training.homogenisation, exponent=exponent)
-        training = dataclasses.replace(self.training, homogenisation=ramp)
+        count = len(pictures.views)
+        training = settings.training.decided(count)
         first = first_splats(
             self.device,
             *(capture, pictures),
-            count=settings.splats,
+            count=training.splats,
             guessed=settings.first_count,
-            seed=settings.seed,
+            seed=training.seed,
         )
-        if settings.asks_for_noise(exponent):
-            count = len(pictures.views)
+        if training.needs_noise:
             few = evenly(count, _NOISE_VIEWS)
             noise = noise_of([pictures.image(number)[..., :3] for number in few])
             training = dataclasses.replace(training, noise=noise)
-        return Trainer(pictures, first, training, self.drawing)
+        return Trainer(pictures, first, training, settings.rendering)
 
     def _pictures(
         self, views: tuple[View, ...], like: CapturePictures | None = None
@@ -267,7 +270,7 @@ class Fit(FitRun[FitPhotosSettings]):
             self.device,
             views,
             downscale=self.downscale,
-            seed=settings.seed,
+            seed=settings.training.seed,
             light=settings.light,
             like=like,
         )

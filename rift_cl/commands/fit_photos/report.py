@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from rift_cl.commands.fit_photos.scores import ViewScore
-from rift_cl.commands.fit_photos.settings import ENOUGH_VIEWS, FitPhotosSettings
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.report.html_page import Compared, Page
 from rift_cl.report.plot import curves, figure_svgs, jpeg
+from rift_cl.train.loss.homogenisation import ENOUGH_VIEWS, USUAL_EXPONENT
 
 _SHOWN = 3
 # Errors are shown this much brighter.
@@ -79,12 +80,12 @@ def history_notes(history: Sequence[tuple[int, int]]) -> list[str]:
 
 def ramp_notes(settings: FitPhotosSettings, views: int) -> list[str]:
     """A sentence about the ramp, where its exponent was not asked for."""
-    exponent = settings.exponent_for(views)
-    if settings.homogenise is not None or exponent == settings.exponent:
+    asked = settings.training.homogenisation
+    if asked.exponent is not None or asked.decided(views).exponent:
         return []
     return [
         f"The ramp that weighs the residual's frequencies was off: with {views} photographs, fewer "
-        f"than {ENOUGH_VIEWS}, it was never found to help. --homogenise {settings.exponent:g} "
+        f"than {ENOUGH_VIEWS}, it was never found to help. --homogenise {USUAL_EXPONENT:g} "
         "turns it on."
     ]
 

@@ -27,7 +27,6 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Camera, Grid, Parallel
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.scans.scan_file import ScanFile
-from rift_cl.train.xray.solve_settings import SolveSettings
 
 # Line integrals are measured by the value that this share of them stays below.
 _STRONG = 0.999
@@ -68,7 +67,8 @@ class XrayInput:
         self.rows = chosen_rows(settings.rows, self.scan)
         check_center(settings.center, self.scan)
         self.center = settings.center
-        self._solved = SolveSettings().views if settings.solve else 0
+        solve = settings.training.solve
+        self._solved = solve.views if solve.every else 0
         self.pitch = (self.scan.pitch or 1.0) if settings.pitch is None else settings.pitch
         self.unit = settings.unit or self.scan.unit or ("bin" if self.pitch == 1.0 else "")
         # Made now, so that a bad pitch is told before any work.

@@ -60,22 +60,26 @@ class XrayFit(FitRun[FitXraySettings]):
         scan, rows = self.input.scan, self.input.rows
         bins, settings = scan.shape[2], self.settings
         seen = self.input.read().of(self.seen)
-        tried = min(settings.splats, TRIED)
-        few = dataclasses.replace(settings, splats=tried)
+        most = settings.training.splats
+        tried = min(most, TRIED)
+        few = dataclasses.replace(
+            settings, training=dataclasses.replace(settings.training, splats=tried)
+        )
         trainer = self._trainer(seen, XrayPictures(self.device, seen), few)
-        seconds = settings.steps * probed(trainer, tried).step(settings.splats)
+        seconds = self.steps * probed(trainer, tried).step(most)
         words = settings.basis_words()
+        solves = ", and that of the solves" if settings.training.solve.every else ""
         return {
             "scan": f"{scan.path} ({scan.source}, {scan.kind})",
             "trained on": f"{len(self.seen)} projections",
             "held out": f"{len(self.unseen)} projections",
             "rows": f"{rows[0]} to {rows[1] - 1}, {bins} bins each",
-            "splats": ", ".join(filter(None, [str(settings.splats), words])),
+            "splats": ", ".join(filter(None, [str(most), words])),
             "output": f"scene.ply and {VOLUME_NAMES[settings.format]}, "
             f"{(rows[1] - rows[0], bins, bins)} (z, y, x)",
             "host memory": f"{self.input.need / 2**20:.0f} MiB",
             "device": self.device.name,
-            "time": time_words(seconds) + (", and that of the solves" if settings.solve else ""),
+            "time": time_words(seconds) + solves,
         }
 
     def run(self) -> Iterator[Report]:
@@ -85,7 +89,7 @@ class XrayFit(FitRun[FitXraySettings]):
             StoppedError: ``stop`` was called; a checkpoint was kept.
         """
         if not self.settings.resume:
-            yield Report(0, self.settings.steps, "steps")
+            yield Report(0, self.steps, "steps")
         for note in self.input.scan.notes:
             self.announce(note)
         whole = self.input.read()
@@ -95,11 +99,13 @@ class XrayFit(FitRun[FitXraySettings]):
         trainer = self._trainer(seen, pictures)
         first = self._start_error(trainer, seen)
         self.settled = dataclasses.replace(
-            self.settings,
-            homogenise=self.settings.exponent,
+            self.settings.decided(len(self.seen)),
+            training=trainer.settings,
             center=whole.center,
             rows=self.input.rows,
             pitch=self.input.pitch,
+            unit=self.input.unit,
+            kind=self.input.scan.kind,
         )
         self._begin(trainer)
         yield from self._trained(trainer, pictures)
@@ -127,7 +133,8 @@ class XrayFit(FitRun[FitXraySettings]):
     def _trainer(
         self, seen: Projections, pictures: XrayPictures, given: FitXraySettings | None = None
     ) -> XrayTrainer:
-        settings, training, rows = given or self.settings, self.training, seen.values.shape[1]
+        settings, rows = given or self.settings, seen.values.shape[1]
+        training = settings.training.decided(len(self.seen))
         volume = np.maximum(backprojected(self.device, seen, "hann"), 0)
         # Without what was negative there is too much of it: as much as the projections say.
         mass = np.maximum(seen.values.sum(axis=2, dtype=float).mean(axis=0), 0)
@@ -135,18 +142,17 @@ class XrayFit(FitRun[FitXraySettings]):
         raw = density_splats(
             volume,
             seen.grid,
-            settings.splats,
-            seed=settings.seed,
-            dilation=settings.eps2d,
+            training.splats,
+            seed=training.seed,
+            dilation=settings.rendering.eps2d,
             size=_SIZE,
         )
         first = Parameters.of(self.device, raw, density=True)
-        asked = settings.asks_for_noise(settings.exponent)
-        if asked and min(len(self.seen), seen.values.shape[2]) >= _FEW:
+        if training.needs_noise and min(len(self.seen), seen.values.shape[2]) >= _FEW:
             few = evenly(rows, _FEW)
             noise = noise_of([seen.values[:, row, :, None] for row in few])
             training = dataclasses.replace(training, noise=noise)
-        return XrayTrainer(pictures, first, training, self.drawing, flat=rows == 1)
+        return XrayTrainer(pictures, first, training, settings.rendering, flat=rows == 1)
 
     def _start_error(self, trainer: XrayTrainer, seen: Projections) -> float:
         """The relative error of a few training projections before the first step."""
@@ -181,11 +187,15 @@ class XrayFit(FitRun[FitXraySettings]):
     def _voxels(self, splats: Splats, whole: Projections) -> Floats:
         """The splats on the grid; plain ones to the last bits of fits from before modes."""
         if splats.shape_modes is not None:
-            volume = voxelise(self.device, splats, whole.grid, dilation=self.drawing.eps2d)
+            volume = voxelise(
+                self.device, splats, whole.grid, dilation=self.settings.rendering.eps2d
+            )
             return np.asarray(self.device.get(volume))
         names = ("means", "quats", "scales", "opacities")
         means, quats, scales, peaks = (
             self.device.get(getattr(splats, name)).astype(float) for name in names
         )
-        footprints = Footprints(whole.grid, means, quats, scales, dilation=self.drawing.eps2d)
+        footprints = Footprints(
+            whole.grid, means, quats, scales, dilation=self.settings.rendering.eps2d
+        )
         return footprints.sums(peaks).astype(np.float32)

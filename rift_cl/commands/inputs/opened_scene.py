@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, FitCameras, open_fit_cameras
 from rift_cl.commands.fit_photos.pictures import Light
+from rift_cl.commands.run_folder.saved_settings import read_settings
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.images.display_light import to_display, to_linear
 from rift_cl.io.json_fields import Fields, read_json_object
@@ -54,10 +55,13 @@ class OpenedScene:
             )
         if len(self.splats) == 0:
             raise InputError(f"{path}: holds no splats, there is nothing to draw")
-        eps2d = self._fitted("eps2d") if settings.eps2d is None else settings.eps2d
-        drawing = SplatSettings(
-            mode=self.splats.mode, activation=self.splats.activation, angular=self.splats.angular
+        drawing = replace(
+            self._rendering(),
+            mode=self.splats.mode,
+            activation=self.splats.activation,
+            angular=self.splats.angular,
         )
+        eps2d = settings.eps2d
         self.drawing = drawing if eps2d is None else replace(drawing, eps2d=eps2d)
         self.light: Light = self._light()
         self.background: NDArray[np.float32] = self._background(settings)
@@ -88,6 +92,13 @@ class OpenedScene:
             RiftError: the files that say so are damaged.
         """
         return None if self.folder is None else open_fit_cameras(self.folder)
+
+    def _rendering(self) -> SplatSettings:
+        """How the fit drew its splats; the defaults where there is no fit."""
+        if self._settings is None:
+            return SplatSettings()
+        record = self._settings.values.get("rendering", {})
+        return read_settings(SplatSettings, record, f"{self._settings.where}: rendering")
 
     def _fitted(self, name: str) -> float | None:
         """A number among the settings of the fit."""

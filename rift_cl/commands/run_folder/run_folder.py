@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import os
 import platform
@@ -20,6 +19,7 @@ from typing import Any
 
 from rift_cl import __version__
 from rift_cl.cl.device import Device
+from rift_cl.commands.run_folder.saved_settings import record_of
 from rift_cl.commands.run_folder.settings_table import changed, show_settings
 from rift_cl.errors import InputError, OutputError
 from rift_cl.io.output import make_folder, write_json, write_text, writing
@@ -136,7 +136,7 @@ class RunFolder:
             "job": self._job,
             "complete": True,
             "rift_cl": __version__,
-            "settings": dataclasses.asdict(settings),
+            "settings": record_of(settings),
             **given,
             **decided,
             "environment": environment(device),

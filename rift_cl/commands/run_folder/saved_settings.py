@@ -1,24 +1,22 @@
-"""``--config``: a run begins with the settings of an earlier one, as its config.json has them.
+"""Settings as a tree: the options in it by name, and as ``config.json`` holds it and gives it back.
 
-The file is read as if its values had been typed: each becomes an option of the command line and
-goes through the same parser, so that a value that cannot be used is refused as it always is.
+A command's settings are a frozen dataclass whose fields are values or further dataclasses. Each
+value is an option of the command line (``rift_cl.option_marks`` says how it is named there), a name
+that Python passes, and an entry of ``config.json``, which ``--config`` repeats.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import io
+import difflib
 import json
-import math
-import re
-from collections.abc import Sequence
-from contextlib import redirect_stderr, redirect_stdout
+import types
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
+from typing import get_type_hints as type_hints
 
-import numpy as np
 import tyro
-from tyro.conf import Positional
 
 from rift_cl import __version__
 from rift_cl.errors import InputError
@@ -27,16 +25,81 @@ S = TypeVar("S")
 # Options that say how a command runs, not what comes out: they are not repeated.
 _NOT_REPEATED = ("config", "dry_run", "overwrite", "preview", "resume", "view")
 _MOST_BYTES = 1 << 24
+_KIND = "name"
+_MISSING = (dataclasses.MISSING, tyro.MISSING)
+
+
+class Option(NamedTuple):
+    """A value in a tree of settings.
+
+    Args:
+        name: of its option, such as ``steps`` or ``learning_rates.means``.
+        value: what it is.
+        default: what it is where nothing is said; MISSING if something has to be.
+        positional: whether it has no option, but a place on the command line.
+        fixed: whether it can be given at all.
+    """
+
+    name: str
+    value: Any
+    default: Any
+    positional: bool = False
+    fixed: bool = False
+
+    def words(self) -> list[str]:
+        """What gives this value on a command line, after the command."""
+        if self.positional:
+            return [str(self.value)]
+        group, _, name = self.name.replace("_", "-").rpartition(".")
+        no = "no-" if self.value is False else ""
+        option = f"--{group}.{no}{name}" if group else f"--{no}{name}"
+        if isinstance(self.value, bool):
+            return [option]
+        several = self.value if isinstance(self.value, tuple) else (self.value,)
+        return [option, *map(str, several)]
+
+
+def options_of(settings: Any, usual: Any = None, prefix: str = "") -> Iterator[Option]:
+    """All values in a tree of settings, by the names of their options.
+
+    Args:
+        settings: the tree.
+        usual: settings with the defaults; those of the class where it is not given.
+        prefix: name of the part of the tree that this is.
+    """
+    hints = type_hints(type(settings), include_extras=True)
+    for field in dataclasses.fields(settings):
+        value, default = getattr(settings, field.name), _default(field, usual)
+        name, marks = _named(field.name, hints[field.name], prefix)
+        if "registry" in field.metadata:
+            registry = field.metadata["registry"]
+            yield Option(name, registry.name_of(type(value)), registry.name_of(type(default)))
+        if not dataclasses.is_dataclass(value):
+            where = (tyro.conf.Positional in marks, tyro.conf.Fixed in marks)
+            yield Option(name, value, default, *where)
+        elif tyro.conf.Fixed not in marks:
+            kind: Any = type(value)
+            yield from options_of(value, default if type(default) is kind else kind(), name)
+
+
+def record_of(settings: Any) -> dict[str, Any]:
+    """A tree of settings as ``config.json`` holds it, by the names of the fields."""
+    record: dict[str, Any] = {}
+    for field in dataclasses.fields(settings):
+        value = getattr(settings, field.name)
+        if dataclasses.is_dataclass(value):
+            registry = field.metadata.get("registry")
+            kind = {} if registry is None else {_KIND: registry.name_of(type(value))}
+            record[field.name] = kind | record_of(value)
+        else:
+            record[field.name] = _plain(value)
+    return record
 
 
 def named_config(arguments: Sequence[str]) -> Path | None:
     """The file that ``--config`` names on a command line, if it does."""
-    for place, argument in enumerate(arguments):
-        if argument.startswith("--config="):
-            return Path(argument.removeprefix("--config="))
-        if argument == "--config" and place + 1 < len(arguments):
-            return Path(arguments[place + 1])
-    return None
+    found = _given(arguments, "--config")
+    return None if found is None else Path(found)
 
 
 def saved_settings(path: Path, job: str, settings: type[S]) -> S:
@@ -48,8 +111,8 @@ def saved_settings(path: Path, job: str, settings: type[S]) -> S:
         settings: the command's settings.
 
     Raises:
-        InputError: the file cannot be read, is another command's, or holds a setting that this
-            version does not have or a value that it does not take.
+        InputError: the file cannot be read, is another command's or another version's, or holds a
+            setting that this version does not have or a value that it does not take.
     """
     try:
         if path.stat().st_size > _MOST_BYTES:
@@ -62,10 +125,14 @@ def saved_settings(path: Path, job: str, settings: type[S]) -> S:
         ) from error
     if name != job:
         raise InputError(f"--config {path}: is of 'rift {name}', not of 'rift {job}'")
+    if (version := record.get("rift_cl", __version__)) != __version__:
+        raise InputError(
+            f"--config {path}: was written by version {version!r}, this is {__version__}, whose "
+            "settings may mean something else: give them as options"
+        )
     repeated = {name: value for name, value in values.items() if name not in _NOT_REPEATED}
-    version = record.get("rift_cl", __version__)
-    by = "" if version == __version__ else f" (written by rift_cl {version})"
-    return parsed_settings(repeated, job, settings, where=f"--config {path}{by}: ")
+    found: S = _read(settings, None, repeated, f"--config {path}: 'rift {job}'", open_ended=True)
+    return found
 
 
 def parsed_settings(
@@ -76,10 +143,11 @@ def parsed_settings(
     earlier: S | None = None,
     where: str = "",
 ) -> S:
-    """Settings of values by their names, which the command line's parser checks.
+    """Settings by the names of their options, as ``options_of`` gives them.
 
     Args:
-        values: what is given; the rest has its defaults, and so has what is None.
+        values: what is given, with ``_`` in names; the rest has its defaults, and so has what is
+            None. The name of a part of the tree stands for a dataclass of its kind.
         job: the command.
         settings: its settings.
         earlier: those to begin with, in place of the defaults.
@@ -88,47 +156,225 @@ def parsed_settings(
     Raises:
         InputError: there is no such setting, or a value is none that it takes.
     """
-    known = {field.name for field in dataclasses.fields(settings)}  # type: ignore[arg-type]
-    unknown = sorted(set(values) - known)
-    if unknown:
-        raise InputError(f"{where}'rift {job}' has no setting {unknown[0]!r}")
-    arguments = _as_arguments(values, settings)
-    said = io.StringIO()
-    try:
-        # The parser prints what is wrong before it gives up.
-        with redirect_stderr(said), redirect_stdout(said):
-            if earlier is not None:
-                return tyro.cli(settings, default=earlier, args=arguments)
-            return tyro.cli(settings, args=arguments)
-    except SystemExit as error:
-        named = re.search(r"(?:Error parsing|for argument) '?--([\w-]+)", said.getvalue())
-        name = "" if named is None else named[1].replace("-", "_")
-        wrong = _as_arguments({name: values[name]}, settings) if name in values else arguments
-        raise InputError(f"{where}'rift {job}' does not take {' '.join(wrong)}") from error
-
-
-def _as_arguments(values: dict[str, Any], settings: type) -> list[str]:
-    """The command line that means these values."""
-    hints = get_type_hints(settings, include_extras=True)
-    positional: list[str] = []
-    options: list[str] = []
+    tree: dict[str, Any] = {}
+    said = f"{where}'rift {job}'"
+    named = {name: kind for name, kind in values.items() if isinstance(kind, str)}
+    places = dict(_places(settings, _of_kinds(settings, earlier, named.get)))
     for name, value in values.items():
+        if name not in places:
+            raise _unknown(name, places, said)
         if value is None:
             continue
-        option = "--" + name.replace("_", "-")
-        if Positional in getattr(hints[name], "__metadata__", ()):
-            positional += map(_word, value if isinstance(value, (list, tuple)) else (value,))
-        elif isinstance(value, bool):
-            options.append(option if value else f"--no-{option[2:]}")
-        elif isinstance(value, (list, tuple)):
-            options += [option, *map(_word, value)]
+        *above, last = places[name]
+        part = tree
+        for step in above:
+            part = part.setdefault(step, {})
+            if not isinstance(part, dict):
+                raise InputError(f"{said}: {name} is given, and all of {step} as well")
+        part[last] = value
+    found: S = _read(settings, earlier, tree, said)
+    return found
+
+
+def read_settings(settings: type[S], record: Any, where: str) -> S:
+    """A dataclass of settings, from what ``record_of`` made of one.
+
+    Args:
+        settings: its class.
+        record: values by the names of its fields; what is not there has its default.
+        where: what a sentence about a mistake begins with.
+
+    Raises:
+        InputError: there is no such setting, or a value is none that it takes.
+    """
+    found: S = _read(settings, None, record, where)
+    return found
+
+
+def chosen(settings: type[S], default: S | None, arguments: Sequence[str]) -> S | None:
+    """Settings to begin with, whose parts are of the kinds that a command line names.
+
+    ``--strategy default`` takes the place of one part of the tree by another, which has other
+    options: those that the rest of the command line may then name.
+
+    Args:
+        settings: a command's settings.
+        default: those of an earlier run, if it is repeated.
+        arguments: the command line.
+    """
+    return _of_kinds(settings, default, lambda name: _given(arguments, f"--{name}"))
+
+
+def _of_kinds(settings: type[S], default: S | None, kind_of: Callable[[str], Any]) -> S | None:
+    """Settings whose parts are of certain kinds, by the names of the options that say so."""
+    tree: dict[str, Any] = {}
+    for name, path in _places(settings, default):
+        kind = kind_of(name) if path[-1] == _KIND else None
+        if kind is None:
+            continue
+        part = tree
+        for step in path[:-1]:
+            part = part.setdefault(step, {})
+        part[_KIND] = kind
+    return _read(settings, default, tree, "", open_ended=True) if tree else default
+
+
+def kinds(settings: type, default: Any) -> Iterator[tuple[str, list[str], str, str]]:
+    """Parts of a command's settings of which there are several kinds.
+
+    Yields:
+        The name of the option, the kinds, the one that is taken where none is named, and its help.
+    """
+    hints = type_hints(settings, include_extras=True)
+    for field in dataclasses.fields(settings):
+        usual = _default(field, default)
+        registry = field.metadata.get("registry")
+        if registry is not None:
+            name, _ = _named(field.name, hints[field.name], "")
+            names = [kind for kind in registry if kind not in field.metadata.get("without", ())]
+            yield name, names, registry.name_of(type(usual)), field.metadata["help"]
+        elif dataclasses.is_dataclass(usual):
+            yield from kinds(type(usual), usual)
+
+
+def _places(settings: Any, usual: Any, prefix: str = "") -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Where in a tree each option is, and each part of it."""
+    hints = type_hints(settings, include_extras=True)
+    for field in dataclasses.fields(settings):
+        default = _default(field, usual)
+        option, marks = _named(field.name, hints[field.name], prefix)
+        if dataclasses.is_dataclass(default):
+            if "registry" in field.metadata:
+                yield option, (field.name, _KIND)
+            else:
+                yield option, (field.name,)
+            if tyro.conf.Fixed not in marks:
+                for name, path in _places(type(default), default, option):
+                    yield name, (field.name, *path)
+        elif tyro.conf.Fixed not in marks:
+            yield option, (field.name,)
+
+
+def _read(settings: Any, usual: Any, values: Any, where: str, *, open_ended: bool = False) -> Any:
+    """A dataclass of values by the names of its fields; what is not there is as usual."""
+    if dataclasses.is_dataclass(values):
+        return values
+    if not isinstance(values, dict):
+        raise InputError(f"{where}: {settings.__name__} is {values!r}, wanted settings by name")
+    hints, found = type_hints(settings, include_extras=True), {}
+    known = {field.name: field for field in dataclasses.fields(settings)}
+    for name in values:
+        if name not in known:
+            raise _unknown(name, known, where)
+    for name, field in known.items():
+        default = _default(field, usual)
+        if name in values and not dataclasses.is_dataclass(default):
+            found[name] = _value(hints[name], values[name], f"{where}: {name}")
+        elif name in values:
+            part, given = _kind_of(field, default, values[name])
+            found[name] = _read(type(part), part, given, where, open_ended=open_ended)
+        elif default not in _MISSING:
+            found[name] = default
+        elif open_ended:
+            found[name] = tyro.MISSING
         else:
-            options.append(f"{option}={_word(value)}")
-    return [*positional, *options]
+            raise InputError(f"{where} wants {name!r}")
+    return settings(**found)
 
 
-def _word(value: Any) -> str:
-    """A value as it is typed; -1e-05 would be taken for an option, -0.00001 is not."""
-    if isinstance(value, float) and math.isfinite(value):
-        return np.format_float_positional(value, trim="0")
-    return str(value)
+def _kind_of(field: dataclasses.Field[Any], default: Any, given: Any) -> tuple[Any, Any]:
+    """The defaults of a part of the tree, of the kind that is given, and the values given."""
+    registry = field.metadata.get("registry")
+    if registry is None or not isinstance(given, dict) or _KIND not in given:
+        return default, given
+    values = {name: value for name, value in given.items() if name != _KIND}
+    kind = given[_KIND]
+    if dataclasses.is_dataclass(kind):
+        return kind, kind
+    return (default if registry[kind] is type(default) else registry[kind]()), values
+
+
+def _value(hint: Any, value: Any, where: str) -> Any:
+    """A value that JSON held, or Python passed, as what a field takes."""
+    origin, inner = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        return _value(inner[0], value, where)
+    if origin in (Union, types.UnionType):
+        some = next(kind for kind in inner if kind is not type(None))
+        return None if value is None else _value(some, value, where)
+    if origin is tuple:
+        return _values(inner, value, where)
+    if origin is Literal:
+        if value not in inner:
+            raise InputError(f"{where} is {value!r}, wanted one of {', '.join(map(str, inner))}")
+        return value
+    wanted, takes = _PLAIN[hint]
+    if not takes(value):
+        raise InputError(f"{where} is {value!r}, wanted {wanted}")
+    return hint(value)
+
+
+def _values(kinds: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:
+    """The entries of a tuple."""
+    if isinstance(value, (list, tuple)):
+        if kinds[-1] is Ellipsis:
+            kinds = (kinds[0],) * len(value)
+        if len(kinds) == len(value):
+            return tuple(_value(kind, one, where) for kind, one in zip(kinds, value, strict=True))
+    raise InputError(f"{where} is {value!r}, wanted {len(kinds)} values")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+# What a field of a plain type takes, in words and as a test.
+_PLAIN: dict[Any, tuple[str, Callable[[Any], bool]]] = {
+    bool: ("true or false", lambda value: isinstance(value, bool)),
+    int: ("a whole number", lambda value: _is_number(value) and value == value // 1),
+    float: ("a number", _is_number),
+    str: ("a text", lambda value: isinstance(value, str)),
+    Path: ("a path", lambda value: isinstance(value, (str, Path))),
+}
+
+
+def _named(name: str, hint: Any, prefix: str) -> tuple[str, tuple[Any, ...]]:
+    """The name of the option of a field, and all marks of its type."""
+    marks = getattr(hint, "__metadata__", ())
+    for mark in marks:
+        if getattr(mark, "name", None):
+            name = mark.name.replace("-", "_")
+        if getattr(mark, "prefix_name", None) is False:
+            prefix = ""
+    return (f"{prefix}.{name}" if prefix else name), marks
+
+
+def _default(field: dataclasses.Field[Any], usual: Any) -> Any:
+    if usual is not None:
+        return getattr(usual, field.name)
+    if field.default_factory is not dataclasses.MISSING:
+        return field.default_factory()
+    return field.default
+
+
+def _unknown(name: str, known: Any, where: str) -> InputError:
+    near = difflib.get_close_matches(str(name), list(known), 1, 0.5)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return InputError(f"{where} has no setting {name!r}{hint}")
+
+
+def _given(arguments: Sequence[str], option: str) -> str | None:
+    """What a command line gives to an option, if it does."""
+    for place, argument in enumerate(arguments):
+        if argument.startswith(f"{option}="):
+            return argument.removeprefix(f"{option}=")
+        if argument == option and place + 1 < len(arguments):
+            return arguments[place + 1]
+    return None
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON holds it."""
+    if isinstance(value, Path):
+        return str(value)
+    return [_plain(entry) for entry in value] if isinstance(value, (list, tuple)) else value

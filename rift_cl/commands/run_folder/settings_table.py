@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 from typing import Any
 
+from rift_cl.commands.run_folder.saved_settings import options_of
 from rift_cl.report.html_page import Page
 
 
@@ -20,10 +20,11 @@ def show_settings(page: Page, settings: Any, asked: Any = None) -> None:
     """
     rows: list[tuple[str, str, str]] = []
     defaults: dict[str, str] = {}
-    for field in dataclasses.fields(settings):
-        name, value = field.name.replace("_", "-"), getattr(settings, field.name)
-        given = value if asked is None else getattr(asked, field.name)
-        if _alike(value, given) and _alike(value, _default(field)):
+    before = {} if asked is None else {option.name: option.value for option in options_of(asked)}
+    for option in options_of(settings):
+        name, value = option.name.replace("_", "-"), option.value
+        given = before.get(option.name, value)
+        if _alike(value, given) and _alike(value, option.default):
             defaults[name] = _words(value)
         else:
             source = "asked for" if _alike(value, given) else "decided"
@@ -38,14 +39,11 @@ def show_settings(page: Page, settings: Any, asked: Any = None) -> None:
 
 def changed(settings: Any) -> dict[str, Any]:
     """The settings that differ from their defaults, by name."""
-    values = {field: getattr(settings, field.name) for field in dataclasses.fields(settings)}
-    return {field.name: value for field, value in values.items() if value != _default(field)}
-
-
-def _default(field: dataclasses.Field[Any]) -> Any:
-    if field.default_factory is not dataclasses.MISSING:
-        return field.default_factory()
-    return field.default
+    return {
+        option.name: option.value
+        for option in options_of(settings)
+        if option.value != option.default
+    }
 
 
 def _alike(one: Any, other: Any) -> bool:

@@ -22,13 +22,14 @@ best there is. So the exponent falls with the share of the residual that is nois
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal, get_args
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve
 from scipy.special import ndtri
+from tyro.conf import arg
 
 from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
@@ -36,6 +37,9 @@ from rift_cl.geometry.numbers import one_number
 Floats = NDArray[np.float64]
 WeightKind = Literal["ramp", "coverage"]
 
+# Exponent from so many photographs on, where none is given: with 8 to 36 the ramp never gained,
+# with 64 short fits did, and long ones lost nothing (docs/homogenisation.md).
+USUAL_EXPONENT, ENOUGH_VIEWS = 0.5, 40
 _STEEPEST = 4.0
 # Immerkaer's mask, which leaves out what is linear along an edge; its norm is 6. Noise is read off
 # the calmest share of the pixels, where there is the least texture to be taken for noise.
@@ -45,26 +49,28 @@ _CALM = 0.25
 
 @dataclass(frozen=True)
 class Homogenisation:
-    """How strongly a loss favours high frequencies.
-
-    Args:
-        exponent: of the ramp; 0 leaves the plain loss, 1 is the whole ramp.
-        noise_aware: let the exponent fall as the residual comes down to the pictures' noise.
-        along_rows: take the ramp's frequency along x alone, as for projections of an orbit.
-        weight: what the exponent is of: ``ramp``, or ``coverage``, one over what was counted.
+    """Weight of spatial frequencies in the gradient of the pixel loss.
 
     Raises:
         InputError: the exponent is out of its range, or the weight unknown.
     """
 
-    exponent: float = 0.0
+    exponent: Annotated[
+        float | None, arg(name="homogenise", prefix_name=False, help_behavior_hint="")
+    ] = 0.0
+    """Exponent of the weight of the residual's frequencies, so that fine detail counts as much as
+    coarse, 0 to 4 (0 = none). Default: 0.5, but 0 for X-rays and for fewer than 40 photographs."""
+    weight: Annotated[WeightKind, arg(name="homogenise-by", prefix_name=False)] = "ramp"
+    """What that exponent is of: the frequency (ramp), which suits evenly spaced views, or one over
+    the coverage of the frequency by all views (coverage)."""
     noise_aware: bool = True
+    """Lower the exponent as the residual comes down to the noise of the images."""
     along_rows: bool = False
-    weight: WeightKind = "ramp"
+    """Weight frequencies along the rows of an image alone, as for the projections of an orbit."""
 
     def __post_init__(self) -> None:
         """Check the exponent and the weight's name."""
-        if not 0 <= one_number(self.exponent) <= _STEEPEST:
+        if self.exponent is not None and not 0 <= one_number(self.exponent) <= _STEEPEST:
             raise InputError(
                 f"Homogenisation: exponent is {self.exponent!r}, wanted 0 to {_STEEPEST:g}"
             )
@@ -77,11 +83,19 @@ class Homogenisation:
         square = (kx**2 if self.along_rows else ky**2 + kx**2) + 1 / longest**2
         return np.asarray(square ** (exponent / 2))
 
+    def decided(self, views: int) -> Homogenisation:
+        """These settings, with an exponent for so many photographs where it was left open."""
+        if self.exponent is not None:
+            return self
+        enough = views >= ENOUGH_VIEWS or self.weight == "coverage"
+        return replace(self, exponent=USUAL_EXPONENT if enough else 0.0)
+
     def exponent_at(self, mean_square: float, noise: float) -> float:
         """The exponent for a mean square residual and a standard deviation of the noise."""
+        most = self.exponent or 0.0
         if not self.noise_aware or noise == 0:
-            return self.exponent
-        return self.exponent * max(0.0, 1 - noise**2 / mean_square)
+            return most
+        return most * max(0.0, 1 - noise**2 / mean_square)
 
 
 def noise_of(images: Sequence[NDArray[np.float32]]) -> float:

@@ -73,7 +73,7 @@ class HomogenisedLoss:
     @property
     def exponent(self) -> float:
         """The exponent that holds now."""
-        most = self.settings.exponent
+        most = self.settings.exponent or 0.0
         share = self.settings.exponent_at(self.mean_square, self.noise) / most if most else 0.0
         return round(share * _PARTS) / _PARTS * most
 

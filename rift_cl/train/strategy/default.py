@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
+from rift_cl.option_marks import Auto
 from rift_cl.splat.renderer import Frame, FrameGradients
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import Parameters
@@ -57,7 +58,7 @@ class DefaultSettings(StrategySettings):
     """Fraction of the run before the first densification."""
     last: float = 0.5
     """Fraction of the run after which there are no densifications and no resets."""
-    grow_gradient: float | None = None
+    grow_gradient: Auto[float] = None
     """Mean screen-space gradient above which a splat is cloned or split, with image coordinates
     from -1 to 1. Default: 2e-4, or 8e-4 with absgrad."""
     absgrad: bool = False
@@ -69,7 +70,7 @@ class DefaultSettings(StrategySettings):
     prune_scale: float = 0.1
     """Scale above which splats are removed after the first reset, as a fraction of the scene's
     extent."""
-    prune_screen_size: float | None = None
+    prune_screen_size: Auto[float] = None
     """Radius on the screen above which splats are removed after the first reset, as a fraction of
     the image's larger side. Default: never."""
     reset: float = 0.1
@@ -102,6 +103,10 @@ class DefaultSettings(StrategySettings):
     def threshold(self) -> float:
         """The mean gradient above which a splat is cloned or split."""
         return self.grow_gradient or (8e-4 if self.absgrad else 2e-4)
+
+    def decided(self) -> DefaultSettings:
+        """These settings, with a value for what was left open."""
+        return replace(self, grow_gradient=self.threshold)
 
     def begin(self, parameters: Parameters, run: TrainingRun) -> DefaultStrategy:
         """The strategy of a run; see ``StrategySettings``."""

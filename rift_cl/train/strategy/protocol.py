@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from numpy.typing import NDArray
 
@@ -39,6 +39,9 @@ class TrainingRun:
     cooldown: int
 
 
+S = TypeVar("S", bound="StrategySettings")
+
+
 class StrategySettings(ABC):
     """Base of the settings of strategies, which are frozen dataclasses."""
 
@@ -53,6 +56,10 @@ class StrategySettings(ABC):
         Raises:
             InputError: the strategy cannot serve splats of this kind.
         """
+
+    def decided(self: S) -> S:
+        """These settings, with a value for what was left open."""
+        return self
 
 
 class Penalties(NamedTuple):

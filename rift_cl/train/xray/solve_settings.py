@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
+
+from tyro.conf import arg
 
 from rift_cl.errors import InputError
 from rift_cl.train.ranges import check_number, check_whole
@@ -15,23 +18,22 @@ class SolveSettings:
     Few conjugate gradients serve best: begun where the coefficients are, they keep to what the
     pictures say loudly, and leave alone what only their noise and gaps would tell.
 
-    Args:
-        every: steps between two solves, the first before the first step, and one after the last;
-            0 for none.
-        views: most pictures that a solve looks at; where there are more, they are drawn by chance
-            from the seed and the step.
-        iterations: conjugate gradients of a solve.
-        ridge: weight of the squared coefficients, as a share of the mean squared norm of what one
-            of them shows. Below 1e-6 float32 does not hold the answer.
-
     Raises:
         InputError: a number is out of its range.
     """
 
-    every: int = 0
+    every: Annotated[int, arg(name="solve", prefix_name=False)] = 0
+    """Steps between two least-squares solves for all densities and their modes, such as 100, with
+    one before the first step and one after the last. Between them only positions and shapes are
+    optimized (0 = none)."""
     views: int = 64
+    """Most projections in a solve; of more, some are drawn by chance."""
     iterations: int = 2
+    """Conjugate gradient iterations of a solve."""
+    # Below 1e-6 float32 does not hold the answer.
     ridge: float = 1e-3
+    """Weight of the squared coefficients, as a fraction of the mean squared norm of what one of
+    them shows."""
 
     def __post_init__(self) -> None:
         """Check every number's range."""

@@ -8,73 +8,15 @@ into their slice; modes of their shapes that vary across it stay at zero.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from rift_cl.cl.arithmetic import copy_columns
 from rift_cl.splat.settings import SplatSettings
-from rift_cl.train.basis_settings import BasisSettings
-from rift_cl.train.loss.homogenisation import Homogenisation, WeightKind
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.settings import BandLimit, LearningRates, TrainSettings
+from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.xray import FLAT
-from rift_cl.train.strategy import XraySettings
 from rift_cl.train.trainer import Trainer, TrainingViews
 from rift_cl.train.xray.density_solve import solve_densities
-from rift_cl.train.xray.solve_settings import SolveSettings
-
-# The start is near already, so that positions may move fast and need not slow down by much.
-LEARNING_RATES = LearningRates(
-    means=6e-4, means_last=0.1, quats=2e-2, log_scales=2e-2, logits=4e-2, sh=0.0
-)
-# Of modes, in a loss of squares that is far smaller than that of photographs.
-RIDGE = 1e-5
-
-
-def xray_settings(
-    *,
-    steps: int,
-    seed: int,
-    splats: int,
-    exponent: float,
-    weight: WeightKind = "ramp",
-    band_limit: BandLimit | None = None,
-    basis: BasisSettings | None = None,
-    solve: SolveSettings | None = None,
-) -> TrainSettings:
-    """The settings of a fit to projections.
-
-    Args:
-        steps: projections that are looked at.
-        seed: of everything that is random.
-        splats: how many there are.
-        exponent: of the ramp along the detector's rows, since orbits are dense along nothing else,
-            or of the inverse coverage.
-        weight: which of the two.
-        band_limit: as in ``TrainSettings``.
-        basis: the modes of the splats' densities.
-        solve: how often densities and modes are solved for. Between solves they then stay as they
-            are, which serves better than moving them by Adam as well.
-    """
-    solve = solve or SolveSettings()
-    rates = LEARNING_RATES
-    if solve.every:
-        rates = replace(rates, logits=0.0, shape_modes=0.0)
-    return TrainSettings(
-        steps=steps,
-        seed=seed,
-        splats=splats,
-        sh_degree=0,
-        loss="l2",
-        ssim_weight=0.0,
-        homogenisation=Homogenisation(exponent, along_rows=True, weight=weight),
-        band_limit=band_limit,
-        learning_rates=rates,
-        strategy=XraySettings(),
-        basis=basis or BasisSettings(),
-        solve=solve,
-    )
 
 
 class XrayTrainer(Trainer):
