@@ -131,7 +131,7 @@ def test_an_object_wider_than_the_detector_is_continued(tmp_path):
     middle = ("--kind", "attenuation", "--center", (bins - 1) / 2)
     padded, assumed = reconstruct(path, tmp_path / "auto", *middle)
     plain, _ = reconstruct(path, tmp_path / "off", *middle, "--pad", "off")
-    assert "continued smoothly" in assumed
+    assert "extrapolated smoothly" in assumed
     t = np.arange(bins) - (bins - 1) / 2
     border = np.abs(np.hypot(t[:, None], t) - 17.5) < 1.5
     bias = [abs((image[0] - truth)[border].mean()) for image in (padded, plain)]
@@ -139,7 +139,7 @@ def test_an_object_wider_than_the_detector_is_continued(tmp_path):
     steps = ("--method", "sirt", "--steps", 30)
     explained, assumed = reconstruct(path, tmp_path / "sirt", *middle, *steps)
     assert "margin of 20 bins" in assumed
-    assert "continued smoothly" not in assumed
+    assert "extrapolated smoothly" not in assumed
     assert explained.shape == padded.shape
     assert abs((explained[0] - truth)[border].mean()) < 0.3 * bias[1]
 
