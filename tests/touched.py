@@ -1,4 +1,4 @@
-"""A whole run of the tests fails where it never launched a kernel or never ran a command.
+"""A whole run of the tests fails where it never launched a kernel or never began a command.
 
 Both selections are held to it (see ``selection``), so that the short one goes on to touch
 everything: whoever adds a kernel or a command adds a test that plain ``pytest`` runs. What
@@ -38,8 +38,9 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def _noted(name: str, run: Any) -> Any:
     def run_and_note(settings: Any, output: Any) -> None:
-        run(settings, output)
+        # Before it runs: a viewer ends with Ctrl-C.
         _touched.add(f"rift {name}")
+        run(settings, output)
 
     return run_and_note
 

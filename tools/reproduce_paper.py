@@ -21,7 +21,7 @@ from typing import Any
 
 import tyro
 
-from figures import (
+from paper import (
     aperture_filter,
     capture_support,
     compensation,
@@ -43,7 +43,7 @@ from figures import (
     spectral_bias,
     surface_views,
 )
-from figures.plan import Plan, find_ornament, sample_ornament
+from paper.plan import Plan, find_ornament, sample_ornament
 from rift_cl.cl import Device, open_device
 from rift_cl.commands.run_folder.run_folder import environment
 from rift_cl.errors import InputError, RiftError

@@ -59,6 +59,14 @@ class RunOptions(DeviceOption):
     """Replace the results of an earlier run at the same place."""
     dry_run: bool = False
     """Print what would be done, and write nothing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepeatableRun(RunOptions):
+    """How a command runs that leaves a config.json."""
+
+    group: ClassVar[str] = "run"
+
     config: Auto[Path] = None
     """config.json of an earlier run of this command. Its settings, with every value that was
     decided in that run, become the defaults of this one."""

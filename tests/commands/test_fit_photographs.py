@@ -125,4 +125,4 @@ def test_a_size_that_is_asked_for_is_kept(capture, tmp_path, monkeypatch):
     assert decided.downscale > 1 and "made smaller by" in decided.plan()["largest photograph"]
     assert "--downscale 1 fits them as they are" in decided._notes()[0]
     with pytest.raises(InputError, match="--frames is 2"):
-        FitPhotosSettings.of(capture=capture, frames=2).check()
+        FitPhotosSettings.of(capture=capture, out=tmp_path / "fit", frames=2).check()

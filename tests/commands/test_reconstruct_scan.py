@@ -36,8 +36,8 @@ def rift_volume(path):
     ("settings", "sentence"),
     [
         ({"colour": "red"}, "no setting 'colour'"),
-        ({"method": "best"}, "method=best"),
-        ({"steps": "many", "method": "sirt"}, "steps=many"),
+        ({"method": "best"}, "method is 'best'"),
+        ({"steps": "many", "method": "sirt"}, "steps is 'many'"),
         ({"dry_run": True}, "leave it out"),
         ({"filter": "hann", "method": "sirt"}, "--filter"),
     ],

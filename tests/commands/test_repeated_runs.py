@@ -98,7 +98,7 @@ def test_a_dry_run_of_center_writes_nothing(scan, tmp_path, capsys):
     [
         ({"job": "analyze"}, ("rift analyze", "rift plan")),
         ({"settings": {"veiws": 3}}, ("veiws",)),
-        ({"settings": {"veiws": 3}, "rift_cl": "0.0.1"}, ("veiws", "0.0.1")),
+        ({"settings": {"veiws": 3}, "rift_cl": "0.0.1"}, ("0.0.1",)),
     ],
 )
 def test_a_config_that_does_not_fit_is_told(tmp_path, capsys, change, words):

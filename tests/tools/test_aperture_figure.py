@@ -17,7 +17,7 @@ from rift_cl.splat import Renderer, Splats, SplatSettings
 
 @pytest.fixture
 def plan(tool, tmp_path):
-    plans = tool("figures.plan")
+    plans = tool("paper.plan")
     sample = plans.sample_ornament()
     return plans.Plan(False, tmp_path, None, sample, (10,), 25, 100, (0,))
 
@@ -42,7 +42,7 @@ def specks(pictures, device):
 
 
 def test_the_thin_lens_explains_what_many_pinholes_saw(tool, plan, monkeypatch):
-    figure, pictures = tool("figures.aperture_filter"), tool("figures.aperture_pictures")
+    figure, pictures = tool("paper.aperture_filter"), tool("paper.aperture_pictures")
     monkeypatch.setattr(pictures, "_AZIMUTHS", 4)
     monkeypatch.setattr(pictures, "_PINHOLES", 16)
     device, results = open_device(), []
@@ -72,15 +72,15 @@ def test_the_thin_lens_explains_what_many_pinholes_saw(tool, plan, monkeypatch):
 
 
 def test_a_disc_passes_all_at_zero_and_nothing_at_its_first_zero(tool):
-    transfer = tool("figures.aperture_spectra").disc_transfer
+    transfer = tool("paper.aperture_spectra").disc_transfer
     frequencies = np.array([1e-6, 3.8317 / np.pi / 5])
     np.testing.assert_allclose(transfer(np.array(5.0), frequencies), [1, 0], atol=1e-4)
 
 
 def test_pictures_of_one_depth_are_filtered_as_the_disc_says(tool):
     """A plane of splats out of focus, drawn by many pinholes, against 2 J1(x) / x."""
-    pictures, spectra = tool("figures.aperture_pictures"), tool("figures.aperture_spectra")
-    power, device = tool("figures.spectra"), open_device()
+    pictures, spectra = tool("paper.aperture_pictures"), tool("paper.aperture_spectra")
+    power, device = tool("paper.spectra"), open_device()
     random, camera = np.random.default_rng(1), Camera(
         (96, 96), [[90, 0, 48], [0, 90, 48], [0, 0, 1]], np.eye(4), aperture=Aperture(0.3, 4.0)
     )  # fmt: skip
@@ -117,7 +117,7 @@ def variance(picture):
 
 @pytest.mark.parametrize("depth", [4.0, 9.0])
 def test_many_pinholes_spread_a_point_as_far_as_the_disc_says(tool, depth):
-    pictures, device = tool("figures.aperture_pictures"), open_device()
+    pictures, device = tool("paper.aperture_pictures"), open_device()
     K = [[90, 0, 32], [0, 90, 32], [0, 0, 1]]
     camera = Camera((64, 64), K, np.eye(4), aperture=Aperture(0.3, 4.0))
     shape = {"quats": [[1, 0, 0, 0]], "scales": [[0.05] * 3], "opacities": [0.9]}
@@ -133,7 +133,7 @@ def test_many_pinholes_spread_a_point_as_far_as_the_disc_says(tool, depth):
 
 
 def test_every_fourth_azimuth_is_scored_with_all_its_apertures(tool, plan, monkeypatch, tmp_path):
-    pictures = tool("figures.aperture_pictures")
+    pictures = tool("paper.aperture_pictures")
     capture = plan.captures.ring
     seen, unseen = pictures.split_azimuths(capture, tmp_path / "split")
     assert len(open_capture(seen).views) == 45 and len(open_capture(unseen).views) == 15
@@ -142,7 +142,7 @@ def test_every_fourth_azimuth_is_scored_with_all_its_apertures(tool, plan, monke
 
 
 def test_a_capture_that_is_missing_is_asked_for(tool, plan, tmp_path):
-    pictures = tool("figures.aperture_pictures")
+    pictures = tool("paper.aperture_pictures")
     given = replace(plan, full=True, ornament=replace(plan.ornament, ring=tmp_path / "orbit"))
     with pytest.raises(InputError, match=r"aperture: holds no transforms\.json; make it with"):
         pictures.lens_capture(given, None)

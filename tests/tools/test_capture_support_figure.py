@@ -20,7 +20,7 @@ TOOLS = Path(__file__).parents[2] / "tools"
 @pytest.fixture
 def figure(monkeypatch):
     monkeypatch.syspath_prepend(str(TOOLS))
-    return importlib.import_module("figures.capture_support")
+    return importlib.import_module("paper.capture_support")
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def plan(figure, tmp_path):
         record = transforms_of(ring(views), [f"{k}.png" for k in range(views)])
         write_json(tmp_path / name / "transforms.json", record)
     (tmp_path / "notes").mkdir()
-    plans = importlib.import_module("figures.plan")
+    plans = importlib.import_module("paper.plan")
     ornament = plans.Ornament(
         tmp_path / "ornament" / "orbit", tmp_path / "ornament" / "off_path", None
     )

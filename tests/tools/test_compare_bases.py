@@ -117,7 +117,7 @@ def test_every_kind_of_radiance_splats_is_one_that_a_fit_takes(tool, tmp_path):
     for kind in radiance.KINDS:
         found = radiance._settings(asked, kind, 30, 0, tmp_path, None)
         found.check()
-        assert 1900 < found.splats * found.training().numbers <= 2000
+        assert 1900 < found.training.splats * found.training.numbers <= 2000
 
 
 @pytest.fixture

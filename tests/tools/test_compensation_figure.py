@@ -16,7 +16,7 @@ TOOLS = Path(__file__).parents[2] / "tools"
 @pytest.fixture
 def figure(monkeypatch):
     monkeypatch.syspath_prepend(str(TOOLS))
-    module = importlib.import_module("figures.compensation")
+    module = importlib.import_module("paper.compensation")
     for name, value in {
         "SIZE": 48,
         "OBJECTS": 2,

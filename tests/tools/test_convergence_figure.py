@@ -13,7 +13,7 @@ from rift_cl.report.html_page import Page
 @pytest.fixture
 def convergence(tool, monkeypatch):
     """The module with so few steps that it shows nothing but that all of it runs."""
-    module = tool("figures.convergence")
+    module = tool("paper.convergence")
     monkeypatch.setattr(module, "QUICK_STEPS", {"CGLS": 5, "FISTA-TV": 6})
     monkeypatch.setattr(module, "STEPS", module.QUICK_STEPS)
     monkeypatch.setattr(module, "NOISES", (0.25,))

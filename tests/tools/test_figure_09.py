@@ -16,7 +16,7 @@ from rift_cl.sample.stock_lenses import STOCK_LENSES
 
 @pytest.fixture
 def figure(tool) -> ModuleType:
-    return tool("figures.figure_09")
+    return tool("paper.figure_09")
 
 
 @pytest.fixture

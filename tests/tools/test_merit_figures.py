@@ -16,14 +16,14 @@ TOOLS = Path(__file__).parents[2] / "tools"
 @pytest.fixture
 def study(monkeypatch):
     monkeypatch.syspath_prepend(str(TOOLS))
-    module = importlib.import_module("figures.merit_study")
+    module = importlib.import_module("paper.merit_study")
     monkeypatch.setattr(module, "_extent", lambda plan: (1, 2))
     monkeypatch.setattr(module, "COUNTS", (12,))
     exact = module.exact
     monkeypatch.setattr(
         module, "exact", lambda observations, target: exact(observations, target, 12)
     )
-    known = importlib.import_module("figures.known_objects")
+    known = importlib.import_module("paper.known_objects")
     for name, value in {"_LEARNT": 30, "_STEPS": 8, "_FREQUENCIES": 400}.items():
         monkeypatch.setattr(known, name, value)
     monkeypatch.setattr(module, "_STEPS", 8)
@@ -63,7 +63,7 @@ def test_gates_are_those_that_are_named(study):
 
 @pytest.mark.parametrize("count", [12, 32])
 def test_sets_of_views_are_what_they_are_called(study, count):
-    families = importlib.import_module("figures.angle_families")
+    families = importlib.import_module("paper.angle_families")
     for family in families.FAMILIES:
         angles = families.family_angles(family, count, 1)
         assert angles.shape == (count,)
@@ -79,7 +79,7 @@ def test_sets_of_views_are_what_they_are_called(study, count):
 
 
 def test_objects_are_drawn_out_as_far_as_asked(study):
-    objects = importlib.import_module("figures.random_objects")
+    objects = importlib.import_module("paper.random_objects")
     across = objects.ALONG + np.pi / 2
     for stretch in (1.0, 8.0):
         power = objects.mean_power(objects.random_objects(20, 64, stretch, 3), isotropic=False)
@@ -94,7 +94,7 @@ def test_objects_are_drawn_out_as_far_as_asked(study):
 
 def test_the_merit_of_a_surface_ranks_views_as_what_they_tell(monkeypatch):
     monkeypatch.syspath_prepend(str(TOOLS))
-    module = importlib.import_module("figures.surface_views")
+    module = importlib.import_module("paper.surface_views")
     for name, value in {"SPLATS": 64, "PIXELS": 24, "FOCAL": 40.0, "_TEST": 8}.items():
         monkeypatch.setattr(module, name, value)
     monkeypatch.setattr(module, "_sets", lambda plan: 1)

@@ -21,12 +21,12 @@ def result_of(figure):
 
 
 def pictures(tool, modes):
-    decode = tool("figures.images").decode
+    decode = tool("paper.images").decode
     return {mode["name"]: decode(mode["image"]) for mode in modes}
 
 
 def test_laguerre_modes_have_their_rings_and_turns(tool):
-    figure = tool("figures.figure_13")
+    figure = tool("paper.figure_13")
     result = result_of(figure)
     assert result["orthonormality"] < 1e-12
     assert result["conversion"] < 1e-12
@@ -51,7 +51,7 @@ def test_laguerre_modes_have_their_rings_and_turns(tool):
 
 
 def test_hermite_modes_have_zeros_along_either_axis(tool):
-    figure = tool("figures.figure_14")
+    figure = tool("paper.figure_14")
     result = result_of(figure)
     assert result["orthonormality"] < 1e-12
     found = pictures(tool, result["modes"])
@@ -68,7 +68,7 @@ def test_hermite_modes_have_zeros_along_either_axis(tool):
 
 
 def test_nine_of_each_kind_are_on_the_sphere(tool):
-    figure = tool("figures.figure_15")
+    figure = tool("paper.figure_15")
     result = result_of(figure)
     assert [len(result[name]) for name in ("harmonics", "laguerre", "hermite")] == [9, 9, 9]
     constant = pictures(tool, result["harmonics"])["SH 0 0"]
@@ -81,7 +81,7 @@ def test_nine_of_each_kind_are_on_the_sphere(tool):
 
 
 def test_signs_have_colours_and_zero_is_white(tool):
-    colors = tool("figures.mode_gallery").signed_colors(np.array([-1.0, 0.0, 1.0]))
+    colors = tool("paper.mode_gallery").signed_colors(np.array([-1.0, 0.0, 1.0]))
     np.testing.assert_allclose(colors[1], 1)
     assert colors[0, 2] > colors[0, 0]
     assert colors[2, 0] > colors[2, 2]

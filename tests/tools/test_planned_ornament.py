@@ -12,12 +12,12 @@ from rift_cl.report.html_page import Page
 
 @pytest.fixture
 def figure(tool):
-    return tool("figures.planned_ornament")
+    return tool("paper.planned_ornament")
 
 
 @pytest.fixture
 def plan(tool, tmp_path):
-    plans = tool("figures.plan")
+    plans = tool("paper.plan")
     return plans.Plan(False, tmp_path, None, None, (4,), 10, 50, (0,))
 
 

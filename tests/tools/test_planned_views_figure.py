@@ -16,7 +16,7 @@ TOOLS = Path(__file__).parents[2] / "tools"
 @pytest.fixture
 def tool(monkeypatch):
     monkeypatch.syspath_prepend(str(TOOLS))
-    return lambda name: importlib.import_module(f"figures.{name}")
+    return lambda name: importlib.import_module(f"paper.{name}")
 
 
 def test_blobs_look_the_same_from_everywhere(tool):

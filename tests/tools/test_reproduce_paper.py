@@ -42,7 +42,7 @@ def tiny(tmp_path_factory):
 def part(monkeypatch):
     """A module of the tool by its name."""
     monkeypatch.syspath_prepend(str(TOOLS))
-    return lambda name: importlib.import_module(f"figures.{name}")
+    return lambda name: importlib.import_module(f"paper.{name}")
 
 
 def test_slices_quick_then_report_alone(tmp_path):

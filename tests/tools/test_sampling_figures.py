@@ -20,12 +20,12 @@ def run(figure, kept=None):
 
 @pytest.fixture
 def slices(tool):
-    return tool("figures.figure_02_04")
+    return tool("paper.figure_02_04")
 
 
 @pytest.fixture
 def support(tool, monkeypatch):
-    figure = tool("figures.figure_07")
+    figure = tool("paper.figure_07")
     for name, value in {
         "SETS": ((3, 1080.0), (12, 270.0), (24, 270.0)),
         "_FINE": 1,

@@ -15,7 +15,7 @@ SOLID = Grid((26, 30, 28), (1.0, 0.9, 1.1), (1.0, 2.0, -3.0))
 
 @pytest.fixture
 def theorem(tool):
-    return tool("figures.slice_theorem")
+    return tool("paper.slice_theorem")
 
 
 def gaussian(grid, center, spread):

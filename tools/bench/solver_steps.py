@@ -33,12 +33,13 @@ def _step_costs(sums: int) -> dict[str, Cost]:
             lambda c: 3 * c.itemsize * (2 * pixels(c) + sums * samples(c)),
             VECTOR_COSTS["axpby"].formula,
         ),
-        # Of the gradient and of the residual with themselves, and of a step with its weighted one.
+        # Of the gradient and of the residual with themselves, and of a step with its weighted one;
+        # where residuals are weighted, of the residual with its weighted one, too.
         "dot_product": Cost(
             "sample",
             5,
-            lambda c: pixels(c) + 2 * samples(c),
-            lambda c: c.itemsize * (pixels(c) + 3 * samples(c)),
+            lambda c: pixels(c) + (1 + sums) * samples(c),
+            lambda c: c.itemsize * (pixels(c) + (1 + 2 * sums) * samples(c)),
             VECTOR_COSTS["dot_product"].formula,
         ),
     }
@@ -50,4 +51,6 @@ def step_tasks(device: rift.Device, n: int, views: int) -> Iterator[Task]:
     for name, precondition, sums in (("CGLS", None, 1), ("CGLS, ramp", "ramp", 2)):
         solver = Cgls(case.projector(device), case.projections, precondition=precondition)
         steps = solver.run(_STEPS)
+        # The first step has its direction from the start.
+        next(steps)
         yield Task(name, case, steps.__next__, _step_costs(sums))

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal
 from tyro.conf import Positional
 
 from rift_cl.commands.inputs.scan_input import ScanArrays
-from rift_cl.commands.options import Auto, RunOptions
+from rift_cl.commands.options import Auto, RepeatableRun
 from rift_cl.errors import InputError
 
 _MOST_ADDED = 64
@@ -67,7 +67,7 @@ class AnalyzeOutput:
 
 
 @dataclass(frozen=True)
-class AnalyzeSettings(RunOptions, AnalyzeOutput, AnalyzeTarget, AnalyzeInput):
+class AnalyzeSettings(RepeatableRun, AnalyzeOutput, AnalyzeTarget, AnalyzeInput):
     """Analyze how views sample a target: coverage, resolution limits, and views to add.
 
     Example: rift analyze capture --out analysis --diameter 0.2 --unit 1000

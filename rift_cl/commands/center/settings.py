@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from rift_cl.commands.inputs.scan_input import ScanInput
-from rift_cl.commands.options import Auto, RunOptions
+from rift_cl.commands.options import Auto, RepeatableRun
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +27,7 @@ class CenterSearch:
 
 
 @dataclass(frozen=True)
-class CenterSettings(RunOptions, CenterSearch, ScanInput):
+class CenterSettings(RepeatableRun, CenterSearch, ScanInput):
     """Find the rotation axis of a parallel-beam scan.
 
     Example: rift center scan.h5 --out center

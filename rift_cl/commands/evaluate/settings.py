@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 from tyro.conf import Positional
 
 from rift_cl.commands.inputs.scene_input import SceneInput
-from rift_cl.commands.options import Auto, RunOptions
+from rift_cl.commands.options import Auto, RepeatableRun
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class EvalOutput:
 
 
 @dataclass(frozen=True)
-class EvalSettings(RunOptions, EvalOutput, EvalInput):
+class EvalSettings(RepeatableRun, EvalOutput, EvalInput):
     """Score a scene on held-out photographs, or on other captures of it.
 
     Example: rift eval fit --out scores

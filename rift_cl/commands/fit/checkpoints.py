@@ -98,6 +98,9 @@ class FitCheckpoints:
     def _compare(self, facts: Any) -> None:
         before, now = facts.get("settings", {}), self._facts["settings"]
         names = (before.keys() | now.keys()) - {"steps"}
+        # A size that is left open now is that of the fit, whether it was given or decided then.
+        if now.get("downscale") is None:
+            names -= {"downscale"}
         # What was decided then may be said now.
         decided = facts.get("decided", {})
         differing = sorted(

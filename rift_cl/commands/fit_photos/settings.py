@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 from tyro.conf import Positional
 
 from rift_cl.commands.fit.settings import FitOutput, FitSettings, SplitOptions
-from rift_cl.commands.options import RunOptions
+from rift_cl.commands.options import RepeatableRun
 from rift_cl.errors import InputError
 from rift_cl.option_marks import Auto, Short
 from rift_cl.splat.settings import SplatSettings
@@ -70,7 +70,7 @@ class PhotosTraining:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FitPhotosSettings(RunOptions, FitOutput, PhotosTraining, PhotosInput, FitSettings):
+class FitPhotosSettings(RepeatableRun, FitOutput, PhotosTraining, PhotosInput, FitSettings):
     """Fit splats to photographs.
 
     '--strategy default --help' lists the options of that strategy.

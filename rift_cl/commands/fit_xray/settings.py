@@ -10,7 +10,7 @@ from tyro.conf import Positional
 
 from rift_cl.cl.budget import parse_bytes
 from rift_cl.commands.fit.settings import FitOutput, FitSettings, SplitOptions
-from rift_cl.commands.options import RunOptions
+from rift_cl.commands.options import RepeatableRun
 from rift_cl.io.scans.literals import AngleUnit, Kind
 from rift_cl.option_marks import Auto, Short
 from rift_cl.splat.settings import SplatSettings
@@ -90,7 +90,7 @@ class XrayTraining:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FitXraySettings(RunOptions, XrayOutput, XrayTraining, XrayInput, FitSettings):
+class FitXraySettings(RepeatableRun, XrayOutput, XrayTraining, XrayInput, FitSettings):
     """Fit Gaussian densities to the projections of a parallel-beam X-ray scan.
 
     Example: rift fit xray scan.h5 --out fit --steps 3000 --splats 20000

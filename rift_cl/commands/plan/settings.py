@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal
 
-from rift_cl.commands.options import Auto, RunOptions, Several
+from rift_cl.commands.options import Auto, RepeatableRun, Several
 from rift_cl.errors import InputError
 
 _MOST_VIEWS = 10_000
@@ -108,7 +108,7 @@ class PlanOutput:
 
 
 @dataclass(frozen=True)
-class PlanSettings(RunOptions, PlanOutput, PlanCameras, PlanTarget, PlanMethod):
+class PlanSettings(RepeatableRun, PlanOutput, PlanCameras, PlanTarget, PlanMethod):
     """Plan camera poses that minimize what remains uncertain about a target.
 
     Example: rift plan --views 64 --diameter 60 --elevation 0 70 --out plan

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from rift_cl.commands.inputs.scan_input import ScanInput
-from rift_cl.commands.options import Auto, RunOptions
+from rift_cl.commands.options import Auto, RepeatableRun
 from rift_cl.errors import InputError
 
 if TYPE_CHECKING:
@@ -189,7 +189,7 @@ class VolumeOutput:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ResumableRun(RunOptions):
+class ResumableRun(RepeatableRun):
     """How the command runs."""
 
     group: ClassVar[str] = "run"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 from rift_cl.commands.inputs.orbit_input import OrbitInput
-from rift_cl.commands.options import Auto, RunOptions
+from rift_cl.commands.options import Auto, RepeatableRun
 from rift_cl.errors import InputError
 
 FilmChoice = Literal["auto", "webm", "mp4", "mp4-h264", "apng"]
@@ -77,7 +77,7 @@ class FrameOutput:
 
 
 @dataclass(frozen=True)
-class RenderSettings(RunOptions, FrameOutput, CameraOptions, OrbitInput):
+class RenderSettings(RepeatableRun, FrameOutput, CameraOptions, OrbitInput):
     """Render a film of a scene, or the views of a capture.
 
     The film follows the cameras of the photographs: an orbit if they surround the scene, else

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import j1
 
-from figures.aperture_pictures import Drawn, linear_pictures, pinhole
-from figures.images import encode
-from figures.spectra import radial_power, ring_edges
+from paper.aperture_pictures import Drawn, linear_pictures, pinhole
+from paper.images import encode
+from paper.spectra import radial_power, ring_edges
 from rift_cl.geometry import Camera
 from rift_cl.io import open_capture
 from rift_cl.io.images.display_light import to_linear

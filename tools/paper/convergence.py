@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.images import decode, encode
-from figures.plan import Plan
+from paper.images import decode, encode
+from paper.plan import Plan
 from rift_cl import Device, Grid, Parallel, Projector, metrics, phantom
 from rift_cl.progress import Report
 from rift_cl.reconstruct.solvers.conjugate_gradients import Cgls

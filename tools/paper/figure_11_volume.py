@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.images import decode, encode
-from figures.plan import Plan
-from figures.radial_kspace import measure
+from paper.images import decode, encode
+from paper.plan import Plan
+from paper.radial_kspace import measure
 from rift_cl import Device, Grid, Parallel, Projector
 from rift_cl.commands.demo.job import COLUMNS, SCORES, study_curves
 from rift_cl.commands.demo.view_study import ViewScore, detector_bins, score_views

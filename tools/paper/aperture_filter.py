@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from figures.aperture_pictures import (
+from paper.aperture_pictures import (
     FOCUS,
     Drawn,
     lens_capture,
@@ -24,9 +24,9 @@ from figures.aperture_pictures import (
     sharp_splats,
     split_azimuths,
 )
-from figures.aperture_spectra import spectra
-from figures.images import decode, encode
-from figures.plan import EPS2D, Plan
+from paper.aperture_spectra import spectra
+from paper.images import decode, encode
+from paper.plan import EPS2D, Plan
 from rift_cl import Device
 from rift_cl.commands.fit_photos.job import Fit
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings

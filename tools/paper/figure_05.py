@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from figures.images import decode, encode
-from figures.plan import Plan
+from paper.images import decode, encode
+from paper.plan import Plan
 from rift_cl import Device
 from rift_cl.commands.demo.job import COLUMNS, SCORING, study_panels, study_row
 from rift_cl.commands.demo.view_study import ViewScore, view_study

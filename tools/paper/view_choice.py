@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.plan import Ornament
+from paper.plan import Ornament
 from rift_cl.errors import InputError
 from rift_cl.io import make_folder, open_capture, read_image, write_json, write_png
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from figures.fits import FIXED, HELD_OUT, OFF_PATH, SETS, Fitted, fitted
-from figures.plan import Plan
+from paper.fits import FIXED, HELD_OUT, OFF_PATH, SETS, Fitted, fitted
+from paper.plan import Plan
 from rift_cl import Device
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import curves, figure_png

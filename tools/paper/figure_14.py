@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from figures.figure_13 import EXTENT, on_plane, orthonormality
-from figures.mode_gallery import packed, show_gallery
-from figures.plan import Plan
+from paper.figure_13 import EXTENT, on_plane, orthonormality
+from paper.mode_gallery import packed, show_gallery
+from paper.plan import Plan
 from rift_cl import Device
 from rift_cl.basis import Hermite
 from rift_cl.basis.indices import place

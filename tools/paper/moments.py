@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from figures.spectra import error_spectrum, ring_edges
+from paper.spectra import error_spectrum, ring_edges
 from rift_cl import Device
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.blob_volumes import (
+from paper.blob_volumes import (
     RADIUS,
     BlobProjector,
     best_linear,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.images import decode, encode
+from paper.images import decode, encode
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_png, image_grid
 

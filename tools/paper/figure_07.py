@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.images import decode, encode
-from figures.plan import Plan
+from paper.images import decode, encode
+from paper.plan import Plan
 from rift_cl import Camera, Device
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.pose import look_at

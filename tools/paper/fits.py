@@ -7,8 +7,8 @@ import sys
 from dataclasses import dataclass
 from typing import Any
 
-from figures.plan import EPS2D, Plan
-from figures.view_choice import choose_views, fixed_views, write_capture
+from paper.plan import EPS2D, Plan
+from paper.view_choice import choose_views, fixed_views, write_capture
 from rift_cl.commands.fit_photos.job import Fit
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.progress_bar import show_progress

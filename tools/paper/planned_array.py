@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.planned_sector import directions
+from paper.planned_sector import directions
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.sampling.planning.constraints import Constraints, Ranges
 from rift_cl.sampling.planning.planner import plan

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.merit_study import NOISE, SIZE, Objects, best_linear
-from figures.random_objects import RADIUS
+from paper.merit_study import NOISE, SIZE, Objects, best_linear
+from paper.random_objects import RADIUS
 from rift_cl import Camera, Device, Grid, Parallel, Projector, cgls
 from rift_cl.geometry.pose import look_at
 from rift_cl.metrics import disc, psnr

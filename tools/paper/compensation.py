@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.images import decode, encode
-from figures.plan import Plan
+from paper.images import decode, encode
+from paper.plan import Plan
 from rift_cl import Device, Grid, Parallel, Projector, fbp
 from rift_cl.metrics import disc, psnr
 from rift_cl.operators.filters.compensation import Compensation

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_opening
 
-from figures.fits import FIXED, OFF_PATH, Fitted, fitted
-from figures.images import decode, encode
-from figures.plan import Plan
+from paper.fits import FIXED, OFF_PATH, Fitted, fitted
+from paper.images import decode, encode
+from paper.plan import Plan
 from rift_cl import Device, Renderer
 from rift_cl.commands.inputs.scene_input import SceneInput
 from rift_cl.io import open_capture, read_view

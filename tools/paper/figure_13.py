@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.mode_gallery import packed, show_gallery
-from figures.plan import Plan
+from paper.mode_gallery import packed, show_gallery
+from paper.plan import Plan
 from rift_cl import Device
 from rift_cl.basis import Hermite, Laguerre
 from rift_cl.basis.indices import laguerre_place

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.fits import fitted
-from figures.plan import EPS2D, Plan
-from figures.view_choice import write_capture
+from paper.fits import fitted
+from paper.plan import EPS2D, Plan
+from paper.view_choice import write_capture
 from rift_cl import Device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Aperture, Camera

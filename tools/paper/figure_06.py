@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from figures.plan import Plan
+from paper.plan import Plan
 from rift_cl import Device
 from rift_cl.commands.demo.job import COLUMNS, SCORES, SCORING, study_curves
 from rift_cl.commands.demo.view_study import view_study

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.plan import Plan
-from figures.score_scatter import score_scatter
+from paper.plan import Plan
+from paper.score_scatter import score_scatter
 from rift_cl import Device
 from rift_cl.geometry import Camera
 from rift_cl.geometry.pose import look_at

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.random_objects import RADIUS, mean_power, random_objects
+from paper.random_objects import RADIUS, mean_power, random_objects
 from rift_cl import Projector
 from rift_cl.sampling.targets.prior import PowerLaw, Prior, Spectrum
 from rift_cl.sampling.targets.target import Target, half_disc

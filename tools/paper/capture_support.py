@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.images import decode, encode
-from figures.plan import Plan
+from paper.images import decode, encode
+from paper.plan import Plan
 from rift_cl import Device
 from rift_cl.commands.analyze.facts import missing, resolution
 from rift_cl.commands.analyze.input import open_sampled

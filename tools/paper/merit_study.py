@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.angle_families import FAMILIES, family_angles, gaps
-from figures.known_objects import KINDS, NOISE, SIZE, Objects, best_linear
-from figures.plan import Plan
-from figures.random_objects import RADIUS
-from figures.score_scatter import score_scatter
+from paper.angle_families import FAMILIES, family_angles, gaps
+from paper.known_objects import KINDS, NOISE, SIZE, Objects, best_linear
+from paper.plan import Plan
+from paper.random_objects import RADIUS
+from paper.score_scatter import score_scatter
 from rift_cl import Device, Grid, Parallel, Projector, cgls
 from rift_cl.metrics import disc
 from rift_cl.report.html_page import Page

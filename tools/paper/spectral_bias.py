@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from figures.fits import FIXED, OFF_PATH, fit_settings, fitted
-from figures.moments import watched
-from figures.plan import Plan
+from paper.fits import FIXED, OFF_PATH, fit_settings, fitted
+from paper.moments import watched
+from paper.plan import Plan
 from rift_cl import Device
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import curves, figure_png

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from figures.plan import Plan
-from figures.planned_array import ARRAYS, DISTANCE, array_case, ball
-from figures.planned_array import VIEWS as ARRAY_VIEWS
-from figures.planned_flat import METHODS, PILOT, flat_case
-from figures.planned_sector import ARCS, SIZE, TWICE, VIEWS, arc_name, directions, volume_case
+from paper.plan import Plan
+from paper.planned_array import ARRAYS, DISTANCE, array_case, ball
+from paper.planned_array import VIEWS as ARRAY_VIEWS
+from paper.planned_flat import METHODS, PILOT, flat_case
+from paper.planned_sector import ARCS, SIZE, TWICE, VIEWS, arc_name, directions, volume_case
 from rift_cl import Device
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import Stands, camera_plot, figure_png

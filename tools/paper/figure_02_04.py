@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.images import decode, encode
-from figures.plan import Plan
-from figures.slice_theorem import slice_comparison
+from paper.images import decode, encode
+from paper.plan import Plan
+from paper.slice_theorem import slice_comparison
 from rift_cl import Device, Grid, Parallel, Projector, backproject
 from rift_cl.phantom import shepp_logan
 from rift_cl.report.html_page import Page

@@ -20,10 +20,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from figures.plan import EPS2D, Plan
 from ornament.cameras import TARGET, Shot, around, off_path, ring, shots_at, transforms
 from ornament.capture_folder import render_capture
 from ornament.tracer import BACKGROUND, Tracer, choose_variant
+from paper.plan import EPS2D, Plan
 from rift_cl import Device
 from rift_cl.commands.fit_photos.job import Fit
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings

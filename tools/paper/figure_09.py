@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from figures.figure_09_drawing import draw
-from figures.plan import Plan
+from paper.figure_09_drawing import draw
+from paper.plan import Plan
 from rift_cl import Device
 from rift_cl.io.lenses.lens_file import open_lens
 from rift_cl.optics.camera_reduction import Reduction, reduce_camera
