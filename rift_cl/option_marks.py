@@ -18,3 +18,5 @@ Auto = Annotated[T | None, tyro.conf.arg(help_behavior_hint="")]
 ShortAuto = Annotated[T | None, tyro.conf.arg(prefix_name=False, help_behavior_hint="")]
 # No option: it follows from other settings, or has one value that makes sense.
 NoOption = Annotated[T, tyro.conf.Fixed, tyro.conf.Suppress]
+# Any number of values, none where it is not given.
+Several = Annotated[tuple[T, ...], tyro.conf.arg(help_behavior_hint="")]

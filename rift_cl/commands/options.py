@@ -10,18 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, get_type_hints
 
-import tyro
+from rift_cl.option_marks import Auto
 
 if TYPE_CHECKING:
     from rift_cl.cl.device import Device
-
-T = TypeVar("T")
-# An option that the run decides where it is not given: its help says how, "None" would not.
-Auto = Annotated[T | None, tyro.conf.arg(help_behavior_hint="")]
-# Any number of values, none where it is not given.
-Several = Annotated[tuple[T, ...], tyro.conf.arg(help_behavior_hint="")]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,6 +12,7 @@ any two steps, is all that a run needs to go on to the same bits.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Protocol, final
 
@@ -43,7 +44,10 @@ _BAND_EVERY = 100
 # What a step costs beside its splats, what harmonics of degree 1 add to a splat, and what each
 # further degree adds, all in the cost of as many splats of one color as there may be. Fitted to the
 # times of steps on PoCL (``tools/time_left.py``).
-_PIXELS, _FIRST_DEGREE, _NEXT_DEGREE = 0.4, 0.5, 0.25
+_PIXELS, _FIRST_DEGREE, _NEXT_DEGREE = 0.6, 0.5, 0.25
+# Splats begin large, so each covers more pixels: what the first step costs more, as a share, and
+# how much of that is left one step later. Fitted to the same times.
+_LARGE, _SHRINK = 0.75, math.exp(-1 / 60)
 
 
 Group = Mapping[str, NDArray[Any]]
@@ -204,11 +208,13 @@ class Trainer:
             self._limit_band()
         return value
 
-    def _work(self, step: int, splats: int) -> float:
-        """The cost of a step with so many splats, in that of all splats of one color."""
+    def _work(self, step: int, splats: int, steps: int = 1) -> float:
+        """The cost of steps with so many splats, in that of a step of all splats of one color."""
         degree = min(step // self.settings.sh_every, self._last_degree)
         harmonics = _FIRST_DEGREE + _NEXT_DEGREE * (degree - 1) if degree else 0.0
-        return _PIXELS + splats / self.settings.splats * (1 + harmonics)
+        one = _PIXELS + splats / self.settings.splats * (1 + harmonics)
+        large = _LARGE * _SHRINK**step * (1 - _SHRINK**steps) / (1 - _SHRINK)
+        return one * (steps + large)
 
     @property
     def _last_degree(self) -> int:
@@ -222,7 +228,7 @@ class Trainer:
         for steps, count in self.strategy.forecast(step, len(self.parameters)):
             end = step + steps
             for until in [*(at for at in joins if step < at < end), end]:
-                left += (until - step) * self._work(step, count)
+                left += self._work(step, count, until - step)
                 step = until
         return left
 

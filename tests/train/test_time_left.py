@@ -56,22 +56,24 @@ def test_the_numbers_of_splats_are_forecast_to_the_last(device):
 @pytest.mark.parametrize("degree", [0, 2])
 def test_reports_say_how_much_work_is_done_and_left(device, degree):
     _, reports, counts = trained(device, sh_degree=degree, sh_every=50)
-    joined = [min(step // 50, degree) for step in range(120)]
-    work = np.cumsum([cost(count / 80, by) for count, by in zip(counts, joined, strict=True)])
+    work = np.cumsum(
+        [cost(step, count / 80, min(step // 50, degree)) for step, count in enumerate(counts)]
+    )
     for report in reports:
         assert report.work == pytest.approx((work[report.done - 1], work[-1]))
 
 
-def cost(share, degree):
+def cost(step, share, degree):
     """Of a step with a share of all splats and harmonics of a degree, as the trainer takes it."""
-    return 0.4 + share * (1 + [0, 0.5, 0.75, 1.0][degree])
+    return (0.6 + share * (1 + [0, 0.5, 0.75, 1.0][degree])) * (1 + 0.75 * np.exp(-step / 60))
 
 
-@pytest.mark.parametrize("pixels", [0.25, 0.4, 0.6])
+@pytest.mark.parametrize("large, shrunk", [(0.5, 60), (0.75, 60), (1.0, 60)])
+@pytest.mark.parametrize("pixels", [0.4, 0.6, 0.8])
 @pytest.mark.parametrize("first_degree, next_degree", [(0.35, 0.2), (0.5, 0.25), (0.65, 0.3)])
 @pytest.mark.parametrize("steps, first", [(900, 4000), (3000, 4000), (3000, 8000), (30_000, 2000)])
 def test_the_time_left_is_within_a_quarter_from_a_tenth_of_the_run_on(
-    steps, first, first_degree, next_degree, pixels
+    steps, first, first_degree, next_degree, pixels, large, shrunk
 ):
     """Whatever pixels, splats and harmonics cost; kernels are built, and other programs run."""
     most = 8000
@@ -83,12 +85,13 @@ def test_the_time_left_is_within_a_quarter_from_a_tenth_of_the_run_on(
     harmonics = harmonics + np.maximum(degrees - 1, 0) * next_degree
     seconds = pixels + counts / most * (1 + harmonics)
     # Splats are too large at first; a degree that joins has its kernels built.
-    seconds[: steps // 20] *= 1.5
+    seconds *= 1 + large * np.exp(-np.arange(steps) / shrunk)
     seconds[500::500][:3] += 0.01 * seconds.sum() / 3
     # Another program runs for a while.
     seconds[int(0.4 * steps) : int(0.42 * steps)] *= 2
     seconds = np.cumsum(seconds)
-    work = np.cumsum([cost(*now) for now in zip(counts / most, degrees, strict=True)])
+    shares = counts / most
+    work = np.cumsum([cost(*now) for now in zip(range(steps), shares, degrees, strict=True)])
     clock = [0.0]
     pace, worst = Pace(lambda: clock[0]), 0.0
     for done in range(25, steps, 25):

@@ -10,8 +10,9 @@ from typing import Annotated, ClassVar, Literal
 from tyro.conf import Positional
 
 from rift_cl.commands.inputs.scan_input import ScanArrays
-from rift_cl.commands.options import Auto, RepeatableRun
+from rift_cl.commands.options import RepeatableRun
 from rift_cl.errors import InputError
+from rift_cl.option_marks import Auto
 
 _MOST_ADDED = 64
 

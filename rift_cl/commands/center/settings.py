@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import ClassVar
 
 from rift_cl.commands.inputs.scan_input import ScanInput
-from rift_cl.commands.options import Auto, RepeatableRun
+from rift_cl.commands.options import RepeatableRun
+from rift_cl.option_marks import Auto
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,8 @@ from typing import Annotated, ClassVar
 from tyro.conf import Positional
 
 from rift_cl.commands.inputs.scene_input import SceneInput
-from rift_cl.commands.options import Auto, RepeatableRun
+from rift_cl.commands.options import RepeatableRun
+from rift_cl.option_marks import Auto
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 from rift_cl.commands.inputs.orbit_input import OrbitInput
-from rift_cl.commands.options import Auto, RunOptions
+from rift_cl.commands.options import RunOptions
+from rift_cl.option_marks import Auto
 
 Target = Literal["html", "ply", "compressed-ply", "spz", "sog", "glb", "stl", "obj"]
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rift_cl.commands.inputs.scene_input import SceneInput
-from rift_cl.commands.options import Auto
 from rift_cl.errors import InputError
+from rift_cl.option_marks import Auto
 
 if TYPE_CHECKING:
     import numpy as np

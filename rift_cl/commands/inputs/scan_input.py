@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional
 
-from rift_cl.commands.options import Auto
 from rift_cl.errors import InputError
 from rift_cl.io.scans.literals import AngleUnit, Kind
+from rift_cl.option_marks import Auto
 
 if TYPE_CHECKING:
     from rift_cl.io.scans.scan_file import ScanFile

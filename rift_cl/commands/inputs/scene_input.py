@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional
 
-from rift_cl.commands.options import Auto
+from rift_cl.option_marks import Auto
 
 if TYPE_CHECKING:
     from rift_cl.commands.inputs.opened_scene import OpenedScene

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal
 
-from rift_cl.commands.options import Auto, RepeatableRun, Several
+from rift_cl.commands.options import RepeatableRun
 from rift_cl.errors import InputError
+from rift_cl.option_marks import Auto, Several
 
 _MOST_VIEWS = 10_000
 

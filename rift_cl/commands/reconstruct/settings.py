@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from rift_cl.commands.inputs.scan_input import ScanInput
-from rift_cl.commands.options import Auto, RepeatableRun
+from rift_cl.commands.options import RepeatableRun
 from rift_cl.errors import InputError
+from rift_cl.option_marks import Auto
 
 if TYPE_CHECKING:
     from rift_cl.operators import Filter

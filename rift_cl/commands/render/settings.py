@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 from rift_cl.commands.inputs.orbit_input import OrbitInput
-from rift_cl.commands.options import Auto, RepeatableRun
+from rift_cl.commands.options import RepeatableRun
 from rift_cl.errors import InputError
+from rift_cl.option_marks import Auto
 
 FilmChoice = Literal["auto", "webm", "mp4", "mp4-h264", "apng"]
 # Pixels along an edge, and frames; more is a slip of the hand.
