@@ -71,6 +71,8 @@ def _use_all_cores(config: pytest.Config) -> None:
     option.numprocesses = workers
     if option.dist == "no":
         option.dist = "loadfile"
+        # By default files of few tests come last, and some of those take longest.
+        option.loadscopereorder = False
 
 
 def _memory() -> int:

@@ -47,6 +47,7 @@ def laid_out(draw):
     return array
 
 
+@pytest.mark.full
 @settings(max_examples=300, deadline=None)
 @given(laid_out())
 def test_any_layout_arrives_as_numpy_reads_it(array):

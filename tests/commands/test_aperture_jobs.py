@@ -135,6 +135,7 @@ def score(folder):
     return next(iter(metrics["scores"].values()))["fit_psnr"]
 
 
+@pytest.mark.full
 def test_a_fit_looks_through_the_captures_lens_unless_it_is_told_not_to(through_lens, tmp_path):
     assert fit(through_lens, tmp_path / "lens") == 0
     assert fit(through_lens, tmp_path / "pinhole", "--pinhole") == 0

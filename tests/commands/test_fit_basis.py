@@ -156,6 +156,7 @@ def test_a_dry_run_says_what_splats_would_be(capture, tmp_path, capsys):
     assert "hermite splats of shape order 1, colour order 1" in printed
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("rows", [1, 3])
 def test_densities_of_x_rays_have_modes_too(tmp_path, rows):
     size, pitch = 24, 0.5

@@ -61,6 +61,7 @@ def test_the_cameras_of_a_fit_are_those_of_its_capture(capture, fitted):
     assert cameras.arc.closed and cameras.reprojection_error is None
 
 
+@pytest.mark.full
 def test_refined_poses_are_those_that_are_kept(capture, fitted, tmp_path):
     words = ["--steps", "20", "--splats", "50", "--hold-out", "4", "--quiet", "--refine-poses"]
     assert main(["fit", str(capture), "--out", str(tmp_path / "fit"), *words]) == 0

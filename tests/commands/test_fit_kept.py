@@ -9,6 +9,7 @@ from rift_cl.commands.fit_photos.job import Fit
 from rift_cl.errors import CheckpointError
 
 
+@pytest.mark.full
 def test_the_size_that_was_decided_is_that_of_what_goes_on(capture, tmp_path, monkeypatch):
     """Another device would decide otherwise, and fits of old began without a choice."""
     small = {True: 400, False: 400}
@@ -27,6 +28,7 @@ def test_the_size_that_was_decided_is_that_of_what_goes_on(capture, tmp_path, mo
         Fit(settings(capture, asked, steps=75, resume=True, downscale=2))
 
 
+@pytest.mark.full
 def test_what_goes_on_begins_with_the_poses_that_were_refined(capture, tmp_path):
     out = tmp_path / "fit"
     run(settings(capture, out, steps=50, **VARIANTS["default"]))

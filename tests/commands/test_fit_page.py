@@ -26,6 +26,7 @@ def test_a_fit_leaves_the_page_that_export_makes(capture, tmp_path):
     assert str(tmp_path).encode() not in page.read_bytes()
 
 
+@pytest.mark.full
 def test_without_viser_and_with_a_viser_that_fails_there_is_no_page(
     capture, tmp_path, monkeypatch, capsys
 ):

@@ -52,6 +52,7 @@ def test_times_are_said_in_two_figures():
     assert told == ["about 0.12 s", "about 4.6 s", "about 99 s", "about 1200 s"]
 
 
+@pytest.mark.full
 def test_a_dry_run_leaves_the_fit_as_it_would_be(capture, tmp_path):
     scenes = []
     for name in ("tried", "not"):

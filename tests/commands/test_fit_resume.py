@@ -61,6 +61,7 @@ def broken_off(given, after):
     return str(caught.value)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_a_fit_that_was_broken_off_goes_on_to_the_same_bits(capture, tmp_path, variant):
     more = VARIANTS[variant]

@@ -48,6 +48,7 @@ def test_solving_serves_projections_that_were_not_looked_at(scan, tmp_path):
     assert found[1] > found[0] + 0.1
 
 
+@pytest.mark.full
 def test_a_fit_that_was_broken_off_goes_on_to_the_same_bits(scan, tmp_path):
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     list(XrayFit(settings(scan, whole)).run())

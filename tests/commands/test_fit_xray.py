@@ -101,6 +101,7 @@ def test_the_unit_of_line_integrals_changes_nothing_but_the_unit(scans, tmp_path
     )
 
 
+@pytest.mark.full
 def test_a_fit_that_was_broken_off_goes_on_to_the_same_bits(scans, tmp_path):
     path, more = scans[4][0], {"homogenise": 1.0, "steps": 140}
     whole, cut = tmp_path / "whole", tmp_path / "cut"

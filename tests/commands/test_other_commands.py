@@ -102,6 +102,7 @@ def test_a_demo_that_is_repeated_leaves_no_old_pictures(tmp_path, capsys):
     assert sorted(path.name for path in out.glob("*.png")) == ["filtered_5.png", "unfiltered_5.png"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("how", [">&-", "2>&-", "| head -0", "> /dev/full", "2> /dev/full"])
 def test_closed_and_full_streams_are_survived(how, tmp_path):
     python = shlex.quote(sys.executable)

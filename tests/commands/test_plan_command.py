@@ -114,6 +114,7 @@ def test_what_was_planned_can_be_analysed_without_photographs(planned):
     )
 
 
+@pytest.mark.full
 def test_the_same_seed_gives_the_same_plan_and_replaces_one_only_on_demand(
     planned, cameras, capsys
 ):

@@ -39,6 +39,7 @@ def fitted(request, capture, tmp_path_factory):
     return settings, rift.SplatScene.load(out / "scene.ply")
 
 
+@pytest.mark.full
 def test_a_fit_wants_what_frames_of_its_splats_take(fitted, tmp_path):
     settings, scene = fitted
     training = replace(settings.training, splats=MANY)

@@ -34,6 +34,7 @@ def agreement(image, truth):
     return np.mean((image > MU / 2) == truth)
 
 
+@pytest.mark.full
 def test_holes_are_found_that_other_methods_smear(disc, tmp_path):
     path, truth = disc
     common = ("--center", 35.5, "--size", 64, "--kind", "attenuation")

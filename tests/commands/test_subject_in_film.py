@@ -74,6 +74,7 @@ def assert_shows_the_subject(image: np.ndarray, camera: Camera) -> None:
     assert alike > _ALIKE and away < 0.05, (alike, away)
 
 
+@pytest.mark.full
 def test_the_subject_is_in_every_frame_of_the_film(fitted):
     views = open_capture(fitted.film).views
     assert len(views) == 16

@@ -90,6 +90,7 @@ def test_a_planner_looks_from_where_its_cameras_may_stand():
     np.testing.assert_allclose(even.T @ even / len(even), np.eye(3) / 3, atol=0.01)
 
 
+@pytest.mark.full
 def test_a_plan_for_where_it_is_looked_at_knows_more_there():
     target = ball(degree=6)
     asked = looked_at(target, LOW)
