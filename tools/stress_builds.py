@@ -25,8 +25,9 @@ raise SystemExit(None if found.passed else found.detail)
 """
 _WITHOUT_LOCK = """
 import contextlib
-from rift_cl.cl import program
-program.build_lock, program._PAUSES = contextlib.nullcontext, (0.0,)
+from rift_cl.cl import build, program
+program.build_lock = build.build_lock = contextlib.nullcontext
+build._PAUSES = (0.0,)
 """
 
 

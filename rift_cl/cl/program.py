@@ -1,40 +1,29 @@
-"""Building and launching kernels: the only caller of the driver's compiler.
+"""Launching kernels.
 
-A program is built once per device, kernel and macros. A ``cl.Kernel`` object holds its arguments,
-so two threads that share one silently compute with each other's; each thread keeps its own.
-Arguments are named, and checked against what the kernel's source says that it takes.
+A ``cl.Kernel`` object holds its arguments, so two threads that share one silently compute with each
+other's; each thread keeps its own. Arguments are named, and checked against what the kernel's
+source says that it takes.
 """
 
 from __future__ import annotations
 
-import re
 import threading
-import time
-import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from rift_cl.cl.build import Builder, Key, building
 from rift_cl.cl.failures import named_errors
 from rift_cl.cl.kernel_cache import build_lock
 from rift_cl.cl.process import claim_process
-from rift_cl.cl.real_type import real_type
 from rift_cl.cl.signature import Parameter, check_names, check_numbers, in_order, parameters
 from rift_cl.cl.source import kernel_source
-from rift_cl.errors import KernelBuildError
 
 if TYPE_CHECKING:
     from rift_cl.cl.device import Device
 
-OPTIONS = ("-cl-std=CL1.2", "-cl-mad-enable", "-w")
 # PoCL compiles for grids up to this size and for larger ones apart.
 _SMALL_GRID = 65534
-_PAUSES = (0.0, 0.1, 0.3)
-# One for all devices: pyopencl writes Python code for each new kernel, and that is not thread-safe.
-_building = threading.RLock()
-# A kernel and its macros as the compiler sees them: 1 and 1.0 are equal, but not the same.
-_Key = tuple[str, tuple[tuple[str, str], ...]]
-_DOUBLE = ("DOUBLE", "1")
 
 
 class _Kernel(NamedTuple):
@@ -48,22 +37,20 @@ class _ThreadKernels(threading.local):
     """The calling thread's own kernel objects."""
 
     def __init__(self) -> None:
-        self.kernels: dict[_Key, _Kernel] = {}
+        self.kernels: dict[Key, _Kernel] = {}
 
 
 class Programs:
-    """The built programs of one device and every thread's kernels.
+    """Every thread's kernels on one device.
 
     Args:
-        device: the device to build for.
+        device: the device to launch on.
     """
 
     def __init__(self, device: Device) -> None:
-        # Some drivers remark on kernels that they build well; a failure is told by an exception.
-        warnings.filterwarnings("ignore", message="Non-empty compiler output")
         self._device = device
-        self._programs: dict[_Key, Any] = {}
-        self._started: set[tuple[_Key, bool]] = set()
+        self._builder = Builder(device)
+        self._started: set[tuple[Key, bool]] = set()
         # The macros among the names that launches give, for each set of names that was given.
         self._macros: dict[tuple[str, ...], tuple[str, ...]] = {}
         self._own = _ThreadKernels()
@@ -110,7 +97,7 @@ class Programs:
 
     def _enqueue(
         self,
-        started: tuple[_Key, bool],
+        started: tuple[Key, bool],
         kernel: Any,
         size: tuple[int, ...],
         local: tuple[int, ...],
@@ -122,21 +109,21 @@ class Programs:
             cl.enqueue_nd_range_kernel(queue, kernel, size, local)
             return
         # PoCL compiles again for the first launch, into the same cache.
-        with _building, build_lock():
+        with building, build_lock():
             cl.enqueue_nd_range_kernel(queue, kernel, size, local)
             queue.finish()
             self._started.add(started)
 
-    def _kernel(self, key: _Key) -> _Kernel:
+    def _kernel(self, key: Key) -> _Kernel:
         kernel = self._own.kernels.get(key)
         if kernel is None:
             import pyopencl as cl
 
             name, macros = key
-            program = self._program(key)
-            with _building, named_errors(f"loading kernel {name}", self._device.name):
+            program = self._builder.program(key)
+            with building, named_errors(f"loading kernel {name}", self._device.name):
                 handle = cl.Kernel(program, name)
-                found = parameters(name, kernel_source(name), self._defines(macros))
+                found = parameters(name, kernel_source(name), self._builder.defines(macros))
                 # Numbers whose types are known beforehand are set many times faster.
                 handle.set_scalar_arg_dtypes(
                     [each.dtype.type if each.lanes == 1 else None for each in found]
@@ -144,57 +131,9 @@ class Programs:
             kernel = self._own.kernels[key] = _Kernel(handle, found)
         return kernel
 
-    def _defines(self, macros: tuple[tuple[str, str], ...]) -> dict[str, str]:
-        """Every macro that a program is built with."""
-        device = {macro: str(value) for macro, value in self._device.traits.macros.items()}
-        return device | dict(macros)
-
-    def _program(self, key: _Key) -> Any:
-        with _building:
-            if key not in self._programs:
-                self._programs[key] = self._build(key)
-            return self._programs[key]
-
-    def _build(self, key: _Key) -> Any:
-        import pyopencl as cl
-
-        name, macros = key
-        if _DOUBLE in macros:
-            real_type(self._device, np.float64)
-        defines = self._defines(macros).items()
-        options = [*OPTIONS, *(f"-D{macro}={value}" for macro, value in defines)]
-        failure = ""
-        for pause in _PAUSES:
-            time.sleep(pause)
-            try:
-                with build_lock():
-                    return cl.Program(self._device.context, kernel_source(name)).build(options)
-            except cl.Error as error:
-                failure = str(error)
-            # An empty log is PoCL's way to lose a race for its cache; a real error has one.
-            if _log(failure):
-                break
-        raise _build_error(name, failure, options, self._device.name)
-
 
 def _literal(value: float | str) -> str:
     """A compile-time constant as the compiler sees it; a text is an expression without spaces."""
     if isinstance(value, str):
         return value
     return f"{float(value)!r}f" if isinstance(value, (float, np.floating)) else str(int(value))
-
-
-def _log(text: str) -> str:
-    lines = [line for line in text.splitlines() if re.search(r"error|warning", line, re.IGNORECASE)]
-    return "\n".join(line for line in lines if "BUILD_PROGRAM_FAILURE" not in line)
-
-
-def _build_error(name: str, text: str, options: list[str], device: str) -> KernelBuildError:
-    log = _log(text)
-    place = re.search(r"([\w./-]+\.(?:cl|h)):(\d+)", log)
-    where = f"{place[1]}:{place[2]}" if place else f"{name}.cl"
-    return KernelBuildError(
-        f"kernel {name} did not compile for {device}, at {where}; this is a defect of rift-cl or "
-        f"of the driver, please report it with this log (options {' '.join(options)}):\n"
-        f"{log or text}"
-    )

@@ -60,7 +60,7 @@ def fresh(device):
 
 
 def _build(device, name, **macros):
-    return device._programs._program((name, tuple(sorted(macros.items()))))
+    return device._programs._builder.program((name, tuple(sorted(macros.items()))))
 
 
 def test_there_are_kernels():

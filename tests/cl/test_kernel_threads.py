@@ -91,7 +91,7 @@ def test_threads_that_build_first_share_one_program(device, restless):
 
     _in_threads(work)
     assert right == [True] * THREADS
-    assert len(fresh._programs._programs) == 1
+    assert len(fresh._programs._builder._programs) == 1
 
 
 def test_allocations_of_threads_do_not_overlap(device, restless):

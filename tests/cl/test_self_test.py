@@ -40,7 +40,7 @@ def test_wrong_numbers_are_noticed(device, monkeypatch, kernel):
     assert wrong != right
     real = source.kernel_source
     monkeypatch.setattr(
-        "rift_cl.cl.program.kernel_source", lambda name: wrong if name == kernel else real(name)
+        "rift_cl.cl.build.kernel_source", lambda name: wrong if name == kernel else real(name)
     )
     found = self_test(Device(device._handle, device.selector, traits=device.traits))
     assert (found.passed, found.detail) == (False, f"{device.name} computed wrong numbers")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rift_cl.cl import source
-from rift_cl.cl.program import OPTIONS
+from rift_cl.cl.build import OPTIONS
 from rift_cl.cl.signature import parameters
 from rift_cl.errors import KernelArgumentError
 
@@ -41,7 +41,7 @@ def test_the_compiler_reads_the_same_signature(device, name, macros):
     if name.endswith(("_cpu", "_gpu")) and not name.endswith(kind):
         pytest.skip("a driver for the other kind of device")
     text = source.kernel_source(name)
-    defines = device._programs._defines(tuple((key, str(macros[key])) for key in macros))
+    defines = device._programs._builder.defines(tuple((key, str(macros[key])) for key in macros))
     options = [*OPTIONS, "-cl-kernel-arg-info", *(f"-D{key}={defines[key]}" for key in defines)]
     kernel = cl.Kernel(cl.Program(device.context, text).build(options), name)
     ours = parameters(name, text, defines)
