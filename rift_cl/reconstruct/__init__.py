@@ -24,7 +24,7 @@ from rift_cl.reconstruct.solvers.ordered_subsets import OrderedSubsets
 from rift_cl.reconstruct.solvers.pdhg import Pdhg
 from rift_cl.reconstruct.solvers.poisson_weights import RayWeights, poisson_weights
 from rift_cl.reconstruct.solvers.simultaneous_iteration import Sirt, sirt
-from rift_cl.reconstruct.solvers.tv_reconstruction import tv
+from rift_cl.reconstruct.solvers.tv import tv
 
 __all__ = [
     "Attenuation",

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from rift_cl.train.loss.image_loss import ImageLoss
     from rift_cl.train.loss.pixel_loss import PIXEL_LOSSES, PixelLoss, register_loss
     from rift_cl.train.parameters import Parameters
+    from rift_cl.train.per_view.images import ImageViews
     from rift_cl.train.settings import LearningRates, TrainSettings
     from rift_cl.train.start.points import random_points, start_splats
     from rift_cl.train.strategy import (
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
         register_strategy,
     )
     from rift_cl.train.trainer import Trainer, TrainingViews
-    from rift_cl.train.views.images import ImageViews
     from rift_cl.train.xray.settings import XrayTrainSettings
     from rift_cl.train.xray.solve_settings import SolveSettings
     from rift_cl.train.xray.trainer import XrayTrainer

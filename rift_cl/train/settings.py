@@ -1,6 +1,8 @@
 """Settings of a fit: every switch of the trainer, in frozen values.
 
-The settings of strategies stand beside their strategies, in ``rift_cl.train.strategy``.
+The settings of strategies stand beside their strategies, in ``rift_cl.train.strategy``. Fits of
+X-rays have defaults of their own (``rift_cl.train.xray.settings``), and so have those of
+photographs (``rift_cl.commands.fit_photos.settings``).
 """
 
 from __future__ import annotations

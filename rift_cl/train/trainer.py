@@ -30,12 +30,12 @@ from rift_cl.train.band_limit import BandLimiter
 from rift_cl.train.loss.coverage_weight import weight_of
 from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
 from rift_cl.train.parameters import Parameters
+from rift_cl.train.per_view.exposures import Exposures
+from rift_cl.train.per_view.poses import Poses
 from rift_cl.train.schedules import CoefficientSchedule, LearningRateSchedule
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import scene_extent
 from rift_cl.train.strategy import TrainingRun
-from rift_cl.train.views.exposures import Exposures
-from rift_cl.train.views.poses import Poses
 
 # Steps between two reports; the loss comes to the host for each.
 REPORT_EVERY = 25

@@ -171,7 +171,7 @@ def test_help_has_an_example(command, capsys):
 def test_every_way_to_ask_gives_the_same_axis(scan, tmp_path, capsys):
     from rift_cl.commands.analyze.input import open_sampled
     from rift_cl.commands.analyze.settings import AnalyzeSettings
-    from rift_cl.commands.center.axis_search import find_axis
+    from rift_cl.commands.inputs.scan_axis import find_axis
     from rift_cl.io.scans.formats import open_scan
 
     with np.load(scan.integrals) as file:

@@ -20,7 +20,7 @@ from rift_cl.reconstruct import (
     rebin_fan,
 )
 from rift_cl.reconstruct.direct.fan_rebin import covered_rays
-from rift_cl.reconstruct.solvers.total_variation import TotalVariation
+from rift_cl.reconstruct.solvers.tv_functional import TotalVariation
 from rift_cl.reference import total_variation as twin
 from rift_cl.reference.level_pull import level_penalty, level_pull
 

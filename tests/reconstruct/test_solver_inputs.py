@@ -12,7 +12,7 @@ from rift_cl.operators import Ramp, ViewFilter
 from rift_cl.reconstruct.solvers.conjugate_gradients import Cgls, cgls
 from rift_cl.reconstruct.solvers.fista import Fista
 from rift_cl.reconstruct.solvers.simultaneous_iteration import sirt
-from rift_cl.reconstruct.solvers.tv_reconstruction import tv
+from rift_cl.reconstruct.solvers.tv import tv
 
 every_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 FUNCTIONS = {

@@ -13,7 +13,7 @@ from rift_cl.reconstruct.solvers.conjugate_gradients import cgls
 from rift_cl.reconstruct.solvers.fista import Fista
 from rift_cl.reconstruct.solvers.pdhg import Pdhg
 from rift_cl.reconstruct.solvers.simultaneous_iteration import Sirt, sirt
-from rift_cl.reconstruct.solvers.tv_reconstruction import tv
+from rift_cl.reconstruct.solvers.tv import tv
 from rift_cl.reference import total_variation as twin
 
 RANDOM = np.random.default_rng(8)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rift_cl.errors import ShapeError
-from rift_cl.reconstruct.solvers.total_variation import TotalVariation
+from rift_cl.reconstruct.solvers.tv_functional import TotalVariation
 from rift_cl.reference import total_variation as twin
 
 SHAPES = {

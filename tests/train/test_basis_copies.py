@@ -9,10 +9,10 @@ from test_basis_parameters import COUNT, with_modes
 
 from rift_cl.basis.indices import graded
 from rift_cl.train.parameters import MORE, Parameters
+from rift_cl.train.per_view.quaternions import rotated
 from rift_cl.train.strategy.default import DefaultSettings, densify
 from rift_cl.train.strategy.mcmc import relocate
 from rift_cl.train.strategy.xray import relocate_densities
-from rift_cl.train.views.quaternions import rotated
 
 
 def test_splats_that_share_a_place_have_the_depth_of_the_one_before(device):

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 from test_start import ring
 
 from rift_cl.geometry import Camera
-from rift_cl.train.views.exposures import Exposures
-from rift_cl.train.views.poses import Poses, twist_gradient
+from rift_cl.train.per_view.exposures import Exposures
+from rift_cl.train.per_view.poses import Poses, twist_gradient
 
 
 def disturbed(cameras, turn, shift, seed=0):

@@ -20,8 +20,8 @@ from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
 from rift_cl.train.loss.image_loss import ImageLoss
 from rift_cl.train.parameters import Parameters
+from rift_cl.train.per_view.exposures import Exposures
 from rift_cl.train.strategy.screen_statistics import ScreenStatistics
-from rift_cl.train.views.exposures import Exposures
 
 if TYPE_CHECKING:
     from bench.splats import SplatCase

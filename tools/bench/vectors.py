@@ -19,7 +19,7 @@ from bench.operations import Task
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import clip_between, clip_negative, multiply, pull_to_levels
 from rift_cl.cl.reductions import dot
-from rift_cl.reconstruct.solvers.total_variation import TotalVariation
+from rift_cl.reconstruct.solvers.tv_functional import TotalVariation
 
 # Of the noise in an image from 0 to 1, and the longest vector of the dual, its weight.
 _NOISE, _RADIUS = 0.02, 0.1

@@ -9,8 +9,8 @@ import numpy as np
 
 from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.cameras.arc import check_places
-from rift_cl.commands.center.axis_search import find_axis
 from rift_cl.commands.inputs.fan_views import fan_cameras
+from rift_cl.commands.inputs.scan_axis import find_axis
 from rift_cl.commands.inputs.scene_bounds import SceneBounds, bounds_of_cameras
 from rift_cl.commands.inputs.scene_depth import space_of
 from rift_cl.commands.inputs.surfaces import trusted

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.commands.center.axis_search import find_axis
 from rift_cl.commands.center.settings import CenterSettings
+from rift_cl.commands.inputs.scan_axis import find_axis
 from rift_cl.commands.inputs.scan_rows import read_attenuation
 from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.run_folder.run_folder import RunFolder

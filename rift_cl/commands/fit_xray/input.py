@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.commands.center.axis_search import find_axis
 from rift_cl.commands.fit_photos.pictures import Light
 from rift_cl.commands.fit_xray.settings import FitXraySettings
+from rift_cl.commands.inputs.scan_axis import find_axis
 from rift_cl.commands.inputs.scan_input import ScanInput
 from rift_cl.commands.inputs.scan_rows import (
     check_center,

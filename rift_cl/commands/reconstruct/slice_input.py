@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.commands.center.axis_search import find_axis
+from rift_cl.commands.inputs.scan_axis import find_axis
 from rift_cl.commands.inputs.scan_rows import (
     check_center,
     chosen_rows,

@@ -23,8 +23,8 @@ from rift_cl.operators.linear import LinearOperator
 from rift_cl.reconstruct.solvers.direction_weights import DirectionWeights
 from rift_cl.reconstruct.solvers.residual_weight import Precondition
 from rift_cl.reconstruct.solvers.solver import check_steps
-from rift_cl.reconstruct.solvers.total_variation import following_weight
-from rift_cl.reconstruct.solvers.variation_problem import VariationSolver, VariationState
+from rift_cl.reconstruct.solvers.tv_functional import following_weight
+from rift_cl.reconstruct.solvers.tv_problem import VariationSolver, VariationState
 
 # A rise of the objective that no rounding explains; after a step without momentum it means that
 # the norm of A was underestimated.

@@ -27,7 +27,7 @@ from rift_cl.operators.linear import LinearOperator
 from rift_cl.reconstruct.solvers.data_term import DataTerm
 from rift_cl.reconstruct.solvers.direction_weights import DirectionWeights
 from rift_cl.reconstruct.solvers.residual_weight import Precondition
-from rift_cl.reconstruct.solvers.variation_problem import VariationSolver, VariationState
+from rift_cl.reconstruct.solvers.tv_problem import VariationSolver, VariationState
 
 # Step of the data's dual, a number without unit. A small one gives momentum, and the worse the
 # condition of A the smaller is best: of 0.01 to 1 these did well for strong and weak variation on a

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.geometry import Camera
-from rift_cl.sampling.planning.budget import paid
 from rift_cl.sampling.planning.candidates import allowed, settings_of, spread
 from rift_cl.sampling.planning.design_space import AZIMUTH, ELEVATION, EXPOSURE, DesignSpace
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.paths import Free, Spline
 from rift_cl.sampling.planning.simple_ways import edge_ways, quantiles_of_power
+from rift_cl.sampling.planning.view_costs import paid
 from rift_cl.sampling.planning.view_table import ViewTable
 
 Floats = NDArray[np.float64]

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.sampling.planning.budget import affordable
 from rift_cl.sampling.planning.constraints import Constraints
 from rift_cl.sampling.planning.design_space import (
     AZIMUTH,
@@ -27,6 +26,7 @@ from rift_cl.sampling.planning.design_space import (
     DesignSpace,
 )
 from rift_cl.sampling.planning.objective import Objective
+from rift_cl.sampling.planning.view_costs import affordable
 from rift_cl.sampling.planning.view_table import ViewTable
 from rift_cl.sampling.targets.target import Target
 

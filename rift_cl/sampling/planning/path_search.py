@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.sampling.planning.budget import paid
 from rift_cl.sampling.planning.candidates import settings_of
 from rift_cl.sampling.planning.curve import Curve
 from rift_cl.sampling.planning.curves import curves_of
@@ -23,6 +22,7 @@ from rift_cl.sampling.planning.design_space import (
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.path_layout import PathLayout
 from rift_cl.sampling.planning.refine import permitted, refine
+from rift_cl.sampling.planning.view_costs import paid
 from rift_cl.sampling.planning.view_table import ViewTable
 
 Floats = NDArray[np.float64]

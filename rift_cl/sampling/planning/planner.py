@@ -15,7 +15,6 @@ from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.numbers import one_number
 from rift_cl.sampling.criteria.merit import CoverageMerit
 from rift_cl.sampling.planning.baselines import Baseline, baselines
-from rift_cl.sampling.planning.budget import check_paid, prices, total
 from rift_cl.sampling.planning.candidates import candidates, looked_at, most_candidates
 from rift_cl.sampling.planning.coincident import parted
 from rift_cl.sampling.planning.constraints import Constraints
@@ -28,6 +27,7 @@ from rift_cl.sampling.planning.path_search import best_path
 from rift_cl.sampling.planning.paths import Free
 from rift_cl.sampling.planning.pool import pool_of
 from rift_cl.sampling.planning.refine import refine
+from rift_cl.sampling.planning.view_costs import check_paid, prices, total
 from rift_cl.sampling.planning.view_plan import Plan
 from rift_cl.sampling.planning.view_table import ViewTable, turned
 from rift_cl.sampling.targets.observations import Observations

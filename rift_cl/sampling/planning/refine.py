@@ -13,7 +13,6 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.sampling.planning.budget import cost, total
 from rift_cl.sampling.planning.candidates import allowed
 from rift_cl.sampling.planning.design_space import (
     AZIMUTH,
@@ -25,6 +24,7 @@ from rift_cl.sampling.planning.design_space import (
 )
 from rift_cl.sampling.planning.keep_out import KeepOut
 from rift_cl.sampling.planning.objective import Objective
+from rift_cl.sampling.planning.view_costs import cost, total
 from rift_cl.sampling.planning.view_table import ViewTable
 
 Floats = NDArray[np.float64]

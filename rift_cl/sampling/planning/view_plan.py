@@ -17,12 +17,12 @@ from rift_cl.geometry import Camera
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.numbers import one_number
 from rift_cl.sampling.planning.baselines import Baseline
-from rift_cl.sampling.planning.budget import cost
 from rift_cl.sampling.planning.design_space import AZIMUTH, DISTANCE, ELEVATION, EXPOSURE, FOCUS
 from rift_cl.sampling.planning.greedy import Choice, Limits, choose
 from rift_cl.sampling.planning.objective import Objective
 from rift_cl.sampling.planning.paths import Free
 from rift_cl.sampling.planning.pool import pool_of
+from rift_cl.sampling.planning.view_costs import cost
 from rift_cl.sampling.planning.view_table import ViewTable
 from rift_cl.sampling.targets.directional_prior import anisotropy
 

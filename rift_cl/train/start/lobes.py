@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.geometry import Camera
+from rift_cl.train.per_view.quaternions import rotated
 from rift_cl.train.start.points import focus_of
-from rift_cl.train.views.quaternions import rotated
 
 # A splat is a disc if its shortest axis is below this share of the next one.
 _DISC = 0.5

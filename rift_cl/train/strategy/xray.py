@@ -25,10 +25,10 @@ from rift_cl.errors import InputError
 from rift_cl.splat.orders import order_of
 from rift_cl.splat.renderer import Frame, FrameGradients
 from rift_cl.train.parameters import Parameters
+from rift_cl.train.per_view.quaternions import rotated
 from rift_cl.train.ranges import check_number, check_whole
 from rift_cl.train.strategy.protocol import StrategySettings, TrainingRun
 from rift_cl.train.strategy.screen_statistics import ScreenStatistics, StatisticsStrategy
-from rift_cl.train.views.quaternions import rotated
 
 # Shift of the halves of a splat, in standard deviations.
 _APART = 0.5

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.arithmetic import sum_columns
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
-from rift_cl.train.views.host_adam import HostAdam
+from rift_cl.train.per_view.host_adam import HostAdam
 
 _COLORS = 3
 

@@ -3,7 +3,7 @@
     minimise  |F^(1/2) (A x - y)|^2 / 2 + weight * TV(x),    x >= 0 if asked for.
 
 The data term is a sum over the samples of y, the variation an integral over the image (see
-``total_variation``), so that the weight has the unit of y squared over the unit of TV: for an image
+``tv_functional``), so that the weight has the unit of y squared over the unit of TV: for an image
 in u and lengths in mm, y is in u mm, TV in u mm, and the weight in u mm; for a volume TV is in
 u mm^2 and the weight in u. It does not depend on how fine the grid is, but for twice the views the
 data term is twice as large, and so is the weight that does the same.
@@ -23,7 +23,7 @@ from rift_cl.reconstruct.solvers.data_term import DataTerm
 from rift_cl.reconstruct.solvers.direction_weights import DirectionWeights
 from rift_cl.reconstruct.solvers.residual_weight import Precondition
 from rift_cl.reconstruct.solvers.solver import Solver, SolverState
-from rift_cl.reconstruct.solvers.total_variation import TotalVariation
+from rift_cl.reconstruct.solvers.tv_functional import TotalVariation
 
 
 @dataclass

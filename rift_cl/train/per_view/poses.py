@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rift_cl.geometry import Camera
-from rift_cl.train.views.host_adam import HostAdam
+from rift_cl.train.per_view.host_adam import HostAdam
 
 Floats = NDArray[np.float64]
 
