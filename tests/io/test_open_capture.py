@@ -48,6 +48,8 @@ def test_a_transforms_json_of_nerfstudio(tmp_path: Path) -> None:
         check_cameras(capture)
         assert capture.path == path
         assert capture.points is None and capture.point_colors is None
+        count = f"{len(made.NAMES)} photographs of {made.WIDTH} x {made.HEIGHT}"
+        assert count in repr(capture) and str(path) in repr(capture)
         assert [view.name for view in capture.views] == [f"images/{name}" for name in made.NAMES]
         assert [view.image for view in capture.views] == [
             tmp_path / "images" / name for name in made.NAMES

@@ -25,6 +25,7 @@ def test_data_exchange(tmp_path: Path, dtype: str) -> None:
     assert (scan.shape, scan.kind, scan.source) == ((6, 4, 5), "counts", "Data Exchange")
     assert (scan.pitch, scan.unit) == (None, "")
     np.testing.assert_allclose(scan.angles, np.deg2rad(made.DEGREES), rtol=1e-15)
+    assert all(fact in repr(scan) for fact in ("a.h5", "6 parallel views", "4 rows of 5", "counts"))
     rows = scan.read(1, 3)
     assert rows.projections.dtype == np.float32
     np.testing.assert_array_equal(rows.projections, data[:, 1:3].astype(np.float32))

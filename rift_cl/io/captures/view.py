@@ -38,7 +38,7 @@ class View:
     upright: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Capture:
     """Posed photographs of one scene.
 
@@ -56,6 +56,16 @@ class Capture:
     point_colors: NDArray[np.float32] | None
     path: Path
     reprojection_error: float | None = None
+
+    def __repr__(self) -> str:
+        first, others = self.views[0].camera, self.views[1:]
+        size = f"{first.width} x {first.height} pixels"
+        alike = all(view.camera.size == first.size for view in others)
+        points = 0 if self.points is None else len(self.points)
+        return (
+            f"<Capture in {self.path}: {len(self.views)} photographs"
+            f"{f' of {size}' if alike else f', the first of {size}'}, {points} sparse points>"
+        )
 
 
 def camera_at(view: View, downscale: int) -> Camera:

@@ -8,7 +8,7 @@ file: it can be sent to another process.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Protocol
 
@@ -75,7 +75,7 @@ class RowSource(Protocol):
         """Read some rows of some frames, (frame, row, bin), all of which are known to exist."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ScanFile:
     """A scan in a file, known by its headers, its angles and a sample of its values.
 
@@ -110,12 +110,22 @@ class ScanFile:
     unit: str
     kind: Kind
     source: str
-    rows: RowSource = field(repr=False)
+    rows: RowSource
     fan: FanBeam | None = None
     background: int = 0
     notes: tuple[str, ...] = ()
     flats_at: NDArray[np.float64] | None = None
     incident: NDArray[np.float64] | None = None
+
+    def __repr__(self) -> str:
+        views, rows, bins = self.shape
+        low, high = np.rad2deg([self.angles.min(), self.angles.max()])
+        beam = "parallel" if self.fan is None else "fan-beam"
+        pitch = "" if self.pitch is None else f", pitch {self.pitch:.4g} {self.unit}".rstrip()
+        return (
+            f"<ScanFile {self.path}: {views} {beam} views from {low:.4g} to {high:.4g} degrees, "
+            f"{rows} rows of {bins} bins{pitch}, {self.kind}>"
+        )
 
     def read(self, start: int, stop: int) -> ScanRows:
         """Read detector rows ``start`` to ``stop``; the file is opened for that and closed again.
