@@ -8,8 +8,12 @@ they share kernels). Marks change that:
 - ``full``: only ``pytest -m full`` runs the test; another one touches the same code at less cost.
 - ``each``: plain ``pytest`` runs it with each of its parameters, for example once per file format.
 
+``pytest -m rest`` is ``-m full`` without what the last plain ``pytest`` passed, for .ci/run, which
+runs one after the other. Only tests that ask for a device are left out so: all others are repeated,
+for they may do something else once optional packages are there, which kernels do not know of.
+
 Whoever names a file, a folder or a word of a test's name (``-k``) gets everything that is there,
-unless ``-m plain`` asks for the short selection. Both selections run on all cores.
+unless ``-m plain`` asks for the short selection. All three selections run on all cores.
 """
 
 from __future__ import annotations
@@ -28,6 +32,9 @@ MARKS = (
 # A worker holds its compiled kernels and its data: up to some 2 GB each.
 _WORKER_BYTES = 3 << 30
 _MOST_WORKERS = 8
+# Where pytest's cache keeps what plain ``pytest`` passed.
+_PASSED_KEY = "selection/passed"
+_passed: set[str] = set()
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -35,13 +42,13 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
     """Decide what was asked for; pytest-xdist tells each worker (see pytest_configure_node)."""
     option = config.option
     told = getattr(config, "workerinput", {}).get("selection")
-    marked = option.markexpr if option.markexpr in ("plain", "full") else None
+    marked = option.markexpr if option.markexpr in ("plain", "full", "rest") else None
     if marked:
         option.markexpr = ""
     named = _named(config)
     config.selection = told or marked or ("named" if named else "plain")
     # Whether every test of the selection runs, so that what none of them touched is a fault.
-    config.whole = config.selection != "named" and not named
+    config.whole = config.selection in ("plain", "full") and not named
     if config.selection != "named" and told is None:
         _use_all_cores(config)
 
@@ -96,12 +103,32 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what plain ``pytest`` does not run."""
-    if config.selection != "plain":
+    """Leave out what the selection does not run."""
+    if config.selection == "plain":
+        chosen = set(plain(items))
+    elif config.selection == "rest":
+        passed = set(config.cache.get(_PASSED_KEY, ()) if hasattr(config, "cache") else ())
+        chosen = {item for item in items if item.nodeid not in passed or _is_cpu(item) is None}
+    else:
         return
-    chosen = set(plain(items))
     config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
     items[:] = [item for item in items if item in chosen]
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Take down what passed; reports of all workers come to their parent."""
+    if report.failed:
+        _passed.discard(report.nodeid)
+    elif report.passed and report.when == "call":
+        _passed.add(report.nodeid)
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Keep what plain ``pytest`` passed for ``-m rest``."""
+    config = session.config
+    parent = not hasattr(config, "workerinput")
+    if config.selection == "plain" and parent and hasattr(config, "cache"):
+        config.cache.set(_PASSED_KEY, sorted(_passed))
 
 
 def plain(items: Iterable[pytest.Item]) -> Iterable[pytest.Item]:
