@@ -1,19 +1,28 @@
 """Building kernels: the only caller of the driver's compiler.
 
-A program is built once per device, kernel and macros.
+A program is built once per device, kernel and macros. A driver that keeps what it compiles in our
+cache folder, as PoCL does, compiles in this process. For any other the binaries are kept by us
+(``program_store``), and a child process compiles them (``guarded_build``): a compiler that dies or
+hangs does not take this process with it.
 """
 
 from __future__ import annotations
 
+import contextlib
 import re
 import threading
 import time
 import warnings
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rift_cl.cl.driver_record import driver_identity, keeps_programs
+from rift_cl.cl.failures import named_errors
+from rift_cl.cl.guarded_build import Request, guarded_build, way_to_build
 from rift_cl.cl.kernel_cache import build_lock
+from rift_cl.cl.program_store import Stored, load, program_name, remove, save
 from rift_cl.cl.real_type import real_type
 from rift_cl.cl.source import kernel_source
 from rift_cl.errors import KernelBuildError
@@ -61,25 +70,84 @@ class Builder:
             return self._programs[key]
 
     def _build(self, key: Key) -> Any:
-        import pyopencl as cl
-
         name, macros = key
         if _DOUBLE in macros:
             real_type(self._device, np.float64)
         defines = self.defines(macros).items()
         options = [*OPTIONS, *(f"-D{macro}={value}" for macro, value in defines)]
+        if self._keeps_programs:
+            return self._compiled(name, kernel_source(name), options)
+        return self._stored(key, kernel_source(name), options)
+
+    @cached_property
+    def _driver(self) -> dict[str, str]:
+        return driver_identity(self._device._handle)
+
+    @cached_property
+    def _keeps_programs(self) -> bool:
+        return keeps_programs(self._driver, self._device.context)
+
+    def _compiled(self, name: str, source: str, options: list[str]) -> Any:
+        """A program that the driver compiles in this process, or takes from a cache of its own."""
+        import pyopencl as cl
+
         failure = ""
         for pause in _PAUSES:
             time.sleep(pause)
             try:
                 with build_lock():
-                    return cl.Program(self._device.context, kernel_source(name)).build(options)
+                    return cl.Program(self._device.context, source).build(options)
             except cl.Error as error:
                 failure = str(error)
             # An empty log is PoCL's way to lose a race for its cache; a real error has one.
             if _log(failure):
                 break
         raise _build_error(name, failure, options, self._device.name)
+
+    def _stored(self, key: Key, source: str, options: list[str]) -> Any:
+        """A program of our own store, which a child process compiles where it is not there yet."""
+        import pyopencl as cl
+
+        name, macros = key
+        entry = program_name(self._driver, source, options)
+        stored = load(entry)
+        if stored is not None:
+            # A driver need not take what it gave; then it compiles again.
+            with contextlib.suppress(cl.Error):
+                return self._loaded(name, stored, source, options)
+            remove(entry)
+        device = self._device
+        built = guarded_build(Request(device.selector, device.name, name, source, options))
+        about = {"kernel": name, "macros": dict(macros), "driver": self._driver}
+        about |= {"way": built.way, "fault": built.fault}
+        if built.binary is None and built.log:
+            raise _build_error(name, built.log, options, device.name)
+        stored = Stored({**about, "built": built.binary is not None}, built.binary or b"")
+        save(entry, stored)
+        with named_errors(f"loading kernel {name}", device.name):
+            return self._loaded(name, stored, source, options)
+
+    def _loaded(self, name: str, stored: Stored, source: str, options: list[str]) -> Any:
+        """The program that a file of the store stands for.
+
+        Raises:
+            KernelBuildError: it stands for a kernel that this driver cannot build.
+        """
+        import pyopencl as cl
+
+        device, about = self._device, stored.about
+        if not about["built"]:
+            macros = " ".join(f"{macro}={value}" for macro, value in about["macros"].items())
+            raise KernelBuildError(
+                f"{device.name} ({device.platform}, driver {device.driver}) cannot build kernel "
+                f"{name} ({macros}): {about['fault']}, and no workaround helped; what needs it "
+                "does not work there: use another device (--device) or another version of the "
+                "driver ('rift devices --retest' tries again)"
+            )
+        if not stored.binary:
+            return self._compiled(name, *way_to_build(about["way"], source, options))
+        context = device.context
+        return cl.Program(context, context.devices, [stored.binary]).build()
 
 
 def _log(text: str) -> str:

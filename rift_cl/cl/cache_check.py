@@ -54,6 +54,11 @@ def record(folder: Path) -> None:
         _write(folder, {**known, **new})
 
 
+def files_kept(folder: Path) -> int:
+    """How many files drivers have put into the cache."""
+    return sum(1 for _ in _files(folder))
+
+
 def _files(folder: Path) -> Iterator[tuple[str, str]]:
     """Every file of every program: its name inside the cache, and its path.
 

@@ -1,0 +1,94 @@
+"""The child process in which kernels are compiled, so that a compiler may die or hang there.
+
+    python -m rift_cl.cl.build_worker
+
+It reads requests from its input and writes answers to its output, each a JSON object behind its
+length (four bytes, big-endian); a binary follows the answer that announces its ``size``. It ends
+when its input does. What a driver prints goes nowhere.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import struct
+import sys
+from functools import cache
+from typing import IO, Any
+
+LENGTH = struct.Struct(">I")
+# The most bytes that are read at once: a source is some 100 KB, a compiler's log may be longer.
+_LONGEST = 1 << 26
+
+
+def write_message(stream: IO[bytes], message: dict[str, Any], data: bytes = b"") -> None:
+    """Write a JSON object behind its length, and the bytes that it announces."""
+    text = json.dumps({**message, "size": len(data)}).encode()
+    stream.write(LENGTH.pack(len(text)) + text + data)
+    stream.flush()
+
+
+def read_message(stream: IO[bytes]) -> tuple[dict[str, Any], bytes] | None:
+    """Read what ``write_message`` wrote, or None where the other side has ended."""
+    head = stream.read(LENGTH.size)
+    if len(head) < LENGTH.size or LENGTH.unpack(head)[0] > _LONGEST:
+        return None
+    try:
+        message = json.loads(stream.read(LENGTH.unpack(head)[0]))
+        size = int(message["size"])
+    except (ValueError, TypeError, LookupError):
+        return None
+    if not 0 <= size <= _LONGEST:
+        return None
+    data = stream.read(size)
+    return (message, data) if len(data) == size else None
+
+
+def main() -> None:
+    """Answer requests until the input ends."""
+    # Ctrl-C is for the process that asks; it ends this one by closing the input.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    while (request := read_message(sys.stdin.buffer)) is not None:
+        write_message(answers, *_answer(request[0]))
+
+
+def _answer(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
+    import warnings
+
+    import pyopencl as cl
+
+    warnings.simplefilter("ignore")
+    try:
+        context = _context(request["selector"], request["device"])
+        program = cl.Program(context, request["source"]).build(request["options"])
+        binary = program.get_info(cl.program_info.BINARIES)[0]
+        if binary:
+            # Whoever asked will load it in a process that must not die of it.
+            loaded = cl.Program(context, context.devices, [binary]).build()
+            cl.Kernel(loaded, request["kernel"])
+    except (cl.Error, LookupError) as error:
+        return {"error": str(error)}, b""
+    return {}, binary
+
+
+@cache
+def _context(selector: str, name: str) -> Any:
+    """The context of the device that the asking process means.
+
+    Raises:
+        LookupError: this process does not see it.
+    """
+    import pyopencl as cl
+
+    platform, index = map(int, selector.split(":"))
+    device = cl.get_platforms()[platform].get_devices()[index]
+    if device.name.strip() != name:
+        raise LookupError(f"device {selector} is {device.name.strip()}, not {name}")
+    return cl.Context([device])
+
+
+if __name__ == "__main__":
+    main()

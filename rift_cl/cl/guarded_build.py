@@ -1,0 +1,195 @@
+"""Compiling where a compiler may die: in a child process, with workarounds for what it cannot do.
+
+One child per device lives as long as this process and is started again when it dies. A compiler
+that crashes, hangs or refuses a kernel is asked again in other ways, the gentlest first.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rift_cl.cl.build_worker import read_message, write_message
+
+# Seconds after which a compiler counts as hanging.
+LIMIT = 300.0
+# Seconds that a child whose pipe broke is given to be gone.
+_DYING = 20.0
+# How a kernel is built: what stands before its source, and further options.
+_WAYS = {
+    "": ("", ()),
+    "noinline": ("#define static static __attribute__((noinline))\n", ()),
+    "without optimization": ("", ("-cl-opt-disable",)),
+}
+
+
+class Built(NamedTuple):
+    """What came of building a kernel.
+
+    Args:
+        binary: what the driver gave, empty where it gives none; None where it did not compile.
+        way: the workaround that was taken, empty for none.
+        fault: what the first attempt met, empty for nothing.
+        log: the compiler's words, where it refused the kernel.
+    """
+
+    binary: bytes | None
+    way: str
+    fault: str
+    log: str
+
+
+class Request(NamedTuple):
+    """A kernel to build.
+
+    Args:
+        selector: of the device, as platform and index.
+        device: its name.
+        kernel: its entry point.
+        source: its source, with the includes in line.
+        options: what the compiler is given.
+    """
+
+    selector: str
+    device: str
+    kernel: str
+    source: str
+    options: list[str]
+
+
+def way_to_build(way: str, source: str, options: list[str]) -> tuple[str, list[str]]:
+    """The source and the options that a workaround stands for; ``""`` is none."""
+    before, further = _WAYS[way]
+    return before + source, [*options, *further]
+
+
+def guarded_build(request: Request, worker: Worker | None = None) -> Built:
+    """Build a kernel in a child process, in the first way that the compiler can do.
+
+    Args:
+        request: the kernel.
+        worker: the child; the one of this device if not given.
+    """
+    worker = worker or _worker_of(request.selector)
+    first = log = ""
+    for way in _WAYS:
+        source, options = way_to_build(way, request.source, request.options)
+        asked = request._replace(source=source, options=options)
+        fault, answer, binary = worker.ask(asked._asdict())
+        if answer is not None and "error" not in answer:
+            return Built(binary, way, first, log)
+        said = "" if answer is None else answer["error"]
+        first, log = first or fault or "its compiler refused it", log or said
+    return Built(None, "", first, log)
+
+
+class Worker:
+    """A child process that compiles.
+
+    Args:
+        command: what to start; our own worker if not given.
+        limit: seconds after which it counts as hanging.
+    """
+
+    def __init__(self, command: list[str] | None = None, limit: float = LIMIT) -> None:
+        self._command = command or [sys.executable, "-m", "rift_cl.cl.build_worker"]
+        self._limit = limit
+        self._process: subprocess.Popen[bytes] | None = None
+        self._asking = threading.Lock()
+
+    def ask(self, request: dict[str, Any]) -> tuple[str, dict[str, Any] | None, bytes]:
+        """Have a request answered.
+
+        Returns:
+            What went wrong with the child, empty if nothing; its answer, or None; and the bytes
+            that came with it.
+        """
+        with self._asking:
+            process = self._started()
+            found: list[tuple[dict[str, Any], bytes]] = []
+            talk = threading.Thread(target=_talk, args=(process, request, found), daemon=True)
+            talk.start()
+            try:
+                talk.join(self._limit)
+            except BaseException:
+                self._end(process, 0)
+                raise
+            if found:
+                return "", *found[0]
+            hung = talk.is_alive()
+            status = self._end(process, 0 if hung else _DYING)
+            fault = f"its compiler hung for {self._limit:.3g} s" if hung else _death(status)
+            return fault, None, b""
+
+    def close(self) -> None:
+        """End the child."""
+        if self._process is not None:
+            self._end(self._process, 0)
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        if self._process is None:
+            root = str(Path(__file__).parents[2])
+            path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
+            self._process = subprocess.Popen(
+                self._command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env={**os.environ, "PYTHONPATH": path},
+            )
+        return self._process
+
+    def _end(self, process: subprocess.Popen[bytes], patience: float) -> int:
+        """Kill the child where it has not ended by itself, and return its exit status."""
+        self._process = None
+        try:
+            status = process.wait(patience)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            status = process.wait()
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                # What was not sent to a dead child is of no use.
+                with contextlib.suppress(OSError):
+                    pipe.close()
+        return status
+
+
+def _talk(
+    process: subprocess.Popen[bytes],
+    request: dict[str, Any],
+    found: list[tuple[dict[str, Any], bytes]],
+) -> None:
+    assert process.stdin is not None
+    assert process.stdout is not None
+    try:
+        write_message(process.stdin, request)
+        answer = read_message(process.stdout)
+    except (OSError, ValueError):
+        # The child died, or was ended, while it was spoken to.
+        return
+    if answer is not None:
+        found.append(answer)
+
+
+def _death(status: int) -> str:
+    if status < 0:
+        return f"its compiler died ({signal.Signals(-status).name})"
+    return f"its compiler ended the process (status {status})"
+
+
+_workers: dict[str, Worker] = {}
+
+
+def _worker_of(selector: str) -> Worker:
+    if selector not in _workers:
+        worker = _workers[selector] = Worker()
+        atexit.register(worker.close)
+    return _workers[selector]

@@ -1,0 +1,133 @@
+"""Our own store of compiled programs, for drivers that keep none.
+
+A file holds one program: a line that names the format, the SHA-256 of all that follows, a line of
+JSON that says what it is, and the driver's binary. Its name is a hash of all that the binary
+depends on, so that a new source, option, driver or release never meets an old file. A file that
+is not as it was written is removed, and the program built again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import tempfile
+import warnings
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rift_cl import __version__
+from rift_cl.cl.kernel_cache import cache_folder
+
+_FORMAT = b"RIFT-CL program 1\n"
+_HASH = 64
+_FOLDER, _SUFFIX = "programs", ".program"
+
+
+class Stored(NamedTuple):
+    """A program as the store keeps it.
+
+    Args:
+        about: what it is, for a person; ``fault`` says why there is no binary where there is none.
+        binary: what the driver gave, and takes again.
+    """
+
+    about: dict[str, Any]
+    binary: bytes
+
+
+def program_name(driver: dict[str, str], source: str, options: list[str]) -> str:
+    """The name of a program in the store: a hash of everything that its binary depends on.
+
+    Args:
+        driver: what tells the device and its driver from any other.
+        source: the complete source, with the includes in line.
+        options: what the compiler is given, macros among them.
+    """
+    parts = [_FORMAT.decode(), __version__, json.dumps(driver, sort_keys=True), source, *options]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def load(name: str) -> Stored | None:
+    """What is stored under a name, or None; a damaged file is removed."""
+    path = _path(name)
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    stored = _parsed(name, data)
+    if stored is None:
+        remove(name)
+    return stored
+
+
+def save(name: str, stored: Stored) -> None:
+    """Store a program; where there is no room for it, it is kept for this run only, and said so."""
+    body = json.dumps(stored.about, sort_keys=True).encode() + b"\n" + stored.binary
+    path = _path(name)
+    try:
+        write_whole(path, _FORMAT + _checksum(name, body) + b"\n" + body)
+    except OSError as error:
+        warnings.warn(
+            f"kernel cache {path.parent} cannot be written ({error.strerror or error}): compiled "
+            "kernels are kept for this run only; make room, or set RIFT_CACHE_DIR to another "
+            "folder that you own",
+            stacklevel=2,
+        )
+
+
+def remove(name: str) -> None:
+    """Forget a program."""
+    with contextlib.suppress(OSError):
+        _path(name).unlink(missing_ok=True)
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file of the cache so that it is there whole or not at all, for this user alone.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    handle, part = tempfile.mkstemp(dir=path.parent, prefix=".part-")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        Path(part).replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            Path(part).unlink(missing_ok=True)
+        raise
+
+
+def stored_programs(driver: dict[str, str] | None = None) -> list[dict[str, Any]]:
+    """What is said of every program in the store, or of one driver's; damaged files are removed."""
+    names = (path.stem for path in sorted((cache_folder() / _FOLDER).glob(f"*{_SUFFIX}")))
+    found = [stored.about for stored in map(load, names) if stored is not None]
+    return [about for about in found if driver is None or about.get("driver") == driver]
+
+
+def forget(driver: dict[str, str]) -> None:
+    """Remove every program of one driver."""
+    for path in (cache_folder() / _FOLDER).glob(f"*{_SUFFIX}"):
+        stored = load(path.stem)
+        if stored is not None and stored.about.get("driver") == driver:
+            remove(path.stem)
+
+
+def _path(name: str) -> Path:
+    return cache_folder() / _FOLDER / f"{name}{_SUFFIX}"
+
+
+def _checksum(name: str, body: bytes) -> bytes:
+    return hashlib.sha256(name.encode() + body).hexdigest().encode()
+
+
+def _parsed(name: str, data: bytes) -> Stored | None:
+    head = len(_FORMAT) + _HASH
+    body = data[head + 1 :]
+    if not data.startswith(_FORMAT) or data[len(_FORMAT) : head] != _checksum(name, body):
+        return None
+    about, _, binary = body.partition(b"\n")
+    return Stored(json.loads(about), binary)

@@ -1,0 +1,86 @@
+"""A compiler that dies, hangs or refuses takes no process with it, and is asked in another way."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+import rift_cl as rift
+from rift_cl.cl.guarded_build import Request, Worker, guarded_build
+
+REQUEST = Request("0:0", "device", "probe", "source", ["-w"])
+# A child that answers with what it was asked, unless the first lines here make an end of it.
+ANSWERS = """
+import os, signal, sys, time
+from rift_cl.cl.build_worker import read_message, write_message
+while (asked := read_message(sys.stdin.buffer)) is not None:
+    request = asked[0]
+    {fate}
+    write_message(sys.stdout.buffer, {{"text": request["source"]}}, b"binary")
+"""
+DIES = "os.kill(os.getpid(), signal.SIGSEGV)"
+
+
+@pytest.fixture
+def worker():
+    """Makes a worker whose fate is given as a statement."""
+    made = []
+
+    def make(fate, limit=60.0):
+        made.append(Worker([sys.executable, "-c", ANSWERS.format(fate=fate)], limit))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
+
+
+def test_compiler_that_does_its_work_is_asked_once(worker):
+    assert guarded_build(REQUEST, worker("pass")) == (b"binary", "", "", "")
+
+
+def test_compiler_that_dies_is_asked_in_another_way(worker):
+    built = guarded_build(REQUEST, worker(f"'noinline' in request['source'] or {DIES}"))
+    assert built == (b"binary", "noinline", "its compiler died (SIGSEGV)", "")
+
+
+def test_compiler_that_hangs_is_ended(worker):
+    fault, answer, _ = worker("time.sleep(600)", limit=0.2).ask(REQUEST._asdict())
+    assert fault == "its compiler hung for 0.2 s"
+    assert answer is None
+
+
+def test_compiler_that_can_do_it_in_no_way_is_told_of(worker):
+    assert guarded_build(REQUEST, worker(DIES)) == (None, "", "its compiler died (SIGSEGV)", "")
+
+
+def test_compiler_that_ends_the_process_is_told_of(worker):
+    assert "status 3" in guarded_build(REQUEST, worker("sys.exit(3)")).fault
+
+
+@pytest.mark.parametrize("noise", ["b'hello, I am a driver'", "b'\\0\\0\\0\\2[]'", "b'\\xff' * 9"])
+def test_child_that_talks_nonsense_is_no_answer(worker, noise):
+    said = f"sys.stdout.buffer.write({noise}); sys.stdout.flush(); sys.exit(0)"
+    assert guarded_build(REQUEST, worker(said)).binary is None
+
+
+def test_our_own_child_compiles_and_tells_what_does_not():
+    import pyopencl as cl
+
+    device = rift.default_device()
+    child = Worker()
+    source = "__kernel void probe(__global int *p) { *p = 1; }"
+    right = Request(device.selector, device.name, "probe", source, ["-cl-std=CL1.2"])
+    try:
+        built = guarded_build(right, child)
+        wrong = guarded_build(right._replace(source="nonsense"), child)
+        elsewhere = guarded_build(right._replace(device="another"), child)
+    finally:
+        child.close()
+    assert (built.way, built.fault) == ("", "")
+    program = cl.Program(device.context, device.context.devices, [built.binary]).build()
+    assert program.kernel_names == "probe"
+    assert wrong.binary is None
+    assert "error" in wrong.log
+    assert elsewhere.binary is None

@@ -1,0 +1,125 @@
+"""Our own store of compiled programs: the same bits, checked files, no run lost without room."""
+
+from __future__ import annotations
+
+import stat
+
+import numpy as np
+import pytest
+
+from rift_cl.cl import Device, build, guarded_build, kernel_cache, program_store
+from rift_cl.cl.program_store import Stored, load, program_name, save
+from rift_cl.errors import KernelBuildError
+
+DRIVER = {"platform": "A", "platform version": "1", "device": "D", "driver": "1"}
+PROGRAM = Stored({"kernel": "probe", "driver": DRIVER, "built": True}, b"\x00\nbinary\xff")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty store; the drivers of this process keep the cache that they have."""
+    for module in (kernel_cache, program_store):
+        monkeypatch.setattr(module, "cache_folder", lambda: tmp_path)
+    return tmp_path / "programs"
+
+
+@pytest.fixture
+def bare(device, folder, monkeypatch):
+    """The device as one whose driver keeps nothing; makes one with nothing built yet."""
+    monkeypatch.setattr(build, "keeps_programs", lambda *_: False)
+    return lambda: Device(device._handle, device.selector, traits=device.traits)
+
+
+def _sum(device):
+    x = device.array(np.linspace(0, 1, 1000, dtype=np.float32) ** 2)
+    y = device.array(np.linspace(3, 4, 1000, dtype=np.float32))
+    device.launch("axpby", (1000,), x=x, y=y, a=0.3, b=-1.7, size=1000, RUN=1, DOUBLE=0)
+    return device.get(y)
+
+
+def _no_build(*_, **__):
+    raise AssertionError("it was built again")
+
+
+def test_stored_program_computes_the_same_bits_and_is_built_once(device, bare, folder, monkeypatch):
+    wanted = _sum(device)
+    assert np.array_equal(_sum(bare()), wanted)
+    assert len(list(folder.iterdir())) == 1
+    monkeypatch.setattr(build, "guarded_build", _no_build)
+    assert np.array_equal(_sum(bare()), wanted)
+
+
+@pytest.mark.parametrize(
+    "damage", [lambda data: data[:-1], lambda data: data + b" ", lambda _: b""]
+)
+def test_damaged_file_is_removed(folder, damage):
+    save("name", PROGRAM)
+    assert load("name") == PROGRAM
+    (path,) = folder.iterdir()
+    path.write_bytes(damage(path.read_bytes()))
+    assert load("name") is None
+    assert not list(folder.iterdir())
+
+
+def test_file_of_another_name_is_not_taken(folder):
+    save("name", PROGRAM)
+    (path,) = folder.iterdir()
+    path.rename(path.with_stem("other"))
+    assert load("other") is None
+
+
+def test_files_are_closed_to_others(folder):
+    save("name", PROGRAM)
+    (path,) = folder.iterdir()
+    assert [stat.S_IMODE(each.stat().st_mode) for each in (folder, path)] == [0o700, 0o600]
+
+
+def test_binary_that_the_driver_refuses_is_built_again(device, bare, folder):
+    wanted = _sum(bare())
+    (path,) = folder.iterdir()
+    about = load(path.stem).about
+    save(path.stem, Stored(about, b"no program of this driver"))
+    assert np.array_equal(_sum(bare()), wanted)
+    assert len(load(path.stem).binary) > 100
+
+
+def test_full_disk_is_a_warning_and_the_result_is_right(device, bare, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(program_store, "write_whole", full)
+    with pytest.warns(UserWarning, match="No space left"):
+        result = _sum(bare())
+    assert np.array_equal(result, _sum(device))
+
+
+def test_broken_write_leaves_no_file(folder, monkeypatch):
+    monkeypatch.setattr("pathlib.Path.replace", lambda *_: (_ for _ in ()).throw(OSError(5, "bad")))
+    with pytest.warns(UserWarning, match="bad"):
+        save("name", PROGRAM)
+    assert not list(folder.iterdir())
+
+
+@pytest.mark.parametrize("part", list(DRIVER))
+def test_drivers_that_differ_in_anything_share_no_program(part):
+    other = {**DRIVER, part: "2"}
+    assert program_name(DRIVER, "source", ["-w"]) != program_name(other, "source", ["-w"])
+
+
+def test_another_release_shares_no_program(monkeypatch):
+    ours = program_name(DRIVER, "source", ["-w"])
+    assert ours != program_name(DRIVER, "source ", ["-w"])
+    assert ours != program_name(DRIVER, "source", [])
+    monkeypatch.setattr(program_store, "__version__", "0.0.1")
+    assert ours != program_name(DRIVER, "source", ["-w"])
+
+
+def test_kernel_that_no_way_builds_is_refused_by_name_and_asked_for_once(bare, monkeypatch):
+    died = guarded_build.Built(None, "", "its compiler died (SIGSEGV)", "")
+    monkeypatch.setattr(build, "guarded_build", lambda *_: died)
+    device = bare()
+    for _ in range(2):
+        with pytest.raises(KernelBuildError, match=r"axpby.*SIGSEGV"):
+            _sum(device)
+        monkeypatch.setattr(build, "guarded_build", _no_build)
+    assert np.array_equal(device.get(device.array(np.ones(3))), np.ones(3))
