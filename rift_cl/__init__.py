@@ -16,8 +16,9 @@ driver is touched before there is work for one.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from rift_cl.lazy_names import lazy_names
 
 __version__ = "0.1.0"
 
@@ -60,60 +61,6 @@ if TYPE_CHECKING:
     from rift_cl.sampling.criteria.merit import merit
     from rift_cl.splat import Renderer, Splats, SplatSettings
 
-_HOMES = {
-    "Aperture": "geometry",
-    "AxisEstimate": "reconstruct",
-    "Camera": "geometry",
-    "CameraType": "geometry",
-    "Constraints": "sampling",
-    "Device": "cl",
-    "FanBeam": "geometry",
-    "FastProjector": "operators",
-    "Grid": "geometry",
-    "HighPass": "operators",
-    "LinearOperator": "operators",
-    "Observations": "sampling",
-    "Parallel": "geometry",
-    "Plan": "sampling",
-    "Projector": "operators",
-    "Ramp": "operators",
-    "Renderer": "splat",
-    "Response": "operators",
-    "RiftError": "errors",
-    "SplatScene": "io",
-    "SplatSettings": "splat",
-    "Splats": "splat",
-    "Target": "sampling",
-    "analyze": "commands.functions",
-    "backproject": "reconstruct",
-    "cgls": "reconstruct",
-    "cheapest_projector": "operators",
-    "coverage": "sampling.coverage.device",
-    "default_device": "cl",
-    "devices": "cl",
-    "dot_test": "operators",
-    "evaluate": "commands.functions",
-    "export": "commands.functions",
-    "fbp": "reconstruct",
-    "find_center": "reconstruct",
-    "fit": "commands.functions",
-    "merit": "sampling.criteria.merit",
-    "next_views": "sampling",
-    "open_capture": "io",
-    "open_device": "cl",
-    "open_lens": "io",
-    "open_scan": "io",
-    "plan": "sampling",
-    "plan_views": "commands.functions",
-    "reconstruct_scan": "commands.functions",
-    "register_filter": "operators",
-    "register_scan_reader": "io",
-    "render": "commands.functions",
-    "scan_of_arrays": "io",
-    "sirt": "reconstruct",
-    "tv": "reconstruct",
-}
-_MODULES = ("basis", "metrics", "phantom")
 
 __all__ = [
     "Aperture",
@@ -172,14 +119,45 @@ __all__ = [
     "tv",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    if name in _MODULES:
-        return import_module(f"rift_cl.{name}")
-    if name in _HOMES:
-        return getattr(import_module(f"rift_cl.{_HOMES[name]}"), name)
-    raise AttributeError(f"module 'rift_cl' has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return [*__all__, "__version__"]
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "": ("basis", "metrics", "phantom"),
+        "cl": ("Device", "default_device", "devices", "open_device"),
+        "commands.functions": (
+            "analyze",
+            "evaluate",
+            "export",
+            "fit",
+            "plan_views",
+            "reconstruct_scan",
+            "render",
+        ),
+        "errors": ("RiftError",),
+        "geometry": ("Aperture", "Camera", "CameraType", "FanBeam", "Grid", "Parallel"),
+        "io": (
+            "SplatScene",
+            "open_capture",
+            "open_lens",
+            "open_scan",
+            "register_scan_reader",
+            "scan_of_arrays",
+        ),
+        "operators": (
+            "FastProjector",
+            "HighPass",
+            "LinearOperator",
+            "Projector",
+            "Ramp",
+            "Response",
+            "cheapest_projector",
+            "dot_test",
+            "register_filter",
+        ),
+        "reconstruct": ("AxisEstimate", "backproject", "cgls", "fbp", "find_center", "sirt", "tv"),
+        "sampling": ("Constraints", "Observations", "Plan", "Target", "next_views", "plan"),
+        "sampling.coverage.device": ("coverage",),
+        "sampling.criteria.merit": ("merit",),
+        "splat": ("Renderer", "SplatSettings", "Splats"),
+    },
+)

@@ -43,6 +43,8 @@ _SUBJECTS = {
     "registry": "filters ... by name",
     "errors": "named errors",
     "progress": "reports of long work",
+    "option_marks": "how settings are options",
+    "lazy_names": "names imported at first use",
     "sample": "embedded captures",
 }
 _STYLE = """

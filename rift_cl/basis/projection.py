@@ -21,8 +21,8 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import block_diag
 
 from rift_cl.basis.indices import n_coeff, of_order, order_slices, place_in_order
 from rift_cl.basis.numbers import numbers, together, vectors
@@ -69,7 +69,7 @@ def gamma_matrix(A: ArrayLike, order: int) -> NDArray[Any]:
     A = _matrix(A)
     if A.ndim != 2:
         raise ShapeError(f"A has shape {A.shape}, wanted one matrix (out, in)")
-    return np.asarray(block_diag(*gamma(A, order)))
+    return np.asarray(scipy.linalg.block_diag(*gamma(A, order)))
 
 
 def project(coeff: ArrayLike, A: ArrayLike, order: int) -> NDArray[Any]:

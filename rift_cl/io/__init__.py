@@ -6,8 +6,9 @@ file libraries.
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from rift_cl.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from rift_cl.io.captures.capture import (
@@ -32,35 +33,6 @@ if TYPE_CHECKING:
     from rift_cl.io.scenes.splat_scene import SplatScene
     from rift_cl.io.volumes import VolumeWriter, open_volume, read_volume, suggested_window
 
-_HOMES = {
-    "Capture": "captures.capture",
-    "PosedPhotographs": "captures.photographs",
-    "ScanFile": "scans.scan_file",
-    "ScanRequest": "scans.scan_file",
-    "ScanRows": "scans.scan_file",
-    "SplatScene": "scenes.splat_scene",
-    "View": "captures.capture",
-    "VolumeWriter": "volumes",
-    "atomic_path": "output",
-    "camera_at": "captures.capture",
-    "check_photographs": "captures.photographs",
-    "holds_bare_photographs": "captures.capture",
-    "make_folder": "output",
-    "open_capture": "captures.capture",
-    "open_lens": "lenses.lens_file",
-    "open_scan": "scans.formats",
-    "open_volume": "volumes",
-    "pose_photographs": "captures.photographs",
-    "read_image": "images.image",
-    "read_view": "captures.capture",
-    "read_volume": "volumes",
-    "register_scan_reader": "scans.formats",
-    "scan_of_arrays": "scans.array_scan",
-    "suggested_window": "volumes",
-    "write_json": "output",
-    "write_png": "images.image",
-    "write_text": "output",
-}
 
 __all__ = [
     "Capture",
@@ -92,9 +64,25 @@ __all__ = [
     "write_text",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    """Load the module that holds a public name."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "captures.capture": (
+            "Capture",
+            "View",
+            "camera_at",
+            "holds_bare_photographs",
+            "open_capture",
+            "read_view",
+        ),
+        "captures.photographs": ("PosedPhotographs", "check_photographs", "pose_photographs"),
+        "images.image": ("read_image", "write_png"),
+        "lenses.lens_file": ("open_lens",),
+        "output": ("atomic_path", "make_folder", "write_json", "write_text"),
+        "scans.array_scan": ("scan_of_arrays",),
+        "scans.formats": ("open_scan", "register_scan_reader"),
+        "scans.scan_file": ("ScanFile", "ScanRequest", "ScanRows"),
+        "scenes.splat_scene": ("SplatScene",),
+        "volumes": ("VolumeWriter", "open_volume", "read_volume", "suggested_window"),
+    },
+)

@@ -19,8 +19,9 @@ Public names are looked up when they are first used, so that settings load witho
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from rift_cl.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from rift_cl.train.basis_settings import AngularSettings, BasisSettings
@@ -47,35 +48,6 @@ if TYPE_CHECKING:
     from rift_cl.train.xray.solve_settings import SolveSettings
     from rift_cl.train.xray.trainer import XrayTrainer
 
-_HOMES = {
-    "PIXEL_LOSSES": "loss.pixel_loss",
-    "STRATEGIES": "strategy",
-    "AngularSettings": "basis_settings",
-    "BasisSettings": "basis_settings",
-    "DefaultSettings": "strategy",
-    "Homogenisation": "loss.homogenisation",
-    "ImageLoss": "loss.image_loss",
-    "ImageViews": "views.images",
-    "LearningRates": "settings",
-    "McmcSettings": "strategy",
-    "Parameters": "parameters",
-    "Penalties": "strategy",
-    "PixelLoss": "loss.pixel_loss",
-    "SolveSettings": "xray.solve_settings",
-    "Strategy": "strategy",
-    "StrategySettings": "strategy",
-    "TrainSettings": "settings",
-    "Trainer": "trainer",
-    "TrainingRun": "strategy",
-    "TrainingViews": "trainer",
-    "XraySettings": "strategy",
-    "XrayTrainer": "xray.trainer",
-    "random_points": "start.points",
-    "register_loss": "loss.pixel_loss",
-    "register_strategy": "strategy",
-    "start_splats": "start.points",
-    "XrayTrainSettings": "xray.settings",
-}
 
 __all__ = [
     "PIXEL_LOSSES",
@@ -107,12 +79,31 @@ __all__ = [
     "start_splats",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'rift_cl.train' has no attribute {name!r}")
-    return getattr(import_module(f"rift_cl.train.{_HOMES[name]}"), name)
-
-
-def __dir__() -> list[str]:
-    return list(__all__)
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "basis_settings": ("AngularSettings", "BasisSettings"),
+        "loss.homogenisation": ("Homogenisation",),
+        "loss.image_loss": ("ImageLoss",),
+        "loss.pixel_loss": ("PIXEL_LOSSES", "PixelLoss", "register_loss"),
+        "parameters": ("Parameters",),
+        "settings": ("LearningRates", "TrainSettings"),
+        "start.points": ("random_points", "start_splats"),
+        "strategy": (
+            "DefaultSettings",
+            "McmcSettings",
+            "Penalties",
+            "STRATEGIES",
+            "Strategy",
+            "StrategySettings",
+            "TrainingRun",
+            "XraySettings",
+            "register_strategy",
+        ),
+        "trainer": ("Trainer", "TrainingViews"),
+        "per_view.images": ("ImageViews",),
+        "xray.settings": ("XrayTrainSettings",),
+        "xray.solve_settings": ("SolveSettings",),
+        "xray.trainer": ("XrayTrainer",),
+    },
+)

@@ -40,6 +40,15 @@ def test_help_of_a_command_loads_its_settings_alone(python, name):
     assert not {"numpy", "h5py", "pyopencl", "scipy"} & set(modules)
 
 
+@pytest.mark.parametrize("name", ["fit photos", "fit xray"])
+def test_help_of_a_fit_loads_no_trainer_and_no_renderer(python, name):
+    modules = set(modules_after(python, *name.split(), "--help"))
+    assert "rift_cl.train.settings" in modules
+    computing = {"train.trainer", "train.parameters", "splat.renderer", "cl"}
+    assert not modules & {f"rift_cl.{name}" for name in computing}
+    assert not {"scipy.linalg", "scipy.ndimage", "h5py", "pyopencl"} & modules
+
+
 @pytest.mark.parametrize("arguments", [("--help",), ("--version",), ("no-such-command",), ()])
 def test_the_overview_loads_no_settings(python, arguments):
     modules = modules_after(python, *arguments)

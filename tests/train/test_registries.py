@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from rift_cl import train
 from rift_cl.errors import InputError
 from rift_cl.registry import Registry
 from rift_cl.train import (
@@ -92,8 +91,3 @@ def test_strategies_are_settings_by_name():
 def test_what_cannot_be_used_is_refused(act, words):
     with pytest.raises(InputError, match=words):
         act()
-
-
-def test_every_public_name_is_there():
-    assert all(getattr(train, name) is not None for name in train.__all__)
-    assert set(train.__all__) == set(train._HOMES)

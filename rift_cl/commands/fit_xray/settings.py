@@ -8,7 +8,6 @@ from typing import Annotated, ClassVar, Literal
 
 from tyro.conf import Positional
 
-from rift_cl.cl.budget import parse_bytes
 from rift_cl.commands.fit.settings import FitOutput, FitSettings, SplitOptions
 from rift_cl.commands.options import RepeatableRun
 from rift_cl.io.scans.literals import AngleUnit, Kind
@@ -100,4 +99,6 @@ class FitXraySettings(RepeatableRun, XrayOutput, XrayTraining, XrayInput, FitSet
 
     def budget(self) -> int | None:
         """Bytes that --memory allows; None where it was not given."""
+        from rift_cl.cl.budget import parse_bytes
+
         return None if self.memory is None else parse_bytes(self.memory)

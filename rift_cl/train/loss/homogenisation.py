@@ -26,9 +26,8 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Literal, get_args
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import convolve
-from scipy.special import ndtri
 from tyro.conf import arg
 
 from rift_cl.errors import InputError
@@ -107,10 +106,10 @@ def noise_of(images: Sequence[NDArray[np.float32]]) -> float:
     found = []
     for image in images:
         rough = np.concatenate([_roughness(image[..., c]) for c in range(image.shape[2])])
-        found.append(float(np.quantile(rough, _CALM)) / ndtri((1 + _CALM) / 2))
+        found.append(float(np.quantile(rough, _CALM)) / scipy.special.ndtri((1 + _CALM) / 2))
     return float(np.median(found))
 
 
 def _roughness(channel: NDArray[np.float32]) -> Floats:
-    inner = convolve(channel.astype(float), _MASK, mode="nearest")[1:-1, 1:-1]
+    inner = scipy.ndimage.convolve(channel.astype(float), _MASK, mode="nearest")[1:-1, 1:-1]
     return np.asarray(np.abs(inner).ravel())

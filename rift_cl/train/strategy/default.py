@@ -19,19 +19,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import log
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.option_marks import Auto
-from rift_cl.splat.renderer import Frame, FrameGradients
-from rift_cl.splat.settings import SplatSettings
-from rift_cl.train.parameters import Parameters
 from rift_cl.train.per_view.quaternions import rotated
 from rift_cl.train.ranges import check_number, check_whole
 from rift_cl.train.strategy.protocol import StrategySettings, TrainingRun
 from rift_cl.train.strategy.screen_statistics import ScreenStatistics, StatisticsStrategy
+
+if TYPE_CHECKING:
+    from rift_cl.splat.renderer import Frame, FrameGradients
+    from rift_cl.splat.settings import SplatSettings
+    from rift_cl.train.parameters import Parameters
 
 _SPLIT_SHRINK = 1.6
 # ln of the largest scale that is drawn; see kernels/splat/splat_activate.cl.

@@ -19,15 +19,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import comb
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.splat.renderer import Frame, FrameGradients
-from rift_cl.train.parameters import Parameters
 from rift_cl.train.ranges import check_number, check_whole
 from rift_cl.train.strategy.protocol import Penalties, Strategy, StrategySettings, TrainingRun
+
+if TYPE_CHECKING:
+    from rift_cl.splat.renderer import Frame, FrameGradients
+    from rift_cl.train.parameters import Parameters
 
 # A set of splats grows by no more than this share at once.
 _MOST_GROWTH = 1.0

@@ -10,14 +10,16 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from numpy.typing import NDArray
 
 from rift_cl.errors import CheckpointError
-from rift_cl.splat.renderer import Frame, FrameGradients
-from rift_cl.splat.settings import SplatSettings
-from rift_cl.train.parameters import Parameters
+
+if TYPE_CHECKING:
+    from rift_cl.splat.renderer import Frame, FrameGradients
+    from rift_cl.splat.settings import SplatSettings
+    from rift_cl.train.parameters import Parameters
 
 
 @dataclass(frozen=True)

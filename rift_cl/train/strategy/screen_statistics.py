@@ -7,15 +7,17 @@ twin.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.cl.device import Device
 from rift_cl.errors import CheckpointError, InputError
-from rift_cl.splat.renderer import Frame, FrameGradients
 from rift_cl.train.strategy.protocol import Strategy, TrainingRun, check_names
+
+if TYPE_CHECKING:
+    from rift_cl.cl.device import Device
+    from rift_cl.splat.renderer import Frame, FrameGradients
 
 _COLUMNS = 3
 

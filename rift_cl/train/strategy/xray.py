@@ -16,6 +16,7 @@ Relocation is seldom, on the host, in NumPy; what is random comes from (seed, st
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +24,14 @@ from numpy.typing import NDArray
 from rift_cl.basis.indices import graded
 from rift_cl.errors import InputError
 from rift_cl.splat.orders import order_of
-from rift_cl.splat.renderer import Frame, FrameGradients
-from rift_cl.train.parameters import Parameters
 from rift_cl.train.per_view.quaternions import rotated
 from rift_cl.train.ranges import check_number, check_whole
 from rift_cl.train.strategy.protocol import StrategySettings, TrainingRun
 from rift_cl.train.strategy.screen_statistics import ScreenStatistics, StatisticsStrategy
+
+if TYPE_CHECKING:
+    from rift_cl.splat.renderer import Frame, FrameGradients
+    from rift_cl.train.parameters import Parameters
 
 # Shift of the halves of a splat, in standard deviations.
 _APART = 0.5
