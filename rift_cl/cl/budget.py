@@ -62,10 +62,11 @@ def _free_host_memory(moment: int) -> int | None:
 def memory_budget(traits: Traits, limit: int | None = None) -> int:
     """Bytes that a device may use.
 
-    The smallest of what the device reports, 60 % of free host memory where the device lives in
-    it, and ``limit`` or else the environment's ``RIFT_MEMORY``.
+    The smallest of what the device reports (85 % of that on a GPU with memory of its own), 60 % of
+    free host memory where the device lives in it, and ``limit`` or else the environment's
+    ``RIFT_MEMORY``.
     """
-    amounts = [traits.memory]
+    amounts = [traits.usable_memory]
     free = free_host_memory() if traits.is_cpu or traits.unified else None
     if free is not None:
         amounts.append(int(_HOST_SHARE * free))
@@ -76,8 +77,17 @@ def memory_budget(traits: Traits, limit: int | None = None) -> int:
     return min(amounts)
 
 
-def plan_chunks(count: int, each: int, fixed: int, budget: int, *, what: str) -> list[slice]:
-    """Cut work into chunks that fit the memory budget: the one way in which work is cut to memory.
+def plan_chunks(
+    count: int,
+    each: int,
+    fixed: int,
+    budget: int,
+    *,
+    what: str,
+    array: int = 0,
+    largest: int = _MOST,
+) -> list[slice]:
+    """Cut work into chunks that fit the memory: the one way in which work is cut to memory.
 
     Args:
         count: how many equal items of work there are, such as slices or rows.
@@ -85,6 +95,8 @@ def plan_chunks(count: int, each: int, fixed: int, budget: int, *, what: str) ->
         fixed: bytes needed whatever the number of items.
         budget: bytes there are.
         what: the name of one item, for the error.
+        array: bytes of one item in the largest of its arrays, which grows with the items.
+        largest: bytes of the largest array that the device takes (``traits.allocation``).
 
     Returns:
         Slices over the items, as even as can be, one for each chunk.
@@ -99,8 +111,28 @@ def plan_chunks(count: int, each: int, fixed: int, budget: int, *, what: str) ->
             f"{format_bytes(budget)}: raise the budget (RIFT_MEMORY or --memory), use a device "
             "with more memory, or make the problem smaller"
         )
-    chunks = -(-count // most)
+    check_array(array, largest, what=f"an array of one {what}")
+    chunks = -(-count // min(most, largest // max(array, 1)))
     return [slice(count * k // chunks, count * (k + 1) // chunks) for k in range(chunks)]
+
+
+def check_array(size: int, largest: int, *, what: str) -> None:
+    """Refuse an array that the device does not take in one piece.
+
+    Args:
+        size: bytes of the array.
+        largest: bytes of the largest array that the device takes.
+        what: the array, for the error.
+
+    Raises:
+        ResourceLimitError: it is larger.
+    """
+    if size > largest:
+        raise ResourceLimitError(
+            f"{what} takes {format_bytes(size)}, the largest single array that the device takes is "
+            f"{format_bytes(largest)}, however much memory it has: work on parts of it, make the "
+            "problem smaller, or use a device that takes larger arrays (rift devices)"
+        )
 
 
 def format_bytes(amount: float) -> str:

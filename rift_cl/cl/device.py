@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from rift_cl.cl.array import DeviceArray
-from rift_cl.cl.budget import memory_budget
+from rift_cl.cl.budget import check_array, memory_budget
 from rift_cl.cl.failures import named_errors
 from rift_cl.cl.memory import as_plain, as_real_array, download, send, upload
 from rift_cl.cl.process import claim_process
@@ -88,19 +88,35 @@ class Device:
         return memory_budget(self.traits, self._limit)
 
     def empty(self, shape: int | tuple[int, ...], dtype: DTypeLike = np.float32) -> DeviceArray:
-        """A new ``pyopencl.array.Array`` whose contents are not set."""
+        """A new ``pyopencl.array.Array`` whose contents are not set.
+
+        Raises:
+            ResourceLimitError: it is larger than the device takes in one piece.
+            DeviceMemoryError: the device's memory ran out.
+        """
         from pyopencl.array import Array
 
         opened = self._open()
         # Blocks that are kept for the next array count as well, until the room is needed.
         count = shape if isinstance(shape, int) else math.prod(shape)
         wanted = int(count) * np.dtype(dtype).itemsize
-        room = self.budget if wanted >= _LARGE else self._limit or self.traits.memory
+        self.check_array(wanted, shape)
+        room = self.budget if wanted >= _LARGE else self._limit or self.traits.usable_memory
         if opened.pool.managed_bytes + wanted > room:
             opened.pool.free_held()
         with named_errors(f"allocating an array of shape {shape}", self.name):
-            array: DeviceArray = Array(opened.queue, shape, dtype, allocator=opened.pool)
+            allocator = opened.allocator(wanted, self.traits.allocation)
+            array: DeviceArray = Array(opened.queue, shape, dtype, allocator=allocator)
             return array
+
+    def check_array(self, size: int, shape: int | tuple[int, ...]) -> None:
+        """Refuse an array that this device does not take in one piece.
+
+        Raises:
+            ResourceLimitError: its ``size`` in bytes is larger than the device's largest buffer.
+        """
+        what = f"an array of shape {shape} on {self.name}"
+        check_array(size, self.traits.allocation, what=what)
 
     def zeros(self, shape: int | tuple[int, ...], dtype: DTypeLike = np.float32) -> DeviceArray:
         """A new device array of zeros."""
@@ -160,6 +176,20 @@ class _Opened(NamedTuple):
     context: Any
     queue: Any
     pool: Any
+    direct: Any
+
+    def allocator(self, size: int, largest: int) -> Any:
+        """What makes a buffer of ``size`` bytes: the pool, unless its own would be too large.
+
+        Buffers of the pool are up to a sixteenth larger than what is asked for.
+        """
+        if size <= largest // 2:
+            return self.pool
+        return (
+            self.pool
+            if self.pool.alloc_size(self.pool.bin_number(size)) <= largest
+            else self.direct
+        )
 
     @classmethod
     def of(cls, handle: Any) -> _Opened:
@@ -168,4 +198,5 @@ class _Opened(NamedTuple):
 
         context = cl.Context([handle])
         queue = cl.CommandQueue(context)
-        return cls(context, queue, MemoryPool(ImmediateAllocator(queue)))
+        direct = ImmediateAllocator(queue)
+        return cls(context, queue, MemoryPool(direct), direct)

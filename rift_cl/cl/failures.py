@@ -5,10 +5,11 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
-from rift_cl.errors import DeviceError, DeviceLostError, DeviceMemoryError
+from rift_cl.errors import DeviceError, DeviceLostError, DeviceMemoryError, ResourceLimitError
 
-_MEMORY = ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES", "INVALID_BUFFER_SIZE")
+_MEMORY = ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES")
 _MEMORY_TOO = ("OUT_OF_HOST_MEMORY",)
+_SIZE = "INVALID_BUFFER_SIZE"
 _LOST = ("DEVICE_NOT_AVAILABLE", "INVALID_COMMAND_QUEUE", "INVALID_CONTEXT")
 
 
@@ -21,7 +22,8 @@ def named_errors(doing: str, device: str) -> Iterator[None]:
         device: the device's name.
 
     Raises:
-        DeviceMemoryError: the driver ran out of memory or refused a size.
+        DeviceMemoryError: the driver ran out of memory.
+        ResourceLimitError: it takes no single array of that size.
         DeviceLostError: the device went away.
         DeviceError: any other failure of the driver.
     """
@@ -35,6 +37,11 @@ def named_errors(doing: str, device: str) -> Iterator[None]:
             raise DeviceMemoryError(
                 f"{device} ran out of memory while {doing} ({text}): give it less at a time, for "
                 "example a smaller memory budget (RIFT_MEMORY or --memory)"
+            ) from error
+        if _SIZE in text:
+            raise ResourceLimitError(
+                f"{device} takes no single array of the size that it was asked for while {doing} "
+                f"({text}): work on parts of it, or make the problem smaller"
             ) from error
         if any(code in text for code in _LOST):
             raise DeviceLostError(

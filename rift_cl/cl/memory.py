@@ -118,6 +118,7 @@ def send(device: Device, host: NDArray[Any]) -> DeviceArray:
 
     if host.size == 0:
         return upload(device, host)
+    device.check_array(host.nbytes, host.shape)
     flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
     with named_errors(f"copying {host.nbytes} bytes to it", device.name):
         buffer = cl.Buffer(device.context, flags, hostbuf=host)
@@ -135,6 +136,7 @@ def share(device: Device, host: NDArray[Any]) -> DeviceArray:
 
     if not device.traits.unified or host.size == 0:
         return upload(device, host)
+    device.check_array(host.nbytes, host.shape)
     flags = cl.mem_flags.READ_ONLY | cl.mem_flags.USE_HOST_PTR
     with named_errors(f"sharing {host.nbytes} bytes with it", device.name):
         buffer = cl.Buffer(device.context, flags, hostbuf=host)

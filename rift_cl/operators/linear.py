@@ -244,8 +244,16 @@ class LinearOperator(ABC):
 
     def _chunks(self, budget: int) -> Iterable[Chunk]:
         """Chunks that fit a budget in bytes; one for the whole unless a subclass overrides it."""
-        arrays = self.dtype.itemsize * (math.prod(self.domain) + math.prod(self.range))
-        plan_chunks(1, arrays, self.scratch, budget, what=f"{type(self).__name__} application")
+        sizes = [self.dtype.itemsize * math.prod(shape) for shape in (self.domain, self.range)]
+        plan_chunks(
+            1,
+            sum(sizes),
+            self.scratch,
+            budget,
+            what=f"{type(self).__name__} application",
+            array=max(sizes),
+            largest=self.device.traits.allocation,
+        )
         return [((), ())]
 
     @abstractmethod

@@ -9,12 +9,12 @@ records are summed in the order of the tiles whatever the band, so that every bi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.cl.budget import format_bytes
+from rift_cl.cl.budget import check_array, format_bytes
 from rift_cl.errors import ResourceLimitError
 from rift_cl.splat.orders import Modal, ModeOrders
 from rift_cl.splat.projection import is_modal
@@ -99,6 +99,15 @@ class FrameMemory:
         records = 4 * self.record * entries if self.gradient else 0
         return tile_lists_bytes(self.splats, entries, tiles=tiles) + records
 
+    def longest(self, entries: int) -> int:
+        """Bytes of the largest single array of these lists: the records, or the pairs."""
+        return max(8, 4 * self.record * self.gradient) * entries
+
+    def fits(self, entries: int, tiles: int, budget: int, largest: int) -> bool:
+        """Whether a frame with such lists fits a budget, and each of them the largest buffer."""
+        within = self.longest(entries) <= largest
+        return within and self.fixed + self.lists(entries, tiles) <= budget
+
 
 def check_fixed(memory: FrameMemory, budget: int) -> None:
     """Refuse a frame that cannot be drawn in any number of bands.
@@ -116,36 +125,43 @@ def check_fixed(memory: FrameMemory, budget: int) -> None:
 
 
 def plan_bands(
-    boxes: NDArray[np.int32], tiles: Tiles, memory: FrameMemory, budget: int
+    boxes: NDArray[np.int32], tiles: Tiles, memory: FrameMemory, budget: int, largest: int
 ) -> list[Tiles]:
-    """Cut an image into as few bands as fit the budget.
+    """Cut an image into as few bands as fit the budget and the largest buffer.
 
     Args:
         boxes: (N, 4) the splats' tiles, on the host.
         tiles: all tiles of the image.
         memory: what a frame takes.
         budget: bytes there are.
+        largest: bytes of the largest array that the device takes.
 
     Raises:
         ResourceLimitError: not even one row of tiles fits.
     """
-    room = budget - memory.fixed
     per_row = entries_per_row(boxes, tiles)
     bands: list[Tiles] = []
     first, entries = 0, 0
     for row, more in enumerate(per_row.tolist()):
-        if row > first and memory.lists(entries + more, (row + 1 - first) * tiles.across) > room:
+        count = (row + 1 - first) * tiles.across
+        if row > first and not memory.fits(entries + more, count, budget, largest):
             bands.append(Tiles(tiles.across, row - first, first))
             first, entries = row, 0
         entries += more
-        if row == first and memory.lists(entries, tiles.across) > room:
-            raise ResourceLimitError(
-                f"one row of tiles ({entries} splat and tile pairs) needs "
-                f"{format_bytes(memory.fixed + memory.lists(entries, tiles.across))}, the memory "
-                f"budget is {format_bytes(budget)}: raise the budget (RIFT_MEMORY or --memory), "
-                "use a device with more memory, or draw fewer or smaller splats"
-            )
+        if row == first and not memory.fits(entries, tiles.across, budget, largest):
+            _refuse(memory, entries, tiles.across, budget, largest)
     return [*bands, Tiles(tiles.across, tiles.rows - first, first)]
+
+
+def _refuse(memory: FrameMemory, entries: int, tiles: int, budget: int, largest: int) -> NoReturn:
+    """Say why one row of tiles does not fit."""
+    what = f"one row of tiles ({entries} splat and tile pairs)"
+    check_array(memory.longest(entries), largest, what=f"a list of {what}")
+    raise ResourceLimitError(
+        f"{what} needs {format_bytes(memory.fixed + memory.lists(entries, tiles))}, the memory "
+        f"budget is {format_bytes(budget)}: raise the budget (RIFT_MEMORY or --memory), "
+        "use a device with more memory, or draw fewer or smaller splats"
+    )
 
 
 def entries_per_row(boxes: NDArray[Any], tiles: Tiles) -> NDArray[np.int64]:

@@ -81,7 +81,7 @@ def draw(
     tiles, sort = Tiles.of(size, settings.tile), settings.mode == "light"
     counts = count_tiles(device, boxes, depths, tiles)
     lists, raster = None, None
-    if _fits(memory, counts.n_entries, tiles, device.budget):
+    if memory.fits(counts.n_entries, tiles.count, device.budget, device.traits.allocation):
         lists = list_tiles(device, counts, sort=sort)
         raster = rasterize(device, screen, lists, size, settings=settings, background=background)
         return Drawing(screen, boxes, depths, size, settings, background, memory, lists, raster)
@@ -149,10 +149,6 @@ def listed(
     return of_each, np.concatenate(owners), np.concatenate(begins)
 
 
-def _fits(memory: FrameMemory, entries: int, tiles: Tiles, budget: int) -> bool:
-    return memory.fixed + memory.lists(entries, tiles.count) <= budget
-
-
 def _bands(
     device: Device,
     boxes: DeviceArray,
@@ -162,7 +158,8 @@ def _bands(
     *,
     sort: bool,
 ) -> Iterator[TileLists]:
-    for band in plan_bands(device.get(boxes), tiles, memory, device.budget):
+    room = device.budget, device.traits.allocation
+    for band in plan_bands(device.get(boxes), tiles, memory, *room):
         yield tile_lists(device, boxes, depths, band, sort=sort)
 
 
@@ -175,7 +172,8 @@ def _lists_again(device: Device, drawing: Drawing) -> Iterator[TileLists]:
     """The lists that were kept, or of one band after the other, as the records fit."""
     memory = replace(drawing.memory, gradient=True)
     kept = drawing.lists
-    if kept is not None and _fits(memory, kept.n_entries, drawing.tiles, device.budget):
+    room = device.budget, device.traits.allocation
+    if kept is not None and memory.fits(kept.n_entries, drawing.tiles.count, *room):
         yield kept
         return
     yield from _bands_of(device, drawing, memory)

@@ -310,6 +310,7 @@ def _sort_by_tile(
     tiles = place.count
     chunks = pieces(pairs, run_length(device, pairs, gpu=_GPU_PAIRS))
     chunks = min(chunks, max(1, _TABLE_SHARE * pairs // tiles))
+    chunks = min(chunks, max(1, device.traits.allocation // (4 * tiles)))
     table = device.empty((chunks, tiles), np.int32)
     starts = device.empty(tiles + 1, np.int32)
     entries = device.empty((pairs, 2), np.int32)

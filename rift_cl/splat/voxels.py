@@ -152,7 +152,8 @@ class _Work:
         tiles = Tiles(int(across), int(rows))
         memory = _LayerMemory(chosen.size, 1, 0, 0, shared=shared)
         listing = device.array(chosen, np.int32), device.array(boxes), device.zeros(chosen.size)
-        for band in plan_bands(boxes, tiles, memory, device.budget):
+        room = device.budget, device.traits.allocation
+        for band in plan_bands(boxes, tiles, memory, *room):
             self._fill_band(device, volume, layer, band, listing)
 
     def _fill_band(

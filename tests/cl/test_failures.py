@@ -14,6 +14,7 @@ from rift_cl.errors import (
     DeviceLostError,
     DeviceMemoryError,
     ResourceLimitError,
+    RiftError,
 )
 
 
@@ -27,7 +28,7 @@ CODES = [
     (cl.MemoryError, "clEnqueueNDRangeKernel", "OUT_OF_RESOURCES", DeviceMemoryError),
     (cl.RuntimeError, "clEnqueueNDRangeKernel", "OUT_OF_RESOURCES", DeviceMemoryError),
     (cl.MemoryError, "clCreateContext", "OUT_OF_HOST_MEMORY", DeviceMemoryError),
-    (cl.LogicError, "clCreateBuffer", "INVALID_BUFFER_SIZE", DeviceMemoryError),
+    (cl.LogicError, "clCreateBuffer", "INVALID_BUFFER_SIZE", ResourceLimitError),
     (cl.RuntimeError, "clFinish", "DEVICE_NOT_AVAILABLE", DeviceLostError),
     (cl.LogicError, "clFinish", "INVALID_COMMAND_QUEUE", DeviceLostError),
     (cl.LogicError, "clEnqueueNDRangeKernel", "INVALID_CONTEXT", DeviceLostError),
@@ -39,7 +40,7 @@ CODES = [
 
 @pytest.mark.parametrize(("kind", "routine", "code", "wanted"), CODES)
 def test_driver_errors_are_named(kind, routine, code, wanted):
-    with pytest.raises(DeviceError) as caught, named_errors("copying 5 bytes to it", "Radeon"):
+    with pytest.raises(RiftError) as caught, named_errors("copying 5 bytes to it", "Radeon"):
         raise _driver_error(kind, routine, code)
     assert type(caught.value) is wanted
     for part in ("Radeon", "copying 5 bytes to it", code, routine):

@@ -187,9 +187,9 @@ def test_bands_cover_each_row_once_and_are_as_few_as_fit(boxes, sizes, room, gra
 
     if not all(fits(row, row + 1) for row in range(tiles.rows)):
         with pytest.raises(ResourceLimitError, match="one row of tiles"):
-            plan_bands(boxes, tiles, memory, memory.fixed + room)
+            plan_bands(boxes, tiles, memory, memory.fixed + room, 1 << 40)
         return
-    bands = plan_bands(boxes, tiles, memory, memory.fixed + room)
+    bands = plan_bands(boxes, tiles, memory, memory.fixed + room, 1 << 40)
     stops = [band.first_row + band.rows for band in bands]
     assert [band.first_row for band in bands] == [0, *stops[:-1]] and stops[-1] == tiles.rows
     for band, stop in zip(bands, stops, strict=True):
@@ -203,7 +203,7 @@ def test_what_fits_no_bands_is_refused_in_one_sentence():
         r"^one row of tiles \(3000 splat and tile pairs\) needs .*, the memory budget is .*: raise"
     )
     with pytest.raises(ResourceLimitError, match=words):
-        plan_bands(boxes, Tiles(30, 1), memory, memory.fixed + 50_000)
+        plan_bands(boxes, Tiles(30, 1), memory, memory.fixed + 50_000, 1 << 40)
     words = (
         "^100 splats and an image of 15360 pixels with 3 channels need .* budget is 1 KiB: raise"
     )

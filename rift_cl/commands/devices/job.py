@@ -28,7 +28,8 @@ def _facts(device: Device) -> dict[str, str]:
         "platform": f"{device.platform}, driver {device.driver}",
         "selector": device.selector,
         "kind": f"{'CPU' if traits.is_cpu else 'GPU'}, {traits.compute_units} compute units",
-        "memory": f"{format_bytes(device.budget)} to use of {format_bytes(traits.memory)}",
+        "memory": f"{format_bytes(device.budget)} to use of {format_bytes(traits.memory)}, "
+        f"arrays of at most {format_bytes(traits.allocation)}",
         "local": f"{format_bytes(traits.local_memory)}, groups of at most {traits.group}",
         "traits": ", ".join(name for name, there in features.items() if there) or "none",
         "self-test": f"{'passed' if test.passed else 'FAILED'}: {test.detail}",

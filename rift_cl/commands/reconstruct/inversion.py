@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Generator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -104,12 +105,14 @@ class Inversion:
         Raises:
             ResourceLimitError: not even one slice does.
         """
-        scratch = self.projector(1).scratch
+        A = self.projector(1)
+        array = 4 * max(int(np.prod(A.grid.shape[-2:])), len(A.scan.angles) * A.scan.bins)
+        fitting = partial(plan_chunks, array=array, largest=self.device.traits.allocation)
         most = _ITERATIVE_SLAB if self.settings.iterative else _SLAB
         cut = []
         for run in runs:
             count, budget = run.stop - run.start, self.device.budget
-            for chunk in plan_chunks(count, self.need, scratch, budget, what="slice"):
+            for chunk in fitting(count, self.need, A.scratch, budget, what="slice"):
                 first, stop = run.start + chunk.start, run.start + chunk.stop
                 cut += [slice(at, min(at + most, stop)) for at in range(first, stop, most)]
         return cut

@@ -252,8 +252,16 @@ class ViewFilter(LinearOperator):
     def _chunks(self, budget: int) -> Iterable[Chunk]:
         if len(self.domain) == 2:
             return super()._chunks(budget)
-        each = 2 * self.dtype.itemsize * self.domain[0] * self.domain[2]
-        chunks = plan_chunks(self.domain[1], each, self.scratch, budget, what="row of every view")
+        array = self.dtype.itemsize * self.domain[0] * self.domain[2]
+        chunks = plan_chunks(
+            self.domain[1],
+            2 * array,
+            self.scratch,
+            budget,
+            what="row of every view",
+            array=array,
+            largest=self.device.traits.allocation,
+        )
         return [((slice(None), chunk), (slice(None), chunk)) for chunk in chunks]
 
 

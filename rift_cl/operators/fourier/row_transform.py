@@ -57,8 +57,9 @@ class RowTransform:
             self._blocks = BlockTransform(device, self.length, dtype)
             return
         self._transform = ColumnTransform(device, self.length, dtype)
-        fitting = min(rows, _SLAB_BYTES["gpu"] // (4 * self.dtype.itemsize * self.length))
-        self._columns = max(1, fitting)
+        each = 2 * self.dtype.itemsize * self.length
+        fitting = min(_SLAB_BYTES["gpu"] // 2, device.traits.allocation) // each
+        self._columns = max(1, min(rows, fitting))
 
     @property
     def scratch(self) -> int:

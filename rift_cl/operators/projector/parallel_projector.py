@@ -76,10 +76,16 @@ class ParallelProjector(LinearOperator):
             fixed: further bytes needed, whatever the number of slices.
         """
         views, bins = len(self.scan.angles), self.scan.bins
-        numbers = math.prod(self.grid.shape[-2:]) + sinograms * views * bins
-        each = self.dtype.itemsize * numbers
-        needed = self.scratch + fixed
-        chunks = plan_chunks(self.grid.slices, each, needed, budget, what="slice")
+        image, sinogram = math.prod(self.grid.shape[-2:]), views * bins
+        chunks = plan_chunks(
+            self.grid.slices,
+            self.dtype.itemsize * (image + sinograms * sinogram),
+            self.scratch + fixed,
+            budget,
+            what="slice",
+            array=self.dtype.itemsize * max(image, sinogram),
+            largest=self.device.traits.allocation,
+        )
         if len(self.grid.shape) == 2:
             return [((), ())]
         return [((chunk,), (slice(None), chunk)) for chunk in chunks]

@@ -92,7 +92,7 @@ class Projector(ParallelProjector):
         return [*super()._facts(), f"footprint {self.footprint}"]
 
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
-        for slab in _slabs(x):
+        for slab in self._slabs(x):
             for transpose, walk in enumerate(self._walks):
                 if walk.count:
                     plane = self._split(walk, x, slab, transpose)
@@ -152,7 +152,7 @@ class Projector(ParallelProjector):
         )
 
     def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
-        for slab in _slabs(out):
+        for slab in self._slabs(out):
             planes = [self._backproject(walk, y, slab) for walk in self._walks]
             ny, nx = self.grid.shape[-2:]
             tiles = (*self._tiles(nx, ny), slab.slices)
@@ -230,20 +230,38 @@ class Projector(ParallelProjector):
         return -(-width // tile), -(-rows // tile)
 
     def _runs(self, walk: _Walk, slab: _Slab) -> Iterator[_Run]:
-        """Runs of views whose tables fit the table memory, but no fewer than a cache's worth."""
+        """Runs of views whose tables fit the table memory, but no fewer than a cache's worth.
+
+        No table is larger than the device's largest buffer, however.
+        """
         each = self.dtype.itemsize * walk.table.entries * slab.slices
         most = max(_FEWEST_VIEWS, self._table_bytes // each)
+        most = max(1, min(most, self.device.traits.allocation // each))
         for first in range(0, walk.count, most):
             yield _Run(first, min(most, walk.count - first))
+
+    def _slabs(self, image: DeviceArray) -> Iterator[_Slab]:
+        """Slices that are worked on together, as many as bounded scratch and one buffer hold."""
+        total = image.shape[0] if len(image.shape) == 3 else 1
+        # One view's table is the other array of a slab that a buffer must hold.
+        largest = max(*self._planes, *(walk.table.entries for walk in self._walks))
+        fitting = self.device.traits.allocation // (self.dtype.itemsize * largest)
+        most = max(1, min(_SLAB, fitting))
+        for first in range(0, total, most):
+            yield _Slab(first, min(most, total - first), total)
+
+    @property
+    def _planes(self) -> list[int]:
+        """Numbers of a slice's padded planes, by rows and by columns."""
+        return [walk.table.rows * (walk.table.width + 2 * self._segment) for walk in self._walks]
 
     @property
     def scratch(self) -> int:
         """Bytes needed besides the arrays that go in and come out."""
         slices = min(_SLAB, self.grid.slices)
-        planes = [walk.table.rows * (walk.table.width + 2 * self._segment) for walk in self._walks]
         tables = max(walk.table.entries for walk in self._walks) * _FEWEST_VIEWS
         records = sum(walk.nbytes for walk in self._walks)
-        numbers = slices * (sum(planes) + tables)
+        numbers = slices * (sum(self._planes) + tables)
         return self.dtype.itemsize * numbers + self._table_bytes + records
 
 
@@ -277,9 +295,3 @@ class _Run(NamedTuple):
 
     first: int
     views: int
-
-
-def _slabs(image: DeviceArray) -> Iterator[_Slab]:
-    total = image.shape[0] if len(image.shape) == 3 else 1
-    for first in range(0, total, _SLAB):
-        yield _Slab(first, min(_SLAB, total - first), total)

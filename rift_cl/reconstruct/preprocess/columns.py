@@ -52,8 +52,17 @@ class DetectorColumns:
     @staticmethod
     def nbytes(device: Device, views: int, bins: int) -> int:
         """Bytes of the device that one row needs: projections, columns, their copy, their order."""
-        lists = 16 // _CPU_COLUMNS if device.traits.is_cpu else 16
-        return (4 * 4 + lists) * views * bins
+        return 4 * 4 * views * bins + DetectorColumns._sort_bytes(device, views, bins)
+
+    @staticmethod
+    def largest(device: Device, views: int, bins: int) -> int:
+        """Bytes that one row takes of the largest of these arrays."""
+        return max(4 * views * bins, DetectorColumns._sort_bytes(device, views, bins))
+
+    @staticmethod
+    def _sort_bytes(device: Device, views: int, bins: int) -> int:
+        """Bytes of the lists that sort one row's columns."""
+        return (16 // _CPU_COLUMNS if device.traits.is_cpu else 16) * views * bins
 
     def projections(self) -> Floats:
         """The columns as projections on the host, (view, row, bin)."""
@@ -221,7 +230,16 @@ def mend_columns(
     each = DetectorColumns.nbytes(device, views, bins)
     most = max(each, _CPU_BYTES) if device.traits.is_cpu else device.budget
     budget = min(device.budget, most)
-    for chunk in plan_chunks(rows, each, 0, budget, what="row of the projections"):
+    fitting = plan_chunks(
+        rows,
+        each,
+        0,
+        budget,
+        what="row of the projections",
+        array=DetectorColumns.largest(device, views, bins),
+        largest=device.traits.allocation,
+    )
+    for chunk in fitting:
         columns = DetectorColumns(device, projections[:, chunk])
         mend(columns)
         out[:, chunk] = columns.projections()

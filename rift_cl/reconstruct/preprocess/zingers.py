@@ -117,9 +117,17 @@ def _cleaned(stack: Floats, rule: _Rule, device: Device | None) -> Floats:
         return stack.copy()
     device = device or default_device()
     out = np.empty(stack.shape, np.float32)
-    each = 3 * 4 * views * bins
-    margin = 0 if rows == 1 else 2 * away * each
-    for chunk in plan_chunks(rows, each, margin, device.budget, what="row of the projections"):
+    array, beside = 4 * views * bins, 0 if rows == 1 else 2 * away
+    fitting = plan_chunks(
+        rows,
+        3 * array,
+        beside * 3 * array,
+        device.budget,
+        what="row of the projections",
+        array=array,
+        largest=device.traits.allocation - beside * array,
+    )
+    for chunk in fitting:
         first = max(0, chunk.start - away)
         slab = np.ascontiguousarray(stack[:, first : chunk.stop + away])
         inner = slice(chunk.start - first, chunk.stop - first)

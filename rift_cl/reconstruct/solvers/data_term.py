@@ -65,7 +65,15 @@ class DataTerm:
         self.A, self.device, self.dtype = A, A.device, A.dtype
         images, sinograms = (math.prod(shape) for shape in (A.domain, A.range))
         each = self.dtype.itemsize * (arrays[0] * images + arrays[1] * sinograms)
-        plan_chunks(1, each, A.scratch, self.device.budget, what="solver")
+        plan_chunks(
+            1,
+            each,
+            A.scratch,
+            self.device.budget,
+            what="solver",
+            array=self.dtype.itemsize * max(images, sinograms),
+            largest=self.device.traits.allocation,
+        )
         self.samples = max(math.prod(A.range), 1)
         """Samples of y that count."""
         self.y = self.data()

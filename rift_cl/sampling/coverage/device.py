@@ -18,12 +18,9 @@ from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.errors import NonFiniteError, ShapeError
 from rift_cl.geometry.numbers import real_numbers
-from rift_cl.sampling.coverage.work import BOX, ROW, CoverageWork, Views
+from rift_cl.sampling.coverage.work import BOX, ROW, RUN, CoverageWork, Views
 from rift_cl.sampling.targets.observations import ObservationsGradient
 from rift_cl.sampling.targets.target import Target
-
-# Frequencies that one work-item of the gradient sums over.
-_RUN = 1024
 
 
 def coverage(
@@ -56,8 +53,16 @@ def coverage(
     found = np.empty((work.points, work.padded), np.float32)
     for points, table in work.point_chunks():
         each = work.lanes * 4 * (3 + len(table)) + 4 * BOX
-        room = work.device.budget
-        for chunk in plan_chunks(len(work.boxes), each, table.nbytes, room, what="few frequencies"):
+        chunks = plan_chunks(
+            len(work.boxes),
+            each,
+            table.nbytes,
+            work.device.budget,
+            what="few frequencies",
+            array=max(work.lanes * 4 * max(3, len(table)), 4 * BOX),
+            largest=work.device.traits.allocation,
+        )
+        for chunk in chunks:
             at = slice(chunk.start * work.lanes, chunk.stop * work.lanes)
             part = work.device.empty((len(table), at.stop - at.start))
             size = (chunk.stop - chunk.start, len(table))
@@ -109,10 +114,19 @@ def _parts(
     work: CoverageWork, table: DeviceArray, upstream: NDArray[np.float32]
 ) -> Iterator[DeviceArray]:
     """The gradients by runs of frequencies, in their order: (runs, points, V, 8) at a time."""
-    each = _RUN * 4 * (3 + len(table)) + _RUN // work.lanes * 4 * BOX + table.nbytes
-    runs, room = -(-work.padded // _RUN), work.device.budget
-    for chunk in plan_chunks(runs, each, table.nbytes, room, what="run of frequencies"):
-        at = slice(chunk.start * _RUN, min(chunk.stop * _RUN, work.padded))
+    boxes = RUN // work.lanes * 4 * BOX
+    each = RUN * 4 * (3 + len(table)) + boxes + table.nbytes
+    chunks = plan_chunks(
+        -(-work.padded // RUN),
+        each,
+        table.nbytes,
+        work.device.budget,
+        what="run of frequencies",
+        array=max(RUN * 4 * max(3, len(table)), boxes, table.nbytes),
+        largest=work.device.traits.allocation,
+    )
+    for chunk in chunks:
+        at = slice(chunk.start * RUN, min(chunk.stop * RUN, work.padded))
         parts = work.device.empty((chunk.stop - chunk.start, *table.shape))
         work.device.launch(
             "coverage_grad",
@@ -121,7 +135,7 @@ def _parts(
             views=table,
             upstream=work.device.array(np.ascontiguousarray(upstream[:, at])),
             parts=parts,
-            RUN=_RUN,
+            RUN=RUN,
         )
         yield parts
 

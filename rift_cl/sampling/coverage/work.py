@@ -23,6 +23,8 @@ Floats = NDArray[np.float64]
 Views = Sequence[Camera] | Observations | Parallel
 # Numbers of a view and of a block's box.
 ROW, BOX = 8, 6
+# Frequencies that one work-item of the gradient sums over.
+RUN = 1024
 _LARGEST = float(np.finfo(np.float32).max)
 # Cycles per diameter beyond which float32 does not tell a slab from its neighbour.
 _MOST = 1e5
@@ -114,8 +116,18 @@ class CoverageWork:
 
     def point_chunks(self) -> Iterator[tuple[slice, Any]]:
         """Points whose views fill no more than a quarter of the memory, with those views."""
-        each, room = self.views * ROW * 4, self.device.budget // 4
-        for chunk in plan_chunks(self.points, each, 0, room, what="point's views"):
+        each = self.views * ROW * 4
+        chunks = plan_chunks(
+            self.points,
+            each,
+            0,
+            self.device.budget // 4,
+            what="point's views",
+            # The gradient by a run of frequencies is an array of its points as well.
+            array=max(each, RUN * 4),
+            largest=self.device.traits.allocation,
+        )
+        for chunk in chunks:
             yield chunk, self.device.array(self.rows[chunk])
 
     def send(self, at: slice) -> dict[str, DeviceArray | int]:

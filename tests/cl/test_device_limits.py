@@ -1,0 +1,195 @@
+"""Every limit of a device, at a small value: what crosses it has the same bits as without it.
+
+A device is opened with fake traits, within which it then works; the driver's own are larger.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from observations_of_all_kinds import random_observations
+from projection_scenes import camera_of
+from projection_scenes import random_splats as visible_splats
+from test_image_loss import mask, pair
+from test_renderer_bits import gradient
+from voxel_scenes import drawn as voxels
+from voxel_scenes import random_splats
+
+import rift_cl as rift
+from rift_cl.cl import reductions
+from rift_cl.errors import ResourceLimitError
+from rift_cl.operators import ViewFilter
+from rift_cl.operators.fourier.spectrum import SpectralFilter
+from rift_cl.reconstruct.preprocess.columns import DetectorColumns, mend_columns
+from rift_cl.sampling.coverage.device import coverage, coverage_grad
+from rift_cl.sampling.targets.target import Target
+from rift_cl.splat import Renderer, Splats, SplatSettings
+from rift_cl.train.loss.image_loss import ImageLoss
+
+Arrays = list[np.ndarray[Any, Any]]
+
+
+def limited(device: rift.Device, **traits: Any) -> rift.Device:
+    """The same device with other traits."""
+    changed = dataclasses.replace(device.traits, **traits)
+    return rift.Device(device._handle, device.selector, traits=changed)
+
+
+def normal(*shape: int) -> np.ndarray[Any, Any]:
+    return np.random.default_rng(len(shape)).standard_normal(shape).astype(np.float32)
+
+
+def tomography(device: rift.Device) -> Arrays:
+    grid, scan = rift.Grid((5, 44, 40)), rift.Parallel(np.linspace(0, 3, 37), 60)
+    A = rift.Projector(grid, scan, device=device)
+    y = normal(*A.range)
+    return [A(normal(*A.domain)), A.T(y), rift.fbp(A, y)]
+
+
+def fast_tomography(device: rift.Device) -> Arrays:
+    grid, scan = rift.Grid((3, 16, 16)), rift.Parallel(np.linspace(0, 3, 9), 24)
+    A = rift.FastProjector(grid, scan, error=1e-2, device=device)
+    return [A(normal(*A.domain)), A.T(normal(*A.range))]
+
+
+def filtering(device: rift.Device) -> Arrays:
+    scan = rift.Parallel(np.linspace(0, 3, 50), 40)
+    return [ViewFilter(scan, rift.Ramp(), rows=9, device=device)(normal(50, 9, 40))]
+
+
+def fourier_filtering(device: rift.Device) -> Arrays:
+    scan = rift.Parallel(np.linspace(0, 3, 20), 400)
+    return [ViewFilter(scan, rift.Ramp(), rows=3, device=device)(normal(20, 3, 400))]
+
+
+def sums(device: rift.Device) -> Arrays:
+    x = device.array(normal(5_000))
+    return [np.array([reductions.dot(device, x, x), reductions.total(device, x)])]
+
+
+def splats(device: rift.Device) -> Arrays:
+    renderer = Renderer(SplatSettings(absgrad=True, tile=8), device=device)
+    values = visible_splats(150)
+    values["scales"] *= 3
+    behind = device.array([0.2, 0.5, 0.9])
+    uploaded = Splats.upload(device, **values)
+    camera = camera_of("pinhole", size=(40, 56))
+    frame = renderer.forward(uploaded, camera, background=behind, depth="expected")
+    found = gradient(renderer, frame)
+    arrays = [frame.image, *vars(found.splats).values(), found.camera, found.background]
+    return [device.get(array) for array in arrays if array is not None]
+
+
+def loss(device: rift.Device) -> Arrays:
+    image, target = map(device.array, pair((14, 90)))
+    value, grad = ImageLoss()(device, image, target, weights=device.array(mask((14, 90))))
+    return [device.get(value), device.get(grad)]
+
+
+def spectrum(device: rift.Device) -> Arrays:
+    apply = SpectralFilter(device, (33, 20), lambda ky, kx: np.sqrt(ky**2 + kx**2 + 1e-4))
+    return [device.get(apply(device.array(normal(33, 20, 3))))]
+
+
+def coverages(device: rift.Device) -> Arrays:
+    target = Target((0, 0, 0), 3.0, points=[[0.1, 0, 0], [-0.5, 0.2, 0.4]])
+    views, k = random_observations(23, 2, diameter=3.0), normal(2500, 3)
+    by_views = coverage_grad(views, target, normal(2, 2500), k, device=device)
+    return [coverage(views, target, k, device=device), *by_views]
+
+
+def voxelised(device: rift.Device) -> Arrays:
+    grid = rift.Grid((12, 20, 30), 0.06, (0.1, 0, 0))
+    return [voxels(device, random_splats(300, order=1, scales=(0.03, 0.12)), grid)]
+
+
+def columns(device: rift.Device) -> Arrays:
+    def mend(found: DetectorColumns) -> None:
+        found.sort()
+        found.median(5)
+        found.unsort()
+        found.subtract(np.ones((found.rows, found.bins)))
+
+    return [mend_columns(normal(30, 7, 25), device, mend)]
+
+
+JOBS: dict[str, Callable[[rift.Device], Arrays]] = {
+    job.__name__: job
+    for job in (
+        tomography,
+        filtering,
+        splats,
+        loss,
+        coverages,
+        voxelised,
+        columns,
+        sums,
+        spectrum,
+        fourier_filtering,
+        fast_tomography,
+    )
+}
+every_job = pytest.mark.parametrize("job", JOBS.values(), ids=list(JOBS))
+
+
+def assert_same_bits(job: Callable[[rift.Device], Arrays], small: rift.Device, device: rift.Device):
+    found, wanted = job(small), job(device)
+    assert len(found) == len(wanted)
+    for one, other in zip(found, wanted, strict=True):
+        assert one.dtype == other.dtype and one.tobytes() == other.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("job", "largest"),
+    [
+        (tomography, 1 << 16),
+        (filtering, 1 << 16),
+        (coverages, 30_000),
+        (columns, 1 << 14),
+        (splats, 40_000),
+    ],
+)
+def test_no_array_is_larger_than_the_largest_buffer(device, job, largest, monkeypatch):
+    sizes, check = [0], rift.Device.check_array
+
+    def noted(asked: rift.Device, size: int, shape: tuple[int, ...]) -> None:
+        sizes.append(size)
+        check(asked, size, shape)
+
+    monkeypatch.setattr(rift.Device, "check_array", noted)
+    job(device)
+    assert max(sizes) > largest, "the limit is crossed"
+    assert_same_bits(job, limited(device, allocation=largest), device)
+
+
+@pytest.mark.once
+@pytest.mark.full
+def test_slabs_of_rows_fit_the_largest_buffer_of_a_gpu(device):
+    gpu = limited(device, is_cpu=False)
+    assert_same_bits(fourier_filtering, limited(gpu, allocation=1 << 16), gpu)
+
+
+def test_an_array_beyond_the_largest_buffer_is_told(device):
+    small = limited(device, allocation=1 << 16)
+    for make in (small.empty, small.zeros, lambda n: small.array(np.zeros(n, np.float32))):
+        make(1 << 14)
+        with pytest.raises(ResourceLimitError, match=r"64 KiB.*parts") as caught:
+            make((1 << 14) + 1)
+        assert small.name in str(caught.value)
+
+
+def test_an_array_as_large_as_the_largest_buffer_is_made(device):
+    """The pool rounds sizes up, and the driver would refuse what it makes of this one."""
+    largest = device.traits.allocation
+    opened = device._open()
+    assert opened.allocator(1000, largest) is opened.pool
+    assert opened.allocator(1000, 1000) is not opened.pool
+
+
+def test_work_whose_least_part_is_beyond_the_largest_buffer_is_told(device):
+    with pytest.raises(ResourceLimitError, match=r"row of every view.*7\.81 KiB.*5\.86 KiB"):
+        filtering(limited(device, allocation=6000))
