@@ -1,6 +1,6 @@
 /* What a pixel leaves on the detector: its share of a bin as a function of their distance in bins.
  *
- * Every footprint is even and ends at `support`. Its numbers come with the view, a real8:
+ * Every footprint is even and ends at `support`. Its numbers come with the view, in a view_shape:
  * (support, scale, and what the profile needs); the profile times scale is the bin's weight.
  *
  * STRIP 0, a hat: 1 - |d| / h; s2 = 1 / h. It is linear interpolation between bins where h is 1,
@@ -24,14 +24,14 @@
 static lanes positive(lanes v) { return v > 0 ? v : 0; }
 
 #if STRIP
-static lanes footprint(lanes distance, real8 f) {
+static lanes footprint(lanes distance, view_shape f) {
   const lanes r = absolute(distance), near = f.s2 - r;
   const lanes inside = positive(f.s3 - absolute(near)), ramp = inside < f.s4 ? inside : f.s4;
   const lanes end = ramp * (ramp * f.s5) + (inside - ramp), top = positive(f.s6 - r);
   return (near > 0 ? f.s7 - end : end) - top * (top * f.s5);
 }
 #else
-static lanes footprint(lanes distance, real8 f) {
+static lanes footprint(lanes distance, view_shape f) {
   return positive(1.0f - absolute(distance) * f.s2);
 }
 #endif

@@ -31,6 +31,17 @@
 /* Columns that one work-item handles. */
 #define SEGMENT (LANES * BLOCKS)
 
+/* What describes a pixel's shadow in a view, eight numbers: see footprint.h and shadow.h. */
+typedef struct {
+  real s0, s1, s2, s3, s4, s5, s6, s7;
+} view_shape;
+
+static view_shape shape_of_view(__global const real *shapes, int view) {
+  __global const real *s = shapes + 8L * view;
+  const view_shape shape = {s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7]};
+  return shape;
+}
+
 #define FIXED_TO_REAL(p) ((real)(p) * (1.0f / 4294967296.0f))
 #define WHOLE(p) ((int)((p) >> 32))
 

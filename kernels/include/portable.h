@@ -3,7 +3,8 @@
  * A CPU wants one work-item per run of samples, with explicit vectors of eight; a GPU wants a
  * work-item per sample, many to a group. A kernel is therefore written in `lanes`, which are
  * eight floats on a CPU (LANES 8, GROUP 1) and one float on a GPU (LANES 1, GROUP 64): its
- * arithmetic reads the same for both, since OpenCL's operators and ?: work on either.
+ * arithmetic reads the same for both, since OpenCL's operators and ?: work on either. Vectors of
+ * eight occur where LANES is 8 alone: some compilers for GPUs know none of more than four.
  *
  * With DOUBLE 1 the same source computes in double precision: `real` is what one lane holds, and
  * `lanes_int` are whole numbers as wide, which ?: on lanes asks for. Scalars of such a kernel are
@@ -30,16 +31,20 @@
 #if DOUBLE
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 typedef double real;
-typedef double8 real8;
 typedef long integer;
+#if LANES == 8
+typedef double8 real8;
 typedef long8 integer8;
+#endif
 #define TO_INTEGER8(v) convert_long8(v)
 #define TO_REAL8(v) convert_double8(v)
 #else
 typedef float real;
-typedef float8 real8;
 typedef int integer;
+#if LANES == 8
+typedef float8 real8;
 typedef int8 integer8;
+#endif
 #define TO_INTEGER8(v) convert_int8(v)
 #define TO_REAL8(v) convert_float8(v)
 #endif

@@ -11,14 +11,14 @@
  * shares beyond its two edges; its rounding is that of M, which is why shadows many bins wide are
  * taken bin by bin (footprint.h).
  *
- * The numbers come with the view, a real8: (half-width, scale, S, 1 / (2 S), M); where S is zero
- * its inverse may be any number. */
+ * The numbers come with the view, in a view_shape: (half-width, scale, S, 1 / (2 S), M); where S is
+ * zero its inverse may be any number. */
 
 #define HALF_WIDTH s0
 #define SCALE s1
 #define WHOLE_SHARE s4
 
-static lanes share(lanes x, real8 shadow) {
+static lanes share(lanes x, view_shape shadow) {
   const lanes room = shadow.HALF_WIDTH - absolute(x), inside = room > 0 ? room : 0;
   const lanes ramp = inside < shadow.s2 ? inside : shadow.s2;
   const lanes end = ramp * (ramp * shadow.s3) + (inside - ramp);

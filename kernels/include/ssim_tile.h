@@ -53,9 +53,11 @@ __constant float TAPS[RADIUS + 1] = {
 #define TAP(k) TAPS[(k) < 0 ? -(k) : (k)]
 
 /* Add row `r` of the ROWS + 2 RADIUS that are blurred down to the sums of the tile's rows. */
-#define ADD_ROW(sums, r, v) \
-  UNROLL for (int o = 0; o < ROWS; o++) \
-    if ((r) >= o && (r) - o <= 2 * RADIUS) sums[o] = sums[o] + TAP((r) - o - RADIUS) * (v);
+static void add_row(lanes *sums, int r, lanes v) {
+  UNROLL for (int o = 0; o < ROWS; o++) {
+    if (r >= o && r - o <= 2 * RADIUS) sums[o] = sums[o] + TAP(r - o - RADIUS) * v;
+  }
+}
 
 static lanes blurred_along(const __local float *p) {
   lanes sum = 0;

@@ -13,11 +13,15 @@
   { const real8 low = (real8)((v).s0, (w).s0, (v).s2, (w).s2, (v).s4, (w).s4, (v).s6, (w).s6); \
     const real8 high = (real8)((v).s1, (w).s1, (v).s3, (w).s3, (v).s5, (w).s5, (v).s7, (w).s7); \
     a = low; b = high; }
-#define TRANSPOSE(v) \
-  { UNROLL for (int t = 0; t < 4; t++) EXCHANGE4(v[t], v[t + 4], v[t], v[t + 4]) \
-    UNROLL for (int t = 0; t < 8; t += 4) \
-      UNROLL for (int s = 0; s < 2; s++) EXCHANGE2(v[t + s], v[t + s + 2], v[t + s], v[t + s + 2]) \
-    UNROLL for (int t = 0; t < 8; t += 2) EXCHANGE1(v[t], v[t + 1], v[t], v[t + 1]) }
+static void transpose8(real8 *v) {
+  UNROLL for (int t = 0; t < 4; t++) EXCHANGE4(v[t], v[t + 4], v[t], v[t + 4])
+  UNROLL for (int t = 0; t < 8; t += 4) {
+    EXCHANGE2(v[t], v[t + 2], v[t], v[t + 2])
+    EXCHANGE2(v[t + 1], v[t + 3], v[t + 1], v[t + 3])
+  }
+  UNROLL for (int t = 0; t < 8; t += 2) EXCHANGE1(v[t], v[t + 1], v[t], v[t + 1])
+}
+#define TRANSPOSE(v) transpose8(v);
 #define SUM_OF_LANES(v) \
   ((((v).s0 + (v).s4) + ((v).s2 + (v).s6)) + (((v).s1 + (v).s5) + ((v).s3 + (v).s7)))
 #else

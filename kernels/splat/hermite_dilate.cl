@@ -135,7 +135,7 @@ KERNEL void hermite_dilate(
   const long i = get_global_id(0);
   if (i >= count) return;
   Gaussian g;
-  float row[6], sides[3], modes[MODES], factor;
+  float row[6], sides[3], modes[MODES], factor = 0;
   float3 columns[3];
   __global float *out = table + WIDTH * i;
   int drawn = read_shape(&g, SHAPE, i) == VISIBLE &&

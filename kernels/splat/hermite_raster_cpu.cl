@@ -49,7 +49,9 @@ KERNEL void hermite_raster_cpu(
 #endif
     float shape[MODES(SHAPE_ORDER)], color[VARIED + 1][MODES(COLOR_ORDER)];
     turn_into_powers(shape, 1, mode + 3, 1, SHAPE_ORDER);
-    if (!SQUARED) UNROLL for (int m = 0; m < MODES(SHAPE_ORDER); m++) shape[m] *= s.weight;
+    if (!SQUARED) {
+      UNROLL for (int m = 0; m < MODES(SHAPE_ORDER); m++) shape[m] *= s.weight;
+    }
     UNROLL for (int n = 0; n < VARIED; n++)
       turn_into_powers(color[n], feature[n], mode + COLOR_MODES + n, COLORED, COLOR_ORDER);
     for (int strip = 0; strip < STRIPS; strip++) {

@@ -54,7 +54,9 @@ KERNEL void hermite_raster_grad_cpu(
     const TileSplat s = splat_in_tile(screen + 8 * splat, x0, y0);
     float shape[MODES(SHAPE_ORDER)], color[VARIED + 1][MODES(COLOR_ORDER)];
     turn_into_powers(shape, 1, mode + 3, 1, SHAPE_ORDER);
-    if (!SQUARED) UNROLL for (int m = 0; m < MODES(SHAPE_ORDER); m++) shape[m] *= s.weight;
+    if (!SQUARED) {
+      UNROLL for (int m = 0; m < MODES(SHAPE_ORDER); m++) shape[m] *= s.weight;
+    }
     UNROLL for (int n = 0; n < VARIED; n++)
       turn_into_powers(color[n], feature[n], mode + COLOR_MODES + n, COLORED, COLOR_ORDER);
     lanes sums[PADDED];
@@ -100,7 +102,7 @@ KERNEL void hermite_raster_grad_cpu(
         const lanes difference = cv - here[1], w = alpha * t;
         here[0] = t;
         here[1] = here[1] + alpha * difference;
-        g = (raw > 0) & (hidden <= most) ? g : 0;
+        g = ((raw > 0) & (hidden <= most)) ? g : 0;
         if (ACTIVATION != CLAMP) g = g * (1.0f - hidden);
         if (SQUARED) g = g * shaped;
         const lanes h = g * (t * difference);
@@ -129,7 +131,7 @@ KERNEL void hermite_raster_grad_cpu(
     }
     lanes shares[PADDED / LANES];
     UNROLL for (int n = 0; n < PADDED; n += LANES) {
-      TRANSPOSE((sums + n));
+      TRANSPOSE(sums + n)
       shares[n / LANES] = sums[n];
       UNROLL for (int m = 1; m < LANES; m++) shares[n / LANES] = shares[n / LANES] + sums[n + m];
     }

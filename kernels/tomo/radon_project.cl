@@ -23,22 +23,26 @@
 #define SEGMENT_AXIS (LANES == 8 ? 1 : 0)
 #define VIEW_AXIS (1 - SEGMENT_AXIS)
 
-/* Add the rows of one phase; SHIFT is 1 where the next phase is column + 1 of phase 0. */
-#define ADD_ROWS(SHIFT) \
-  for (int n = starts[r]; n < starts[r + 1]; n++) { \
-    const int i = order[n]; \
-    const long position = g.x + i * g.y; \
-    const int j = k0 - WHOLE(position); \
-    if (j <= -SEGMENT || j > width) continue; \
-    const real w = next_weight(position), u = 1.0f - w; \
-    __global const real *pixels = image + (long)i * pitch + SEGMENT + j; \
-    UNROLL for (int b = 0; b < BLOCKS; b++) { \
-      lanes value = LOAD(pixels + b * LANES); \
-      here[b] = here[b] + u * value; \
-      if (SHIFT) value = LOAD(pixels + b * LANES - 1); \
-      next[b] = next[b] + w * value; \
-    } \
+/* Add rows `begin` to `end` of one phase; shift is 1 where the next phase is column + 1 of phase 0. */
+static void add_rows(
+    lanes *here, lanes *next, __global const real *image, __global const int *order, int begin,
+    int end, long4 g, int k0, int width, const int shift)
+{
+  for (int n = begin; n < end; n++) {
+    const int i = order[n];
+    const long position = g.x + i * g.y;
+    const int j = k0 - WHOLE(position);
+    if (j <= -SEGMENT || j > width) continue;
+    const real w = next_weight(position), u = 1.0f - w;
+    __global const real *pixels = image + (long)i * (width + 2 * SEGMENT) + SEGMENT + j;
+    UNROLL for (int b = 0; b < BLOCKS; b++) {
+      lanes value = LOAD(pixels + b * LANES);
+      here[b] = here[b] + u * value;
+      if (shift) value = LOAD(pixels + b * LANES - 1);
+      next[b] = next[b] + w * value;
+    }
   }
+}
 
 KERNEL void radon_project(
     __global real *restrict table, __global const real *restrict plane,
@@ -51,8 +55,7 @@ KERNEL void radon_project(
   const int slice = (int)get_global_id(2);
   if (k0 >= views[view].y) return;
   const long4 g = geometry[view];
-  const int pitch = width + 2 * SEGMENT;
-  __global const real *image = plane + (long)slice * rows * pitch;
+  __global const real *image = plane + (long)slice * rows * (width + 2 * SEGMENT);
   __global const int *order = orders + (long)view * rows;
   __global const int *starts = all_starts + view * (PHASES + 1);
   lanes sums[PHASES][BLOCKS], next[BLOCKS];
@@ -60,7 +63,10 @@ KERNEL void radon_project(
   for (int r = 0; r < PHASES; r++) {
     lanes here[BLOCKS];
     UNROLL for (int b = 0; b < BLOCKS; b++) { here[b] = next[b]; next[b] = 0; }
-    if (r == PHASES - 1) { ADD_ROWS(1) } else { ADD_ROWS(0) }
+    if (r == PHASES - 1)
+      add_rows(here, next, image, order, starts[r], starts[r + 1], g, k0, width, 1);
+    else
+      add_rows(here, next, image, order, starts[r], starts[r + 1], g, k0, width, 0);
     UNROLL for (int b = 0; b < BLOCKS; b++) sums[r][b] = here[b];
   }
   __global real *out = table + (((long)slice * count + number) * columns + k0) * PHASES;

@@ -19,7 +19,7 @@
 
 KERNEL void radon_resample(
     __global const real *restrict sinogram, __global real *restrict table,
-    __global const long4 *restrict geometry, __global const real8 *restrict footprints,
+    __global const long4 *restrict geometry, __global const real *restrict footprints,
     __global const int2 *restrict views, int first, int slice0, int slices,
     int bins, int columns)
 {
@@ -28,7 +28,7 @@ KERNEL void radon_resample(
   const int slice = (int)get_global_id(2);
   if (k0 >= views[view].y) return;
   const long4 g = geometry[view];
-  const real8 shape = footprints[view];
+  const view_shape shape = shape_of_view(footprints, view);
   const long support = (long)(4294967296.0f * shape.SUPPORT);
   const long spread = g.w - (g.w >> LOG2_PHASES);
   const long lower = (spread < 0 ? spread : 0) - support, upper = (spread > 0 ? spread : 0) + support;

@@ -19,7 +19,7 @@
 
 KERNEL void radon_resample_adjoint(
     __global real *restrict sinogram, __global const real *restrict table,
-    __global const long4 *restrict geometry, __global const real8 *restrict footprints,
+    __global const long4 *restrict geometry, __global const real *restrict footprints,
     __global const int2 *restrict views, int first, int slice0, int slices,
     int bins, int columns)
 {
@@ -28,7 +28,7 @@ KERNEL void radon_resample_adjoint(
   const int number = (int)get_global_id(1), count = (int)get_global_size(1), view = first + number;
   const int slice = (int)get_global_id(2), used = views[view].y;
   const long4 g = geometry[view];
-  const real8 shape = footprints[view];
+  const view_shape shape = shape_of_view(footprints, view);
   const real per_bin = 1.0f / FIXED_TO_REAL(g.w);
   const real reach = (per_bin < 0 ? -per_bin : per_bin) * shape.SUPPORT + 1e-3f + 1e-6f * columns;
   __global const real *entries = table + ((long)slice * count + number) * PHASES * columns;

@@ -20,7 +20,7 @@
 
 KERNEL void radon_resample_edges(
     __global const real *restrict sinogram, __global real *restrict table,
-    __global const long4 *restrict geometry, __global const real8 *restrict footprints,
+    __global const long4 *restrict geometry, __global const real *restrict footprints,
     __global const int2 *restrict views, int first, int slice0, int slices, int bins, int columns)
 {
   const int k0 = (int)get_global_id(0) * LANES;
@@ -29,7 +29,7 @@ KERNEL void radon_resample_edges(
   if (k0 >= views[view].y) return;
   const long4 g = run_upwards(geometry[view], bins);
   const int mirrored = geometry[view].w < 0;
-  const real8 shadow = footprints[view];
+  const view_shape shadow = shape_of_view(footprints, view);
   const long reach = (long)(4294967296.0f * shadow.HALF_WIDTH), to_edge = 1L << 31;
   const long lower = to_edge - reach, upper = to_edge + reach + g.w - (g.w >> LOG2_PHASES);
   /* As in radon_resample: columns take so many edges even where one of them is out of reach. */

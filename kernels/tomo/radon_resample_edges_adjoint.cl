@@ -30,7 +30,7 @@
 
 KERNEL void radon_resample_edges_adjoint(
     __global real *restrict sinogram, __global const real *restrict table,
-    __global const long4 *restrict geometry, __global const real8 *restrict footprints,
+    __global const long4 *restrict geometry, __global const real *restrict footprints,
     __global const int2 *restrict views, int first, int slice0, int slices, int bins, int columns)
 {
   const int b0 = (int)get_global_id(0) * BINS;
@@ -39,7 +39,7 @@ KERNEL void radon_resample_edges_adjoint(
   const int slice = (int)get_global_id(2), used = GROUPS * views[view].y;
   const long4 g = run_upwards(geometry[view], bins);
   const int mirrored = geometry[view].w < 0;
-  const real8 shadow = footprints[view];
+  const view_shape shadow = shape_of_view(footprints, view);
   const real per_bin = (real)GROUPS / FIXED_TO_REAL(g.w);
   const real reach = per_bin * shadow.HALF_WIDTH + GROUPS * (1e-3f + 1e-6f * columns);
   const real rest = FIXED_TO_REAL(g.z & 0xffffffffL) + 0.5f;

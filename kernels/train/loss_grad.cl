@@ -61,13 +61,13 @@ KERNEL void loss_grad(
       UNROLL for (int o = 0; o < ROWS; o++) sums[o] = 0;
       UNROLL for (int r = 0; r < ROWS + 2 * RADIUS; r++) {
         const long row = (long)map * height + mirrored(row0 + r - RADIUS, height);
-        ADD_ROW(sums, r, LOAD(maps + row * pitch + f))
+        add_row(sums, r, LOAD(maps + row * pitch + f));
       }
       UNROLL for (int o = 0; o < ROWS; o++) STORE_LOCAL(rows[map][o] + f - first + HALO, sums[o]);
     }
   }
   WAIT
-  for (int k = 0; k < MAPS * ROWS; k++) mirror_ends(rows[0][0] + k * SPAN, first, width);
+  for (int k = 0; k < MAPS * ROWS; k++) mirror_ends(rows[k / ROWS][k % ROWS], first, width);
   WAIT
 #endif
   lanes sum = 0;

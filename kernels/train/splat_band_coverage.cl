@@ -53,7 +53,7 @@ static lanes known(
     if (c[17] > 0) {
       const lanes z = a * c[12], v = k * z * c[19] / (2 * c[17]);
       const lanes b = 2 * c[17] * absolute(1 - z * c[18]) * k * (1 - v);
-      const lanes disc = resolved & (b > 1e-6f) ? b : 1e-6f;
+      const lanes disc = (resolved & (b > 1e-6f)) ? b : 1e-6f;
       passed *= defocus(half_turn_of(disc), disc) * diffraction(v);
     }
     sum += resolved ? passed * passed : 0;
@@ -83,7 +83,7 @@ KERNEL void splat_band_coverage(
   /* A hair below half a cycle per pixel, lest rounding leaves the finest camera out. */
   lanes high = 0.499999f / finest, low = 1 / diameter + 0 * finest;
   const lanes_int whole = known(cameras, p, high, near_plane, diameter, snr, views) > 1;
-  low = whole | (high < low) ? high : low;
+  low = (whole | (high < low)) ? high : low;
   for (int n = 0; n < HALVINGS; n++) {
     const lanes k = sqrt(low * high);
     const lanes_int more = known(cameras, p, k, near_plane, diameter, snr, views) > 1;

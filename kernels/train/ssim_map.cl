@@ -53,8 +53,8 @@ KERNEL void ssim_map(
         const lanes x = IMAGE_CHANNELS == CHANNELS ? LOAD(in + f) : GATHER(in, at);
         const lanes y = LOAD(target + row * width + f);
         const lanes v = part ? x + y - 1 : x - y;
-        ADD_ROW(mean, r, v)
-        ADD_ROW(square, r, v * v)
+        add_row(mean, r, v);
+        add_row(square, r, v * v);
       }
       UNROLL for (int o = 0; o < ROWS; o++) {
         STORE_LOCAL(rows[part][o] + f - first + HALO, mean[o]);
@@ -63,7 +63,7 @@ KERNEL void ssim_map(
     }
   }
   WAIT
-  for (int k = 0; k < MOMENTS * ROWS; k++) mirror_ends(rows[0][0] + k * SPAN, first, width);
+  for (int k = 0; k < MOMENTS * ROWS; k++) mirror_ends(rows[k / ROWS][k % ROWS], first, width);
   WAIT
   lanes sum = 0;
   for (int o = 0; o < ROWS && row0 + o < height; o++)
