@@ -24,7 +24,7 @@ from rift_cl.cl.guarded_build import Request, guarded_build, way_to_build
 from rift_cl.cl.kernel_cache import build_lock
 from rift_cl.cl.program_store import Stored, load, program_name, remove, save
 from rift_cl.cl.real_type import real_type
-from rift_cl.cl.source import kernel_source
+from rift_cl.cl.source import fault_place, kernel_source
 from rift_cl.errors import KernelBuildError
 
 if TYPE_CHECKING:
@@ -157,8 +157,7 @@ def _log(text: str) -> str:
 
 def _build_error(name: str, text: str, options: list[str], device: str) -> KernelBuildError:
     log = _log(text)
-    place = re.search(r"([\w./-]+\.(?:cl|h)):(\d+)", log)
-    where = f"{place[1]}:{place[2]}" if place else f"{name}.cl"
+    where = fault_place(name, log)
     return KernelBuildError(
         f"kernel {name} did not compile for {device}, at {where}; this is a defect of rift-cl or "
         f"of the driver, please report it with this log (options {' '.join(options)}):\n"

@@ -16,6 +16,11 @@ from pathlib import Path
 from rift_cl.errors import KernelBuildError
 
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
+_LINE = re.compile(r'#line (\d+) "(.+)"')
+_OWN_PLACE = re.compile(r"([\w./-]+\.(?:cl|h)):(\d+)")
+_COUNTED_PLACE = re.compile(
+    r"^[^:\n]*:(\d+):(?:\d+:)? *(?:fatal )?error", re.MULTILINE | re.IGNORECASE
+)
 
 
 @cache
@@ -38,6 +43,27 @@ def kernel_source(name: str) -> str:
     found = sorted(folder.rglob(f"{name}.cl"))
     file = found[0].relative_to(folder).as_posix() if found else f"{name}.cl"
     return "\n".join(_expand(file, set()))
+
+
+def fault_place(name: str, log: str) -> str:
+    """Where a compiler found fault with a kernel: its file and line, or the file alone.
+
+    A compiler that heeds ``#line`` says it. Others (NVIDIA's) count the lines of the whole text
+    and call it by a name of their own, as in ``<kernel>:31:5: error``.
+    """
+    place = _OWN_PLACE.search(log)
+    if place:
+        return f"{place[1]}:{place[2]}"
+    counted = _COUNTED_PLACE.search(log)
+    lines = kernel_source(name).splitlines()[: int(counted[1])] if counted else []
+    file, number = f"{name}.cl", 0
+    for line in lines:
+        directive = _LINE.fullmatch(line)
+        if directive:
+            file, number = directive[2], int(directive[1]) - 1
+        else:
+            number += 1
+    return f"{file}:{number}" if number else file
 
 
 def _expand(name: str, seen: set[str]) -> list[str]:

@@ -120,6 +120,20 @@ def test_line_directives_map_every_line_to_its_file(name):
     assert seen > 10
 
 
+@pytest.mark.parametrize(
+    "log", ["<kernel>:{}:5: error: no", "1:{}:5: Error: no", "x:{}: error: no"]
+)
+def test_a_compiler_that_counts_all_lines_is_understood(log):
+    lines = source.kernel_source("radon_project").splitlines()
+    for file in ("tomo/radon_project.cl", "include/transpose.h"):
+        wanted = (source.kernel_folder() / file).read_text(encoding="utf-8").splitlines()
+        unique = next(line for line in reversed(wanted) if lines.count(line) == 1 and line.strip())
+        place = source.fault_place("radon_project", log.format(lines.index(unique) + 1))
+        assert place == f"{file}:{wanted.index(unique) + 1}"
+    assert source.fault_place("radon_project", "error: out of luck") == "radon_project.cl"
+    assert source.fault_place("radon_project", "include/turn.h:7:1: error") == "include/turn.h:7"
+
+
 def _message(device, name):
     with pytest.raises(KernelBuildError) as caught:
         _build(device, name)
