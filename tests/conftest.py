@@ -1,7 +1,8 @@
 """What every test shares: the devices to test on and the folder of real data.
 
-Every OpenCL device that is found takes part. A CPU takes part twice: as it is, and dressed as a
-GPU (one lane, groups of 64), so that both drivers of every kernel are tested without a GPU.
+Every OpenCL device that is found takes part, or the one that RIFT_DEVICE selects. A CPU takes part
+twice: as it is, and dressed as a GPU (one lane, groups of 64), so that both drivers of every kernel
+are tested without a GPU.
 """
 
 from __future__ import annotations
@@ -41,9 +42,14 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 @cache
+def _devices() -> list[rift.Device]:
+    return [rift.open_device()] if os.environ.get("RIFT_DEVICE") else list(rift.devices())
+
+
+@cache
 def _variants() -> list[rift.Device]:
-    found = list(rift.devices())
-    for device in rift.devices():
+    found = _devices().copy()
+    for device in _devices():
         if device.traits.is_cpu:
             traits = dataclasses.replace(device.traits, is_cpu=False)
             found.append(rift.Device(device._handle, device.selector, traits=traits))
@@ -61,7 +67,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """
     if "device" in metafunc.fixturenames:
         once = metafunc.definition.get_closest_marker("once") is not None
-        chosen = rift.devices() if once else _variants()
+        chosen = _devices() if once else _variants()
         metafunc.parametrize("device", chosen, ids=_label, scope="session")
 
 

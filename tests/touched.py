@@ -3,37 +3,74 @@
 Both selections are held to it (see ``selection``), so that the short one goes on to touch
 everything: whoever adds a kernel or a command adds a test that plain ``pytest`` runs. What
 processes of their own do is not seen.
+
+``--record-kernels FILE`` adds the macros of all kernels that the run launches to a file that
+``tools/compile_gate.py`` reads.
 """
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 import rift_cl as rift
-from rift_cl.cl.program import Programs
+from rift_cl.cl.program import Programs, literal
 from rift_cl.cl.source import kernel_names
 
 _touched: set[str] = set()
 _WORKERS_KEY = "touched"
+# A kernel, the kind of device and its macros, as in "adam gpu A=1 B=2".
+_variants: set[str] = set()
+_VARIANTS_KEY = "kernel variants"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let a run record what the kernels are built with."""
+    parser.addoption(
+        "--record-kernels",
+        type=Path,
+        metavar="FILE",
+        help="add every set of macros that a kernel is launched with to this JSON file",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Take down what is launched and run in this process."""
-    if config.selection == "named":
+    recorded = config.option.record_kernels
+    if config.selection == "named" and not recorded:
         return
     from rift_cl.commands.cli import COMMANDS
 
     launch = Programs.launch
 
-    def launch_and_note(self: Programs, name: str, *rest: Any, **named: Any) -> None:
-        launch(self, name, *rest, **named)
+    def launch_and_note(
+        self: Programs, name: str, size: tuple[int, ...], given: dict[str, Any]
+    ) -> None:
+        launch(self, name, size, given)
         _touched.add(f"kernel {name}")
+        if recorded:
+            _variants.add(_variant(self, name, given))
 
     Programs.launch = launch_and_note
     for name, entry in COMMANDS.items():
         COMMANDS[name] = entry._replace(run=_noted(name, entry.run))
+
+
+def _variant(programs: Programs, name: str, given: dict[str, Any]) -> str:
+    macros = (f"{macro}={literal(given[macro])}" for macro in sorted(given) if macro.isupper())
+    kind = "cpu" if programs._device.traits.is_cpu else "gpu"
+    return " ".join((name, kind, *macros))
+
+
+def _record(path: Path) -> None:
+    """Add what was launched to the file; kernels that are no more leave it."""
+    known = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else []
+    names = set(kernel_names())
+    kept = sorted(line for line in {*known, *_variants} if line.split()[0] in names)
+    path.write_text(json.dumps(kept, indent=0) + "\n", encoding="utf-8")
 
 
 def _noted(name: str, run: Any) -> Any:
@@ -48,7 +85,9 @@ def _noted(name: str, run: Any) -> Any:
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any) -> None:
     """Take over what a worker of pytest-xdist touched."""
-    _touched.update(getattr(node, "workeroutput", {}).get(_WORKERS_KEY, ()))
+    told = getattr(node, "workeroutput", {})
+    _touched.update(told.get(_WORKERS_KEY, ()))
+    _variants.update(told.get(_VARIANTS_KEY, ()))
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
@@ -56,7 +95,11 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     config = session.config
     if hasattr(config, "workeroutput"):
         config.workeroutput[_WORKERS_KEY] = sorted(_touched)
-    elif exitstatus == pytest.ExitCode.OK and _left_out(config):
+        config.workeroutput[_VARIANTS_KEY] = sorted(_variants)
+        return
+    if config.option.record_kernels:
+        _record(config.option.record_kernels)
+    if exitstatus == pytest.ExitCode.OK and _left_out(config):
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 

@@ -2,8 +2,8 @@
 
 ``RIFT_DEVICE`` or ``--device`` selects one by its number in the list (``1``), by platform and
 device (``0:1``), by kind (``cpu``, ``gpu``) or by a part of its name or its platform's
-(``radeon``, ``pocl``). Without a choice the first GPU is taken, and the first CPU where there is
-no GPU.
+(``radeon``, ``pocl``). Without a choice the first GPU is taken, and where there is no GPU the first
+CPU, by PoCL if that is there.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from functools import cache
 from typing import Any
 
 from rift_cl.cl.device import Device
+from rift_cl.cl.intel_runtime import register_intel_runtime
 from rift_cl.cl.kernel_cache import prepare_cache
 from rift_cl.cl.process import claim_process
 from rift_cl.errors import NoDeviceError
@@ -42,6 +43,7 @@ def devices() -> tuple[Device, ...]:
 @cache
 def _found() -> tuple[Device, ...]:
     prepare_cache()
+    register_intel_runtime()
     import pyopencl as cl
 
     try:
@@ -88,8 +90,15 @@ def open_device(selector: str | None = None, memory: int | None = None) -> Devic
 
 
 def by_rank() -> list[Device]:
-    """The devices in the order in which they are preferred: GPUs, then CPUs."""
-    return sorted(devices(), key=lambda device: device.traits.is_cpu)
+    """The devices in the order in which they are preferred: GPUs, then CPUs, PoCL's first.
+
+    Another driver for the CPU that is installed later changes no result.
+    """
+    return sorted(devices(), key=_rank)
+
+
+def _rank(device: Device) -> int:
+    return 0 if not device.traits.is_cpu else 1 if device.traits.pocl else 2
 
 
 def default_device() -> Device:

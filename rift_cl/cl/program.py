@@ -79,7 +79,7 @@ class Programs:
         macros = self._macros.get(names)
         if macros is None:
             macros = self._macros[names] = tuple(sorted(filter(str.isupper, names)))
-        key = (name, tuple([(macro, _literal(given[macro])) for macro in macros]))
+        key = (name, tuple([(macro, literal(given[macro])) for macro in macros]))
         kernel = self._kernel(key)
         if len(given) != len(macros) + len(kernel.parameters):
             check_names(name, kernel.parameters, given)
@@ -132,7 +132,7 @@ class Programs:
         return kernel
 
 
-def _literal(value: float | str) -> str:
+def literal(value: float | str) -> str:
     """A compile-time constant as the compiler sees it; a text is an expression without spaces."""
     if isinstance(value, str):
         return value

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import pickle
+from types import SimpleNamespace
 
 import pytest
 
 import rift_cl as rift
+from rift_cl.cl import discovery
 from rift_cl.errors import NoDeviceError
 
 
@@ -47,6 +49,16 @@ def test_part_of_a_name_selects(pocl, selector):
 def test_device_name_selects(pocl):
     assert rift.open_device(pocl.name).name == pocl.name
     assert rift.open_device(pocl.name[:8].upper()).name[:8] == pocl.name[:8]
+
+
+def test_gpus_come_first_and_of_cpus_pocl(monkeypatch):
+    kinds = {"other": (True, False), "pocl": (True, True), "gpu": (False, False)}
+    found = [
+        SimpleNamespace(name=name, traits=SimpleNamespace(is_cpu=is_cpu, pocl=pocl))
+        for name, (is_cpu, pocl) in kinds.items()
+    ]
+    monkeypatch.setattr(discovery, "devices", lambda: tuple(found))
+    assert [device.name for device in discovery.by_rank()] == ["gpu", "pocl", "other"]
 
 
 def test_kind_selects(pocl):
