@@ -86,7 +86,7 @@ def _case(device: rift.Device, options: Options, settings: SplatSettings) -> dic
     splats = replace(case.splats, scales=device.array(options.widen * case.parameters["scales"]))
     plain = SplatSettings(mode=settings.mode)
     frame = rift.Renderer(plain, device=device).forward(splats, case.camera)
-    screen = ScreenSplats(frame.projection.screen, frame.drawing.screen.features)
+    screen = ScreenSplats(frame.projection.screen, frame.raster_pass.screen.features)
     kinds = {_GAUSSIAN: (screen, plain)}
     for name, orders in _KINDS.items():
         modes = _modes(device, device.get(screen.screen), *orders)

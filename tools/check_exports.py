@@ -97,7 +97,7 @@ class Judge:
             whole if job.format.suffix in (".ply", ".glb", ".html") else along_curve(whole)
         )
         device, known = default_device(), job.scene.cameras
-        seen = known.unseen or known.seen if known is not None else ()
+        seen = known.test_views or known.training_views if known is not None else ()
         factor = job.scene.downscale
         self._cameras = [camera_at(view, factor) for view in seen[:views]]
         self._truths = [
@@ -153,7 +153,7 @@ def _drawn(
     device: Device, job: Export, scene: SplatScene, cameras: list[Camera]
 ) -> list[NDArray[np.float32]]:
     settings = dataclasses.replace(
-        job.scene.drawing, activation=scene.activation, angular=scene.angular
+        job.scene.rendering, activation=scene.activation, angular=scene.angular
     )
     renderer, splats = Renderer(settings, device=device), scene.upload(device)
     return [device.get(renderer.forward(splats, camera).image).clip(0, 1) for camera in cameras]

@@ -48,14 +48,14 @@ def check(fit: Path) -> tuple[int, dict[str, float]]:
         fit: a folder of ``rift fit``, with views held out.
     """
     found = open_fit_cameras(fit)
-    if found is None or not found.unseen:
+    if found is None or not found.test_views:
         raise SystemExit(f"{fit}: no fit with views that were held out")
     scores = json.loads((fit / "metrics.json").read_text())["views"]["held out"]
     error = {row["name"]: -row["fit_psnr"] for row in scores}
     sampled = open_sampled(AnalyzeSettings(fit))
-    trained = replace(sampled, cameras=tuple(view.camera for view in found.seen))
-    cameras = [view.camera for view in found.unseen]
-    errors = [error[view.name] for view in found.unseen]
+    trained = replace(sampled, cameras=tuple(view.camera for view in found.training_views))
+    cameras = [view.camera for view in found.test_views]
+    errors = [error[view.name] for view in found.test_views]
     rows = foretold(trained, cameras)
     return len(cameras), {name: _rank(values, errors) for name, values in rows.items()}
 

@@ -13,8 +13,8 @@ from rift_cl.cl.device import Device
 from rift_cl.interop.splat_functions import Drawer
 from rift_cl.interop.tensors import to_device, to_tensor
 from rift_cl.splat.bands import FrameMemory
-from rift_cl.splat.drawing import Drawing, draw, draw_grad, listed
 from rift_cl.splat.raster import MOMENTS, ScreenSplats
+from rift_cl.splat.raster_pass import RasterPass, draw, draw_grad, listed
 
 
 class Parts(NamedTuple):
@@ -48,18 +48,18 @@ class Rasterize(torch.autograd.Function):
         """
         means2d, conics, weights, features, backgrounds, depths, extents, boxes = tensors
         screen = torch.cat([means2d, conics, weights[:, None], extents], dim=1)
-        ctx.how, ctx.parts, ctx.drawings = how, parts, []
+        ctx.how, ctx.parts, ctx.passes = how, parts, []
         for view, rows in enumerate(_runs(parts.counts)):
             # X-rays have nothing behind them.
             lit = backgrounds is not None and how.settings.mode == "light"
             behind = to_device(how.device, backgrounds[view]) if lit else None
             arrays = [to_device(how.device, t[rows]) for t in (screen, depths, boxes, features)]
-            ctx.drawings.append(_draw(how, arrays, behind))
+            ctx.passes.append(_draw(how, arrays, behind))
         ctx.save_for_backward(means2d, conics, weights)
-        images = [to_tensor(how.device, d.raster.image, means2d) for d in ctx.drawings]
-        thin = [to_tensor(how.device, d.raster.transmittance, means2d) for d in ctx.drawings]
+        images = [to_tensor(how.device, d.raster.image, means2d) for d in ctx.passes]
+        thin = [to_tensor(how.device, d.raster.transmittance, means2d) for d in ctx.passes]
         nothing = [means2d.new_empty(0, dtype=torch.int32) for _ in range(3)]
-        lists = _lists(how.device, ctx.drawings, means2d) if parts.listed else nothing
+        lists = _lists(how.device, ctx.passes, means2d) if parts.listed else nothing
         ctx.mark_non_differentiable(*lists)
         return (torch.stack(images), 1 - torch.stack(thin)[..., None], *lists)
 
@@ -69,12 +69,12 @@ class Rasterize(torch.autograd.Function):
         """Gradients by all that was drawn; positions gain ``absgrad`` where that is asked for."""
         device, (means2d, conics, weights) = ctx.how.device, ctx.saved_tensors
         sums, behind = [], []
-        for view, drawing in enumerate(ctx.drawings):
+        for view, one in enumerate(ctx.passes):
             by_image = to_device(device, incoming[0][view])
             by_thin = to_device(device, -incoming[1][view, ..., 0])
-            sums.append(to_tensor(device, draw_grad(device, drawing, by_image, by_thin), means2d))
-            if drawing.background is not None:
-                thin = to_tensor(device, drawing.raster.transmittance, means2d)
+            sums.append(to_tensor(device, draw_grad(device, one, by_image, by_thin), means2d))
+            if one.background is not None:
+                thin = to_tensor(device, one.raster.transmittance, means2d)
                 behind.append((thin[..., None] * incoming[0][view]).sum((0, 1)))
         s = torch.cat(sums)
         if ctx.how.settings.absgrad:
@@ -89,7 +89,7 @@ class Rasterize(torch.autograd.Function):
         return (None, None, *found, None, None, None)
 
 
-def _draw(how: Drawer, arrays: list[Any], background: Any) -> Drawing:
+def _draw(how: Drawer, arrays: list[Any], background: Any) -> RasterPass:
     screen, depths, boxes, features = arrays
     pixels = how.size[0] * how.size[1]
     absgrad = how.settings.absgrad
@@ -104,13 +104,13 @@ def _draw(how: Drawer, arrays: list[Any], background: Any) -> Drawing:
     )
 
 
-def _lists(device: Device, drawings: list[Drawing], like: torch.Tensor) -> list[torch.Tensor]:
+def _lists(device: Device, passes: list[RasterPass], like: torch.Tensor) -> list[torch.Tensor]:
     tiles, splats, starts, before, entries = [], [], [], 0, 0
-    for drawing in drawings:
-        of_each, owners, begins = listed(device, drawing)
+    for one in passes:
+        of_each, owners, begins = listed(device, one)
         tiles.append(of_each)
         splats.append(owners + before)
-        starts.append((begins + entries).reshape(drawing.tiles.rows, drawing.tiles.across))
+        starts.append((begins + entries).reshape(one.tiles.rows, one.tiles.across))
         before, entries = before + len(of_each), entries + len(owners)
     arrays = (np.concatenate(tiles), np.concatenate(splats), np.stack(starts))
     return [torch.from_numpy(a.astype(np.int32)).to(like.device) for a in arrays]

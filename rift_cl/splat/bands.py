@@ -1,4 +1,4 @@
-"""Drawing within a memory budget: how much it takes, and which rows of tiles at a time.
+"""Rendering within a memory budget: how much it takes, and which rows of tiles at a time.
 
 Tile lists and the gradient's records grow with the number of (splat, tile) pairs, which can be
 any multiple of the number of splats. Where they do not fit, the image is drawn in bands of whole

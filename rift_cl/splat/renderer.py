@@ -20,7 +20,6 @@ from rift_cl.cl.memory import as_device_array
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.splat.bands import FrameMemory, check_fixed
-from rift_cl.splat.drawing import Drawing, draw, draw_grad
 from rift_cl.splat.features import Channels, gather_features, own_columns, shade_grad
 from rift_cl.splat.projection import (
     CULL_REASONS,
@@ -31,6 +30,7 @@ from rift_cl.splat.projection import (
     project_grad,
 )
 from rift_cl.splat.raster import Raster, ScreenSplats
+from rift_cl.splat.raster_pass import RasterPass, draw, draw_grad
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 from rift_cl.splat.tile_lists import TileLists
@@ -46,23 +46,23 @@ class Frame:
         projection: what was drawn, and how the camera sees it.
         depth: ``accumulated``, ``expected``, or None.
         channels: what the image's channels are.
-        drawing: the splats on the screen, the image, and what the raster left for its gradient.
+        raster_pass: the splats on the screen, the image, and what the raster left for its gradient.
     """
 
     projection: Projection
     depth: str | None
     channels: Channels
-    drawing: Drawing
+    raster_pass: RasterPass
 
     @property
     def image(self) -> DeviceArray:
         """(height, width, D) device array, the background included."""
-        return self.drawing.raster.image
+        return self.raster_pass.raster.image
 
     @property
     def transmittance(self) -> DeviceArray:
         """(height, width) device array, what of the background is seen; alpha is one minus it."""
-        return self.drawing.raster.transmittance
+        return self.raster_pass.raster.transmittance
 
     @property
     def splats(self) -> Splats:
@@ -77,12 +77,12 @@ class Frame:
     @property
     def lists(self) -> TileLists | None:
         """The tile lists; None where the image was drawn in bands."""
-        return self.drawing.lists
+        return self.raster_pass.lists
 
     @property
     def raster(self) -> Raster:
         """The image, and what the raster left for its gradient."""
-        return self.drawing.raster
+        return self.raster_pass.raster
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ def check_depth(depth: str | None, settings: SplatSettings) -> None:
 
 
 class Renderer:
-    """Draws splats and differentiates the drawing.
+    """Renders splats, and differentiates the image.
 
     Args:
         settings: every switch of the rasterizer.
@@ -175,7 +175,7 @@ class Renderer:
         check_fixed(memory, device.budget)
         projection = project(device, splats, camera, settings)
         features = gather_features(projection, channels)
-        drawing = draw(
+        raster_pass = draw(
             device,
             ScreenSplats(projection.screen, features, projection.modes),
             *(projection.boxes, projection.depths, camera.size),
@@ -184,8 +184,8 @@ class Renderer:
             background=behind,
         )
         if depth == "expected":
-            _expected_depth(device, drawing.raster)
-        return Frame(projection, depth, channels, drawing)
+            _expected_depth(device, raster_pass.raster)
+        return Frame(projection, depth, channels, raster_pass)
 
     def backward(
         self,
@@ -215,7 +215,7 @@ class Renderer:
             grad_image, grad_transmittance = _expected_depth_grad(
                 device, frame.raster, grad_image, grad_transmittance
             )
-        sums = draw_grad(device, frame.drawing, grad_image, grad_transmittance)
+        sums = draw_grad(device, frame.raster_pass, grad_image, grad_transmittance)
         gradients = project_grad(
             frame.projection,
             sums,
@@ -253,7 +253,7 @@ class Renderer:
         sh = shade_grad(
             device,
             *(splats.means, splats.sh, frame.camera),
-            features=frame.drawing.screen.features,
+            features=frame.raster_pass.screen.features,
             gradients=gradients,
             lobes=splats.lobes,
             angular=self.settings.angular,
@@ -278,7 +278,7 @@ class Renderer:
         return behind.reshape((channels.total,))
 
     def _background_grad(self, frame: Frame, grad_image: DeviceArray) -> DeviceArray | None:
-        if frame.drawing.background is None:
+        if frame.raster_pass.background is None:
             return None
         height, width, channels = frame.image.shape
         seen = self.device.empty((height * width, channels))

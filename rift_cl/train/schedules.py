@@ -80,10 +80,10 @@ class CoefficientSchedule:
         self._cameras = cameras
         self._flat = flat
 
-    def drawing(self, parameters: Parameters, drawing: SplatSettings) -> SplatSettings:
+    def rendering(self, parameters: Parameters, rendering: SplatSettings) -> SplatSettings:
         """How splats are drawn that have what these have by now."""
         angular = self.settings.angular.kind if "lobes" in parameters.raw else "sh"
-        return replace(drawing, activation=self.settings.basis.activation, angular=angular)
+        return replace(rendering, activation=self.settings.basis.activation, angular=angular)
 
     def after_step(self, parameters: Parameters) -> None:
         """Add what is due after the steps that were taken; before the first one, too."""

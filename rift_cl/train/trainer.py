@@ -84,7 +84,7 @@ class Trainer:
         pictures: the training views.
         parameters: the splats to begin with; the trainer changes them in place.
         settings: of the fit.
-        drawing: how splats are rendered; the activation is that of the settings.
+        rendering: how splats are rendered; the activation is that of the settings.
         flat: whether all splats lie in one slice.
 
     Raises:
@@ -98,7 +98,7 @@ class Trainer:
         pictures: TrainingViews,
         parameters: Parameters,
         settings: TrainSettings,
-        drawing: SplatSettings | None = None,
+        rendering: SplatSettings | None = None,
         *,
         flat: bool = False,
     ) -> None:
@@ -115,8 +115,8 @@ class Trainer:
             settings.steps, settings.splats, settings.seed, extent, self.schedule.cooldown
         )
         self.strategy = settings.strategy.begin(parameters, run)
-        drawing = self.strategy.render_settings(drawing or SplatSettings())
-        self.renderer = Renderer(drawing, device=self.device)
+        rendering = self.strategy.render_settings(rendering or SplatSettings())
+        self.renderer = Renderer(rendering, device=self.device)
         self.coefficient_schedule = CoefficientSchedule(settings, pictures.cameras, flat=flat)
         self._add_coefficients()
         self.poses = Poses(pictures.cameras, extent) if settings.refine_poses else None
@@ -234,8 +234,8 @@ class Trainer:
 
     def alike(self, parameters: Parameters) -> Trainer:
         """A fit of the same views by the same settings that begins with other splats."""
-        drawing = self.renderer.settings
-        return type(self)(self.pictures, parameters, self.settings, drawing, flat=self.flat)
+        rendering = self.renderer.settings
+        return type(self)(self.pictures, parameters, self.settings, rendering, flat=self.flat)
 
     def camera(self, number: int) -> Camera:
         """The camera of a view, with its pose as refined so far."""
@@ -278,7 +278,7 @@ class Trainer:
                 band=groups.get("band", {}).get("lengths"),
             )
             self.coefficient_schedule.hold(self.parameters)
-            self._fit_drawing()
+            self._update_renderer()
             self.strategy.restore(groups.get("strategy", {}))
             self.loss.restore(groups["loss"])
             for name, refined in (("poses", self.poses), ("exposures", self.exposures)):
@@ -302,13 +302,13 @@ class Trainer:
     def _add_coefficients(self) -> None:
         """Add coefficients scheduled for this step; rebuild the renderer if needed."""
         self.coefficient_schedule.after_step(self.parameters)
-        self._fit_drawing()
+        self._update_renderer()
 
-    def _fit_drawing(self) -> None:
+    def _update_renderer(self) -> None:
         """Rebuild the renderer where splats have become others than it renders."""
-        drawing = self.coefficient_schedule.drawing(self.parameters, self.renderer.settings)
-        if drawing != self.renderer.settings:
-            self.renderer = Renderer(drawing, device=self.device)
+        rendering = self.coefficient_schedule.rendering(self.parameters, self.renderer.settings)
+        if rendering != self.renderer.settings:
+            self.renderer = Renderer(rendering, device=self.device)
 
     def _limit_band(self) -> None:
         if self._band is not None:

@@ -61,7 +61,7 @@ def test_a_ring_misses_a_cone_about_its_axis_and_views_above_it_are_suggested(
     # What was assumed is said on the console as well.
     assert "--diameter" in printed.err and "--center" in printed.err
     found = metrics_of(out)
-    assert (found["views"], found["seen_by"], found["unit"]) == (48, 48, "unit")
+    assert (found["views"], found["views_of_center"], found["unit"]) == (48, 48, "unit")
     np.testing.assert_allclose(found["target"]["center"], MIDDLE_OF_RING, atol=1e-6)
     for hole in found["missing"][1:]:
         assert abs(hole["axis"][2]) > 0.999
@@ -212,7 +212,7 @@ def test_of_a_narrow_wedge_the_detail_within_it_is_said_and_the_share_outside(sc
     first = found.figures["limits"][0]
     # Slices at 8 cycles per diameter reach asin(1 / 16) beyond the wedge, to either side.
     seen = 30 * 149 / 150 + 2 * math.degrees(math.asin(1 / 16))
-    assert first["unseen"] == pytest.approx(1 - seen / 180, abs=0.005)
+    assert first["unsampled"] == pytest.approx(1 - seen / 180, abs=0.005)
     assert 1 / first["within_seen"] < 0.1 * sampled.target.diameter
     assert 1 / first["reached"] > sampled.target.diameter
     words = " ".join(found.sentences)

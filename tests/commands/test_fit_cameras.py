@@ -48,9 +48,9 @@ def views_of(folder, cameras, **more):
 def test_the_cameras_of_a_fit_are_those_of_its_capture(capture, fitted):
     cameras = open_fit_cameras(fitted)
     expected = open_capture(capture).views
-    assert [view.name for view in cameras.unseen] == ["0.png", "4.png"]
+    assert [view.name for view in cameras.test_views] == ["0.png", "4.png"]
     assert [view.name for view in cameras.views] == [view.name for view in expected]
-    assert cameras.seen == tuple(view for k, view in enumerate(cameras.views) if k % 4)
+    assert cameras.training_views == tuple(view for k, view in enumerate(cameras.views) if k % 4)
     for found, view in zip(cameras.views, expected, strict=True):
         assert found.image == view.image and found.camera.size == view.camera.size
         np.testing.assert_allclose(found.camera.view, view.camera.view, atol=1e-12)
@@ -66,10 +66,10 @@ def test_refined_poses_are_those_that_are_kept(capture, fitted, tmp_path):
     words = ["--steps", "20", "--splats", "50", "--hold-out", "4", "--quiet", "--refine-poses"]
     assert main(["fit", str(capture), "--out", str(tmp_path / "fit"), *words]) == 0
     plain, refined = (open_fit_cameras(fit) for fit in (fitted, tmp_path / "fit"))
-    for old, new in zip(plain.seen, refined.seen, strict=True):
+    for old, new in zip(plain.training_views, refined.training_views, strict=True):
         moved = np.abs(new.camera.view - old.camera.view).max()
         assert 1e-6 < moved < 0.2 and np.array_equal(new.camera.K, old.camera.K)
-    for old, new in zip(plain.unseen, refined.unseen, strict=True):
+    for old, new in zip(plain.test_views, refined.test_views, strict=True):
         np.testing.assert_array_equal(old.camera.view, new.camera.view)
 
 

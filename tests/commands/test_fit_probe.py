@@ -13,7 +13,7 @@ from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 
 def trainer_of(capture, out, **more):
     job = Fit(FitPhotosSettings.of(capture, out, steps=600, splats=200, **more))
-    return job._trainer(job.source, job._pictures(job.seen))
+    return job._trainer(job.source, job._pictures(job.training_views))
 
 
 def test_steps_are_tried_as_at_the_beginning_and_as_at_the_end(capture, tmp_path):

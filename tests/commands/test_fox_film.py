@@ -65,7 +65,7 @@ def looking_back(camera: Camera, subject, up) -> Camera:
 
 def drawn(render: Render, camera: Camera):
     scene, device = render.scene, render.device
-    renderer = Renderer(scene.drawing, device=device)
+    renderer = Renderer(scene.rendering, device=device)
     return device.get(renderer.forward(scene.splats.upload(device), camera).image)
 
 

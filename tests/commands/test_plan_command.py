@@ -94,9 +94,9 @@ def test_the_report_compares_and_says_what_planning_is_worth(planned, capsys):
     found, page = metrics_of(planned), (planned / "report.html").read_text()
     assert set(found["baselines"]) <= {"ring", "arc", "fibonacci", "zigzag", "random"}
     own = found["planned_with"]
-    assert 0 < own["bound"] <= own["merit"] < 1 and len(found["merits"]) == 9
-    assert found["merits"][-1] == pytest.approx(found["merit"], rel=1e-6)
-    assert found["merit"] <= min(found["baselines"].values()) * 1.02
+    assert 0 < own["bound"] <= own["value"] < 1 and len(found["values"]) == 9
+    assert found["values"][-1] == pytest.approx(found["value"], rel=1e-6)
+    assert found["value"] <= min(found["baselines"].values()) * 1.02
     assert found["verdict"] in page and page.count("<img") >= 4
     assert "falls as 1/k^2" in page or "fall as 1/k^2" in page
     assert json.loads((planned / "config.json").read_text())["complete"]

@@ -44,10 +44,10 @@ def test_a_fit_wants_what_frames_of_its_splats_take(fitted, tmp_path):
     settings, scene = fitted
     training = replace(settings.training, splats=MANY)
     job = Fit(replace(settings, out=tmp_path / "none", training=training))
-    size = job.seen[0].camera.size
+    size = job.training_views[0].camera.size
     absgrad = isinstance(training.strategy, DefaultSettings)
-    drawing = SplatSettings(absgrad=absgrad, activation=scene.activation)
-    frame = FrameMemory.of(scene.upload(rift.default_device()), size, 3, drawing)
+    rendering = SplatSettings(absgrad=absgrad, activation=scene.activation)
+    frame = FrameMemory.of(scene.upload(rift.default_device()), size, 3, rendering)
     need = replace(frame, splats=MANY, gradient=True).fixed + 8 * frame.parameters * MANY
     assert job.plan()["device memory"].startswith(f"{need / 2**20:.0f} MiB, and about ")
     assert frame.parameters == training.numbers
@@ -57,7 +57,7 @@ def test_a_fit_wants_what_frames_of_its_splats_take(fitted, tmp_path):
 def test_a_rendering_wants_what_frames_of_its_scene_take(fitted, tmp_path, depth):
     settings, scene = fitted
     job = Render(RenderSettings(settings.out, out=tmp_path / "none", size=(64, 48), depth=depth))
-    drawing = SplatSettings(activation=scene.activation, angular=scene.angular)
+    rendering = SplatSettings(activation=scene.activation, angular=scene.angular)
     splats = scene.upload(rift.default_device())
-    frame = FrameMemory.of(splats, (48, 64), 3 + depth, drawing)
+    frame = FrameMemory.of(splats, (48, 64), 3 + depth, rendering)
     assert job.plan()["device memory"] == f"{format_bytes(frame.fixed)} and the tile lists"

@@ -25,7 +25,7 @@ def at(degrees, distance=4.0):
 
 def test_a_view_farther_from_those_taken_is_foretold_worse():
     found = foretold(views(arc(7, 30)), [at(2), at(40), at(70), at(120)])
-    for name in ("angle", "sheen", "sides"):
+    for name in ("angle", "appearance", "sides"):
         assert (np.diff(found[name]) > 0).all(), name
     # To the camera at 30 degrees, all of them 14 above the horizon.
     lift = math.atan(0.25)
@@ -43,5 +43,5 @@ def test_the_largest_gap_of_an_arc_lies_behind_it():
 
 
 def test_what_did_not_hold_is_withheld():
-    every = {name: name for name in ("angle", "sheen", "sides", "pixel", "parallax")}
+    every = {name: name for name in ("angle", "appearance", "sides", "pixel", "parallax")}
     assert said(every) == list(HELD) == ["angle", "pixel"]

@@ -51,7 +51,7 @@ def test_x_rays_are_drawn_as_line_integrals_and_through_no_lens(tmp_path):
     device = rift.default_device()
     painter = Painter(np.zeros(3, np.float32), "display", settings.bounds(scene))
     camera = pinhole((40, 40), 40, look_at(HERE, [0, 0, 0], UP))
-    given = (scene.splats.upload(device), rift.Renderer(scene.drawing, device=device), camera)
+    given = (scene.splats.upload(device), rift.Renderer(scene.rendering, device=device), camera)
     picture = painter.paint(*given, Wish(), 0)
     rows = picture[20, :, 0]
     # A Gaussian's shadow is a Gaussian: its logarithm is a parabola with the right width.

@@ -11,8 +11,8 @@ from projection_scenes import random_splats, turned
 
 from rift_cl.basis.projection import gamma_matrix
 from rift_cl.reference.hermite_projection import splat_roots
-from rift_cl.splat.drawing import draw
 from rift_cl.splat.orders import order_of
+from rift_cl.splat.raster_pass import draw
 
 
 def same_but_for_thresholds(found, right):
@@ -171,10 +171,10 @@ def test_what_lies_beyond_a_splats_rectangle_is_not_seen(device):
     wide[:, 6:] = 6 * g
     again = draw(
         device,
-        dataclasses.replace(frame.drawing.screen, screen=device.array(wide)),
+        dataclasses.replace(frame.raster_pass.screen, screen=device.array(wide)),
         *(device.array(boxes, np.int32), frame.projection.depths, SIZE),
         settings=renderer.settings,
-        memory=frame.drawing.memory,
+        memory=frame.raster_pass.memory,
     )
     assert (wide[:, 6:] >= device.get(frame.projection.screen)[:, 6:]).all()
     away = np.abs(device.get(again.raster.image) - device.get(frame.image))

@@ -15,7 +15,7 @@ from rift_cl.splat import Renderer, Splats, SplatSettings
 from rift_cl.splat.bands import FrameMemory, entries_per_row
 from rift_cl.splat.tile_lists import Tiles
 
-DRAWING = importlib.import_module("rift_cl.splat.drawing")
+RASTER_PASS = importlib.import_module("rift_cl.splat.raster_pass")
 
 
 def digest(renderer, frame):
@@ -37,7 +37,7 @@ def many(device):
 
 def needs(device, frame, *, gradient):
     """Bytes for the image at once, and for its fullest row of tiles."""
-    given = (frame.splats, frame.camera.size, frame.image.shape[2], frame.drawing.settings)
+    given = (frame.splats, frame.camera.size, frame.image.shape[2], frame.raster_pass.settings)
     memory = dataclasses.replace(FrameMemory.of(*given), gradient=gradient)
     tiles = Tiles.of(SIZE, 8)
     rows = entries_per_row(device.get(frame.projection.boxes), tiles)
@@ -51,8 +51,8 @@ def test_another_run_gives_the_same_bits(device):
 
 def test_bands_within_a_small_budget_give_the_same_bits(device, monkeypatch):
     """Backward row by row of tiles, and forward in the least that a picture can be drawn in."""
-    plans, plan = [], DRAWING.plan_bands
-    monkeypatch.setattr(DRAWING, "plan_bands", lambda *a: plans.append(plan(*a)) or plans[-1])
+    plans, plan = [], RASTER_PASS.plan_bands
+    monkeypatch.setattr(RASTER_PASS, "plan_bands", lambda *a: plans.append(plan(*a)) or plans[-1])
     renderer, frame = many(device)
     whole, right = digest(renderer, frame), device.get(frame.image)
     assert not plans

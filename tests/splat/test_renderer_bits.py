@@ -25,7 +25,7 @@ from rift_cl.splat import Renderer, Splats, SplatSettings
 from rift_cl.splat.bands import FrameMemory, check_fixed, entries_per_row, plan_bands
 from rift_cl.splat.tile_lists import Tiles
 
-DRAWING = importlib.import_module("rift_cl.splat.drawing")
+RASTER_PASS = importlib.import_module("rift_cl.splat.raster_pass")
 SIZE, TILE = (120, 160), 8
 
 
@@ -97,7 +97,7 @@ def test_another_process_gives_the_same_bits_whatever_its_threads(device, python
 
 def memory_of(frame, *, gradient):
     channels = frame.image.shape[2]
-    memory = FrameMemory.of(frame.splats, frame.camera.size, channels, frame.drawing.settings)
+    memory = FrameMemory.of(frame.splats, frame.camera.size, channels, frame.raster_pass.settings)
     return dataclasses.replace(memory, gradient=gradient)
 
 
@@ -117,7 +117,7 @@ def plans_of(monkeypatch):
         plans.append(plan_bands(*arguments))
         return plans[-1]
 
-    monkeypatch.setattr(DRAWING, "plan_bands", planned)
+    monkeypatch.setattr(RASTER_PASS, "plan_bands", planned)
     return plans
 
 

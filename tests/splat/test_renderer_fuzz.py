@@ -125,7 +125,7 @@ def run(device, chosen, scene, values):
     coming = [device.array(random.normal(size=a.shape)) for a in (frame.image, frame.transmittance)]
     found = renderer.backward(frame, *coming, with_camera=True)
     arrays = arrays_of(frame.projection) | vars(frame.raster)
-    arrays |= {"features": frame.drawing.screen.features}
+    arrays |= {"features": frame.raster_pass.screen.features}
     arrays |= {"coming": coming[0], "by camera": found.camera, "by background": found.background}
     gradients = vars(found.splats) | {"colors": found.colors, "sh": found.sh}
     hosts = [

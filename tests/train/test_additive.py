@@ -59,8 +59,8 @@ def test_what_is_not_kept_is_drawn_anew_to_the_same_bits(device, monkeypatch, ke
     seen = additive(c)
     back = additive.T(seen)
     frame = additive._kept[0]
-    one = frame.drawing.memory.fixed
-    one += frame.drawing.memory.lists(frame.lists.n_entries, frame.lists.tiles.count)
+    one = frame.raster_pass.memory.fixed
+    one += frame.raster_pass.memory.lists(frame.lists.n_entries, frame.lists.tiles.count)
     monkeypatch.setattr(rift.Device, "budget", (2 * kept + 1) * one + one // 2)
     few = Additive(additive.renderer, additive.cameras, parameters.drawn, modes=4)
     assert bool(few._kept) == (kept > 0) and len(few._kept) < VIEWS

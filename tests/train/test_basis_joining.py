@@ -131,9 +131,9 @@ def test_flat_scans_have_no_modes_across_their_slice(device):
     raw = start_splats(means, np.ones((30, 3)), seed=0)
     basis = BasisSettings("hermite", 2, first=0, every=0, ridge=0)
     settings = XrayTrainSettings(steps=STEPS, splats=30, basis=basis)
-    drawing = SplatSettings(mode="xray")
+    rendering = SplatSettings(mode="xray")
     trainer = XrayTrainer(
-        pictures, Parameters.of(device, raw, density=True), settings, drawing, flat=True
+        pictures, Parameters.of(device, raw, density=True), settings, rendering, flat=True
     )
     run_to(trainer, 12)
     modes = trainer.parameters.host()[0]["shape_modes"]

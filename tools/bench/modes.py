@@ -1,4 +1,4 @@
-"""Splats with modes and lobes: drawing, its gradient, voxels, and what each kernel has to do.
+"""Splats with modes and lobes: rendering, its gradient, voxels, and what each kernel has to do.
 
 The scene is that of ``bench.splats`` with a density of order 2, colours of order 1 and lobes of
 Laguerre-Gaussians. Compositing is counted in the lanes that the Gaussian scene evaluates: a splat
@@ -110,7 +110,7 @@ class ModeCase(SplatCase):
 
 
 def mode_tasks(device: rift.Device, count: int, size: int) -> Iterator[Task]:
-    """Drawing with modes, its gradient and voxels."""
+    """Rendering with modes, its gradient and voxels."""
     yield from ModeCase(count, size, device).tasks
 
 

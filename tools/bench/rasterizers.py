@@ -21,7 +21,7 @@ from rift_cl.splat.renderer import Renderer
 
 
 class Rasterizer(Contender):
-    """Drawing, and drawing with the gradient."""
+    """Rendering, and rendering with the gradient."""
 
     case: SplatCase
     operations = ("draw", "draw and gradient")
@@ -127,7 +127,7 @@ class TorchTiles(Rasterizer):
 class TorchTilesAlone(TorchTiles):
     """The same on one thread.
 
-    Torch's threads wait for each other many times in a drawing. Where another program takes one of
+    Torch's threads wait for each other many times in a frame. Where another program takes one of
     the cores, several threads can take ten times as long as one.
     """
 

@@ -1,4 +1,4 @@
-"""A step of training beside drawing, and what each part of it has to do.
+"""A step of training beside rendering, and what each part of it has to do.
 
 The loss, plain and homogenised, Adam, the random walk, the limit of the splats' band, what
 densification gathers of a frame, and a photograph's exposure.

@@ -85,7 +85,7 @@ def _drawn(fit: Fitted, view: dict[str, Any], device: Device) -> dict[str, Any]:
     test = dict(zip((FIXED, OFF_PATH), fit.settings.test[1:], strict=True))[view["set"]]
     scene = SceneInput(fit.settings.out).open_scene()
     camera = open_capture(test).views[view["number"]].camera
-    renderer = Renderer(scene.drawing, device=device)
+    renderer = Renderer(scene.rendering, device=device)
     splats = scene.splats.upload(device)
     frame = renderer.forward(splats, camera, background=device.array(scene.background))
     score = fit.views(view["set"])[view["number"]]

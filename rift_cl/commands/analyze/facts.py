@@ -206,7 +206,7 @@ def _ends(found: Limits, p: int, name: str) -> dict[str, Any]:
         "point": name,
         **dict(zip(_KEYS, ends, strict=True)),
         "limited_by": found.cause[p],
-        "unseen": float(found.unseen[p]),
+        "unsampled": float(found.unseen[p]),
         "within_seen": float(found.within[p]),
     }
 

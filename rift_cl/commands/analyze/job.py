@@ -86,7 +86,7 @@ class Analysis:
         self.metrics = {
             "source": str(self.settings.source),
             "views": sampled.views,
-            "seen_by": int((sampled.observations().weight[:, 0] > 0).sum()),
+            "views_of_center": int((sampled.observations().weight[:, 0] > 0).sum()),
             "target": {"center": sampled.target.center, "diameter": sampled.target.diameter},
             "unit": sampled.unit,
             "unknown": self._unknown(sampled),

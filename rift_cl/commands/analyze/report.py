@@ -34,7 +34,7 @@ def analysis_page(
     page.facts(
         {
             **sampled.facts,
-            "views that see the target's centre": metrics["seen_by"],
+            "views that see the target's centre": metrics["views_of_center"],
             "target": f"{target.diameter:.4g} {sampled.units} about {place_of(target)}",
             **_unknown(sampled, metrics["unknown"]),
         }

@@ -32,7 +32,7 @@ def surface_missing(sampled: ViewSet, distance: float) -> Findings:
     figures = {
         "mode": "surface",
         "largest_gap_degrees": sides.gap,
-        "unseen_sides": sides.unseen,
+        "uncovered_sides": sides.unseen,
         "sides_seen_once": sides.seen_once,
         "shut_sides": None if sampled.space is None else sides.shut,
     }

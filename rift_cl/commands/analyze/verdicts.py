@@ -24,7 +24,7 @@ from rift_cl.sampling.targets.target import Target, half_disc
 
 # The verdicts that held, Spearman with the errors of held-out photographs on the fox, the ornament
 # and two rendered one-sided captures, a shelf and a wall: angle .47 .87 .39 .57; pixel .55 on the
-# fox, where alone distances differ. Withheld: sheen .61 .63 -.02 .69; sides .26 .48 .63 .83;
+# fox, where alone distances differ. Withheld: appearance .61 .63 -.02 .69; sides .26 .48 .63 .83;
 # parallax .17 .07 .94 .57. (slices, .46 .38 .84 .81, is of what is seen through: it follows the
 # angle, but the length that it names is none of a surface.)
 HELD = ("angle", "pixel")
@@ -69,7 +69,7 @@ def foretold(sampled: ViewSet, cameras: Sequence[Camera]) -> dict[str, Floats]:
     pixel = np.median(taken.pixel[:, 0]) / asked.pixel[:, 0]
     return {
         "angle": apart.min(axis=1),
-        "sheen": np.array([_appearance(observations, target, side) for side in sides]),
+        "appearance": np.array([_appearance(observations, target, side) for side in sides]),
         "sides": few,
         "pixel": pixel,
         "parallax": np.array([_parallax(ways[near]) for near in apart < math.radians(SQUARE)]),

@@ -45,7 +45,7 @@ _TRANSFORMS, _CAMERAS, _POINTS = CAMERA_FILES
 _MOST_POINTS = 1 << 20
 # The squares of larger coordinates would not be numbers in float32.
 _FARTHEST = 1e15
-_SEEN, _UNSEEN = "train", "test"
+_TRAINING, _TEST = "train", "test"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +53,9 @@ class FitCameras:
     """The cameras of a fit, and what they tell of the capture.
 
     Args:
-        seen: the views that were trained on, in the capture's order, at the photographs' size.
-        unseen: those that were held out.
+        training_views: those that were trained on, in the capture's order, at the photographs'
+            size.
+        test_views: those that were held out.
         up: (3,) unit vector, the cameras' common up.
         focus: (3,) what the cameras look at.
         arc: from where they looked.
@@ -66,8 +67,8 @@ class FitCameras:
             held out.
     """
 
-    seen: tuple[View, ...]
-    unseen: tuple[View, ...]
+    training_views: tuple[View, ...]
+    test_views: tuple[View, ...]
     up: Floats
     focus: Floats
     arc: Arc
@@ -99,8 +100,8 @@ class FitCameras:
 def save_fit_cameras(
     fit: Path,
     capture: Capture,
-    seen: Sequence[View],
-    unseen: Sequence[View],
+    training_views: Sequence[View],
+    test_views: Sequence[View],
     *,
     photographs: int | None = None,
 ) -> None:
@@ -109,16 +110,18 @@ def save_fit_cameras(
     Args:
         fit: the folder of the fit.
         capture: all that was opened.
-        seen: its views that are trained on, with poses as they were refined.
-        unseen: those that are held out.
+        training_views: its views that are trained on, with poses as they were refined.
+        test_views: those that are held out.
         photographs: how many there are, with those that have no pose; as many as views if not
             given.
 
     Raises:
         OutputError: a file cannot be written.
     """
-    splits = {view.name: _SEEN for view in seen} | {view.name: _UNSEEN for view in unseen}
-    kept = {view.name: view for view in (*seen, *unseen)}
+    splits = {view.name: _TRAINING for view in training_views} | {
+        view.name: _TEST for view in test_views
+    }
+    kept = {view.name: view for view in (*training_views, *test_views)}
     views = [kept[view.name] for view in capture.views if view.name in kept]
     cameras = [view.camera for view in views]
     bounds = bounds_of_cameras(cameras, points=capture.points)
@@ -208,8 +211,8 @@ def _found_again(file: Path, config: Fields, fit: Path) -> Capture:
 
 def _cameras_of(capture: Capture, splits: Sequence[str | None], facts: Fields) -> FitCameras:
     views = list(zip(capture.views, splits, strict=True))
-    seen = tuple(view for view, split in views if split == _SEEN)
-    if not seen:
+    training_views = tuple(view for view, split in views if split == _TRAINING)
+    if not training_views:
         raise FileFormatError(f"{facts.where}: no frame says that it was trained on")
     up, focus = _vector(facts, "up"), _vector(facts, "focus")
     length = math.hypot(*up)
@@ -219,8 +222,8 @@ def _cameras_of(capture: Capture, splits: Sequence[str | None], facts: Fields) -
         raise FileFormatError(f"{facts.where}: 'focus' is farther off than {_FARTHEST:g} units")
     count = len(capture.views)
     return FitCameras(
-        seen=seen,
-        unseen=tuple(view for view, split in views if split == _UNSEEN),
+        training_views=training_views,
+        test_views=tuple(view for view, split in views if split == _TEST),
         up=up / length,
         focus=focus,
         arc=arc_of([view.camera for view in capture.views], focus, up / length),

@@ -44,8 +44,8 @@ class Evaluation:
             self.groups = {"held out": self._held_out()}
         elif len(self.groups) < len(settings.captures):
             raise InputError("two captures have the same name: rename one folder")
-        self.seen = self._seen()
-        for view in [*self.seen, *(v for views in self.groups.values() for v in views)]:
+        self.training_views = self._training_views()
+        for view in [*self.training_views, *(v for views in self.groups.values() for v in views)]:
             camera_at(view, self.downscale)
         self.device = settings.open_device()
         self.folder = RunFolder(settings.out, "eval", overwrite=settings.overwrite)
@@ -55,7 +55,7 @@ class Evaluation:
     @property
     def decided(self) -> EvalSettings:
         """The settings with the values that were decided."""
-        eps2d = self.scene.drawing.eps2d
+        eps2d = self.scene.rendering.eps2d
         return replace(absolute_paths(self.settings), eps2d=eps2d, downscale=self.downscale)
 
     def _scored(self, path: Path) -> tuple[View, ...]:
@@ -75,19 +75,19 @@ class Evaluation:
         every = self.settings.hold_out
         return views[::every] if every else views
 
-    def _seen(self) -> tuple[View, ...]:
+    def _training_views(self) -> tuple[View, ...]:
         """What was trained on; empty where nobody says, or where it is what is scored."""
         if self.settings.train is None:
             return self._trained()
         views = open_seen(self.settings.train, pinhole=self.scene.pinhole).views
-        seen, _ = split_views(views, self.settings.hold_out, 0)
-        both = self._in_both(seen)
+        training_views, _ = split_views(views, self.settings.hold_out, 0)
+        both = self._in_both(training_views)
         if both is not None:
             raise InputError(
                 f"{both} is also a training photograph (--train): leave --train out, or hold the "
                 "scored ones out (--hold-out)"
             )
-        return seen
+        return training_views
 
     def _cameras(self) -> FitCameras | None:
         """Those of the fit, whose photographs may have moved."""
@@ -107,23 +107,23 @@ class Evaluation:
                 f"there is no capture to score: name one or more after the scene, since {where} "
                 f"{why} and holds no cameras"
             )
-        if not cameras.unseen:
+        if not cameras.test_views:
             raise InputError(
                 f"{where} held no photographs out: name a capture to score after the scene"
             )
         cameras.check_photographs(where)
-        return cameras.unseen
+        return cameras.test_views
 
     def _trained(self) -> tuple[View, ...]:
         """What the fit was trained on; empty where those photographs are gone, or are scored."""
         cameras = self.cameras
-        if cameras is None or not all(view.image.is_file() for view in cameras.seen):
+        if cameras is None or not all(view.image.is_file() for view in cameras.training_views):
             return ()
-        return () if self._in_both(cameras.seen) else cameras.seen
+        return () if self._in_both(cameras.training_views) else cameras.training_views
 
-    def _in_both(self, seen: tuple[View, ...]) -> str | None:
+    def _in_both(self, training_views: tuple[View, ...]) -> str | None:
         """A photograph that is scored and was trained on, with its capture's name."""
-        files = {view.image.resolve() for view in seen}
+        files = {view.image.resolve() for view in training_views}
         scored = ((view, name) for name, views in self.groups.items() for view in views)
         names = (f"{view.name} of {name}" for view, name in scored if view.image.resolve() in files)
         return next(names, None)
@@ -131,31 +131,35 @@ class Evaluation:
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""
         scored = {f"score {name}": f"{len(views)} views" for name, views in self.groups.items()}
-        trained = f"{len(self.seen)} views" if self.seen else "not given: no baselines"
+        trained = (
+            f"{len(self.training_views)} views"
+            if self.training_views
+            else "not given: no baselines"
+        )
         return {
             "scene": f"{self.scene.name}, {len(self.scene.splats)} splats",
             **scored,
             "trained on": trained,
             "downscale": str(self.downscale),
-            "eps2d": f"{self.scene.drawing.eps2d:g}",
+            "eps2d": f"{self.scene.rendering.eps2d:g}",
             "device": self.device.name,
         }
 
     def run(self) -> Iterator[Report]:
         """Do it; a report for each picture."""
-        renderer = Renderer(self.scene.drawing, device=self.device)
+        renderer = Renderer(self.scene.rendering, device=self.device)
         splats = self.scene.splats.upload(self.device)
-        seen = self._pictures(self.seen) if self.seen else None
+        training = self._pictures(self.training_views) if self.training_views else None
         self.folder.make()
         for name, views in self.groups.items():
-            unseen = self._pictures(views, seen)
+            test = self._pictures(views, training)
             self.scores[name] = []
-            for score in score_views(renderer, splats, unseen, seen):
+            for score in score_views(renderer, splats, test, training):
                 self.scores[name].append(score)
                 yield Report(len(self.scores[name]), len(views), f"views of {name}")
         self.metrics = {
             "splats": len(self.scene.splats),
-            "eps2d": self.scene.drawing.eps2d,
+            "eps2d": self.scene.rendering.eps2d,
             "downscale": self.downscale,
             **score_record(self.scores),
         }

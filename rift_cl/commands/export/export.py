@@ -68,10 +68,10 @@ class Export:
                 "changes with the direction is lost (other formats keep it; a fit with "
                 "--sh-degree 0 has nothing to lose by it)"
             )
-        if self.scene.drawing.eps2d != _VIEWERS:
+        if self.scene.rendering.eps2d != _VIEWERS:
             self.notes.append(
                 f"viewers blur by {_VIEWERS:g} square pixels, the scene was fitted with "
-                f"{self.scene.drawing.eps2d:g}: pictures smaller than the photographs look softer"
+                f"{self.scene.rendering.eps2d:g}: pictures smaller than the photographs look softer"
             )
 
     def _format(self, name: str) -> SplatFormat:

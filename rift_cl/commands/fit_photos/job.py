@@ -61,8 +61,8 @@ class Fit(FitRun[FitPhotosSettings]):
         else:
             self.source = open_seen(settings.capture, pinhole=settings.pinhole)
         self.downscale = settings.downscale or 1
-        self.seen: tuple[View, ...] = ()
-        self.unseen: tuple[View, ...] = ()
+        self.training_views: tuple[View, ...] = ()
+        self.test_views: tuple[View, ...] = ()
         if isinstance(self.source, Capture):
             self._split(self.source)
         self.tests = {
@@ -79,13 +79,13 @@ class Fit(FitRun[FitPhotosSettings]):
                 "splats": self._splats,
                 "device": self.device.name,
             }
-        cameras = [camera_at(view, self.downscale) for view in self.seen]
+        cameras = [camera_at(view, self.downscale) for view in self.training_views]
         largest = max(camera.height * camera.width for camera in cameras)
-        masks = sum(view.mask is not None for view in self.seen)
+        masks = sum(view.mask is not None for view in self.training_views)
         return {
             "capture": str(self.source.path),
-            "trained on": f"{len(self.seen)} photographs",
-            "held out": f"{len(self.unseen)} photographs",
+            "trained on": f"{len(self.training_views)} photographs",
+            "held out": f"{len(self.test_views)} photographs",
             **({"masks": f"{masks} photographs have one"} if masks else {}),
             "largest photograph": f"{largest} pixels, made smaller by {self.downscale}",
             "splats": self._splats,
@@ -104,7 +104,7 @@ class Fit(FitRun[FitPhotosSettings]):
         probe, frame = probed(trainer, count), self._frame(pixels)
         first = round(len(trainer.parameters) * most / count)
         ahead = trainer.strategy.forecast(0, first)
-        seconds = reading * len(self.seen) + probe.steps(ahead)
+        seconds = reading * len(self.training_views) + probe.steps(ahead)
         lists = min(probe.lists(frame, settings.rendering.tile), self.device.budget)
         return {
             "device memory": f"{self._need(frame) / 2**20:.0f} MiB, and about "
@@ -115,9 +115,9 @@ class Fit(FitRun[FitPhotosSettings]):
     def _timed_reading(self) -> tuple[CapturePictures, float]:
         """The photographs, and the seconds that it takes to read one."""
         begin = time.perf_counter()
-        self._pictures(self.seen[:1])
+        self._pictures(self.training_views[:1])
         reading = time.perf_counter() - begin
-        return self._pictures(self.seen), reading
+        return self._pictures(self.training_views), reading
 
     def _frame(self, pixels: int) -> FrameMemory:
         """What a frame of so many pixels takes on the device, but for its tile lists."""
@@ -156,7 +156,7 @@ class Fit(FitRun[FitPhotosSettings]):
             self._split(capture)
         for note in self._notes():
             self.announce(f"rift: {note}")
-        pictures = self._pictures(self.seen)
+        pictures = self._pictures(self.training_views)
         if settings.training.refine_exposures and pictures.any_cut_out():
             raise InputError(
                 "--refine-exposures wants photographs of a whole scene: these are cut out, and "
@@ -165,12 +165,14 @@ class Fit(FitRun[FitPhotosSettings]):
         trainer = self._trainer(capture, pictures)
         yield from self._read_ahead(trainer, pictures)
         self.settled = dataclasses.replace(
-            settings.decided(len(self.seen)),
+            settings.decided(len(self.training_views)),
             training=trainer.settings,
             downscale=self.downscale,
             first_splats=settings.first_share,
         )
-        self.decided = {"photographs": place_record([*self.seen, *self.unseen], settings.out)}
+        self.decided = {
+            "photographs": place_record([*self.training_views, *self.test_views], settings.out)
+        }
         self._begin(trainer)
         self._keep_cameras(capture, trainer)
         yield from self._trained(trainer, pictures)
@@ -183,8 +185,8 @@ class Fit(FitRun[FitPhotosSettings]):
         )
         for name, views in self._scored().items():
             self.scores[name] = []
-            unseen = self._pictures(views, pictures)
-            for score in score_views(trainer.renderer, splats, unseen, pictures):
+            test = self._pictures(views, pictures)
+            for score in score_views(trainer.renderer, splats, test, pictures):
                 self.scores[name].append(score)
                 yield Report(len(self.scores[name]), len(views), f"views of {name}")
                 self._heed(trainer.parameters.step)
@@ -196,7 +198,7 @@ class Fit(FitRun[FitPhotosSettings]):
             **settings.basis_facts(),
             **score_record(self.scores),
         }
-        ramp = ramp_notes(settings, len(self.seen))
+        ramp = ramp_notes(settings, len(self.training_views))
         notes = [*self._notes(), *ramp, *history_notes(self._history)]
         scene = leave_page(settings.out, pictures, self.announce)
         name = capture_name(settings.capture)
@@ -219,28 +221,35 @@ class Fit(FitRun[FitPhotosSettings]):
 
     def _keep_cameras(self, capture: Capture, trainer: Trainer) -> None:
         """Leave the cameras in the folder as they are known, so that an unfinished fit has them."""
-        out, seen = self.settings.out, self.seen
+        out, training_views = self.settings.out, self.training_views
         if trainer.poses is not None:
-            seen = with_poses(seen, [trainer.poses.camera(number) for number in range(len(seen))])
+            training_views = with_poses(
+                training_views,
+                [trainer.poses.camera(number) for number in range(len(training_views))],
+            )
         self.folder.drop(*CAMERA_FILES)
         count = self.source.photographs if isinstance(self.source, BareInput) else None
-        save_fit_cameras(out, capture, seen, self.unseen, photographs=count)
+        save_fit_cameras(out, capture, training_views, self.test_views, photographs=count)
 
     def _split(self, capture: Capture) -> None:
         settings = self.settings
         check_places([view.camera for view in capture.views], settings.capture)
-        self.seen, self.unseen = split_views(capture.views, settings.hold_out, settings.views)
+        self.training_views, self.test_views = split_views(
+            capture.views, settings.hold_out, settings.views
+        )
         decided = self.checkpoints.decided.get("downscale")
-        self.downscale = decided or fitting_downscale(self.seen, self.device)
+        self.downscale = decided or fitting_downscale(self.training_views, self.device)
 
     def _notes(self) -> list[str]:
         """What was decided about the photographs, and what of them is not used."""
         notes = list(self.source.notes) if isinstance(self.source, BareInput) else []
-        masks = sum(view.mask is not None for view in self.seen)
+        masks = sum(view.mask is not None for view in self.training_views)
         if masks:
-            notes.append(f"{masks} of {len(self.seen)} photographs have a mask: black is left out")
+            notes.append(
+                f"{masks} of {len(self.training_views)} photographs have a mask: black is left out"
+            )
         if self.settings.downscale is None and self.downscale > 1:
-            notes.append(size_words(self.seen, self.downscale))
+            notes.append(size_words(self.training_views, self.downscale))
         return notes
 
     def _trainer(
@@ -277,5 +286,5 @@ class Fit(FitRun[FitPhotosSettings]):
 
     def _scored(self) -> dict[str, tuple[View, ...]]:
         """The pictures that are scored, by the name of their group."""
-        groups = {"held out": self.unseen} if self.unseen else {}
+        groups = {"held out": self.test_views} if self.test_views else {}
         return groups | {name: capture.views for name, capture in self.tests.items()}

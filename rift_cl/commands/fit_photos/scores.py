@@ -46,26 +46,26 @@ class ViewScore:
 
 
 def score_views(
-    renderer: Renderer, splats: Splats, unseen: CapturePictures, seen: CapturePictures | None
+    renderer: Renderer, splats: Splats, test: CapturePictures, training: CapturePictures | None
 ) -> Iterator[ViewScore]:
-    """Draw and score every picture of ``unseen``.
+    """Render and score every picture of ``test``.
 
-    ``seen`` are the ones that were trained on; where nobody knows them there are no angles and no
+    ``training`` are the ones that were trained on; without them there are no angles and no
     baselines.
     """
-    behind, focus = unseen.behind, focus_of((seen or unseen).cameras)
-    for number, camera in enumerate(unseen.cameras):
+    behind, focus = test.behind, focus_of((training or test).cameras)
+    for number, camera in enumerate(test.cameras):
         frame = renderer.forward(splats, camera, background=renderer.device.array(behind))
-        image = unseen.shown(renderer.device.get(frame.image))
-        truth = unseen.shown(unseen.over(number, behind))
-        masks = unseen.counted(number), unseen.foreground(number)
+        image = test.shown(renderer.device.get(frame.image))
+        truth = test.shown(test.over(number, behind))
+        masks = test.counted(number), test.foreground(number)
         values, angle = scores_of(image, truth, masks, "fit"), float("nan")
-        if seen is not None:
-            angles = _angles(seen.cameras, camera, focus)
+        if training is not None:
+            angles = _angles(training.cameras, camera, focus)
             angle = float(angles.min())
-            for name, blend in _baselines(seen, angles, truth.shape, behind).items():
+            for name, blend in _baselines(training, angles, truth.shape, behind).items():
                 values |= scores_of(blend, truth, masks, name)
-        yield ViewScore(unseen.views[number].name, angle, values, truth, image)
+        yield ViewScore(test.views[number].name, angle, values, truth, image)
 
 
 def scores_of(image: Floats, truth: Floats, masks: Masks, name: str) -> dict[str, float]:
@@ -123,11 +123,11 @@ def _angles(cameras: Sequence[Camera], camera: Camera, focus: NDArray[np.float64
 
 
 def _baselines(
-    seen: CapturePictures, angles: Floats, shape: tuple[int, ...], behind: Floats
+    training: CapturePictures, angles: Floats, shape: tuple[int, ...], behind: Floats
 ) -> dict[str, Floats]:
     """The nearest training picture, and the mean of the two nearest, where their sizes agree."""
     nearest = np.argsort(angles, kind="stable")[:2].tolist()
-    pictures = [seen.shown(seen.over(number, behind)) for number in nearest]
+    pictures = [training.shown(training.over(number, behind)) for number in nearest]
     if any(picture.shape != shape for picture in pictures):
         return {}
     return {"nearest": pictures[0], "blend": np.mean(pictures, axis=0, dtype=np.float32)}

@@ -33,12 +33,12 @@ def split_views(
     Raises:
         InputError: nothing is left to train on, or there are fewer than ``count``.
     """
-    seen = tuple(v for k, v in enumerate(views) if not hold_out or k % hold_out)
-    unseen = tuple(v for k, v in enumerate(views) if hold_out and k % hold_out == 0)
-    if not seen:
+    training = tuple(v for k, v in enumerate(views) if not hold_out or k % hold_out)
+    test = tuple(v for k, v in enumerate(views) if hold_out and k % hold_out == 0)
+    if not training:
         raise InputError(f"--hold-out {hold_out} leaves no {what} to train on")
-    if count > len(seen):
-        raise InputError(f"--views is {count}, there are {len(seen)} {what}s to train on")
+    if count > len(training):
+        raise InputError(f"--views is {count}, there are {len(training)} {what}s to train on")
     if count:
-        seen = tuple(seen[int(k)] for k in np.arange(count) * len(seen) / count)
-    return seen, unseen
+        training = tuple(training[int(k)] for k in np.arange(count) * len(training) / count)
+    return training, test

@@ -51,7 +51,7 @@ class XrayFit(FitRun[FitXraySettings]):
         super().__init__(settings)
         self.input = XrayInput(settings, self.device)
         numbers = tuple(range(self.input.scan.shape[0]))
-        self.seen, self.unseen = split_views(
+        self.training_views, self.test_views = split_views(
             numbers, settings.hold_out, settings.views, what="projection"
         )
 
@@ -59,20 +59,20 @@ class XrayFit(FitRun[FitXraySettings]):
         """What would be done, by name."""
         scan, rows = self.input.scan, self.input.rows
         bins, settings = scan.shape[2], self.settings
-        seen = self.input.read().of(self.seen)
+        measured = self.input.read().of(self.training_views)
         most = settings.training.splats
         tried = min(most, TRIED)
         few = dataclasses.replace(
             settings, training=dataclasses.replace(settings.training, splats=tried)
         )
-        trainer = self._trainer(seen, XrayPictures(self.device, seen), few)
+        trainer = self._trainer(measured, XrayPictures(self.device, measured), few)
         seconds = self.steps * probed(trainer, tried).step(most)
         words = settings.basis_words()
         solves = ", and that of the solves" if settings.training.solve.every else ""
         return {
             "scan": f"{scan.path} ({scan.source}, {scan.kind})",
-            "trained on": f"{len(self.seen)} projections",
-            "held out": f"{len(self.unseen)} projections",
+            "trained on": f"{len(self.training_views)} projections",
+            "held out": f"{len(self.test_views)} projections",
             "rows": f"{rows[0]} to {rows[1] - 1}, {bins} bins each",
             "splats": ", ".join(filter(None, [str(most), words])),
             "output": f"scene.ply and {VOLUME_NAMES[settings.format]}, "
@@ -94,12 +94,12 @@ class XrayFit(FitRun[FitXraySettings]):
             self.announce(note)
         whole = self.input.read()
         self.folder.make()
-        seen = whole.of(self.seen)
-        pictures = XrayPictures(self.device, seen)
-        trainer = self._trainer(seen, pictures)
-        first = self._start_error(trainer, seen)
+        measured = whole.of(self.training_views)
+        pictures = XrayPictures(self.device, measured)
+        trainer = self._trainer(measured, pictures)
+        first = self._start_error(trainer, measured)
         self.settled = dataclasses.replace(
-            self.settings.decided(len(self.seen)),
+            self.settings.decided(len(self.training_views)),
             training=trainer.settings,
             center=whole.center,
             rows=self.input.rows,
@@ -109,14 +109,14 @@ class XrayFit(FitRun[FitXraySettings]):
         )
         self._begin(trainer)
         yield from self._trained(trainer, pictures)
-        splats, volume = trainer.parameters.drawn, backprojected(self.device, seen)
-        if self.unseen:
+        splats, volume = trainer.parameters.drawn, backprojected(self.device, measured)
+        if self.test_views:
             self.scores["held out"] = []
-            unseen = whole.of(self.unseen)
-            for score in score_projections(trainer.renderer, splats, unseen, seen, volume):
+            held_out = whole.of(self.test_views)
+            for score in score_projections(trainer.renderer, splats, held_out, measured, volume):
                 self.scores["held out"].append(score)
                 done = len(self.scores["held out"])
-                yield Report(done, len(self.unseen), "projections held out")
+                yield Report(done, len(self.test_views), "projections held out")
                 self._heed(trainer.parameters.step)
         self.metrics = {
             "splats": len(splats),
@@ -131,35 +131,35 @@ class XrayFit(FitRun[FitXraySettings]):
         self._leave(splats, volume, whole)
 
     def _trainer(
-        self, seen: Projections, pictures: XrayPictures, given: FitXraySettings | None = None
+        self, measured: Projections, pictures: XrayPictures, given: FitXraySettings | None = None
     ) -> XrayTrainer:
-        settings, rows = given or self.settings, seen.values.shape[1]
-        training = settings.training.decided(len(self.seen))
-        volume = np.maximum(backprojected(self.device, seen, "hann"), 0)
+        settings, rows = given or self.settings, measured.values.shape[1]
+        training = settings.training.decided(len(self.training_views))
+        volume = np.maximum(backprojected(self.device, measured, "hann"), 0)
         # Without what was negative there is too much of it: as much as the projections say.
-        mass = np.maximum(seen.values.sum(axis=2, dtype=float).mean(axis=0), 0)
+        mass = np.maximum(measured.values.sum(axis=2, dtype=float).mean(axis=0), 0)
         volume *= (mass / np.maximum(volume.sum(axis=(1, 2)), 1e-12))[:, None, None]
         raw = density_splats(
             volume,
-            seen.grid,
+            measured.grid,
             training.splats,
             seed=training.seed,
             dilation=settings.rendering.eps2d,
             size=_SIZE,
         )
         first = Parameters.of(self.device, raw, density=True)
-        if training.needs_noise and min(len(self.seen), seen.values.shape[2]) >= _FEW:
+        if training.needs_noise and min(len(self.training_views), measured.values.shape[2]) >= _FEW:
             few = evenly(rows, _FEW)
-            noise = noise_of([seen.values[:, row, :, None] for row in few])
+            noise = noise_of([measured.values[:, row, :, None] for row in few])
             training = dataclasses.replace(training, noise=noise)
         return XrayTrainer(pictures, first, training, settings.rendering, flat=rows == 1)
 
-    def _start_error(self, trainer: XrayTrainer, seen: Projections) -> float:
+    def _start_error(self, trainer: XrayTrainer, measured: Projections) -> float:
         """The relative error of a few training projections before the first step."""
-        few = evenly(len(self.seen), _FEW)
+        few = evenly(len(self.training_views), _FEW)
         splats, cameras = trainer.parameters.drawn, trainer.pictures.cameras
         images = [drawn(trainer.renderer, splats, cameras[number]) for number in few]
-        return relative_error(np.stack(images), seen.values[few])
+        return relative_error(np.stack(images), measured.values[few])
 
     def _leave(self, splats: Splats, volume: Floats, whole: Projections) -> None:
         """Write splats, slices and report, in the scan's units."""

@@ -42,7 +42,7 @@ def xray_page(
     Args:
         name: of the scan.
         slices: the splats' and the filtered backprojection's, (z, y, x) each, in one unit.
-        groups: scores of unseen projections by the name of their group.
+        groups: scores of held-out projections by the name of their group.
         losses: by step.
         metrics: the figures of the fit.
     """
@@ -71,7 +71,7 @@ def _show_projections(page: Page, group: str, scores: Sequence[ViewScore]) -> No
     page.figure(
         figure_svgs(partial(_profile, scores)),
         caption="The middle row of the worst by PSNR: line integrals by detector bin.",
-        alt="Line integrals of an unseen projection: truth and fit",
+        alt="Line integrals of a held-out projection: truth and fit",
     )
     columns = ("projection", "degrees away", "PSNR", "error", "fbp PSNR", "blend PSNR")
     page.table(columns, [_row(score) for score in scores], caption="Away from the nearest.")

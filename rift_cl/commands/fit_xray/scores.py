@@ -43,12 +43,12 @@ def score_rows(metrics: Mapping[str, Any]) -> list[tuple[Any, ...]]:
     ]
 
 
-def backprojected(device: Device, seen: Projections, filter: str = "ram-lak") -> Floats:
+def backprojected(device: Device, training: Projections, filter: str = "ram-lak") -> Floats:
     """The filtered backprojection of some views, zero where not every view sees."""
-    A = Projector(seen.grid, seen.geometry, device=device)
-    volume = np.asarray(fbp(A, seen.values, filter))
-    y, x = np.meshgrid(*(seen.grid.coordinates(axis) for axis in (1, 2)), indexing="ij")
-    return np.where(np.hypot(x, y) <= seen.reach, volume, 0).astype(np.float32)
+    A = Projector(training.grid, training.geometry, device=device)
+    volume = np.asarray(fbp(A, training.values, filter))
+    y, x = np.meshgrid(*(training.grid.coordinates(axis) for axis in (1, 2)), indexing="ij")
+    return np.where(np.hypot(x, y) <= training.reach, volume, 0).astype(np.float32)
 
 
 def drawn(renderer: Renderer, splats: Splats, camera: Camera) -> Floats:
@@ -57,20 +57,20 @@ def drawn(renderer: Renderer, splats: Splats, camera: Camera) -> Floats:
 
 
 def score_projections(
-    renderer: Renderer, splats: Splats, unseen: Projections, seen: Projections, volume: Floats
+    renderer: Renderer, splats: Splats, test: Projections, training: Projections, volume: Floats
 ) -> Iterator[ViewScore]:
-    """Draw and score every view of ``unseen``; ``volume`` is the reconstruction of ``seen``."""
-    A = Projector(unseen.grid, unseen.geometry, device=renderer.device)
+    """Render and score every view of ``test``; ``volume`` is the reconstruction of ``training``."""
+    A = Projector(test.grid, test.geometry, device=renderer.device)
     again = np.asarray(A(volume))
-    peak = float(max(unseen.values.max(), seen.values.max()))
-    for number, camera in enumerate(unseen.cameras()):
-        truth, angle = unseen.values[number], unseen.angles[number]
-        turned = np.mod(seen.angles - angle + np.pi, 2 * np.pi) - np.pi
+    peak = float(max(test.values.max(), training.values.max()))
+    for number, camera in enumerate(test.cameras()):
+        truth, angle = test.values[number], test.angles[number]
+        turned = np.mod(training.angles - angle + np.pi, 2 * np.pi) - np.pi
         nearest = np.argsort(np.abs(turned), kind="stable")[:2]
         images = {
             "fit": drawn(renderer, splats, camera),
             "fbp": again[number],
-            "blend": seen.values[nearest].mean(axis=0),
+            "blend": training.values[nearest].mean(axis=0),
         }
         values = {}
         for name, image in images.items():
@@ -78,7 +78,7 @@ def score_projections(
             values[f"{name}_error"] = relative_error(image, truth)
         degrees = float(np.degrees(np.abs(turned[nearest[0]])))
         name = f"{np.degrees(angle):.2f} degrees"
-        yield ViewScore(name, degrees, values, truth * unseen.scale, images["fit"] * unseen.scale)
+        yield ViewScore(name, degrees, values, truth * test.scale, images["fit"] * test.scale)
 
 
 def relative_error(image: Floats, truth: Floats) -> float:

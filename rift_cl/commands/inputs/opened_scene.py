@@ -55,14 +55,14 @@ class OpenedScene:
             )
         if len(self.splats) == 0:
             raise InputError(f"{path}: holds no splats, there is nothing to draw")
-        drawing = replace(
+        rendering = replace(
             self._rendering(),
             mode=self.splats.mode,
             activation=self.splats.activation,
             angular=self.splats.angular,
         )
         eps2d = settings.eps2d
-        self.drawing = drawing if eps2d is None else replace(drawing, eps2d=eps2d)
+        self.rendering = rendering if eps2d is None else replace(rendering, eps2d=eps2d)
         self.light: Light = self._light()
         self.background: NDArray[np.float32] = self._background(settings)
 

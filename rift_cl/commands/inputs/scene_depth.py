@@ -68,7 +68,7 @@ def depth_maps(scene: OpenedScene, cameras: Sequence[Camera], device: Device) ->
         cameras: of the pictures; those that are no pinholes are left out.
         device: that draws.
     """
-    renderer = Renderer(scene.drawing, device=device)
+    renderer = Renderer(scene.rendering, device=device)
     splats = scene.splats.upload(device)
     maps = []
     for camera in _few(cameras):

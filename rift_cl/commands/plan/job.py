@@ -73,7 +73,7 @@ class Planning:
             "distance": "as near as it fits" if distance is None else "{:g} to {:g} mm".format(
                 *distance),
             "path": settings.path,
-            "criterion": settings.merit,
+            "criterion": settings.criterion,
             "assumed": " ".join(given.notes) or "nothing",
             "device": self.device.name,
         }  # fmt: skip
@@ -94,21 +94,21 @@ class Planning:
             given.types,
             fixed=() if given.have is None else given.have.cameras,
             seed=settings.seed,
-            kind=settings.merit,
+            kind=settings.criterion,
         )
         self.found = found
-        yield Report(1, _STEPS, "steps", {"merit": found.elsewhere})
+        yield Report(1, _STEPS, "steps", {"criterion": found.elsewhere})
         self.wrong = if_wrong(found)
         self.verdict = " ".join([found.verdict(), *(entry.sentence for entry in self.wrong)])
         diminishing_returns = found.diminishing_returns()
-        yield Report(2, _STEPS, "steps", {"merit": found.elsewhere})
+        yield Report(2, _STEPS, "steps", {"criterion": found.elsewhere})
         sampled = self._sampled(found)
         self.metrics = self._figures(found)
         page = plan_page(given, found, diminishing_returns, sampled, self.metrics, self.device)
-        yield Report(3, _STEPS, "steps", {"merit": found.elsewhere})
+        yield Report(3, _STEPS, "steps", {"criterion": found.elsewhere})
         self._write(found)
         self.folder.finish(given.decided, self.metrics, page, self.device, asked=settings)
-        yield Report(_STEPS, _STEPS, "steps", {"merit": found.elsewhere})
+        yield Report(_STEPS, _STEPS, "steps", {"criterion": found.elsewhere})
 
     def _sampled(self, found: Plan) -> ViewSet:
         """All views, those that were there already first."""
@@ -128,16 +128,16 @@ class Planning:
             "views": len(found),
             "wanted": self.settings.views,
             "taken_before": len(found.fixed),
-            "merit": found.elsewhere,
-            "planned_with": {"merit": found.merit, "bound": found.bound},
-            "kind": self.settings.merit,
+            "criterion": self.settings.criterion,
+            "value": found.elsewhere,
+            "planned_with": {"value": found.merit, "bound": found.bound},
             "mode": given.target.mode,
             "cost": found.cost,
             "baselines": {name: entry.elsewhere for name, entry in found.baselines.items()},
             "verdict": self.verdict,
             "if_prior_is_wrong": [entry._asdict() for entry in self.wrong],
-            "knee": diminishing_returns.views,
-            "merits": diminishing_returns.merits,
+            "diminishing_returns": diminishing_returns.views,
+            "values": diminishing_returns.merits,
             "target": {"center": given.target.center, "diameter": given.target.diameter},
             "assumed": list(given.notes),
         }

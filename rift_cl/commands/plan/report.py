@@ -21,7 +21,7 @@ from rift_cl.report.plot import curves, figure_svg
 from rift_cl.sampling.planning.view_plan import DiminishingReturns, Plan
 
 # The criterion that is minimized, for people.
-_MERITS = {
+_CRITERIA = {
     "wiener": "posterior variance (A-optimal)",
     "logdet": "negative information, bits per frequency (D-optimal)",
     "worst": "posterior variance, worst direction (E-optimal)",
@@ -54,25 +54,25 @@ def plan_page(
     page.paragraph(metrics["verdict"])
     page.paragraph(bound_words(metrics))
     _assumed(page, given)
-    _gains(page, found, diminishing_returns, merit_name(metrics))
+    _gains(page, found, diminishing_returns, criterion_name(metrics))
     _coverage(page, sampled, device)
     return page
 
 
-def merit_name(metrics: Mapping[str, Any]) -> str:
+def criterion_name(metrics: Mapping[str, Any]) -> str:
     """The criterion, for people."""
-    kind = metrics["kind"]
+    kind = metrics["criterion"]
     if metrics["mode"] == "surface" and kind != "logdet":
         return "posterior variance of texture and appearance, added"
-    return _MERITS[kind]
+    return _CRITERIA[kind]
 
 
 def worth_table(metrics: Mapping[str, Any]) -> tuple[tuple[str, ...], list[tuple[Any, ...]]]:
     """Columns and rows: the criterion of the plan and of common arrangements of as many views."""
-    own, kind = metrics["merit"], metrics["kind"]
+    own, kind = metrics["value"], metrics["criterion"]
     columns = (
         "views",
-        merit_name(metrics),
+        criterion_name(metrics),
         "gain of the plan",
     )
     rows: list[tuple[Any, ...]] = [("planned", _shown(own, kind), "")]
@@ -98,12 +98,12 @@ def _shown(value: float, kind: str) -> str:
 
 def bound_words(metrics: Mapping[str, Any]) -> str:
     """How far from the optimum the plan may be."""
-    kind, own = metrics["kind"], metrics["planned_with"]
+    kind, own = metrics["criterion"], metrics["planned_with"]
     # The bound of a surface may be too weak to be of use.
     if kind != "logdet" and own["bound"] <= 0:
         return "The distance to the optimum is not known."
     return (
-        f"At the frequencies used for planning the criterion is {_shown(own['merit'], kind)}; no "
+        f"At the frequencies used for planning the criterion is {_shown(own['value'], kind)}; no "
         f"choice of as many views among the candidates and these can be below "
         f"{_shown(own['bound'], kind)}."
     )

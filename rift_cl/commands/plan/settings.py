@@ -88,7 +88,7 @@ class PlanMethod:
 
     views: int = 64
     """Number of views to plan; with --have, in addition to those."""
-    merit: Literal["wiener", "logdet", "worst"] = "wiener"
+    criterion: Literal["wiener", "logdet", "worst"] = "wiener"
     """Criterion to minimize: posterior variance (wiener, A-optimal), negative information gain
     (logdet, D-optimal), or the variance in the worst direction (worst, E-optimal)."""
     budget: Auto[float] = None

@@ -96,7 +96,10 @@ class Render:
         Elevation and distance stay open along a path of photographs, where they change.
         """
         settings = self.settings
-        decided: dict[str, Any] = {"eps2d": self.scene.drawing.eps2d, "film": self._kind or "auto"}
+        decided: dict[str, Any] = {
+            "eps2d": self.scene.rendering.eps2d,
+            "film": self._kind or "auto",
+        }
         if self.scene.light == "display":
             decided["background"] = tuple(float(value) for value in self.scene.background)
         if settings.path is None:
@@ -187,7 +190,7 @@ class Render:
         bounds, scene = self.bounds, self.scene.splats
         largest = max((camera.size for camera in self.cameras), key=lambda size: size[0] * size[1])
         channels = 3 + self.settings.depth
-        memory = FrameMemory.of(scene, largest, channels, self.scene.drawing)
+        memory = FrameMemory.of(scene, largest, channels, self.scene.rendering)
         return {
             "scene": f"{self.scene.name}, {len(scene)} splats",
             "middle": "({:.4g}, {:.4g}, {:.4g})".format(*bounds.center),
@@ -196,7 +199,7 @@ class Render:
             "cameras": self._way(),
             "frames": f"{len(self.cameras)}, at most {largest[1]} x {largest[0]} pixels",
             "film": self.film or "none, since frames differ in size or there is only one",
-            "eps2d": f"{self.scene.drawing.eps2d:g}",
+            "eps2d": f"{self.scene.rendering.eps2d:g}",
             "device memory": f"{format_bytes(memory.fixed)} and the tile lists",
             "device": self.device.name,
         }
@@ -208,7 +211,7 @@ class Render:
         self.folder.mark()
         self.folder.drop(*_LEFT)
         make_folder(folder / "frames")
-        renderer = Renderer(self.scene.drawing, device=self.device)
+        renderer = Renderer(self.scene.rendering, device=self.device)
         splats = self.scene.splats.upload(self.device)
         behind = self.device.array(self.scene.background)
         window = (0.0, 0.0)
@@ -262,7 +265,7 @@ class Render:
             "radius": bounds.radius,
             "up": bounds.up,
             "degrees_to_photographs": farthest_from_cameras(self.cameras, bounds),
-            "eps2d": self.scene.drawing.eps2d,
+            "eps2d": self.scene.rendering.eps2d,
             "background": self.scene.background,
             "film": self.film,
             "depth_window": list(window) if self.settings.depth else None,

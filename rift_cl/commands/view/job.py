@@ -37,7 +37,7 @@ class ViewJob:
         self.notes = settings.notes(scene)
         bounds = settings.bounds(scene)
         device = settings.open_device()
-        self._renderer = Renderer(scene.drawing, device=device)
+        self._renderer = Renderer(scene.rendering, device=device)
         self._splats = scene.splats.upload(device)
         # Kernels are built before anybody waits for a picture.
         self._renderer.forward(self._splats, resized(first_view(bounds)[0], (16, 16)))

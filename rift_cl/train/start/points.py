@@ -90,7 +90,7 @@ def hull_points(
         cameras: some views, from as many sides as there are.
         masks: (height, width) the foreground of each.
         count: how many points.
-        seed: of the drawing by chance.
+        seed: random seed.
 
     Returns:
         The points, or None where hardly any point is in front of the background everywhere.

@@ -38,7 +38,7 @@ def density_splats(
         volume: (nz, ny, nx) densities; what is negative counts as zero.
         grid: its samples.
         count: how many splats.
-        seed: of the drawing by chance.
+        seed: random seed.
         dilation: variance that splats gain where they are drawn, in the grid's unit squared.
         size: standard deviations, as a share of the gaps between splats.
 

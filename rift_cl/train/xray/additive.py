@@ -23,9 +23,9 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.elementwise import put, take
 from rift_cl.geometry import Camera
 from rift_cl.operators.linear import LinearOperator
-from rift_cl.splat.drawing import draw_grad
 from rift_cl.splat.projection import project_modes, project_modes_grad
 from rift_cl.splat.raster import MOMENTS, rasterize
+from rift_cl.splat.raster_pass import draw_grad
 from rift_cl.splat.renderer import Frame, Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
@@ -108,7 +108,7 @@ class Additive(LinearOperator):
         room, kept = self.device.budget // 2, 0
         for number in range(len(self.cameras)):
             frame = self._frame(number)
-            memory, lists = frame.drawing.memory, frame.lists
+            memory, lists = frame.raster_pass.memory, frame.lists
             if lists is None:
                 return kept
             one = memory.fixed + memory.lists(lists.n_entries, lists.tiles.count)
@@ -139,18 +139,18 @@ class Additive(LinearOperator):
         frame, modes = self._kept.get(number), None
         if frame is None:
             return self.renderer.forward(splats, self.cameras[number]).image
-        settings, drawing = self.renderer.settings, frame.drawing
+        settings, done = self.renderer.settings, frame.raster_pass
         if splats.color_modes is not None:
             modes = project_modes(replace(frame.projection, splats=splats))
-        assert drawing.lists is not None and splats.colors is not None
-        screen = replace(drawing.screen, features=splats.colors, modes=modes)
-        size = drawing.size
-        return rasterize(self.device, screen, drawing.lists, size, settings=settings).image
+        assert done.lists is not None and splats.colors is not None
+        screen = replace(done.screen, features=splats.colors, modes=modes)
+        size = done.size
+        return rasterize(self.device, screen, done.lists, size, settings=settings).image
 
     def _pulled_back(self, frame: Frame, grad_image: Any) -> list[Any]:
         """The gradient by the constants, behind other sums, and by the modes if there are any."""
-        sums = draw_grad(self.device, frame.drawing, grad_image)
-        if frame.drawing.screen.modes is None:
+        sums = draw_grad(self.device, frame.raster_pass, grad_image)
+        if frame.raster_pass.screen.modes is None:
             return [sums]
         found = project_modes_grad(frame.projection, sums)
         return [found.sums, found.color_modes]

@@ -26,7 +26,7 @@ class XrayTrainer(Trainer):
         pictures: projections of one channel, of lengths in detector bins.
         parameters: the splats to begin with, which have densities.
         settings: of the fit.
-        drawing: of the rasterizer, in xray mode.
+        rendering: of the rasterizer, in xray mode.
         flat: whether there is but one detector row.
     """
 
@@ -37,11 +37,11 @@ class XrayTrainer(Trainer):
         pictures: TrainingViews,
         parameters: Parameters,
         settings: TrainSettings,
-        drawing: SplatSettings,
+        rendering: SplatSettings,
         *,
         flat: bool,
     ) -> None:
-        super().__init__(pictures, parameters, settings, drawing, flat=flat)
+        super().__init__(pictures, parameters, settings, rendering, flat=flat)
         count = len(parameters)
         self._zero = self.device.zeros((count, 2)) if flat else None
         thin = np.full((count, 1), np.log(FLAT), np.float32)

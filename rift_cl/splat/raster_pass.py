@@ -21,7 +21,7 @@ from rift_cl.splat.tile_lists import TileLists, Tiles, count_tiles, list_tiles, 
 
 
 @dataclass(frozen=True, eq=False)
-class Drawing:
+class RasterPass:
     """What was drawn, with what its gradient needs; arrays are device arrays.
 
     Args:
@@ -62,7 +62,7 @@ def draw(
     settings: SplatSettings,
     memory: FrameMemory,
     background: DeviceArray | None = None,
-) -> Drawing:
+) -> RasterPass:
     """Draw splats, at once if they fit the budget.
 
     Args:
@@ -84,19 +84,19 @@ def draw(
     if memory.fits(counts.n_entries, tiles.count, device.budget, device.traits.allocation):
         lists = list_tiles(device, counts, sort=sort)
         raster = rasterize(device, screen, lists, size, settings=settings, background=background)
-        return Drawing(screen, boxes, depths, size, settings, background, memory, lists, raster)
+        return RasterPass(screen, boxes, depths, size, settings, background, memory, lists, raster)
     del counts
     for band in _bands(device, boxes, depths, tiles, memory, sort=sort):
         raster = rasterize(
             device, screen, band, size, settings=settings, background=background, into=raster
         )
     assert raster is not None
-    return Drawing(screen, boxes, depths, size, settings, background, memory, None, raster)
+    return RasterPass(screen, boxes, depths, size, settings, background, memory, None, raster)
 
 
 def draw_grad(
     device: Device,
-    drawing: Drawing,
+    done: RasterPass,
     grad_image: DeviceArray,
     grad_transmittance: DeviceArray | None = None,
 ) -> DeviceArray:
@@ -106,7 +106,7 @@ def draw_grad(
 
     Args:
         device: where the arrays are.
-        drawing: what ``draw`` returned.
+        done: what ``draw`` returned.
         grad_image: dL/d image, (height, width, D) device array.
         grad_transmittance: dL/d transmittance, (height, width); zero if not given.
 
@@ -115,12 +115,12 @@ def draw_grad(
         ResourceLimitError: not even one row of tiles fits the budget.
     """
     sums: DeviceArray | None = None
-    for lists in _lists_again(device, drawing):
+    for lists in _lists_again(device, done):
         records = raster_grad(
             device,
-            *(drawing.screen, lists, drawing.raster, grad_image, grad_transmittance),
-            settings=drawing.settings,
-            background=drawing.background,
+            *(done.screen, lists, done.raster, grad_image, grad_transmittance),
+            settings=done.settings,
+            background=done.background,
         )
         sums = sum_slots(device, lists, records, onto=sums)
     assert sums is not None
@@ -128,7 +128,7 @@ def draw_grad(
 
 
 def listed(
-    device: Device, drawing: Drawing
+    device: Device, done: RasterPass
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
     """The tile lists on the host, of all bands.
 
@@ -136,10 +136,10 @@ def listed(
         Tiles of every splat (N,), the splats of all entries (M,), and where each tile's entries
         begin (tiles,).
     """
-    memory = drawing.memory
-    kept = [drawing.lists] if drawing.lists else None
-    bands = kept or _bands_of(device, drawing, memory)
-    of_each = np.zeros(len(drawing.depths), np.int32)
+    memory = done.memory
+    kept = [done.lists] if done.lists else None
+    bands = kept or _bands_of(device, done, memory)
+    of_each = np.zeros(len(done.depths), np.int32)
     owners, begins, before = [], [], 0
     for lists in bands:
         of_each += np.diff(device.get(lists.slots))
@@ -163,17 +163,17 @@ def _bands(
         yield tile_lists(device, boxes, depths, band, sort=sort)
 
 
-def _bands_of(device: Device, drawing: Drawing, memory: FrameMemory) -> Iterator[TileLists]:
-    where = (drawing.boxes, drawing.depths, drawing.tiles)
-    return _bands(device, *where, memory, sort=drawing.settings.mode == "light")
+def _bands_of(device: Device, done: RasterPass, memory: FrameMemory) -> Iterator[TileLists]:
+    where = (done.boxes, done.depths, done.tiles)
+    return _bands(device, *where, memory, sort=done.settings.mode == "light")
 
 
-def _lists_again(device: Device, drawing: Drawing) -> Iterator[TileLists]:
+def _lists_again(device: Device, done: RasterPass) -> Iterator[TileLists]:
     """The lists that were kept, or of one band after the other, as the records fit."""
-    memory = replace(drawing.memory, gradient=True)
-    kept = drawing.lists
+    memory = replace(done.memory, gradient=True)
+    kept = done.lists
     room = device.budget, device.traits.allocation
-    if kept is not None and memory.fits(kept.n_entries, drawing.tiles.count, *room):
+    if kept is not None and memory.fits(kept.n_entries, done.tiles.count, *room):
         yield kept
         return
-    yield from _bands_of(device, drawing, memory)
+    yield from _bands_of(device, done, memory)
