@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rift_cl.cl.driver_record import driver_identity, keeps_programs
+from rift_cl.cl.driver_record import keeps_programs, read_record
 from rift_cl.cl.failures import named_errors
 from rift_cl.cl.guarded_build import Request, guarded_build, way_to_build
 from rift_cl.cl.kernel_cache import build_lock
 from rift_cl.cl.program_store import Stored, load, program_name, remove, save
 from rift_cl.cl.real_type import real_type
 from rift_cl.cl.source import fault_place, kernel_source
-from rift_cl.errors import KernelBuildError
+from rift_cl.errors import DeviceError, KernelBuildError
 
 if TYPE_CHECKING:
     from rift_cl.cl.device import Device
@@ -57,15 +57,22 @@ class Builder:
         device = {macro: str(value) for macro, value in self._device.traits.macros.items()}
         return device | dict(macros)
 
+    @property
+    def kernels(self) -> list[str]:
+        """The names of the kernels that were built or loaded so far."""
+        return sorted({name for name, _ in self._programs})
+
     def program(self, key: Key) -> Any:
         """The ``pyopencl.Program`` of a kernel and its macros, built by the first who asks.
 
         Raises:
             KernelBuildError: it does not compile.
-            DeviceError: ``DOUBLE`` is 1 and the device has no doubles.
+            DeviceError: this driver computes wrong numbers with it, or ``DOUBLE`` is 1 and the
+                device has no doubles.
         """
         with building:
             if key not in self._programs:
+                self._check_known(key[0])
                 self._programs[key] = self._build(key)
             return self._programs[key]
 
@@ -75,17 +82,33 @@ class Builder:
             real_type(self._device, np.float64)
         defines = self.defines(macros).items()
         options = [*OPTIONS, *(f"-D{macro}={value}" for macro, value in defines)]
+        source, options = way_to_build(self._known.get("way", ""), kernel_source(name), options)
         if self._keeps_programs:
-            return self._compiled(name, kernel_source(name), options)
-        return self._stored(key, kernel_source(name), options)
+            return self._compiled(name, source, options)
+        return self._stored(key, source, options)
 
     @cached_property
     def _driver(self) -> dict[str, str]:
-        return driver_identity(self._device._handle)
+        return self._device.identity
+
+    @cached_property
+    def _known(self) -> dict[str, Any]:
+        """What the test of this driver left behind, if there was one."""
+        return read_record(self._driver)
 
     @cached_property
     def _keeps_programs(self) -> bool:
         return keeps_programs(self._driver, self._device.context)
+
+    def _check_known(self, name: str) -> None:
+        said = self._known.get("refused", {}).get(name)
+        if said is not None:
+            device = self._device
+            raise DeviceError(
+                f"kernel {name} is refused on {device.name} ({device.platform}, driver "
+                f"{device.driver}), which failed its test: {said}; use another device (--device) "
+                "or another version of the driver ('rift devices --retest' tests it again)"
+            )
 
     def _compiled(self, name: str, source: str, options: list[str]) -> Any:
         """A program that the driver compiles in this process, or takes from a cache of its own."""

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import check_array, memory_budget
+from rift_cl.cl.driver_record import driver_identity
 from rift_cl.cl.failures import named_errors
 from rift_cl.cl.memory import as_plain, as_real_array, download, send, upload
 from rift_cl.cl.process import claim_process
@@ -58,6 +59,27 @@ class Device:
         from rift_cl.cl.discovery import open_device
 
         return open_device, (self.selector, self._limit)
+
+    @property
+    def kind(self) -> str:
+        """``CPU``, ``GPU``, or ``accelerator`` for what is neither."""
+        import pyopencl as cl
+
+        if self.traits.is_cpu:
+            return "CPU"
+        # A CPU in the guise of a GPU (``traits``) is one.
+        gpu = self._handle.type & (cl.device_type.GPU | cl.device_type.CPU)
+        return "GPU" if gpu else "accelerator"
+
+    @property
+    def identity(self) -> dict[str, str]:
+        """What tells this device and its driver from any other; see ``driver_record``."""
+        return driver_identity(self._handle)
+
+    @property
+    def kernels(self) -> list[str]:
+        """The names of the kernels that were built or loaded for it so far."""
+        return self._programs.kernels
 
     @property
     def context(self) -> Any:

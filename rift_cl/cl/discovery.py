@@ -1,9 +1,9 @@
 """Which OpenCL devices there are, and which one to use.
 
 ``RIFT_DEVICE`` or ``--device`` selects one by its number in the list (``1``), by platform and
-device (``0:1``), by kind (``cpu``, ``gpu``) or by a part of its name or its platform's
-(``radeon``, ``pocl``). Without a choice the first GPU is taken, and where there is no GPU the first
-CPU, by PoCL if that is there.
+device (``0:1``), by kind (``cpu``, ``gpu``, ``accelerator``) or by a part of its name or its
+platform's (``radeon``, ``pocl``). Without a choice the first GPU is taken; where there is none the
+first CPU, by PoCL if that is there; what is neither (an FPGA or its emulator) comes last.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ _INSTALL = (
     "PyPI with: pip install 'pyopencl[pocl]'"
 )
 _enumerating = threading.Lock()
+_RANKS = ("GPU", "CPU", "accelerator")
 # A driver that calls itself by a long name is asked for by the short one.
 _NICKNAMES = {"pocl": "portable computing language"}
 
@@ -90,15 +91,11 @@ def open_device(selector: str | None = None, memory: int | None = None) -> Devic
 
 
 def by_rank() -> list[Device]:
-    """The devices in the order in which they are preferred: GPUs, then CPUs, PoCL's first.
+    """The devices in the order in which they are preferred: GPUs, CPUs (PoCL's first), others.
 
     Another driver for the CPU that is installed later changes no result.
     """
-    return sorted(devices(), key=_rank)
-
-
-def _rank(device: Device) -> int:
-    return 0 if not device.traits.is_cpu else 1 if device.traits.pocl else 2
+    return sorted(devices(), key=lambda device: (_RANKS.index(device.kind), not device.traits.pocl))
 
 
 def default_device() -> Device:
@@ -114,8 +111,8 @@ def _fits(device: Device, number: int, selector: str) -> bool:
     wanted = selector.strip().lower()
     if wanted in (str(number), device.selector):
         return True
-    if wanted in ("cpu", "gpu"):
-        return device.traits.is_cpu == (wanted == "cpu")
+    if wanted in map(str.lower, _RANKS):
+        return device.kind.lower() == wanted
     if not any(letter.isalpha() for letter in wanted):
         return False
     wanted = _NICKNAMES.get(wanted, wanted)

@@ -40,8 +40,9 @@ def read_record(driver: dict[str, str]) -> dict[str, Any]:
         record = json.loads(_path(driver).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    known = isinstance(record, dict) and record.get("format") == _FORMAT
-    return record if known and record.get("driver") == driver else {}
+    wanted = {"format": _FORMAT, "rift_cl": __version__, "driver": driver}
+    known = isinstance(record, dict) and wanted.items() <= record.items()
+    return record if known else {}
 
 
 def add_to_record(driver: dict[str, str], **facts: Any) -> None:

@@ -23,7 +23,7 @@ LIMIT = 300.0
 # Seconds that a child whose pipe broke is given to be gone.
 _DYING = 20.0
 # How a kernel is built: what stands before its source, and further options.
-_WAYS = {
+WAYS = {
     "": ("", ()),
     "noinline": ("#define static static __attribute__((noinline))\n", ()),
     "without optimization": ("", ("-cl-opt-disable",)),
@@ -66,7 +66,7 @@ class Request(NamedTuple):
 
 def way_to_build(way: str, source: str, options: list[str]) -> tuple[str, list[str]]:
     """The source and the options that a workaround stands for; ``""`` is none."""
-    before, further = _WAYS[way]
+    before, further = WAYS[way]
     return before + source, [*options, *further]
 
 
@@ -79,7 +79,7 @@ def guarded_build(request: Request, worker: Worker | None = None) -> Built:
     """
     worker = worker or _worker_of(request.selector)
     first = log = ""
-    for way in _WAYS:
+    for way in WAYS:
         source, options = way_to_build(way, request.source, request.options)
         asked = request._replace(source=source, options=options)
         fault, answer, binary = worker.ask(asked._asdict())
@@ -125,7 +125,11 @@ class Worker:
                 return "", *found[0]
             hung = talk.is_alive()
             status = self._end(process, 0 if hung else _DYING)
-            fault = f"its compiler hung for {self._limit:.3g} s" if hung else _death(status)
+            fault = (
+                f"its compiler hung for {self._limit:.3g} s"
+                if hung
+                else death_of("its compiler", status)
+            )
             return fault, None, b""
 
     def close(self) -> None:
@@ -179,10 +183,11 @@ def _talk(
         found.append(answer)
 
 
-def _death(status: int) -> str:
+def death_of(who: str, status: int) -> str:
+    """How a process ended that should not have, from its exit status."""
     if status < 0:
-        return f"its compiler died ({signal.Signals(-status).name})"
-    return f"its compiler ended the process (status {status})"
+        return f"{who} died ({signal.Signals(-status).name})"
+    return f"{who} ended the process (status {status})"
 
 
 _workers: dict[str, Worker] = {}

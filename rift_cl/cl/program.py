@@ -55,6 +55,11 @@ class Programs:
         self._macros: dict[tuple[str, ...], tuple[str, ...]] = {}
         self._own = _ThreadKernels()
 
+    @property
+    def kernels(self) -> list[str]:
+        """The names of the kernels that were built or loaded so far."""
+        return self._builder.kernels
+
     def launch(self, name: str, size: tuple[int, ...], given: dict[str, Any]) -> None:
         """Enqueue one kernel over ``size`` work-items; the first axis is rounded up to groups.
 

@@ -138,8 +138,9 @@ def _earlier(name: str, arguments: Sequence[str]) -> Any:
 
 
 def _devices(settings: Any, output: Output) -> None:
-    from rift_cl.commands.devices.job import device_facts
+    from rift_cl.commands.devices.job import device_facts, examine_drivers
 
+    watch(examine_drivers(again=settings.retest), output)
     for name, facts in device_facts():
         print(name)
         for what, value in facts.items():

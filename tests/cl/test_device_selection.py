@@ -52,13 +52,13 @@ def test_device_name_selects(pocl):
 
 
 def test_gpus_come_first_and_of_cpus_pocl(monkeypatch):
-    kinds = {"other": (True, False), "pocl": (True, True), "gpu": (False, False)}
+    kinds = {"fpga": "accelerator", "other": "CPU", "pocl": "CPU", "gpu": "GPU"}
     found = [
-        SimpleNamespace(name=name, traits=SimpleNamespace(is_cpu=is_cpu, pocl=pocl))
-        for name, (is_cpu, pocl) in kinds.items()
+        SimpleNamespace(name=name, kind=kind, traits=SimpleNamespace(pocl=name == "pocl"))
+        for name, kind in kinds.items()
     ]
     monkeypatch.setattr(discovery, "devices", lambda: tuple(found))
-    assert [device.name for device in discovery.by_rank()] == ["gpu", "pocl", "other"]
+    assert [device.name for device in discovery.by_rank()] == ["gpu", "pocl", "other", "fpga"]
 
 
 def test_kind_selects(pocl):
@@ -94,6 +94,35 @@ def test_environment_selects_where_no_selector_is_given(monkeypatch):
 
 def test_a_gpu_comes_first_where_there_is_one():
     assert rift.default_device().traits.is_cpu == all(d.traits.is_cpu for d in rift.devices())
+
+
+class Accelerator:
+    """A handle of PoCL's device that calls itself an accelerator."""
+
+    def __init__(self, handle):
+        self._handle, self.type = handle, 1 << 3
+
+    def __getattr__(self, name):
+        return getattr(self._handle, name)
+
+
+def test_an_accelerator_comes_last_and_is_no_gpu(pocl, monkeypatch):
+    other = rift.Device(Accelerator(pocl._handle), "9:0")
+    assert (pocl.kind, other.kind) == ("CPU", "accelerator")
+    monkeypatch.setattr("rift_cl.cl.discovery._found", lambda: (other, pocl))
+    assert rift.open_device() is pocl
+    assert rift.open_device("accelerator") is other
+    with pytest.raises(NoDeviceError, match="'gpu'"):
+        rift.open_device("gpu")
+    monkeypatch.setattr("rift_cl.cl.discovery._found", lambda: (other,))
+    assert rift.open_device() is other
+
+
+def test_drivers_of_one_name_differ_by_their_version(pocl):
+    class Newer(Accelerator):
+        driver_version = "99"
+
+    assert rift.Device(Newer(pocl._handle), "9:0").identity != pocl.identity
 
 
 def test_device_travels_as_its_selector(monkeypatch):

@@ -140,11 +140,14 @@ def test_center_of_a_row_that_is_not_there(scan, tmp_path, capsys):
     assert "--row is 7" in capsys.readouterr().err
 
 
-def test_devices(capsys):
-    assert main(["devices"]) == 0
+def test_devices(capsys, monkeypatch):
+    # One family stands for all: their test is tests/commands/test_driver_test.py.
+    monkeypatch.setattr("rift_cl.commands.devices.job.FAMILIES", ["sums"])
+    assert main(["devices", "--retest"]) == 0
     printed = capsys.readouterr().out
     assert "*" in printed
     assert "passed" in printed
+    assert "1 of 1 families" in printed
     for device in rift.devices():
         assert device.name in printed
         assert device.platform in printed

@@ -1,0 +1,180 @@
+"""A driver that gives wrong numbers, dies or hangs is found out once, worked round, or refused."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.cl import Device, build, driver_record, program_store, source
+from rift_cl.cl.driver_record import add_to_record, read_record
+from rift_cl.cl.reductions import total
+from rift_cl.commands.devices import driver_test
+from rift_cl.commands.devices.driver_test import examine_driver, findings, in_child, verdict
+from rift_cl.commands.devices.families import FAMILIES, stored_results
+from rift_cl.commands.devices.family_check import try_family
+from rift_cl.errors import DeviceError
+
+RIGHT = {"deviation": 1e-7, "kernels": ["a", "b"]}
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """No driver is known, and what is found of one is forgotten afterwards."""
+    for module in (driver_record, program_store):
+        monkeypatch.setattr(module, "cache_folder", lambda: tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def tested():
+    """The default device, with nothing built yet."""
+    return _fresh()
+
+
+def _fresh():
+    found = rift.default_device()
+    return Device(found._handle, found.selector, traits=found.traits)
+
+
+def _examined(tested, attempt, families=("one", "two")):
+    reports = list(examine_driver(tested, families, attempt))
+    assert reports[-1].done == reports[-1].total == len(families)
+    return verdict(tested)
+
+
+def _always(**found):
+    return lambda _, families: iter([{"family": name, **found} for name in families])
+
+
+def test_there_is_a_known_result_for_every_family():
+    stored = stored_results()
+    assert all(stored[name] for name in FAMILIES)
+    arrays = [array for results in stored.values() for array in results.values()]
+    assert all(np.isfinite(array).all() and np.abs(array).max() > 0 for array in arrays)
+
+
+@pytest.mark.parametrize(
+    "name", [n if n == "sums" else pytest.param(n, marks=pytest.mark.full) for n in FAMILIES]
+)
+def test_family_gives_the_known_results_in_a_child(name):
+    (found,) = in_child(rift.default_device().selector, [name])
+    assert found["family"] == name
+    assert found["deviation"] < driver_test.RIGHT
+
+
+def test_driver_that_is_right_is_tested_once(tested):
+    assert verdict(tested) is None
+    assert findings(tested) == []
+    record = _examined(tested, _always(**RIGHT))
+    assert record["way"] == ""
+    assert record["refused"] == {}
+    (said,) = findings(tested)
+    assert said.startswith("2 of 2 families")
+    assert "today" in said
+
+
+def test_wrong_numbers_are_found_and_refused_by_name_and_nothing_else_is(tested, monkeypatch):
+    real, wanted = source.kernel_source, stored_results()
+    wrong = "#define get_global_id(d) (get_global_id(d) / 2 * 2)\n" + real("dot_product")
+    monkeypatch.setattr(build, "kernel_source", lambda n: wrong if n == "dot_product" else real(n))
+
+    def attempt(_, families):
+        for name in families:
+            yield {"family": name, **try_family(tested, FAMILIES[name], wanted[name])}
+
+    record = _examined(tested, attempt, ["sums"])
+    assert list(record["refused"]) == ["dot_product"]
+    assert "WRONG" in findings(tested)[1]
+    tested = _fresh()
+    x = tested.array(np.ones(5))
+    with pytest.raises(DeviceError, match=r"dot_product is refused.*sums"):
+        total(tested, x)
+    assert np.array_equal(tested.get(tested.array(np.ones(5))), np.ones(5))
+
+
+def test_way_that_puts_a_driver_right_is_taken_for_every_kernel(tested, monkeypatch):
+    def attempt(_, families):
+        good = read_record(tested.identity)["way"] == "noinline"
+        for name in families:
+            found = RIGHT if good or name == "one" else {"deviation": 0.1, "kernels": ["c"]}
+            yield {"family": name, **found}
+
+    record = _examined(tested, attempt)
+    assert (record["way"], record["refused"]) == ("noinline", {})
+    seen = []
+    monkeypatch.setattr(build, "way_to_build", lambda way, *rest: (seen.append(way), *rest)[1:])
+    tested = _fresh()
+    total(tested, tested.array(np.ones(5)))
+    assert seen == ["noinline"]
+
+
+def test_kernels_that_a_right_family_uses_are_not_refused(tested):
+    def attempt(_, families):
+        yield {"family": "one", **RIGHT}
+        yield {"family": "two", "deviation": float("inf"), "kernels": ["b", "c"]}
+
+    assert list(_examined(tested, attempt)["refused"]) == ["c"]
+
+
+def test_error_of_a_family_is_told_and_refuses_nothing(tested):
+    assert _examined(tested, _always(error="no room", kernels=["a"]))["refused"] == {}
+    assert findings(tested)[1:] == ["one: no room", "two: no room"]
+
+
+CHILD = """
+import json, os, signal, sys, time
+for name in {names!r}:
+    if name == "bad":
+        {fate}
+    print(json.dumps({{"family": name, "deviation": 0.0, "kernels": []}}), flush=True)
+"""
+
+
+@pytest.mark.parametrize(
+    ("fate", "said"),
+    [
+        ("os.kill(os.getpid(), signal.SIGSEGV)", "died (SIGSEGV)"),
+        ("sys.exit(3)", "status 3"),
+        ("time.sleep(600)", "hung"),
+    ],
+)
+def test_child_that_ends_early_is_a_finding_and_the_rest_is_tried(monkeypatch, fate, said):
+    def start(arguments):
+        code = CHILD.format(names=arguments[1:], fate=fate)
+        command = [sys.executable, "-c", code]
+        return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+
+    monkeypatch.setattr(driver_test, "_start", start)
+    limit = 3.0 if said == "hung" else 60.0
+    found = list(in_child("0:0", ["good", "bad", "better"], limit))
+    assert [each["family"] for each in found] == ["good", "bad", "better"]
+    assert said in found[1]["error"]
+    assert "error" not in found[0] and "error" not in found[2]
+
+
+def test_what_another_release_or_driver_left_is_not_taken(tested, monkeypatch):
+    add_to_record(tested.identity, families={}, way="noinline")
+    assert read_record(tested.identity)["way"] == "noinline"
+    assert read_record({**tested.identity, "driver": "another"}) == {}
+    monkeypatch.setattr(driver_record, "__version__", "0.0.1")
+    assert read_record(tested.identity) == {}
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"format": 0}'])
+def test_record_that_cannot_be_read_is_no_record(tested, folder, content):
+    add_to_record(tested.identity, way="noinline")
+    (path,) = (folder / "drivers").iterdir()
+    path.write_text(content)
+    assert read_record(tested.identity) == {}
+
+
+def test_cache_that_cannot_be_written_costs_the_record_alone(tested, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(driver_record, "write_whole", full)
+    assert total(tested, tested.array(np.ones(5))) == 5
