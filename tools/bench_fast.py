@@ -34,9 +34,9 @@ from bench.formula_race import formula_case, formula_tables
 from bench.surroundings import surroundings
 from bench.tables import Table
 from rift_cl.metrics import psnr
-from rift_cl.operators.projector.fast_projector import FastProjector
+from rift_cl.operators import FastProjector
 from rift_cl.phantom import shepp_logan, shepp_logan_sinogram
-from rift_cl.reconstruct.direct.filtered_backprojection import FilteredBackprojection
+from rift_cl.reconstruct import FilteredBackprojection
 
 _FINEST = 1e-6
 # Bins per pixel of the image's edge, and views.

@@ -29,9 +29,9 @@ import tyro
 
 import rift_cl as rift
 from bench.surroundings import surroundings
-from rift_cl.cl.discovery import default_device
+from rift_cl.cl import default_device
 from rift_cl.commands.console_table import print_table
-from rift_cl.phantom.projection import project
+from rift_cl.phantom import project
 
 _HERE = Path(__file__).resolve().parents[1]
 # Photons without the sample, the greatest line integral, and the share of columns with a gain.

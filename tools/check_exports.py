@@ -26,19 +26,17 @@ import tyro
 from numpy.typing import NDArray
 
 from export_readers import readers
-from rift_cl.cl.device import Device
-from rift_cl.cl.discovery import default_device
+from rift_cl.cl import Device, default_device
 from rift_cl.commands.export.axes import turned
 from rift_cl.commands.export.export import Export
 from rift_cl.commands.export.settings import ExportSettings, Target
 from rift_cl.commands.inputs.opened_scene import in_display_light
 from rift_cl.geometry import Camera
-from rift_cl.io.captures.view_image import camera_at, read_view
+from rift_cl.io import SplatScene, camera_at, read_view
 from rift_cl.io.scenes.formats.plain import along_curve, unit_quats
 from rift_cl.io.scenes.splat_activations import HARMONIC_0, opacities_of
-from rift_cl.io.scenes.splat_scene import SplatScene
 from rift_cl.metrics import psnr
-from rift_cl.splat.renderer import Renderer
+from rift_cl.splat import Renderer
 
 Floats = NDArray[Any]
 _COLUMNS = (

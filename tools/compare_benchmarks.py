@@ -19,7 +19,8 @@ import tyro
 
 from bench.history import FOLDER, Change, Record, changes, load
 from bench.table import Table, show
-from rift_cl.errors import InputError, RiftError
+from rift_cl import RiftError
+from rift_cl.errors import InputError
 
 
 @dataclass(frozen=True)

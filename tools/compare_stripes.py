@@ -30,8 +30,7 @@ from numpy.typing import NDArray
 
 import rift_cl as rift
 from rift_cl.io import open_scan
-from rift_cl.reconstruct import find_center
-from rift_cl.reconstruct.preprocess import remove_rings
+from rift_cl.reconstruct import find_center, remove_rings
 
 Floats = NDArray[Any]
 # Bins of the median in both.

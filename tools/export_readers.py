@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.commands.export.axes import quaternions_of, turned
+from rift_cl.io import SplatScene
 from rift_cl.io.scenes.splat_activations import HARMONIC_0, logits_of
-from rift_cl.io.scenes.splat_scene import SplatScene
 
 Floats = NDArray[Any]
 # splat-transform gives all that it reads in the axes of PLY files: SPZ's half turned about x.

@@ -30,8 +30,7 @@ from scipy import ndimage
 import rift_cl as rift
 from rift_cl.commands.console_table import print_table
 from rift_cl.geometry import FanBeam
-from rift_cl.io import open_scan
-from rift_cl.io.images.image import read_image, write_png
+from rift_cl.io import open_scan, read_image, write_png
 from rift_cl.reconstruct import (
     DirectionWeights,
     FewLevels,

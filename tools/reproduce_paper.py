@@ -44,9 +44,10 @@ from paper import (
     surface_views,
 )
 from paper.plan import Plan, find_ornament, sample_ornament
+from rift_cl import RiftError
 from rift_cl.cl import Device, open_device
 from rift_cl.commands.run_folder.run_folder import environment
-from rift_cl.errors import InputError, RiftError
+from rift_cl.errors import InputError
 from rift_cl.io import make_folder, write_json, write_text
 from rift_cl.report.html_page import Page
 

@@ -167,7 +167,7 @@ def serve(memory: int) -> None:
 
 
 def _outcome(path: Path) -> tuple[str, str]:
-    from rift_cl.errors import RiftError
+    from rift_cl import RiftError
     from rift_cl.io import open_scan
 
     try:

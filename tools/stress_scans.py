@@ -88,9 +88,9 @@ def _wrapped(sentence: str, width: int) -> list[str]:
 
 def tried(case: Case) -> Outcome:
     """Open a file, reconstruct what it holds, and hold it against the truth."""
+    from rift_cl import RiftError
     from rift_cl.commands.inputs.scan_input import ScanInput
     from rift_cl.commands.inputs.scan_rows import read_attenuation
-    from rift_cl.errors import RiftError
     from rift_cl.reconstruct.direct.padding import is_truncated
 
     with tempfile.TemporaryDirectory(prefix="rift-cl-scans-") as folder:

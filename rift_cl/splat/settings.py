@@ -12,7 +12,6 @@ from rift_cl.option_marks import NoOption, Short
 
 SplatMode = Literal["light", "xray"]
 Activation = Literal["clamp", "exp", "square"]
-Angular = Literal["sh", "hg", "lg", "sg", "asg"]
 # Devices count in float32.
 _LARGEST = 3.4028234e38
 
@@ -52,7 +51,7 @@ class SplatSettings:
     alpha in light mode: ``clamp`` max(E, 0), ``exp`` 1 - exp(-max(E, 0)), ``square``
     1 - exp(-weight Q^2 Gaussian). With the last two opacities are optical depths at the peak, any
     number >= 0."""
-    angular: NoOption[Angular] = "sh"
+    angular: NoOption[str] = "sh"
     """Functions of the viewing direction that colours are made of: spherical harmonics, or ``hg``,
     ``lg`` (Hermite- and Laguerre-Gaussian lobes), ``sg``, ``asg`` (isotropic and anisotropic
     spherical Gaussians), which want ``Splats.lobes``."""

@@ -17,7 +17,7 @@ from rift_cl.basis.angular import ANGULAR_BASES, angular_basis
 from rift_cl.errors import InputError
 from rift_cl.option_marks import Short, ShortAuto
 from rift_cl.splat.orders import HIGHEST
-from rift_cl.splat.settings import Activation, Angular
+from rift_cl.splat.settings import Activation
 from rift_cl.train.ranges import check_choice, check_number, check_whole
 
 BasisKind = Literal["gaussian", "hermite", "laguerre"]
@@ -105,10 +105,11 @@ class AngularSettings:
         InputError: a number is out of its range, or the kind is unknown.
     """
 
-    kind: Annotated[Angular, arg(name="angular", prefix_name=False)] = "sh"
+    kind: Annotated[str, arg(name="angular", prefix_name=False)] = "sh"
     """Functions of the viewing direction for colours: spherical harmonics (sh), Hermite- or
     Laguerre-Gaussian lobes with an axis and a width (hg, lg), or isotropic or anisotropic spherical
-    Gaussians (sg, asg)."""
+    Gaussians (sg, asg), or the name of a registered basis
+    (rift_cl.basis.register_angular_basis)."""
     modes: Short[int] = 8
     """Number of lobe modes or spherical Gaussians besides the constant, 1 to 35; not for sh."""
     first: float = 0.15

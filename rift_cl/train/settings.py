@@ -20,7 +20,6 @@ from rift_cl.train.ranges import check_choice, check_number, check_whole
 from rift_cl.train.strategy import STRATEGIES, DefaultSettings, McmcSettings, StrategySettings
 from rift_cl.train.xray.solve_settings import SolveSettings
 
-LossKind = Literal["l1", "l2"]
 BandLimit = Literal["pixels", "coverage"]
 
 
@@ -96,8 +95,9 @@ class TrainSettings:
     """Highest degree of the spherical harmonics of colours, 0 to 4."""
     sh_every: Short[int] = 500
     """Steps after which the next degree of harmonics is added."""
-    loss: Short[LossKind] = "l1"
-    """Pixel loss: absolute (l1) or squared (l2) differences."""
+    loss: Short[str] = "l1"
+    """Pixel loss: absolute (l1) or squared (l2) differences, or the name of a registered one
+    (rift_cl.train.register_loss)."""
     ssim_weight: Short[float] = 0.2
     """Fraction of 1 - SSIM in the loss; the rest is the pixel loss."""
     noise: ShortAuto[float] = None

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
+from rift_cl.commands.fit_xray.settings import FitXraySettings
+from rift_cl.commands.run_folder.saved_settings import parsed_settings
 from rift_cl.errors import InputError
 from rift_cl.registry import Registry
 from rift_cl.train import (
@@ -52,6 +55,16 @@ def test_a_registry_says_what_it_holds_and_what_is_taken():
             numbers.add(name, 3)
     with pytest.raises(InputError, match="not registered"):
         numbers.name_of(7)
+
+
+@pytest.mark.parametrize(
+    ("job", "settings"), [("fit photos", FitPhotosSettings), ("fit xray", FitXraySettings)]
+)
+def test_a_loss_of_ones_own_is_an_option_of_both_fits(job, settings, square):
+    given = {"capture": "x", "out": "fit"}
+    assert parsed_settings({**given, "loss": square}, job, settings).training.loss == square
+    with pytest.raises(InputError, match="loss is 'cube'"):
+        parsed_settings({**given, "loss": "cube"}, job, settings)
 
 
 def test_a_loss_of_ones_own_is_the_same_as_the_one_that_it_repeats(device, square):

@@ -23,6 +23,7 @@ from rift_cl.cl.elementwise import copy
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.operators import LinearOperator
+from rift_cl.splat import Renderer, Splats
 from rift_cl.splat.orders import WHITENING
 from rift_cl.splat.projection import (
     SplatGradients,
@@ -38,8 +39,6 @@ from rift_cl.splat.raster import (
     rasterize,
     sum_slots,
 )
-from rift_cl.splat.renderer import Renderer
-from rift_cl.splat.splats import Splats
 from rift_cl.splat.tile_lists import Tiles, tile_lists
 
 Floats = NDArray[np.float64]

@@ -21,7 +21,7 @@ from bases.exact import solved
 from bases.mode_sets import ModeSet, seen_gram
 from rift_cl.geometry import Camera
 from rift_cl.reconstruct import Cgls, mean_diagonal
-from rift_cl.splat.renderer import Renderer
+from rift_cl.splat import Renderer
 from rift_cl.train.per_view.host_adam import HostAdam
 
 # Steps of means in widths of the first splats, of quaternions, of logarithms of scales.

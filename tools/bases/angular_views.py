@@ -19,7 +19,7 @@ from bases.plan import Plan
 from bases.statistics import distinct, paired, sentence, spread, values
 from bench.table import Table
 from rift_cl import Device
-from rift_cl.basis.angular import SphericalHarmonics
+from rift_cl.basis import SphericalHarmonics
 from rift_cl.report.plot import curves
 
 NAME = "angular_views"

@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rift_cl.basis import indices
-from rift_cl.basis.angular import (
+from rift_cl.basis import (
     AngularBasis,
     AnisotropicSphericalGaussians,
     HGLobe,
     LGLobe,
     SphericalGaussians,
     SphericalHarmonics,
+    indices,
 )
 
 Floats = NDArray[np.float64]

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl import Device
 from rift_cl.geometry import Camera
-from rift_cl.splat.renderer import Renderer
-from rift_cl.splat.settings import SplatSettings
+from rift_cl.splat import Renderer, SplatSettings
 
 
 def additive_renderer(device: Device, *, tile: int, eps2d: float) -> Renderer:

@@ -21,9 +21,7 @@ from bases.races import race_pictures, race_tables, race_verdicts
 from bases.starts import ball_start
 from bases.views import additive_renderer, turned_cameras
 from rift_cl import Device, Grid, Parallel
-from rift_cl.phantom import Ellipsoid
-from rift_cl.phantom.projection import project
-from rift_cl.phantom.rendering import render
+from rift_cl.phantom import Ellipsoid, project, render
 
 NAME = "volumes"
 TITLE = "Tomography of volumes by additive splats"

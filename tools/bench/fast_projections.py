@@ -17,7 +17,7 @@ from bench.costs import Cost
 from bench.operations import Task
 from bench.row_filters import ROW_COSTS
 from bench.transform_work import transform_bytes, transform_flops
-from rift_cl.operators.projector.fast_projector import FastProjector
+from rift_cl.operators import FastProjector
 
 _ERROR, _SLICES = 1e-3, 4
 

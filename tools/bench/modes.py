@@ -19,10 +19,8 @@ from bench.costs import Cost
 from bench.operations import Task
 from bench.splats import SPLAT_COSTS, SplatCase
 from rift_cl.basis.indices import n_coeff
+from rift_cl.splat import Frame, Renderer, Splats, SplatSettings
 from rift_cl.splat.projection import moment_count, table_width
-from rift_cl.splat.renderer import Frame, Renderer
-from rift_cl.splat.settings import SplatSettings
-from rift_cl.splat.splats import Splats
 from rift_cl.splat.voxels import voxelise
 
 SHAPE_ORDER, COLOR_ORDER = 2, 1

@@ -17,7 +17,7 @@ import rift_cl as rift
 from bench.case import Floats
 from bench.contender import Contender, relative
 from bench.splats import SplatCase
-from rift_cl.splat.renderer import Renderer
+from rift_cl.splat import Renderer
 
 
 class Rasterizer(Contender):

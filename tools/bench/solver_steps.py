@@ -15,7 +15,7 @@ from bench.operations import Task
 from bench.projections import COSTS, pixels, samples
 from bench.row_filters import ROW_COSTS
 from bench.vectors import VECTOR_COSTS
-from rift_cl.reconstruct.solvers.conjugate_gradients import Cgls
+from rift_cl.reconstruct import Cgls
 
 # More steps than a benchmark ever does.
 _STEPS = 1 << 30

@@ -21,9 +21,8 @@ from bench.costs import Cost
 from bench.operations import Task
 from bench.training import TRAINING_COSTS, training_operations
 from rift_cl.geometry import Camera
+from rift_cl.splat import Frame, FrameGradients, Renderer, Splats
 from rift_cl.splat.raster import MOMENTS
-from rift_cl.splat.renderer import Frame, FrameGradients, Renderer
-from rift_cl.splat.splats import Splats
 
 # Operations per lane, forward and backward: the count that the design's prototype used.
 _FORWARD, _BACKWARD = 32, 62

@@ -16,9 +16,8 @@ from torch.nn.functional import conv2d, normalize
 
 from bench.torch_tiles import draw, flushed_denormals, on_threads
 from rift_cl.geometry import Camera
+from rift_cl.train import McmcSettings, TrainSettings
 from rift_cl.train.schedules import LearningRateSchedule
-from rift_cl.train.settings import TrainSettings
-from rift_cl.train.strategy import McmcSettings
 
 _BETAS, _EPSILON = (0.9, 0.999), 1e-15
 _WINDOW, _SIGMA = 11, 1.5

@@ -15,11 +15,9 @@ from bench.costs import Cost
 from bench.row_filters import ROW_COSTS
 from bench.transform_work import transform_bytes, transform_flops
 from rift_cl.operators.fourier.spectrum import padded_length
+from rift_cl.train import Homogenisation, ImageLoss, Parameters
 from rift_cl.train.band_limit import Detail, camera_table
-from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
-from rift_cl.train.loss.image_loss import ImageLoss
-from rift_cl.train.parameters import Parameters
 from rift_cl.train.per_view.exposures import Exposures
 from rift_cl.train.strategy.screen_statistics import ScreenStatistics
 

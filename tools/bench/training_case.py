@@ -25,14 +25,11 @@ from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.start import first_splats
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
-from rift_cl.io.captures.capture import open_capture
+from rift_cl.io import open_capture
 from rift_cl.sample import ornament
-from rift_cl.splat.renderer import Renderer
-from rift_cl.splat.splats import Splats
-from rift_cl.train.parameters import Arrays, Parameters
-from rift_cl.train.settings import TrainSettings
-from rift_cl.train.strategy import McmcSettings
-from rift_cl.train.trainer import Trainer, TrainingViews
+from rift_cl.splat import Renderer, Splats
+from rift_cl.train import McmcSettings, Parameters, Trainer, TrainingViews, TrainSettings
+from rift_cl.train.parameters import Arrays
 
 # Views that are looked at; each has its turn in every pass.
 VIEWS = 8

@@ -22,11 +22,15 @@ from bench.operations import each_launch
 from bench.timing import summary, timed
 from bench.training_case import VIEWS, TrainingCase
 from bench.waits import Wait, each_wait
-from rift_cl.train.loss.homogenisation import Homogenisation
-from rift_cl.train.parameters import Parameters
-from rift_cl.train.settings import LearningRates
-from rift_cl.train.strategy.mcmc import McmcSettings, relocate
-from rift_cl.train.trainer import Trainer, TrainingViews
+from rift_cl.train import (
+    Homogenisation,
+    LearningRates,
+    McmcSettings,
+    Parameters,
+    Trainer,
+    TrainingViews,
+)
+from rift_cl.train.strategy.mcmc import relocate
 
 _STAGES = {
     "project and shade": ("splat_project", "splat_shade"),

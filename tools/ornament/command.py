@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from rift_cl import RiftError
 from rift_cl.commands.progress_bar import print_line
-from rift_cl.errors import RiftError
 
 _INTERRUPTED = 130
 

@@ -18,7 +18,7 @@ from paper.images import decode, encode
 from paper.plan import Plan
 from rift_cl import Device, Grid, Parallel, Projector, fbp
 from rift_cl.metrics import disc, psnr
-from rift_cl.operators.filters.compensation import Compensation
+from rift_cl.operators import Compensation
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import curves, figure_png, image_grid
 

@@ -17,10 +17,7 @@ from paper.images import decode, encode
 from paper.plan import Plan
 from rift_cl import Device, Grid, Parallel, Projector, metrics, phantom
 from rift_cl.progress import Report
-from rift_cl.reconstruct.solvers.conjugate_gradients import Cgls
-from rift_cl.reconstruct.solvers.fista import Fista
-from rift_cl.reconstruct.solvers.pdhg import Pdhg
-from rift_cl.reconstruct.solvers.simultaneous_iteration import Sirt
+from rift_cl.reconstruct import Cgls, Fista, Pdhg, Sirt
 from rift_cl.reconstruct.solvers.solver import Solver
 from rift_cl.reference.radon import radon
 from rift_cl.report.html_page import Page

@@ -16,10 +16,10 @@ import numpy as np
 from paper.figure_09_drawing import draw
 from paper.plan import Plan
 from rift_cl import Device
-from rift_cl.io.lenses.lens_file import open_lens
-from rift_cl.optics.camera_reduction import Reduction, reduce_camera
+from rift_cl.io import open_lens
+from rift_cl.optics import LensPrescription, reduce_camera
+from rift_cl.optics.camera_reduction import Reduction
 from rift_cl.optics.depth_of_field import finite_depth_optimum
-from rift_cl.optics.lens_prescription import LensPrescription
 from rift_cl.optics.optical_transfer import incoherent_cutoff
 from rift_cl.optics.real_rays import pupil_rays, trace
 from rift_cl.reference.pupil import (

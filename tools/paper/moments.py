@@ -17,8 +17,8 @@ from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.commands.progress_bar import show_progress
 from rift_cl.io import open_capture
 from rift_cl.metrics import psnr
+from rift_cl.train import Trainer
 from rift_cl.train.loss.homogenisation import noise_of
-from rift_cl.train.trainer import Trainer
 
 # Shares of the steps after which the pictures are looked at.
 SHARES = (1 / 8, 1 / 4, 1 / 2, 1)

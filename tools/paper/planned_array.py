@@ -14,11 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paper.planned_sector import directions
-from rift_cl.geometry.camera_type import CameraType
-from rift_cl.sampling.planning.constraints import Constraints, Ranges
-from rift_cl.sampling.planning.planner import plan
-from rift_cl.sampling.targets.prior import PowerLaw
-from rift_cl.sampling.targets.target import Target
+from rift_cl.geometry import CameraType
+from rift_cl.sampling import Constraints, PowerLaw, Ranges, Target, plan
 
 # Millimetres. The long lens has a third of the ball's outline in its picture.
 WIDE = CameraType("wide", 12.0, 5.6, 0.012, (480, 480))

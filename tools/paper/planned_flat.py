@@ -16,10 +16,8 @@ from paper.random_objects import RADIUS
 from rift_cl import Camera, Device, Grid, Parallel, Projector, cgls
 from rift_cl.geometry.pose import look_at
 from rift_cl.metrics import disc, psnr
-from rift_cl.sampling.planning.constraints import Constraints
-from rift_cl.sampling.planning.planner import next_views, plan
-from rift_cl.sampling.targets.pilot import Pilot
-from rift_cl.sampling.targets.target import Target, half_disc
+from rift_cl.sampling import Constraints, Pilot, Target, next_views, plan
+from rift_cl.sampling.targets.target import half_disc
 
 METHODS = ("CGLS", "MAP")
 # Views of the first look, from which the rest are planned.

@@ -24,17 +24,15 @@ from ornament.cameras import TARGET, Shot, around, off_path, ring, shots_at, tra
 from ornament.capture_folder import render_capture
 from ornament.tracer import BACKGROUND, Tracer, choose_variant
 from paper.plan import EPS2D, Plan
-from rift_cl import Device
+from rift_cl import Device, merit
 from rift_cl.commands.fit_photos.job import Fit
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.progress_bar import show_progress
 from rift_cl.io import open_capture
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import Stands, camera_plot, figure_png
-from rift_cl.sampling.criteria.merit import merit
-from rift_cl.sampling.planning.constraints import Constraints
-from rift_cl.sampling.planning.planner import plan as plan_views
-from rift_cl.sampling.targets.target import Target
+from rift_cl.sampling import Constraints, Target
+from rift_cl.sampling import plan as plan_views
 
 NAME = "planned_ornament"
 TITLE = "Planned views of the ornament"

@@ -21,11 +21,8 @@ from paper.blob_volumes import (
     random_volumes,
 )
 from rift_cl.metrics import psnr
-from rift_cl.sampling.planning.constraints import Constraints
-from rift_cl.sampling.planning.planner import plan
-from rift_cl.sampling.planning.view_plan import Plan
-from rift_cl.sampling.targets.prior import PowerLaw
-from rift_cl.sampling.targets.target import Target, half_ball
+from rift_cl.sampling import Constraints, Plan, PowerLaw, Target, plan
+from rift_cl.sampling.targets.target import half_ball
 
 SIZE, VIEWS, NOISE = 36, 24, 0.5
 SECTOR = Constraints(elevation=(0, np.pi / 3), azimuth=(-np.pi / 3, np.pi / 3))

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rift_cl.cl.device import Device
+from rift_cl.cl import Device
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.geometry.numbers import one_number, real_numbers

@@ -19,17 +19,14 @@ from numpy.typing import NDArray
 
 from paper.plan import Plan
 from paper.score_scatter import score_scatter
-from rift_cl import Device
+from rift_cl import Device, merit
 from rift_cl.geometry import Camera
 from rift_cl.geometry.pose import look_at
 from rift_cl.reference.splat_projection import spherical_harmonics
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_png
-from rift_cl.sampling.criteria.merit import merit
-from rift_cl.sampling.targets.prior import PowerLaw
-from rift_cl.sampling.targets.target import Target
-from rift_cl.splat.renderer import Renderer
-from rift_cl.splat.splats import Splats
+from rift_cl.sampling import PowerLaw, Target
+from rift_cl.splat import Renderer, Splats
 
 NAME = "surface_views"
 TITLE = "A merit of views of a surface against what they tell of it"

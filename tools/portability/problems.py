@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 
 import rift_cl as rift
-from rift_cl.basis.angular import angular_basis
+from rift_cl import coverage
+from rift_cl.basis import angular_basis
 from rift_cl.cl.reductions import dot, norm, total
 from rift_cl.operators.fourier.spectrum import SpectralFilter
-from rift_cl.sampling.coverage.device import coverage, coverage_grad
-from rift_cl.sampling.targets.observations import Observations
-from rift_cl.sampling.targets.target import Target
+from rift_cl.sampling import Observations, Target
+from rift_cl.sampling.coverage.device import coverage_grad
 from rift_cl.splat.features import shade, shade_grad
 from rift_cl.splat.orders import count_of
 from rift_cl.splat.projection import SplatGradients
 from rift_cl.splat.tile_lists import Tiles, tile_lists
 from rift_cl.splat.voxels import voxelise
-from rift_cl.train.loss.image_loss import ImageLoss
+from rift_cl.train import ImageLoss
 
 Arrays = dict[str, np.ndarray]
 Problem = Callable[[rift.Device, bool], Arrays]

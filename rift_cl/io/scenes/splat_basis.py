@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from rift_cl.basis.angular import ANGULAR_BASES, AngularBasis, angular_basis
 from rift_cl.errors import FileFormatError, InputError, ShapeError
 from rift_cl.splat.orders import HIGHEST, count_of, order_of
-from rift_cl.splat.settings import Activation, Angular
+from rift_cl.splat.settings import Activation
 
 _MARK = "rift-cl basis:"
 _FAMILY = re.compile(r"(shape|tint|lobe|angular)_[0-9]+")
@@ -52,7 +52,7 @@ class SceneBasis:
     shape_order: int = 0
     color_order: int = 0
     activation: Activation = "clamp"
-    angular: Angular = "sh"
+    angular: str = "sh"
     linear: int = 0
 
     @classmethod
@@ -211,7 +211,7 @@ def _parsed(path: Path, said: str, rest: int) -> SceneBasis:
         except InputError as error:
             raise FileFormatError(f"{path}: its properties angular_0..: {error}") from error
     how = cast(Activation, activation)
-    return SceneBasis(int(orders[0]), int(orders[1]), how, cast(Angular, angular), linear)
+    return SceneBasis(int(orders[0]), int(orders[1]), how, angular, linear)
 
 
 def _meaningless(path: Path, said: str) -> FileFormatError:

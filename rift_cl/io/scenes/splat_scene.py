@@ -32,7 +32,7 @@ from rift_cl.io.scenes.splat_activations import (
 from rift_cl.io.scenes.splat_basis import SceneBasis
 from rift_cl.io.scenes.splat_file import encode_splat, read_splat
 from rift_cl.io.scenes.splat_ply import COEFFICIENTS, encode_ply, read_ply, scene_shapes
-from rift_cl.splat.settings import Activation, Angular, SplatMode
+from rift_cl.splat.settings import Activation, SplatMode
 from rift_cl.splat.splats import Splats
 
 _ENCODERS = {".ply": encode_ply, ".splat": encode_splat}
@@ -72,7 +72,7 @@ class SplatScene:
     color_modes: NDArray[np.float32] | None = None
     lobes: NDArray[np.float32] | None = None
     activation: Activation = "clamp"
-    angular: Angular = "sh"
+    angular: str = "sh"
     mode: ClassVar[SplatMode] = "light"
 
     def __post_init__(self) -> None:
@@ -192,7 +192,7 @@ class SplatScene:
         device: Device,
         *,
         activation: Activation = "clamp",
-        angular: Angular = "sh",
+        angular: str = "sh",
     ) -> SplatScene:
         """Copy splats back from a device.
 

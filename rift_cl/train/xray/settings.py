@@ -12,7 +12,7 @@ from rift_cl.option_marks import NoOption, Short
 from rift_cl.splat.settings import Activation
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
-from rift_cl.train.settings import LearningRates, LossKind, TrainSettings
+from rift_cl.train.settings import LearningRates, TrainSettings
 from rift_cl.train.strategy import StrategySettings, XraySettings
 from rift_cl.train.xray.solve_settings import SolveSettings
 
@@ -54,7 +54,7 @@ class XrayTrainSettings(TrainSettings):
 
     sh_degree: NoOption[int] = 0
     sh_every: NoOption[int] = 500
-    loss: Short[LossKind] = "l2"
+    loss: Short[str] = "l2"
     ssim_weight: Short[float] = 0.0
     refine_poses: NoOption[bool] = False
     refine_exposures: NoOption[bool] = False
