@@ -43,7 +43,7 @@ KERNEL void stack_transpose(
 #else
   __local float tile[DEEP * (GROUP + 1)];
   const int local_j = (int)get_local_id(0);
-  const int j0 = (int)get_group_id(0) * GROUP, i0 = (int)get_global_id(1) * DEEP;
+  const int j0 = GROUP_NUMBER(0) * GROUP, i0 = (int)get_global_id(1) * DEEP;
   for (int k = 0; k < DEEP; k++)
     if (i0 + k < ni && j0 + local_j < nj)
       tile[k * (GROUP + 1) + local_j] = source[(i0 + k) * in_pitch + j0 + local_j];

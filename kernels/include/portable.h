@@ -51,6 +51,11 @@ typedef int8 integer8;
 
 #define KERNEL __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1)))
 #define UNROLL _Pragma("unroll")
+/* A group's number in the grid that was asked for. A grid beyond what a device takes is launched in
+ * parts, each with an offset: get_global_id counts on from it, but get_group_id, get_num_groups and
+ * get_global_size know of their part alone, so that no kernel uses these for anything else. */
+#define GROUP_NUMBER(axis) \
+  ((int)(get_group_id(axis) + get_global_offset(axis) / get_local_size(axis)))
 
 #if LANES == 8
 typedef real8 lanes;

@@ -19,7 +19,8 @@
 KERNEL void coverage_grad(
     __global const float *restrict frequencies, __global const float *restrict boxes,
     __global const float *restrict views, __global const float *restrict upstream,
-    __global float *restrict parts, int count, int view_count)
+    __global float *restrict parts, int count, int view_count,
+    int point_count)
 {
   const int v = get_global_id(0);
   if (v >= view_count) return;
@@ -67,7 +68,7 @@ KERNEL void coverage_grad(
     gy += by_u * s.y;
     gz += by_u * s.z;
   }
-  __global float *out = parts + ((long)part * get_global_size(1) * view_count + row) * ROW;
+  __global float *out = parts + ((long)part * point_count * view_count + row) * ROW;
   out[0] = SUM_OF_LANES(gx);
   out[1] = SUM_OF_LANES(gy);
   out[2] = SUM_OF_LANES(gz);

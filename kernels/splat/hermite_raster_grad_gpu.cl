@@ -34,7 +34,7 @@ KERNEL void hermite_raster_grad_gpu(
   /* One more than GROUP in a row, so that items which sum neighbouring rows read other banks. */
   __local float shares[ROUND][GROUP + 1];
   __local int ends[GROUP];
-  const int me = (int)get_local_id(0), tile = (int)get_group_id(0);
+  const int me = (int)get_local_id(0), tile = GROUP_NUMBER(0);
   const int x0 = tile % tiles_x * TILE, y0 = (tile / tiles_x + first_tile_row) * TILE;
   const float most = cap_that_counts(cap);
   float left[PIXELS], behind[PIXELS], v[PIXELS][CHANNELS];

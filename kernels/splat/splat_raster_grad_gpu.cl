@@ -26,7 +26,7 @@ KERNEL void splat_raster_grad_gpu(
 {
   __local float shares[BATCH][RECORD][GROUP];
   __local int ends[GROUP];
-  const int me = (int)get_local_id(0), tile = (int)get_group_id(0);
+  const int me = (int)get_local_id(0), tile = GROUP_NUMBER(0);
   const int x0 = tile % tiles_x * TILE, y0 = (tile / tiles_x + first_tile_row) * TILE;
   float left[PIXELS], behind[PIXELS], v[PIXELS][CHANNELS];
   const int begin = starts[tile];

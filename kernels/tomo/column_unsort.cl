@@ -12,11 +12,11 @@
 
 KERNEL void column_unsort(
     __global const float *restrict ranked, __global const int *restrict order,
-    __global float *restrict values, int views)
+    __global float *restrict values, int bins, int views)
 {
   const int begin = (int)get_global_id(0) * RUN;
   const int end = begin + RUN < views ? begin + RUN : views;
-  const long column = get_global_id(2) * (long)get_global_size(1) + get_global_id(1);
+  const long column = get_global_id(2) * (long)bins + get_global_id(1);
   const long at = column * views;
   for (int k = begin; k < end; k++) values[at + order[at + k]] = ranked[at + k];
 }

@@ -47,10 +47,11 @@ static void add_rows(
 KERNEL void radon_project(
     __global real *restrict table, __global const real *restrict plane,
     __global const long4 *restrict geometry, __global const int *restrict orders,
-    __global const int *restrict all_starts, __global const int2 *restrict views, int first, int columns, int rows, int width)
+    __global const int *restrict all_starts, __global const int2 *restrict views,
+    int first, int count, int columns, int rows, int width)
 {
   const int k0 = (int)get_global_id(SEGMENT_AXIS) * SEGMENT;
-  const int number = (int)get_global_id(VIEW_AXIS), count = (int)get_global_size(VIEW_AXIS);
+  const int number = (int)get_global_id(VIEW_AXIS);
   const int view = first + number;
   const int slice = (int)get_global_id(2);
   if (k0 >= views[view].y) return;

@@ -20,11 +20,11 @@
 KERNEL void radon_resample(
     __global const real *restrict sinogram, __global real *restrict table,
     __global const long4 *restrict geometry, __global const real *restrict footprints,
-    __global const int2 *restrict views, int first, int slice0, int slices,
+    __global const int2 *restrict views, int first, int count, int slice0, int slices,
     int bins, int columns)
 {
   const int k0 = (int)get_global_id(0) * LANES;
-  const int number = (int)get_global_id(1), count = (int)get_global_size(1), view = first + number;
+  const int number = (int)get_global_id(1), view = first + number;
   const int slice = (int)get_global_id(2);
   if (k0 >= views[view].y) return;
   const long4 g = geometry[view];

@@ -31,11 +31,12 @@
 KERNEL void radon_resample_edges_adjoint(
     __global real *restrict sinogram, __global const real *restrict table,
     __global const long4 *restrict geometry, __global const real *restrict footprints,
-    __global const int2 *restrict views, int first, int slice0, int slices, int bins, int columns)
+    __global const int2 *restrict views, int first, int count, int slice0, int slices,
+    int bins, int columns)
 {
   const int b0 = (int)get_global_id(0) * BINS;
   const int b1 = b0 + BINS < bins ? b0 + BINS : bins;
-  const int number = (int)get_global_id(1), count = (int)get_global_size(1), view = first + number;
+  const int number = (int)get_global_id(1), view = first + number;
   const int slice = (int)get_global_id(2), used = GROUPS * views[view].y;
   const long4 g = run_upwards(geometry[view], bins);
   const int mirrored = geometry[view].w < 0;

@@ -47,7 +47,7 @@ KERNEL void loss_grad(
     __global float *restrict grad, __global float *restrict parts, int first_part,
     int height, int width, int pitch, float pixel_scale, float ssim_scale)
 {
-  const int first = (int)get_group_id(0) * STRIP, row0 = (int)get_group_id(1) * ROWS;
+  const int first = GROUP_NUMBER(0) * STRIP, row0 = GROUP_NUMBER(1) * ROWS;
   const int item = (int)get_local_id(0);
   const long image_width = (long)width / CHANNELS * IMAGE_CHANNELS;
 #if SSIM
@@ -93,6 +93,6 @@ KERNEL void loss_grad(
       sum = sum + (f + LANE_NUMBERS < width ? m * error : 0);
       store_grad(grad + row * image_width, f, width, g);
     }
-  const long tile = (long)get_group_id(1) * get_num_groups(0) + get_group_id(0);
+  const long tile = (long)(row0 / ROWS) * ((width + STRIP - 1) / STRIP) + first / STRIP;
   parts[first_part + tile * GROUP + item] = SUM_OF_LANES(sum);
 }

@@ -36,7 +36,7 @@ KERNEL void ssim_map(
     __global float *restrict parts, int height, int width, int pitch, float scale)
 {
   __local float rows[MOMENTS][ROWS][SPAN];
-  const int first = (int)get_group_id(0) * STRIP, row0 = (int)get_group_id(1) * ROWS;
+  const int first = GROUP_NUMBER(0) * STRIP, row0 = GROUP_NUMBER(1) * ROWS;
   const int item = (int)get_local_id(0);
   const long image_width = (long)width / CHANNELS * IMAGE_CHANNELS;
   for (int n = item * LANES; n < SPAN; n += GROUP * LANES) {
@@ -90,6 +90,6 @@ KERNEL void ssim_map(
       const lanes e = m * (a + b - a * b);
       sum = sum + (f + LANE_NUMBERS < width ? e : 0);
     }
-  const long tile = (long)get_group_id(1) * get_num_groups(0) + get_group_id(0);
+  const long tile = (long)(row0 / ROWS) * ((width + STRIP - 1) / STRIP) + first / STRIP;
   parts[tile * GROUP + item] = scale * SUM_OF_LANES(sum);
 }

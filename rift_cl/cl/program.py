@@ -12,25 +12,33 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.build import Builder, Key, building
 from rift_cl.cl.failures import named_errors
+from rift_cl.cl.grid_parts import Size, grid_parts
 from rift_cl.cl.kernel_cache import build_lock
 from rift_cl.cl.process import claim_process
 from rift_cl.cl.signature import Parameter, check_names, check_numbers, in_order, parameters
 from rift_cl.cl.source import kernel_source
+from rift_cl.errors import DeviceError
 
 if TYPE_CHECKING:
     from rift_cl.cl.device import Device
 
 # PoCL compiles for grids up to this size and for larger ones apart.
 _SMALL_GRID = 65534
+# Items of a group that know of each other: the kernel's driver in Python counts in groups as well.
+_COOPERATES = "get_local_id"
+# A variant of a kernel as it was launched: PoCL also compiles apart for a part of a grid.
+_Started = tuple[Key, bool, bool]
 
 
 class _Kernel(NamedTuple):
-    """A kernel object of one thread, and what the kernel takes."""
+    """A kernel object of one thread, what the kernel takes, and the size of its groups."""
 
     handle: Any
     parameters: tuple[Parameter, ...]
+    group: int
 
 
 class _ThreadKernels(threading.local):
@@ -50,10 +58,12 @@ class Programs:
     def __init__(self, device: Device) -> None:
         self._device = device
         self._builder = Builder(device)
-        self._started: set[tuple[Key, bool]] = set()
+        self._started: set[_Started] = set()
         # The macros among the names that launches give, for each set of names that was given.
         self._macros: dict[tuple[str, ...], tuple[str, ...]] = {}
         self._own = _ThreadKernels()
+        # Grids that are no longer along any axis need not be looked at.
+        self._longest = min(device.traits.items)
 
     @property
     def kernels(self) -> list[str]:
@@ -62,6 +72,8 @@ class Programs:
 
     def launch(self, name: str, size: tuple[int, ...], given: dict[str, Any]) -> None:
         """Enqueue one kernel over ``size`` work-items; the first axis is rounded up to groups.
+
+        A grid that is larger than the device takes is enqueued in parts, with the same results.
 
         Args:
             name: the kernel, which is also its file and its entry point.
@@ -75,7 +87,8 @@ class Programs:
         Raises:
             KernelArgumentError: an argument is missing, unknown, or of another type than the
                 kernel wants.
-            DeviceError: ``DOUBLE`` is 1 and the device has no doubles, or the driver failed.
+            DeviceError: ``DOUBLE`` is 1 and the device has no doubles, the kernel needs larger
+                groups or more local memory than the device has, or the driver failed.
         """
         claim_process()
         if 0 in size:
@@ -89,7 +102,7 @@ class Programs:
         if len(given) != len(macros) + len(kernel.parameters):
             check_names(name, kernel.parameters, given)
         values = in_order(name, kernel.parameters, given)
-        group = self._device.traits.macros["GROUP"]
+        group = kernel.group
         rounded = (-(-size[0] // group) * group, *size[1:])
         local = (group,) + (1,) * (len(size) - 1)
         with named_errors(f"running {name}", self._device.name):
@@ -98,43 +111,95 @@ class Programs:
             except RuntimeError:
                 check_numbers(name, kernel.parameters, values)
                 raise
-            self._enqueue((key, max(size) > _SMALL_GRID), kernel.handle, rounded, local)
+            if max(rounded) <= self._longest:
+                self._enqueue(key, kernel.handle, rounded, local)
+                return
+            for part in grid_parts(rounded, self._device.traits.items, group):
+                self._enqueue(key, kernel.handle, part.size, local, part.offset)
 
     def _enqueue(
-        self,
-        started: tuple[Key, bool],
-        kernel: Any,
-        size: tuple[int, ...],
-        local: tuple[int, ...],
+        self, key: Key, kernel: Any, size: Size, local: Size, offset: Size | None = None
     ) -> None:
         import pyopencl as cl
 
         queue = self._device.queue
+        started = key, max(size) > _SMALL_GRID, offset is not None
         if started in self._started:
-            cl.enqueue_nd_range_kernel(queue, kernel, size, local)
+            cl.enqueue_nd_range_kernel(queue, kernel, size, local, offset)
             return
         # PoCL compiles again for the first launch, into the same cache.
         with building, build_lock():
-            cl.enqueue_nd_range_kernel(queue, kernel, size, local)
+            cl.enqueue_nd_range_kernel(queue, kernel, size, local, offset)
             queue.finish()
             self._started.add(started)
 
     def _kernel(self, key: Key) -> _Kernel:
         kernel = self._own.kernels.get(key)
         if kernel is None:
-            import pyopencl as cl
-
-            name, macros = key
-            program = self._builder.program(key)
-            with building, named_errors(f"loading kernel {name}", self._device.name):
-                handle = cl.Kernel(program, name)
-                found = parameters(name, kernel_source(name), self._builder.defines(macros))
-                # Numbers whose types are known beforehand are set many times faster.
-                handle.set_scalar_arg_dtypes(
-                    [each.dtype.type if each.lanes == 1 else None for each in found]
-                )
-            kernel = self._own.kernels[key] = _Kernel(handle, found)
+            group = self._device.traits.macros["GROUP"]
+            kernel = self._own.kernels[key] = self._built(key, group)
         return kernel
+
+    def _built(self, key: Key, group: int) -> _Kernel:
+        """A kernel in groups of ``group``, or of half as many items where these are too many."""
+        import pyopencl as cl
+
+        name, macros = key
+        program = self._builder.program(key)
+        with building, named_errors(f"loading kernel {name}", self._device.name):
+            handle = cl.Kernel(program, name)
+            found = parameters(name, kernel_source(name), self._builder.defines(macros))
+            # Numbers whose types are known beforehand are set many times faster.
+            handle.set_scalar_arg_dtypes(
+                [each.dtype.type if each.lanes == 1 else None for each in found]
+            )
+            needs = kernel_needs(handle, self._device._handle)
+        self._check_local(name, needs)
+        if needs.group >= group:
+            return _Kernel(handle, found, group)
+        if group == 1 or _COOPERATES in kernel_source(name):
+            raise DeviceError(
+                f"kernel {name} works in groups of {group} work-items, and {self._device.name} "
+                f"runs it in groups of at most {needs.group}: what needs it does not work there; "
+                "use another device (--device)"
+            )
+        smaller = {**dict(macros), "GROUP": str(group // 2)}
+        return self._built((name, tuple(sorted(smaller.items()))), group // 2)
+
+    def _check_local(self, name: str, needs: KernelNeeds) -> None:
+        """Refuse a kernel that needs more local memory than there is.
+
+        Raises:
+            DeviceError: it does.
+        """
+        there = self._device.traits.local_memory
+        if needs.local_memory > there:
+            raise DeviceError(
+                f"kernel {name} needs {format_bytes(needs.local_memory)} of local memory, "
+                f"{self._device.name} has {format_bytes(there)}: what needs it does not work "
+                "there; use another device (--device)"
+            )
+
+
+class KernelNeeds(NamedTuple):
+    """What a driver says of a kernel that it built.
+
+    Args:
+        group: most work-items of a group that it can run in.
+        local_memory: bytes of local memory that a group takes.
+    """
+
+    group: int
+    local_memory: int
+
+
+def kernel_needs(kernel: Any, device: Any) -> KernelNeeds:
+    """What the driver of a ``pyopencl.Device`` says of a ``pyopencl.Kernel``."""
+    import pyopencl as cl
+
+    asked = cl.kernel_work_group_info
+    found = (asked.WORK_GROUP_SIZE, asked.LOCAL_MEM_SIZE)
+    return KernelNeeds(*(kernel.get_work_group_info(info, device) for info in found))
 
 
 def literal(value: float | str) -> str:

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from observations_of_all_kinds import random_observations
 from projection_scenes import camera_of
 from projection_scenes import random_splats as visible_splats
@@ -20,8 +22,10 @@ from voxel_scenes import drawn as voxels
 from voxel_scenes import random_splats
 
 import rift_cl as rift
-from rift_cl.cl import reductions
-from rift_cl.errors import ResourceLimitError
+from rift_cl.cl import program, reductions
+from rift_cl.cl.grid_parts import grid_parts
+from rift_cl.cl.program import Programs, kernel_needs
+from rift_cl.errors import DeviceError, ResourceLimitError
 from rift_cl.operators import ViewFilter
 from rift_cl.operators.fourier.spectrum import SpectralFilter
 from rift_cl.reconstruct.preprocess.columns import DetectorColumns, mend_columns
@@ -136,8 +140,7 @@ JOBS: dict[str, Callable[[rift.Device], Arrays]] = {
 every_job = pytest.mark.parametrize("job", JOBS.values(), ids=list(JOBS))
 
 
-def assert_same_bits(job: Callable[[rift.Device], Arrays], small: rift.Device, device: rift.Device):
-    found, wanted = job(small), job(device)
+def assert_same(found: Arrays, wanted: Arrays) -> None:
     assert len(found) == len(wanted)
     for one, other in zip(found, wanted, strict=True):
         assert one.dtype == other.dtype and one.tobytes() == other.tobytes()
@@ -163,14 +166,14 @@ def test_no_array_is_larger_than_the_largest_buffer(device, job, largest, monkey
     monkeypatch.setattr(rift.Device, "check_array", noted)
     job(device)
     assert max(sizes) > largest, "the limit is crossed"
-    assert_same_bits(job, limited(device, allocation=largest), device)
+    assert_same(job(limited(device, allocation=largest)), job(device))
 
 
 @pytest.mark.once
 @pytest.mark.full
 def test_slabs_of_rows_fit_the_largest_buffer_of_a_gpu(device):
     gpu = limited(device, is_cpu=False)
-    assert_same_bits(fourier_filtering, limited(gpu, allocation=1 << 16), gpu)
+    assert_same(fourier_filtering(limited(gpu, allocation=1 << 16)), fourier_filtering(gpu))
 
 
 def test_an_array_beyond_the_largest_buffer_is_told(device):
@@ -193,3 +196,89 @@ def test_an_array_as_large_as_the_largest_buffer_is_made(device):
 def test_work_whose_least_part_is_beyond_the_largest_buffer_is_told(device):
     with pytest.raises(ResourceLimitError, match=r"row of every view.*7\.81 KiB.*5\.86 KiB"):
         filtering(limited(device, allocation=6000))
+
+
+def offsets_of(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, ...]]:
+    """Where the parts of grids begin, as they are launched on a device."""
+    seen, enqueue = [], Programs._enqueue
+
+    def noted(programs, key, kernel, size, local, offset=None):
+        seen.append(offset)
+        enqueue(programs, key, kernel, size, local, offset)
+
+    monkeypatch.setattr(Programs, "_enqueue", noted)
+    return seen
+
+
+@every_job
+def test_grids_beyond_the_most_work_items_are_launched_in_parts(device, job, monkeypatch):
+    """No more than a group of a GPU along x."""
+    small = limited(device, items=(1, 3, 1))
+    seen = offsets_of(monkeypatch)
+    found = job(small)
+    assert any(offset is not None and any(offset) for offset in seen), "the limit is crossed"
+    assert_same(found, job(device))
+
+
+@given(
+    size=st.tuples(st.integers(1, 40), st.integers(1, 9), st.integers(1, 5)),
+    most=st.tuples(*[st.integers(1, 12)] * 3),
+    group=st.sampled_from([1, 4]),
+    axes=st.integers(1, 3),
+)
+def test_parts_of_a_grid_hold_every_item_once(size, most, group, axes):
+    size = (size[0] * group, *size[1:])[:axes]
+    taken = np.zeros(size, int)
+    for offset, part in grid_parts(size, most, group):
+        assert offset[0] % group == part[0] % group == 0
+        assert all(n <= max(m, group) for n, m in zip(part, most, strict=False))
+        taken[tuple(slice(at, at + n) for at, n in zip(offset, part, strict=True))] += 1
+    assert (taken == 1).all()
+
+
+@pytest.mark.once
+def test_filtered_views_beyond_the_groups_that_a_gpu_numbers(device):
+    """65,537 rows, one to a work-item along y."""
+    gpu = limited(device, is_cpu=False)
+    scan = rift.Parallel(np.zeros(1), 2)
+    F = ViewFilter(scan, rift.Ramp(), rows=65_537, device=gpu)
+    y = normal(*F.domain)
+    alone = ViewFilter(scan, rift.Ramp(), rows=2, device=gpu)
+    assert np.array_equal(F(y)[:, -2:], alone(y[:, -2:]))
+
+
+def test_local_memory_beyond_the_devices_is_told(device):
+    small = limited(device, local_memory=4096)
+    with pytest.raises(DeviceError, match=r"ssim_map needs .* KiB of local memory.*4 KiB"):
+        loss(small)
+
+
+@pytest.mark.once
+@pytest.mark.full
+@every_job
+def test_a_gpu_of_small_groups_has_results_to_rounding(device, job):
+    """Sums over the items of a group are in another order there."""
+    gpu = limited(device, is_cpu=False)
+    small = limited(gpu, group=20)
+    assert small.traits.macros["GROUP"] == 16
+    for one, other in zip(job(small), job(gpu), strict=True):
+        assert np.abs(one - other).max() <= 2e-5 * np.abs(other).max()
+
+
+@pytest.mark.once
+@pytest.mark.parametrize("most", [32, 20])
+def test_a_kernel_that_runs_in_smaller_groups_alone(device, most, monkeypatch):
+    gpu = limited(device, is_cpu=False)
+    needs = kernel_needs
+
+    def few(kernel, handle):
+        return needs(kernel, handle)._replace(group=most)
+
+    wanted = filtering(gpu)
+    monkeypatch.setattr(program, "kernel_needs", few)
+    small = limited(gpu)
+    assert_same(filtering(small), wanted)
+    groups = {kernel.group for kernel in small._programs._own.kernels.values()}
+    assert groups == {32 if most == 32 else 16}
+    with pytest.raises(DeviceError, match=f"ssim_map.* groups of at most {most}"):
+        loss(limited(gpu))

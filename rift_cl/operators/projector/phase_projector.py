@@ -135,6 +135,7 @@ class Projector(ParallelProjector):
             all_starts=walk.starts,
             views=walk.views,
             first=first,
+            count=count,
             columns=table.columns,
             rows=table.rows,
             width=table.width,
@@ -147,6 +148,7 @@ class Projector(ParallelProjector):
             sinogram=out,
             table=entries,
             first=first,
+            count=count,
             **self._resampled(walk, slab),
             BINS=bins,
         )
@@ -184,6 +186,7 @@ class Projector(ParallelProjector):
                 sinogram=y,
                 table=entries,
                 first=first,
+                count=count,
                 **self._resampled(walk, slab),
             )
             self.device.launch(

@@ -115,6 +115,7 @@ class DetectorColumns:
             ranked=self._values,
             order=self._order,
             values=other,
+            bins=self.bins,
             views=self.views,
             RUN=run,
         )
@@ -170,6 +171,7 @@ class DetectorColumns:
             (-(-self.views // run), self.bins, self.rows),
             x=self._values,
             shift=self.device.array(levels, np.float32),
+            bins=self.bins,
             views=self.views,
             RUN=run,
         )

@@ -135,6 +135,7 @@ def _parts(
             views=table,
             upstream=work.device.array(np.ascontiguousarray(upstream[:, at])),
             parts=parts,
+            point_count=len(table),
             RUN=RUN,
         )
         yield parts
