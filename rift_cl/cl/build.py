@@ -1,9 +1,9 @@
 """Building kernels: the only caller of the driver's compiler.
 
 A program is built once per device, kernel and macros. A driver that keeps what it compiles in our
-cache folder, as PoCL does, compiles in this process. For any other the binaries are kept by us
-(``program_store``), and a child process compiles them (``guarded_build``): a compiler that dies or
-hangs does not take this process with it.
+cache folder, as PoCL does, compiles in this process, but for kernels that it died of before. For
+any other the binaries are kept by us (``program_store``), and a child process compiles them
+(``guarded_build``): a compiler that dies or hangs does not take this process with it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rift_cl.cl.driver_record import keeps_programs, read_record
 from rift_cl.cl.failures import named_errors
 from rift_cl.cl.guarded_build import Request, guarded_build, way_to_build
 from rift_cl.cl.kernel_cache import build_lock
-from rift_cl.cl.program_store import Stored, load, program_name, remove, save
+from rift_cl.cl.program_store import Stored, begun, load, program_name, remove, save
 from rift_cl.cl.real_type import real_type
 from rift_cl.cl.source import fault_place, kernel_source
 from rift_cl.errors import DeviceError, KernelBuildError
@@ -83,21 +83,24 @@ class Builder:
         defines = self.defines(macros).items()
         options = [*OPTIONS, *(f"-D{macro}={value}" for macro, value in defines)]
         source, options = way_to_build(self._known.get("way", ""), kernel_source(name), options)
-        if self._keeps_programs:
-            return self._compiled(name, source, options)
+        if self.keeps_programs:
+            program = self._compiled(name, source, options)
+            if program is not None:
+                return program
         return self._stored(key, source, options)
 
     @cached_property
     def _driver(self) -> dict[str, str]:
         return self._device.identity
 
-    @cached_property
+    @property
     def _known(self) -> dict[str, Any]:
-        """What the test of this driver left behind, if there was one."""
+        """What the last test of this driver left behind, if there was one."""
         return read_record(self._driver)
 
     @cached_property
-    def _keeps_programs(self) -> bool:
+    def keeps_programs(self) -> bool:
+        """Whether the driver keeps what it compiles in our cache folder."""
         return keeps_programs(self._driver, self._device.context)
 
     def _check_known(self, name: str) -> None:
@@ -111,14 +114,20 @@ class Builder:
             )
 
     def _compiled(self, name: str, source: str, options: list[str]) -> Any:
-        """A program that the driver compiles in this process, or takes from a cache of its own."""
+        """A program that the driver compiles in this process, or takes from a cache of its own.
+
+        None where a process once began with it and never came to an end.
+        """
         import pyopencl as cl
 
+        entry = program_name(self._driver, source, options)
         failure = ""
         for pause in _PAUSES:
             time.sleep(pause)
             try:
-                with build_lock():
+                with build_lock(), begun(entry) as first:
+                    if not first:
+                        return None
                     return cl.Program(self._device.context, source).build(options)
             except cl.Error as error:
                 failure = str(error)
@@ -167,9 +176,11 @@ class Builder:
                 "does not work there: use another device (--device) or another version of the "
                 "driver ('rift devices --retest' tries again)"
             )
-        if not stored.binary:
-            return self._compiled(name, *way_to_build(about["way"], source, options))
         context = device.context
+        if not stored.binary:
+            # The driver gives no binaries; the child saw that it compiles.
+            source, options = way_to_build(about["way"], source, options)
+            return cl.Program(context, source).build(options)
         return cl.Program(context, context.devices, [stored.binary]).build()
 
 

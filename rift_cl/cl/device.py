@@ -77,6 +77,11 @@ class Device:
         return driver_identity(self._handle)
 
     @property
+    def keeps_programs(self) -> bool:
+        """Whether its driver keeps what it compiles in our cache folder."""
+        return self._programs.keeps_programs
+
+    @property
     def kernels(self) -> list[str]:
         """The names of the kernels that were built or loaded for it so far."""
         return self._programs.kernels

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rift_cl.cl.build_worker import read_message, write_message
+from rift_cl.errors import DeviceError
 
 # Seconds after which a compiler counts as hanging.
 LIMIT = 300.0
@@ -110,6 +111,9 @@ class Worker:
         Returns:
             What went wrong with the child, empty if nothing; its answer, or None; and the bytes
             that came with it.
+
+        Raises:
+            DeviceError: no child can be started.
         """
         with self._asking:
             process = self._started()
@@ -141,13 +145,19 @@ class Worker:
         if self._process is None:
             root = str(Path(__file__).parents[2])
             path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
-            self._process = subprocess.Popen(
-                self._command,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                env={**os.environ, "PYTHONPATH": path},
-            )
+            try:
+                self._process = subprocess.Popen(
+                    self._command,
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.DEVNULL,
+                    env={**os.environ, "PYTHONPATH": path},
+                )
+            except OSError as error:
+                raise DeviceError(
+                    f"the process that compiles kernels cannot be started ({error}): it is Python "
+                    "itself, and wants memory and the right to start processes"
+                ) from error
         return self._process
 
     def _end(self, process: subprocess.Popen[bytes], patience: float) -> int:

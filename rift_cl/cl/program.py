@@ -66,6 +66,11 @@ class Programs:
         self._longest = min(device.traits.items)
 
     @property
+    def keeps_programs(self) -> bool:
+        """Whether the driver keeps what it compiles in our cache folder."""
+        return self._builder.keeps_programs
+
+    @property
     def kernels(self) -> list[str]:
         """The names of the kernels that were built or loaded so far."""
         return self._builder.kernels

@@ -14,6 +14,7 @@ import json
 import os
 import tempfile
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,7 +23,7 @@ from rift_cl.cl.kernel_cache import cache_folder
 
 _FORMAT = b"RIFT-CL program 1\n"
 _HASH = 64
-_FOLDER, _SUFFIX = "programs", ".program"
+_FOLDER, _SUFFIX, _BEGUN = "programs", ".program", ".begun"
 
 
 class Stored(NamedTuple):
@@ -83,6 +84,29 @@ def remove(name: str) -> None:
         _path(name).unlink(missing_ok=True)
 
 
+@contextlib.contextmanager
+def begun(name: str) -> Iterator[bool]:
+    """Mark a program while this process compiles it; hold the build lock meanwhile.
+
+    Whether nobody began before without an end: a mark that is found is of a process that died of
+    it, or was ended meanwhile. It stays, and the program is left to a child from then on.
+    """
+    path = _path(name).with_suffix(_BEGUN)
+    first = not path.exists()
+    if not first:
+        yield False
+        return
+    # Where no mark can be made the program is compiled without one.
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        path.touch()
+    try:
+        yield True
+    finally:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+
+
 def write_whole(path: Path, data: bytes) -> None:
     """Write a file of the cache so that it is there whole or not at all, for this user alone.
 
@@ -114,6 +138,7 @@ def forget(driver: dict[str, str]) -> None:
         stored = load(path.stem)
         if stored is not None and stored.about.get("driver") == driver:
             remove(path.stem)
+            path.with_suffix(_BEGUN).unlink(missing_ok=True)
 
 
 def _path(name: str) -> Path:

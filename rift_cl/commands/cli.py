@@ -19,7 +19,7 @@ from rift_cl import __version__
 from rift_cl.commands.console_table import print_table
 from rift_cl.commands.interruption import gentle_interrupt
 from rift_cl.commands.progress_bar import print_line
-from rift_cl.commands.runner import Output, command, exit_status, parsed, ran, told, watch
+from rift_cl.commands.runner import Output, command, exit_status, parsed, ran, run_job, told, watch
 
 _USAGE = 2
 
@@ -154,7 +154,7 @@ def _demo(settings: Any, output: Output) -> None:
     from rift_cl.commands.fit_photos.report import score_rows
 
     job = DemoJob(settings)
-    watch(job.run(), output)
+    run_job(job, output)
     print_table(COLUMNS, job.rows, caption=SCORING)
     for name, fit in job.fits.items():
         print_table(FIT_COLUMNS, score_rows(fit.metrics), caption=f"{name}: {FIT_SCORING}")

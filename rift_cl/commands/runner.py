@@ -161,8 +161,19 @@ def ran(job: Any, settings: Any, output: Output) -> bool:
     if settings.dry_run:
         print_table(("what", "plan"), job.plan().items())
         return False
-    watch(job.run(), output)
+    run_job(job, output)
     return True
+
+
+def run_job(job: Any, output: Output) -> None:
+    """Run a job, behind the test of a driver that is new here."""
+    # Imported when used, so that a command's help loads no device layer.
+    from rift_cl.commands.devices.driver_test import meet_driver
+
+    device = getattr(job, "device", None)
+    if device is not None:
+        watch(meet_driver(device), output)
+    watch(job.run(), output)
 
 
 def _guarded(run: Callable[[Any, Output], None], settings: Any, output: Output) -> int:

@@ -8,6 +8,7 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.cl.guarded_build import Request, Worker, guarded_build
+from rift_cl.errors import DeviceError
 
 REQUEST = Request("0:0", "device", "probe", "source", ["-w"])
 # A child that answers with what it was asked, unless the first lines here make an end of it.
@@ -63,6 +64,11 @@ def test_compiler_that_ends_the_process_is_told_of(worker):
 def test_child_that_talks_nonsense_is_no_answer(worker, noise):
     said = f"sys.stdout.buffer.write({noise}); sys.stdout.flush(); sys.exit(0)"
     assert guarded_build(REQUEST, worker(said)).binary is None
+
+
+def test_child_that_cannot_be_started_is_a_named_error():
+    with pytest.raises(DeviceError, match="cannot be started"):
+        guarded_build(REQUEST, Worker(["/there/is/no/such/program"]))
 
 
 def test_our_own_child_compiles_and_tells_what_does_not():

@@ -123,3 +123,17 @@ def test_kernel_that_no_way_builds_is_refused_by_name_and_asked_for_once(bare, m
             _sum(device)
         monkeypatch.setattr(build, "guarded_build", _no_build)
     assert np.array_equal(device.get(device.array(np.ones(3))), np.ones(3))
+
+
+def test_kernel_that_a_process_died_of_is_left_to_a_child(device, folder, monkeypatch):
+    fresh = Device(device._handle, device.selector, traits=device.traits)
+    monkeypatch.setattr(build, "keeps_programs", lambda *_: True)
+    seen = []
+    real = program_store.begun
+    monkeypatch.setattr(build, "begun", lambda name: (seen.append(name), real(name))[1])
+    wanted = _sum(fresh)
+    assert not list(folder.iterdir())
+    (folder / f"{seen[0]}.begun").touch()
+    again = Device(device._handle, device.selector, traits=device.traits)
+    assert np.array_equal(_sum(again), wanted)
+    assert load(seen[0]).about["kernel"] == "axpby"

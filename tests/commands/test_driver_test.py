@@ -13,7 +13,13 @@ from rift_cl.cl import Device, build, driver_record, program_store, source
 from rift_cl.cl.driver_record import add_to_record, read_record
 from rift_cl.cl.reductions import total
 from rift_cl.commands.devices import driver_test
-from rift_cl.commands.devices.driver_test import examine_driver, findings, in_child, verdict
+from rift_cl.commands.devices.driver_test import (
+    examine_driver,
+    findings,
+    in_child,
+    meet_driver,
+    verdict,
+)
 from rift_cl.commands.devices.families import FAMILIES, stored_results
 from rift_cl.commands.devices.family_check import try_family
 from rift_cl.errors import DeviceError
@@ -75,6 +81,17 @@ def test_driver_that_is_right_is_tested_once(tested):
     (said,) = findings(tested)
     assert said.startswith("2 of 2 families")
     assert "today" in said
+
+
+def test_driver_that_keeps_nothing_is_met_once(tested, monkeypatch):
+    families = dict.fromkeys(["one", "two"])
+    monkeypatch.setattr("rift_cl.commands.devices.families.FAMILIES", families)
+    monkeypatch.setattr(driver_test, "in_child", _always(**RIGHT))
+    monkeypatch.setattr(Device, "keeps_programs", True)
+    assert not list(meet_driver(tested))
+    monkeypatch.setattr(Device, "keeps_programs", False)
+    assert [report.done for report in meet_driver(tested)] == [1, 2]
+    assert not list(meet_driver(tested))
 
 
 def test_wrong_numbers_are_found_and_refused_by_name_and_nothing_else_is(tested, monkeypatch):

@@ -46,6 +46,18 @@ def verdict(device: Device) -> dict[str, Any] | None:
     return record if "families" in record else None
 
 
+def meet_driver(device: Device) -> Iterator[Report]:
+    """Test the driver of a device that a command is about to use, if that was never done.
+
+    A driver that keeps its programs with us is PoCL, whose numbers the known results are: it is
+    tested where somebody asks, by ``rift devices``, for there a cold compiler costs the most.
+    """
+    if verdict(device) is None and not device.keeps_programs:
+        from rift_cl.commands.devices.families import FAMILIES
+
+        yield from examine_driver(device, list(FAMILIES))
+
+
 def examine_driver(
     device: Device, families: Sequence[str], attempt: Try | None = None
 ) -> Iterator[Report]:
