@@ -63,7 +63,8 @@ def _label(device: rift.Device) -> str:
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Run a test that asks for ``device`` on each of them; they are opened but once.
 
-    A test that is marked ``once`` is spared a CPU's second kind.
+    A test that is marked ``once`` is spared a CPU's second kind: it puts kernels together that have
+    tests of their own.
     """
     if "device" in metafunc.fixturenames:
         once = metafunc.definition.get_closest_marker("once") is not None

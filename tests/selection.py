@@ -7,6 +7,8 @@ they share kernels). Marks change that:
 
 - ``full``: only ``pytest -m full`` runs the test; another one touches the same code at less cost.
 - ``each``: plain ``pytest`` runs it with each of its parameters, for example once per file format.
+- ``dealt``: ``pytest -m full`` runs it with each of its parameters on one kind of device, which
+  alternates. It puts kernels together that have tests of their own on every kind.
 
 ``pytest -m rest`` is ``-m full`` without what the last plain ``pytest`` passed, for .ci/run, which
 runs one after the other. Only tests that ask for a device are left out so: all others are repeated,
@@ -27,7 +29,8 @@ import pytest
 MARKS = (
     "full: takes long, and only `pytest -m full` runs it",
     "each: plain `pytest` runs it with each of its parameters, not with the first alone",
-    "once: a CPU runs it as a CPU alone, for its kernels are the same for every kind of device",
+    "once: a CPU runs it as a CPU alone; others test its kernels on every kind of device",
+    "dealt: all cases together run each of its parameters once, on the devices in turn",
 )
 # A worker holds its compiled kernels and its data: up to some 2 GB each.
 _WORKER_BYTES = 3 << 30
@@ -106,9 +109,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Leave out what the selection does not run."""
     if config.selection == "plain":
         chosen = set(plain(items))
+    elif config.selection == "full":
+        chosen = set(dealt(items))
     elif config.selection == "rest":
         passed = set(config.cache.get(_PASSED_KEY, ()) if hasattr(config, "cache") else ())
-        chosen = {item for item in items if item.nodeid not in passed or _is_cpu(item) is None}
+        chosen = {i for i in dealt(items) if i.nodeid not in passed or _is_cpu(i) is None}
     else:
         return
     config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
@@ -139,6 +144,25 @@ def plain(items: Iterable[pytest.Item]) -> Iterable[pytest.Item]:
             tests.setdefault(item.nodeid.split("[")[0], []).append(item)
     for cases in tests.values():
         yield from cases if cases[0].get_closest_marker("each") else [_one(cases)]
+
+
+def dealt(items: Iterable[pytest.Item]) -> Iterable[pytest.Item]:
+    """Every case, but of a test that is marked ``dealt`` each row of parameters on one device."""
+    tests: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        if item.get_closest_marker("dealt") is None or _is_cpu(item) is None:
+            yield item
+        else:
+            tests.setdefault(item.nodeid.split("[")[0], []).append(item)
+    for name, cases in tests.items():
+        devices = 1 + max(case.callspec.indices["device"] for case in cases)
+        rows: dict[tuple[tuple[str, int], ...], int] = {}
+        for case in cases:
+            row = tuple(sorted((n, k) for n, k in case.callspec.indices.items() if n != "device"))
+            # Tests of one row begin on different devices, the same every time.
+            turn = rows.setdefault(row, len(rows)) + zlib.crc32(name.encode())
+            if turn % devices == case.callspec.indices["device"]:
+                yield case
 
 
 def _one(cases: list[pytest.Item]) -> pytest.Item:

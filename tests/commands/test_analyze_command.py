@@ -51,6 +51,7 @@ def page_of(folder):
     return (folder / "report.html").read_text()
 
 
+@pytest.mark.full
 def test_a_ring_misses_a_cone_about_its_axis_and_views_above_it_are_suggested(
     ringed, tmp_path, capsys
 ):

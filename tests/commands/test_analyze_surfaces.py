@@ -93,6 +93,7 @@ def test_fitted_splats_tell_what_is_in_the_way_as_well(tmp_path):
     )
 
 
+@pytest.mark.full
 def test_where_nothing_tells_what_stands_where_suggestions_stay_near(tmp_path):
     sampled = open_sampled(AnalyzeSettings(capture(tmp_path / "bare", arc()), diameter=1.2))
     assert sampled.space is None

@@ -36,6 +36,7 @@ def test_a_fit_leaves_splats_scores_and_a_report(capture, tmp_path, capsys):
     assert config["complete"] and config["settings"]["training"]["steps"] == 60
 
 
+@pytest.mark.full
 def test_the_same_seed_gives_the_same_file(capture, tmp_path):
     for name in ("one", "two"):
         assert fit(capture, tmp_path / name) == 0

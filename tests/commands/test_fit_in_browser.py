@@ -47,6 +47,7 @@ def likeness(picture, photograph, there):
     return float(np.corrcoef(*shown)[0, 1]) if np.ptp(shown[0]) > 0 else 0.0
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", CAPTURES)
 def test_a_fit_that_runs_is_seen_from_its_photographs(tmp_path, name):
     pytest.importorskip("viser", reason="viser is not installed")

@@ -228,6 +228,7 @@ def test_the_report_says_what_was_decided_and_folds_defaults_away(capture, tmp_p
     assert ">homogenise</th><td>0.5</td><td>asked for</td>" in page
 
 
+@pytest.mark.full
 def test_a_config_repeats_a_fit_and_trains_it_on(capture, tmp_path, capsys):
     out, again = tmp_path / "fit", tmp_path / "again"
     assert fit(capture, out, "--strategy.absgrad", "--strategy", "default") == 0

@@ -33,11 +33,12 @@ HEAD = 0.1
 pytestmark = pytest.mark.skipif(not FOX.is_dir(), reason="shared data are not there")
 
 
+@pytest.mark.full
 def test_the_head_is_in_every_frame(tmp_path):
     fit, film = tmp_path / "fit", tmp_path / "film"
     steps = ("--steps", "400", "--splats", "4000", "--downscale", str(FACTOR))
     assert main(["fit", str(FOX), "--out", str(fit), *steps, "--checkpoint-every", "0"]) == 0
-    shape = ("--frames", "12", "--film", "apng")
+    shape = ("--frames", "6", "--film", "apng")
     assert main(["render", str(fit), "--out", str(film), *shape]) == 0
     cameras = open_fit_cameras(fit)
     render = Render(RenderSettings(fit, out=tmp_path / "none"))

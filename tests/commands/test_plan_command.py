@@ -141,6 +141,7 @@ def test_further_views_are_planned_besides_those_that_were_taken(tmp_path, capsy
     assert "--diameter" not in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_a_budget_may_end_before_the_views_do(cameras, tmp_path, capsys):
     dear = tmp_path / "dear.json"
     dear.write_text(json.dumps({**CAMERA, "cost": 2}))

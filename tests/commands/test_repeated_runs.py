@@ -5,6 +5,8 @@ import json
 import pytest
 
 from rift_cl.commands.cli import main
+from rift_cl.commands.plan.input import plan_input
+from rift_cl.commands.plan.settings import PlanSettings
 
 
 def run(*arguments):
@@ -28,14 +30,19 @@ def figures(out, *but):
 
 def test_plan(tmp_path, capsys):
     out, again = tmp_path / "a", tmp_path / "b"
-    assert run("plan", "--views", 3, "--seed", 2, "--elevation", -10, 40, "--out", out) == 0
+    options = ("--views", 3, "--seed", 2, "--elevation", -10, 40, "--mode", "volume")
+    assert run("plan", *options, "--out", out) == 0
     first, second = repeat("plan", out, again)
     assert first == second
-    assert (first["mode"], first["diameter"], first["center"]) == ("surface", 100.0, [0, 0, 0])
+    assert (first["mode"], first["diameter"], first["center"]) == ("volume", 100.0, [0, 0, 0])
     assert first["band"] == pytest.approx(16 / 100)
     for name in ("transforms.json", "views.csv"):
         assert (out / name).read_bytes() == (again / name).read_bytes()
     assert figures(out) == figures(again)
+
+
+def test_a_target_without_a_pilot_is_decided_to_be_opaque():
+    assert plan_input(PlanSettings()).decided.mode == "surface"
 
 
 def test_analyze_a_capture(capture, tmp_path, capsys):

@@ -88,6 +88,7 @@ def drawn(fit, camera: Camera) -> np.ndarray:
     return np.clip(rift.default_device().get(frame.image), 0, 1)
 
 
+@pytest.mark.full
 def test_the_first_view_is_a_photographs_and_shows_the_subject(fitted):
     settings = RenderSettings(scene=fitted.fit)
     camera, _ = first_view(settings.bounds(settings.open_scene()))
@@ -96,6 +97,7 @@ def test_the_first_view_is_a_photographs_and_shows_the_subject(fitted):
     assert_shows_the_subject(drawn(fitted.fit, camera), camera)
 
 
+@pytest.mark.full
 def test_from_behind_the_wall_no_subject_is_found(fitted):
     """The comparison can tell: what an orbit would draw there is not like the photographs."""
     view = open_capture(fitted.film).views[0]

@@ -154,6 +154,7 @@ def fitted(capture, out, announce=lambda line: None, **more):
 
 
 @pytest.mark.parametrize("opens", [True, False])
+@pytest.mark.full
 def test_a_fit_whose_viewer_fails_goes_on_to_the_same_bits(capture, tmp_path, monkeypatch, opens):
     def refused(*_, **__):
         raise InputError("port 8080 cannot be had")

@@ -9,6 +9,8 @@ import rift_cl as rift
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.interop.astra import from_astra, to_astra
 
+pytestmark = pytest.mark.once
+
 ANGLES = np.linspace(-0.4, 3.9, 11)
 
 

@@ -10,6 +10,8 @@ from rift_cl.errors import DTypeError, InputError, ShapeError
 torch = pytest.importorskip("torch", reason="torch is not installed")
 from test_gsplat_rasterization import CAMERAS, draw, scene  # noqa: E402 - needs torch
 
+pytestmark = pytest.mark.once
+
 
 @pytest.mark.parametrize(
     ("options", "words"),

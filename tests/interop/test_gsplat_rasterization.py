@@ -15,6 +15,8 @@ torch = pytest.importorskip("torch", reason="torch is not installed")
 from rift_cl.interop import torch as interop  # noqa: E402 - it needs torch
 from rift_cl.interop.gsplat import rasterization  # noqa: E402
 
+pytestmark = pytest.mark.once
+
 HEIGHT, WIDTH, COUNT, CAMERAS = 45, 61, 70, 3
 NAMES = ("means", "quats", "scales", "opacities")
 ROWS = ("means2d", "conics", "depths", "opacities", "radii")

@@ -13,6 +13,8 @@ from rift_cl.errors import DTypeError, NonFiniteError
 from rift_cl.interop.scipy import aslinearoperator
 from rift_cl.reconstruct import FilteredBackprojection
 
+pytestmark = pytest.mark.once
+
 TYPES = ("float32", "float64")
 SMALLEST = {"float32": 1e-5, "float64": 1e-13}
 

@@ -14,6 +14,8 @@ import rift_cl.interop.skimage as adapter
 from rift_cl.errors import DTypeError, InputError, NonFiniteError, ShapeError
 from rift_cl.interop.skimage import iradon, radon
 
+pytestmark = pytest.mark.once
+
 FILTERS = ("ramp", "shepp-logan", "cosine", "hamming", "hann", None)
 INTERPOLATIONS = ("linear", "nearest", "cubic")
 both = pytest.mark.parametrize("circle", [True, False])

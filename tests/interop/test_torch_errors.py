@@ -10,6 +10,8 @@ from rift_cl.splat.settings import SplatSettings
 torch = pytest.importorskip("torch", reason="torch is not installed")
 from test_torch_render import NAMES, cameras, render, scene, tensors_of  # noqa: E402 - needs torch
 
+pytestmark = pytest.mark.once
+
 BAD = {
     "double": ({"means": lambda t: t.double()}, DTypeError, r"means.*float64.*call"),
     "whole numbers": ({"opacities": lambda t: t.int()}, DTypeError, "opacities.*int32"),

@@ -12,6 +12,8 @@ from rift_cl.reconstruct import FilteredBackprojection
 torch = pytest.importorskip("torch", reason="torch is not installed")
 from rift_cl.interop.linear_torch import apply  # noqa: E402 - needs torch
 
+pytestmark = pytest.mark.once
+
 # torch's own forward mode compiles with what torch itself has given up.
 forward_mode = pytest.mark.filterwarnings("ignore:.*torch.jit.script:DeprecationWarning")
 

@@ -13,6 +13,8 @@ from rift_cl.splat.splats import Splats
 torch = pytest.importorskip("torch", reason="torch is not installed")
 from rift_cl.interop import torch as interop  # noqa: E402 - it needs torch
 
+pytestmark = pytest.mark.once
+
 SIZE = (45, 61)
 NAMES = ("means", "quats", "scales", "opacities")
 

@@ -14,6 +14,8 @@ from rift_cl.operators.filters.compensation import COMPENSATIONS, LEVEL, Compens
 from rift_cl.operators.filters.directions import Directions
 from rift_cl.reference import filter_rows, response_taps
 
+pytestmark = pytest.mark.dealt
+
 KINDS = tuple(COMPENSATIONS)
 BINS, PITCH = 96, 1.0
 DIAMETER = 96.0

@@ -10,6 +10,8 @@ from rift_cl.errors import InputError
 from rift_cl.operators.filters.compensation import COMPENSATIONS, Compensation
 from rift_cl.operators.filters.compensation_3d import central_planes, radial_lines
 
+pytestmark = pytest.mark.dealt
+
 KINDS = tuple(COMPENSATIONS)
 DIAMETER = 20.0
 K = np.array([0.0, 0.01, 0.05, 0.1, 0.25, 0.5])

@@ -24,6 +24,8 @@ from rift_cl.reconstruct.direct.filtered_backprojection import FilteredBackproje
 from rift_cl.reference import radon
 from rift_cl.reference.band_limited import band_limited
 
+pytestmark = pytest.mark.dealt
+
 ROUNDING = 1e-5
 # Errors that between them take narrow kernels and wide ones.
 ERRORS = (3e-2, 1e-3, 1e-5)
@@ -92,6 +94,7 @@ def test_the_named_error_is_met_on_any_geometry(device, scene, lobes):
     assert relative(A.T(y), exact.backproject(y), floor * np.linalg.norm(y)) <= 1e-3
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("n", [24, 41])
 @pytest.mark.parametrize("error", ERRORS)
 def test_the_named_error_is_met_at_any_size(device, n, error):

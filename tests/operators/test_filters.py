@@ -10,6 +10,8 @@ from rift_cl.errors import InputError, ShapeError
 from rift_cl.operators import FILTERS, ViewFilter, as_filter, register_filter
 from rift_cl.reference import filter_rows, ramp_taps, response_taps, shepp_logan_taps
 
+pytestmark = pytest.mark.dealt
+
 NAMES = ("ram-lak", "shepp-logan", "cosine", "hamming", "hann", "high-pass")
 AT_NYQUIST = {"ram-lak": 1, "shepp-logan": 2 / np.pi, "cosine": 0, "hamming": 0.08, "hann": 0}
 BINS, PITCH = 200, 0.7

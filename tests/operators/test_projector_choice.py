@@ -11,6 +11,8 @@ from rift_cl.metrics import psnr
 from rift_cl.operators import cheapest_projector
 from rift_cl.phantom import shepp_logan, shepp_logan_sinogram
 
+pytestmark = pytest.mark.dealt
+
 
 def half_turn(views, bins, **settings):
     return Parallel(np.linspace(0, np.pi, views, endpoint=False), bins, **settings)

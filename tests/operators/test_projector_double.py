@@ -16,6 +16,8 @@ from rift_cl.cl.arithmetic import axpby
 from rift_cl.errors import DeviceError, DTypeError, NonFiniteError, ResourceLimitError
 from rift_cl.operators.projector.footprint import FOOTPRINTS
 
+pytestmark = pytest.mark.dealt
+
 GRID = rift.Grid((12, 15))
 SCAN = rift.Parallel(np.linspace(0, np.pi, 8, endpoint=False), bins=21)
 X = np.random.default_rng(3).standard_normal(GRID.shape)

@@ -16,6 +16,8 @@ import pytest
 from rift_cl import Grid, Parallel, Projector, fbp, metrics, phantom, sirt
 from rift_cl.operators.projector.footprint import FOOTPRINTS
 
+pytestmark = pytest.mark.dealt
+
 HALF = np.linspace(0, np.pi, 192, endpoint=False)
 TIES = [0, np.pi / 4, np.pi / 2, 3 * np.pi / 4, np.pi, 1e-9, np.pi / 2 - 1e-9]
 WHOLE = [

@@ -10,6 +10,8 @@ from rift_cl.reconstruct.preprocess.alignment import straightened, tilt_halo, up
 from rift_cl.reconstruct.preprocess.sinc_interpolation import resampled
 from rift_cl.reference import resample as twin
 
+pytestmark = pytest.mark.dealt
+
 
 @pytest.mark.parametrize("bins", [5, 16, 61])
 @pytest.mark.parametrize("rows", [1, 4])

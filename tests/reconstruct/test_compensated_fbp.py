@@ -16,6 +16,8 @@ from rift_cl.operators import Ramp, ViewFilter
 from rift_cl.operators.filters.compensation import COMPENSATIONS, Compensation
 from rift_cl.reconstruct import FilteredBackprojection
 
+pytestmark = pytest.mark.once
+
 RANDOM = np.random.default_rng(11)
 HALF = np.linspace(0, np.pi, 96, endpoint=False)
 ANGLES = {

@@ -18,6 +18,8 @@ from rift_cl.reconstruct import FilteredBackprojection
 from rift_cl.reconstruct.direct.view_weights import view_weights
 from rift_cl.reference import filter_rows, radon, ramp_taps
 
+pytestmark = pytest.mark.once
+
 LEVEL = 1.7
 RANDOM = np.random.default_rng(11)
 HALF = np.linspace(0, np.pi, 96, endpoint=False)

@@ -24,6 +24,8 @@ from rift_cl.reconstruct.solvers.tv_functional import TotalVariation
 from rift_cl.reference import total_variation as twin
 from rift_cl.reference.level_pull import level_penalty, level_pull
 
+pytestmark = pytest.mark.dealt
+
 RANDOM = np.random.default_rng(21)
 WEDGE = DirectionWeights(0.7, seen=1.3, unseen=0.2)
 LEVELS = (-0.5, 0.2, 1.0, 1.5)

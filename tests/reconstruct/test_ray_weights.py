@@ -22,6 +22,8 @@ from rift_cl.reconstruct import (
 )
 from rift_cl.reference import total_variation as twin
 
+pytestmark = pytest.mark.once
+
 RANDOM = np.random.default_rng(11)
 every_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 

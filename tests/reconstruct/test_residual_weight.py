@@ -12,6 +12,8 @@ from rift_cl.reconstruct.solvers.data_term import DataTerm
 from rift_cl.reconstruct.solvers.residual_weight import mean_power
 from rift_cl.reconstruct.solvers.simultaneous_iteration import Sirt
 
+pytestmark = pytest.mark.once
+
 RANDOM = np.random.default_rng(8)
 
 

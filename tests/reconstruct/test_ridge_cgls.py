@@ -9,6 +9,8 @@ from solver_cases import Matrix
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.reconstruct import Cgls, cgls, mean_diagonal
 
+pytestmark = pytest.mark.dealt
+
 SHAPE, PICTURES = (5, 3), (4, 6, 2)
 
 

@@ -9,6 +9,8 @@ from rift_cl.reconstruct.preprocess import STRIPE_METHODS, remove_rings
 from rift_cl.reconstruct.preprocess.stripe_detection import fluctuating, offset
 from rift_cl.reference import detector_columns as twin
 
+pytestmark = pytest.mark.dealt
+
 BINS, VIEWS = 192, 240
 ANGLES = np.arange(VIEWS) * np.pi / VIEWS
 GRID, SCAN = rift.Grid((BINS, BINS)), rift.Parallel(ANGLES, BINS)

@@ -11,6 +11,8 @@ from rift_cl.metrics import psnr
 from rift_cl.phantom import shepp_logan, shepp_logan_sinogram
 from rift_cl.reconstruct.solvers.simultaneous_iteration import inverse_sums
 
+pytestmark = pytest.mark.once
+
 HALF = np.linspace(0, np.pi, 100, endpoint=False)
 SCENES = {
     "detector wider than the image": (Grid((64, 64)), Parallel(HALF, bins=91)),
@@ -38,6 +40,7 @@ def test_it_is_as_good_as_on_the_direct_projector(device, name, nonnegative):
     assert fast > direct - 0.1
 
 
+@pytest.mark.full
 def test_steps_never_grow_the_residual(device):
     """Weights that ringing has made large would: 200 steps at nearly the greatest relaxation."""
     grid, scan = SCENES["detector wider than the image"]

@@ -14,6 +14,8 @@ from rift_cl.reconstruct.solvers.fista import Fista
 from rift_cl.reconstruct.solvers.simultaneous_iteration import sirt
 from rift_cl.reconstruct.solvers.tv import tv
 
+pytestmark = pytest.mark.once
+
 every_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 FUNCTIONS = {
     "cgls": cgls,

@@ -10,6 +10,8 @@ from rift_cl import Device, Parallel, Projector
 from rift_cl.errors import CheckpointError, InputError, ResourceLimitError
 from rift_cl.reconstruct import Cgls, Fista, tv
 
+pytestmark = pytest.mark.once
+
 every_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 
 

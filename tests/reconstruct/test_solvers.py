@@ -16,6 +16,8 @@ from rift_cl.reconstruct.solvers.simultaneous_iteration import Sirt, sirt
 from rift_cl.reconstruct.solvers.tv import tv
 from rift_cl.reference import total_variation as twin
 
+pytestmark = pytest.mark.once
+
 RANDOM = np.random.default_rng(8)
 every_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 both_types = pytest.mark.parametrize(("dtype", "close"), [("float32", 1e-2), ("float64", 1e-8)])

@@ -9,6 +9,8 @@ from rift_cl.errors import ShapeError
 from rift_cl.reconstruct.solvers.tv_functional import TotalVariation
 from rift_cl.reference import total_variation as twin
 
+pytestmark = pytest.mark.dealt
+
 SHAPES = {
     "image": ((17, 23), (1.0, 1.0)),
     "anisotropic image": ((12, 9), (0.3, 2.5)),

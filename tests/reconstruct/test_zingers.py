@@ -7,6 +7,8 @@ from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.reconstruct.preprocess import remove_zingers
 from rift_cl.reference import zingers as twin
 
+pytestmark = pytest.mark.dealt
+
 SHAPE = (90, 12, 160)
 
 

@@ -55,6 +55,7 @@ def test_a_plan_in_a_sector_beats_rings_arcs_and_even_views():
     assert "Planning gains little (isotropic target, constrained cameras)" in found.verdict()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("snr", [30.0, 1000.0])
 def test_free_views_of_an_isotropic_target_gain_little_and_the_plan_says_so(snr):
     found = plan(Target(CENTER, 60.0, band=6 / 60, snr=snr), 24)
@@ -103,6 +104,7 @@ def test_a_known_direction_of_detail_is_looked_at():
     assert "anisotropic target, free cameras" in found.verdict()
 
 
+@pytest.mark.full
 def test_the_same_seed_gives_the_same_plan_and_another_turns_it():
     first, again, other = (plan(TARGET, 6, Constraints(**SECTOR), seed=s) for s in (1, 1, 2))
     np.testing.assert_array_equal(first.view_table.table, again.view_table.table)
@@ -146,6 +148,7 @@ def test_lenses_are_set_within_their_ranges_and_to_advantage():
         assert camera.K[0, 0] * 30 / math.sqrt(away**2 - 900) <= 500 * (1 + 1e-6)
 
 
+@pytest.mark.full
 def test_of_two_types_each_is_taken_where_it_is_worth_its_price():
     limits = Constraints(distance=(100, 600), budget=Budget(12, {"wide": 1, "long": 3}))
     found = plan(TARGET, 30, limits, (WIDE, LONG))
@@ -173,6 +176,7 @@ def test_exposure_is_dealt_out_within_the_budget():
     np.testing.assert_allclose([kind.exposure for kind in found.types], found.exposure)
 
 
+@pytest.mark.full
 def test_further_views_go_where_the_first_left_most_unknown():
     first = plan(TARGET, 5, Constraints(**SECTOR))
     more = next_views(first, TARGET, 5)

@@ -12,6 +12,8 @@ from rift_cl.splat.projection import project
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 
+pytestmark = pytest.mark.dealt
+
 
 def projected_on(device, values, modal):
     """What projection gives, and the table of modes, on the host."""

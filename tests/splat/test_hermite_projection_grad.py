@@ -25,6 +25,8 @@ from rift_cl.geometry import Aperture
 from rift_cl.splat.projection import project, project_grad
 from rift_cl.splat.splats import Splats
 
+pytestmark = pytest.mark.dealt
+
 PIXELS, STEP = 7, 1e-5
 CHANNELS = 4
 

@@ -14,6 +14,8 @@ from rift_cl.reference.hermite_projection import splat_roots
 from rift_cl.splat.orders import order_of
 from rift_cl.splat.raster_pass import draw
 
+pytestmark = pytest.mark.dealt
+
 
 def same_but_for_thresholds(found, right):
     """A pixel here and there has a splat more or less of 1/255, as rounding has it."""

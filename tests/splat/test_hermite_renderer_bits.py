@@ -15,6 +15,8 @@ from rift_cl.splat import Renderer, Splats, SplatSettings
 from rift_cl.splat.bands import FrameMemory, entries_per_row
 from rift_cl.splat.tile_lists import Tiles
 
+pytestmark = pytest.mark.dealt
+
 RASTER_PASS = importlib.import_module("rift_cl.splat.raster_pass")
 
 

@@ -24,6 +24,8 @@ from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 
+pytestmark = pytest.mark.dealt
+
 SIZE, STEP, COUNT = (17, 23), 1e-5, 12
 # Orders of shape and colour, camera, settings.
 WAYS = {

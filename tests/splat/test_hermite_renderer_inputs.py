@@ -13,6 +13,8 @@ from rift_cl.splat import Splats, SplatSettings
 from rift_cl.splat.orders import count_of, order_of
 from rift_cl.splat.projection import CULL_REASONS
 
+pytestmark = pytest.mark.dealt
+
 
 @pytest.mark.full
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 1e30])

@@ -12,6 +12,8 @@ from rift_cl.basis.angular import angular_basis
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.splat import Renderer, Splats, SplatSettings, draw_views, views_grad
 
+pytestmark = pytest.mark.dealt
+
 FUNCTIONS = {"hg": 4, "lg": 4, "sg": 3, "asg": 3}
 
 

@@ -9,6 +9,8 @@ from projection_scenes import KINDS, Kind, changed, plain, projected_on, random_
 from rift_cl.reference.splat_projection import covariances
 from rift_cl.splat.settings import SplatSettings
 
+pytestmark = pytest.mark.dealt
+
 
 def close_calls(twin, kind):
     """Splats for which rounding decides a radius, a tile or a cull."""

@@ -13,6 +13,8 @@ from rift_cl.splat.projection import project
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 
+pytestmark = pytest.mark.dealt
+
 CULLS = {
     "visible": (plain(), 0),
     "nearly transparent": (plain(opacities=[1.001 / 255]), 0),

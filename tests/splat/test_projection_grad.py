@@ -15,6 +15,8 @@ from rift_cl.splat.settings import SplatSettings
 
 pytest.importorskip("torch", reason="the oracle of gradients is torch's autograd")
 made = pytest.importorskip("projection_gradients")
+
+pytestmark = pytest.mark.dealt
 run, oracle, error, errors_by_splat = made.run, made.oracle, made.error, made.errors_by_splat
 
 

@@ -14,6 +14,8 @@ from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 from rift_cl.splat.tile_lists import Tiles
 
+pytestmark = pytest.mark.dealt
+
 SIZE = (45, 61)
 BACKGROUND = np.float32([0.2, 0.5, 0.9])
 WAYS = {

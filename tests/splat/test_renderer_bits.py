@@ -25,6 +25,8 @@ from rift_cl.splat import Renderer, Splats, SplatSettings
 from rift_cl.splat.bands import FrameMemory, check_fixed, entries_per_row, plan_bands
 from rift_cl.splat.tile_lists import Tiles
 
+pytestmark = pytest.mark.dealt
+
 RASTER_PASS = importlib.import_module("rift_cl.splat.raster_pass")
 SIZE, TILE = (120, 160), 8
 

@@ -18,6 +18,8 @@ from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 
+pytestmark = pytest.mark.dealt
+
 SIZE = (33, 41)
 STEP = 1e-5
 WAYS = {

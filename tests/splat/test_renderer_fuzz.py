@@ -19,6 +19,8 @@ import rift_cl as rift
 from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
 from rift_cl.splat import Renderer, Splats, SplatSettings
 
+pytestmark = pytest.mark.dealt
+
 
 @dataclass(frozen=True)
 class Way(Kind):

@@ -10,6 +10,8 @@ from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 
+pytestmark = pytest.mark.dealt
+
 SIZE = (97, 143)
 SHARED = ("means", "quats", "scales", "opacities")
 

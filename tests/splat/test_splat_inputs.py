@@ -13,6 +13,8 @@ from rift_cl.splat.projection import project
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 
+pytestmark = pytest.mark.dealt
+
 
 def test_camera_and_settings_must_agree(device):
     splats = upload(device, plain(), Kind())

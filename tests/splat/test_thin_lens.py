@@ -23,6 +23,8 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Aperture, Camera
 from rift_cl.splat import Renderer, SplatSettings, views_grad
 
+pytestmark = pytest.mark.dealt
+
 FOCAL, SIZE = 150.0, (96, 96)
 
 

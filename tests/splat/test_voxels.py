@@ -19,6 +19,8 @@ from rift_cl.splat import Renderer, Splats, SplatSettings
 from rift_cl.splat.orders import count_of
 from rift_cl.train.xray.voxels import Footprints
 
+pytestmark = pytest.mark.dealt
+
 ORDERS = (0, 1, 2, 4, 8)
 # Neither symmetric nor even, and no whole number of bricks.
 GRID = rift.Grid((13, 19, 37), (0.11, 0.09, 0.05), (0.2, -0.1, 0.3))

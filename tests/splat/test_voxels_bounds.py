@@ -12,6 +12,8 @@ from rift_cl.reference.splat_projection import covariances
 from rift_cl.splat import Splats
 from rift_cl.splat.voxels import voxelise
 
+pytestmark = pytest.mark.dealt
+
 GRID = rift.Grid((21, 40, 50), 0.06, (0.1, 0, 0))
 
 

@@ -15,6 +15,8 @@ import rift_cl as rift
 from rift_cl.reference.splat_projection import covariances
 from rift_cl.splat import Renderer, Splats, SplatSettings
 
+pytestmark = pytest.mark.dealt
+
 # The axes, a diagonal, and one in every other part of the circle.
 ANGLES = np.array([0.0, 0.4, np.pi / 4, np.pi / 2, 2.3, 3.9, 5.5])
 COUNT = 30

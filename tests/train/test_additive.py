@@ -15,6 +15,8 @@ from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.xray.additive import Additive
 
+pytestmark = pytest.mark.once
+
 VIEWS = 3
 
 

@@ -15,6 +15,8 @@ from rift_cl.reference.training import activate, finest_known, finest_seen
 from rift_cl.train.band_limit import Detail, camera_table, unseen_length
 from rift_cl.train.parameters import Parameters
 
+pytestmark = pytest.mark.dealt
+
 
 def limited(device, raw, cameras, detail=None):
     parameters = Parameters.of(device, raw)

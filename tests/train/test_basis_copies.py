@@ -14,6 +14,8 @@ from rift_cl.train.strategy.default import DefaultSettings, densify
 from rift_cl.train.strategy.mcmc import relocate
 from rift_cl.train.strategy.xray import relocate_densities
 
+pytestmark = pytest.mark.once
+
 
 def test_splats_that_share_a_place_have_the_depth_of_the_one_before(device):
     """Depths add up, so that a copy and its host show exactly what the host did."""

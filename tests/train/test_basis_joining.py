@@ -19,6 +19,8 @@ from rift_cl.train.trainer import Trainer
 from rift_cl.train.xray.settings import XrayTrainSettings
 from rift_cl.train.xray.trainer import XrayTrainer
 
+pytestmark = pytest.mark.once
+
 STEPS = 30
 BOTH = BasisSettings("hermite", 1, 1, first=0, ridge=0)
 KINDS = {

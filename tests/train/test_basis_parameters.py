@@ -13,6 +13,8 @@ from rift_cl.reference.training import activate, adam_step
 from rift_cl.splat.orders import count_of
 from rift_cl.train.parameters import GROUPS, MORE, Parameters
 
+pytestmark = pytest.mark.dealt
+
 MORE_RATES = RATES | {"shape_modes": 3e-3, "color_modes": 2e-3, "lobes": 1e-2}
 COUNT = 37
 

@@ -19,6 +19,8 @@ from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
 from rift_cl.train.start.points import field_diameter, focus_of
 
+pytestmark = pytest.mark.once
+
 EDGE = 256
 
 

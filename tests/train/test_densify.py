@@ -10,6 +10,8 @@ from rift_cl.reference.splat_projection import covariances
 from rift_cl.train.parameters import GROUPS, Parameters
 from rift_cl.train.strategy.default import DefaultSettings, densify, reset_opacities
 
+pytestmark = pytest.mark.dealt
+
 COUNT = 60
 SMALL, LARGE = np.log(0.005), np.log(0.05)
 PULLED, STILL = 1e-3, 1e-5

@@ -19,6 +19,8 @@ from rift_cl.train.xray.additive import Additive
 from rift_cl.train.xray.density_solve import DensityProblem, solve_densities
 from rift_cl.train.xray.solve_settings import SolveSettings
 
+pytestmark = pytest.mark.once
+
 EXACT = SolveSettings(every=1, iterations=40, ridge=1e-7)
 
 

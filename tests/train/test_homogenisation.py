@@ -11,6 +11,8 @@ from rift_cl.train.loss.homogenisation import Homogenisation, noise_of
 from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
 from rift_cl.train.loss.image_loss import ImageLoss
 
+pytestmark = pytest.mark.once
+
 SIZE = (24, 30)
 
 

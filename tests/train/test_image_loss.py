@@ -12,6 +12,8 @@ from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
 from rift_cl.reference import image_loss as twin
 from rift_cl.train.loss.image_loss import ImageLoss
 
+pytestmark = pytest.mark.dealt
+
 # Of the second, a strip of 256 floats leaves two.
 SIZES = [(11, 11), (12, 86), (13, 200), (97, 143)]
 

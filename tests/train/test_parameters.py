@@ -10,6 +10,8 @@ import pytest
 from rift_cl.reference.training import activate, adam_step, noise
 from rift_cl.train.parameters import GROUPS, Parameters
 
+pytestmark = pytest.mark.dealt
+
 RATES = {"means": 1e-3, "quats": 2e-3, "log_scales": 5e-3, "logits": 5e-2, "sh": 2.5e-3}
 FREE = {"sh_rest": 0.2, "opacity_penalty": 0.0, "scale_penalty": 0.0}
 

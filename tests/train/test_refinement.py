@@ -11,6 +11,8 @@ from rift_cl.geometry import Camera
 from rift_cl.train.per_view.exposures import Exposures
 from rift_cl.train.per_view.poses import Poses, twist_gradient
 
+pytestmark = pytest.mark.dealt
+
 
 def disturbed(cameras, turn, shift, seed=0):
     random = np.random.default_rng(seed)

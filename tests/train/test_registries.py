@@ -25,6 +25,8 @@ from rift_cl.train import (
     register_strategy,
 )
 
+pytestmark = pytest.mark.once
+
 
 @dataclass(frozen=True)
 class Still(StrategySettings):

@@ -16,6 +16,8 @@ from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.strategy.screen_statistics import ScreenStatistics
 
+pytestmark = pytest.mark.dealt
+
 COUNT, SIZE = 300, (90, 160)
 
 

@@ -18,6 +18,8 @@ from rift_cl.train.xray.settings import XrayTrainSettings
 from rift_cl.train.xray.solve_settings import SolveSettings
 from rift_cl.train.xray.trainer import XrayTrainer
 
+pytestmark = pytest.mark.once
+
 STEPS = 24
 
 
@@ -53,7 +55,7 @@ def run_to(trainer, step):
 def test_a_fit_goes_on_from_any_state_to_the_same_bits(device, rows):
     pictures = pictures_of(device, scene(0, flat=rows == 1), rows=rows)
     whole, states = trainer_of(device, pictures, rows=rows), []
-    for step in (0, 5, 8, 17):
+    for step in (5, 17):
         run_to(whole, step)
         states.append(whole.state())
     run_to(whole, STEPS)

@@ -17,6 +17,8 @@ from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import random_points, scene_extent, start_splats
 from rift_cl.train.strategy import DefaultSettings, DefaultStrategy, McmcSettings, TrainingRun
 
+pytestmark = pytest.mark.once
+
 RATES = {"means": 1e-3, "quats": 1e-3, "log_scales": 5e-3, "logits": 5e-2, "sh": 2.5e-3}
 MCMC = TrainSettings(steps=40, splats=90, cooldown=0.25, strategy=McmcSettings(first=10, every=5))
 # The scene is as large as its extent and its splats are few, so that size prunes none.

@@ -20,6 +20,8 @@ from rift_cl.train.start.points import start_splats
 from rift_cl.train.strategy import McmcSettings, McmcStrategy, TrainingRun
 from rift_cl.train.trainer import Trainer
 
+pytestmark = pytest.mark.once
+
 
 def trained(device, **more):
     """A small fit: its reports, and how many splats each of its steps had."""
@@ -44,6 +46,7 @@ def trained(device, **more):
     return trainer, list(trainer.run()), counts
 
 
+@pytest.mark.full
 def test_the_numbers_of_splats_are_forecast_to_the_last(device):
     trainer, _, counts = trained(device)
     assert counts[0] == 25 and counts[-1] == 80

@@ -18,6 +18,8 @@ from rift_cl.train.start.points import hull_points, random_points, start_splats
 from rift_cl.train.strategy import McmcSettings
 from rift_cl.train.trainer import Trainer
 
+pytestmark = pytest.mark.once
+
 MIDDLE = np.array([0.3, -0.2, 0.1])
 SETTINGS = TrainSettings(
     steps=120,
@@ -105,6 +107,7 @@ def test_learning_rates_fall_and_fall_further_in_the_cooldown():
         assert last[name] == pytest.approx(0.05 * middle[name]), name
 
 
+@pytest.mark.full
 def test_the_hull_is_where_every_mask_agrees():
     cameras = ring(16)
     masks = []

@@ -18,6 +18,8 @@ from rift_cl.train.strategy.mcmc import relocate
 from rift_cl.train.strategy.xray import relocate_densities
 from rift_cl.train.xray.voxels import Footprints
 
+pytestmark = pytest.mark.once
+
 MIN_MASS = 0.05
 
 
