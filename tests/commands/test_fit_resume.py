@@ -28,7 +28,7 @@ VARIANTS = {
 
 
 def settings(capture, out, **more):
-    given = {"steps": 150, "splats": 200, "hold_out": 4, "checkpoint_every": 25}
+    given = {"steps": 100, "splats": 200, "hold_out": 4, "checkpoint_every": 20}
     return FitPhotosSettings.of(capture, out, **(given | more))
 
 
@@ -67,13 +67,13 @@ def test_a_fit_that_was_broken_off_goes_on_to_the_same_bits(capture, tmp_path, v
     more = VARIANTS[variant]
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     list(Fit(settings(capture, whole, **more)).run())
-    broken_off(settings(capture, cut, **more), 50)
+    broken_off(settings(capture, cut, **more), 25)
     assert not (cut / "scene.ply").exists()
-    words = broken_off(settings(capture, cut, resume=True, **more), 100)
-    assert "after step 10" in words and words.endswith("--resume")
+    words = broken_off(settings(capture, cut, resume=True, **more), 50)
+    assert "after step 5" in words and words.endswith("--resume")
     job = Fit(settings(capture, cut, resume=True, **more))
     done = [report.done for report in job.run() if report.what == "steps"]
-    assert done[0] > 100
+    assert done[0] > 50
     assert digest(cut) == digest(whole)
     other = Fit(settings(capture, whole, resume=True, **more))
     list(other.run())
@@ -85,7 +85,7 @@ def test_other_settings_cannot_go_on(capture, tmp_path, capsys):
     broken_off(settings(capture, tmp_path / "fit"), 25)
     before = contents(tmp_path / "fit")
     for name, value, words in (("seed", 8, "0, now it is 8"), ("hold-out", 3, "4, now it is 3")):
-        other = ("--resume", "--steps", "150", f"--{name}", str(value))
+        other = ("--resume", "--steps", "100", f"--{name}", str(value))
         assert fit(capture, tmp_path / "fit", *other) == 3
         assert f"had {name.replace('-', '_')} {words}" in capsys.readouterr().err
         assert contents(tmp_path / "fit") == before
