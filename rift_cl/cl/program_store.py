@@ -92,7 +92,9 @@ def begun(name: str) -> Iterator[bool]:
     it, or was ended meanwhile. It stays, and the program is left to a child from then on.
     """
     path = _path(name).with_suffix(_BEGUN)
-    first = not path.exists()
+    first = True
+    with contextlib.suppress(OSError):
+        first = not path.exists()
     if not first:
         yield False
         return

@@ -1,1 +1,1 @@
-"""``rift cache``: the compiled kernels that drivers keep."""
+"""``rift cache``: the compiled kernels that are kept."""

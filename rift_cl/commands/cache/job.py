@@ -1,4 +1,4 @@
-"""``rift cache``: show or remove the compiled kernels that drivers keep."""
+"""``rift cache``: show or remove the compiled kernels that are kept."""
 
 from __future__ import annotations
 

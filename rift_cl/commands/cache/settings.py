@@ -9,6 +9,8 @@ from dataclasses import dataclass
 class CacheSettings:
     """Show where compiled kernels are kept and how much disk space they take, or remove them.
 
+    What is known of drivers ('rift devices') is kept with them, and removed with them.
+
     Example: rift cache --clear
     """
 

@@ -17,19 +17,24 @@ from typing import Any
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import open_device
 from rift_cl.commands.devices.families import FAMILIES, Results, deviation, stored_results
-from rift_cl.errors import RiftError
+from rift_cl.errors import DeviceError, ResourceLimitError
 
 
 def try_family(
     device: Device, family: Callable[[Device], Results], wanted: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Try a device on one family: its ``deviation`` or its ``error``, and its ``kernels``."""
+    """Try a device on one family: its ``deviation`` or its ``error``, and its ``kernels``.
+
+    Numbers that are so wrong that they raise an error are infinitely far off, and both are told.
+    """
     fresh = Device(device._handle, device.selector, traits=device.traits)
     found: dict[str, Any] = {}
     try:
         found["deviation"] = deviation(family(fresh), wanted)
-    except RiftError as error:
+    except (DeviceError, ResourceLimitError) as error:
         found["error"] = str(error)
+    except Exception as error:
+        found |= {"deviation": float("inf"), "error": f"wrong numbers ({error})"}
     return {**found, "kernels": fresh.kernels}
 
 
