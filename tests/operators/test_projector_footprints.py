@@ -82,6 +82,7 @@ def test_a_uniform_disc_comes_back_flat(device, size, spacing, center, views, mo
     assert deviation < most
 
 
+@pytest.mark.full
 def test_a_uniform_disc_comes_back_flat_in_double_precision(device):
     mean, deviation = interior(device, 128, 360, 1.0, 0.0, dtype="float64")
     assert abs(mean - 1) < 2e-3

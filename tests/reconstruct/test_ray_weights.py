@@ -83,6 +83,7 @@ def test_sirt_with_weights_is_its_formula(device):
     np.testing.assert_allclose(found, x, atol=2e-4 * x.max())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("precondition", [None, "ramp"])
 def test_fista_and_pdhg_reach_the_same_weighted_minimum(device, precondition):
     A, _, _, y = problem(device, noise=0.1)

@@ -36,6 +36,7 @@ def test_modes_that_are_zero_change_nothing(device, mode):
         assert np.abs(found - right).max() < 5e-4 * np.abs(right).max()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("mode", ["light", "xray"])
 def test_gradients_of_modes_that_are_zero_are_those_of_gaussians(device, mode):
     values = random_splats(40, coefficients=4, wide=1.0)
