@@ -17,9 +17,18 @@ import tyro
 
 from rift_cl import __version__
 from rift_cl.commands.console_table import print_table
-from rift_cl.commands.interruption import gentle_interrupt
 from rift_cl.commands.progress_bar import print_line
-from rift_cl.commands.runner import Output, command, exit_status, parsed, ran, run_job, told, watch
+from rift_cl.commands.runner import (
+    Output,
+    command,
+    exit_status,
+    gentle_interrupt,
+    parsed,
+    ran,
+    run_job,
+    told,
+    watch,
+)
 
 _USAGE = 2
 

@@ -9,12 +9,16 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import signal
 import sys
+import threading
 import traceback
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from inspect import Parameter, Signature
+from types import FrameType
 from typing import Annotated, Any, Literal
 
 import tyro
@@ -198,3 +202,23 @@ def _say(sentence: str, status: int) -> int:
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     print_line(f"rift: warning: {message}")
+
+
+@contextmanager
+def gentle_interrupt(stop: Callable[[], None]) -> Iterator[None]:
+    """Call ``stop`` at the first Ctrl-C; the second breaks off at once, as usual."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # Signals are the main thread's.
+        return
+    usual = signal.getsignal(signal.SIGINT)
+
+    def heard(number: int, frame: FrameType | None) -> None:
+        signal.signal(signal.SIGINT, usual)
+        stop()
+        print_line("rift: stopping after this step; Ctrl-C again stops at once")
+
+    signal.signal(signal.SIGINT, heard)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)

@@ -10,11 +10,10 @@ import pytest
 from test_start import MIDDLE_OF_RING, ring
 
 from rift_cl.commands.analyze.facts import missing, resolution, unknown_share
-from rift_cl.commands.analyze.input import open_sampled
+from rift_cl.commands.analyze.input import fan_cameras, open_sampled
 from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.analyze.suggestions import angles_to_add
 from rift_cl.commands.cli import main
-from rift_cl.commands.inputs.fan_views import fan_cameras
 from rift_cl.geometry import Camera, FanBeam
 from rift_cl.geometry.aperture import Aperture
 from rift_cl.io.captures.transforms_record import transforms_of

@@ -14,9 +14,8 @@ from rift_cl.commands.cli import main
 from rift_cl.commands.inputs.scene_bounds import SceneBounds
 from rift_cl.commands.view import viewer as viewer_module
 from rift_cl.commands.view.crop import Crop
-from rift_cl.commands.view.pace import Pace
 from rift_cl.commands.view.pose import Pose
-from rift_cl.commands.view.viewer import SplatViewer
+from rift_cl.commands.view.viewer import Pace, SplatViewer
 from rift_cl.commands.view.wish import Wish
 from rift_cl.errors import InputError
 from rift_cl.geometry.pose import look_at

@@ -16,8 +16,7 @@ from rift_cl.commands.cameras.film_path import first_view
 from rift_cl.commands.inputs.scene_bounds import SceneBounds, bounds_of_cameras
 from rift_cl.commands.view import path_panel
 from rift_cl.commands.view.crop import Crop, cropped
-from rift_cl.commands.view.key_frames import KeyFrame, path_file, way_through
-from rift_cl.commands.view.path_panel import PathPanel
+from rift_cl.commands.view.path_panel import KeyFrame, PathPanel, path_file, way_through
 from rift_cl.commands.view.photographs import (
     Photograph,
     compared,

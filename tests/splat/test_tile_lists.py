@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 import rift_cl as rift
 from rift_cl.errors import DTypeError, InputError, ResourceLimitError, ShapeError
 from rift_cl.reference.tile_lists import tile_lists as twin
-from rift_cl.splat import prefix_sum
-from rift_cl.splat.tile_lists import Tiles, tile_lists, tile_lists_bytes
+from rift_cl.splat.tile_lists import Tiles, scan_levels, tile_lists, tile_lists_bytes
 
 MODULE = importlib.import_module("rift_cl.splat.tile_lists")
 FIELDS = ("slots", "entries", "starts")
@@ -80,9 +79,7 @@ def test_random_splats(device, splats, sort):
 @pytest.mark.parametrize("sort", [True, False])
 @pytest.mark.parametrize("least", [2, 3])
 def test_every_way_of_cutting_the_work(device, monkeypatch, least, sort):
-    monkeypatch.setattr(prefix_sum, "_CPU_LEAST", least)
-    monkeypatch.setattr(prefix_sum, "GPU_RUN", least)
-    for name in ("GPU_RUN", "_GPU_PAIRS"):
+    for name in ("_CPU_LEAST", "GPU_RUN", "_GPU_PAIRS"):
         monkeypatch.setattr(MODULE, name, least)
     for splats in (1, 2, 5, 8, 9, 33, 70):
         boxes, depth = _scene(splats, tiles_x=4, tiles_y=3, seed=splats)
@@ -110,7 +107,7 @@ def test_culled_splats_between_visible_ones(device):
 
 def test_culled_splats_are_left_out_of_the_sort(device):
     keys, slots = np.array([7, 5, 9, 1], np.uint32), np.array([0, 3, 3, 4, 6], np.int32)
-    levels = prefix_sum.scan_levels(device, 1 << 12)
+    levels = scan_levels(device, 1 << 12)
     order, visible = MODULE._depth_order(device, device.array(keys), device.array(slots), levels)
     assert device.get(visible).tolist() == [3]
     assert device.get(order)[:3].tolist() == [3, 0, 2]

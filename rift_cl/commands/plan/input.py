@@ -1,4 +1,4 @@
-"""The input of a plan: the target, the cameras to choose from, and their constraints."""
+"""The input of a plan: the target, the cameras to choose from, their constraints in words."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.inputs.surfaces import SURFACE, hidden_places, surface_of
 from rift_cl.commands.inputs.view_set import Floats, ViewSet
 from rift_cl.commands.options import absolute_paths
-from rift_cl.commands.plan.keep_out_words import keep_out_of
 from rift_cl.commands.plan.settings import PlanSettings
 from rift_cl.errors import InputError
 from rift_cl.geometry.camera_type import CameraType
@@ -25,6 +24,7 @@ from rift_cl.io.lenses.lens_file import open_lens
 from rift_cl.io.volumes import read_volume
 from rift_cl.sampling.planning.constraints import Budget, Constraints, Ranges
 from rift_cl.sampling.planning.design_space import DISTANCE, DesignSpace
+from rift_cl.sampling.planning.keep_out import Box, Cone, KeepOut, Sphere
 from rift_cl.sampling.planning.paths import Free, Ring, Spline, TiltedRings
 from rift_cl.sampling.planning.paths import Path as Way
 from rift_cl.sampling.targets.directional_prior import Trusted
@@ -242,3 +242,44 @@ def _constraints(
         ranges={c.kind.name: Ranges(**c.ranges) for c in choices if c.ranges},
         up=(float(up[0]), float(up[1]), float(up[2])),
     )
+
+
+_BODY = "body-"
+_FORMS = {
+    "sphere": "sphere:X,Y,Z,RADIUS",
+    "box": "box:X,Y,Z,X,Y,Z",
+    "cone": "cone:X,Y,Z,DX,DY,DZ,DEGREES",
+}
+
+
+def keep_out_of(text: str) -> KeepOut:
+    """The place that a text such as ``sphere:0,0,-50,40`` names.
+
+    ``body-`` before it says that the target is not seen through it.
+
+    Raises:
+        InputError: it is no such text, or names an impossible shape.
+    """
+    hides = text.startswith(_BODY)
+    kind, _, rest = text.removeprefix(_BODY).partition(":")
+    try:
+        numbers = [float(part) for part in rest.split(",")]
+    except ValueError:
+        numbers = []
+    if kind not in _FORMS or len(numbers) != _FORMS[kind].count(",") + 1:
+        wanted = " or ".join(_FORMS.values())
+        raise InputError(f"--keep-out is {text!r}, wanted {wanted}, with 'body-' before it or not")
+    try:
+        return KeepOut(_shape(kind, numbers), hides)
+    except InputError as error:
+        raise InputError(f"--keep-out {text}: {error}") from error
+
+
+def _shape(kind: str, numbers: list[float]) -> Sphere | Box | Cone:
+    first, second = (numbers[0], numbers[1], numbers[2]), tuple(numbers[3:6])
+    if kind == "sphere":
+        return Sphere(first, numbers[3])
+    x, y, z = second
+    if kind == "box":
+        return Box(first, (x, y, z))
+    return Cone(first, (x, y, z), math.radians(numbers[6]))

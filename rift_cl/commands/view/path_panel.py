@@ -1,19 +1,59 @@
-"""The panel of key frames: a camera's way that is played, and exported for 'rift render --path'."""
+"""Key frames and their panel: a camera path is played, and exported for 'rift render --path'."""
 
 from __future__ import annotations
 
+import dataclasses
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from rift_cl.commands.view.key_frames import KeyFrame, path_file, way_through
+from rift_cl.commands.cameras.camera_path import smooth_path
 from rift_cl.commands.view.lens_panel import LensPanel
+from rift_cl.commands.view.pose import Pose
 from rift_cl.commands.view.standpoint import Standpoint
 from rift_cl.commands.view.viser_camera import go, pose_of
 from rift_cl.errors import InputError
-from rift_cl.geometry import Camera
+from rift_cl.geometry import Aperture, Camera
+from rift_cl.io.captures.transforms_record import transforms_of
+from rift_cl.io.output import json_text
+
+
+@dataclass(frozen=True)
+class KeyFrame:
+    """Where a page's camera was, and its lens; None for a pinhole."""
+
+    pose: Pose
+    aperture: Aperture | None = None
+
+    def camera(self, aspect: float, edge: int) -> Camera:
+        """The camera of a picture with this width by height, and so many pixels along an edge."""
+        seen = dataclasses.replace(self.pose, aspect=aspect).camera(edge)
+        return Camera(seen.size, seen.K, seen.view, seen.model, self.aperture)
+
+
+def way_through(keys: Sequence[KeyFrame], between: int, edge: int) -> list[Camera]:
+    """The cameras of a way.
+
+    Args:
+        keys: one or more; the first one's window gives the shape of all pictures.
+        between: frames between each two of them.
+        edge: longer edge of a picture in pixels.
+
+    Raises:
+        InputError: a pose makes no sense.
+    """
+    cameras = [key.camera(keys[0].pose.aspect, edge) for key in keys]
+    return smooth_path(cameras, between)
+
+
+def path_file(cameras: Sequence[Camera]) -> bytes:
+    """The content of a transforms.json of these cameras."""
+    names = [f"{number:04}.png" for number in range(len(cameras))]
+    return json_text(transforms_of(cameras, names)).encode()
+
 
 _RATE = 24.0
 _BETWEEN, _MOST_BETWEEN, _MOST_KEYS = 23, 239, 200

@@ -25,17 +25,52 @@ from rift_cl.commands.fit_photos.pictures import Light
 from rift_cl.commands.inputs.scene_bounds import SceneBounds
 from rift_cl.commands.view.browser_splats import MovingSplats
 from rift_cl.commands.view.crop import Crop
-from rift_cl.commands.view.pace import Pace
 from rift_cl.commands.view.page import ViewerPage
 from rift_cl.commands.view.photographs import Photograph, nearest_one
 from rift_cl.commands.view.picture import Painter
-from rift_cl.commands.view.pose import Pose
+from rift_cl.commands.view.pose import NARROWEST, Pose
 from rift_cl.commands.view.standpoint import standpoint_of
 from rift_cl.commands.view.wish import Wish
 from rift_cl.errors import InputError, RiftError
 from rift_cl.geometry import Camera
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
+
+# Seconds that a picture of a moving camera should take, and that one of half the size may take.
+_PICTURE, _SLOW = 0.05, 0.25
+# The least longer edge of a picture, and how many sizes there are up to the full one.
+_LEAST, _SIZES = 96, 8
+
+
+class Pace:
+    """How many pixels are drawn and sent in a second; None before the first picture."""
+
+    def __init__(self) -> None:
+        self.pixels: float | None = None
+
+    def learn(self, pixels: int, seconds: float) -> None:
+        """Note what a picture took; one that had to wait for something else says little."""
+        now = pixels / seconds
+        self.pixels = now if self.pixels is None else math.sqrt(now * self.pixels)
+
+    def edge(self, pose: Pose, full: int) -> int:
+        """The longer edge in pixels at which a moving camera's picture is drawn in time.
+
+        At least half of what it is at rest, unless that took all too long; in few steps, since a
+        picture that changes its size all the time flickers.
+
+        Args:
+            pose: whose window has a shape.
+            full: the longer edge at rest.
+        """
+        if self.pixels is None:
+            return min(full, max(_LEAST, full // 2))
+        share = max(min(pose.aspect, 1 / pose.aspect), NARROWEST)
+        soon, late = (math.sqrt(self.pixels * limit / share) for limit in (_PICTURE, _SLOW))
+        step = full / _SIZES
+        fits = max(step * int(soon / step), min(full / 2, late))
+        return min(full, max(_LEAST, int(fits)))
+
 
 # Seconds without a move after which a camera rests.
 _REST = 0.2
