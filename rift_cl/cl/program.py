@@ -8,6 +8,7 @@ source says that it takes.
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -15,8 +16,9 @@ import numpy as np
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.build import Builder, Key, building
 from rift_cl.cl.failures import named_errors
-from rift_cl.cl.grid_parts import Size, grid_parts
+from rift_cl.cl.grid_parts import GridPart, Size, grid_parts
 from rift_cl.cl.kernel_cache import build_lock
+from rift_cl.cl.launch_times import LaunchTimes
 from rift_cl.cl.process import claim_process
 from rift_cl.cl.signature import Parameter, check_names, check_numbers, in_order, parameters
 from rift_cl.cl.source import kernel_source
@@ -62,8 +64,10 @@ class Programs:
         # The macros among the names that launches give, for each set of names that was given.
         self._macros: dict[tuple[str, ...], tuple[str, ...]] = {}
         self._own = _ThreadKernels()
+        seconds = device.traits.seconds
+        self._times = None if seconds is None else LaunchTimes(seconds, device.finish)
         # Grids that are no longer along any axis need not be looked at.
-        self._longest = min(device.traits.items)
+        self._longest = min(device.traits.items) if self._times is None else 0
 
     @property
     def keeps_programs(self) -> bool:
@@ -78,7 +82,8 @@ class Programs:
     def launch(self, name: str, size: tuple[int, ...], given: dict[str, Any]) -> None:
         """Enqueue one kernel over ``size`` work-items; the first axis is rounded up to groups.
 
-        A grid that is larger than the device takes is enqueued in parts, with the same results.
+        A grid that is larger than the device takes, or takes longer than it may, is enqueued in
+        parts, with the same results.
 
         Args:
             name: the kernel, which is also its file and its entry point.
@@ -119,8 +124,15 @@ class Programs:
             if max(rounded) <= self._longest:
                 self._enqueue(key, kernel.handle, rounded, local)
                 return
-            for part in grid_parts(rounded, self._device.traits.items, group):
+
+            def start(part: GridPart) -> None:
                 self._enqueue(key, kernel.handle, part.size, local, part.offset)
+
+            for part in grid_parts(rounded, self._device.traits.items, group):
+                if self._times is None:
+                    start(part)
+                else:
+                    self._times.launch((key, _magnitudes(values)), part, group, start)
 
     def _enqueue(
         self, key: Key, kernel: Any, size: Size, local: Size, offset: Size | None = None
@@ -184,6 +196,11 @@ class Programs:
                 f"{self._device.name} has {format_bytes(there)}: what needs it does not work "
                 "there; use another device (--device)"
             )
+
+
+def _magnitudes(values: Iterable[Any]) -> tuple[int, ...]:
+    """Binary digits of the whole numbers that a kernel is given: most loops are as long as one."""
+    return tuple(int(v).bit_length() for v in values if isinstance(v, (int, np.integer)))
 
 
 class KernelNeeds(NamedTuple):

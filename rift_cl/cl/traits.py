@@ -39,8 +39,9 @@ class Traits:
         address_bits: of a pointer on the device; memory beyond what they reach is not used.
         share: the part of ``memory`` that we may use.
         items: most work-items of one launch along x, y and z; larger grids are launched in parts.
-        seconds: longest time that one launch may take before the system ends it, which ends the
-            program's use of the device; None where nothing does that.
+        seconds: longest time that one launch may take where the system ends those that take longer,
+            and with them the program's use of the device; launches are cut by it. None where
+            nothing does that.
     """
 
     is_cpu: bool

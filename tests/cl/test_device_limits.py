@@ -23,7 +23,8 @@ from voxel_scenes import random_splats
 
 import rift_cl as rift
 from rift_cl.cl import program, reductions
-from rift_cl.cl.grid_parts import grid_parts
+from rift_cl.cl.grid_parts import GridPart, grid_parts
+from rift_cl.cl.launch_times import LaunchTimes
 from rift_cl.cl.program import Programs, kernel_needs
 from rift_cl.errors import DeviceError, ResourceLimitError
 from rift_cl.operators import ViewFilter
@@ -282,3 +283,64 @@ def test_a_kernel_that_runs_in_smaller_groups_alone(device, most, monkeypatch):
     assert groups == {32 if most == 32 else 16}
     with pytest.raises(DeviceError, match=f"ssim_map.* groups of at most {most}"):
         loss(limited(gpu))
+
+
+@every_job
+def test_launches_that_would_take_too_long_are_cut(device, job, monkeypatch):
+    """To the least that can be launched, for no launch is as short as this."""
+    seen = offsets_of(monkeypatch)
+    found = job(limited(device, seconds=1e-12))
+    assert any(any(offset or ()) for offset in seen), "the limit is crossed"
+    assert_same(found, job(device))
+
+
+class Watch:
+    """A device without work whose time passes by a rule: seconds of an item, and of a launch."""
+
+    def __init__(self, item: float, launch: float = 0.0) -> None:
+        self.now, self.pieces, self.item, self.fixed = 0.0, [], item, launch
+
+    def start(self, piece: GridPart) -> None:
+        self.pieces.append(piece)
+        self.now += self.fixed + self.item * np.prod(piece.size)
+
+    def longest(self) -> float:
+        return self.item * max(np.prod(piece.size) for piece in self.pieces)
+
+
+@pytest.mark.each
+@pytest.mark.parametrize("size", [(64_000,), (640, 100), (64, 5, 200)])
+def test_pieces_take_a_part_of_the_time_once_they_are_measured(size):
+    watch = Watch(item=1e-4, launch=1e-5)
+    times = LaunchTimes(1.0, lambda: None, lambda: watch.now)
+    for _ in range(2):
+        watch.pieces.clear()
+        times.launch("work", GridPart((0,) * len(size), size), 64, watch.start)
+        taken = np.zeros(size, int)
+        for offset, part in watch.pieces:
+            assert offset[0] % 64 == part[0] % 64 == 0
+            taken[tuple(slice(at, at + n) for at, n in zip(offset, part, strict=True))] += 1
+        assert (taken == 1).all() and watch.longest() <= 0.26
+    assert len(watch.pieces) < 40, "what was measured is kept"
+    assert watch.longest() > 0.15, "no shorter than it must be"
+
+
+def test_short_launches_are_whole_and_waited_for_but_at_first():
+    waits, watch = [], Watch(item=1e-9)
+    times = LaunchTimes(1.0, lambda: waits.append(1), lambda: watch.now)
+    grid = GridPart((0,), (1024,))
+    for _ in range(5):
+        times.launch("work", grid, 1, watch.start)
+    assert watch.pieces[-3:] == [grid] * 3 and len(waits) == 2
+
+
+def test_work_that_becomes_slower_is_measured_again():
+    watch = Watch(item=1e-4)
+    times = LaunchTimes(1.0, lambda: None, lambda: watch.now)
+    grid = GridPart((0,), (8000,))
+    times.launch("work", grid, 1, watch.start)
+    watch.item *= 3
+    times.launch("work", grid, 1, watch.start)
+    watch.pieces.clear()
+    times.launch("work", grid, 1, watch.start)
+    assert watch.longest() <= 0.26
