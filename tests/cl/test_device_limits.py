@@ -125,8 +125,8 @@ def columns(device: rift.Device) -> Arrays:
 JOBS: dict[str, Callable[[rift.Device], Arrays]] = {
     job.__name__: job
     for job in (
-        tomography,
         filtering,
+        tomography,
         splats,
         loss,
         coverages,
