@@ -112,6 +112,7 @@ def test_the_lens_of_the_file_comes_before_that_of_the_command(tmp_path):
     assert own == other and 0 < own[1]["depth_of_field"] < math.inf
 
 
+@pytest.mark.full
 def test_one_camera_still_gets_an_answer(tmp_path, capsys):
     source = capture(tmp_path / "alone", ring(1))
     center = [f"{x}" for x in MIDDLE_OF_RING]

@@ -80,6 +80,7 @@ def test_what_makes_no_sense_is_named_and_leaves_nothing(capture, tmp_path, caps
     assert not (tmp_path / "fit").exists()
 
 
+@pytest.mark.full
 def test_an_earlier_fit_is_not_lost(capture, tmp_path, capsys):
     assert fit(capture, tmp_path / "fit") == 0
     before = (tmp_path / "fit" / "scene.ply").read_bytes()

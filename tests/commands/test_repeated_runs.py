@@ -45,6 +45,7 @@ def test_a_target_without_a_pilot_is_decided_to_be_opaque():
     assert plan_input(PlanSettings()).decided.mode == "surface"
 
 
+@pytest.mark.full
 def test_analyze_a_capture(capture, tmp_path, capsys):
     out, again = tmp_path / "a", tmp_path / "b"
     assert run("analyze", capture, "--add", 1, "--out", out) == 0

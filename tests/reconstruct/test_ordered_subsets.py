@@ -190,6 +190,7 @@ def test_what_does_not_go_with_subsets_is_refused(device):
         OrderedSubsets(Matrix(-np.ones((12, 20)), (4, 5), (12,), device), np.ones(12), 3)
 
 
+@pytest.mark.full
 def test_one_view_to_a_subset_is_astras_sart(device):
     astra = pytest.importorskip("astra")
     size, views = 24, 30

@@ -214,6 +214,7 @@ def test_other_merits_are_planned_as_well(kind):
     assert len(found.diminishing_returns().gains) == 6
 
 
+@pytest.mark.full
 def test_a_surface_is_planned_by_the_sides_that_its_points_show():
     normals = np.array([[1.0, 0, 0], [0, 0, 1]])
     target = Target(CENTER, 60.0, CENTER + 30 * normals, normals, "surface", band=0.5, snr=100.0)

@@ -102,6 +102,7 @@ def test_pixels_that_do_not_count_say_nothing(device):
     np.testing.assert_allclose(found["shape_modes"], raw["shape_modes"], atol=2e-3)
 
 
+@pytest.mark.full
 def test_modes_that_are_held_stay_at_zero(device):
     raw = scene(2, flat=True)
     across = graded(2, 3)[1:, 2] > 0

@@ -51,6 +51,7 @@ def run_to(trainer, step):
         trainer.step()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("rows", [1, SIZE])
 def test_a_fit_goes_on_from_any_state_to_the_same_bits(device, rows):
     pictures = pictures_of(device, scene(0, flat=rows == 1), rows=rows)
