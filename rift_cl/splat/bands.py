@@ -95,7 +95,7 @@ class FrameMemory:
         return self.splats * splat + self.pixels * pixel + summed // 32 + _SMALL
 
     def lists(self, entries: int, tiles: int) -> int:
-        """Bytes that the lists of so many tiles take, with the records of the gradient."""
+        """Bytes of tile lists, with the gradient's records."""
         records = 4 * self.record * entries if self.gradient else 0
         return tile_lists_bytes(self.splats, entries, tiles=tiles) + records
 
@@ -110,7 +110,7 @@ class FrameMemory:
 
 
 def check_fixed(memory: FrameMemory, budget: int) -> None:
-    """Refuse a frame that cannot be drawn in any number of bands.
+    """Raise an error if a frame does not fit the memory in any number of bands.
 
     Raises:
         ResourceLimitError: what is taken however the image is cut does not fit the budget.

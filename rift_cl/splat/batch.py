@@ -63,7 +63,7 @@ def draw_views(
     backgrounds: Sequence[DeviceArray] | None = None,
     depth: DepthKind | None = None,
 ) -> list[Frame]:
-    """Draw the same splats for every camera; see ``Renderer.forward``.
+    """Render the same splats for every camera; see ``Renderer.forward``.
 
     Args:
         renderer: draws each of them.

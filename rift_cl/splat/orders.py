@@ -69,7 +69,7 @@ class ModeOrders:
         return WHITENING + n_coeff(self.shape, 2) - 1 + self._color_numbers
 
     def record_length(self, channels: int) -> int:
-        """Numbers of a gradient's record, of an image with so many channels.
+        """Floats of one gradient record, for an image of a number of channels.
 
         ``kernels/include/hermite_slots.h`` says what they are; a gradient by the place has moments
         of two orders more than the polynomial.

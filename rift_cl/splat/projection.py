@@ -296,7 +296,7 @@ def table_width(splats: Splats) -> int:
 
 
 def moment_count(splats: Splats, channels: int) -> int:
-    """Floats that the raster's gradient leaves of a splat drawn in so many channels."""
+    """Floats per splat that the raster's gradient sums, for a number of channels."""
     return ModeOrders.of(splats).record_length(channels)
 
 

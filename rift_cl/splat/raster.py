@@ -141,7 +141,7 @@ class ScreenSplats:
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """A drawn image, and what its gradient needs; device arrays.
+    """A rendered image, and what its gradient needs; device arrays.
 
     Args:
         image: (height, width, D), with the background.
@@ -164,7 +164,7 @@ def rasterize(
     background: DeviceArray | None = None,
     into: Raster | None = None,
 ) -> Raster:
-    """Draw splats.
+    """Rasterize projected splats.
 
     Args:
         device: where the arrays are.

@@ -22,7 +22,7 @@ from rift_cl.splat.tile_lists import TileLists, Tiles, count_tiles, list_tiles, 
 
 @dataclass(frozen=True, eq=False)
 class RasterPass:
-    """What was drawn, with what its gradient needs; arrays are device arrays.
+    """One rasterization, with what its gradient needs; arrays are device arrays.
 
     Args:
         screen: the splats on the screen, and what they show.
@@ -63,7 +63,7 @@ def draw(
     memory: FrameMemory,
     background: DeviceArray | None = None,
 ) -> RasterPass:
-    """Draw splats, at once if they fit the budget.
+    """Rasterize splats, at once if they fit the memory, else in bands.
 
     Args:
         device: where the arrays are.

@@ -1,4 +1,4 @@
-"""The whole way from splats to an image and back, resident on the device.
+"""The renderer: splats to an image and back, resident on the device.
 
 ``forward`` keeps what its gradient needs in a ``Frame``; ``backward`` turns dL/d image into
 gradients of every parameter. Nothing is summed by atomics, so the same call gives the same bits,
@@ -40,7 +40,7 @@ DepthKind = Literal["accumulated", "expected"]
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A drawn image with what its gradient needs.
+    """A rendered image with what its gradient needs.
 
     Args:
         projection: what was drawn, and how the camera sees it.
@@ -66,7 +66,7 @@ class Frame:
 
     @property
     def splats(self) -> Splats:
-        """What was drawn."""
+        """The rendered splats."""
         return self.projection.splats
 
     @property
@@ -76,7 +76,7 @@ class Frame:
 
     @property
     def lists(self) -> TileLists | None:
-        """The tile lists; None where the image was drawn in bands."""
+        """The tile lists; None where the image was rendered in bands."""
         return self.raster_pass.lists
 
     @property
@@ -148,7 +148,7 @@ class Renderer:
         background: DeviceArray | None = None,
         depth: DepthKind | None = None,
     ) -> Frame:
-        """Draw splats.
+        """Render splats.
 
         The channels of the image are three colours if the splats have ``sh``, then their
         ``colors`` if they have any, then depth if it is asked for.

@@ -41,12 +41,12 @@ def run_length(device: Device, count: int, *, gpu: int) -> int:
 
 
 def pieces(count: int, size: int) -> int:
-    """Pieces of this size that hold so many elements; one piece where there are none."""
+    """Number of pieces of a size that hold ``count`` elements, at least one."""
     return max(1, -(-count // size))
 
 
 def scan_levels(device: Device, most: int) -> Levels:
-    """For scans of at most so many numbers: each level's run and room for the sums of its runs."""
+    """Levels of a scan of at most ``most`` numbers: run lengths and buffers for their sums."""
     run = run_length(device, most, gpu=GPU_RUN)
     sums = device.empty(pieces(most, run), np.int64)
     return [(run, sums), *(scan_levels(device, sums.size) if sums.size > 1 else [])]
@@ -141,7 +141,7 @@ class TileLists:
 
 @dataclass(frozen=True, eq=False)
 class TileCounts:
-    """What is known before lists are made: how long they will be.
+    """Lengths of the tile lists, which are counted before they are filled.
 
     Args:
         boxes: the splats' boxes.

@@ -1,4 +1,4 @@
-"""Splats as voxels, on a device: the slices that people look at.
+"""Splats sampled on a voxel grid, on a device.
 
 A pixel is a mean over a little square and a voxel one over a little cube. The rasterizer stands for
 the square by a dilation that keeps every splat's mass; the same dilation along all three axes makes

@@ -73,7 +73,7 @@ class BasisSettings:
 
     @property
     def plain(self) -> bool:
-        """Whether splats are Gaussians of one colour, drawn as they always were."""
+        """Whether splats are plain Gaussians of one colour with the activation ``clamp``."""
         return not any(self.orders) and self.activation == "clamp"
 
     @property

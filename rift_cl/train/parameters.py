@@ -177,7 +177,7 @@ class Parameters:
         self.activate()
 
     def activate(self) -> None:
-        """Make what is drawn of what is trained."""
+        """Compute the rendered splats from the trained parameters."""
         drawn, count = self.drawn, len(self)
         self.device.launch(
             "splat_activate",
@@ -259,7 +259,7 @@ class Parameters:
         self.redraw()
 
     def redraw(self) -> None:
-        """Make what is drawn anew, after arrays of ``raw`` were put in the place of others."""
+        """Compute the rendered splats again, after arrays of ``raw`` were replaced."""
         self.drawn = _undrawn(self.device, self.raw)
         self.activate()
 

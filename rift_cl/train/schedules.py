@@ -81,7 +81,7 @@ class CoefficientSchedule:
         self._flat = flat
 
     def rendering(self, parameters: Parameters, rendering: SplatSettings) -> SplatSettings:
-        """How splats are drawn that have what these have by now."""
+        """Rendering settings for the coefficients that are active at this step."""
         angular = self.settings.angular.kind if "lobes" in parameters.raw else "sh"
         return replace(rendering, activation=self.settings.basis.activation, angular=angular)
 

@@ -138,7 +138,7 @@ class Trainer:
             self._limit_band()
 
     def run(self, stopped: Callable[[], bool] = lambda: False) -> Iterator[Report]:
-        """Fit until all steps are done, from where the parameters stand.
+        """Train from the parameters' current step to the last.
 
         Args:
             stopped: asked after each step whether to stop there.
@@ -209,7 +209,7 @@ class Trainer:
         return value
 
     def _work(self, step: int, splats: int, steps: int = 1) -> float:
-        """The cost of steps with so many splats, in that of a step of all splats of one color."""
+        """Cost of steps, in units of one step with all splats of one color each."""
         degree = min(step // self.settings.sh_every, self._last_degree)
         harmonics = _FIRST_DEGREE + _NEXT_DEGREE * (degree - 1) if degree else 0.0
         one = _PIXELS + splats / self.settings.splats * (1 + harmonics)

@@ -61,7 +61,7 @@ class _Score(NamedTuple):
 def appearance_error(
     observations: Observations, target: Target, normals: Floats, kind: str
 ) -> tuple[float, Floats, Floats]:
-    """The share of the brightness's variance that stays unknown, a mean over points.
+    """Posterior variance of the radiance as a fraction of the prior's, averaged over points.
 
     Args:
         observations: V views of the target's P points.
@@ -95,7 +95,7 @@ def light_of(observations: Observations, normals: Floats) -> Floats:
 
 
 def wanted_of(target: Target) -> Floats:
-    """(D, 3) the directions from which it matters what a surface looks like."""
+    """(D, 3) viewing directions in which the surface's appearance counts."""
     if target.seen_from is not None:
         return target.seen_from
     half = directions_for(3, _HALF)

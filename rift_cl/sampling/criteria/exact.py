@@ -30,7 +30,7 @@ _WIDER = 1.25
 
 
 def exact(observations: Observations, target: Target, samples: int | None = None) -> float:
-    """Share of the variance that stays: ``tr(C - C M' (M C M' + N)^-1 M C) / tr(C)``.
+    """Posterior variance over prior variance: ``tr(C - C M' (M C M' + N)^-1 M C) / tr(C)``.
 
     C is the covariance by the prior of samples in the target's disc or ball, M projects them along
     every view's direction and passes the frequencies that a view's optics pass, and N is white,

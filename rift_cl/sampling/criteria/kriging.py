@@ -25,7 +25,7 @@ _NOTHING = 1e12
 
 
 def kriging(observations: Observations, target: Target) -> float:
-    """Share of the power that stays unknown, as ``wiener``, but with correlated views.
+    """Posterior variance as in ``wiener``, but with correlations between views.
 
     Each frequency is estimated from the nearest points of the 24 slices closest to it:
     ``S (1 - r^T (R + N)^-1 r)``, where r and R are correlations by the target's window, a disc or

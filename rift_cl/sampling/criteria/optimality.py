@@ -47,7 +47,7 @@ def scored(kind: str, coverage: Floats, power: Floats, snr: float, k: Floats) ->
 
 
 def wiener(coverage: Floats, power: Floats, snr: float) -> Scored:
-    """Share of the power that stays unknown to the best linear estimator (A-optimal).
+    """Posterior variance of the best linear estimator, as a fraction of the power (A-optimal).
 
     ``mean S / (1 + snr S L)`` over points and frequencies, over ``mean S``: from 0, all is known,
     to 1, nothing is.
@@ -76,7 +76,7 @@ def logdet(coverage: Floats, power: Floats, snr: float) -> Scored:
 
 
 def worst(coverage: Floats, power: Floats, snr: float, k: Floats) -> Scored:
-    """The share of its power that the worst seen direction keeps unknown, as a soft maximum.
+    """Posterior variance in the worst direction, as a soft maximum over directions (E-optimal).
 
     Frequencies are grouped by direction; the Wiener error of each group goes into a mean of power
     8, weighted by the group's power. So it lies between 0 and 1, never below ``wiener``, and what

@@ -122,7 +122,7 @@ def seen_directions(views: Views, target: Target, point: int) -> Floats:
 
 
 def frequency_directions(target: Target) -> Floats:
-    """Directions that stand for all frequencies: over the half-sphere, or half-circle, (n, 3)."""
+    """(n, 3) frequency directions that sample the half-sphere, or the half-circle."""
     return half_circle(_IN_PLANE) if target.is_flat else half_sphere(_IN_SPACE)
 
 

@@ -95,7 +95,7 @@ def tuy(cameras: Sequence[Camera], target: Target, *, tolerance: float | None = 
 
 
 def _spacing(places: Floats, diameter: float) -> float:
-    """How far apart neighbouring cameras stand, in the median."""
+    """Median distance between neighbouring cameras."""
     from scipy.spatial import cKDTree
 
     least = 0.01 * diameter

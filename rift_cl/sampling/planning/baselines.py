@@ -136,7 +136,7 @@ def _rings(design: DesignSpace, lens: _Lens) -> list[tuple[str, ViewTable]]:
 
 
 def _arcs(design: DesignSpace, lens: _Lens) -> list[tuple[str, ViewTable]]:
-    """Straight ways in azimuth and elevation, of half a turn at the most."""
+    """Straight paths in azimuth and elevation, of at most half a turn."""
     first, last = design.constraints.azimuth
     last = min(last, first + math.pi)
     corners = list(

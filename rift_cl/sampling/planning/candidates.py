@@ -75,7 +75,7 @@ def candidates(objective: Objective, views: int, seed: int) -> ViewTable:
 
 
 def most_candidates(views: int) -> int:
-    """How many candidates there may be for so many views of one camera type."""
+    """Largest number of candidates for a number of views of one camera type."""
     return max(_CANDIDATES, 2 * views)
 
 

@@ -1,4 +1,4 @@
-"""What a plan has to keep to: where cameras may stand, what they may be set to, what it may cost.
+"""Constraints of a plan: camera positions, camera settings, and total cost.
 
 Elevation is the angle above the plane through the target's centre across ``up``, azimuth the angle
 round ``up``, both in radians; lengths are in the unit of the world.
@@ -106,7 +106,7 @@ class Budget:
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """Where cameras may stand and what they may be set to.
+    """Constraints on camera positions and settings.
 
     Args:
         elevation: lowest and highest, radians from -pi / 2 to pi / 2.
@@ -189,7 +189,7 @@ class Constraints:
 
     @property
     def full_circle(self) -> bool:
-        """Whether cameras may go all the way round."""
+        """Whether the azimuth is the full circle."""
         return self.azimuth[1] - self.azimuth[0] > 2 * math.pi - 1e-6
 
     @property

@@ -1,4 +1,4 @@
-"""Which curves a path asks for, and where the views of rings stand along them."""
+"""The curves of each kind of path, and the positions of views along rings."""
 
 from __future__ import annotations
 

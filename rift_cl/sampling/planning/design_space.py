@@ -171,7 +171,7 @@ class DesignSpace:
         return bool(longest >= focal)
 
     def type_at(self, kind: int, row: Floats) -> CameraType:
-        """A type as it is set in a row of a table."""
+        """The camera type with the settings of one row of a view table."""
         return replace(
             self.types[kind],
             focal_length=float(row[FOCAL]),

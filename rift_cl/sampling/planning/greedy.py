@@ -103,7 +103,7 @@ def _next(pool: Pool, merit: float, stale: Floats, worth: Floats) -> int:
 
 
 def bound(pool: Pool, limits: Limits, chosen: list[int]) -> float:
-    """A merit that no choice of as many candidates, at the same cost, falls below.
+    """Lower bound of the criterion over all choices of as many candidates at the same cost.
 
     Args:
         pool: the candidates; their merit is convex in the amount of each.

@@ -1,4 +1,4 @@
-"""Places where no camera may stand, and bodies through which the target is not seen.
+"""Regions without cameras, and bodies that occlude the target.
 
 A shape answers how far points lie outside it (negative inside) and in which direction that grows,
 so that refinement can move along its surface instead of only rejecting what is inside.

@@ -1,7 +1,7 @@
-"""The merit of views as a planner moves them, and its derivatives by every number of theirs.
+"""The criterion as a function of a view table, and its gradient by every entry of the table.
 
 The chain goes from a row of settings to how the target's points are seen (``Observations``), to
-coverage, to the merit, and back. It does for whole tables what ``ViewTable.cameras`` and
+coverage, to the criterion, and back. It does for whole tables what ``ViewTable.cameras`` and
 ``Observations.of`` do one camera at a time; tests hold the two together.
 """
 
@@ -42,7 +42,7 @@ class Objective:
 
     Args:
         site: where views are planned.
-        kind: of the merit.
+        kind: the criterion.
         fixed: how views that are there already see the target's points; None if there are none.
         asked: the target, where the site has it at more frequencies; None if it has not.
     """
@@ -89,7 +89,7 @@ class Objective:
         return checked_power(target.prior, target.k, target.diameter)
 
     def scored(self, added: Floats) -> criteria.Scored:
-        """A volume's merit with so much coverage (P, K) added to what is there; its derivative.
+        """A volume's criterion with coverage (P, K) added to the fixed views', and its derivative.
 
         That of ``merit_of_coverage``, with the prior asked but once.
         """
@@ -97,28 +97,28 @@ class Objective:
         return criteria.scored(self.kind, known, self.power, target.snr, target.k)
 
     def observations(self, view_table: ViewTable) -> Observations:
-        """How the stations see the target's points."""
+        """Observations of the target's points by the views of a table."""
         return _Sight(self.design, view_table).observations
 
     def value(self, view_table: ViewTable) -> float:
-        """The merit of the stations, with what is there already."""
+        """The criterion of a view table, with the fixed views."""
         return self.value_of(self.observations(view_table))
 
     def value_of(self, observations: Observations) -> float:
-        """The merit of views that see the target so, with what is there already."""
+        """The criterion of these observations, with the fixed views."""
         target = self.design.target
         if target.mode == "surface":
             return self.surface(observations)[0]
         return self.scored(host_coverage(observations, target.k, target.diameter)).value
 
     def surface(self, observations: Observations) -> tuple[float, ObservationsGradient]:
-        """The merit of a surface, and its derivative by the looks."""
+        """A surface's criterion, and its derivative by the observations."""
         known = observations if self.fixed is None else joined([self.fixed, observations])
         value, gradient = surface_merit(known, self.design.target, self.kind)
         return value, ObservationsGradient(*(values[-observations.views :] for values in gradient))
 
     def gradient(self, view_table: ViewTable) -> tuple[float, Floats]:
-        """The merit, and its derivative (V, 7) by the stations' table."""
+        """The criterion, and its derivative (V, 7) by the view table."""
         target, sight = self.design.target, _Sight(self.design, view_table)
         if target.mode == "surface":
             value, by_observations = self.surface(sight.observations)
@@ -147,7 +147,7 @@ def some(observations: Observations, which: Sequence[int] | slice) -> Observatio
 
 @dataclass(frozen=True, eq=False)
 class _Sight:
-    """How stations see points; all arrays (V,), or (V, P) once points come in."""
+    """Geometry of each view and point; arrays are (V,), or (V, P) where points come in."""
 
     design: DesignSpace
     view_table: ViewTable
@@ -222,7 +222,7 @@ class _Sight:
         return np.asarray((np.abs(rise) <= sizes[:, :1] / 2) & (np.abs(along) <= sizes[:, 1:] / 2))
 
     def chained(self, by: ObservationsGradient) -> Floats:
-        """From derivatives by looks to those by the table, (V, 7)."""
+        """Chain derivatives by observations to those by the view table, (V, 7)."""
         observations, plane = self.observations, self.plane[:, None]
         reach = np.maximum(self.depth, 1e-9 * self.design.target.diameter)
         sharp = 1 - reach / plane
@@ -247,7 +247,7 @@ class _Sight:
         return np.column_stack([turning, *rest])
 
     def _by_place(self, by_direction: Floats, by_reach: Floats) -> tuple[Floats, Floats]:
-        """By the distance (V,), and by azimuth and elevation (V, 2), of where a camera stands."""
+        """Derivatives by distance (V,), and by azimuth and elevation (V, 2)."""
         frames, distance = self.frames, self._column(DISTANCE)
         length = np.linalg.norm(self.away, axis=2, keepdims=True)
         unit = self.away / length

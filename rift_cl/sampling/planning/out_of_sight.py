@@ -82,7 +82,7 @@ def places_about(center: ArrayLike, near: float, far: float) -> tuple[Floats, fl
 def out_of_sight(
     space: FreeSpace, center: ArrayLike, radius: float, near: float, far: float
 ) -> OutOfSight | None:
-    """Where cameras stand in something, or do not see the target; None if that is nowhere.
+    """Positions inside an object or occluded from the target; None if there are none.
 
     Args:
         space: what pictures show of what stands where.

@@ -123,7 +123,7 @@ class PathLayout:
         return changes
 
     def nearer(self, numbers: Floats, views: NDArray[np.bool_]) -> Floats:
-        """Numbers half way back to the start: a path moves as one."""
+        """Parameters half way back to the start; a path moves as a whole."""
         return (numbers + self.start) / 2
 
 

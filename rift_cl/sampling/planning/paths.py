@@ -1,4 +1,4 @@
-"""The ways along which cameras may stand: anywhere, on rings, or on one smooth curve."""
+"""Kinds of camera paths: free positions, rings, or one smooth curve."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rift_cl.errors import InputError
 
 @dataclass(frozen=True)
 class Free:
-    """Every camera stands where it likes."""
+    """Camera positions are independent of each other."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Choose views: greedily among candidates, then moved to where the merit is lowest nearby."""
+"""Choose views greedily among candidates, then refine them to a local minimum of the criterion."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def plan(
     kind: CoverageMerit = "wiener",
     compare: bool = True,
 ) -> Plan:
-    """Choose where to look from.
+    """Choose camera poses that minimize a criterion.
 
     All views look at the target's centre, upright about ``constraints.up``. Free views are chosen
     one after another among some 500 directions with each camera type; from there, or from the best
@@ -76,7 +76,7 @@ def plan(
         method: ``greedy`` leaves the second step out.
         fixed: views that were taken already; the new ones go where those left most unknown.
         seed: turns the candidates; the same gives the same plan.
-        kind: of the merit: ``wiener``, ``logdet`` or ``worst``.
+        kind: the criterion: ``wiener``, ``logdet`` or ``worst``.
         compare: whether simple arrangements are tried as well, as starts and to compare with, and
             a bound is looked for; without, the plan has neither, in a third of the time.
 
@@ -170,7 +170,7 @@ def _warn_of_few_frequencies(target: Target) -> None:
 def _chosen(
     objective: Objective, views: int, method: Method, seed: int, simple: Mapping[str, Baseline]
 ) -> tuple[ViewTable, float]:
-    """The views, and a bound of their merit."""
+    """The views, and a lower bound of the criterion."""
     design = objective.design
     offered = candidates(objective, views, seed)
     pool = pool_of(objective, offered)

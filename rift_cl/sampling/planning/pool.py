@@ -1,4 +1,4 @@
-"""Candidates as a greedy choice needs them: what is known with some of them, and with one more."""
+"""Candidates of the greedy choice: the criterion with some of them, and with one more."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Pool(Protocol):
 
     @property
     def start(self) -> float:
-        """The merit before the first is chosen."""
+        """The criterion before the first choice."""
 
     @property
     def mixing(self) -> int:
@@ -36,23 +36,23 @@ class Pool(Protocol):
         """Choose none."""
 
     def merit_with(self, index: int) -> float:
-        """The merit of what is chosen, and one more."""
+        """The criterion of the chosen candidates and one more."""
 
     def add(self, index: int) -> None:
         """Choose one more."""
 
     def ceilings(self) -> Floats:
-        """(C,) by how much one more of each lowers the merit at the most."""
+        """(C,) upper bound of how much each further candidate lowers the criterion."""
 
     def with_views(self, view_table: ViewTable) -> Pool:
         """A pool with some more candidates, and none chosen."""
 
     def mixed(self, amounts: Floats) -> tuple[float, Floats]:
-        """The merit of so much of each candidate (C,), and how fast it falls with each."""
+        """The criterion of candidates in amounts (C,), and minus its derivative by each."""
 
 
 def pool_of(objective: Objective, view_table: ViewTable) -> Pool:
-    """The candidates at some stations."""
+    """The pool of candidates of a view table."""
     observations = objective.observations(view_table)
     if objective.design.target.mode == "surface":
         return SurfacePool(objective, observations)

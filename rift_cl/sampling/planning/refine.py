@@ -1,4 +1,4 @@
-"""Move chosen views to where the merit is lowest nearby, by the method of moving asymptotes.
+"""Refine views to a local minimum of the criterion by the method of moving asymptotes.
 
 What is moved is a vector of numbers within a box; a ``Layout`` says which table of views they stand
 for and how the table changes with them. Keep-outs and a budget of exposure are inequalities.
@@ -67,7 +67,7 @@ def refine(objective: Objective, layout: Layout, steps: int = STEPS) -> ViewTabl
     Args:
         objective: what is to be small.
         layout: what can be moved; its start keeps to all constraints.
-        steps: evaluations of the merit, at the most.
+        steps: largest number of evaluations of the criterion.
     """
     import nlopt
 

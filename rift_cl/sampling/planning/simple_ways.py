@@ -44,7 +44,7 @@ def edge_ways(limits: Constraints) -> list[tuple[str, Floats]]:
 
 
 def _laid(corners: Floats) -> Floats:
-    """Points evenly along straight ways in azimuth and elevation, by their length on the sphere."""
+    """Points evenly spaced along straight paths in azimuth and elevation, by arc length."""
     dense = np.concatenate(
         [np.linspace(a, b, _LAID, endpoint=False) for a, b in itertools.pairwise(corners)]
         + [corners[-1:]]

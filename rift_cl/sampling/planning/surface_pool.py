@@ -89,7 +89,7 @@ class SurfacePool:
         self._known, self._appearance = self._base, self._given
 
     def merit_with(self, index: int) -> float:
-        """The merit of what is chosen, and one more."""
+        """The criterion of the chosen candidates and one more."""
         texture = self._scored(self._known + self._texture[index]).value
         light, appearance = self._light[:, index], self._appearance
         more = 1 + light * appearance.variance[:, index]
@@ -104,7 +104,7 @@ class SurfacePool:
         self._appearance = self._with(self._appearance, index)
 
     def ceilings(self) -> Floats:
-        """(C,) by how much one more of each lowers the merit at the most."""
+        """(C,) upper bound of how much each further candidate lowers the criterion."""
         slope = self._scored(self._known).gradient
         return self._falls(slope, self._appearance.toward, self._appearance.variance)
 
@@ -115,7 +115,7 @@ class SurfacePool:
         return SurfacePool(self._objective, joined([self._observations, own]), texture)
 
     def mixed(self, amounts: Floats) -> tuple[float, Floats]:
-        """The merit of so much of each candidate (C,), and how fast it falls with each."""
+        """The criterion of candidates in amounts (C,), and minus its derivative by each."""
         scored = self._scored(self._base + np.tensordot(amounts, self._texture, 1))
         some_of_each = np.concatenate([amounts, np.ones(self._light.shape[1] - len(amounts))])
         used = np.flatnonzero(some_of_each)

@@ -95,7 +95,7 @@ class Plan:
         return f"Plan({len(self)} views{more}, merit {self.merit:.4g}, cameras: {kinds})"
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: what the plan is worth, and where its cameras stand."""
+        """Table of the criterion, and a plot of the cameras, for notebooks."""
         html: str = import_module("rift_cl.report.notebook").plan_card(self)
         return html
 
@@ -106,7 +106,7 @@ class Plan:
 
     @cached_property
     def types(self) -> tuple[CameraType, ...]:
-        """What each new view is taken with, as it is set: focal length, f-number, exposure."""
+        """Camera of each new view with its settings: focal length, f-number, exposure."""
         return self.view_table.camera_types(self.objective.design)
 
     @property
@@ -184,7 +184,7 @@ class Plan:
 
     @cached_property
     def elsewhere(self) -> float:
-        """The merit at frequencies that the plan was not made with, so that none was favoured."""
+        """The criterion at frequencies that the plan was not optimized for."""
         return self.objective.elsewhere.value(self.view_table)
 
     def gain(self, merit: float) -> float:

@@ -61,12 +61,12 @@ class ViewTable:
         return design.constraints.frames(self.table[:, [AZIMUTH, ELEVATION]])
 
     def places(self, design: DesignSpace) -> Floats:
-        """(V, 3) where the cameras stand."""
+        """(V, 3) camera positions."""
         outward = self.frames(design)[:, 0]
         return design.target.center + self.table[:, DISTANCE, None] * outward
 
     def camera_types(self, design: DesignSpace) -> tuple[CameraType, ...]:
-        """What each camera is, as it is set."""
+        """Camera type of each view, with its settings."""
         return tuple(
             design.type_at(int(kind), row) for kind, row in zip(self.kind, self.table, strict=True)
         )

@@ -17,7 +17,7 @@ _EVEN = "fibonacci"
 
 
 class WrongPrior(NamedTuple):
-    """Merits if the spectrum is turned; lower is better.
+    """Values of the criterion if the spectrum is rotated; lower is better.
 
     Args:
         degrees: by how much it is turned, about the axis about which the plan does worst.

@@ -34,7 +34,7 @@ class CameraGradients(NamedTuple):
 def camera_gradients(
     cameras: Sequence[Camera], seen: Observations, gradient: ObservationsGradient
 ) -> CameraGradients:
-    """Chain the derivatives by looks with those of looks by cameras.
+    """Chain derivatives by observations with those of observations by cameras.
 
     Whether a point is in a picture is taken as given: a merit jumps where one leaves it.
 

@@ -1,4 +1,4 @@
-"""What stands where, as far as pictures show it: free space, what lies behind surfaces, the rest.
+"""Occupancy from depth maps: free space, behind surfaces, or not observed.
 
 Each picture with a map of depth says of every point before it whether it is free (nearer than what
 shows there) or behind a surface. A point is free if some pictures look through it, and behind if it
@@ -34,7 +34,7 @@ _IN_CELL, _NEAREST, _GAP = 4, 0.25, 2.0
 
 @dataclass(frozen=True, eq=False)
 class DepthMap:
-    """How far off what a picture shows is.
+    """Depth map of one view.
 
     Args:
         camera: the view; its size may be another than that of the map.
@@ -98,7 +98,7 @@ class FreeSpace:
         return np.where((free_in > 0) & (free_in >= _LEAST * looked), FREE, found).astype(np.int8)
 
     def in_sight(self, places: ArrayLike, center: ArrayLike, radius: float) -> Floats:
-        """(n,) share of a ball's outline that cameras would see, 0 where none could stand.
+        """(n,) visible fraction of a ball's outline from each position; 0 where no camera fits.
 
         A line of sight is clear if no part of it outside the ball lies behind a surface: what shows
         within the ball is the target itself.
@@ -132,7 +132,7 @@ class FreeSpace:
         return np.asarray(np.where(self.judged(x) == BEHIND, 0, clear.mean(axis=0)))
 
     def scaled(self, factor: float) -> FreeSpace:
-        """The same with all lengths so many times as large."""
+        """A copy with all lengths multiplied by a factor."""
         return FreeSpace([_scaled(one, factor) for one in self.maps])
 
 

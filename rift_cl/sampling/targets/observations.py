@@ -104,7 +104,7 @@ class Observations:
     def of(
         cls, cameras: Sequence[Camera], points: ArrayLike, weights: ArrayLike | None = None
     ) -> Observations:
-        """How cameras see points; nothing stands in the way.
+        """Observations of points by cameras, without occlusion.
 
         Args:
             cameras: the V views.
@@ -121,7 +121,7 @@ class Observations:
         return observations.weighted(weights)
 
     def weighted(self, weights: ArrayLike | None) -> Observations:
-        """The same with so many times the light in each view (V,); None leaves it as it is.
+        """A copy with the photons of each view multiplied by weights (V,); None changes nothing.
 
         Raises:
             ShapeError: there is another number of weights.

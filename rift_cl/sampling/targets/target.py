@@ -1,4 +1,4 @@
-"""What shall be known: where a target stands, how large it is, and which frequencies matter.
+"""The target: its position, its size, and the frequencies that count.
 
 Lengths are in the unit of the world, frequencies in cycles per that unit.
 """

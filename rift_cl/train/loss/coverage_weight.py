@@ -42,7 +42,7 @@ _LEAST = 0.1
 def weight_of(
     chosen: Homogenisation, cameras: Sequence[Camera], device: Device
 ) -> CoverageWeight | None:
-    """The weights of a fit that wants them; None for the ramp, or for none."""
+    """Coverage weights, if the settings ask for them; None for the ramp or no weights."""
     if chosen.weight == "ramp" or not chosen.exponent:
         return None
     return CoverageWeight(cameras, device)
@@ -108,7 +108,7 @@ class CoverageWeight:
         return np.asarray(np.log(np.maximum(means, _LEAST)), np.float32)
 
     def _on_slice(self, view: int, ky: Floats, kx: Floats) -> Floats:
-        """The target's frequencies (n, 3) that image frequencies of a view stand for."""
+        """Frequencies (n, 3) of the target on the slice of a view's image frequencies."""
         camera, sight = self._cameras[view], self._observations.direction[view, 0]
         fx, fy = camera.intrinsics[:2]
         axes = camera.view[:2, :3]

@@ -83,7 +83,7 @@ class Homogenisation:
         return np.asarray(square ** (exponent / 2))
 
     def decided(self, views: int) -> Homogenisation:
-        """These settings, with an exponent for so many photographs where it was left open."""
+        """These settings, with the exponent decided by the number of views if it was left open."""
         if self.exponent is not None:
             return self
         enough = views >= ENOUGH_VIEWS or self.weight == "coverage"

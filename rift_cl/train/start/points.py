@@ -1,4 +1,4 @@
-"""Where splats begin: at known points, in the visual hull, or at random where the cameras look."""
+"""Initial positions of splats: at sparse points, in the visual hull, or at random in view."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def focus_of(cameras: Sequence[Camera]) -> Floats:
 
 
 def field_diameter(cameras: Sequence[Camera]) -> float:
-    """How wide pictures are where the cameras look: the size of a target that fills them."""
+    """Width of the field of view at the focus: the size of a target that fills the images."""
     middle = focus_of(cameras)
     widths = []
     for camera in cameras:
@@ -148,7 +148,7 @@ def _pixels_of(
 
 
 def _seen_by(cameras: Sequence[Camera], points: Floats) -> Floats:
-    """Share of the cameras in whose image each point lies."""
+    """Fraction of the cameras in whose image each point lies."""
     seen = sum(_pixels_of(camera, points)[2].astype(float) for camera in cameras)
     return np.asarray(seen / len(cameras))
 

@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 def density_splats(
     volume: Floats, grid: Grid, count: int, *, seed: int, dilation: float, size: float = 1.0
 ) -> dict[str, NDArray[np.float32]]:
-    """Round splats that look about like a volume.
+    """Isotropic splats that approximate a volume.
 
     Args:
         volume: (nz, ny, nx) densities; what is negative counts as zero.
@@ -98,7 +98,7 @@ def _coarser(held: Floats, grid: Grid, size: float) -> tuple[Floats, Grid]:
 
 
 def _densities(footprints: Footprints, held: Floats) -> Floats:
-    """Densities with which the splats look like the volume."""
+    """Densities with which the splats approximate the volume."""
     whole = np.maximum(footprints.inner_products(np.ones_like(held)), 1e-12)
     densities = np.full(len(footprints), held.sum() / whole.sum())
     least = _LEAST * densities[0]

@@ -280,7 +280,7 @@ def _fates(
 
 
 def _usable(raw: Raw) -> Chosen:
-    """Splats that can be drawn: finite, with a quaternion that is a rotation."""
+    """Splats with finite parameters and a nonzero quaternion."""
     usable = np.asarray(raw["quats"].any(axis=1))
     for array in raw.values():
         usable &= np.isfinite(array).reshape(len(usable), -1).all(axis=1)
@@ -304,7 +304,7 @@ def _strongest(gradient: Floats, wanted: Chosen, cost: NDArray[np.int64], room: 
 
 
 def _samples(raw: Raw, split: NDArray[np.intp], random: np.random.Generator) -> Floats:
-    """Where the halves of S splats lie, seen from their middle: drawn from it, (2S, 3)."""
+    """(2S, 3) offsets of the halves of S splats, sampled from each splat's Gaussian."""
     twice = np.concatenate([split, split])
     scales = np.exp(np.minimum(raw["log_scales"][twice].astype(float), _MOST_LOG))
     along = scales * random.standard_normal(scales.shape)

@@ -68,7 +68,7 @@ class Additive(LinearOperator):
 
     @property
     def scratch(self) -> int:
-        """Bytes of the frames that are kept; a renderer sees to those that are drawn anew."""
+        """Bytes of the frames that are kept; others are rendered again within the budget."""
         return self._memory
 
     def _apply(self, x: Any, out: Any) -> None:

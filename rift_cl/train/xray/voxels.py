@@ -1,4 +1,4 @@
-"""Splats as voxels: the slices that people look at, and what a start from a volume needs.
+"""Splats as voxels: slices for reports, and the linear system of a start from a volume.
 
 A pixel is a mean over a little square and a voxel one over a little cube. The rasterizer stands for
 the square by a dilation that keeps every splat's mass; the same dilation along all three axes makes
