@@ -195,8 +195,26 @@ def test_an_array_as_large_as_the_largest_buffer_is_made(device):
 
 
 def test_work_whose_least_part_is_beyond_the_largest_buffer_is_told(device):
+    with pytest.raises(ResourceLimitError, match=r"one view.*1\.41 KiB.*1e\+03 B"):
+        filtering(limited(device, allocation=1000))
+    scan = rift.Parallel(np.linspace(0, 3, 50), 40)
+    gains = np.arange(50.0)
+    F = ViewFilter(scan, rift.Ramp(), rows=9, gains=gains, device=limited(device, allocation=6000))
     with pytest.raises(ResourceLimitError, match=r"row of every view.*7\.81 KiB.*5\.86 KiB"):
-        filtering(limited(device, allocation=6000))
+        F(normal(50, 9, 40))
+
+
+@pytest.mark.parametrize(("bins", "largest"), [(40, 1 << 15), (400, 1 << 20)])
+def test_a_sinogram_beyond_the_largest_buffer_is_filtered_by_views(device, bins, largest):
+    """Rows that are convolved, and longer ones that are transformed."""
+    scan, y = rift.Parallel(np.linspace(0, 3, 700), bins), normal(700, bins)
+    limit = limited(device, allocation=largest)
+    found, wanted = (
+        [F(y), F.T(y), (2 * F)(y)]
+        for F in (ViewFilter(scan, rift.Ramp(), device=each) for each in (limit, device))
+    )
+    assert y.nbytes > largest, "the limit is crossed"
+    assert_same(found, wanted)
 
 
 def offsets_of(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, ...]]:

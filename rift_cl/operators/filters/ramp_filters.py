@@ -217,6 +217,8 @@ class ViewFilter(LinearOperator):
         self._views, self._rows, self._given_gains = scan, rows, gains
         factors, taps = _factors_and_taps(scan, filter, gains)
         self._gains = self.device.array(factors, self.dtype)
+        # Then any views may stand in the place of any others.
+        self._alike = len(taps) == 1 and bool((factors == factors[:1]).all())
         self._convolve: RowConvolution | RowTransform
         taps *= scan.pitch
         if len(taps) == 1 and scan.bins <= SHORT_ROW:
@@ -250,19 +252,22 @@ class ViewFilter(LinearOperator):
         return self._convolve.scratch
 
     def _chunks(self, budget: int) -> Iterable[Chunk]:
+        """Some views, where all are filtered alike; or some rows of every view."""
+        if self._alike:
+            chunks = self._parts(self.domain[0], budget, what="view")
+            return [((chunk,), (chunk,)) for chunk in chunks]
         if len(self.domain) == 2:
             return super()._chunks(budget)
-        array = self.dtype.itemsize * self.domain[0] * self.domain[2]
-        chunks = plan_chunks(
-            self.domain[1],
-            2 * array,
-            self.scratch,
-            budget,
-            what="row of every view",
-            array=array,
-            largest=self.device.traits.allocation,
-        )
+        chunks = self._parts(self.domain[1], budget, what="row of every view")
         return [((slice(None), chunk), (slice(None), chunk)) for chunk in chunks]
+
+    def _parts(self, count: int, budget: int, *, what: str) -> list[slice]:
+        """Cut an axis of so many samples."""
+        array = self.dtype.itemsize * (math.prod(self.domain) // max(count, 1))
+        largest = self.device.traits.allocation
+        return plan_chunks(
+            count, 2 * array, self.scratch, budget, what=what, array=array, largest=largest
+        )
 
 
 def _factors_and_taps(scan: Parallel, filter: Filter, gains: Gains | None) -> tuple[Floats, Floats]:
