@@ -31,7 +31,10 @@ from portability.variants import Variant, variants
 from rift_cl.cl.source import kernel_source
 
 _TOOLS = Path(__file__).parent
-_FAULTS = re.compile(r"(?:Data race|Invalid (?:read|write)|out of bounds)[^\n]*")
+_FAULTS = re.compile(
+    r"[^\n]*data race[^\n]*|Invalid (?:read|write)[^\n]*|[^\n]*exceeds static array[^\n]*",
+    re.IGNORECASE,
+)
 _CLSPV = "import sys, pyclspv; sys.exit(not pyclspv.compile(sys.stdin.read()))"
 
 
