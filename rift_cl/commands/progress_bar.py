@@ -78,7 +78,7 @@ class Pace:
 
 
 def show_progress(reports: Iterable[Report], *, quiet: bool) -> None:
-    """Run a generator of reports to its end and show where it stands."""
+    """Run a generator of reports to its end, and show progress."""
     if quiet:
         for _ in reports:
             pass

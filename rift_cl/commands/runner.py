@@ -156,7 +156,7 @@ def _values(part: Any) -> dict[str, Any]:
 
 
 def watch(reports: Iterable[Report], output: Output) -> None:
-    """Run a generator of reports to its end and show where it stands, if that is wanted."""
+    """Run a generator of reports to its end, and show progress unless quiet."""
     show_progress(reports, quiet=output.quiet)
 
 

@@ -88,7 +88,7 @@ def _capture(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
 
 
 def _with_space(sampled: ViewSet, settings: AnalyzeSettings, capture: Capture) -> ViewSet:
-    """The same with what stands where, as far as splats or sparse points tell it."""
+    """The views with free space estimated from splats or sparse points."""
     space, known = space_of(settings.source, sampled.cameras, capture.points, settings.device)
     if space is None:
         return sampled
@@ -162,7 +162,7 @@ def _with_lens(
 
 
 def in_millimetres(sampled: ViewSet, unit: float) -> ViewSet:
-    """The same views with lengths in millimetres, of which a unit of the world has so many."""
+    """The same views in millimetres, given the millimetres per world unit."""
     target = sampled.target
     band = None if target.band is None else target.band / unit
     scaled = replace(

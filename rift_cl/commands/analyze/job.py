@@ -134,7 +134,7 @@ class Analysis:
         return Findings({"largest_gap_degrees": gap, "add": angles}, (), (text + more,))
 
     def _worth(self, cameras: tuple[Camera, ...]) -> Findings:
-        """Where cameras to add stand, and what they would bring."""
+        """Positions of cameras to add, and their gain."""
         sampled = self.sampled
         rows = [(row[0], *(round(float(n), 6) for n in row[1:4])) for row in self._rows(cameras)]
         columns = ("add", "azimuth, °", "elevation, °", f"distance, {sampled.units}")

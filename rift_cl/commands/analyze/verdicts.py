@@ -78,7 +78,7 @@ def foretold(sampled: ViewSet, cameras: Sequence[Camera]) -> dict[str, Floats]:
 
 
 def _on_slice(taken: Observations, target: Target, side: Floats) -> float:
-    """The share of power on the slice across a line of sight that views of a volume leave."""
+    """Posterior variance on the slice across a line of sight, as a fraction of the power."""
     first = np.cross(side, np.eye(3)[np.argmin(np.abs(side))])
     first /= np.linalg.norm(first)
     plane = half_disc(target.highest)

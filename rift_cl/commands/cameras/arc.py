@@ -45,7 +45,7 @@ class Arc:
     closed: bool
 
     def record(self) -> dict[str, Any]:
-        """The same for JSON, angles in degrees."""
+        """The arc for JSON, with angles in degrees."""
         return {
             "front": self.front,
             "azimuth": self.azimuth,
@@ -101,14 +101,14 @@ def _all_round(units: Floats, up: Floats, elevations: Floats) -> bool:
 
 
 def across(up: Floats) -> Floats:
-    """A horizontal unit vector (3,), always the same for one up."""
+    """A horizontal unit vector (3,), determined by up."""
     along = np.eye(3)[np.abs(up).argmin()]
     second = np.cross(up, along)
     return np.asarray(np.cross(second / np.linalg.norm(second), up))
 
 
 def check_places(cameras: Sequence[Camera], where: Path) -> None:
-    """Make sure that cameras, if there are several, do not all stand in one place.
+    """Check that several cameras are not all at one position.
 
     Raises:
         InputError: they do.

@@ -81,7 +81,7 @@ def resized(camera: Camera, size: tuple[int, int]) -> Camera:
 
 
 def smooth_path(cameras: Sequence[Camera], between: int) -> list[Camera]:
-    """The cameras, with so many more between each two: positions on a spline, rotations turned.
+    """The cameras with interpolated ones between: spline positions, interpolated rotations.
 
     Positions lie on a uniform Catmull-Rom spline through the given ones (Catmull and Rom 1974)
     whose ends go straight on; rotations turn evenly about one axis from each to the next (slerp,

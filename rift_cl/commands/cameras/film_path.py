@@ -84,12 +84,12 @@ def orbit_place(
 
 
 def capture_arc(bounds: SceneBounds) -> Arc | None:
-    """From where cameras looked; None where nobody knows them."""
+    """Arc of the capture's cameras; None if they are not known."""
     return arc_of(bounds.cameras, bounds.center, bounds.up) if bounds.cameras else None
 
 
 def first_view(bounds: SceneBounds) -> tuple[Camera, Floats]:
-    """Where a viewer begins, and the point (3,) that it looks at.
+    """The viewer's first camera, and its focus (3,).
 
     A photograph's camera, the one in the middle of the capture; where nobody knows the cameras,
     that of an orbit.

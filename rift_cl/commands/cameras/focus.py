@@ -1,4 +1,4 @@
-"""What cameras look at: the point nearest to their axes, as long as that is among what they see."""
+"""Focus of cameras: the point nearest to their axes, if it lies within their view."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NEAR, _FAR = 0.02, 0.98
 
 
 def focus_among(cameras: Sequence[Camera], points: NDArray[np.float32] | None) -> Floats:
-    """What cameras look at, (3,).
+    """Focus of the cameras, (3,).
 
     Axes that do not meet leave the depth of the point nearest to them to chance. Where it is not
     among the sparse points, the median depth of those takes its place; without points, it is put
@@ -49,7 +49,7 @@ def focus_among(cameras: Sequence[Camera], points: NDArray[np.float32] | None) -
 
 
 def axes_meet(cameras: Sequence[Camera], focus: Floats) -> bool:
-    """Whether cameras look at a point, and not past it or side by side.
+    """Whether the axes of cameras meet near a point, in front of them.
 
     They do if their axes turn with the directions in which they see it: if they miss it by angles
     that are small beside the spread of those directions.

@@ -1,4 +1,4 @@
-"""A smooth way from one end of a capture to the other, close to its cameras all along.
+"""A smooth camera path from one end of a capture to the other, close to its cameras.
 
 The cameras are the knots of a graph; the route is the one between the two that lie farthest apart
 in it whose hops have the least sum of squares, so that many short hops are preferred to a long one.
@@ -34,7 +34,7 @@ _WIDER, _GAP = 3.0, 36.0
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """A way of a camera.
+    """A camera path.
 
     Args:
         places: (N, 3) where it stands, evenly spaced along the way.
@@ -101,7 +101,7 @@ def looked_at(camera: Camera, focus: Floats) -> Floats:
 
 
 def _gaps(distances: Floats, ways: Floats) -> NDArray[np.bool_]:
-    """Between which cameras (V, V) there is a gap that nobody looked from.
+    """(V, V) pairs of cameras with a gap in coverage between them.
 
     Args:
         distances: (V, V) between cameras.
@@ -156,7 +156,7 @@ def _away(places: Floats, centers: Floats) -> Floats:
 
 
 def _evenly_spaced(places: Floats, targets: Floats, longest: float) -> Route:
-    """The same way with equal steps."""
+    """The same path with equal steps."""
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     ways = np.concatenate([[0], np.cumsum(steps)]) / (steps.sum() or 1.0)
     shares = np.linspace(0, 1, len(places))

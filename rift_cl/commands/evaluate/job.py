@@ -76,7 +76,7 @@ class Evaluation:
         return views[::every] if every else views
 
     def _training_views(self) -> tuple[View, ...]:
-        """What was trained on; empty where nobody says, or where it is what is scored."""
+        """Training views; empty if they are not known, or if they are the scored ones."""
         if self.settings.train is None:
             return self._trained()
         views = open_seen(self.settings.train, pinhole=self.scene.pinhole).views

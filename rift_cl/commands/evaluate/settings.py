@@ -15,7 +15,7 @@ from rift_cl.option_marks import Auto
 
 @dataclass(frozen=True)
 class EvalInput(SceneInput):
-    """The scene, how its splats are drawn, and the photographs to score it on."""
+    """The scene, how its splats are rendered, and the photographs to score it on."""
 
     group: ClassVar[str] = "input"
 

@@ -136,7 +136,7 @@ def surface(
 
 
 def _grid(scene: SplatScene, voxels: int) -> Grid:
-    """The box of all splats that are not faint, with so many voxels along its longest edge."""
+    """Grid over the box of all splats that are not faint, by voxels along its longest edge."""
     densities = scene.logit_opacities.astype(np.float64)
     strong = densities >= densities.max() + np.log(_FAINT)
     reach = _REACH * scales_of(scene.log_scales[strong]).max(axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""From what was fitted to what every viewer draws: Gaussians, opacities, harmonics, display light.
+"""A fitted scene as every viewer renders it: Gaussians, opacities, harmonics, display light.
 
 What cannot be kept is converted by a stated approximation, and said in a sentence with its error.
 
@@ -43,7 +43,7 @@ _OPAQUE = 0.999
 
 
 def plain_scene(scene: SplatScene, light: Light) -> tuple[SplatScene, list[str]]:
-    """A scene that every viewer draws, and a sentence for each thing that was lost.
+    """A scene that every viewer can render, and a sentence for each loss.
 
     Args:
         scene: of photographs.

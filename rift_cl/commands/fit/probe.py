@@ -42,18 +42,18 @@ class Probe:
     entries: float
 
     def step(self, splats: int) -> float:
-        """Seconds of a step with so many splats."""
+        """Seconds of one step with a number of splats."""
         (few, many), (quick, slow) = self.counts, self.seconds
         if many <= few:
             return slow * max(1.0, splats / many)
         return quick + max(slow - quick, 0.0) * (splats - few) / (many - few)
 
     def steps(self, ahead: Iterable[tuple[int, int]]) -> float:
-        """Seconds of numbers of steps, each with so many splats; see ``Strategy.forecast``."""
+        """Seconds of steps with changing numbers of splats; see ``Strategy.forecast``."""
         return sum(steps * self.step(count) for steps, count in ahead)
 
     def lists(self, frame: FrameMemory, tile: int) -> int:
-        """Bytes of the tile lists of a frame, whose tiles have a side of so many pixels."""
+        """Bytes of a frame's tile lists, by tile edge in pixels."""
         return frame.lists(round(self.entries * frame.splats), -(-frame.pixels // tile**2))
 
 

@@ -1,4 +1,4 @@
-"""What every fit does, whatever it looks at: it trains, can be stopped gently, and goes on later.
+"""What all fits share: training, checkpoints, stopping between steps, and resuming.
 
 ``Fit`` (photographs) and ``XrayFit`` (projections) add what they read, how they score, and what
 they leave behind.

@@ -1,4 +1,4 @@
-"""What ``rift fit`` takes that nobody has posed: a folder of photographs, or a video.
+"""Unposed input of ``rift fit``: a folder of photographs, or a video.
 
 Poses are found first, and of a video the frames; both are kept in the folder of the fit, so that a
 fit that goes on has the very same.
@@ -21,7 +21,7 @@ _LISTED = 4
 
 
 class BareInput:
-    """Photographs that nobody has posed; nothing is read yet.
+    """Unposed photographs; nothing is read yet.
 
     Args:
         source: their folder, or a video.

@@ -120,7 +120,7 @@ class Fit(FitRun[FitPhotosSettings]):
         return self._pictures(self.training_views), reading
 
     def _frame(self, pixels: int) -> FrameMemory:
-        """What a frame of so many pixels takes on the device, but for its tile lists."""
+        """Device memory of a frame, without its tile lists."""
         training = self.settings.training
         order, color_order = training.basis.orders
         channels = 3 if color_order else 0

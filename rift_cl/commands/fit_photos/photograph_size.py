@@ -1,4 +1,4 @@
-"""How much smaller photographs are made for a fit, where nobody says.
+"""Default downscaling of photographs for a fit.
 
 The time of a step grows with the number of pixels, and phones give 12 million of them, finer than
 the splats of a usual fit. 1.6 megapixels are what splats are usually fitted at (the code of Kerbl

@@ -135,7 +135,7 @@ class CapturePictures:
         return held
 
     def begin(self, step: int) -> None:
-        """Say which step comes: backgrounds hang on it."""
+        """Announce the next step, which determines the backgrounds."""
         self._step = step
 
     def target(self, number: int) -> Any:
@@ -158,7 +158,7 @@ class CapturePictures:
         return random.uniform(0, 1, 3).astype(np.float32)
 
     def foreground(self, number: int) -> NDArray[np.bool_] | None:
-        """(height, width) what is in front of the background; None where nobody can tell."""
+        """(height, width) foreground mask; None if it is not known."""
         image, counted = self.image(number), self.counted(number)
         if image.shape[2] == 4 and counted is None:
             return np.asarray(image[..., 3] > _FOREGROUND)

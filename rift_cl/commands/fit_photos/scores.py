@@ -115,7 +115,7 @@ def score_record(groups: Mapping[str, Sequence[ViewScore]]) -> dict[str, Any]:
 
 
 def _angles(cameras: Sequence[Camera], camera: Camera, focus: NDArray[np.float64]) -> Floats:
-    """Degrees between a camera and others, as seen from where they look."""
+    """Degrees between a camera and others, measured at their focus."""
     ways = np.array([other.center for other in cameras]) - focus
     way = camera.center - focus
     across = np.linalg.norm(np.cross(ways, way), axis=1)

@@ -45,7 +45,7 @@ def first_splats(
 
 
 def _guessed(pictures: CapturePictures, count: int, seed: int) -> Any:
-    """Points in the visual hull, or where the cameras look if there is no background."""
+    """Points in the visual hull, or about the focus if there is no background."""
     views = len(pictures.cameras)
     few = evenly(views, _HULL_VIEWS)
     fronts = [pictures.foreground(number) for number in few]

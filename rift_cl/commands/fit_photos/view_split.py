@@ -1,4 +1,4 @@
-"""What a fit looks at and what it holds out."""
+"""Split of views into training and test views."""
 
 from __future__ import annotations
 

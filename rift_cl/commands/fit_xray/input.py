@@ -171,7 +171,7 @@ class XrayPictures:
         self.behind: Floats = np.zeros(3, np.float32)
 
     def begin(self, step: int) -> None:
-        """Nothing hangs on the step."""
+        """Nothing depends on the step."""
 
     def target(self, number: int) -> Any:
         """(rows, bins, 1) line integrals on the device."""

@@ -32,7 +32,7 @@ _OF_FIT = (_CONFIG, *CAMERA_FILES[:1])
 
 
 class OpenedScene:
-    """Splats in host memory, and how to draw them.
+    """Splats in host memory, with their rendering settings.
 
     Args:
         settings: where the scene is.
@@ -156,7 +156,7 @@ def scene_file(path: Path) -> Path:
 
 
 def in_display_light(image: NDArray[np.float32], light: Light) -> NDArray[np.float32]:
-    """A drawn image as a display shows it, 0 to 1."""
+    """A rendered image in display light, 0 to 1."""
     shown = np.clip(image, 0, 1)
     if light == "linear":
         to_display(shown)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class OrbitInput(SceneInput):
-    """The scene, how its splats are drawn, and the cameras that saw it."""
+    """The scene, how its splats are rendered, and the cameras of its capture."""
 
     capture: Auto[Path] = None
     """A capture of the same scene (its photographs need not be there), whose cameras set height,

@@ -1,4 +1,4 @@
-"""Where a scene lies: what an orbit turns about, and which way is up.
+"""Bounds of a scene: centre of orbits, extent, and up direction.
 
 Splats that float far off, or faint ones, must not pull the middle away: everything is a median or
 a percentile, weighted by opacity. Splats alone do not say which way is up; cameras do, since people
@@ -81,7 +81,7 @@ def bounds_of_cameras(
     center: Floats | None = None,
     up: Floats | None = None,
 ) -> SceneBounds:
-    """Where cameras look, how far off they stand, and their common up.
+    """Focus, distance and common up direction of cameras.
 
     Args:
         cameras: of the capture that the splats were fitted to.

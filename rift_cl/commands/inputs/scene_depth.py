@@ -1,4 +1,4 @@
-"""Where surfaces stand, for those who place cameras: depth by fitted splats or by sparse points."""
+"""Depth of surfaces for placing cameras, from fitted splats or sparse points."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def space_of(
     points: NDArray[np.float32] | None,
     device: str | None = None,
 ) -> tuple[FreeSpace | None, str]:
-    """What stands where, and where that is known from, for people.
+    """Free space of a scene, and a sentence on its source.
 
     Args:
         source: a capture, or the folder of a fit, whose splats tell more than sparse points.

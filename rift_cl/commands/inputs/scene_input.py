@@ -1,4 +1,4 @@
-"""Which scene a command takes, and how its splats are drawn."""
+"""The scene that a command takes, and how its splats are rendered."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SceneInput:
-    """The scene, and how its splats are drawn."""
+    """The scene, and how its splats are rendered."""
 
     group: ClassVar[str] = "input"
 

@@ -72,7 +72,7 @@ def hidden_places(sampled: ViewSet, near: float, far: float) -> KeepOut | None:
 
 
 def strange_places(sampled: ViewSet, distance: float) -> KeepOut | None:
-    """Where nobody stood near: of what is there nothing is known."""
+    """Positions far from all cameras, about which nothing is known."""
     places, step = places_about(sampled.target.center, distance, distance)
     ways = (places - sampled.target.center) / distance
     near = (ways @ sampled.directions().T).max(axis=1) >= math.cos(math.radians(ASTRAY))

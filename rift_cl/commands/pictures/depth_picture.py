@@ -1,4 +1,4 @@
-"""Depth as a picture that people can look at: near is bright, far is dark, nothing is black.
+"""Depth as a picture: near is bright, far is dark, nothing is black.
 
 Colours follow the logarithm of depth, so that a scene that goes on to the horizon leaves near
 things colours of their own.

@@ -1,4 +1,4 @@
-"""A few of many, evenly spaced: what a picture shows, or what an estimate looks at."""
+"""An evenly spaced subset, for pictures and estimates."""
 
 from __future__ import annotations
 

@@ -132,7 +132,7 @@ class CleanRows:
         return self.clean(self.load(start, stop))
 
     def load(self, start: int, stop: int) -> LoadedRows:
-        """Read some rows, and those around them that corrections look at.
+        """Read rows, and the neighbours that corrections need.
 
         Works on the host alone, so that another thread than the one that uses the device can do it.
         """
@@ -160,7 +160,7 @@ class CleanRows:
 
     @property
     def _halo(self) -> int:
-        """Rows on either side that zingers and phase retrieval look at."""
+        """Neighbouring rows that zinger removal and phase retrieval need."""
         halo = 0 if self.phase is None else self.phase.halo_rows()
         return halo + (0 if self._settings.zingers is None else _ZINGER_HALO)
 

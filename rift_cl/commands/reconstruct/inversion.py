@@ -93,7 +93,7 @@ class Inversion:
         return 4 * (images * int(np.prod(A.grid.shape[-2:])) + sinograms * views * bins + fine)
 
     def projector(self, slices: int) -> ParallelProjector:
-        """The projector of so many slices, kept for the next slab of the same size."""
+        """The projector of a number of slices, kept for the next slab of the same size."""
         count = 0 if self.settings.iterative else slices
         if count not in self._projectors:
             self._projectors[count] = self._projector(slices)

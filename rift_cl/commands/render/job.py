@@ -176,7 +176,7 @@ class Render:
         return open_capture(Path(self.settings.path or ""), photographs=False)
 
     def _way(self) -> str:
-        """The way of the film's camera, in words."""
+        """The film's camera path, in words."""
         arc, bounds = capture_arc(self.bounds), self.bounds
         if self.settings.path is not None:
             return str(self.settings.path)

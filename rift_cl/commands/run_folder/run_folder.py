@@ -1,4 +1,4 @@
-"""The folder that a long command leaves behind: what was asked, what came out, what to look at.
+"""The output folder of a long command: settings, metrics, pictures and report.
 
 ``config.json`` holds the settings, the device and the version, so that the run can be repeated;
 ``metrics.json`` holds its figures; ``report.html`` shows both, and the pictures, in one file.

@@ -35,7 +35,7 @@ class KeyFrame:
 
 
 def way_through(keys: Sequence[KeyFrame], between: int, edge: int) -> list[Camera]:
-    """The cameras of a way.
+    """Cameras along a path.
 
     Args:
         keys: one or more; the first one's window gives the shape of all pictures.
@@ -100,7 +100,7 @@ class PathPanel:
         run.on_click(on_run)
 
     def cameras(self) -> list[Camera]:
-        """The way's cameras; none where there are no key frames."""
+        """The path's cameras; none without key frames."""
         between = int(np.clip(self._between.value, 0, _MOST_BETWEEN))
         keys = list(self._keys)
         try:
@@ -137,7 +137,7 @@ class PathPanel:
             self._play(cameras, client)
 
     def _play(self, cameras: list[Camera], client: Any) -> None:
-        """Lead a page's camera along the way."""
+        """Play the camera path on a page."""
         self._stop = stopped = threading.Event()
         self._player = client
         reach = float(np.linalg.norm(client.camera.look_at - client.camera.position)) or 1.0

@@ -66,7 +66,7 @@ def nearest_one(photographs: Sequence[Photograph], camera: Camera) -> int:
 
 
 def taken_from(photograph: Photograph, camera: Camera, reach: float) -> bool:
-    """Whether a camera stands where a photograph was taken.
+    """Whether a camera is at a photograph's position.
 
     Args:
         photograph: that may be compared with.

@@ -1,4 +1,4 @@
-"""Where a page's camera is told to stand."""
+"""Positions that a page's camera is moved to."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ KINDS: tuple[Kind, ...] = ("colour", "depth")
 
 @dataclass(frozen=True)
 class Wish:
-    """What is to be drawn.
+    """A request for a picture.
 
     Args:
         kind: of picture.

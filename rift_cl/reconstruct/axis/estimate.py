@@ -1,4 +1,4 @@
-"""What is known of a rotation axis after a search."""
+"""Result of a search for the rotation axis."""
 
 from __future__ import annotations
 

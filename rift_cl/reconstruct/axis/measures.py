@@ -86,7 +86,7 @@ class RowAxis(NamedTuple):
 
 
 class Measure(Protocol):
-    """A way to find the axis of one row."""
+    """A method that estimates the axis of one row."""
 
     def find(self, views: Views) -> RowAxis | None:
         """The axis of a row, (angle, bin); None where this measure does not apply to it."""

@@ -52,7 +52,7 @@ class Pairs:
     share: Floats
 
     def thinned(self, most: int) -> Pairs:
-        """At most so many of them, evenly chosen."""
+        """An evenly spaced subset of at most a given size."""
         count = self.first.size
         chosen = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
         return Pairs(*(part[chosen] for part in (self.first, self.before, self.after, self.share)))

@@ -84,7 +84,7 @@ def find_center(
 
 
 def searched_rows(count: int) -> list[int]:
-    """The rows of a detector that a search looks at: evenly spread, the middle one among them."""
+    """Detector rows used by a search: evenly spaced, the middle one included."""
     taken = min(_ROWS, count)
     return [int((index + 0.5) * count / taken) for index in range(taken)]
 

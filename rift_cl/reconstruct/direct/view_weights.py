@@ -1,4 +1,4 @@
-"""How much of the half-circle of directions each view stands for.
+"""Weights of unevenly spaced views: the part of the half-circle that each represents.
 
 A reconstruction by integration is a sum over directions; the weights here are its quadrature.
 They add up to pi, so that the level of the result is right: one number for each view, or, where

@@ -16,7 +16,7 @@ from rift_cl.geometry import Parallel
 
 
 def binned(frames: NDArray[Any], *, rows: int = 1, bins: int = 1) -> NDArray[np.float32]:
-    """Means of blocks of so many detector rows and bins.
+    """Means over blocks of detector rows and bins.
 
     Rows and bins at the far end that fill no block are left out; ``binning_note`` says how many.
 
@@ -50,7 +50,7 @@ def binned(frames: NDArray[Any], *, rows: int = 1, bins: int = 1) -> NDArray[np.
 
 
 def binned_center(center: float, bins: int) -> float:
-    """The rotation axis in blocks of so many bins.
+    """The rotation axis in units of binned detector bins.
 
     Block j holds the bins ``bins j`` to ``bins j + bins - 1``, whose middle is
     ``bins j + (bins - 1) / 2``.

@@ -80,7 +80,7 @@ class DetectorColumns:
         return self.device.get(found)
 
     def levels(self, dropped: int) -> Floats:
-        """Mean of each sorted column without so many values at either end, (row, bin)."""
+        """Trimmed mean of each sorted column, (row, bin)."""
         found = self.device.empty((self.rows, self.bins))
         self._profile("column_level", ranked=self._values, level=found, dropped=dropped)
         return self.device.get(found)
@@ -122,7 +122,7 @@ class DetectorColumns:
         self._values, self._other, self._order = other, self._values, None
 
     def median(self, window: int) -> None:
-        """Replace every value by the median across so many bins, an odd number.
+        """Median filter across an odd number of bins.
 
         Beyond the detector's ends the bins are mirrored.
         """

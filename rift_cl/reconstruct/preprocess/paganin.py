@@ -120,7 +120,7 @@ class Propagation:
         return int(np.flatnonzero(beyond < error)[0]) if beyond[-1] < error else reach
 
     def _laplacian(self, count: int) -> NDArray[np.float64]:
-        """|k|^2 along an axis of so many pixels, at the frequencies of the cosine transform."""
+        """|k|^2 along one axis, at the frequencies of the cosine transform."""
         phase = np.pi * np.arange(count) / count
         squared = 2 - 2 * np.cos(phase) if self.generalised else phase**2
         return np.asarray(squared / self.pixel**2)

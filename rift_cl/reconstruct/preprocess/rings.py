@@ -86,7 +86,7 @@ class SortingFilter:
         columns.unsort()
 
     def window_for(self, bins: int) -> int:
-        """The window on a detector of so many bins.
+        """Window in bins for a detector's width.
 
         Raises:
             InputError: the window that was asked for is wider than the detector.
@@ -387,7 +387,7 @@ def _demand_whole(least: int, most: int, **values: Any) -> None:
 
 
 def _gaussian(values: NDArray[Any], deviation: float, *, axis: int) -> NDArray[Any]:
-    """Values smoothed by a Gaussian of so many samples, mirrored beyond the ends.
+    """Values smoothed by a Gaussian (width in samples), mirrored at the ends.
 
     The cosine transform is that of the values mirrored without end.
     """

@@ -66,7 +66,7 @@ def unevenness(levels: ArrayLike) -> Profile:
 
 
 def odd_window(window: int, bins: int) -> int:
-    """The window, or the odd share of a smaller detector."""
+    """The window, or an odd fraction of the width of a smaller detector."""
     return min(window, max(bins // _SHARE, 3)) | 1
 
 

@@ -80,5 +80,5 @@ class DirectionWeights:
         )
 
     def heaviest(self, axes: int) -> float:
-        """The largest weight of any direction, for so many axes."""
+        """Largest weight over all directions, for 2 or 3 axes."""
         return max(self.seen, self.unseen, 1.0 if axes == 3 else 0.0)

@@ -58,7 +58,7 @@ class Disc:
     misfit: float = 0.0
 
     def coverage(self, grid: Grid) -> NDArray[np.float32]:
-        """The share of every pixel that the disc covers, (y, x), nearly."""
+        """Approximate fraction of each pixel inside the disc, (y, x)."""
         y, x = np.meshgrid(grid.coordinates(-2), grid.coordinates(-1), indexing="ij")
         pixel = float(np.sqrt(np.prod(grid.spacing[-2:])))
         inside = (self.radius - np.hypot(x - self.x, y - self.y)) / pixel

@@ -164,6 +164,6 @@ class OrderedSubsets(Solver):
         copy(self.data.device, self.data.device.array(whole, self.data.dtype), out)
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """All that the next step depends on, as host arrays; costs a look at all views."""
+        """The solver's state as host arrays; computing it projects all views once."""
         self._measured(self._now.image, self._now.residual)
         return super().state()

@@ -128,7 +128,7 @@ def _ramp(A: LinearOperator, scan: Parallel, name: str, share: Share) -> LinearO
 
 
 def _kept_share(A: LinearOperator, scan: Parallel, y: Any, noise: float | None) -> Share:
-    """The share of a frequency that is kept, as a function of frequencies in cycles per length."""
+    """Factor of each frequency, as a function of frequencies in cycles per length."""
     # Beyond these a square is no number any more.
     variance = 0.0 if noise is None else min(noise, 1e150) ** 2
     if variance == 0:

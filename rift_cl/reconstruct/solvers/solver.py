@@ -85,7 +85,7 @@ class Solver(ABC):
         return met or self._exhausted
 
     def run(self, steps: int) -> Iterator[Report]:
-        """Go on until so many steps are done in all, or the residual is down to the noise.
+        """Iterate up to a total number of steps, or until the residual is down to the noise.
 
         Args:
             steps: in all, with those of an earlier run.

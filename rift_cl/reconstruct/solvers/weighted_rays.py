@@ -52,7 +52,7 @@ class WeightedRays(LinearOperator):
 
     @property
     def scratch(self) -> int:
-        """The operator's, the roots, and the data weighed on the way back."""
+        """Scratch bytes: the operator's, square roots of the weights, and weighted data."""
         return self.inner.scratch + 2 * int(self._roots.nbytes)
 
     def _apply(self, x: Any, out: Any) -> None:
