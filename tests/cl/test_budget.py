@@ -133,6 +133,12 @@ def test_memory_of_its_own_is_not_bounded_by_the_host(traits):
     assert memory_budget(dataclasses.replace(traits, is_cpu=False, unified=True)) == 600
 
 
+def test_a_share_of_the_memory_that_pointers_reach_is_used(traits):
+    own = dataclasses.replace(traits, is_cpu=False, unified=False, share=0.85)
+    assert memory_budget(own) == 4250
+    assert memory_budget(dataclasses.replace(own, address_bits=10)) == 1024
+
+
 def test_host_that_does_not_say_what_is_free(traits, monkeypatch):
     monkeypatch.setattr(budget, "free_host_memory", lambda: None)
     assert memory_budget(traits) == 5000

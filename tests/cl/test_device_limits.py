@@ -26,6 +26,7 @@ from rift_cl.cl import program, reductions
 from rift_cl.cl.grid_parts import GridPart, grid_parts
 from rift_cl.cl.launch_times import LaunchTimes
 from rift_cl.cl.program import Programs, kernel_needs
+from rift_cl.cl.source import kernel_names, kernel_source
 from rift_cl.errors import DeviceError, ResourceLimitError
 from rift_cl.operators import ViewFilter
 from rift_cl.operators.fourier.spectrum import SpectralFilter
@@ -253,6 +254,13 @@ def test_parts_of_a_grid_hold_every_item_once(size, most, group, axes):
         assert all(n <= max(m, group) for n, m in zip(part, most, strict=False))
         taken[tuple(slice(at, at + n) for at, n in zip(offset, part, strict=True))] += 1
     assert (taken == 1).all()
+
+
+@pytest.mark.parametrize("asked", ["get_num_groups", "get_global_size", "get_group_id"])
+def test_no_kernel_asks_for_what_is_wrong_in_a_part_of_a_grid(asked):
+    for name in kernel_names():
+        lines = [line for line in kernel_source(name).splitlines() if f"{asked}(" in line]
+        assert all("get_global_offset" in line for line in lines), name
 
 
 @pytest.mark.once
