@@ -155,13 +155,17 @@ def dealt(items: Iterable[pytest.Item]) -> Iterable[pytest.Item]:
         else:
             tests.setdefault(item.nodeid.split("[")[0], []).append(item)
     for name, cases in tests.items():
-        devices = 1 + max(case.callspec.indices["device"] for case in cases)
+        devices: dict[int, int] = {}
         rows: dict[tuple[tuple[str, int], ...], int] = {}
         for case in cases:
-            row = tuple(sorted((n, k) for n, k in case.callspec.indices.items() if n != "device"))
+            devices.setdefault(id(case.callspec.params["device"]), len(devices))
+        for case in cases:
+            # Values are the same objects for each device, whatever they are.
+            params = {n: id(value) for n, value in case.callspec.params.items()}
+            device = devices[params.pop("device")]
             # Tests of one row begin on different devices, the same every time.
-            turn = rows.setdefault(row, len(rows)) + zlib.crc32(name.encode())
-            if turn % devices == case.callspec.indices["device"]:
+            turn = rows.setdefault(tuple(params.items()), len(rows)) + zlib.crc32(name.encode())
+            if turn % len(devices) == device:
                 yield case
 
 
