@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rift_cl.cl.memory import download
+from rift_cl.cl.host_arrays import download
 
 if TYPE_CHECKING:
     from rift_cl.cl.array import DeviceArray

@@ -19,7 +19,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from rift_cl.cl.memory import check_finite
+from rift_cl.cl.host_arrays import check_finite
 from rift_cl.errors import DTypeError
 from rift_cl.interop.tensors import check_tensor, to_host
 from rift_cl.operators.linear import LinearOperator

@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from skimage.util import img_as_float
 
 from rift_cl.cl.discovery import default_device
-from rift_cl.cl.memory import as_real_array
+from rift_cl.cl.host_arrays import as_real_array
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.geometry.numbers import real_numbers

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 
 from rift_cl.cl.device import Device
-from rift_cl.cl.memory import as_plain, upload
+from rift_cl.cl.host_arrays import as_plain, upload
 from rift_cl.errors import DeviceError, DTypeError, ShapeError
 
 

@@ -28,7 +28,7 @@ from numpy.typing import DTypeLike, NDArray
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
-from rift_cl.cl.memory import (
+from rift_cl.cl.host_arrays import (
     as_device_array,
     as_host_array,
     check_apart,

@@ -19,7 +19,7 @@ from rift_cl.basis.angular import ANGULAR_BASES, AngularBasis, angular_basis
 from rift_cl.cl.arithmetic import copy_columns
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
-from rift_cl.cl.memory import as_device_array
+from rift_cl.cl.host_arrays import as_device_array
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Camera
 from rift_cl.splat.host_shading import shade_on_host, shade_on_host_grad

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
-from rift_cl.cl.memory import as_device_array
+from rift_cl.cl.host_arrays import as_device_array
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Aperture, Camera
 from rift_cl.splat.orders import Modal, ModeOrders

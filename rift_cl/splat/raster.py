@@ -15,7 +15,7 @@ import numpy as np
 
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
-from rift_cl.cl.memory import as_device_array
+from rift_cl.cl.host_arrays import as_device_array
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.splat.orders import ModeOrders, check_order

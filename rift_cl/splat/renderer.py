@@ -16,7 +16,7 @@ from rift_cl.cl.arithmetic import copy_columns, sum_columns
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
-from rift_cl.cl.memory import as_device_array
+from rift_cl.cl.host_arrays import as_device_array
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.splat.bands import FrameMemory, check_fixed

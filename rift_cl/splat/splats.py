@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
-from rift_cl.cl.memory import as_plain, as_real_array, upload
+from rift_cl.cl.host_arrays import as_plain, as_real_array, upload
 from rift_cl.errors import DTypeError, InputError, ShapeError
 from rift_cl.splat.orders import count_of, order_of
 

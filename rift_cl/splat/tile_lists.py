@@ -20,7 +20,7 @@ import numpy as np
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
-from rift_cl.cl.memory import as_device_array
+from rift_cl.cl.host_arrays import as_device_array
 from rift_cl.errors import DTypeError, InputError, ResourceLimitError, ShapeError
 
 # A CPU's cores take so many chunks each, which evens their loads, of at least so many elements,

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
-from rift_cl.cl.memory import as_device_array
+from rift_cl.cl.host_arrays import as_device_array
 from rift_cl.errors import InputError, ResourceLimitError, ShapeError
 from rift_cl.geometry import Grid
 from rift_cl.geometry.numbers import real_numbers

@@ -8,7 +8,7 @@ import pytest
 import rift_cl as rift
 from rift_cl.cl import Device
 from rift_cl.cl.arithmetic import axpby
-from rift_cl.cl.memory import as_device_array, is_device_array
+from rift_cl.cl.host_arrays import as_device_array, is_device_array
 from rift_cl.errors import DeviceError, DTypeError, ShapeError
 
 SHAPE = (4, 6)

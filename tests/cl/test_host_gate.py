@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from rift_cl.cl.memory import as_host_array, check_output, download, share
+from rift_cl.cl.host_arrays import as_host_array, check_output, download, share
 from rift_cl.errors import DTypeError, InputError, NonFiniteError, ShapeError
 
 REAL = ["f2", "f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "?"]

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
-from rift_cl.cl.memory import is_device_array
+from rift_cl.cl.host_arrays import is_device_array
 from rift_cl.operators.projector.footprint import FOOTPRINTS
 from rift_cl.operators.projector.phase_table import PHASES, phase_table
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.cl.memory import is_device_array
+from rift_cl.cl.host_arrays import is_device_array
 from rift_cl.cl.reductions import dot, norm, total
 from rift_cl.geometry import Camera, Grid, Parallel
 from rift_cl.operators import Projector

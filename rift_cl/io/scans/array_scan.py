@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rift_cl.cl.memory import as_real_array
+from rift_cl.cl.host_arrays import as_real_array
 from rift_cl.errors import ShapeError
 from rift_cl.io.scans.literals import Kind
 from rift_cl.io.scans.scan_file import Frames, Part, ScanFile, ScanRows, check_angles

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.cl.memory import check_finite
+from rift_cl.cl.host_arrays import check_finite
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.scenes.splat_activations import (

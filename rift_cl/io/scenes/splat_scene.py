@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.cl.memory import as_host_array, as_real_array, check_finite
+from rift_cl.cl.host_arrays import as_host_array, as_real_array, check_finite
 from rift_cl.errors import FileFormatError, InputError, OutputError, ShapeError
 from rift_cl.io.boundary import reading
 from rift_cl.io.output import atomic_path, check_space

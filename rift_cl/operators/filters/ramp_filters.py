@@ -23,7 +23,7 @@ from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
-from rift_cl.cl.memory import check_finite
+from rift_cl.cl.host_arrays import check_finite
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
 from rift_cl.operators.filters.row_convolution import SHORT_ROW, RowConvolution

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.arithmetic import sum_columns
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
-from rift_cl.cl.memory import as_device_array
+from rift_cl.cl.host_arrays import as_device_array
 from rift_cl.errors import NonFiniteError, ShapeError
 from rift_cl.operators.fourier.column_transform import ColumnTransform
 

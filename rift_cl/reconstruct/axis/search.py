@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.cl.memory import as_host_array
+from rift_cl.cl.host_arrays import as_host_array
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
 from rift_cl.reconstruct.axis.estimate import AxisEstimate

@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rift_cl.cl.memory import check_finite
+from rift_cl.cl.host_arrays import check_finite
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
 from rift_cl.geometry.fan import FanBeam

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.cl.memory import as_plain, as_real_array, check_finite
+from rift_cl.cl.host_arrays import as_plain, as_real_array, check_finite
 from rift_cl.errors import InputError, ShapeError
 
 Floats = NDArray[np.float32]

@@ -18,7 +18,7 @@ import numpy as np
 
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import copy, multiply
-from rift_cl.cl.memory import as_real_array
+from rift_cl.cl.host_arrays import as_real_array
 from rift_cl.cl.reductions import dot
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry.numbers import one_number

@@ -17,7 +17,7 @@ import numpy as np
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.elementwise import copy
-from rift_cl.cl.memory import as_device_array, as_host_array, is_device_array
+from rift_cl.cl.host_arrays import as_device_array, as_host_array, is_device_array
 from rift_cl.cl.reductions import dot, norm
 from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.geometry.numbers import one_number

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rift_cl.cl.memory import as_real_array
+from rift_cl.cl.host_arrays import as_real_array
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Grid, Parallel
 

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.elementwise import pull_to_levels
-from rift_cl.cl.memory import download
+from rift_cl.cl.host_arrays import download
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry.numbers import one_number, real_numbers
 from rift_cl.operators.linear import LinearOperator

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import clip_negative, copy, multiply
-from rift_cl.cl.memory import download
+from rift_cl.cl.host_arrays import download
 from rift_cl.cl.reductions import dot
 from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.geometry.numbers import one_number

@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.cl.memory import download
+from rift_cl.cl.host_arrays import download
 from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
 from rift_cl.geometry import Parallel
 from rift_cl.operators.filters.compensation import COMPENSATIONS, Compensation

@@ -28,7 +28,7 @@ import numpy as np
 
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import clip_negative, copy, multiply
-from rift_cl.cl.memory import download
+from rift_cl.cl.host_arrays import download
 from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.linear import LinearOperator

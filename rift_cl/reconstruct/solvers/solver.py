@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import copy
-from rift_cl.cl.memory import as_device_array, check_output, download, is_device_array
+from rift_cl.cl.host_arrays import as_device_array, check_output, download, is_device_array
 from rift_cl.errors import CheckpointError, InputError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.progress import Report

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.elementwise import copy
-from rift_cl.cl.memory import download
+from rift_cl.cl.host_arrays import download
 from rift_cl.geometry import Parallel
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.operators.projector.fast_projector import FastProjector

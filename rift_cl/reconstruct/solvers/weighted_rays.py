@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.elementwise import copy, multiply
-from rift_cl.cl.memory import as_real_array, download, is_device_array
+from rift_cl.cl.host_arrays import as_real_array, download, is_device_array
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.operators.linear import LinearOperator
 

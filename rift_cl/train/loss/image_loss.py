@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from rift_cl.cl.arithmetic import sum_columns
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
-from rift_cl.cl.memory import as_device_array
+from rift_cl.cl.host_arrays import as_device_array
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.train.loss.pixel_loss import PIXEL_LOSSES
