@@ -17,8 +17,8 @@ from typing import Any
 import pytest
 
 import rift_cl as rift
+from rift_cl.cl.build.source import kernel_names
 from rift_cl.cl.program import Programs, literal
-from rift_cl.cl.source import kernel_names
 
 _touched: set[str] = set()
 _WORKERS_KEY = "touched"

@@ -33,7 +33,7 @@ from bench.rasterizers import RASTERIZERS
 from bench.splats import SplatCase
 from bench.surroundings import surroundings
 from bench.tables import markdown, tables
-from rift_cl.cl.source import kernel_names
+from rift_cl.cl.build.source import kernel_names
 
 _SIZES = ("256x384", "512x768", "2048x1500")
 _QUICK_SIZES = ("256x384",)

@@ -3,8 +3,8 @@
     python tools/stress_builds.py --rounds 17 --processes 6
 
 Each round starts with an empty kernel cache. PoCL loses such builds now and then; the lock in
-``rift_cl/cl/kernel_cache.py`` is there to prevent that, and ``--without-lock`` shows the driver
-alone. Ends with status 1 if any build failed.
+``rift_cl/cl/build/kernel_cache.py`` is there to prevent that, and ``--without-lock`` shows the
+driver alone. Ends with status 1 if any build failed.
 """
 
 from __future__ import annotations

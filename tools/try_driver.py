@@ -28,7 +28,7 @@ import tyro
 
 from portability.unpacked import UnpackError, unpack
 from portability.variants import Variant, variants
-from rift_cl.cl.source import kernel_source
+from rift_cl.cl.build.source import kernel_source
 
 _TOOLS = Path(__file__).parent
 _FAULTS = re.compile(

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import check_array, memory_budget
-from rift_cl.cl.driver_record import driver_identity
+from rift_cl.cl.build.driver_record import driver_identity
 from rift_cl.cl.failures import named_errors
 from rift_cl.cl.host_arrays import as_plain, as_real_array, download, send, upload
 from rift_cl.cl.process import claim_process

@@ -13,9 +13,9 @@ import threading
 from functools import cache
 from typing import Any
 
+from rift_cl.cl.build.intel_runtime import register_intel_runtime
+from rift_cl.cl.build.kernel_cache import prepare_cache
 from rift_cl.cl.device import Device
-from rift_cl.cl.intel_runtime import register_intel_runtime
-from rift_cl.cl.kernel_cache import prepare_cache
 from rift_cl.cl.process import claim_process
 from rift_cl.errors import NoDeviceError
 

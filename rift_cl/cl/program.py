@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rift_cl.cl.budget import format_bytes
-from rift_cl.cl.build import Builder, Key, building
+from rift_cl.cl.build.builder import Builder, Key, building
+from rift_cl.cl.build.kernel_cache import build_lock
+from rift_cl.cl.build.source import kernel_source
 from rift_cl.cl.failures import named_errors
 from rift_cl.cl.grid_parts import GridPart, Size, grid_parts
-from rift_cl.cl.kernel_cache import build_lock
 from rift_cl.cl.launch_times import LaunchTimes
 from rift_cl.cl.process import claim_process
 from rift_cl.cl.signature import Parameter, check_names, check_numbers, in_order, parameters
-from rift_cl.cl.source import kernel_source
 from rift_cl.errors import DeviceError
 
 if TYPE_CHECKING:

@@ -121,7 +121,7 @@ def test_children_share_the_fallback_and_its_lock(python, tmp_path, pocl_only):
     code = (
         "import subprocess, sys, os, warnings\n"
         "warnings.simplefilter('ignore')\n"
-        "from rift_cl.cl.kernel_cache import cache_folder\n"
+        "from rift_cl.cl.build.kernel_cache import cache_folder\n"
         "print(cache_folder(), os.environ['POCL_CACHE_DIR'], flush=True)\n"
         "if len(sys.argv) == 1:\n"
         "    subprocess.run([sys.executable, '-c', sys.orig_argv[2], 'child'], check=True)\n"

@@ -28,13 +28,13 @@ def test_concurrent_first_builds_all_succeed():
 
 LOCKED = """
 import sys, time
-from rift_cl.cl.kernel_cache import build_lock
+from rift_cl.cl.build.kernel_cache import build_lock
 with build_lock():
     print("locked", flush=True)
     sys.stdin.readline()
 """
 WAITING = """
-from rift_cl.cl.kernel_cache import build_lock
+from rift_cl.cl.build.kernel_cache import build_lock
 print("wants", flush=True)
 with build_lock():
     print("has", flush=True)

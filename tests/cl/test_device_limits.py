@@ -23,10 +23,10 @@ from voxel_scenes import random_splats
 
 import rift_cl as rift
 from rift_cl.cl import program, reductions
+from rift_cl.cl.build.source import kernel_names, kernel_source
 from rift_cl.cl.grid_parts import GridPart, grid_parts
 from rift_cl.cl.launch_times import LaunchTimes
 from rift_cl.cl.program import Programs, kernel_needs
-from rift_cl.cl.source import kernel_names, kernel_source
 from rift_cl.errors import DeviceError, ResourceLimitError
 from rift_cl.operators import ViewFilter
 from rift_cl.operators.fourier.spectrum import SpectralFilter

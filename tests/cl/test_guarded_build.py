@@ -7,14 +7,14 @@ import sys
 import pytest
 
 import rift_cl as rift
-from rift_cl.cl.guarded_build import Request, Worker, guarded_build
+from rift_cl.cl.build.guarded_build import Request, Worker, guarded_build
 from rift_cl.errors import DeviceError
 
 REQUEST = Request("0:0", "device", "probe", "source", ["-w"])
 # A child that answers with what it was asked, unless the first lines here make an end of it.
 ANSWERS = """
 import os, signal, sys, time
-from rift_cl.cl.build_worker import read_message, write_message
+from rift_cl.cl.build.worker import read_message, write_message
 while (asked := read_message(sys.stdin.buffer)) is not None:
     request = asked[0]
     {fate}

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from rift_cl.cl import intel_runtime
+from rift_cl.cl.build import intel_runtime
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the loader of Linux")
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from rift_cl import __version__
-from rift_cl.cl import cache_check, kernel_cache
+from rift_cl.cl.build import cache_check, kernel_cache
 from rift_cl.errors import DeviceError
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="PoCL's cache, on Linux")
@@ -116,7 +116,7 @@ def test_clearing_frees_what_it_says_and_spares_the_rest(folder):
 
 def test_next_run_after_clearing_works_in_the_same_process_and_in_another(cache, python):
     again = (
-        "from rift_cl.cl.kernel_cache import cache_size, clear_cache\n"
+        "from rift_cl.cl.build.kernel_cache import cache_size, clear_cache\n"
         "print(clear_cache() > 10_000, cache_size() < 100)\n"
         "print(works(rift.Device(device._handle, '0:0')))\n"
     )
@@ -128,7 +128,7 @@ def test_next_run_after_clearing_works_in_the_same_process_and_in_another(cache,
 def test_cache_that_is_deleted_under_a_running_process(cache, python):
     code = (
         "import shutil, rift_cl as rift\n"
-        "from rift_cl.cl.kernel_cache import cache_folder\n"
+        "from rift_cl.cl.build.kernel_cache import cache_folder\n"
         "rift.open_device('pocl').context\n"
         "shutil.rmtree(cache_folder().parents[1])\n"
     )
@@ -205,7 +205,7 @@ def test_lock_on_a_folder_that_became_unusable_is_a_named_error(folder):
 
 
 def test_cache_follows_the_users_cache_folder(python, tmp_path):
-    code = "from rift_cl.cl.kernel_cache import cache_folder; print(cache_folder())"
+    code = "from rift_cl.cl.build.kernel_cache import cache_folder; print(cache_folder())"
     done = python(code, RIFT_CACHE_DIR=None, XDG_CACHE_HOME=str(tmp_path / "xdg"))
     assert Path(done.stdout.strip()) == tmp_path / "xdg" / "rift_cl" / __version__
     done = python(code, RIFT_CACHE_DIR=None, XDG_CACHE_HOME=None, HOME=str(tmp_path))

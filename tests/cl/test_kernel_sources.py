@@ -8,7 +8,8 @@ import shutil
 import numpy as np
 import pytest
 
-from rift_cl.cl import Device, source
+from rift_cl.cl import Device
+from rift_cl.cl.build import source
 from rift_cl.errors import KernelBuildError
 
 KERNELS = source.kernel_names()

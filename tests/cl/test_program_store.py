@@ -7,8 +7,9 @@ import stat
 import numpy as np
 import pytest
 
-from rift_cl.cl import Device, build, guarded_build, kernel_cache, program_store
-from rift_cl.cl.program_store import Stored, load, program_name, save
+from rift_cl.cl import Device
+from rift_cl.cl.build import builder, guarded_build, kernel_cache, program_store
+from rift_cl.cl.build.program_store import Stored, load, program_name, save
 from rift_cl.errors import KernelBuildError
 
 DRIVER = {"platform": "A", "platform version": "1", "device": "D", "driver": "1"}
@@ -26,7 +27,7 @@ def folder(tmp_path, monkeypatch):
 @pytest.fixture
 def bare(device, folder, monkeypatch):
     """The device as one whose driver keeps nothing; makes one with nothing built yet."""
-    monkeypatch.setattr(build, "keeps_programs", lambda *_: False)
+    monkeypatch.setattr(builder, "keeps_programs", lambda *_: False)
     return lambda: Device(device._handle, device.selector, traits=device.traits)
 
 
@@ -45,7 +46,7 @@ def test_stored_program_computes_the_same_bits_and_is_built_once(device, bare, f
     wanted = _sum(device)
     assert np.array_equal(_sum(bare()), wanted)
     assert len(list(folder.iterdir())) == 1
-    monkeypatch.setattr(build, "guarded_build", _no_build)
+    monkeypatch.setattr(builder, "guarded_build", _no_build)
     assert np.array_equal(_sum(bare()), wanted)
 
 
@@ -116,21 +117,21 @@ def test_another_release_shares_no_program(monkeypatch):
 
 def test_kernel_that_no_way_builds_is_refused_by_name_and_asked_for_once(bare, monkeypatch):
     died = guarded_build.Built(None, "", "its compiler died (SIGSEGV)", "")
-    monkeypatch.setattr(build, "guarded_build", lambda *_: died)
+    monkeypatch.setattr(builder, "guarded_build", lambda *_: died)
     device = bare()
     for _ in range(2):
         with pytest.raises(KernelBuildError, match=r"axpby.*SIGSEGV"):
             _sum(device)
-        monkeypatch.setattr(build, "guarded_build", _no_build)
+        monkeypatch.setattr(builder, "guarded_build", _no_build)
     assert np.array_equal(device.get(device.array(np.ones(3))), np.ones(3))
 
 
 def test_kernel_that_a_process_died_of_is_left_to_a_child(device, folder, monkeypatch):
     fresh = Device(device._handle, device.selector, traits=device.traits)
-    monkeypatch.setattr(build, "keeps_programs", lambda *_: True)
+    monkeypatch.setattr(builder, "keeps_programs", lambda *_: True)
     seen = []
     real = program_store.begun
-    monkeypatch.setattr(build, "begun", lambda name: (seen.append(name), real(name))[1])
+    monkeypatch.setattr(builder, "begun", lambda name: (seen.append(name), real(name))[1])
     wanted = _sum(fresh)
     assert not list(folder.iterdir())
     (folder / f"{seen[0]}.begun").touch()

@@ -7,7 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rift_cl.cl import Device, source
+from rift_cl.cl import Device
+from rift_cl.cl.build import source
 from rift_cl.cl.self_test import SelfTest, self_test
 from rift_cl.errors import DeviceLostError
 
@@ -40,7 +41,8 @@ def test_wrong_numbers_are_noticed(device, monkeypatch, kernel):
     assert wrong != right
     real = source.kernel_source
     monkeypatch.setattr(
-        "rift_cl.cl.build.kernel_source", lambda name: wrong if name == kernel else real(name)
+        "rift_cl.cl.build.builder.kernel_source",
+        lambda name: wrong if name == kernel else real(name),
     )
     found = self_test(Device(device._handle, device.selector, traits=device.traits))
     assert (found.passed, found.detail) == (False, f"{device.name} computed wrong numbers")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rift_cl.cl import source
-from rift_cl.cl.build import OPTIONS
+from rift_cl.cl.build import source
+from rift_cl.cl.build.builder import OPTIONS
 from rift_cl.cl.signature import parameters
 from rift_cl.errors import KernelArgumentError
 

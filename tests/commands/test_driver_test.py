@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
-from rift_cl.cl import Device, build, driver_record, program_store, source
-from rift_cl.cl.driver_record import add_to_record, read_record
+from rift_cl.cl import Device
+from rift_cl.cl.build import builder, driver_record, program_store, source
+from rift_cl.cl.build.driver_record import add_to_record, read_record
 from rift_cl.cl.reductions import total
 from rift_cl.commands.devices import driver_test
 from rift_cl.commands.devices.driver_test import (
@@ -99,7 +100,9 @@ def test_driver_that_keeps_nothing_is_met_once(tested, monkeypatch):
 def test_wrong_numbers_are_found_and_refused_by_name(tested, monkeypatch, fault):
     real, wanted = source.kernel_source, stored_results()
     wrong = real("dot_product").replace("over_lanes(sum) + tail", fault)
-    monkeypatch.setattr(build, "kernel_source", lambda n: wrong if n == "dot_product" else real(n))
+    monkeypatch.setattr(
+        builder, "kernel_source", lambda n: wrong if n == "dot_product" else real(n)
+    )
 
     def attempt(_, families):
         for name in families:
@@ -125,7 +128,7 @@ def test_way_that_puts_a_driver_right_is_taken_for_every_kernel(tested, monkeypa
     record = _examined(tested, attempt)
     assert (record["way"], record["refused"]) == ("noinline", {})
     seen = []
-    monkeypatch.setattr(build, "way_to_build", lambda way, *rest: (seen.append(way), *rest)[1:])
+    monkeypatch.setattr(builder, "way_to_build", lambda way, *rest: (seen.append(way), *rest)[1:])
     tested = _fresh()
     total(tested, tested.array(np.ones(5)))
     assert seen == ["noinline"]

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
-from rift_cl.cl.source import kernel_names
+from rift_cl.cl.build.source import kernel_names
 from rift_cl.errors import InputError
 
 ROOT = Path(__file__).parents[2]

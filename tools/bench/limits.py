@@ -17,7 +17,7 @@ import pyopencl as cl
 
 import rift_cl as rift
 from bench.timing import timed
-from rift_cl.cl.kernel_cache import build_lock
+from rift_cl.cl.build.kernel_cache import build_lock
 
 _OPTIONS = ("-cl-std=CL1.2", "-cl-mad-enable", "-cl-fast-relaxed-math", "-w")
 _CHAINS, _LINKS = 10, 8

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from portability.variants import Variant
-from rift_cl.cl.source import kernel_source
+from rift_cl.cl.build.source import kernel_source
 
 TARGETS = ("spir64", "spir", "gfx1100")
 # The version whose registers the table holds; another allocates them in another way.

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from rift_cl.cl.source import kernel_names
+from rift_cl.cl.build.source import kernel_names
 
 RECORDED = Path(__file__).with_name("kernel_variants.json")
 _KINDS = ("cpu", "gpu")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rift_cl.cl.budget import format_bytes
-from rift_cl.cl.kernel_cache import cache_folder, cache_size, clear_cache
+from rift_cl.cl.build.kernel_cache import cache_folder, cache_size, clear_cache
 from rift_cl.commands.cache.settings import CacheSettings
 
 

@@ -2,8 +2,8 @@
 
 It runs in a child process, which may die or hang. What is found is kept beside the compiled
 kernels, and holds for this driver, its version and this release. A driver that fails is tried again
-with all kernels built in another way (``rift_cl.cl.guarded_build``); what no way puts right is
-refused from then on, kernel by kernel.
+with all kernels built in another way (``rift_cl.cl.build.guarded_build``); what no way puts right
+is refused from then on, kernel by kernel.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, Any
 
+from rift_cl.cl.build.driver_record import add_to_record, forget_record, read_record
+from rift_cl.cl.build.guarded_build import WAYS, death_of
+from rift_cl.cl.build.program_store import forget, stored_programs
 from rift_cl.cl.device import Device
-from rift_cl.cl.driver_record import add_to_record, forget_record, read_record
-from rift_cl.cl.guarded_build import WAYS, death_of
-from rift_cl.cl.program_store import forget, stored_programs
 from rift_cl.progress import Report
 
 # Relative deviation (L2) from the known results beyond which numbers are wrong: the worst gradient

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from rift_cl import __version__
-from rift_cl.cl.cache_check import files_kept
-from rift_cl.cl.kernel_cache import build_lock, cache_folder
-from rift_cl.cl.program_store import write_whole
+from rift_cl.cl.build.cache_check import files_kept
+from rift_cl.cl.build.kernel_cache import build_lock, cache_folder
+from rift_cl.cl.build.program_store import write_whole
 
 _FORMAT = 1
 # A program that no cache can hold: its text is new each time.

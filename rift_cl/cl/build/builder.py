@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rift_cl.cl.driver_record import keeps_programs, read_record
+from rift_cl.cl.build.driver_record import keeps_programs, read_record
+from rift_cl.cl.build.guarded_build import Request, guarded_build, way_to_build
+from rift_cl.cl.build.kernel_cache import build_lock
+from rift_cl.cl.build.program_store import Stored, begun, load, program_name, remove, save
+from rift_cl.cl.build.source import fault_place, kernel_source
 from rift_cl.cl.failures import named_errors
-from rift_cl.cl.guarded_build import Request, guarded_build, way_to_build
-from rift_cl.cl.kernel_cache import build_lock
-from rift_cl.cl.program_store import Stored, begun, load, program_name, remove, save
 from rift_cl.cl.real_type import real_type
-from rift_cl.cl.source import fault_place, kernel_source
 from rift_cl.errors import DeviceError, KernelBuildError
 
 if TYPE_CHECKING:

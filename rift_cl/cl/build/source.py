@@ -26,7 +26,7 @@ _COUNTED_PLACE = re.compile(
 @cache
 def kernel_folder() -> Path:
     """The folder of kernels: inside an installed package, or beside an editable one."""
-    package = Path(__file__).parents[1]
+    package = Path(__file__).parents[2]
     inside, beside = package / "kernels", package.parent / "kernels"
     return inside if inside.is_dir() else beside
 

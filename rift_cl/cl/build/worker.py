@@ -1,6 +1,6 @@
 """The child process in which kernels are compiled, so that a compiler may die or hang there.
 
-    python -m rift_cl.cl.build_worker
+    python -m rift_cl.cl.build.worker
 
 It reads requests from its input and writes answers to its output, each a JSON object behind its
 length (four bytes, big-endian); a binary follows the answer that announces its ``size``. It ends

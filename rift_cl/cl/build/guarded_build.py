@@ -16,7 +16,7 @@ import threading
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rift_cl.cl.build_worker import read_message, write_message
+from rift_cl.cl.build.worker import read_message, write_message
 from rift_cl.errors import DeviceError
 
 # Seconds after which a compiler counts as hanging.
@@ -100,7 +100,7 @@ class Worker:
     """
 
     def __init__(self, command: list[str] | None = None, limit: float = LIMIT) -> None:
-        self._command = command or [sys.executable, "-m", "rift_cl.cl.build_worker"]
+        self._command = command or [sys.executable, "-m", "rift_cl.cl.build.worker"]
         self._limit = limit
         self._process: subprocess.Popen[bytes] | None = None
         self._asking = threading.Lock()
@@ -143,7 +143,7 @@ class Worker:
 
     def _started(self) -> subprocess.Popen[bytes]:
         if self._process is None:
-            root = str(Path(__file__).parents[2])
+            root = str(Path(__file__).parents[3])
             path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
             try:
                 self._process = subprocess.Popen(

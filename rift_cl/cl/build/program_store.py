@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rift_cl import __version__
-from rift_cl.cl.kernel_cache import cache_folder
+from rift_cl.cl.build.kernel_cache import cache_folder
 
 _FORMAT = b"RIFT-CL program 1\n"
 _HASH = 64

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
-from rift_cl.cl.kernel_cache import cache_folder
+from rift_cl.cl.build.kernel_cache import cache_folder
 
 _WHEEL = "intel-opencl-rt"
 _LINUX, _WINDOWS = "libintelocl.so", "intelocl64.dll"

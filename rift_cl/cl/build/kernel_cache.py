@@ -19,7 +19,7 @@ from functools import cache
 from pathlib import Path
 
 from rift_cl import __version__
-from rift_cl.cl.cache_check import record, remove_damaged
+from rift_cl.cl.build.cache_check import record, remove_damaged
 from rift_cl.errors import DeviceError
 
 try:
