@@ -74,3 +74,14 @@ def test_where_no_file_can_be_written_the_other_drivers_are_left(wheel, monkeypa
     (tmp_path / "vendors").write_text("a file, no folder")
     intel_runtime.register_intel_runtime()
     assert not os.environ["OCL_ICD_VENDORS"]
+
+
+def test_a_folder_with_a_space_is_told_and_left_out(wheel, monkeypatch):
+    folder = wheel.parent.parent / "my environment"
+    wheel.parent.rename(folder)
+    listed = SimpleNamespace(name=wheel.name, locate=lambda: folder / wheel.name)
+    found = SimpleNamespace(files=[listed])
+    monkeypatch.setattr(intel_runtime, "distribution", lambda name: found)
+    with pytest.warns(UserWarning, match="space in its path"):
+        intel_runtime.register_intel_runtime()
+    assert not os.environ["OCL_ICD_VENDORS"]

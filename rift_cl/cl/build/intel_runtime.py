@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
+import warnings
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
@@ -27,9 +28,18 @@ def register_intel_runtime() -> None:
     """Let the loader find Intel's driver where its wheel is installed; call before it loads.
 
     Nothing is done where an environment variable names drivers, or where no file can be written.
+    The driver opens no device from a folder with a space in its path (seen with 2026.22 on Linux),
+    a link to it or not; it is left out there, with a warning.
     """
     library = _library()
     if library is None or any(os.environ.get(name) for name in _CHOICES):
+        return
+    if " " in str(library) and sys.platform != "win32":
+        warnings.warn(
+            f"Intel's driver in {library.parent} is left out: it opens no device from a folder "
+            "with a space in its path; install the extra intel in an environment without one",
+            stacklevel=2,
+        )
         return
     if sys.platform == "win32":
         # The loader of Windows takes libraries by name beside those of the registry.
