@@ -87,7 +87,7 @@ def plan_chunks(
     array: int = 0,
     largest: int = _MOST,
 ) -> list[slice]:
-    """Cut work into chunks that fit the memory: the one way in which work is cut to memory.
+    """Cut equal items of work into chunks that fit the memory (images: ``rift_cl.splat.bands``).
 
     Args:
         count: how many equal items of work there are, such as slices or rows.

@@ -210,13 +210,8 @@ class _Opened(NamedTuple):
 
         Buffers of the pool are up to a sixteenth larger than what is asked for.
         """
-        if size <= largest // 2:
-            return self.pool
-        return (
-            self.pool
-            if self.pool.alloc_size(self.pool.bin_number(size)) <= largest
-            else self.direct
-        )
+        fits = size <= largest // 2 or self.pool.alloc_size(self.pool.bin_number(size)) <= largest
+        return self.pool if fits else self.direct
 
     @classmethod
     def of(cls, handle: Any) -> _Opened:
