@@ -35,7 +35,17 @@ if TYPE_CHECKING:
         render,
     )
     from rift_cl.errors import RiftError
-    from rift_cl.geometry import Aperture, Camera, CameraType, FanBeam, Grid, Parallel
+    from rift_cl.geometry import (
+        Aperture,
+        Camera,
+        CameraType,
+        Cone,
+        Fan,
+        FanBeam,
+        Grid,
+        Parallel,
+        Vectors,
+    )
     from rift_cl.io import (
         SplatScene,
         open_capture,
@@ -67,8 +77,10 @@ __all__ = [
     "AxisEstimate",
     "Camera",
     "CameraType",
+    "Cone",
     "Constraints",
     "Device",
+    "Fan",
     "FanBeam",
     "FastProjector",
     "Grid",
@@ -86,6 +98,7 @@ __all__ = [
     "SplatSettings",
     "Splats",
     "Target",
+    "Vectors",
     "analyze",
     "backproject",
     "basis",
@@ -134,7 +147,17 @@ __getattr__, __dir__ = lazy_names(
             "render",
         ),
         "errors": ("RiftError",),
-        "geometry": ("Aperture", "Camera", "CameraType", "FanBeam", "Grid", "Parallel"),
+        "geometry": (
+            "Aperture",
+            "Camera",
+            "CameraType",
+            "Cone",
+            "Fan",
+            "FanBeam",
+            "Grid",
+            "Parallel",
+            "Vectors",
+        ),
         "io": (
             "SplatScene",
             "open_capture",

@@ -1,4 +1,4 @@
-"""How a target was looked at from a point: source and flat detector of a fan-beam scan.
+"""How a slice was looked at from a point: source and detector of a fan-beam scan.
 
 At angle a the source stands at ``source_to_axis * (sin a, -cos a)`` and looks across the rotation
 axis at a straight detector, ``source_to_detector`` away from it. Bins grow along
@@ -12,14 +12,21 @@ the ray of a parallel scan at the angle ``a - gamma`` with ``t = source_to_axis 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from rift_cl.errors import InputError, ShapeError
-from rift_cl.geometry.numbers import one_number
+from rift_cl.geometry.scan_value import (
+    ScanValue,
+    checked_angles,
+    checked_center,
+    checked_count,
+    checked_distances,
+    checked_flag,
+    checked_length,
+    refuse_degrees,
+)
 
 
 @dataclass(frozen=True)
@@ -43,19 +50,11 @@ class FanBeam:
 
     def __post_init__(self) -> None:
         """Check the arguments and bring them into their normal form."""
-        for field in fields(self):
-            given: Any = getattr(self, field.name)
-            value = one_number(given)
-            if np.isnan(value):
-                raise InputError(f"FanBeam: {field.name} is {given!r}, wanted a finite number")
-            if field.name != "center" and not value > 0:
-                raise InputError(f"FanBeam: {field.name} is {given!r}, wanted a positive length")
-            object.__setattr__(self, field.name, value)
-        if not self.source_to_detector >= self.source_to_axis:
-            raise InputError(
-                f"FanBeam: source_to_detector is {self.source_to_detector:g}, source_to_axis is "
-                f"{self.source_to_axis:g}; the detector stands behind the axis"
-            )
+        lengths = checked_distances("FanBeam", self.source_to_axis, self.source_to_detector)
+        object.__setattr__(self, "source_to_axis", lengths[0])
+        object.__setattr__(self, "source_to_detector", lengths[1])
+        object.__setattr__(self, "pitch", checked_length("FanBeam", "pitch", self.pitch))
+        object.__setattr__(self, "center", checked_center("FanBeam", self.center))
 
     @property
     def magnification(self) -> float:
@@ -71,9 +70,94 @@ class FanBeam:
         Raises:
             ShapeError: ``bins`` is not a positive whole number.
         """
-        count = one_number(bins)
-        if not (count >= 1 and count.is_integer()):
-            raise ShapeError(f"FanBeam: bins is {bins!r}, wanted a positive whole number")
-        u = (np.arange(int(count), dtype=np.float64) - self.center) * self.pitch
-        gamma: NDArray[np.float64] = np.arctan2(u, self.source_to_detector)
-        return gamma
+        count = checked_count("FanBeam", "bins", bins)
+        return fan_angles(count, self.center, self.pitch, self.source_to_detector)
+
+
+@dataclass(frozen=True, init=False, eq=False)
+class Fan(ScanValue):
+    """A fan-beam scan of a slice, or of every slice of a volume in the same way.
+
+    Args:
+        angles: of the source in radians, any order, any range; kept as a read-only float64 array.
+        bins: number of detector bins in a row.
+        pitch: distance between bins on the detector, in the grid's unit of length.
+        source_to_axis: distance of the source from the rotation axis.
+        source_to_detector: distance of the source from the detector, beyond the axis.
+        center: bin, possibly fractional, at which the axis is seen; ``(bins - 1) / 2`` when not
+            given.
+        curved: the detector is an arc about the source, bins are ``pitch`` apart along it, and
+            the fan angle is ``(k - center) * pitch / source_to_detector``.
+
+    Raises:
+        ShapeError: ``angles`` is empty or not one-dimensional, or ``bins`` is not positive.
+        InputError: another argument is not a usable number, the detector stands before the axis,
+            or the angles look like degrees.
+    """
+
+    angles: NDArray[np.float64]
+    bins: int
+    pitch: float
+    source_to_axis: float
+    source_to_detector: float
+    center: float
+    curved: bool
+
+    def __init__(
+        self,
+        angles: ArrayLike,
+        bins: int,
+        pitch: float,
+        source_to_axis: float,
+        source_to_detector: float,
+        center: float | None = None,
+        curved: bool = False,
+    ) -> None:
+        """Check the arguments and bring them into their normal form."""
+        object.__setattr__(self, "angles", checked_angles("Fan", angles))
+        refuse_degrees("Fan", self.angles)
+        object.__setattr__(self, "bins", checked_count("Fan", "bins", bins))
+        object.__setattr__(self, "pitch", checked_length("Fan", "pitch", pitch))
+        lengths = checked_distances("Fan", source_to_axis, source_to_detector)
+        object.__setattr__(self, "source_to_axis", lengths[0])
+        object.__setattr__(self, "source_to_detector", lengths[1])
+        middle = (self.bins - 1) / 2
+        object.__setattr__(self, "center", checked_center("Fan", center, middle))
+        object.__setattr__(self, "curved", checked_flag("Fan", "curved", curved))
+
+    @property
+    def views(self) -> int:
+        """Number of views."""
+        return len(self.angles)
+
+    @property
+    def magnification(self) -> float:
+        """How much larger the detector shows what stands at the axis."""
+        return self.source_to_detector / self.source_to_axis
+
+    @property
+    def beam(self) -> FanBeam:
+        """Source and detector without the angles."""
+        return FanBeam(self.source_to_axis, self.source_to_detector, self.pitch, self.center)
+
+    def fan_angles(self) -> NDArray[np.float64]:
+        """The fan angle of every bin's ray in radians, (bins,)."""
+        where = self.bins, self.center, self.pitch, self.source_to_detector
+        return fan_angles(*where, curved=self.curved)
+
+
+def fan_angles(
+    bins: int, center: float, pitch: float, distance: float, *, curved: bool = False
+) -> NDArray[np.float64]:
+    """Angles between the rays of a row's bins and the ray through the axis, in radians, (bins,).
+
+    Args:
+        bins: of the row.
+        center: bin at which the axis is seen.
+        pitch: distance between bins, along the row.
+        distance: of the source from the detector.
+        curved: whether the row is an arc about the source.
+    """
+    u = (np.arange(bins, dtype=np.float64) - center) * pitch
+    gamma: NDArray[np.float64] = u / distance if curved else np.arctan2(u, distance)
+    return gamma

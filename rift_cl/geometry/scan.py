@@ -7,19 +7,22 @@ axis is seen at the (possibly fractional) bin ``center``.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rift_cl.errors import InputError, ShapeError
-from rift_cl.geometry.numbers import one_number, real_numbers
+from rift_cl.geometry.scan_value import (
+    ScanValue,
+    checked_angles,
+    checked_center,
+    checked_count,
+    checked_length,
+)
 
 
 @dataclass(frozen=True, init=False, eq=False)
-class Parallel:
+class Parallel(ScanValue):
     """A parallel-beam scan; on a volume every slice is looked at in the same way.
 
     Args:
@@ -42,50 +45,18 @@ class Parallel:
         self, angles: ArrayLike, bins: int, pitch: float = 1.0, center: float | None = None
     ) -> None:
         """Check the arguments and bring them into their normal form."""
-        object.__setattr__(self, "angles", _angles(angles))
-        count, length = one_number(bins), one_number(pitch)
-        if not (count >= 1 and count.is_integer()):
-            raise ShapeError(f"Parallel: bins is {bins!r}, wanted a positive whole number")
-        object.__setattr__(self, "bins", int(count))
-        if not length > 0:
-            raise InputError(f"Parallel: pitch is {pitch!r}, wanted a positive length")
-        object.__setattr__(self, "pitch", length)
-        middle = (self.bins - 1) / 2 if center is None else one_number(center)
-        if math.isnan(middle):
-            raise InputError(f"Parallel: center is {center!r}, wanted a bin number")
-        object.__setattr__(self, "center", middle)
+        object.__setattr__(self, "angles", checked_angles("Parallel", angles))
+        object.__setattr__(self, "bins", checked_count("Parallel", "bins", bins))
+        object.__setattr__(self, "pitch", checked_length("Parallel", "pitch", pitch))
+        middle = (self.bins - 1) / 2
+        object.__setattr__(self, "center", checked_center("Parallel", center, middle))
 
-    def __eq__(self, other: object) -> bool:
-        """Scans are equal when every ray is."""
-        return isinstance(other, Parallel) and self._key() == other._key()
-
-    def __hash__(self) -> int:
-        """Equal scans hash equally."""
-        return hash(self._key())
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Copies are made by the constructor, so that their angles are read-only as well."""
-        return Parallel, (self.angles, self.bins, self.pitch, self.center)
-
-    def _key(self) -> tuple[bytes, int, float, float]:
-        return self.angles.tobytes(), self.bins, self.pitch, self.center
+    @property
+    def views(self) -> int:
+        """Number of views."""
+        return len(self.angles)
 
     def coordinates(self) -> NDArray[np.float64]:
         """The coordinate t of every bin's centre, in the unit of ``pitch``."""
         t: NDArray[np.float64] = (np.arange(self.bins, dtype=np.float64) - self.center) * self.pitch
         return t
-
-
-def _angles(angles: ArrayLike) -> NDArray[np.float64]:
-    values = real_numbers(angles)
-    if values is None:
-        raise InputError(f"Parallel: angles is {angles!r}, wanted real numbers, in radians")
-    if values.ndim != 1:
-        raise ShapeError(f"Parallel: angles has shape {values.shape}, wanted one dimension")
-    if values.size == 0:
-        raise ShapeError("Parallel: angles is empty; a scan needs at least one direction")
-    if not np.isfinite(values).all():
-        index = int(np.flatnonzero(~np.isfinite(values))[0])
-        raise InputError(f"Parallel: angles[{index}] is {values[index]}, wanted a finite number")
-    values.flags.writeable = False
-    return values

@@ -1,0 +1,155 @@
+"""What the geometries of scans have in common: equality by value, and arguments that are checked.
+
+Every check names the class and the argument, says what came and what was wanted.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rift_cl.errors import InputError, ShapeError
+from rift_cl.geometry.numbers import one_number, real_numbers
+
+# Whole turns in degrees. Evenly spaced angles that fill one of them to rounding are degrees.
+_TURNS_IN_DEGREES = (180.0, 360.0, 720.0)
+_TURN_TOLERANCE = 1e-5
+
+
+class ScanValue:
+    """A frozen dataclass whose fields are its constructor's arguments, arrays among them."""
+
+    def __eq__(self, other: object) -> bool:
+        """Scans are equal when every ray is."""
+        return type(other) is type(self) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        """Equal scans hash equally."""
+        return hash(self._key())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies are made by the constructor, so that their arrays are read-only as well."""
+        return type(self), self._values()
+
+    def _values(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, field.name) for field in fields(self))  # type: ignore[arg-type]
+
+    def _key(self) -> tuple[Any, ...]:
+        return tuple(
+            value.tobytes() if isinstance(value, np.ndarray) else value for value in self._values()
+        )
+
+
+def checked_angles(owner: str, angles: ArrayLike) -> NDArray[np.float64]:
+    """Angles as a read-only float64 array of one dimension.
+
+    Args:
+        owner: name of the class that they are given to.
+        angles: in radians, at least one.
+
+    Raises:
+        ShapeError: there are none, or not in one dimension.
+        InputError: they are no finite numbers.
+    """
+    values = real_numbers(angles)
+    if values is None:
+        raise InputError(f"{owner}: angles is {angles!r}, wanted real numbers, in radians")
+    if values.ndim != 1:
+        raise ShapeError(f"{owner}: angles has shape {values.shape}, wanted one dimension")
+    if values.size == 0:
+        raise ShapeError(f"{owner}: angles is empty; a scan needs at least one direction")
+    if not np.isfinite(values).all():
+        index = int(np.flatnonzero(~np.isfinite(values))[0])
+        raise InputError(f"{owner}: angles[{index}] is {values[index]}, wanted a finite number")
+    values.flags.writeable = False
+    return values
+
+
+def refuse_degrees(owner: str, angles: NDArray[np.float64]) -> None:
+    """Refuse evenly spaced angles that fill half a turn, a turn or two in degrees.
+
+    Raises:
+        InputError: they do; radians that do so by chance would be 28 turns or more.
+    """
+    if len(angles) < 3:
+        return
+    steps = np.diff(angles)
+    span = abs(float(angles[-1] - angles[0]))
+    if np.ptp(steps) > _TURN_TOLERANCE * span:
+        return
+    for whole in (span, span + abs(float(steps[0]))):
+        for turn in _TURNS_IN_DEGREES:
+            if abs(whole - turn) < _TURN_TOLERANCE * turn:
+                raise InputError(
+                    f"{owner}: angles fill {turn:g} in even steps, which looks like degrees; "
+                    "wanted radians: numpy.deg2rad(angles)"
+                )
+
+
+def checked_count(owner: str, name: str, value: Any) -> int:
+    """A positive whole number.
+
+    Raises:
+        ShapeError: it is none.
+    """
+    count = one_number(value)
+    if not (count >= 1 and count.is_integer()):
+        raise ShapeError(f"{owner}: {name} is {value!r}, wanted a positive whole number")
+    return int(count)
+
+
+def checked_length(owner: str, name: str, value: Any) -> float:
+    """A positive length.
+
+    Raises:
+        InputError: it is none.
+    """
+    length = one_number(value)
+    if math.isnan(length):
+        raise InputError(f"{owner}: {name} is {value!r}, wanted a finite number")
+    if not length > 0:
+        raise InputError(f"{owner}: {name} is {value!r}, wanted a positive length")
+    return length
+
+
+def checked_center(owner: str, value: Any, middle: float | None = None) -> float:
+    """The bin at which the axis is seen: ``middle`` if ``value`` is None.
+
+    Raises:
+        InputError: it is no finite number.
+    """
+    center = one_number(middle if value is None else value)
+    if math.isnan(center):
+        raise InputError(f"{owner}: center is {value!r}, wanted a bin number")
+    return center
+
+
+def checked_distances(owner: str, to_axis: Any, to_detector: Any) -> tuple[float, float]:
+    """Distances of the source from the axis and from the detector.
+
+    Raises:
+        InputError: one is no positive length, or the detector stands before the axis.
+    """
+    axis = checked_length(owner, "source_to_axis", to_axis)
+    detector = checked_length(owner, "source_to_detector", to_detector)
+    if not detector >= axis:
+        raise InputError(
+            f"{owner}: source_to_detector is {detector:g}, source_to_axis is {axis:g}; "
+            "the detector stands behind the axis"
+        )
+    return axis, detector
+
+
+def checked_flag(owner: str, name: str, value: Any) -> bool:
+    """A truth value.
+
+    Raises:
+        InputError: it is none.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{owner}: {name} is {value!r}, wanted True or False")
+    return bool(value)
