@@ -10,7 +10,7 @@ import pytest
 
 from rift_cl import phantom
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.geometry import Grid, Parallel
+from rift_cl.geometry import Cone, Fan, Grid, Parallel
 from rift_cl.phantom import Ellipsoid, rendering
 
 TILTED = Ellipsoid((0.3, -0.7, 1.1), (1.5, 2.0, 3.1), 0.6, 1.7)
@@ -248,3 +248,70 @@ def test_a_useless_ellipsoid_is_refused(change, error, word):
 def test_a_useless_oversampling_is_refused(oversampling):
     with pytest.raises(InputError, match="oversampling"):
         phantom.shepp_logan(Grid((8, 8)), oversampling=oversampling)
+
+
+ANGLES = np.array([0.3, 1.9, -2.5])
+
+
+def from_a_point(curved: bool, **changes) -> Cone:
+    given = {"center": (5.4, 9.1), "heights": [0.4, -0.7, 0.2], "curved": curved, **changes}
+    return Cone(ANGLES, 12, 19, (0.9, 0.8), 11.0, 17.0, **given)
+
+
+@pytest.mark.parametrize("curved", [False, True])
+def test_rays_of_a_cone_against_quadrature(curved):
+    scan = from_a_point(curved)
+    along = ((np.arange(20_000) + 0.5) / 20_000 * 14 + 4)[:, None]
+    found = phantom.project(PAIR, Grid((4, 4, 4)), scan, dtype=np.float64)
+    for view, row, column in ((0, 5, 11), (1, 7, 7), (2, 6, 8)):
+        angle, height = scan.angles[view], scan.heights[view]
+        gamma = scan.fan_angles()[column]
+        v = (row - scan.center[0]) * scan.pitch[0]
+        across = np.array([math.cos(angle), math.sin(angle), 0])
+        ahead = np.array([-math.sin(angle), math.cos(angle), 0])
+        depth = math.cos(gamma) if curved else 1.0
+        ray = 17 * depth * (math.tan(gamma) * across + ahead) + [0, 0, v]
+        x, y, z = (np.array([0, 0, height]) - 11 * ahead + along * ray / np.linalg.norm(ray)).T
+        expected = density(PAIR, z, y, x).sum() * 14 / 20_000
+        assert found[view, row, column] == pytest.approx(expected, abs=4e-3)
+        assert expected > 1
+
+
+def test_rays_through_a_ball_are_its_chords():
+    ball = Ellipsoid.ball(3.0, 2.0, center=(0.5, -1.0, 0.7))
+    scan = from_a_point(False)
+    corner, far = scan.vectors().corners()[0], scan.vectors().source
+    ray = corner - far
+    offset = np.linalg.norm(np.cross(ray, far - [0.7, -1.0, 0.5]), axis=1)
+    offset /= np.linalg.norm(ray, axis=1)
+    chord = 4 * np.sqrt(np.maximum(9 - offset**2, 0))
+    views = phantom.project([ball], Grid((4, 4, 4)), scan, dtype=np.float64)
+    np.testing.assert_allclose(views[:, 0, 0], chord, rtol=1e-12)
+    assert views.max() == pytest.approx(12, rel=0.02)
+
+
+def test_a_cone_and_its_vectors_see_the_same():
+    grid, scan = Grid((4, 4, 4)), from_a_point(False)
+    cone = phantom.project(PAIR, grid, scan, dtype=np.float64)
+    np.testing.assert_allclose(phantom.project(PAIR, grid, scan.vectors()), cone, atol=1e-6)
+
+
+@pytest.mark.parametrize("curved", [False, True])
+def test_the_middle_row_of_a_cone_is_its_fan(curved):
+    scan = from_a_point(curved, center=(5, 9.1), heights=[0.4] * 3)
+    row = phantom.project(PAIR, Grid((4, 4, 4)), scan)[:, 5]
+    slices = Grid((3, 4, 4), spacing=(0.4, 1, 1))
+    stack = phantom.project(PAIR, slices, scan.fan())
+    np.testing.assert_allclose(stack[:, 2], row, atol=1e-5)
+    image = phantom.project(equatorial(PAIR), slices.slice(), scan.fan())
+    np.testing.assert_allclose(image.max(), stack.max(), rtol=0.1)
+    assert image.shape == row.shape
+
+
+def test_a_source_far_away_has_parallel_rays():
+    grid, far = Grid((3, 4, 4)), 1e7
+    fan = Fan(ANGLES, 31, 0.4, far, far, center=14.3)
+    parallel = Parallel(ANGLES, 31, 0.4, center=14.3)
+    there, here = phantom.project(PAIR, grid, fan), phantom.project(PAIR, grid, parallel)
+    np.testing.assert_allclose(there, here, atol=1e-4)
+    assert there.shape == here.shape == (3, 3, 31)

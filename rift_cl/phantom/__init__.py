@@ -1,9 +1,9 @@
 """Phantoms made of ellipsoids: known objects whose line integrals are known exactly.
 
 An ellipsoid of constant value has a closed-form projection and a closed-form spectrum, so a
-phantom gives a picture and the measurements that a perfect scanner would make of it, none derived
-from another. The Shepp-Logan head is the standard one; ``render``, ``project`` and ``spectrum``
-take any list of ellipsoids.
+phantom gives a picture and the measurements that a perfect scanner would make of it, by rays side
+by side, in fans or in cones, none derived from another. The Shepp-Logan head is the standard one;
+``render``, ``project`` and ``spectrum`` take any list of ellipsoids.
 
 An image has no z: it shows the equatorial section of every ellipsoid, which is how the classic
 two-dimensional head is contained in the three-dimensional one.

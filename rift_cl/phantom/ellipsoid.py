@@ -46,6 +46,16 @@ class Ellipsoid:
         if not np.isfinite([*self.center, *self.semi_axes, self.angle, self.value]).all():
             raise InputError(f"Ellipsoid: every number must be finite, this is {self!r}")
 
+    @classmethod
+    def ball(
+        cls,
+        radius: float,
+        value: float = 1.0,
+        center: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ) -> Ellipsoid:
+        """A uniform ball: the object whose reconstruction says whether densities are right."""
+        return cls(center, (radius, radius, radius), 0.0, value)
+
     def placed(self, scale: float, center: tuple[float, float, float]) -> Ellipsoid:
         """This ellipsoid enlarged about the origin by ``scale``, then moved by ``center``."""
         z, y, x = (scale * c + o for c, o in zip(self.center, center, strict=True))

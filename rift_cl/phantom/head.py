@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.geometry import Grid, Parallel
+from rift_cl.geometry import Grid, Scan
 from rift_cl.phantom.ellipsoid import Ellipsoid
 from rift_cl.phantom.projection import project
 from rift_cl.phantom.rendering import render
@@ -54,7 +54,7 @@ def shepp_logan(grid: Grid, *, oversampling: int = 4) -> NDArray[np.float32]:
     return np.maximum(density, 0, out=density)
 
 
-def shepp_logan_sinogram(grid: Grid, scan: Parallel) -> NDArray[np.float32]:
+def shepp_logan_sinogram(grid: Grid, scan: Scan) -> NDArray[np.float32]:
     """The exact line integrals of the head that ``shepp_logan(grid)`` shows; see ``project``."""
     return project(head(grid), grid, scan)
 
