@@ -113,6 +113,13 @@ class Cone(ScanValue):
         """Whether all heights are equal."""
         return bool(np.all(self.heights == self.heights[0]))
 
+    @property
+    def source(self) -> NDArray[np.float64]:
+        """Where the source stands in every view, (views, 3) as (x, y, z)."""
+        places = -self.source_to_axis * _frame(self.angles)[1]
+        places[:, 2] = self.heights
+        return places
+
     def fan_angles(self) -> NDArray[np.float64]:
         """Angles of the columns' rays in the plane across the axis, in radians, (bins,)."""
         where = self.bins, self.center[1], self.pitch[1], self.source_to_detector
@@ -144,7 +151,7 @@ class Cone(ScanValue):
             raise InputError("Cone: curved is True; vectors describe flat detectors alone")
         along, ahead = _frame(self.angles)
         up = np.array([0.0, 0.0, 1.0])
-        source = -self.source_to_axis * ahead + self.heights[:, None] * up
+        source = self.source
         off = (np.array([self.rows, self.bins]) - 1) / 2 - self.center
         middle = source + self.source_to_detector * ahead
         middle = middle + off[1] * self.pitch[1] * along + off[0] * self.pitch[0] * up

@@ -10,12 +10,13 @@ import pytest
 from test_start import MIDDLE_OF_RING, ring
 
 from rift_cl.commands.analyze.facts import missing, resolution, unknown_share
-from rift_cl.commands.analyze.input import fan_cameras, open_sampled
+from rift_cl.commands.analyze.input import open_sampled
 from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.analyze.suggestions import angles_to_add
 from rift_cl.commands.cli import main
-from rift_cl.geometry import Camera, FanBeam
+from rift_cl.geometry import Camera, Fan
 from rift_cl.geometry.aperture import Aperture
+from rift_cl.geometry.scan_cameras import scan_cameras
 from rift_cl.io.captures.transforms_record import transforms_of
 from rift_cl.io.output import write_json
 from rift_cl.sampling.targets.observations import Observations
@@ -146,21 +147,15 @@ def test_a_wedge_of_a_scan_is_missing_and_its_middle_is_suggested(scan):
 
 
 def test_a_fan_is_taken_as_it_is():
-    fan, angle, bins = FanBeam(400.0, 600.0, 0.5, 30.0), 0.7, 64
+    angle = 0.7
+    fan = Fan([angle], 64, 0.5, 400.0, 600.0, 30.0)
     point = np.array([[12.0, -9.0, 0]])
-    observations = Observations.of(fan_cameras(fan, [angle], bins), point)
+    observations = Observations.of(scan_cameras(fan).cameras, point)
     source = 400 * np.array([np.sin(angle), -np.cos(angle), 0])
     way = source - point[0]
     np.testing.assert_allclose(observations.direction[0, 0], way / np.linalg.norm(way), atol=1e-12)
-    # The ray of its bin is that of a parallel scan, whose t is the point's.
-    u = fan.fan_angles(bins)
-    t = point[0, 0] * np.cos(angle - u) + point[0, 1] * np.sin(angle - u)
-    bin_seen = float(np.interp(0, (400 * np.sin(u) - t), np.arange(bins)))
-    camera = fan_cameras(fan, [angle], bins)[0]
-    x, _, z = camera.view[:3, :3] @ point[0] + camera.view[:3, 3]
-    fx, _, cx, _ = camera.intrinsics
-    assert fx * x / z + cx - 0.5 == pytest.approx(bin_seen, abs=1e-3)
-    assert observations.pixel[0, 0] == pytest.approx(0.5 * z / 600)
+    depth = 400 - point[0, 0] * np.sin(angle) + point[0, 1] * np.cos(angle)
+    assert observations.pixel[0, 0] == pytest.approx(0.5 * depth / 600)
     assert observations.weight[0, 0] == 1
 
 

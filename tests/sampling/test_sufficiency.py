@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from observations_of_all_kinds import ring_directions, ring_of_cameras
 
+import rift_cl as rift
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
+from rift_cl.geometry.scan_cameras import scan_cameras
 from rift_cl.sampling.coverage.density import half_sphere
 from rift_cl.sampling.criteria.crowther import crowther, crowther_views
 from rift_cl.sampling.criteria.orlov import orlov
-from rift_cl.sampling.criteria.tuy import tuy
+from rift_cl.sampling.criteria.tuy import missed_planes, tuy
 from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.target import Target
 
@@ -74,6 +76,32 @@ def test_more_views_reach_further_and_a_cluster_does_not():
     assert reached[0] < reached[1] < reached[2]
     cluster = half_sphere(4000)[:160]
     assert crowther(Observations.along(cluster), SPACE).frequency < reached[0]
+
+
+@pytest.mark.parametrize("height", [0.0, 2.0, -5.0, 20.0])
+def test_a_circle_misses_the_planes_that_lie_flat(height):
+    scan = rift.Cone(np.linspace(0, 2 * np.pi, 200), 9, 9, 1.0, 20, 30)
+    points = [[0, 0, height], [6, -3, 0]]
+    wanted = 1 - 20 / np.hypot(20, height)
+    np.testing.assert_allclose(missed_planes(scan, points), [wanted, 0], atol=2e-3)
+
+
+def test_a_helix_crosses_every_plane_and_an_arc_does_not():
+    angles = np.linspace(0, 6 * np.pi, 500)
+    helix = rift.Cone(angles, 9, 9, 1.0, 20, 30, heights=angles - angles.mean())
+    arc = rift.Cone(angles[:60], 9, 9, 1.0, 20, 30)
+    points = np.random.default_rng(0).uniform(-3, 3, (50, 3))
+    assert missed_planes(helix, points).max() == 0
+    assert missed_planes(arc, points).min() > 0.1
+    np.testing.assert_array_equal(missed_planes(arc, points), missed_planes(arc.vectors(), points))
+
+
+def test_coverage_takes_a_cone_as_its_cameras():
+    cone = rift.Cone(np.linspace(0, 6, 20), 9, 9, 0.5, 20, 30)
+    k = np.array([[0.1, 0.2, 0.0], [0.0, 0.0, 0.3]])
+    target = Target((0, 0, 0), 4.0)
+    cameras = scan_cameras(cone).cameras
+    assert rift.coverage(cone, target, k).tolist() == rift.coverage(cameras, target, k).tolist()
 
 
 def test_one_ring_fails_tuy_and_two_meet_it():

@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.cameras.arc import check_places
@@ -17,8 +16,9 @@ from rift_cl.commands.inputs.surfaces import trusted
 from rift_cl.commands.inputs.view_set import Floats, ViewSet, points_of
 from rift_cl.commands.options import absolute_paths
 from rift_cl.errors import InputError
-from rift_cl.geometry import Camera, FanBeam, Parallel
+from rift_cl.geometry import Camera, Fan, Parallel
 from rift_cl.geometry.aperture import Aperture
+from rift_cl.geometry.scan_cameras import scan_cameras
 from rift_cl.io.captures.capture import Capture, capture_name, holds_capture, open_capture
 from rift_cl.io.scans.formats import open_scan
 from rift_cl.io.scans.scan_file import ScanFile
@@ -254,7 +254,9 @@ def _rays(
     """Cameras of a fan beam or parallel rays, and the edge of a bin at the axis."""
     if file.fan is not None:
         edge = file.fan.pitch / file.fan.magnification
-        return fan_cameras(file.fan, file.angles, file.shape[2]), None, edge
+        distances = file.fan.source_to_axis, file.fan.source_to_detector
+        fan = Fan(file.angles, file.shape[2], file.fan.pitch, *distances, file.fan.center)
+        return scan_cameras(fan).cameras, None, edge
     return (), Parallel(file.angles, file.shape[2], pitch, _axis(settings, notes)), pitch
 
 
@@ -270,24 +272,3 @@ def _axis(settings: AnalyzeSettings, notes: list[str]) -> float | None:
         return None
     notes.append(f"The rotation axis was found {found.in_words()}.")
     return found.center
-
-
-def fan_cameras(fan: FanBeam, angles: ArrayLike, bins: int) -> tuple[Camera, ...]:
-    """Pinhole cameras with pictures of one row that see what the rays of a fan beam see.
-
-    Args:
-        fan: source and detector.
-        angles: (V,) radians.
-        bins: of the detector.
-    """
-    focal = fan.source_to_detector / fan.pitch
-    K = np.array([[focal, 0, fan.center + 0.5], [0, focal, 0.5], [0, 0, 1]])
-    cameras = []
-    for angle in np.asarray(angles, np.float64):
-        sine, cosine = np.sin(angle), np.cos(angle)
-        view = np.eye(4)
-        # Bins grow to the right, rays go forward; z points against what a picture calls down.
-        view[:3, :3] = [[cosine, sine, 0], [0, 0, -1], [-sine, cosine, 0]]
-        view[2, 3] = fan.source_to_axis
-        cameras.append(Camera((1, bins), K, view))
-    return tuple(cameras)

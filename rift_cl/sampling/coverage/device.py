@@ -34,7 +34,7 @@ def coverage(
     """How well views sample frequencies, at each point of a target.
 
     Args:
-        views: cameras, a parallel scan about the z axis, or ``Observations`` at the target's
+        views: cameras, a scan (parallel, fan, cone or vectors), or ``Observations`` at the target's
             points.
         target: its points and diameter.
         k: (K, 3) cycles per unit of the world; those of the target by default.

@@ -14,13 +14,14 @@ from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
-from rift_cl.geometry import Camera, Parallel
+from rift_cl.geometry import Camera, Cone, Fan, Parallel, Scan, Vectors
 from rift_cl.geometry.numbers import real_numbers
+from rift_cl.geometry.scan_cameras import scan_cameras
 from rift_cl.sampling.targets.observations import Observations, ObservationsGradient
 from rift_cl.sampling.targets.target import Target
 
 Floats = NDArray[np.float64]
-Views = Sequence[Camera] | Observations | Parallel
+Views = Sequence[Camera] | Observations | Scan
 # Numbers of a view and of a block's box.
 ROW, BOX = 8, 6
 # Frequencies that one work-item of the gradient sums over.
@@ -38,6 +39,8 @@ def looks_at(views: Views, target: Target, weights: ArrayLike | None = None) -> 
             have another shape.
         InputError: a weight is given for what is no camera, or is no weight.
     """
+    if isinstance(views, (Fan, Cone, Vectors)):
+        views = scan_cameras(views).cameras
     if not isinstance(views, (Observations, Parallel)):
         return Observations.of(views, target.points, weights)
     if weights is not None:

@@ -2,7 +2,9 @@
 
 It is what rays from points need for an exact reconstruction (Tuy 1983; Smith 1985). One ring of
 cameras does not do; two at right angles do, for a target that is small enough. Cameras are points
-and not a path, so that a plane counts as met where one stands near it.
+and not a path, so that a plane counts as met where one stands near it. The source of a scanner
+does move along a path, and a plane with views on either side of it is one that it crossed: for
+scans the share of planes that were never crossed is given for every point.
 """
 
 from __future__ import annotations
@@ -11,11 +13,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from rift_cl.errors import InputError
-from rift_cl.geometry import Camera
-from rift_cl.geometry.numbers import one_number
+from rift_cl.errors import InputError, ShapeError
+from rift_cl.geometry import Camera, Cone, Vectors
+from rift_cl.geometry.numbers import one_number, real_numbers
 from rift_cl.sampling.coverage.density import half_sphere
 from rift_cl.sampling.criteria.orlov import runs
 from rift_cl.sampling.targets.target import Target
@@ -103,3 +105,37 @@ def _spacing(places: Floats, diameter: float) -> float:
         return least
     nearest: Floats = cKDTree(places).query(places, k=2)[0][:, 1]
     return max(least, float(np.median(nearest)))
+
+
+def missed_planes(scan: Cone | Vectors, points: ArrayLike) -> Floats:
+    """For each point the share of the planes through it that the source never crossed.
+
+    What varies across such a plane is not measured there: the plane's integral, or its derivative,
+    enters no projection. On the axis of a circle of radius R, at height z, it is the planes
+    within ``atan(z / R)`` of the orbit's, ``1 - R / sqrt(R^2 + z^2)`` of all.
+
+    Args:
+        scan: its views are taken for places on one connected path of the source. What the detector
+            does not see of a point is not counted.
+        points: (P, 3) as (x, y, z), in the grid's coordinates.
+
+    Returns:
+        (P,) shares, 0 where Tuy's condition is met, to about a thousandth.
+
+    Raises:
+        ShapeError: points have another shape.
+        InputError: they are no finite numbers.
+    """
+    places = real_numbers(points)
+    if places is None or not np.isfinite(places).all():
+        raise InputError("points are no finite numbers, wanted (P, 3) of them, (x, y, z)")
+    if places.ndim != 2 or places.shape[1] != 3:
+        raise ShapeError(f"points has shape {places.shape}, wanted (P, 3)")
+    normals = half_sphere(_NORMALS)
+    heights = normals @ scan.source.T
+    low, high = heights.min(axis=1), heights.max(axis=1)
+    shares = np.empty(len(places))
+    for part in runs(len(places), len(normals)):
+        across = places[part] @ normals.T
+        shares[part] = ((across < low) | (across > high)).mean(axis=1)
+    return shares
