@@ -10,13 +10,14 @@ import numpy as np
 from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.cameras.arc import check_places
 from rift_cl.commands.inputs.scan_axis import find_axis
+from rift_cl.commands.inputs.scan_lengths import scan_lengths
 from rift_cl.commands.inputs.scene_bounds import SceneBounds, bounds_of_cameras
 from rift_cl.commands.inputs.scene_depth import space_of
 from rift_cl.commands.inputs.surfaces import trusted
 from rift_cl.commands.inputs.view_set import Floats, ViewSet, points_of
 from rift_cl.commands.options import absolute_paths
 from rift_cl.errors import InputError
-from rift_cl.geometry import Camera, Fan, Parallel
+from rift_cl.geometry import Camera, Parallel
 from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.scan_cameras import scan_cameras
 from rift_cl.io.captures.capture import Capture, capture_name, holds_capture, open_capture
@@ -53,7 +54,7 @@ def open_views(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
 
 
 def _capture(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
-    for name in ("dataset", "theta", "image_key", "axes", "angle_unit"):
+    for name in ("dataset", "theta", "image_key", "axes", "angle_unit", "geometry"):
         if getattr(settings, name) is not None:
             option = name.replace("_", "-")
             raise InputError(f"--{option} applies to scans, {settings.source} is a capture")
@@ -244,6 +245,8 @@ def _opened(settings: AnalyzeSettings, *, values: bool) -> ScanFile:
         image_key=settings.image_key,
         axes=settings.axes,
         angle_unit=settings.angle_unit,
+        geometry=settings.geometry,
+        reversed=settings.reversed,
         values=values,
     )
 
@@ -251,12 +254,10 @@ def _opened(settings: AnalyzeSettings, *, values: bool) -> ScanFile:
 def _rays(
     settings: AnalyzeSettings, file: ScanFile, pitch: float, notes: list[str]
 ) -> tuple[tuple[Camera, ...], Parallel | None, float]:
-    """Cameras of a fan beam or parallel rays, and the edge of a bin at the axis."""
-    if file.fan is not None:
-        edge = file.fan.pitch / file.fan.magnification
-        distances = file.fan.source_to_axis, file.fan.source_to_detector
-        fan = Fan(file.angles, file.shape[2], file.fan.pitch, *distances, file.fan.center)
-        return scan_cameras(fan).cameras, None, edge
+    """Cameras of a fan or cone beam or parallel rays, and the edge of a bin at the axis."""
+    scan = file.geometry
+    if not isinstance(scan, Parallel):
+        return scan_cameras(scan).cameras, None, scan_lengths(scan).pixel[1]
     return (), Parallel(file.angles, file.shape[2], pitch, _axis(settings, notes)), pitch
 
 

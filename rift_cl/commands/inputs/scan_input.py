@@ -37,6 +37,13 @@ class ScanArrays:
     angle,bin or bin,angle for a single sinogram. Default: inferred from the number of angles."""
     angle_unit: Auto[AngleUnit] = None
     """Unit of the angles. Default: that of the file, checked against their range."""
+    geometry: Auto[Path] = None
+    """File with the positions of source and detector for fan and cone beams: Nikon .xtekct, SkyScan
+    .log, RTK .xml, ASTRA vectors (.geom, .npy, .txt; 12 numbers per view), or .yaml or .json as in
+    docs/tomography.md. Default: that of the scan, otherwise parallel rays."""
+    reversed: bool = False
+    """Negate the angles, for an object that turned in the other sense than assumed; a wrong sense
+    doubles edges in fan and cone beams."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +53,8 @@ class ScanInput(ScanArrays):
     group: ClassVar[str] = "input"
 
     scan: Annotated[Path, Positional]
-    """HDF5 (Data Exchange, NXtomo, or any named dataset), NPZ, MAT or TIFF file, or a folder of
-    TIFF files."""
+    """HDF5 (Data Exchange, NXtomo, or any named dataset), NPZ, MAT, MRC, TXRM or TIFF file, folder
+    of TIFF files, or a scanner's .xtekct or .log file."""
     flats: Auto[str] = None
     """Flat fields (beam without sample): their name in the file; for TIFF, their folder or file.
     For counts without flat fields, 'air' estimates the incident beam of each view from the
@@ -74,10 +81,10 @@ class ScanInput(ScanArrays):
         """The file's description.
 
         Args:
-            fan: whether fan-beam scans are accepted.
+            fan: whether fan-beam and cone-beam scans are accepted.
 
         Raises:
-            InputError: it is a fan-beam scan and those are not accepted, or the background is wider
+            InputError: it is one of these and they are not accepted, or the background is wider
                 than the detector.
         """
         from rift_cl.io.scans.formats import open_scan
@@ -92,11 +99,14 @@ class ScanInput(ScanArrays):
             kind=self.kind,
             axes=self.axes,
             angle_unit=self.angle_unit,
+            geometry=self.geometry,
+            reversed=self.reversed,
             budget=self.memory_limit,
         )
-        if scan.fan is not None and not fan:
+        if not (fan or (scan.fan is None and scan.cone is None)):
+            beam = "fan" if scan.cone is None else "cone"
             raise InputError(
-                f"{scan.path}: is a fan-beam scan, this command takes parallel beams; "
+                f"{scan.path}: is a {beam}-beam scan, this command takes parallel beams; "
                 "'rift reconstruct' takes both"
             )
         if self.background is None:

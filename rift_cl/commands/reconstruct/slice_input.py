@@ -62,6 +62,11 @@ class SliceInput:
         self.settings, self.device = settings, device
         # The scan as the file has it, and as it is worked on.
         self.file = settings.open_scan(fan=True)
+        if self.file.cone is not None:
+            raise InputError(
+                f"{self.file.path}: is a cone-beam scan, whose slices are not independent: project "
+                "and reconstruct it from Python, with open_scan(...).geometry"
+            )
         check_center(settings.center, self.file)
         binning = settings.binning
         self.scan = binned_file(self.file, binning)

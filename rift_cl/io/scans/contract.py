@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError, NonFiniteError
-from rift_cl.geometry.fan import FanBeam
+from rift_cl.geometry import FanBeam
 from rift_cl.io.scans.axes import words
+from rift_cl.io.scans.beam import AnyBeam, Geometry, ViewVectors
 from rift_cl.io.scans.kind import (
     INTEGRAL,
     Sample,
@@ -33,6 +34,8 @@ from rift_cl.io.scans.scan_file import RowSource, ScanFile, ScanRequest
 
 # What ``flats`` may say in place of a name.
 AIR, MEAN = "air", "mean"
+# What takes their place by itself: the beam's counts that a scanner wrote down.
+_WHITE = "white"
 # Bins at each end that are taken for air, as a share of the detector.
 _AIR_SHARE = 0.02
 # Rows over which the mean of a view is taken.
@@ -67,6 +70,7 @@ class Finding:
         kind: the kind where the layout prescribes it.
         flats_at: see ``ScanFile``.
         pitch, unit, fan, background, notes: as in ``ScanFile``.
+        beam: source and detector as a file tells them, where rays diverge; in place of ``fan``.
         contents: a phrase that lists what else the file holds, or nothing.
         advice: for formats whose values tell nothing of their kind, what to do about it; counts
             without flats are then divided by the mean of each view.
@@ -89,6 +93,7 @@ class Finding:
     pitch: float | None = None
     unit: str = ""
     fan: FanBeam | None = None
+    beam: AnyBeam | None = None
     background: int = 0
     notes: tuple[str, ...] = ()
     contents: Callable[[], str] = str
@@ -102,12 +107,22 @@ def scan_of(found: Finding, request: ScanRequest) -> ScanFile:
         InputError: that is doubtful, or what was asked for does not fit the file.
         NonFiniteError: no value that was looked at is finite.
     """
+    if request.reversed:
+        found = _reversed(found)
+    geometry = None
+    if found.beam is not None:
+        geometry = found.beam.over(found.path, found.shape, found.angles)
+        notes = (*found.notes, *found.beam.notes)
+        pitch, unit = found.beam.bin_pitch, found.beam.unit
+        found = replace(found, pitch=pitch, unit=unit, notes=notes)
     if not request.values:
-        return _unseen(found)
+        return _unseen(found, geometry)
     seen = sample(found.rows, found.shape, found.dtype)
     substitute = request.flats if request.flats in (AIR, MEAN) and not found.flats else None
     if found.advice and request.kind == "counts":
         substitute = substitute or MEAN
+    if request.flats is None and _has_white(found, request, seen):
+        substitute = _WHITE
     kind, notes = _kind(found, request, seen, substitute)
     rows: RowSource = found.rows
     flats, darks = found.flats, found.darks
@@ -119,9 +134,12 @@ def scan_of(found: Finding, request: ScanRequest) -> ScanFile:
         background = _air(found, seen)
     if kind == "counts" and substitute == MEAN:
         incident = _means(found, rows)
+    if kind == "counts" and substitute == _WHITE:
+        incident = _white(found, seen)
     if kind != "counts" and found.kind is None:
         notes += _off_air(kind, seen)
-    line = _line(found, kind, seen, _calibration(found, kind, substitute, flats, darks))
+    calibration = _calibration(found, kind, substitute, flats, darks)
+    line = _line(found, kind, seen, calibration, geometry)
     return ScanFile(
         path=found.path,
         shape=found.shape,
@@ -131,7 +149,7 @@ def scan_of(found: Finding, request: ScanRequest) -> ScanFile:
         kind=kind,
         source=found.source,
         rows=rows,
-        fan=found.fan,
+        **_rays(found, geometry),
         background=background,
         notes=(line, *found.notes, *notes),
         flats_at=found.flats_at if flats else None,
@@ -139,9 +157,28 @@ def scan_of(found: Finding, request: ScanRequest) -> ScanFile:
     )
 
 
-def _unseen(found: Finding) -> ScanFile:
+def _reversed(found: Finding) -> Finding:
+    """The scan with its angles in the other sense.
+
+    Raises:
+        InputError: it is described by vectors.
+    """
+    if isinstance(found.beam, ViewVectors):
+        raise InputError(f"{found.path}: vectors say how the object turned: leave --reversed out")
+    angles = -found.angles
+    angles.flags.writeable = False
+    return replace(found, angles=angles, angle_words=f"{found.angle_words}, in the other sense")
+
+
+def _rays(found: Finding, geometry: Geometry | None) -> dict[str, Any]:
+    if geometry is None or isinstance(geometry, FanBeam):
+        return {"fan": found.fan if geometry is None else geometry}
+    return {"cone": geometry}
+
+
+def _unseen(found: Finding, geometry: Geometry | None) -> ScanFile:
     """A scan whose values nobody wants."""
-    line = f"{found.path.name}: {found.dtype.name}; {_geometry(found)}."
+    line = f"{found.path.name}: {found.dtype.name}; {_geometry(found, geometry)}."
     return ScanFile(
         path=found.path,
         shape=found.shape,
@@ -151,7 +188,7 @@ def _unseen(found: Finding) -> ScanFile:
         kind=found.kind or "counts",
         source=found.source,
         rows=found.rows,
-        fan=found.fan,
+        **_rays(found, geometry),
         background=found.background,
         notes=(line, *found.notes),
         flats_at=found.flats_at,
@@ -329,6 +366,34 @@ def _means(found: Finding, rows: RowSource) -> NDArray[np.float64]:
     return means
 
 
+def _has_white(found: Finding, request: ScanRequest, seen: Sample) -> bool:
+    """Whether the beam is a number that the scanner wrote down, and the values are counts."""
+    if found.beam is None or found.beam.white is None or found.flats:
+        return False
+    if request.kind is not None:
+        return request.kind == "counts"
+    return possible_kinds(seen)[0] == "counts"
+
+
+def _white(found: Finding, seen: Sample) -> NDArray[np.float64]:
+    """The scanner's number for every view.
+
+    Raises:
+        InputError: projections are much brighter.
+    """
+    assert found.beam is not None
+    level = float(found.beam.white or 0)
+    if not 0 < level < float("inf") or seen.high > _BRIGHTER * level:
+        raise InputError(
+            f"{found.path}: the beam is said to be {level:g} counts, and {found.name} has "
+            f"{seen.high:.4g}: name the flats (--flats), or give --flats air where the bins at "
+            "both ends of the detector see nothing but air"
+        )
+    white = np.full(found.shape[0], level)
+    white.flags.writeable = False
+    return white
+
+
 def _calibration(found: Finding, kind: Kind, substitute: str | None, flats: int, darks: int) -> str:
     if kind != "counts":
         return ""
@@ -339,6 +404,9 @@ def _calibration(found: Finding, kind: Kind, substitute: str | None, flats: int,
         return f", an even beam from {share} {bins} of air at each end of every view, {words[0]}"
     if substitute == MEAN:
         return f", the beam taken to be the mean of every view, {words[0]}"
+    if substitute == _WHITE:
+        assert found.beam is not None
+        return f", the beam {found.beam.white:g} counts as the scanner says, {words[0]}"
     words.insert(0, f"{flats} flat{'s' * (flats != 1)}")
     if found.flats_at is not None and len(np.unique(found.flats_at)) > 1:
         times = len(np.unique(found.flats_at))
@@ -346,15 +414,19 @@ def _calibration(found: Finding, kind: Kind, substitute: str | None, flats: int,
     return f", {' and '.join(words)}"
 
 
-def _line(found: Finding, kind: Kind, seen: Sample, calibration: str) -> str:
+def _line(
+    found: Finding, kind: Kind, seen: Sample, calibration: str, geometry: Geometry | None
+) -> str:
     """What the file was taken to hold."""
-    return f"{found.path.name}: {kind} ({seen}){calibration}; {_geometry(found)}."
+    return f"{found.path.name}: {kind} ({seen}){calibration}; {_geometry(found, geometry)}."
 
 
-def _geometry(found: Finding) -> str:
+def _geometry(found: Finding, geometry: Geometry | None) -> str:
     stored = dict(zip("nrb", found.shape, strict=True))
     sizes = " x ".join(str(stored[axis]) for axis in found.axes)
     parts = [f"axes {words(found.axes)} {sizes}", found.angle_words]
     if found.pitch is not None:
         parts.append(f"pitch {found.pitch:.4g} {found.unit}".rstrip())
+    if geometry is not None and found.beam is not None:
+        parts.append(found.beam.words(geometry))
     return "; ".join(parts)

@@ -15,6 +15,7 @@ from typing import Any, get_args
 
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.boundary import reading
+from rift_cl.io.scans.beam_file import DESCRIPTIONS, projections_of
 from rift_cl.io.scans.hdf5_scan import open_hdf5_scan
 from rift_cl.io.scans.literals import AngleUnit, Kind
 from rift_cl.io.scans.mat_scan import open_mat5_scan, open_mat73_scan
@@ -23,6 +24,7 @@ from rift_cl.io.scans.mrc_scan import open_mrc_scan
 from rift_cl.io.scans.npz_scan import open_npz_scan
 from rift_cl.io.scans.scan_file import ScanFile, ScanRequest
 from rift_cl.io.scans.tiff_scan import open_tiff_scan
+from rift_cl.io.scans.txrm_scan import open_txrm_scan
 from rift_cl.registry import Registry
 
 # What reads a file, by its extension and then by its content.
@@ -32,10 +34,15 @@ _READERS = {
     ".mat": {"MAT": open_mat5_scan, "HDF5": open_mat73_scan},
     ".npz": {"NPZ": open_npz_scan},
     **{suffix: {"MRC": open_mrc_scan} for suffix in MRC_SUFFIXES},
+    ".txrm": {"TXRM": open_txrm_scan},
 }
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_ZIP_SIGNATURE = b"PK\x03\x04"
-_TIFF_SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+# What files begin with: TXRM is one of Microsoft's containers of streams.
+_SIGNATURES = (
+    ((b"PK\x03\x04",), "NPZ"),
+    ((b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1",), "TXRM"),
+    ((b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"), "TIFF"),
+)
 # The version and the order of bytes, after 124 bytes of text.
 _MAT_SIGNATURES = (b"\0\1IM", b"\1\0MI")
 # The name of the format, after 52 numbers.
@@ -73,7 +80,8 @@ def register_scan_reader(extension: str, reader: Reader) -> None:
 def is_scan_file(path: Path) -> bool:
     """Whether a path is a file of a kind that holds scans, by its extension."""
     suffix = path.suffix.lower()
-    return (suffix in _READERS or suffix in SCAN_READERS) and path.is_file()
+    known = suffix in _READERS or suffix in SCAN_READERS or suffix in (".xtekct", ".log")
+    return known and path.is_file()
 
 
 def open_scan(
@@ -88,6 +96,8 @@ def open_scan(
     axes: str | None = None,
     angle_unit: AngleUnit | None = None,
     values: bool = True,
+    geometry: str | os.PathLike[str] | None = None,
+    reversed: bool = False,
     budget: int | None = None,
 ) -> ScanFile:
     """Find the scan in a file or a folder, and settle what it holds.
@@ -106,6 +116,11 @@ def open_scan(
     flats and darks are recognised by the names of files and folders, angles by ``angles.txt`` or
     ``theta.txt``, and are else taken as even over 180 degrees. MRC (.mrc, .st, .ali, .rec) is a
     tilt series about the y axis, its angles in the extended header or in a .tlt or .rawtlt file.
+
+    Fans and cones are told by what the scanner wrote: Nikon's .xtekct and SkyScan's .log, opened
+    themselves or lying in the folder of their images; Zeiss' .txrm; distances in NXtomo, Data
+    Exchange and NPZ (``source_to_axis``, ``source_to_detector`` and the like beside ``pitch``); or
+    a file of ``geometry``.
 
     Args:
         path: the file or the folder.
@@ -127,6 +142,11 @@ def open_scan(
         angle_unit: unit of the angles, "degrees" or "radians".
         values: whether to look at values and settle their kind; False for who wants to know of the
             geometry alone, to whom ``ScanFile.kind`` means nothing.
+        geometry: a file that says where source and detector stand, in place of what the scan says:
+            Nikon's .xtekct, SkyScan's .log, RTK's .xml, ASTRA's twelve numbers a view (.geom,
+            .npy, .txt), or ours (.yaml, .json), whose names ``docs/tomography.md`` lists.
+        reversed: the object turned the other way than the file is taken to say; the angles change
+            their sign.
         budget: bytes that one ``read`` may take; 60 % of the free memory when not given.
 
     Raises:
@@ -149,7 +169,17 @@ def open_scan(
         axes=axes,
         angle_unit=_one_of("angle_unit", angle_unit, get_args(AngleUnit)),
         values=values,
+        geometry=None if geometry is None else os.fspath(geometry),
+        reversed=reversed,
     )
+    if path.suffix.lower() in DESCRIPTIONS and path.is_file():
+        request = replace(request, geometry=request.geometry or str(path))
+        path = projections_of(path)
+    return _opened(path, request, budget)
+
+
+def _opened(path: Path, request: ScanRequest, budget: int | None) -> ScanFile:
+    """The scan in a file or a folder that holds projections."""
     suffix = path.suffix.lower()
     known_suffix = suffix in _READERS or suffix in SCAN_READERS
     if not known_suffix and path.is_dir():
@@ -157,7 +187,7 @@ def open_scan(
     if not known_suffix and not path.exists():
         raise InputError(f"{path}: there is no such file or folder")
     if not known_suffix:
-        known = ", ".join(sorted({*_READERS, *SCAN_READERS}))
+        known = ", ".join(sorted({*_READERS, *SCAN_READERS, *DESCRIPTIONS}))
         raise InputError(
             f"{path}: a scan is read from a folder of TIFF files, or from {known}, not from "
             f"{suffix!r}"
@@ -165,7 +195,7 @@ def open_scan(
     with reading(path, "the file"):
         if suffix in SCAN_READERS:
             found = SCAN_READERS[suffix](path, request)
-            return found if kind is None else replace(found, kind=kind)
+            return found if request.kind is None else replace(found, kind=request.kind)
         content = _content(path)
     readers = _READERS[suffix]
     if content not in readers:
@@ -187,10 +217,9 @@ def _content(path: Path) -> str:
         raise InputError(f"{path}: is not a file")
     with path.open("rb") as file:
         start = file.read(212)
-        if start[:4] == _ZIP_SIGNATURE:
-            return "NPZ"
-        if start[:4] in _TIFF_SIGNATURES:
-            return "TIFF"
+        for signatures, kind in _SIGNATURES:
+            if start.startswith(signatures):
+                return kind
         if start[124:128] in _MAT_SIGNATURES:
             return "MAT"
         if start[208:] == _MRC_SIGNATURE:

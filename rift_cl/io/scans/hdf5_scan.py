@@ -22,6 +22,7 @@ from rift_cl.io.scans.hdf5_values import (
     axes_stated,
     numeric_shape,
     read_angles,
+    read_beam,
     read_length,
     read_vector,
     unit_of,
@@ -38,6 +39,12 @@ _THETA = "/exchange/theta"
 _PIXELS = (
     "/measurement/instrument/detector/actual_pixel_size_x",
     "/measurement/instrument/detector/pixel_size_x",
+)
+_ROW = "/measurement/instrument/detector/pixel_size_y"
+# Of the source and of the detector from the sample.
+_DISTANCES = (
+    "/measurement/instrument/source/distance",
+    "/measurement/instrument/detector/distance",
 )
 
 
@@ -73,6 +80,8 @@ def _data_exchange(tree: Hdf5Tree) -> Layout:
     theta = _THETA if tree.find(_THETA) is not None else None
     lengths = (read_length(tree, name) for name in _PIXELS)
     pixel, unit = next((length for length in lengths if length), (0.0, ""))
+    across = read_length(tree, _PIXELS[1])
+    beam, notes = read_beam(tree, _DISTANCES, (read_length(tree, _ROW), across))
     return Layout(
         source="Data Exchange",
         projections=_DATA,
@@ -82,6 +91,8 @@ def _data_exchange(tree: Hdf5Tree) -> Layout:
         pitch=usable_pitch(pixel),
         unit=unit,
         axes={2: "nb", 3: axes_stated(tree, _DATA) or "nrb"},
+        beam=beam,
+        notes=notes,
     )
 
 

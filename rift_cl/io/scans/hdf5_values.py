@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, ShapeError
+from rift_cl.geometry.length_units import length_unit
 from rift_cl.io.boundary import check_claim, check_numeric
 from rift_cl.io.hdf5_tree import Hdf5Tree
 from rift_cl.io.scans.angle_list import AngleList, named_unit
 from rift_cl.io.scans.axes import spelled
+from rift_cl.io.scans.beam import PARALLEL_BELOW, Beam
 
 # Eight million frames: no scan has more, and a forged header may not ask for gigabytes.
 _LONGEST_VECTOR = 64 << 20
@@ -58,6 +60,54 @@ def read_length(tree: Hdf5Tree, name: str) -> tuple[float, str] | None:
     if tree.find(name) is None:
         return None
     return float(read_vector(tree, name)[0]), unit_of(tree, name)
+
+
+def read_beam(
+    tree: Hdf5Tree, distances: tuple[str, str], pixels: tuple[tuple[float, str] | None, ...]
+) -> tuple[Beam | None, tuple[str, ...]]:
+    """Source and detector where a file tells their distances from the axis, and what is said of it.
+
+    Args:
+        tree: the file.
+        distances: names of the distances of the source and of the detector from the axis.
+        pixels: sizes of a detector pixel, along the rows and along the bins, with their units.
+
+    Returns:
+        None, and a note where there is one, of a source that is far away: its rays are parallel.
+    """
+    to_axis, beyond = (read_length(tree, name) for name in distances)
+    row, bin = pixels
+    if to_axis is None or beyond is None or bin is None:
+        return None, ()
+    unit = bin[1]
+    in_unit = [_in_unit(length, unit) for length in (to_axis, beyond, row or bin, bin)]
+    if any(value is None or not math.isfinite(value) for value in in_unit) or not in_unit[0]:
+        return None, (
+            "The distances of source and detector are in a unit that is not known, so that they "
+            "are not used: rays are taken as parallel (--geometry).",
+        )
+    source, detector, pitch_row, pitch_bin = (abs(value or 0.0) for value in in_unit)
+    magnification = 1 + detector / source
+    if magnification < PARALLEL_BELOW:
+        return None, (
+            f"The source is far away, magnification {magnification:.5g}: rays are taken as "
+            "parallel (--geometry for a cone).",
+        )
+    return Beam(
+        source_to_axis=source,
+        source_to_detector=source + detector,
+        pitch=(pitch_row, pitch_bin),
+        unit=unit,
+    ), ("The pixel size is taken to be that of the detector, not that at the object.",)
+
+
+def _in_unit(length: tuple[float, str], unit: str) -> float | None:
+    """A length in another unit; as it is where neither is stated."""
+    value, own = length
+    if own == unit:
+        return value
+    one, other = length_unit(own), length_unit(unit)
+    return None if one is None or other is None else value * one.metres / other.metres
 
 
 def read_angles(tree: Hdf5Tree, name: str) -> AngleList:

@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, ShapeError
-from rift_cl.geometry.fan import FanBeam
+from rift_cl.geometry import FanBeam
 from rift_cl.io.scans.angle_list import AngleList, given_angles
 from rift_cl.io.scans.axes import axes_of
+from rift_cl.io.scans.beam import AnyBeam
+from rift_cl.io.scans.beam_file import given_beam
 from rift_cl.io.scans.contract import AIR, MEAN, Finding, scan_of
 from rift_cl.io.scans.frame_stack import FrameStack, runs_of
 from rift_cl.io.scans.frame_words import is_said
@@ -83,7 +85,7 @@ class Layout:
         fixed: the layout is known for no other axes, whatever the number of angles.
         angle_unit: unit of angles whose unit the file does not state.
         search: look beside the projections for what is not named.
-        kind, pitch, unit, fan, background, notes: as in ``Finding``.
+        kind, pitch, unit, fan, beam, background, notes: as in ``Finding``.
     """
 
     source: str
@@ -100,6 +102,7 @@ class Layout:
     pitch: float | None = None
     unit: str = ""
     fan: FanBeam | None = None
+    beam: AnyBeam | None = None
     background: int = 0
     notes: tuple[str, ...] = ()
 
@@ -111,7 +114,8 @@ def scan_in(store: ArrayStore, layout: Layout, request: ScanRequest) -> ScanFile
         InputError: a part is missing, parts do not fit each other, or what they are is doubtful.
     """
     layout, beside = _completed(store, layout, request)
-    angles = _angles(store, layout)
+    beam = given_beam(request, store.path, layout.pitch, layout.unit) or layout.beam
+    angles = _angles(store, layout, beam)
     keys = store.vector(layout.image_key) if layout.image_key else None
     if keys is not None and layout.image_key in beside:
         # Keys that nobody named may be those of another array.
@@ -143,6 +147,7 @@ def scan_in(store: ArrayStore, layout: Layout, request: ScanRequest) -> ScanFile
         pitch=layout.pitch,
         unit=layout.unit,
         fan=layout.fan,
+        beam=beam,
         background=layout.background,
         notes=(*layout.notes, *_told(beside, flats, darks), *notes),
         contents=store.contents,
@@ -181,7 +186,9 @@ def _completed(
     return replace(layout, **new), frozenset(new.values())
 
 
-def _angles(store: ArrayStore, layout: Layout) -> AngleList:
+def _angles(store: ArrayStore, layout: Layout, beam: AnyBeam | None) -> AngleList:
+    if layout.theta is None and beam is not None and beam.angles is not None:
+        return beam.angles
     if layout.theta is None:
         raise FileFormatError(
             f"{store.path}: the angles of {layout.projections!r} are not known; name them with "

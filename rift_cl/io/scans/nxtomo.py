@@ -13,7 +13,7 @@ import h5py
 
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.hdf5_tree import Hdf5Tree
-from rift_cl.io.scans.hdf5_values import axes_stated, read_length
+from rift_cl.io.scans.hdf5_values import axes_stated, read_beam, read_length
 from rift_cl.io.scans.named_arrays import Layout
 from rift_cl.io.scans.scan_file import usable_pitch
 
@@ -21,6 +21,9 @@ _KEY = "instrument/detector/image_key"
 _DATA = "instrument/detector/data"
 _ANGLE = "sample/rotation_angle"
 _PIXEL = "instrument/detector/x_pixel_size"
+_ROW = "instrument/detector/y_pixel_size"
+# Of the source, which is negative by convention, and of the detector from the sample.
+_DISTANCES = ("instrument/source/distance", "instrument/detector/distance")
 _DEEPEST = 2
 _MOST_GROUPS = 500
 
@@ -62,7 +65,12 @@ def nxtomo_layout(tree: Hdf5Tree, group: str) -> Layout:
     Raises:
         InputError: the pixel size is no number.
     """
-    pixel, unit = read_length(tree, f"{group}/{_PIXEL}") or (0.0, "")
+    length = read_length(tree, f"{group}/{_PIXEL}")
+    pixel, unit = length or (0.0, "")
+    source, detector = (f"{group}/{name}" for name in _DISTANCES)
+    beam, notes = read_beam(
+        tree, (source, detector), (read_length(tree, f"{group}/{_ROW}"), length)
+    )
     return Layout(
         source=f"NXtomo {group or '/'}",
         projections=f"{group}/{_DATA}",
@@ -71,6 +79,8 @@ def nxtomo_layout(tree: Hdf5Tree, group: str) -> Layout:
         axes={2: "nb", 3: axes_stated(tree, f"{group}/{_DATA}") or "nrb"},
         pitch=usable_pitch(pixel),
         unit=unit,
+        beam=beam,
+        notes=notes,
     )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
-from rift_cl.geometry.fan import FanBeam
+from rift_cl.geometry import Cone, Fan, FanBeam, Parallel, Scan, Vectors
 from rift_cl.io.scans.literals import AngleUnit, Kind
 
 Frames = NDArray[np.float32]
@@ -52,6 +52,8 @@ class ScanRequest:
         axes: names of the axes of the projections, such as "angle,row,bin".
         angle_unit: unit of the angles.
         values: whether what the values are is to be settled; ``kind`` means nothing otherwise.
+        geometry: a file that says where source and detector stand: see ``open_scan``.
+        reversed: the object turned the other way than the file is taken to say.
     """
 
     dataset: str | None = None
@@ -63,6 +65,8 @@ class ScanRequest:
     axes: str | None = None
     angle_unit: AngleUnit | None = None
     values: bool = True
+    geometry: str | None = None
+    reversed: bool = False
 
 
 class RowSource(Protocol):
@@ -91,7 +95,9 @@ class ScanFile:
         source: the layout that was recognised, for people.
         rows: reads the rows.
         fan: source and detector where the rays are those of a fan beam; its lengths are in
-            ``unit``, and ``pitch`` is its pitch, on the detector. None for parallel rays.
+            ``unit``, and ``pitch`` is its pitch, on the detector. None for other rays.
+        cone: source and detector where the rays are those of a cone beam, of which no row is
+            independent of the others; as for ``fan``. None for other rays.
         background: bins at each end of the detector that see nothing but air: the mean line
             integral over these bins of both ends is 0 in truth, and is to be subtracted from the
             view. 0 where no such bins are known.
@@ -112,6 +118,7 @@ class ScanFile:
     source: str
     rows: RowSource
     fan: FanBeam | None = None
+    cone: Cone | Vectors | None = None
     background: int = 0
     notes: tuple[str, ...] = ()
     flats_at: NDArray[np.float64] | None = None
@@ -121,11 +128,27 @@ class ScanFile:
         views, rows, bins = self.shape
         low, high = np.rad2deg([self.angles.min(), self.angles.max()])
         beam = "parallel" if self.fan is None else "fan-beam"
+        beam = beam if self.cone is None else "cone-beam"
         pitch = "" if self.pitch is None else f", pitch {self.pitch:.4g} {self.unit}".rstrip()
         return (
             f"<ScanFile {self.path}: {views} {beam} views from {low:.4g} to {high:.4g} degrees, "
             f"{rows} rows of {bins} bins{pitch}, {self.kind}>"
         )
+
+    @property
+    def geometry(self) -> Scan:
+        """The scan as a projector takes it; a pitch that is not known counts as 1.
+
+        The axis of parallel rays, which no file tells, is taken to be at the middle.
+        """
+        if self.cone is not None:
+            return self.cone
+        bins = self.shape[2]
+        if self.fan is None:
+            return Parallel(self.angles, bins, self.pitch or 1.0)
+        fan = self.fan
+        lengths = fan.pitch, fan.source_to_axis, fan.source_to_detector
+        return Fan(self.angles, bins, *lengths, fan.center)
 
     def read(self, start: int, stop: int) -> ScanRows:
         """Read detector rows ``start`` to ``stop``; the file is opened for that and closed again.

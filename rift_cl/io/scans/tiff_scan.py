@@ -6,6 +6,7 @@ or from the caller. What is assumed is written into the description's notes.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,6 +17,8 @@ from rift_cl.io.number_list import SUFFIXES
 from rift_cl.io.scans import angle_list
 from rift_cl.io.scans.angle_list import AngleList
 from rift_cl.io.scans.axes import axes_of, parsed
+from rift_cl.io.scans.beam import AnyBeam
+from rift_cl.io.scans.beam_file import description_in, given_beam, read_beam
 from rift_cl.io.scans.contract import AIR, MEAN, Finding, scan_of
 from rift_cl.io.scans.frame_words import FrameKind, words_of
 from rift_cl.io.scans.scan_file import ScanFile, ScanRequest
@@ -44,6 +47,7 @@ class _Place:
         folders: folders in which flats, darks and angles are looked for, the nearest first.
         beside: flats and darks among the projections' own files.
         notes: what was assumed of the files' names.
+        beam: source and detector where a file tells of them; None for parallel rays.
     """
 
     path: Path
@@ -51,6 +55,7 @@ class _Place:
     folders: tuple[Path, ...]
     beside: dict[FrameKind, tuple[Path, ...]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    beam: AnyBeam | None = None
 
 
 def open_tiff_scan(path: Path, request: ScanRequest, *, budget: int | None) -> ScanFile:
@@ -65,10 +70,13 @@ def open_tiff_scan(path: Path, request: ScanRequest, *, budget: int | None) -> S
                 f"{path}: {name} is {getattr(request, name)!r}, but TIFF holds no named arrays; "
                 "name the folder of the projections itself, and flats and darks by --flats, --darks"
             )
-    place = _folder(path) if path.is_dir() else _file(path)
+    beam, told = _beam(path, request)
+    place = _folder(path, beam) if path.is_dir() else _file(path)
+    place = replace(place, beam=beam, notes=(*told, *place.notes))
     stack = tiff_stack(place.files)
+    _check_complete(place, stack, request)
     angles, notes = _angles(place, request.theta)
-    stack = replace(stack, axes=_axes(path, stack, angles, request))
+    stack = replace(stack, axes=_axes(place, stack, angles, request))
     flats, flats_from = _calibration(place, "flats", request.flats, stack)
     darks, darks_from = _calibration(place, "darks", request.darks, stack)
     if angles is None:
@@ -89,12 +97,40 @@ def open_tiff_scan(path: Path, request: ScanRequest, *, budget: int | None) -> S
         darks=darks.stack.frames if darks else 0,
         evidence=(place.files[0].stem,),
         notes=(*place.notes, *notes, *doubts),
+        beam=beam,
     )
     return scan_of(found, request)
 
 
-def _axes(path: Path, stack: TiffStack, angles: AngleList | None, request: ScanRequest) -> str:
+def _beam(path: Path, request: ScanRequest) -> tuple[AnyBeam | None, tuple[str, ...]]:
+    """Source and detector as a person names them, or as a file among the frames tells."""
+    found = given_beam(request, path)
+    if found is not None or not path.is_dir():
+        return found, ()
+    described = description_in(path)
+    if described is None:
+        return None, ()
+    return read_beam(described), (f"Source and detector are those of {described.name}.",)
+
+
+def _check_complete(place: _Place, stack: TiffStack, request: ScanRequest) -> None:
+    """Refuse a scan of which projections are missing, unless a person gives the angles."""
+    named = None if place.beam is None else place.beam.views
+    count = stack.stack.shape[0]
+    if named is None or named == count or request.theta is not None or request.axes is not None:
+        return
+    raise ShapeError(
+        f"{place.path}: {named} projections are named, and there are {count} images: add the "
+        "missing ones, or give the angles of those that are there with theta= (--theta)"
+    )
+
+
+def _axes(place: _Place, stack: TiffStack, angles: AngleList | None, request: ScanRequest) -> str:
     """What page, line and column are; a single page is a sinogram of one row."""
+    path = place.path
+    if place.beam is not None and request.axes is None and stack.stack.shape[0] > 1:
+        # A scanner's images are projections, of as many rows as there happen to be.
+        return "nrb"
     count = None if angles is None else angles.count
     shape = stack.stack.shape
     asked = request.axes
@@ -113,12 +149,13 @@ def _axes(path: Path, stack: TiffStack, angles: AngleList | None, request: ScanR
     return axes_of(path, name, shape, count=count, asked=asked, usual=usual)
 
 
-def _folder(path: Path) -> _Place:
+def _folder(path: Path, beam: AnyBeam | None) -> _Place:
     names = tiff_names(path)
     scan = path
     if not names:
         path = projection_folder(scan)
         names = tiff_names(path)
+    names, passed_over = _of_series(names, "" if beam is None else beam.prefix)
     kinds = sorted_kinds(path, names)
     if not kinds["projections"]:
         raise FileFormatError(
@@ -130,7 +167,20 @@ def _folder(path: Path) -> _Place:
         kind: inside(path, kinds[kind]) for kind in ("flats", "darks") if kinds[kind]
     }
     files = inside(path, kinds["projections"])
-    return _Place(scan, files, around, beside, _named_alike(names))
+    return _Place(scan, files, around, beside, (*passed_over, *_named_alike(names)))
+
+
+def _of_series(names: list[str], prefix: str) -> tuple[list[str], tuple[str, ...]]:
+    """The files whose names are a scanner's prefix and a number, if there are such; others."""
+    numbered = re.compile(rf"{re.escape(prefix)}\D?\d+", re.IGNORECASE)
+    found = [name for name in names if numbered.fullmatch(Path(name).stem)]
+    if not prefix or not found or len(found) == len(names):
+        return names, ()
+    other = next(name for name in names if name not in found)
+    return found, (
+        f"{len(names) - len(found)} other images ({other!r}, ...) are no projections of "
+        f"{prefix!r}.",
+    )
 
 
 def _named_alike(names: list[str]) -> tuple[str, ...]:
@@ -204,6 +254,8 @@ def _angles(place: _Place, theta: str | None) -> tuple[AngleList | None, tuple[s
     if theta is not None:
         turn = angle_list.even_turn(theta)
         return turn or angle_list.file_angles(_named(place, theta)), ()
+    if place.beam is not None and place.beam.angles is not None:
+        return place.beam.angles, ()
     for folder in place.folders:
         found = [folder / name for name in _ANGLE_NAMES if (folder / name).is_file()]
         if len(found) > 1:

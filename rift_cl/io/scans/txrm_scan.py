@@ -1,0 +1,222 @@
+"""Finds the scan in a Zeiss (Xradia) ``.txrm`` file: a container of streams with known names.
+
+Each projection is a stream ``ImageDataN/ImageK``, a hundred to a folder; the rest is small: angles
+in degrees, distances of the source and of the detector from the axis in millimetres, the size of a
+pixel at the object in micrometres. Names are those that the readers of tomopy's dxchange and of CIL
+know. A cone beam is told by ``XrayGeometry``; the sense of rotation is CIL's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import olefile
+from numpy.typing import NDArray
+
+from rift_cl.errors import DTypeError, FileFormatError, InputError
+from rift_cl.io.boundary import check_claim, reading
+from rift_cl.io.scans.angle_list import AngleList, given_angles
+from rift_cl.io.scans.beam import Beam
+from rift_cl.io.scans.beam_file import given_beam
+from rift_cl.io.scans.contract import Finding, scan_of
+from rift_cl.io.scans.scan_file import Frames, Part, ScanFile, ScanRequest, ScanRows, usable_pitch
+
+_TYPES = {3: "<u1", 5: "<u2", 10: "<f4"}
+_FOLDER = 100
+_REFERENCES = ("ReferenceData/Image", "MultiReferenceData/Image1")
+_CONE = 1
+# Images, and rows and bins of one, beyond which a header is forged.
+_MOST, _WIDEST = 1 << 20, 1 << 16
+
+
+@dataclass(frozen=True)
+class TxrmRows:
+    """Reads rows of a scan in a TXRM file (a ``RowSource``); images are read one after another.
+
+    Args:
+        path: the file.
+        shape: (angle, row, bin).
+        dtype: type of a sample as it is stored.
+        flats: name of the stream of the beam without the sample, or None.
+        darks: None; the format keeps none.
+        budget: bytes that one reading may take; 60 % of the free memory when None.
+    """
+
+    path: Path
+    shape: tuple[int, int, int]
+    dtype: str
+    flats: str | None
+    darks: None
+    budget: int | None
+
+    def read(self, start: int, stop: int) -> ScanRows:
+        """Read detector rows ``start`` to ``stop`` of every image."""
+        views, rows, bins = self.shape
+        need = 4 * views * (stop - start) * bins + rows * bins * np.dtype(self.dtype).itemsize
+        check_claim(self.path, f"rows {start} to {stop} of the scan", need, self.budget)
+        with _opened(self.path) as ole:
+            found = np.empty((views, stop - start, bins), np.float32)
+            for view in range(views):
+                found[view] = self._image(ole, image_name(view))[start:stop]
+            flats = None
+            if self.flats is not None:
+                flats = self._image(ole, self.flats, "<f4")[None, start:stop].astype(np.float32)
+        return ScanRows(found, flats, None)
+
+    def look(self, part: Part, frames: Sequence[int], rows: Sequence[int]) -> Frames:
+        """Read some rows of some images."""
+        with _opened(self.path) as ole:
+            if part == "flats":
+                assert self.flats is not None
+                image = self._image(ole, self.flats, "<f4")
+                return np.stack([image[list(rows)] for _ in frames]).astype(np.float32)
+            images = [self._image(ole, image_name(view))[list(rows)] for view in frames]
+        return np.stack(images).astype(np.float32)
+
+    def _image(
+        self, ole: olefile.OleFileIO, name: str, dtype: str | None = None
+    ) -> NDArray[np.generic]:
+        rows, bins = self.shape[1:]
+        kind = np.dtype(dtype or self.dtype)
+        values = np.frombuffer(_stream(self.path, ole, name, rows * bins * kind.itemsize), kind)
+        return values.reshape(rows, bins)
+
+
+def image_name(view: int) -> str:
+    """The stream of a projection."""
+    return f"ImageData{view // _FOLDER + 1}/Image{view + 1}"
+
+
+def open_txrm_scan(path: Path, request: ScanRequest, *, budget: int | None) -> ScanFile:
+    """Find the scan in a TXRM file; see ``open_scan``."""
+    for name in ("dataset", "image_key", "axes", "darks"):
+        if getattr(request, name) is not None:
+            raise InputError(f"{path}: {name} is given, and a TXRM file has nothing to name")
+    with _opened(path) as ole:
+        header = _Header(path, ole)
+        views = header.whole("NoOfImages", _MOST)
+        shape = (views, header.whole("ImageHeight", _WIDEST), header.whole("ImageWidth", _WIDEST))
+        dtype = header.dtype()
+        missing = next((k for k in range(views) if not ole.exists(image_name(k))), None)
+        if missing is not None:
+            raise FileFormatError(
+                f"{path}: names {views} images, and number {missing + 1} is missing"
+            )
+        reference = next((name for name in _REFERENCES if ole.exists(name)), None)
+        size = 4 * shape[1] * shape[2]
+        if reference is not None and ole.get_size(reference) != size:
+            reference = None
+        angles = AngleList("ImageInfo/Angles", header.numbers("Angles", views), unit="degrees")
+        cone, pixel = _beam(header, views)
+    if cone is not None:
+        # The sense that CIL reads; ours is the opposite.
+        angles = AngleList(angles.name, -angles.values, unit="degrees")
+    if request.theta is not None:
+        given = given_angles(request.theta)
+        if given is None:
+            raise InputError(
+                f"{path}: theta is {request.theta!r}, wanted a turn such as 0:360, or a list "
+                "(.txt, .csv, .npy)"
+            )
+        angles = given
+    beam = given_beam(request, path, pixel, "um") or cone
+    if beam is not None and request.theta is None and beam.angles is not None:
+        angles = beam.angles
+    radians, phrase, doubts = angles.settled(path, views, request.angle_unit)
+    rows = TxrmRows(path, shape, dtype, reference, None, budget)
+    found = Finding(
+        path=path,
+        source="Zeiss TXRM",
+        name="its images",
+        shape=shape,
+        axes="nrb",
+        dtype=np.dtype(dtype),
+        rows=rows,
+        angles=radians,
+        angle_words=phrase,
+        flats=0 if reference is None else 1,
+        pitch=pixel,
+        unit="" if pixel is None else "um",
+        beam=beam,
+        notes=doubts,
+    )
+    return scan_of(found, request)
+
+
+def _beam(header: _Header, views: int) -> tuple[Beam | None, float | None]:
+    """Source and detector of a cone, and the size of a pixel at the object in micrometres."""
+    pixel = usable_pitch(header.number("PixelSize"))
+    if header.number("XrayGeometry") != _CONE or pixel is None:
+        return None, pixel
+    to_axis = float(np.abs(header.numbers("StoRADistance", views))[0])
+    beyond = float(np.abs(header.numbers("DtoRADistance", views))[0])
+    pitch = pixel / 1000 * (to_axis + beyond) / max(to_axis, 1e-30)
+    return Beam(
+        source_to_axis=to_axis,
+        source_to_detector=to_axis + beyond,
+        pitch=(pitch, pitch),
+        unit="mm",
+        notes=(
+            "Zeiss' pixel size is that at the object: the detector's pitch is taken to be as much "
+            "larger as the magnification says. If edges are double, turn the sense of rotation "
+            "with --reversed.",
+        ),
+    ), pixel
+
+
+@dataclass(frozen=True)
+class _Header:
+    """Small streams of ``ImageInfo``."""
+
+    path: Path
+    ole: olefile.OleFileIO
+
+    def numbers(self, name: str, count: int) -> NDArray[np.float64]:
+        """So many real numbers."""
+        data = _stream(self.path, self.ole, f"ImageInfo/{name}", 4 * count)
+        return np.frombuffer(data, "<f4").astype(np.float64)
+
+    def number(self, name: str) -> float:
+        """A whole number or a real one, by its name; NaN where there is none."""
+        if not self.ole.exists(f"ImageInfo/{name}"):
+            return float("nan")
+        data = _stream(self.path, self.ole, f"ImageInfo/{name}", 4)
+        return float(np.frombuffer(data, "<f4" if name == "PixelSize" else "<i4")[0])
+
+    def whole(self, name: str, most: int) -> int:
+        """A whole number from 1 to so many."""
+        value = self.number(name)
+        if not 1 <= value <= most:
+            raise FileFormatError(f"{self.path}: ImageInfo/{name} is {value:g}, wanted 1 to {most}")
+        return int(value)
+
+    def dtype(self) -> str:
+        """Type of a sample."""
+        code = self.number("DataType")
+        if code not in _TYPES:
+            raise DTypeError(f"{self.path}: samples are of type {code:g}, known are {[*_TYPES]}")
+        return _TYPES[int(code)]
+
+
+def _stream(path: Path, ole: olefile.OleFileIO, name: str, size: int) -> bytes:
+    """A stream of that many bytes."""
+    if not ole.exists(name):
+        raise FileFormatError(f"{path}: has no {name}: it is no scan of projections")
+    if ole.get_size(name) < size:
+        raise FileFormatError(
+            f"{path}: {name} holds {ole.get_size(name)} bytes, wanted {size}: the file is damaged"
+        )
+    data: bytes = ole.openstream(name).read(size)
+    if len(data) < size:
+        raise FileFormatError(f"{path}: {name} is cut short: the file is damaged")
+    return data
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[olefile.OleFileIO]:
+    with reading(path, "the TXRM file"), olefile.OleFileIO(str(path)) as ole:
+        yield ole
