@@ -38,7 +38,8 @@ from rift_cl.geometry import Grid, Parallel
 from rift_cl.geometry.numbers import real_numbers
 from rift_cl.interop.spline_backprojection import backproject_spline
 from rift_cl.operators.filters.ramp_filters import Ramp, ViewFilter
-from rift_cl.operators.projector.phase_projector import Projector
+from rift_cl.operators.projector.parallel_projector import ParallelProjector
+from rift_cl.operators.projector.phase_projector import PhaseProjector
 
 __all__ = ["iradon", "radon"]
 
@@ -168,7 +169,9 @@ def _as_float(name: str, values: Any, preserve_range: bool) -> NDArray[Any]:
     return numbers
 
 
-def _projector(shape: tuple[int, ...], theta: ArrayLike, bins: int, footprint: str) -> Projector:
+def _projector(
+    shape: tuple[int, ...], theta: ArrayLike, bins: int, footprint: str
+) -> ParallelProjector:
     """A projector whose axis is in the pixel n // 2 and in the bin n // 2.
 
     In scikit-image a point (x, y) is seen at ``t = x cos(theta) - y sin(theta)``: its angle is
@@ -179,7 +182,7 @@ def _projector(shape: tuple[int, ...], theta: ArrayLike, bins: int, footprint: s
         raise InputError(f"theta is {theta!r}, wanted angles in degrees")
     middle = [(n - 1) / 2 - n // 2 for n in shape]
     scan = Parallel(-np.deg2rad(degrees), bins, center=bins // 2)
-    return Projector(Grid(shape, center=middle), scan, footprint, device=default_device())
+    return PhaseProjector(Grid(shape, center=middle), scan, footprint, device=default_device())
 
 
 def _square(image: NDArray[Any]) -> NDArray[Any]:

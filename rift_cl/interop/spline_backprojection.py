@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.operators.projector.phase_projector import Projector
+from rift_cl.operators.projector.parallel_projector import ParallelProjector
 
 
 def backproject_spline(
-    A: Projector, sinogram: NDArray[np.float32], degree: int
+    A: ParallelProjector, sinogram: NDArray[np.float32], degree: int
 ) -> NDArray[np.float32]:
     """Sum the views' splines at every pixel.
 
@@ -57,7 +57,7 @@ def _coefficients(sinogram: NDArray[np.float32], degree: int) -> NDArray[Any]:
     return np.pad(factors, ((0, 0), (1, 2)), mode="reflect")
 
 
-def _lines(A: Projector) -> NDArray[np.float64]:
+def _lines(A: ParallelProjector) -> NDArray[np.float64]:
     """Where a view sees the first pixel, and how far a row and a column are apart: (angles, 3)."""
     y, x = A.grid.coordinates(0)[0], A.grid.coordinates(1)[0]
     dy, dx = A.grid.spacing

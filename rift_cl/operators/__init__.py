@@ -17,7 +17,7 @@ from rift_cl.operators.linear import LinearOperator
 from rift_cl.operators.projector.fast_projector import FastProjector
 from rift_cl.operators.projector.footprint import FOOTPRINTS
 from rift_cl.operators.projector.parallel_projector import ParallelProjector
-from rift_cl.operators.projector.phase_projector import Projector
+from rift_cl.operators.projector.projector import Projector
 from rift_cl.operators.projector.projector_choice import cheapest_projector
 
 __all__ = [

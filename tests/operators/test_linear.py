@@ -187,7 +187,7 @@ def test_operators_say_what_they_are(A, F, device):
     place = f"float32, device {device.selector}>"
     samples = "grid 12 x 15, spacing 1, 8 parallel views of 21 bins, pitch 1"
     sizes = f"{A.domain} -> {A.range}"
-    assert repr(A) == f"<Projector {sizes}: {samples}, footprint strip, {place}"
+    assert repr(A) == f"<PhaseProjector {sizes}: {samples}, footprint strip, {place}"
     stack = rift.Projector(rift.Grid((2, 12, 15), (3, 1, 0.5)), SCAN, device=device)
     assert "grid 2 x 12 x 15, spacing 3 x 1 x 0.5" in repr(stack)
     fast = rift.FastProjector(GRID, SCAN, 0.01, lobes=2, device=device)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rift_cl import FastProjector, Grid, Parallel, Projector, fbp
+from rift_cl import FastProjector, Grid, Parallel, fbp
 from rift_cl.errors import InputError
 from rift_cl.metrics import psnr
 from rift_cl.operators import cheapest_projector
+from rift_cl.operators.projector.phase_projector import PhaseProjector
 from rift_cl.phantom import shepp_logan, shepp_logan_sinogram
 
 pytestmark = pytest.mark.dealt
@@ -25,7 +26,7 @@ def large(device):
 
 @pytest.mark.parametrize("iterative", [False, True])
 def test_large_slices_go_through_the_spectrum_and_small_ones_do_not(device, iterative):
-    for n, kind in ((16, Projector), (64, Projector), (large(device), FastProjector)):
+    for n, kind in ((16, PhaseProjector), (64, PhaseProjector), (large(device), FastProjector)):
         grids = Grid((n, n)), Grid((3, n, n))
         for grid in grids:
             A = cheapest_projector(grid, half_turn(n, n), iterative=iterative, device=device)
@@ -39,7 +40,7 @@ def test_few_views_or_few_pixels_are_projected_directly(device):
         (Grid((20, 20)), half_turn(20, 200)),
         (Grid((8, 8)), half_turn(900, 12, pitch=1e-4)),
     ):
-        assert type(cheapest_projector(grid, scan, device=device)) is Projector
+        assert type(cheapest_projector(grid, scan, device=device)) is PhaseProjector
 
 
 def test_a_smaller_error_is_kept_to(device):
@@ -53,7 +54,7 @@ def test_a_smaller_error_is_kept_to(device):
 
 def test_whoever_names_a_footprint_gets_it(device):
     A = cheapest_projector(Grid((512, 512)), half_turn(512, 512), footprint="strip", device=device)
-    assert type(A) is Projector
+    assert type(A) is PhaseProjector
     assert A.footprint == "strip"
     with pytest.raises(InputError, match="give one of them"):
         cheapest_projector(Grid((9, 9)), half_turn(9, 9), footprint="strip", error=1e-3)
@@ -72,5 +73,5 @@ def test_the_formula_loses_nothing_by_its_error(device, views, bins, pitch, nois
     n = large(device)
     error = cheapest_projector(Grid((n, n)), half_turn(n, n), device=device).error
     fast = FastProjector(grid, scan, error, device=device)
-    direct = Projector(grid, scan, device=device)
+    direct = PhaseProjector(grid, scan, device=device)
     assert psnr(fbp(fast, y), truth) > psnr(fbp(direct, y), truth) - 0.05

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.metrics import affine_fit, disc, psnr, ssim
-from rift_cl.operators import Projector
+from rift_cl.operators import ParallelProjector, Projector
 from rift_cl.phantom import shepp_logan, shepp_logan_sinogram
 from rift_cl.reconstruct import backproject, fbp
 
@@ -59,7 +59,7 @@ def view_study(size: int, counts: Sequence[int], device: Device) -> Iterator[Vie
 
 
 def score_views(
-    A: Projector, y: Image, truth: Image, mask: NDArray[np.bool_] | None = None
+    A: ParallelProjector, y: Image, truth: Image, mask: NDArray[np.bool_] | None = None
 ) -> ViewScore:
     """Reconstruct unfiltered and filtered, and score both.
 

@@ -20,6 +20,7 @@ from rift_cl.geometry import Grid, Parallel
 from rift_cl.operators.projector.footprint import check_footprint
 from rift_cl.operators.projector.parallel_projector import ParallelProjector
 from rift_cl.operators.projector.phase_table import LOG2_PHASES, PhaseTable, phase_table
+from rift_cl.operators.projector.projector import Projector
 
 # Tables of a run of views together: on a CPU they should stay in its caches.
 _TABLE_BYTES = {"cpu": 4 << 20, "gpu": 64 << 20}
@@ -30,8 +31,8 @@ _ROW_RUNS, _ITEMS_PER_UNIT = (64, 32, 16), 8
 _SLAB = 16
 
 
-class Projector(ParallelProjector):
-    """Line integrals of an image, or of every slice of a volume.
+class PhaseProjector(ParallelProjector, Projector):
+    """Line integrals of an image, or of every slice of a volume, along parallel rays.
 
     Args:
         grid: the grid of the image, (ny, nx), or of the volume, (nz, ny, nx).
@@ -86,7 +87,7 @@ class Projector(ParallelProjector):
         return _Walk(self.device, by_rows, self.dtype), _Walk(self.device, by_columns, self.dtype)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Projector, (self.grid, self.scan, self.footprint, self.device, self.dtype)
+        return PhaseProjector, (self.grid, self.scan, self.footprint, self.device, self.dtype)
 
     def _facts(self) -> list[str]:
         return [*super()._facts(), f"footprint {self.footprint}"]

@@ -17,7 +17,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.operators.projector.fast_projector import FastProjector
 from rift_cl.operators.projector.parallel_projector import ParallelProjector
-from rift_cl.operators.projector.phase_projector import Projector
+from rift_cl.operators.projector.phase_projector import PhaseProjector
 from rift_cl.operators.projector.ray_geometry import IMAGE, too_fine
 
 # What FastProjector may differ by in norm. A uniform disc then comes back as flat as from
@@ -85,9 +85,9 @@ def cheapest_projector(
         )
     device = device or default_device()
     if footprint is not None:
-        return Projector(grid, scan, footprint, device=device)
+        return PhaseProjector(grid, scan, footprint, device=device)
     if too_fine(grid, scan):
-        return Projector(grid, scan, device=device)
+        return PhaseProjector(grid, scan, device=device)
     # Steps that keep an image from negative values lose up to 0.3 dB on 64 x 64 pixels where the
     # spectrum ends with what the image shows.
     lobes = 1 if iterative else IMAGE
@@ -95,7 +95,7 @@ def cheapest_projector(
     costs = _COSTS["cpu" if device.traits.is_cpu else "gpu"]
     if _fast_cost(fast, costs) < _direct_cost(grid, scan, costs):
         return fast
-    return Projector(grid, scan, device=device)
+    return PhaseProjector(grid, scan, device=device)
 
 
 def _direct_cost(grid: Grid, scan: Parallel, costs: _Costs) -> float:

@@ -12,7 +12,7 @@ from rift_cl.cl.host_arrays import download
 from rift_cl.geometry import Parallel
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.operators.projector.fast_projector import FastProjector
-from rift_cl.operators.projector.phase_projector import Projector
+from rift_cl.operators.projector.phase_projector import PhaseProjector
 from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays
 
 Views = NDArray[np.intp]
@@ -50,8 +50,8 @@ def restricted(A: LinearOperator, views: Views) -> LinearOperator:
     """
     if isinstance(A, WeightedRays):
         return WeightedRays(restricted(A.inner, views), A.weights[views])
-    if type(A) is Projector:
-        return Projector(
+    if type(A) is PhaseProjector:
+        return PhaseProjector(
             A.grid, _restricted_scan(A.scan, views), A.footprint, device=A.device, dtype=A.dtype
         )
     if type(A) is FastProjector:

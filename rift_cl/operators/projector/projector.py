@@ -1,0 +1,73 @@
+"""The one public name of a matched projector, whose class is chosen by the scan.
+
+Users write ``rift.Projector(grid, scan)`` whatever the scan, and get one of its subclasses, as they
+get a path of their own system from ``pathlib.Path``. ``isinstance(A, Projector)`` holds for all.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, overload
+
+from numpy.typing import DTypeLike
+
+from rift_cl.cl.array import DeviceArray
+from rift_cl.cl.device import Device
+from rift_cl.geometry import Grid, Parallel
+from rift_cl.operators.linear import LinearOperator
+
+if TYPE_CHECKING:
+    from rift_cl.operators.projector.phase_projector import PhaseProjector
+
+
+class Projector(LinearOperator):
+    """Line integrals of an image or a volume, and their exact adjoint.
+
+    Of a ``Parallel`` scan this is a ``PhaseProjector``, whose documentation says more of its
+    footprints and types.
+
+    Args:
+        grid: the grid of the image, (ny, nx), or of the volume, (nz, ny, nx).
+        scan: angles and detector.
+        footprint: the projection of a pixel onto the detector, ``strip`` (the default), ``joseph``
+            or ``linear``.
+        device: the device to use; the default device if not given.
+        dtype: ``float32`` (the default), or ``float64`` where the device has it.
+
+    The domain is ``grid.shape``; the range is (angles, bins), or (angles, nz, bins) for a volume.
+    Values of the range are in the image's unit times the grid's unit of length.
+
+    Raises:
+        InputError: ``grid`` is no ``Grid``, ``scan`` no scan, or the footprint or the type unknown.
+        DeviceError: the device has no float64.
+    """
+
+    grid: Grid
+    footprint: str
+
+    @overload
+    def __new__(
+        cls,
+        grid: Grid,
+        scan: Parallel,
+        footprint: str = ...,
+        device: Device | None = ...,
+        dtype: DTypeLike = ...,
+    ) -> PhaseProjector: ...
+    @overload
+    def __new__(cls, grid: Grid, scan: Any, *given: Any, **named: Any) -> Projector: ...
+    def __new__(cls, grid: Grid, scan: Any, *given: Any, **named: Any) -> Projector:
+        """Make the subclass that the scan asks for, whose ``__init__`` reads the arguments."""
+        return object.__new__(_kind() if cls is Projector else cls)
+
+    # Not abstract, since for a type checker a call of Projector may make one of these.
+    def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
+        raise NotImplementedError
+
+    def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
+        raise NotImplementedError
+
+
+def _kind() -> type[Projector]:
+    from rift_cl.operators.projector.phase_projector import PhaseProjector
+
+    return PhaseProjector
