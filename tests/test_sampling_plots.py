@@ -17,6 +17,7 @@ from rift_cl.report.plot import (
     direction_maps,
     figure_png,
     frequency_maps,
+    section_map,
 )
 from rift_cl.report.plot.camera_plot import axis_names, upright_frame
 from rift_cl.report.plot.direction_map import flattened, unflattened
@@ -135,3 +136,30 @@ def test_both_axes_of_curves_can_be_logarithmic():
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
     with pytest.raises(InputError, match="log_y"):
         curves({"law": ([1.0], [0.0])}, xlabel="k", ylabel="views", log_y=True)
+
+
+def section(values, half_edges=(2.0, 1.0)):
+    return section_map(values, half_edges=half_edges, axes=("x", "z"), label="missed", unit="mm")
+
+
+def test_the_first_row_of_a_section_is_its_lowest_place():
+    values = np.zeros((20, 40))
+    values[:10] = 0.5
+    image = pixels(section(values))
+    column = image[:, 300].astype(int).sum(axis=1)
+    # Dark below, where half is missed; pale above.
+    assert column[60] > column[200] + 100
+    assert figure_png(section(np.zeros((20, 40)))) != figure_png(section(values))
+
+
+@pytest.mark.parametrize(
+    ("values", "edges", "error"),
+    [
+        (np.zeros(4), (1, 1), ShapeError),
+        (np.full((3, 3), np.nan), (1, 1), NonFiniteError),
+        (np.zeros((3, 3)), (0, 1), InputError),
+    ],
+)
+def test_sections_that_cannot_be_drawn_are_refused(values, edges, error):
+    with pytest.raises(error):
+        section(values, edges)

@@ -31,10 +31,11 @@ def view_rays(scan: Fan | Cone | Vectors, view: int) -> tuple[Reals, Reals]:
     reach = scan.source_to_detector * reach
     across, ahead = reach * np.sin(gamma), reach * np.cos(gamma)
     flat = across[:, None] * np.array([cosine, sine, 0]) + ahead[:, None] * [-sine, cosine, 0]
-    height, rows = 0.0, np.zeros(1)
+    height: float = 0.0
+    rows: Reals = np.zeros(1)
     if isinstance(scan, Cone):
         height = scan.heights[view]
-        rows = (np.arange(scan.rows) - scan.center[0]) * scan.pitch[0]
+        rows = (np.arange(scan.rows, dtype=np.float64) - scan.center[0]) * scan.pitch[0]
     source = np.array([scan.source_to_axis * sine, -scan.source_to_axis * cosine, height])
     rays = np.broadcast_to(flat, (len(rows), *flat.shape)).copy()
     rays[..., 2] += rows[:, None]

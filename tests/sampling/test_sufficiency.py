@@ -83,7 +83,7 @@ def test_a_circle_misses_the_planes_that_lie_flat(height):
     scan = rift.Cone(np.linspace(0, 2 * np.pi, 200), 9, 9, 1.0, 20, 30)
     points = [[0, 0, height], [6, -3, 0]]
     wanted = 1 - 20 / np.hypot(20, height)
-    np.testing.assert_allclose(missed_planes(scan, points), [wanted, 0], atol=2e-3)
+    np.testing.assert_allclose(missed_planes(scan, points), [wanted, 0], atol=3e-4)
 
 
 def test_a_helix_crosses_every_plane_and_an_arc_does_not():

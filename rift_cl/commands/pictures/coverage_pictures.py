@@ -11,14 +11,16 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.commands.inputs.view_set import ViewSet
-from rift_cl.geometry import Camera
+from rift_cl.geometry import Camera, Cone, Vectors
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import curves, figure_svg
 from rift_cl.report.plot.camera_plot import Stands, camera_plot
 from rift_cl.report.plot.direction_map import direction_maps
 from rift_cl.report.plot.frequency_map import FrequencySlice, frequency_maps
+from rift_cl.report.plot.section_map import section_map
 from rift_cl.sampling.coverage.density import window_width
 from rift_cl.sampling.criteria.orlov import slice_gaps
+from rift_cl.sampling.criteria.tuy import missed_planes
 from rift_cl.sampling.targets.prior import directions_for
 
 if TYPE_CHECKING:
@@ -35,6 +37,8 @@ LEAST = 0.01
 # Frequency, in cycles per diameter, at which directions of detail are asked for.
 _DETAIL = 8.0
 _RADII, _WAYS = 60, 500
+# Samples along the longer edge of a section through the target.
+_SECTION = 61
 
 
 def slice_maps(sampled: ViewSet, points: Mapping[str, Floats], device: Device) -> Figure:
@@ -161,6 +165,52 @@ def camera_figure(groups: Mapping[str, Sequence[Camera]], sampled: ViewSet) -> F
         diameter=sampled.target.diameter,
         up=tuple(sampled.up),
         unit=sampled.unit,
+    )
+
+
+def add_missed_planes(
+    page: Page, scan: Cone | Vectors, *, radius: float, half_height: float, unit: str
+) -> None:
+    """Add to a report what the path of a scanner's source cannot tell, place by place.
+
+    Args:
+        page: the report.
+        scan: the views.
+        radius: of the volume about the axis.
+        half_height: of the volume.
+        unit: of length.
+    """
+    longer = max(radius, half_height)
+    across, up = (max(5, round(_SECTION * edge / longer)) for edge in (radius, half_height))
+    x, z = np.linspace(-radius, radius, across), np.linspace(-half_height, half_height, up)
+    points = np.stack([np.tile(x, up), np.zeros(across * up), np.repeat(z, across)], axis=1)
+    missed = missed_planes(scan, points)
+    page.section("What the source's path cannot tell")
+    if not missed.any():
+        page.paragraph(
+            "The source crosses every plane through the volume: Tuy's condition is met, and views "
+            "enough determine every point."
+        )
+        return
+    page.paragraph(
+        f"Of the planes through a point, up to {missed.max():.2%} are never crossed by the source. "
+        "What varies across such a plane is not measured there: edges that lie along it blur, "
+        "whatever the method, and filtered backprojection loses contrast besides. No more views "
+        "on this path mend it; a helix, or a second circle, does."
+    )
+    page.figure(
+        figure_svg(
+            section_map(
+                missed.reshape(up, across),
+                half_edges=(radius, half_height),
+                axes=("x", "z"),
+                label="planes never crossed",
+                unit=unit,
+            )
+        ),
+        caption="Section along the rotation axis: the share of planes through each point that the "
+        "source's path misses (Tuy's condition).",
+        alt="Map of the share of planes that the source never crosses",
     )
 
 

@@ -142,6 +142,7 @@ class Response:
         return np.concatenate([kernel[:0:-1], kernel])
 
 
+FilterLike = str | Filter | Callable[[Floats], ArrayLike]
 FILTERS: Registry[Filter] = Registry(
     "filter", {**{window: Ramp(window) for window in WINDOWS}, HIGH_PASS: HighPass()}
 )
@@ -162,7 +163,7 @@ def register_filter(name: str, filter: Filter | Callable[[Floats], ArrayLike]) -
     FILTERS.add(name, as_filter(filter))
 
 
-def as_filter(filter: str | Filter | Callable[[Floats], ArrayLike]) -> Filter:
+def as_filter(filter: FilterLike) -> Filter:
     """A filter from its name, itself, or a response function.
 
     Raises:

@@ -13,23 +13,22 @@ each view gets a filter of its own (rift_cl/operators/filters/compensation.py).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.filters.compensation import Compensation
-from rift_cl.operators.filters.ramp_filters import Filter, Gains, ViewFilter, as_filter
+from rift_cl.operators.filters.ramp_filters import FilterLike, Gains, ViewFilter, as_filter
 from rift_cl.operators.linear import Chunk, LinearOperator
 from rift_cl.operators.projector.parallel_projector import ParallelProjector
 from rift_cl.reconstruct.direct.view_weights import view_gains
 
 Floats = NDArray[np.float64]
-FilterLike = str | Filter | Callable[[Floats], ArrayLike]
 
 
 class FilteredBackprojection(LinearOperator):

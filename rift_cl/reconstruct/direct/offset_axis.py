@@ -40,9 +40,13 @@ def is_full_turn(angles: Floats) -> bool:
 
 def is_offset(scan: Parallel) -> bool:
     """Whether a full turn's axis lies so far from the detector's middle that it sees further."""
-    left, right = scan.center, scan.bins - 1 - scan.center
-    short, long = min(left, right), max(left, right)
-    return is_full_turn(scan.angles) and 0 < short < _OFFSET * long
+    return is_full_turn(scan.angles) and sees_further(scan.center, scan.bins)
+
+
+def sees_further(center: float, bins: int) -> bool:
+    """Whether a detector reaches much further on one side of the axis, and beyond it on both."""
+    short, long = sorted((center, bins - 1 - center))
+    return 0 < short < _OFFSET * long
 
 
 def offset_weights(scan: Parallel) -> Floats:

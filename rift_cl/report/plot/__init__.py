@@ -7,6 +7,7 @@ from rift_cl.report.plot.figure import WIDE, figure_png, figure_svg, figure_svgs
 from rift_cl.report.plot.frames import framed, jpeg
 from rift_cl.report.plot.frequency_map import FrequencySlice, frequency_maps
 from rift_cl.report.plot.panels import image_grid
+from rift_cl.report.plot.section_map import section_map
 
 __all__ = [
     "WIDE",
@@ -22,4 +23,5 @@ __all__ = [
     "frequency_maps",
     "image_grid",
     "jpeg",
+    "section_map",
 ]

@@ -25,6 +25,8 @@ from rift_cl.sampling.targets.target import Target
 Floats = NDArray[np.float64]
 # Planes through the target: directions, and places along each.
 _NORMALS, _OFFSETS = 1024, 9
+# Planes through a point of which it is counted how many were crossed.
+_CROSSED = 1 << 14
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +122,7 @@ def missed_planes(scan: Cone | Vectors, points: ArrayLike) -> Floats:
         points: (P, 3) as (x, y, z), in the grid's coordinates.
 
     Returns:
-        (P,) shares, 0 where Tuy's condition is met, to about a thousandth.
+        (P,) shares, 0 where Tuy's condition is met, to about 1e-4.
 
     Raises:
         ShapeError: points have another shape.
@@ -131,7 +133,7 @@ def missed_planes(scan: Cone | Vectors, points: ArrayLike) -> Floats:
         raise InputError("points are no finite numbers, wanted (P, 3) of them, (x, y, z)")
     if places.ndim != 2 or places.shape[1] != 3:
         raise ShapeError(f"points has shape {places.shape}, wanted (P, 3)")
-    normals = half_sphere(_NORMALS)
+    normals = half_sphere(_CROSSED)
     heights = normals @ scan.source.T
     low, high = heights.min(axis=1), heights.max(axis=1)
     shares = np.empty(len(places))
