@@ -17,7 +17,7 @@ A scan whose source or detector stands otherwise, view by view, is a ``Vectors``
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -62,6 +62,13 @@ class Cone(ScanValue):
         InputError: an argument is not a usable number, the detector stands before the axis, or the
             angles look like degrees.
     """
+
+    _lengths: ClassVar[tuple[str, ...]] = (
+        "pitch",
+        "source_to_axis",
+        "source_to_detector",
+        "heights",
+    )
 
     angles: NDArray[np.float64]
     rows: int

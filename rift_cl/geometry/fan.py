@@ -13,6 +13,7 @@ the ray of a parallel scan at the angle ``a - gamma`` with ``t = source_to_axis 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -94,6 +95,8 @@ class Fan(ScanValue):
         InputError: another argument is not a usable number, the detector stands before the axis,
             or the angles look like degrees.
     """
+
+    _lengths: ClassVar[tuple[str, ...]] = ("pitch", "source_to_axis", "source_to_detector")
 
     angles: NDArray[np.float64]
     bins: int

@@ -8,6 +8,7 @@ axis is seen at the (possibly fractional) bin ``center``.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +36,8 @@ class Parallel(ScanValue):
         ShapeError: ``angles`` is empty or not one-dimensional, or ``bins`` is not positive.
         InputError: an angle, the pitch or the centre is not a usable number.
     """
+
+    _lengths: ClassVar[tuple[str, ...]] = ("pitch",)
 
     angles: NDArray[np.float64]
     bins: int

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import fields
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,13 +15,21 @@ from numpy.typing import ArrayLike, NDArray
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry.numbers import one_number, real_numbers
 
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
 # Whole turns in degrees. Evenly spaced angles that fill one of them to rounding are degrees.
 _TURNS_IN_DEGREES = (180.0, 360.0, 720.0)
 _TURN_TOLERANCE = 1e-5
 
 
 class ScanValue:
-    """A frozen dataclass whose fields are its constructor's arguments, arrays among them."""
+    """A frozen dataclass whose fields are its constructor's arguments, arrays among them.
+
+    Every array has an entry for each view; ``_lengths`` names the fields that are lengths.
+    """
+
+    _lengths: ClassVar[tuple[str, ...]] = ()
 
     def __eq__(self, other: object) -> bool:
         """Scans are equal when every ray is."""
@@ -34,6 +42,29 @@ class ScanValue:
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies are made by the constructor, so that their arrays are read-only as well."""
         return type(self), self._values()
+
+    def subset(self, views: ArrayLike) -> Self:
+        """The scan of some views.
+
+        Args:
+            views: their numbers, or a truth value for each view.
+        """
+        chosen = np.asarray(views)
+        return type(self)(
+            *(value[chosen] if isinstance(value, np.ndarray) else value for value in self._values())
+        )
+
+    def scaled(self, factor: float) -> Self:
+        """The same scan with every length times a factor, as for another unit.
+
+        Raises:
+            InputError: the factor is no positive number.
+        """
+        times = checked_length(type(self).__name__, "factor", factor)
+        values = dict(zip((field.name for field in fields(self)), self._values(), strict=True))  # type: ignore[arg-type]
+        for name in self._lengths:
+            values[name] = np.multiply(values[name], times)
+        return type(self)(**values)
 
     def _values(self) -> tuple[Any, ...]:
         return tuple(getattr(self, field.name) for field in fields(self))  # type: ignore[arg-type]

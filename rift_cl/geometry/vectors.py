@@ -12,7 +12,7 @@ ASTRA's ``cone_vec`` has the same twelve numbers to a view.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,6 +42,8 @@ class Vectors(ScanValue):
         InputError: a number is not finite, ``across`` and ``down`` are parallel, or the source
             lies in the plane of the detector; the sentence names the first such view.
     """
+
+    _lengths: ClassVar[tuple[str, ...]] = ("source", "middle", "across", "down")
 
     source: NDArray[np.float64]
     middle: NDArray[np.float64]

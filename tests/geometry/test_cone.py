@@ -153,3 +153,37 @@ def test_vectors_name_the_view_that_is_wrong(name, change, error, what):
     values = {k: getattr(VECTORS, k) for k in ("source", "middle", "across", "down")}
     with pytest.raises(error, match=what):
         rift.Vectors(**{**values, name: change(values[name])}, rows=10, bins=12)
+
+
+SCANS = [
+    rift.Parallel(USUAL["angles"], 12, 0.4, 4.5),
+    cone().fan(),
+    cone(),
+    cone(curved=True),
+    VECTORS,
+]
+
+
+@pytest.mark.parametrize("scan", SCANS, ids=lambda scan: type(scan).__name__)
+def test_some_views_of_a_scan_are_a_scan(scan):
+    part = scan.subset([4, 1])
+    assert part.views == 2 and part != scan
+    assert scan.subset(np.arange(7)) == scan == scan.subset(np.ones(7, bool))
+    for name in ("angles", "source", "heights"):
+        if hasattr(scan, name):
+            assert getattr(part, name).tolist() == getattr(scan, name)[[4, 1]].tolist()
+
+
+@pytest.mark.parametrize("scan", SCANS, ids=lambda scan: type(scan).__name__)
+def test_another_unit_changes_every_length_and_no_angle(scan):
+    scaled = scan.scaled(10.0)
+    if isinstance(scan, rift.Vectors):
+        np.testing.assert_allclose(scaled.corners(), 10 * np.array(scan.corners()))
+    else:
+        assert np.allclose(scaled.pitch, 10 * np.array(scan.pitch))
+        assert scaled.angles.tolist() == scan.angles.tolist()
+        assert scaled.center == scan.center and scaled.bins == scan.bins
+    if isinstance(scan, rift.Cone) and not scan.curved:
+        assert rift.Cone.of_vectors(scaled.vectors()).pitch == pytest.approx((5.0, 4.0))
+    with pytest.raises(InputError, match="factor"):
+        scan.scaled(-1)

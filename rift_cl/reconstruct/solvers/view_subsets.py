@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.elementwise import copy
 from rift_cl.cl.host_arrays import download
-from rift_cl.geometry import Parallel
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.operators.projector.fast_projector import FastProjector
 from rift_cl.operators.projector.phase_projector import PhaseProjector
@@ -51,18 +50,11 @@ def restricted(A: LinearOperator, views: Views) -> LinearOperator:
     if isinstance(A, WeightedRays):
         return WeightedRays(restricted(A.inner, views), A.weights[views])
     if type(A) is PhaseProjector:
-        return PhaseProjector(
-            A.grid, _restricted_scan(A.scan, views), A.footprint, device=A.device, dtype=A.dtype
-        )
+        part = A.scan.subset(views)
+        return PhaseProjector(A.grid, part, A.footprint, device=A.device, dtype=A.dtype)
     if type(A) is FastProjector:
-        return FastProjector(
-            A.grid, _restricted_scan(A.scan, views), A.error, lobes=A.lobes, device=A.device
-        )
+        return FastProjector(A.grid, A.scan.subset(views), A.error, lobes=A.lobes, device=A.device)
     return ChosenViews(A, views)
-
-
-def _restricted_scan(scan: Parallel, views: Views) -> Parallel:
-    return Parallel(scan.angles[views], scan.bins, scan.pitch, scan.center)
 
 
 class ChosenViews(LinearOperator):
