@@ -10,7 +10,6 @@ import numpy as np
 from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.cameras.arc import check_places
 from rift_cl.commands.inputs.scan_axis import find_axis
-from rift_cl.commands.inputs.scan_lengths import scan_lengths
 from rift_cl.commands.inputs.scene_bounds import SceneBounds, bounds_of_cameras
 from rift_cl.commands.inputs.scene_depth import space_of
 from rift_cl.commands.inputs.surfaces import trusted
@@ -20,6 +19,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Camera, Parallel
 from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.scan_cameras import scan_cameras
+from rift_cl.geometry.seen_grid import scan_lengths
 from rift_cl.io.captures.capture import Capture, capture_name, holds_capture, open_capture
 from rift_cl.io.scans.formats import open_scan
 from rift_cl.io.scans.scan_file import ScanFile

@@ -1,0 +1,101 @@
+"""What a scan from a point sees: the size of a pixel at the axis, and the voxels it fills."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from rift_cl.geometry.cone import Cone
+from rift_cl.geometry.fan import Fan
+from rift_cl.geometry.grid import Grid
+from rift_cl.geometry.scan_value import checked_length
+from rift_cl.geometry.vectors import Vectors
+
+
+class ScanLengths(NamedTuple):
+    """Lengths that most views of a scan have.
+
+    Args:
+        source_to_axis: distance of the source from the axis.
+        source_to_detector: distance of the source from the detector.
+        pitch: distance between rows and between bins on the detector.
+    """
+
+    source_to_axis: float
+    source_to_detector: float
+    pitch: tuple[float, float]
+
+    @property
+    def pixel(self) -> tuple[float, float]:
+        """Distance between rows and between bins as they are seen at the axis."""
+        share = self.source_to_axis / self.source_to_detector
+        return self.pitch[0] * share, self.pitch[1] * share
+
+
+def scan_lengths(scan: Fan | Cone | Vectors) -> ScanLengths:
+    """Lengths of a scan; of vectors, the medians over the views.
+
+    Args:
+        scan: a fan's pitch counts for rows as well.
+    """
+    if isinstance(scan, Vectors):
+        normal = np.cross(scan.across, scan.down)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        to_detector = np.abs(((scan.middle - scan.source) * normal).sum(axis=1))
+        to_axis = np.hypot(scan.source[:, 0], scan.source[:, 1])
+        pitch = [np.median(np.linalg.norm(v, axis=1)) for v in (scan.down, scan.across)]
+        lengths = float(np.median(to_axis)), float(np.median(to_detector))
+        return ScanLengths(*lengths, (float(pitch[0]), float(pitch[1])))
+    pitch_of = scan.pitch if isinstance(scan, Cone) else (scan.pitch, scan.pitch)
+    return ScanLengths(scan.source_to_axis, scan.source_to_detector, pitch_of)
+
+
+def seen_grid(scan: Fan | Cone | Vectors, spacing: float | None = None) -> Grid:
+    """Cubic voxels over what the detector shows, centred on the rotation axis.
+
+    Across the axis they reach as far as the detector's longer side does at the axis; along it, from
+    the detector's first row to its last as seen at the axis, and as far as the source rises.
+
+    Args:
+        scan: a fan gives the pixels of a slice.
+        spacing: edge of a voxel; a bin as it is seen at the axis if not given.
+
+    Raises:
+        InputError: the spacing is no positive length.
+    """
+    row, bin = scan_lengths(scan).pixel
+    edge = bin if spacing is None else checked_length("seen_grid", "spacing", spacing)
+    if isinstance(scan, Vectors):
+        width, low, high = scan.bins * bin, *_rows_of_vectors(scan, row)
+    else:
+        center = scan.center if isinstance(scan, Fan) else scan.center[1]
+        width = 2 * max(center + 0.5, scan.bins - 0.5 - center) * bin
+        low, high = (0.0, edge) if isinstance(scan, Fan) else _rows_of_cone(scan, row)
+    across = max(1, _whole(width / edge))
+    if isinstance(scan, Fan):
+        return Grid((across, across), edge)
+    along = max(1, _whole((high - low) / edge))
+    return Grid((along, across, across), edge, ((low + high) / 2, 0, 0))
+
+
+def _rows_of_cone(scan: Cone, row: float) -> tuple[float, float]:
+    """The lowest and the highest place that rows show at the axis."""
+    first = (-0.5 - scan.center[0]) * row + float(scan.heights.min())
+    last = (scan.rows - 0.5 - scan.center[0]) * row + float(scan.heights.max())
+    return first, last
+
+
+def _rows_of_vectors(scan: Vectors, row: float) -> tuple[float, float]:
+    """As for a cone, about where the middle of the detector looks past the axis."""
+    lengths = scan_lengths(scan)
+    share = lengths.source_to_axis / lengths.source_to_detector
+    heights = (scan.source + share * (scan.middle - scan.source))[:, 2]
+    half = scan.rows / 2 * row
+    return float(heights.min()) - half, float(heights.max()) + half
+
+
+def _whole(count: float) -> int:
+    """The whole number above, but for rounding."""
+    return math.ceil(count - 1e-6)

@@ -1,0 +1,47 @@
+"""Voxels that a scan from a point fills: what the detector's edges show at the axis."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.errors import InputError
+from rift_cl.geometry.seen_grid import scan_lengths, seen_grid
+
+ANGLES = np.linspace(0, 6, 7)
+CONE = rift.Cone(ANGLES, 10, 16, (0.4, 0.8), 50, 100, (4.5, 7.5))
+
+
+def test_a_voxel_is_a_bin_at_the_axis():
+    grid = seen_grid(CONE)
+    assert grid.spacing == pytest.approx((0.4,) * 3)
+    # Ten rows of 0.2 at the axis are five voxels.
+    assert grid.shape == (5, 16, 16) and grid.center == pytest.approx((0, 0, 0))
+    assert seen_grid(CONE, 0.2).shape == (10, 32, 32)
+
+
+def test_the_longer_side_of_an_offset_detector_counts_and_rows_are_where_they_look():
+    grid = seen_grid(rift.Cone(ANGLES, 10, 16, (0.4, 0.8), 50, 100, (0.0, 3.5)))
+    assert grid.shape == (5, 24, 24)
+    assert grid.center == pytest.approx((4.5 * 0.2, 0, 0))
+
+
+def test_a_helix_is_as_long_as_the_source_rises():
+    cone = rift.Cone(ANGLES, 10, 16, (0.4, 0.8), 50, 100, (4.5, 7.5), heights=ANGLES)
+    grid = seen_grid(cone)
+    assert grid.shape[0] == 20 and grid.center[0] == pytest.approx(3)
+
+
+def test_vectors_of_a_cone_see_what_the_cone_sees():
+    for cone in (CONE, rift.Cone(ANGLES, 9, 16, 0.8, 50, 100, heights=ANGLES)):
+        assert seen_grid(cone.vectors()).shape == seen_grid(cone).shape
+        np.testing.assert_allclose(seen_grid(cone.vectors()).center, seen_grid(cone).center)
+        np.testing.assert_allclose(scan_lengths(cone.vectors()).pixel, scan_lengths(cone).pixel)
+
+
+def test_a_fan_sees_a_slice():
+    grid = seen_grid(CONE.fan())
+    assert grid.shape == (16, 16) and grid.spacing == pytest.approx((0.4, 0.4))
+    with pytest.raises(InputError, match="spacing"):
+        seen_grid(CONE, -1)
