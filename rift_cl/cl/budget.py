@@ -112,8 +112,13 @@ def plan_chunks(
             "with more memory, or make the problem smaller"
         )
     check_array(array, largest, what=f"an array of one {what}")
-    chunks = -(-count // min(most, largest // max(array, 1)))
-    return [slice(count * k // chunks, count * (k + 1) // chunks) for k in range(chunks)]
+    return cut_evenly(count, min(most, largest // max(array, 1)))
+
+
+def cut_evenly(count: int, most: int) -> list[slice]:
+    """Cut ``count`` items into as few runs of at most ``most`` as can be, as even as can be."""
+    runs = -(-count // most)
+    return [slice(count * k // runs, count * (k + 1) // runs) for k in range(runs)]
 
 
 def check_array(size: int, largest: int, *, what: str) -> None:

@@ -44,7 +44,10 @@ class Adjoint(LinearOperator):
         return self._forward.scratch
 
     def _chunks(self, budget: int) -> Iterable[Chunk]:
-        return [(inside, outside) for outside, inside in self._forward._chunks(budget)]
+        return self._forward._adjoint_chunks(budget)
+
+    def _adjoint_chunks(self, budget: int) -> Iterable[Chunk]:
+        return self._forward._chunks(budget)
 
 
 class Scaled(LinearOperator):
@@ -76,7 +79,14 @@ class Scaled(LinearOperator):
         return self._inner.scratch
 
     def _chunks(self, budget: int) -> Iterable[Chunk]:
-        return self._inner._chunks(budget)
+        return map(self._scaled, self._inner._chunks(budget))
+
+    def _adjoint_chunks(self, budget: int) -> Iterable[Chunk]:
+        return map(self._scaled, self._inner._adjoint_chunks(budget))
+
+    def _scaled(self, chunk: Chunk) -> Chunk:
+        part = chunk.operator
+        return chunk if part is None else chunk._replace(operator=part * self._factor)
 
 
 class Sum(LinearOperator):

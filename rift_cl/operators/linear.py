@@ -10,7 +10,7 @@ them again, the device as its selector, so that no device memory travels and the
 same bits.
 
 Host arrays that are too large for the device are processed in chunks, which an operator defines by
-``_chunks``; the result is the same to the bit.
+``_chunks``; the result is the same to the bit, unless a single sum has to be cut.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from functools import cached_property
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -43,12 +43,35 @@ from rift_cl.errors import DeviceMemoryError, InputError, ResourceLimitError
 from rift_cl.geometry import Grid, Parallel
 
 Shape = tuple[int, ...]
-# An index into an operator's domain and the index into its range that depends on it alone.
-Chunk = tuple[tuple[slice, ...], tuple[slice, ...]]
 _HALVINGS = 6
 # What applies an operator to tensors; loaded when the first one comes, by its name, since an
 # operator knows nothing of torch.
 _TENSOR_BRIDGE = "rift_cl.interop.linear_torch"
+
+
+class Chunk(NamedTuple):
+    """A part of an operator's work.
+
+    Args:
+        inside: index into its domain.
+        outside: index into its range. Chunks with the same one follow each other, and their results
+            are added.
+        operator: what maps the one part to the other; None for the whole operator, which does so
+            where the two depend on each other alone.
+    """
+
+    inside: tuple[slice, ...]
+    outside: tuple[slice, ...]
+    operator: LinearOperator | None = None
+
+    @property
+    def transposed(self) -> Chunk:
+        """The same part of the adjoint's work."""
+        from rift_cl.operators.algebra import Adjoint
+
+        # Not its ``T``, which would keep a part and its arrays in a circle of references.
+        operator = None if self.operator is None else Adjoint(self.operator)
+        return Chunk(self.outside, self.inside, operator)
 
 
 class LinearOperator(ABC):
@@ -205,8 +228,10 @@ class LinearOperator(ABC):
         lack: DeviceMemoryError | None = None
         for halving in range(_HALVINGS + 1):
             try:
-                for inside, outside in self._chunks(budget >> halving):
-                    self._apply_chunk(x, y, inside, outside)
+                before = None
+                for chunk in self._chunks(budget >> halving):
+                    self._apply_chunk(x, y, chunk, add=chunk.outside == before)
+                    before = chunk.outside
                 return
             except DeviceMemoryError as failure:
                 # The driver had less memory than it reported: retry with smaller chunks.
@@ -221,18 +246,15 @@ class LinearOperator(ABC):
                     raise lack from None
                 raise
 
-    def _apply_chunk(
-        self,
-        x: NDArray[Any],
-        y: NDArray[Any],
-        inside: tuple[slice, ...],
-        outside: tuple[slice, ...],
-    ) -> None:
-        chunk = np.ascontiguousarray(x[inside])
-        part = y[outside]
+    def _apply_chunk(self, x: NDArray[Any], y: NDArray[Any], chunk: Chunk, *, add: bool) -> None:
+        operator = chunk.operator or self
+        given = np.ascontiguousarray(x[chunk.inside])
+        part = y[chunk.outside]
         target = self.device.empty(part.shape, self.dtype)
-        self._apply(share(self.device, chunk), target)
-        if part.flags.c_contiguous:
+        operator._apply(share(self.device, given), target)
+        if add:
+            part += download(self.device, target)
+        elif part.flags.c_contiguous:
             download(self.device, target, part)
         else:
             part[...] = download(self.device, target)
@@ -254,7 +276,11 @@ class LinearOperator(ABC):
             array=max(sizes),
             largest=self.device.traits.allocation,
         )
-        return [((), ())]
+        return [Chunk((), ())]
+
+    def _adjoint_chunks(self, budget: int) -> Iterable[Chunk]:
+        """Chunks of the adjoint's work."""
+        return [chunk.transposed for chunk in self._chunks(budget)]
 
     @abstractmethod
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:

@@ -5,14 +5,13 @@ A device is opened with fake traits, within which it then works; the driver's ow
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from limited_devices import Arrays, assert_same, limited, normal
 from observations_of_all_kinds import random_observations
 from projection_scenes import camera_of
 from projection_scenes import random_splats as visible_splats
@@ -35,18 +34,6 @@ from rift_cl.sampling.coverage.device import coverage, coverage_grad
 from rift_cl.sampling.targets.target import Target
 from rift_cl.splat import Renderer, Splats, SplatSettings
 from rift_cl.train.loss.image_loss import ImageLoss
-
-Arrays = list[np.ndarray[Any, Any]]
-
-
-def limited(device: rift.Device, **traits: Any) -> rift.Device:
-    """The same device with other traits."""
-    changed = dataclasses.replace(device.traits, **traits)
-    return rift.Device(device._handle, device.selector, traits=changed)
-
-
-def normal(*shape: int) -> np.ndarray[Any, Any]:
-    return np.random.default_rng(len(shape)).standard_normal(shape).astype(np.float32)
 
 
 def tomography(device: rift.Device) -> Arrays:
@@ -142,12 +129,6 @@ JOBS: dict[str, Callable[[rift.Device], Arrays]] = {
 every_job = pytest.mark.parametrize("job", JOBS.values(), ids=list(JOBS))
 
 
-def assert_same(found: Arrays, wanted: Arrays) -> None:
-    assert len(found) == len(wanted)
-    for one, other in zip(found, wanted, strict=True):
-        assert one.dtype == other.dtype and one.tobytes() == other.tobytes()
-
-
 @pytest.mark.parametrize(
     ("job", "largest"),
     [
@@ -200,8 +181,8 @@ def test_work_whose_least_part_is_beyond_the_largest_buffer_is_told(device):
         filtering(limited(device, allocation=1000))
     scan = rift.Parallel(np.linspace(0, 3, 50), 40)
     gains = np.arange(50.0)
-    F = ViewFilter(scan, rift.Ramp(), rows=9, gains=gains, device=limited(device, allocation=6000))
-    with pytest.raises(ResourceLimitError, match=r"row of every view.*7\.81 KiB.*5\.86 KiB"):
+    F = ViewFilter(scan, rift.Ramp(), rows=9, gains=gains, device=limited(device, allocation=1000))
+    with pytest.raises(ResourceLimitError, match=r"one view with its gain.*1\.41 KiB"):
         F(normal(50, 9, 40))
 
 

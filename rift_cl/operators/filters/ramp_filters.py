@@ -11,20 +11,21 @@ lies beyond the detector, which is small and not zero.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from rift_cl.cl.array import DeviceArray
-from rift_cl.cl.budget import plan_chunks
+from rift_cl.cl.budget import check_array, cut_evenly, plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.cl.host_arrays import check_finite
-from rift_cl.errors import InputError, ShapeError
+from rift_cl.errors import InputError, ResourceLimitError, ShapeError
 from rift_cl.geometry import Parallel
 from rift_cl.operators.filters.row_convolution import SHORT_ROW, RowConvolution
 from rift_cl.operators.fourier.row_transform import RowTransform
@@ -216,16 +217,18 @@ class ViewFilter(LinearOperator):
             raise ShapeError(f"rows is {rows}, wanted at least 1 detector row")
         self.filter = filter
         self._views, self._rows, self._given_gains = scan, rows, gains
-        factors, taps = _factors_and_taps(scan, filter, gains)
-        self._gains = self.device.array(factors, self.dtype)
-        # Then any views may stand in the place of any others.
-        self._alike = len(taps) == 1 and bool((factors == factors[:1]).all())
-        self._convolve: RowConvolution | RowTransform
-        taps *= scan.pitch
-        if len(taps) == 1 and scan.bins <= SHORT_ROW:
-            self._convolve = RowConvolution(self.device, taps, self.dtype)
-        else:
-            self._convolve = RowTransform(self.device, taps, math.prod(shape[:-1]), self.dtype)
+        self._factors, self._taps = _factors_and_taps(scan, filter, gains)
+        self._taps *= scan.pitch
+
+    @cached_property
+    def _gains(self) -> DeviceArray:
+        return self.device.array(self._factors, self.dtype)
+
+    @cached_property
+    def _convolve(self) -> RowConvolution | RowTransform:
+        if len(self._taps) == 1 and self.domain[-1] <= SHORT_ROW:
+            return RowConvolution(self.device, self._taps, self.dtype)
+        return RowTransform(self.device, self._taps, math.prod(self.domain[:-1]), self.dtype)
 
     def __reduce__(self) -> tuple[Any, ...]:
         settled = partial(
@@ -253,22 +256,63 @@ class ViewFilter(LinearOperator):
         return self._convolve.scratch
 
     def _chunks(self, budget: int) -> Iterable[Chunk]:
-        """Some views, where all are filtered alike; or some rows of every view."""
+        """Some views, where all are filtered alike; else some rows of all, or views by theirs."""
         if self._alike:
             chunks = self._parts(self.domain[0], budget, what="view")
-            return [((chunk,), (chunk,)) for chunk in chunks]
-        if len(self.domain) == 2:
-            return super()._chunks(budget)
-        chunks = self._parts(self.domain[1], budget, what="row of every view")
-        return [((slice(None), chunk), (slice(None), chunk)) for chunk in chunks]
+            return [Chunk((chunk,), (chunk,)) for chunk in chunks]
+        try:
+            if len(self.domain) == 2:
+                self._parts(1, budget, what="sinogram with gains of its views")
+                return [Chunk((), ())]
+            chunks = self._parts(self.domain[1], budget, what="row of every view")
+            return [Chunk((slice(None), chunk), (slice(None), chunk)) for chunk in chunks]
+        except ResourceLimitError:
+            return self._runs_of_views(budget)
+
+    def _adjoint_chunks(self, budget: int) -> Iterable[Chunk]:
+        return self._chunks(budget)
+
+    @property
+    def _alike(self) -> bool:
+        """Whether any views may stand in the place of any others."""
+        return len(self._taps) == 1 and bool((self._factors == self._factors[:1]).all())
 
     def _parts(self, count: int, budget: int, *, what: str) -> list[slice]:
         """Cut an axis of so many samples."""
         array = self.dtype.itemsize * (math.prod(self.domain) // max(count, 1))
         largest = self.device.traits.allocation
+        check_array(self._convolve.largest_array, largest, what="the responses of all views")
         return plan_chunks(
             count, 2 * array, self.scratch, budget, what=what, array=array, largest=largest
         )
+
+    def _runs_of_views(self, budget: int) -> Iterator[Chunk]:
+        """Views with the gains and responses of their own, in one filter after the other.
+
+        Raises:
+            ResourceLimitError: not even one view fits.
+        """
+        views, largest = self.domain[0], self.device.traits.allocation
+
+        def fits(count: int) -> bool:
+            run = self._of_views(slice(0, count))
+            array = self.dtype.itemsize * math.prod(run.domain)
+            enough = 2 * array + run.scratch <= budget
+            return enough and max(array, run._convolve.largest_array) <= largest
+
+        most = bisect_left(range(1, views + 1), True, key=lambda count: not fits(count))
+        self._of_views(slice(0, max(most, 1)))._parts(1, budget, what="view with its gain")
+        for run in cut_evenly(views, most):
+            yield Chunk((run,), (run,), self._of_views(run))
+
+    def _of_views(self, run: slice) -> ViewFilter:
+        """The filter of some views."""
+        part = ViewFilter.__new__(ViewFilter)
+        shape = (run.stop - run.start, *self.domain[1:])
+        LinearOperator.__init__(part, shape, shape, self.device, self.dtype)
+        part._factors = self._factors[run]
+        part._taps = self._taps if len(self._taps) == 1 else self._taps[run]
+        return part
 
 
 def _factors_and_taps(scan: Parallel, filter: Filter, gains: Gains | None) -> tuple[Floats, Floats]:

@@ -39,6 +39,11 @@ class RowConvolution:
         """Bytes of the device besides the rows."""
         return int(self._taps.nbytes)
 
+    @property
+    def largest_array(self) -> int:
+        """Bytes of the largest array on the device besides the rows."""
+        return self.scratch
+
     def __call__(self, x: DeviceArray, out: DeviceArray, gains: DeviceArray, per_view: int) -> None:
         """Fill ``out`` with the filtered rows.
 

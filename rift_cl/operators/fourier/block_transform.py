@@ -18,9 +18,9 @@ from rift_cl.cl.device import Device
 from rift_cl.operators.fourier.column_transform import turns
 
 # Columns of a block: a line of the cache. Items for each unit, so that none waits long for the
-# last.
+# last, and the part of the memory that their blocks may take together: no result depends on either.
 BLOCK = 16
-_ITEMS_PER_UNIT = 4
+_ITEMS_PER_UNIT, _SHARE = 4, 8
 
 
 class BlockTransform:
@@ -34,7 +34,9 @@ class BlockTransform:
 
     def __init__(self, device: Device, length: int, dtype: DTypeLike = np.float32) -> None:
         self.device, self.length, self._dtype = device, length, np.dtype(dtype)
-        self._items = _ITEMS_PER_UNIT * device.traits.compute_units
+        room = min(device.traits.allocation, device.budget // _SHARE)
+        fitting = room // (4 * length * BLOCK * self._dtype.itemsize)
+        self._items = max(1, min(_ITEMS_PER_UNIT * device.traits.compute_units, fitting))
 
     @cached_property
     def _turns(self) -> DeviceArray:

@@ -9,6 +9,7 @@ kernels/tomo/rows_weigh_gpu.cl): what stands beside it does not change a bit of 
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -47,9 +48,9 @@ class RowTransform:
     ) -> None:
         self.device, self.dtype = device, np.dtype(dtype)
         self._double = int(self.dtype == np.float64)
+        self._taps = taps
         self.bins = taps.shape[1]
         self.length = transform_length(self.bins)
-        self._weights = tuple(device.array(table, dtype) for table in _weights(taps, self.length))
         half_turns = turns(2 * self.length, self.length // 2 + 1)
         self._half_turns = device.array(half_turns, dtype)
         self._blocks: BlockTransform | None = None
@@ -61,10 +62,26 @@ class RowTransform:
         fitting = min(_SLAB_BYTES["gpu"] // 2, device.traits.allocation) // each
         self._columns = max(1, min(rows, fitting))
 
+    @cached_property
+    def _weights(self) -> tuple[DeviceArray, DeviceArray]:
+        sums, differences = _weights(self._taps, self.length)
+        return self.device.array(sums, self.dtype), self.device.array(differences, self.dtype)
+
+    @property
+    def _response(self) -> int:
+        """Bytes of one of the two tables of weights."""
+        return self.dtype.itemsize * (self.length // 2 + 1) * len(self._taps)
+
+    @property
+    def largest_array(self) -> int:
+        """Bytes of the largest array on the device besides the rows."""
+        slab = 0 if self._blocks is not None else 2 * self.length * self._columns
+        return max(self._response, self.dtype.itemsize * slab)
+
     @property
     def scratch(self) -> int:
         """Bytes of the device besides the rows: blocks or a slab, with copies, and responses."""
-        responses = sum(int(table.nbytes) for table in self._weights)
+        responses = 2 * self._response
         if self._blocks is not None:
             return responses + self._blocks.nbytes
         return responses + 4 * self.dtype.itemsize * self.length * self._columns
@@ -78,7 +95,7 @@ class RowTransform:
             gains: (views,) device array of factors.
             per_view: rows of a view.
         """
-        rows, filters = x.size // self.bins, self._weights[0].shape[1]
+        rows, filters = x.size // self.bins, len(self._taps)
         if self._blocks is not None:
             self._blocks.launch(
                 "rows_filter_cpu",
@@ -122,7 +139,7 @@ class RowTransform:
         )
 
     def _weigh(self, planes: DeviceArray, slab: _Slab, per_view: int) -> None:
-        filters = self._weights[0].shape[1]
+        filters = len(self._taps)
         self.device.launch(
             "rows_weigh_gpu",
             (slab.columns, self.length // 2 + 1),

@@ -11,6 +11,7 @@ view, where every pixel of every view costs ``Projector`` something.
 
 from __future__ import annotations
 
+import math
 from functools import cached_property, partial
 from typing import Any
 
@@ -366,6 +367,11 @@ class FastProjector(ParallelProjector):
     @property
     def scratch(self) -> int:
         """Bytes needed besides the arrays that go in and come out."""
+        return self._working + self._tables.nbytes + self._spectrum.nbytes
+
+    @property
+    def _working(self) -> int:
+        """Bytes of scratch memory besides what is kept."""
         found = self._rays
         fields = 2 * found.length * self._columns
         grid, transform = self._spectrum.entries, self._spectrum.scratch_entries
@@ -374,8 +380,20 @@ class FastProjector(ParallelProjector):
         transforming = more * max(self._ray_entries, grid) + max(
             2 * fields + self._ray_entries, transform
         )
-        most = max(spreading, transforming)
-        return 4 * most + self._tables.nbytes + self._spectrum.nbytes
+        return 4 * max(spreading, transforming)
+
+    @property
+    def fits(self) -> bool:
+        """Whether a slice fits the device now, told before any table is made."""
+        found, edges = self._rays, self.gridding.edges
+        image, views = math.prod(self.grid.shape[-2:]), len(self.scan.angles) * self.scan.bins
+        fields = 2 * max(found.length * self._columns, edges[1] * self._spectrum.pairs)
+        largest = max(image, views, fields, self._ray_entries, self._spectrum.entries)
+        blocks = (
+            BlockTransform(self.device, found.length).nbytes if self.device.traits.is_cpu else 0
+        )
+        need = self._working + 4 * (image + views) + self._spectrum.nbytes + blocks
+        return need <= self.device.budget and 4 * largest <= self.device.traits.allocation
 
     @property
     def _ray_entries(self) -> int:

@@ -39,6 +39,10 @@ class FootprintRecords:
     records: Floats
     by_edges: bool = False
 
+    def of_views(self, chosen: NDArray[np.bool_]) -> FootprintRecords:
+        """The numbers of some of the views."""
+        return replace(self, support=self.support[chosen], records=self.records[chosen])
+
 
 def check_footprint(name: str) -> str:
     """The name itself.

@@ -64,6 +64,11 @@ class ParallelProjector(LinearOperator):
             f"pitch {self.scan.pitch:g}",
         ]
 
+    @property
+    def _largest_scratch(self) -> int:
+        """Bytes of the largest array that a slice needs besides itself and its sinogram."""
+        return 0
+
     def _chunks(self, budget: int) -> Iterable[Chunk]:
         return self.chunks(budget)
 
@@ -83,9 +88,9 @@ class ParallelProjector(LinearOperator):
             self.scratch + fixed,
             budget,
             what="slice",
-            array=self.dtype.itemsize * max(image, sinogram),
+            array=max(self.dtype.itemsize * max(image, sinogram), self._largest_scratch),
             largest=self.device.traits.allocation,
         )
         if len(self.grid.shape) == 2:
-            return [((), ())]
-        return [((chunk,), (slice(None), chunk)) for chunk in chunks]
+            return [Chunk((), ())]
+        return [Chunk((chunk,), (slice(None), chunk)) for chunk in chunks]

@@ -3,11 +3,17 @@
 Forward: image -> padded planes (by rows, by columns) -> phase tables -> bins. Adjoint: the same
 steps transposed, in reverse, with the same numbers. ``kernels/include/phase_table.h`` derives the
 method; ``rift_cl/reference/radon.py`` has the matrix that it approximates.
+
+A slice on the host that is too large for the device is taken in parts, a band of rows of the image
+and a run of views each. Bands are independent of each other in a backprojection and views in a
+projection, so that those have the bits of the whole; what must be cut the other way as well is
+added up in float, to the rounding of the sums.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -15,8 +21,11 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from rift_cl.cl.array import DeviceArray
+from rift_cl.cl.budget import cut_evenly, plan_chunks
 from rift_cl.cl.device import Device
+from rift_cl.errors import ResourceLimitError
 from rift_cl.geometry import Grid, Parallel
+from rift_cl.operators.linear import Chunk
 from rift_cl.operators.projector.footprint import check_footprint
 from rift_cl.operators.projector.parallel_projector import ParallelProjector
 from rift_cl.operators.projector.phase_table import LOG2_PHASES, PhaseTable, phase_table
@@ -29,6 +38,8 @@ _FEWEST_VIEWS = 16
 _ROW_RUNS, _ITEMS_PER_UNIT = (64, 32, 16), 8
 # Slices that are worked on together, which bounds the scratch memory of any volume.
 _SLAB = 16
+# Bytes of a view's records, besides the order of its rows.
+_VIEW_BYTES = 160
 
 
 class PhaseProjector(ParallelProjector, Projector):
@@ -78,12 +89,17 @@ class PhaseProjector(ParallelProjector, Projector):
         self._resampling = {"STRIP": int(footprint == "strip"), **self._macros}
 
     @cached_property
-    def _walks(self) -> tuple[_Walk, _Walk]:
+    def _tables(self) -> tuple[PhaseTable, PhaseTable]:
         plane, scan = self.grid.slice(), self.scan
         by_rows, by_columns = (
             phase_table(plane, scan, self.footprint, along_x=along_x, segment=self._segment)
             for along_x in (True, False)
         )
+        return by_rows, by_columns
+
+    @cached_property
+    def _walks(self) -> tuple[_Walk, _Walk]:
+        by_rows, by_columns = self._tables
         return _Walk(self.device, by_rows, self.dtype), _Walk(self.device, by_columns, self.dtype)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -248,7 +264,7 @@ class PhaseProjector(ParallelProjector, Projector):
         """Slices that are worked on together, as many as bounded scratch and one buffer hold."""
         total = image.shape[0] if len(image.shape) == 3 else 1
         # One view's table is the other array of a slab that a buffer must hold.
-        largest = max(*self._planes, *(walk.table.entries for walk in self._walks))
+        largest = max(*self._planes, *(table.entries for table in self._tables))
         fitting = self.device.traits.allocation // (self.dtype.itemsize * largest)
         most = max(1, min(_SLAB, fitting))
         for first in range(0, total, most):
@@ -257,16 +273,102 @@ class PhaseProjector(ParallelProjector, Projector):
     @property
     def _planes(self) -> list[int]:
         """Numbers of a slice's padded planes, by rows and by columns."""
-        return [walk.table.rows * (walk.table.width + 2 * self._segment) for walk in self._walks]
+        return [table.rows * (table.width + 2 * self._segment) for table in self._tables]
 
     @property
     def scratch(self) -> int:
         """Bytes needed besides the arrays that go in and come out."""
         slices = min(_SLAB, self.grid.slices)
-        tables = max(walk.table.entries for walk in self._walks) * _FEWEST_VIEWS
-        records = sum(walk.nbytes for walk in self._walks)
+        tables = max(table.entries for table in self._tables) * _FEWEST_VIEWS
+        records = sum(table.nbytes for table in self._tables)
         numbers = slices * (sum(self._planes) + tables)
         return self.dtype.itemsize * numbers + self._table_bytes + records
+
+    @property
+    def _largest_scratch(self) -> int:
+        planes = self.dtype.itemsize * max(self._planes)
+        return max(planes, *(table.orders.nbytes for table in self._tables))
+
+    def _chunks(self, budget: int) -> Iterable[Chunk]:
+        try:
+            return self.chunks(budget)
+        except ResourceLimitError:
+            rows, views = self._cut(budget, image_first=False)
+            return self._parts([_Cut(band, run) for run in views for band in rows])
+
+    def _adjoint_chunks(self, budget: int) -> Iterable[Chunk]:
+        try:
+            return [chunk.transposed for chunk in self.chunks(budget)]
+        except ResourceLimitError:
+            rows, views = self._cut(budget, image_first=True)
+            parts = self._parts([_Cut(band, run) for band in rows for run in views])
+            return (chunk.transposed for chunk in parts)
+
+    def _parts(self, cuts: list[_Cut]) -> Iterator[Chunk]:
+        """Parts of every slice; their tables are there while they are worked on."""
+        stack = len(self.grid.shape) == 3
+        for k in range(self.grid.slices):
+            alone = (slice(k, k + 1),) if stack else ()
+            for rows, views in cuts:
+                yield Chunk((*alone, rows), (views, *alone), self._part(rows, views))
+
+    def _part(self, rows: slice, views: slice) -> PhaseProjector:
+        """The projector of a band of a slice and a run of views, with the numbers of the whole."""
+        plane, scan, one = self.grid.slice(), self.scan, self.grid.shape[:-2] and (1,)
+        (ny, nx), spacing = plane.shape, plane.spacing
+        middle = plane.center[0] + ((rows.start + rows.stop) - ny) / 2 * spacing[0]
+        between = self.grid.spacing[:-2], self.grid.center[:-2]
+        grid = Grid(
+            (*one, rows.stop - rows.start, nx),
+            (*between[0], *spacing),
+            (*between[1], middle, plane.center[1]),
+        )
+        seen = Parallel(scan.angles[views], scan.bins, scan.pitch, scan.center)
+        part = PhaseProjector(grid, seen, self.footprint, self.device, self.dtype)
+        part._table_bytes = 0
+        by_rows, by_columns = self._tables
+        part._tables = (
+            by_rows.part(views, rows, slice(0, nx), self._segment),
+            by_columns.part(views, slice(0, nx), rows, self._segment),
+        )
+        return part
+
+    def _cut(self, budget: int, *, image_first: bool) -> tuple[list[slice], list[slice]]:
+        """Bands of rows and runs of views of which any two fit, one or the other cut first.
+
+        Raises:
+            ResourceLimitError: not even the least of them do.
+        """
+        rows, segment = self.grid.shape[-2], self._segment
+        bands, views = -(-rows // segment), len(self.scan.angles)
+        largest = self.device.traits.allocation
+
+        def fits(bands: int, views: int) -> bool:
+            need, array = self._part_need(min(bands * segment, rows), views)
+            return need <= budget and array <= largest
+
+        if image_first:
+            bands, views = _largest_pair(fits, bands, views)
+        else:
+            views, bands = _largest_pair(lambda views, bands: fits(bands, views), views, bands)
+        need, array = self._part_need(min(bands * segment, rows), views)
+        what = f"part of a slice ({min(bands * segment, rows)} rows in {views} views)"
+        plan_chunks(1, need, 0, budget, what=what, array=array, largest=largest)
+        starts = cut_evenly(-(-rows // segment), bands)
+        cut = [slice(segment * at.start, min(segment * at.stop, rows)) for at in starts]
+        return cut, cut_evenly(len(self.scan.angles), views)
+
+    def _part_need(self, rows: int, views: int) -> tuple[int, int]:
+        """Bytes that a part of a slice takes, and those of its largest array."""
+        width, segment, each = self.grid.shape[-1], self._segment, self.dtype.itemsize
+        padded = -(-rows // segment) * segment
+        planes = rows * (width + 2 * segment), width * (padded + 2 * segment)
+        table = each * max(table.entries for table in self._tables)
+        tables = table * min(views, _FEWEST_VIEWS)
+        orders = 4 * max(rows, width) * views
+        arrays = [each * n for n in (rows * width, views * self.scan.bins, *planes)]
+        need = sum(arrays) + tables + orders + views * _VIEW_BYTES
+        return need, max(*arrays, orders, table)
 
 
 class _Walk:
@@ -282,8 +384,22 @@ class _Walk:
         self.footprints = device.array(table.footprints.records, dtype)
         self.orders = device.array(table.orders)
         self.starts = device.array(table.starts)
-        arrays = (self.views, self.geometry, self.footprints, self.orders, self.starts)
-        self.nbytes: int = sum(array.nbytes for array in arrays)
+
+
+def _largest_pair(fits: Callable[[int, int], bool], first: int, second: int) -> tuple[int, int]:
+    """The largest numbers that fit, the second halved only where no first one does."""
+    while True:
+        most = bisect_left(range(1, first + 1), True, key=lambda n: not fits(n, second))
+        if most or second == 1:
+            return max(most, 1), second
+        second = -(-second // 2)
+
+
+class _Cut(NamedTuple):
+    """A part of a slice: rows of the image, and views."""
+
+    rows: slice
+    views: slice
 
 
 class _Slab(NamedTuple):

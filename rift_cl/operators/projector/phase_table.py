@@ -8,7 +8,7 @@ further over the detector than a step in y, along y otherwise; either way the im
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,38 @@ class PhaseTable:
     def entries(self) -> int:
         """Numbers in one view's table of one slice."""
         return PHASES * self.columns
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the records of all views, footprints in double precision."""
+        arrays = (self.views, self.geometry, self.footprints.records, self.orders, self.starts)
+        return sum(int(array.nbytes) for array in arrays)
+
+    def part(self, views: slice, rows: slice, columns: slice, segment: int) -> PhaseTable:
+        """The same numbers for some views of the scan and a part of the image.
+
+        Args:
+            views: which views of the scan; they are counted from the first of these.
+            rows: which rows, as seen along this axis.
+            columns: which columns, from the beginning of a segment on.
+            segment: columns that one work-item handles.
+        """
+        chosen = (self.views[:, 0] >= views.start) & (self.views[:, 0] < views.stop)
+        base, slope, origin, step = self.geometry[chosen].T
+        base = base + slope * rows.start + (columns.start << 32)
+        count, width = rows.stop - rows.start, columns.stop - columns.start
+        orders, starts = _rows_by_phase(base, slope, count)
+        return replace(
+            self,
+            views=self.views[chosen] - np.array([views.start, 0], np.int32),
+            geometry=np.stack([base, slope, origin, step], axis=1),
+            footprints=self.footprints.of_views(chosen),
+            orders=orders,
+            starts=starts,
+            rows=count,
+            width=width,
+            padded=-(-width // segment) * segment,
+        )
 
 
 def phase_table(

@@ -3,14 +3,17 @@
 ``Projector`` costs something for every pixel of every view, ``FastProjector`` for every sample of a
 view and for the transforms: the one wins where slices are small or views are few, the other from
 some 150 samples along an edge up. Costs are counted, never timed, so that the choice, and with it
-the result, does not depend on what else a machine does.
+the result, does not depend on what else a machine does. Only a slice for which FastProjector has
+too little memory is left to PhaseProjector, which takes slices in parts.
 """
 
 from __future__ import annotations
 
 import math
+import warnings
 from typing import NamedTuple
 
+from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError
@@ -93,8 +96,17 @@ def cheapest_projector(
     lobes = 1 if iterative else IMAGE
     fast = FastProjector(grid, scan, _ERROR if error is None else error, lobes=lobes, device=device)
     costs = _COSTS["cpu" if device.traits.is_cpu else "gpu"]
-    if _fast_cost(fast, costs) < _direct_cost(grid, scan, costs):
+    if _fast_cost(fast, costs) >= _direct_cost(grid, scan, costs):
+        return PhaseProjector(grid, scan, device=device)
+    if fast.fits:
         return fast
+    warnings.warn(
+        f"FastProjector's transforms of a slice of {grid.shape[-2]} x {grid.shape[-1]} samples do "
+        f"not fit the memory of {device.name} (at most {format_bytes(device.budget)}, and "
+        f"{format_bytes(device.traits.allocation)} for one array): Projector is used, which takes "
+        "a slice in parts and is slower",
+        stacklevel=2,
+    )
     return PhaseProjector(grid, scan, device=device)
 
 

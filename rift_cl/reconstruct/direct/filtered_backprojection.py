@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, ResourceLimitError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.filters.compensation import Compensation
 from rift_cl.operators.filters.ramp_filters import FilterLike, Gains, ViewFilter, as_filter
@@ -93,6 +93,15 @@ class FilteredBackprojection(LinearOperator):
         self._A._apply(y, projected)
         self._filter._apply_adjoint(projected, out)
 
+    def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
+        try:
+            super()._apply_host(x, y)
+        except ResourceLimitError:
+            # One after the other, each of which takes a slice in parts where it must.
+            filtered = np.empty_like(x)
+            self._filter._apply_host(x, filtered)
+            self._A.T._apply_host(filtered, y)
+
     @property
     def scratch(self) -> int:
         """The filtered sinogram, besides what filter and projector need."""
@@ -102,7 +111,7 @@ class FilteredBackprojection(LinearOperator):
     def _chunks(self, budget: int) -> Iterable[Chunk]:
         # The sinogram and the filtered one.
         chunks = self._A.chunks(budget, sinograms=2, fixed=self._filter.scratch)
-        return [(inside, outside) for outside, inside in chunks]
+        return [chunk.transposed for chunk in chunks]
 
 
 def fbp(

@@ -1,0 +1,28 @@
+"""A device with limits that are not its own, and the comparison of what comes out."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+import rift_cl as rift
+
+Arrays = list[np.ndarray[Any, Any]]
+
+
+def limited(device: rift.Device, memory: int | None = None, **traits: Any) -> rift.Device:
+    """The same device with other traits, and with so many bytes of memory."""
+    changed = dataclasses.replace(device.traits, **traits)
+    return rift.Device(device._handle, device.selector, traits=changed, memory=memory)
+
+
+def normal(*shape: int) -> np.ndarray[Any, Any]:
+    return np.random.default_rng(len(shape)).standard_normal(shape).astype(np.float32)
+
+
+def assert_same(found: Arrays, wanted: Arrays) -> None:
+    assert len(found) == len(wanted)
+    for one, other in zip(found, wanted, strict=True):
+        assert one.dtype == other.dtype and one.tobytes() == other.tobytes()
