@@ -28,17 +28,9 @@ hypothesis.settings.load_profile("repeatable")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Keep compiled kernels in the tests' own folder, which stays warm from run to run.
-
-    Workers of pytest-xdist have one each: they would wait for each other's builds in a common one,
-    and few kernels are asked for by the files of more than one of them.
-    """
-    folder = os.environ.get("RIFT_CACHE_DIR")
-    if folder is None and hasattr(config, "cache"):
-        folder = str(config.cache.mkdir("rift_cl_kernels"))
-    if folder is not None:
-        worker = os.environ.get("PYTEST_XDIST_WORKER", "")
-        os.environ["RIFT_CACHE_DIR"] = str(Path(folder, worker))
+    """Keep compiled kernels in the tests' own folder, which stays warm from run to run."""
+    if "RIFT_CACHE_DIR" not in os.environ and hasattr(config, "cache"):
+        os.environ["RIFT_CACHE_DIR"] = str(config.cache.mkdir("rift_cl_kernels"))
 
 
 @cache

@@ -25,9 +25,10 @@ raise SystemExit(None if found.passed else found.detail)
 """
 _WITHOUT_LOCK = """
 import contextlib
-from rift_cl.cl import build, program
-program.build_lock = build.build_lock = contextlib.nullcontext
-build._PAUSES = (0.0,)
+from rift_cl.cl import program
+from rift_cl.cl.build import builder
+program.build_lock = builder.build_lock = contextlib.nullcontext
+builder._PAUSES = (0.0,)
 """
 
 

@@ -145,7 +145,7 @@ class Programs:
             cl.enqueue_nd_range_kernel(queue, kernel, size, local, offset)
             return
         # PoCL compiles again for the first launch, into the same cache.
-        with building, build_lock():
+        with building, build_lock(key[0]):
             cl.enqueue_nd_range_kernel(queue, kernel, size, local, offset)
             queue.finish()
             self._started.add(started)

@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from rift_cl import __version__
+from rift_cl.cl.build.cache_check import remove_damaged
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -27,16 +30,17 @@ def test_concurrent_first_builds_all_succeed():
 
 
 LOCKED = """
-import sys, time
+import sys
 from rift_cl.cl.build.kernel_cache import build_lock
-with build_lock():
+with build_lock(*sys.argv[1:]):
     print("locked", flush=True)
     sys.stdin.readline()
 """
 WAITING = """
+import sys
 from rift_cl.cl.build.kernel_cache import build_lock
 print("wants", flush=True)
-with build_lock():
+with build_lock(*sys.argv[1:]):
     print("has", flush=True)
 """
 
@@ -45,9 +49,9 @@ with build_lock():
 def start(tmp_path):
     running = []
 
-    def run(code):
+    def run(code, *kernel):
         process = subprocess.Popen(
-            [sys.executable, "-c", code],
+            [sys.executable, "-c", code, *kernel],
             env={**os.environ, "PYTHONPATH": str(ROOT), "RIFT_CACHE_DIR": str(tmp_path)},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -64,10 +68,13 @@ def start(tmp_path):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no PoCL to guard on Windows")
 @pytest.mark.parametrize("end", ["released", "killed"])
-def test_lock_keeps_others_out_until_its_holder_ends(start, end):
-    holder = start(LOCKED)
+@pytest.mark.parametrize(
+    ("held", "wanted"), [((), ("a",)), (("a",), ()), (("a",), ("a",))], ids=("all", "one", "same")
+)
+def test_lock_keeps_others_out_until_its_holder_ends(start, held, wanted, end):
+    holder = start(LOCKED, *held)
     assert holder.stdout.readline() == "locked\n"
-    waiting = start(WAITING)
+    waiting = start(WAITING, *wanted)
     assert waiting.stdout.readline() == "wants\n"
     with pytest.raises(subprocess.TimeoutExpired):
         waiting.wait(timeout=0.3)
@@ -78,3 +85,18 @@ def test_lock_keeps_others_out_until_its_holder_ends(start, end):
         holder.stdin.flush()
     assert waiting.communicate(timeout=30)[0] == "has\n"
     assert waiting.returncode == 0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no PoCL to guard on Windows")
+def test_other_kernels_are_built_meanwhile_and_recorded_by_the_last(start, tmp_path):
+    holder = start(LOCKED, "a")
+    assert holder.stdout.readline() == "locked\n"
+    program = tmp_path / "rift_cl" / __version__ / "AB" / "CD" / "program.bc"
+    program.parent.mkdir(parents=True)
+    program.write_bytes(b"a half")
+    assert start(WAITING, "b").communicate(timeout=30)[0] == "wants\nhas\n"
+    program.write_bytes(b"a whole")
+    holder.communicate("\n", timeout=30)
+    assert remove_damaged(program.parents[2]) == 0
+    program.write_bytes(b"another")
+    assert remove_damaged(program.parents[2]) == 1

@@ -125,7 +125,7 @@ class Builder:
         for pause in _PAUSES:
             time.sleep(pause)
             try:
-                with build_lock(), begun(entry) as first:
+                with build_lock(name), begun(entry) as first:
                     if not first:
                         return None
                     return cl.Program(self._device.context, source).build(options)

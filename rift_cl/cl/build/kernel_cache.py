@@ -4,7 +4,7 @@ PoCL loads its cached kernels as shared libraries, so whoever can write there ru
 user: the folder is ours alone (mode 0700, owner checked). When that folder cannot be used PoCL's
 device vanishes without an error, so a private temporary folder takes its place with a warning.
 PoCL also loses a build when several processes make the same one at once; a file lock round the
-build and the first launch prevents that.
+build and the first launch prevents that, one for each kernel: other kernels are built meanwhile.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import warnings
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import IO
 
 from rift_cl import __version__
 from rift_cl.cl.build.cache_check import record, remove_damaged
@@ -27,7 +28,8 @@ try:
 except ImportError:  # Windows: no PoCL wheel there, so no cache to guard
     fcntl = None  # type: ignore[assignment]
 
-_LOCK = "build.lock"
+_LOCK, _TURN = "build.lock", "turn.lock"
+_LOCK_SUFFIX = ".lock"
 
 
 def prepare_cache() -> None:
@@ -95,30 +97,53 @@ def _temporary() -> Path:
 
 
 @contextlib.contextmanager
-def build_lock() -> Iterator[None]:
-    """Hold the cache against every other process of this user.
+def build_lock(kernel: str = "") -> Iterator[None]:
+    """Hold one kernel in the cache, or the whole cache, against every other process of this user.
+
+    Args:
+        kernel: the name of a kernel, all of whose variants are held; empty for the whole cache.
 
     Raises:
         DeviceError: the cache folder cannot be used any more.
     """
     folder = cache_folder()
-    try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        handle = (folder / _LOCK).open("w")
-    except OSError as error:
-        raise DeviceError(
-            f"kernel cache {folder} cannot be used any more ({error.strerror}): make it writable, "
-            "or set RIFT_CACHE_DIR to a folder that you own"
-        ) from error
-    with handle:
-        if fcntl is not None:
-            # Some network file systems have no locks; a lost race is then repeated (program.py).
-            with contextlib.suppress(OSError):
-                fcntl.flock(handle, fcntl.LOCK_EX)
+    with contextlib.ExitStack() as held:
+        try:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            whole = held.enter_context((folder / _LOCK).open("w"))
+            # Whoever wants the whole cache keeps this one while he waits, lest others keep him out.
+            with (folder / _TURN).open("w") as turn:
+                _lock(turn)
+                _lock(whole, shared=bool(kernel))
+            if kernel:
+                _lock(held.enter_context((folder / f"{kernel}{_LOCK_SUFFIX}").open("w")))
+        except OSError as error:
+            raise DeviceError(
+                f"kernel cache {folder} cannot be used any more ({error.strerror}): make it "
+                "writable, or set RIFT_CACHE_DIR to a folder that you own"
+            ) from error
         yield
-        # What cannot be recorded is trusted, as any driver trusts its cache.
+        # What cannot be recorded is trusted, as any driver trusts its cache. What others build
+        # meanwhile is not whole yet: the last of them records it all.
         with contextlib.suppress(OSError):
-            record(folder)
+            if not kernel or _lock(whole, wait=False):
+                record(folder)
+
+
+def _lock(handle: IO[str], *, shared: bool = False, wait: bool = True) -> bool:
+    """Lock a file; whether that could be done without waiting, where that was asked for.
+
+    Some network file systems have no locks; a lost race is then repeated (``builder``).
+    """
+    if fcntl is not None:
+        kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+        try:
+            fcntl.flock(handle, kind if wait else kind | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        except OSError:
+            pass
+    return True
 
 
 def cache_size() -> int:
@@ -134,6 +159,6 @@ def clear_cache() -> int:
         for entry in cache_folder().iterdir():
             if entry.is_dir():
                 shutil.rmtree(entry, ignore_errors=True)
-            elif entry.name != _LOCK:
+            elif entry.suffix != _LOCK_SUFFIX:
                 entry.unlink(missing_ok=True)
         return before - cache_size()
