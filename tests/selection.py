@@ -11,8 +11,9 @@ they share kernels). Marks change that:
   alternates. It puts kernels together that have tests of their own on every kind.
 
 ``pytest -m rest`` is ``-m full`` without what the last plain ``pytest`` passed, for .ci/run, which
-runs one after the other. Only tests that ask for a device are left out so: all others are repeated,
-for they may do something else once optional packages are there, which kernels do not know of.
+runs one after the other and installs optional packages in between. Tests that may do something else
+once those are there are repeated: all of a file in which one looked for a package that was not
+there, or started a process, of which nothing is seen.
 
 Whoever names a file, a folder or a word of a test's name (``-k``) gets everything that is there,
 unless ``-m plain`` asks for the short selection. All three selections run on all cores.
@@ -21,6 +22,7 @@ unless ``-m plain`` asks for the short selection. All three selections run on al
 from __future__ import annotations
 
 import os
+import sys
 import zlib
 from collections.abc import Iterable
 
@@ -38,6 +40,10 @@ _MOST_WORKERS = 8
 # Where pytest's cache keeps what plain ``pytest`` passed.
 _PASSED_KEY = "selection/passed"
 _passed: set[str] = set()
+# Files of tests whose results may depend on optional packages.
+_open: set[str] = set()
+_OPEN_KEY = "may depend on optional packages"
+_PROCESSES = ("subprocess.Popen", "os.posix_spawn", "os.fork", "os.forkpty", "os.system")
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -99,9 +105,47 @@ def pytest_configure_node(node) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Declare the marks."""
+    """Declare the marks; a plain run notes what may depend on optional packages."""
     for mark in MARKS:
         config.addinivalue_line("markers", mark)
+    if config.selection == "plain":
+        notes = _Notes()
+        config.pluginmanager.register(notes, "optional-packages")
+        sys.meta_path.append(notes)
+        sys.addaudithook(notes.hear)
+
+
+class _Notes:
+    """Which files have tests that may go otherwise where more packages are installed.
+
+    What one test of a file made, others of it use, so that files are noted and not tests.
+    """
+
+    def __init__(self) -> None:
+        self.files: set[str] = set()
+        self.file = ""
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
+        """Note that a package was looked for in vain: the last finder is asked only then."""
+        if path is None:
+            self.files.add(self.file)
+
+    def hear(self, event: str, arguments: tuple[object, ...]) -> None:
+        """Note that a process was started."""
+        if event in _PROCESSES:
+            self.files.add(self.file)
+
+    def pytest_collectstart(self, collector: pytest.Collector) -> None:
+        self.file = _file(collector.nodeid)
+
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        self.file = _file(nodeid)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport(self, item: pytest.Item):
+        report = yield
+        report.user_properties.append((_OPEN_KEY, _file(item.nodeid) in self.files))
+        return report
 
 
 @pytest.hookimpl(trylast=True)
@@ -113,7 +157,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         chosen = set(dealt(items))
     elif config.selection == "rest":
         passed = set(config.cache.get(_PASSED_KEY, ()) if hasattr(config, "cache") else ())
-        chosen = {i for i in dealt(items) if i.nodeid not in passed or _is_cpu(i) is None}
+        chosen = {item for item in dealt(items) if item.nodeid not in passed}
     else:
         return
     config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
@@ -126,6 +170,8 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
         _passed.discard(report.nodeid)
     elif report.passed and report.when == "call":
         _passed.add(report.nodeid)
+    if dict(report.user_properties).get(_OPEN_KEY):
+        _open.add(_file(report.nodeid))
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
@@ -133,7 +179,12 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     config = session.config
     parent = not hasattr(config, "workerinput")
     if config.selection == "plain" and parent and hasattr(config, "cache"):
-        config.cache.set(_PASSED_KEY, sorted(_passed))
+        kept = (nodeid for nodeid in _passed if _file(nodeid) not in _open)
+        config.cache.set(_PASSED_KEY, sorted(kept))
+
+
+def _file(nodeid: str) -> str:
+    return nodeid.split("::", maxsplit=1)[0]
 
 
 def plain(items: Iterable[pytest.Item]) -> Iterable[pytest.Item]:

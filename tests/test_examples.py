@@ -19,7 +19,7 @@ RUNS = {
     "fit_xray": ("20", "<XrayScene: 1000 splats"),
     "own_angular_basis": ("", "mean of the image: "),
     "own_filter": ("32", "butterworth: "),
-    "own_loss": ("", "charbonnier: "),
+    "own_loss": ("30", "charbonnier: loss "),
     "own_reader": ("", "(4, 96, 96) voxels"),
     "own_solver": ("32", "SciPy's LSQR: "),
     "own_strategy": ("30", "step 30: loss "),
