@@ -19,6 +19,21 @@ class InputError(RiftError, ValueError):
     exit_status = 3
 
 
+class SettingError(InputError):
+    """A field of a dataclass of settings has a value that it does not take.
+
+    Args:
+        settings: the dataclass, an instance or its name.
+        name: of the field.
+        said: what is said of it, such as "is 'l3', wanted l1 or l2".
+    """
+
+    def __init__(self, settings: object, name: str, said: str) -> None:
+        owner = settings if isinstance(settings, str) else type(settings).__name__
+        super().__init__(f"{owner}: {name} {said}")
+        self.settings, self.name, self.said = owner, name, said
+
+
 class ShapeError(InputError):
     """An array has the wrong shape."""
 

@@ -10,6 +10,7 @@ import dataclasses
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -75,7 +76,8 @@ def _run(arguments: Sequence[str]) -> int:
         # Without an earlier run only one form of a switch is of use: that which its default is not.
         config = (tyro.conf.FlagCreatePairsOff,) if earlier is None else ()
         entry = _command(name, earlier, rest)
-        return parsed(lambda: tyro.cli(entry, prog=f"rift {name}", args=rest, config=config))()
+        parse = partial(tyro.cli, entry, prog=f"rift {name}", args=rest, config=config)
+        return parsed(parse, COMMANDS[name].settings_class())()
     if first == "fit":
         print(_FIT_HELP)
         return 0 if rest else _USAGE

@@ -26,7 +26,7 @@ import tyro
 from rift_cl.commands.console_table import print_table
 from rift_cl.commands.options import join_help_lines, option_groups
 from rift_cl.commands.progress_bar import print_line, show_progress
-from rift_cl.errors import RiftError
+from rift_cl.errors import InputError, RiftError, SettingError
 from rift_cl.progress import Report
 
 _INPUT, _OUTPUT, _INTERRUPTED = 3, 5, 130
@@ -70,8 +70,8 @@ def told(run: Callable[[], int]) -> int:
         return _say(f"rift: {error}", error.exit_status)
 
 
-def parsed(parse: Callable[[], Callable[[], int]]) -> Callable[[], int]:
-    """What a command line means; what settings refuse is raised as they say it.
+def parsed(parse: Callable[[], Callable[[], int]], settings: type) -> Callable[[], int]:
+    """What a command line means; what its settings refuse is raised by the name of the option.
 
     Raises:
         RiftError: a value is out of its range.
@@ -85,6 +85,8 @@ def parsed(parse: Callable[[], Callable[[], int]]) -> Callable[[], int]:
         error: BaseException | None = end
         while error is not None and not isinstance(error, RiftError):
             error = error.__context__
+        if isinstance(error, SettingError):
+            raise InputError(_sentence(error, settings)) from None
         if error is not None:
             raise error from None
         print(said.getvalue(), end="", file=sys.stderr)
@@ -189,10 +191,21 @@ def _guarded(run: Callable[[Any, Output], None], settings: Any, output: Output) 
     except RiftError as error:
         if output.debug:
             traceback.print_exc()
-        return _say(f"rift: {error}", error.exit_status)
+        return _say(f"rift: {_sentence(error, type(settings))}", error.exit_status)
     except MemoryError as error:
         return _say(f"rift: there is too little memory for this ({error}): ask for less", _INPUT)
     return 0
+
+
+def _sentence(error: RiftError, settings: type) -> str:
+    """What an error says, with the option in place of a field of the settings."""
+    if not isinstance(error, SettingError):
+        return str(error)
+    # Imported when used: a command that refuses nothing needs no tree of settings.
+    from rift_cl.commands.run_folder.saved_settings import option_of
+
+    option = option_of(error, settings)
+    return str(error) if option is None else f"--{option.replace('_', '-')} {error.said}"
 
 
 def _say(sentence: str, status: int) -> int:

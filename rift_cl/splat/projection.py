@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.host_arrays import as_device_array
-from rift_cl.errors import InputError, ShapeError
+from rift_cl.errors import InputError, SettingError, ShapeError
 from rift_cl.geometry import Aperture, Camera
 from rift_cl.splat.orders import Modal, ModeOrders
 from rift_cl.splat.raster import MOMENTS, ScreenModes
@@ -307,9 +307,11 @@ def check_modal(splats: Splats, settings: SplatSettings) -> None:
         InputError: magnitudes of gradients are asked for.
     """
     if settings.absgrad and is_modal(splats, settings):
-        raise InputError(
-            "SplatSettings: absgrad is not there for splats with Hermite modes or an activation "
-            "other than clamp: leave it off"
+        raise SettingError(
+            settings,
+            "absgrad",
+            "is not there for splats with Hermite modes or an activation other than clamp: leave "
+            "it off",
         )
 
 
@@ -345,8 +347,8 @@ def _check(device: Device, splats: Splats, camera: Camera, settings: SplatSettin
             "integrals are sharp at every depth"
         )
     if camera.model == "pinhole" and settings.near <= 0:
-        raise InputError(
-            f"SplatSettings: near is {settings.near}, a pinhole camera wants a positive distance"
+        raise SettingError(
+            settings, "near", f"is {settings.near}, a pinhole camera wants a positive distance"
         )
 
 

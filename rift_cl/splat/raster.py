@@ -16,7 +16,7 @@ import numpy as np
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.host_arrays import as_device_array
-from rift_cl.errors import InputError, ShapeError
+from rift_cl.errors import InputError, SettingError, ShapeError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.splat.orders import ModeOrders, check_order
 from rift_cl.splat.settings import Activation, SplatSettings
@@ -83,9 +83,8 @@ class ScreenModes:
             InputError: magnitudes of gradients are asked for.
         """
         if settings.absgrad:
-            raise InputError(
-                "SplatSettings: absgrad is for Gaussians alone, these splats have modes: leave it "
-                "off"
+            raise SettingError(
+                settings, "absgrad", "is for Gaussians alone, these splats have modes: leave it off"
             )
         return self._orders.record_length(features)
 

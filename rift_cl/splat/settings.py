@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from rift_cl.basis.angular import ANGULAR_BASES
-from rift_cl.errors import InputError
+from rift_cl.errors import SettingError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.option_marks import NoOption, Short
 
@@ -59,24 +59,23 @@ class SplatSettings:
     def __post_init__(self) -> None:
         """Check every number's range."""
         if not one_number(self.near) < one_number(self.far):
-            raise InputError(
-                f"SplatSettings: near is {self.near!r} and far is {self.far!r}, wanted near < far, "
-                "both finite"
+            raise SettingError(
+                self,
+                "near",
+                f"is {self.near!r} and far is {self.far!r}, wanted near < far, both finite",
             )
         for name in ("radius_clip", "eps2d"):
             value = getattr(self, name)
             if not one_number(value) >= 0:
-                raise InputError(f"SplatSettings: {name} is {value!r}, wanted a number >= 0")
+                raise SettingError(self, name, f"is {value!r}, wanted a number >= 0")
         for name in ("near", "far", "radius_clip", "eps2d"):
             if abs(one_number(getattr(self, name))) > _LARGEST:
-                raise InputError(
-                    f"SplatSettings: {name} is {getattr(self, name)!r}, too large for float32"
-                )
+                raise SettingError(self, name, f"is {getattr(self, name)!r}, too large for float32")
         edge = one_number(self.tile)
         if not (edge >= 1 and edge.is_integer()):
-            raise InputError(f"SplatSettings: tile is {self.tile!r}, wanted a whole number >= 1")
+            raise SettingError(self, "tile", f"is {self.tile!r}, wanted a whole number >= 1")
         if not 0 < one_number(self.alpha_cap) < 1:
-            raise InputError(f"SplatSettings: alpha_cap is {self.alpha_cap!r}, wanted 0 < cap < 1")
+            raise SettingError(self, "alpha_cap", f"is {self.alpha_cap!r}, wanted 0 < cap < 1")
         for name, choices in (
             ("mode", get_args(SplatMode)),
             ("activation", get_args(Activation)),
@@ -84,16 +83,17 @@ class SplatSettings:
         ):
             if getattr(self, name) not in choices:
                 wanted = " or ".join(choices)
-                raise InputError(
-                    f"SplatSettings: {name} is {getattr(self, name)!r}, wanted {wanted}"
-                )
+                raise SettingError(self, name, f"is {getattr(self, name)!r}, wanted {wanted}")
         if self.antialiased and self.mode == "xray":
-            raise InputError(
-                "SplatSettings: antialiased has no meaning in xray mode, where dilation keeps a "
-                "splat's mass: leave it off"
+            raise SettingError(
+                self,
+                "antialiased",
+                "has no meaning in xray mode, where dilation keeps a splat's mass: leave it off",
             )
         if self.activation != "clamp" and self.mode == "xray":
-            raise InputError(
-                f"SplatSettings: activation {self.activation} has no meaning in xray mode, which "
-                "adds densities as they are: leave it at clamp"
+            raise SettingError(
+                self,
+                "activation",
+                f"{self.activation} has no meaning in xray mode, which adds densities as they are: "
+                "leave it at clamp",
             )

@@ -14,7 +14,7 @@ from typing import Annotated, Literal, get_args
 from tyro.conf import arg
 
 from rift_cl.basis.angular import ANGULAR_BASES, angular_basis
-from rift_cl.errors import InputError
+from rift_cl.errors import SettingError
 from rift_cl.option_marks import Short, ShortAuto
 from rift_cl.splat.orders import HIGHEST
 from rift_cl.splat.settings import Activation
@@ -63,9 +63,11 @@ class BasisSettings:
             if getattr(self, name) is not None:
                 check_whole(self, name, 0, HIGHEST)
             if self.kind == "gaussian" and getattr(self, name):
-                raise InputError(
-                    f"BasisSettings: {name} is {getattr(self, name)} and kind is 'gaussian', whose "
-                    "splats have no orders: use 'hermite' or 'laguerre'"
+                raise SettingError(
+                    self,
+                    name,
+                    f"is {getattr(self, name)} and kind is 'gaussian', whose splats have no "
+                    "orders: use 'hermite' or 'laguerre'",
                 )
         for name in ("first", "every"):
             check_number(self, name, most=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from rift_cl.errors import InputError
+from rift_cl.errors import SettingError
 from rift_cl.geometry.numbers import one_number
 
 # Devices count in float32.
@@ -18,7 +18,7 @@ def check_whole(settings: Any, name: str, least: int, most: int | None = None) -
     """Check that a field is a whole number from ``least`` to ``most``, if there is one.
 
     Raises:
-        InputError: it is not.
+        SettingError: it is not.
     """
     given = getattr(settings, name)
     value = one_number(given)
@@ -28,32 +28,31 @@ def check_whole(settings: Any, name: str, least: int, most: int | None = None) -
         if value > most or (isinstance(given, int) and given > most):
             wanted = f"a whole number up to {most}"
     if not (least <= value <= most and value.is_integer()):
-        raise InputError(f"{type(settings).__name__}: {name} is {given!r}, wanted {wanted}")
+        raise SettingError(settings, name, f"is {given!r}, wanted {wanted}")
 
 
 def check_number(settings: Any, name: str, *, most: float = _LARGEST, above: bool = False) -> None:
     """Check that a field is a number from 0 to ``most``; ``above`` leaves 0 itself out.
 
     Raises:
-        InputError: it is not.
+        SettingError: it is not.
     """
     given = getattr(settings, name)
     value = one_number(given)
     if not 0 <= value <= most or (above and value == 0):
-        kind = type(settings).__name__
         wanted = "a number > 0" if above else "a number >= 0"
         if most < _LARGEST:
             wanted = f"a number above 0, at most {most}" if above else f"0 to {most}"
-        raise InputError(f"{kind}: {name} is {given!r}, wanted {wanted}")
+        raise SettingError(settings, name, f"is {given!r}, wanted {wanted}")
 
 
 def check_choice(settings: Any, name: str, choices: Sequence[str]) -> None:
     """Check that a field is one of some words.
 
     Raises:
-        InputError: it is not.
+        SettingError: it is not.
     """
     given = getattr(settings, name)
     if given not in choices:
-        kind, wanted = type(settings).__name__, " or ".join(choices)
-        raise InputError(f"{kind}: {name} is {given!r}, wanted {wanted}")
+        wanted = " or ".join(choices)
+        raise SettingError(settings, name, f"is {given!r}, wanted {wanted}")

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields, replace
 from typing import Literal, TypeVar, get_args
 
-from rift_cl.errors import InputError
+from rift_cl.errors import SettingError
 from rift_cl.option_marks import NoOption, Short, ShortAuto
 from rift_cl.splat.orders import count_of
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
@@ -142,17 +142,20 @@ class TrainSettings:
         check_choice(self, "loss", PIXEL_LOSSES.names)
         if self.band_limit is not None and self.band_limit not in get_args(BandLimit):
             wanted = "None, " + " or ".join(get_args(BandLimit))
-            raise InputError(f"TrainSettings: band_limit is {self.band_limit!r}, wanted {wanted}")
+            raise SettingError(self, "band_limit", f"is {self.band_limit!r}, wanted {wanted}")
         if not isinstance(self.strategy, StrategySettings):
-            raise InputError(
-                f"TrainSettings: strategy is {self.strategy!r}, wanted the settings of one, such "
-                "as McmcSettings()"
+            raise SettingError(
+                self,
+                "strategy",
+                f"is {self.strategy!r}, wanted the settings of one, such as McmcSettings()",
             )
         absgrad = isinstance(self.strategy, DefaultSettings) and self.strategy.absgrad
         if absgrad and not self.basis.plain:
-            raise InputError(
-                "TrainSettings: strategy.absgrad wants magnitudes of screen gradients, which "
-                "splats with modes or an activation do not have: leave it off"
+            raise SettingError(
+                self.strategy,
+                "absgrad",
+                "wants magnitudes of screen gradients, which splats with modes or an activation do "
+                "not have: leave it off",
             )
 
     @property

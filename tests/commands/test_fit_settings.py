@@ -167,3 +167,31 @@ def test_an_option_that_is_not_there_is_told_with_the_nearest():
         FitPhotosSettings.of(Path("x"), Path("y"), spalts=3)
     with pytest.raises(InputError, match="refine_poses"):
         FitXraySettings.of(Path("x"), Path("y"), refine_poses=True)
+
+
+@pytest.mark.parametrize(
+    ("job", "words", "option", "field"),
+    [
+        ("fit photos", "--loss l3", "--loss", "loss"),
+        ("fit photos", "--rendering.tile 0", "--rendering.tile", "rendering.tile"),
+        ("fit photos", "--learning-rates.means -1", "--learning-rates.means", "learning_rates"),
+        ("fit photos", "--homogenise 9", "--homogenise", "homogenise"),
+        ("fit photos", "--order 2", "--order", "order"),
+        (
+            "fit photos",
+            "--strategy default --strategy.split-scale -1",
+            "--strategy.split-scale",
+            "strategy.split_scale",
+        ),
+        ("fit xray", "--splats 0", "--splats", "splats"),
+    ],
+)
+def test_a_refused_setting_is_named_as_its_option_and_in_python_as_its_field(
+    job, words, option, field, capsys, tmp_path
+):
+    assert main([*job.split(), str(tmp_path), *words.split()]) == 3
+    assert capsys.readouterr().err.startswith(f"rift: {option} is ")
+    names = (word.removeprefix("--").replace("-", "_") for word in words.split()[::2])
+    values = [json.loads(v) if v[-1].isdigit() and v != "l3" else v for v in words.split()[1::2]]
+    with pytest.raises(InputError, match=f"^'rift {job}': {field}"):
+        CLASSES[job].of(tmp_path, tmp_path, **dict(zip(names, values, strict=True)))

@@ -19,7 +19,7 @@ from typing import get_type_hints as type_hints
 import tyro
 
 from rift_cl import __version__
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, SettingError
 
 S = TypeVar("S")
 # Options that say how a command runs, not what comes out: they are not repeated.
@@ -131,8 +131,7 @@ def saved_settings(path: Path, job: str, settings: type[S]) -> S:
             "settings may mean something else: give them as options"
         )
     repeated = {name: value for name, value in values.items() if name not in _NOT_REPEATED}
-    found: S = _read(settings, None, repeated, f"--config {path}: 'rift {job}'", open_ended=True)
-    return found
+    return _read_tree(settings, None, repeated, f"--config {path}: 'rift {job}'", open_ended=True)
 
 
 def parsed_settings(
@@ -172,8 +171,7 @@ def parsed_settings(
             if not isinstance(part, dict):
                 raise InputError(f"{said}: {name} is given, and all of {step} as well")
         part[last] = value
-    found: S = _read(settings, earlier, tree, said)
-    return found
+    return _read_tree(settings, earlier, tree, said)
 
 
 def read_settings(settings: type[S], record: Any, where: str) -> S:
@@ -187,8 +185,35 @@ def read_settings(settings: type[S], record: Any, where: str) -> S:
     Raises:
         InputError: there is no such setting, or a value is none that it takes.
     """
-    found: S = _read(settings, None, record, where)
-    return found
+    return _read_tree(settings, None, record, where)
+
+
+def option_of(error: SettingError, settings: Any, prefix: str = "") -> str | None:
+    """The name of the option that an error is about, such as ``learning_rates.means``.
+
+    Args:
+        error: what a dataclass in the tree of settings refused.
+        settings: the class of the tree.
+        prefix: name of the part of the tree that this is.
+
+    Returns:
+        None if that field is no option of this tree.
+    """
+    hints = type_hints(settings, include_extras=True)
+    here = error.settings in {kind.__name__ for kind in settings.__mro__}
+    for field in dataclasses.fields(settings):
+        name, marks = _named(field.name, hints[field.name], prefix)
+        if tyro.conf.Fixed in marks:
+            continue
+        if here and field.name == error.name:
+            return name
+        registry, default = field.metadata.get("registry", {}), _default(field, None)
+        parts = [registry[kind] for kind in registry] or [type(default)]
+        for part in filter(dataclasses.is_dataclass, parts):
+            found = option_of(error, part, name)
+            if found is not None:
+                return found
+    return None
 
 
 def chosen(settings: type[S], default: S | None, arguments: Sequence[str]) -> S | None:
@@ -253,6 +278,18 @@ def _places(settings: Any, usual: Any, prefix: str = "") -> Iterator[tuple[str, 
                     yield name, (field.name, *path)
         elif tyro.conf.Fixed not in marks:
             yield option, (field.name,)
+
+
+def _read_tree(
+    settings: type[S], usual: S | None, values: Any, where: str, *, open_ended: bool = False
+) -> S:
+    """A whole tree of settings; what a part of it refuses is told by its place in the tree."""
+    try:
+        found: S = _read(settings, usual, values, where, open_ended=open_ended)
+    except SettingError as error:
+        name = option_of(error, settings) or error.name
+        raise InputError(f"{where}: {name} {error.said}") from error
+    return found
 
 
 def _read(settings: Any, usual: Any, values: Any, where: str, *, open_ended: bool = False) -> Any:

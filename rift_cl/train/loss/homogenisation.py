@@ -30,7 +30,7 @@ import scipy
 from numpy.typing import NDArray
 from tyro.conf import arg
 
-from rift_cl.errors import InputError
+from rift_cl.errors import SettingError
 from rift_cl.geometry.numbers import one_number
 
 Floats = NDArray[np.float64]
@@ -70,12 +70,10 @@ class Homogenisation:
     def __post_init__(self) -> None:
         """Check the exponent and the weight's name."""
         if self.exponent is not None and not 0 <= one_number(self.exponent) <= _STEEPEST:
-            raise InputError(
-                f"Homogenisation: exponent is {self.exponent!r}, wanted 0 to {_STEEPEST:g}"
-            )
+            raise SettingError(self, "exponent", f"is {self.exponent!r}, wanted 0 to {_STEEPEST:g}")
         if self.weight not in get_args(WeightKind):
             wanted = " or ".join(get_args(WeightKind))
-            raise InputError(f"Homogenisation: weight is {self.weight!r}, wanted {wanted}")
+            raise SettingError(self, "weight", f"is {self.weight!r}, wanted {wanted}")
 
     def response(self, ky: Floats, kx: Floats, *, longest: int, exponent: float) -> Floats:
         """The ramp at frequencies in cycles per pixel, for an image with that longer edge."""

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import InputError
+from rift_cl.errors import SettingError
 from rift_cl.option_marks import Auto
 from rift_cl.train.per_view.quaternions import rotated
 from rift_cl.train.ranges import check_number, check_whole
@@ -97,9 +97,11 @@ class DefaultSettings(StrategySettings):
             check_number(self, name, above=True)
         check_number(self, "prune_opacity", most=0.25, above=True)
         if self.split_scale > self.prune_scale:
-            raise InputError(
-                f"DefaultSettings: split_scale is {self.split_scale!r} and prune_scale is "
-                f"{self.prune_scale!r}, wanted split_scale <= prune_scale"
+            raise SettingError(
+                self,
+                "split_scale",
+                f"is {self.split_scale!r} and prune_scale is {self.prune_scale!r}, wanted "
+                "split_scale <= prune_scale",
             )
 
     @property
@@ -114,9 +116,10 @@ class DefaultSettings(StrategySettings):
     def begin(self, parameters: Parameters, run: TrainingRun) -> DefaultStrategy:
         """The strategy of a run; see ``StrategySettings``."""
         if parameters.density:
-            raise InputError(
-                "TrainSettings: strategy 'default' is for splats with opacities, and these have "
-                "densities: use 'xray'"
+            raise SettingError(
+                "TrainSettings",
+                "strategy",
+                "'default' is for splats with opacities, and these have densities: use 'xray'",
             )
         return DefaultStrategy(self, parameters, run)
 

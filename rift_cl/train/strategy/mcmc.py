@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, SettingError
 from rift_cl.train.ranges import check_number, check_whole
 from rift_cl.train.strategy.protocol import Penalties, Strategy, StrategySettings, TrainingRun
 
@@ -81,9 +81,10 @@ class McmcSettings(StrategySettings):
     def begin(self, parameters: Parameters, run: TrainingRun) -> McmcStrategy:
         """The strategy of a run; see ``StrategySettings``."""
         if parameters.density:
-            raise InputError(
-                "TrainSettings: strategy 'mcmc' is for splats with opacities, and these have "
-                "densities: use 'xray'"
+            raise SettingError(
+                "TrainSettings",
+                "strategy",
+                "'mcmc' is for splats with opacities, and these have densities: use 'xray'",
             )
         return McmcStrategy(self, run)
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.basis.indices import graded
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, SettingError
 from rift_cl.splat.orders import order_of
 from rift_cl.train.per_view.quaternions import rotated
 from rift_cl.train.ranges import check_number, check_whole
@@ -64,9 +64,11 @@ class XraySettings(StrategySettings):
     def begin(self, parameters: Parameters, run: TrainingRun) -> XrayStrategy:
         """The strategy of a run; see ``StrategySettings``."""
         if not parameters.density:
-            raise InputError(
-                "TrainSettings: strategy 'xray' is for splats with densities, and these have "
-                "opacities: use 'mcmc' or 'default'"
+            raise SettingError(
+                "TrainSettings",
+                "strategy",
+                "'xray' is for splats with densities, and these have opacities: use 'mcmc' or "
+                "'default'",
             )
         return XrayStrategy(self, parameters, run)
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from tyro.conf import arg
 
-from rift_cl.errors import InputError
+from rift_cl.errors import SettingError
 from rift_cl.train.ranges import check_number, check_whole
 
 
@@ -49,9 +49,11 @@ class SolveSettings:
             InputError: there shall be solves.
         """
         if self.every and not solves:
-            raise InputError(
-                f"TrainSettings: solve.every is {self.every}, which is for the densities of X-rays "
-                "alone: leave it 0 for splats with opacities"
+            raise SettingError(
+                self,
+                "every",
+                f"is {self.every}, which is for the densities of X-rays alone: leave it 0 for "
+                "splats with opacities",
             )
 
     def due(self, step: int) -> bool:
