@@ -5,6 +5,7 @@ Methods see linear operators only.
 
 from rift_cl.reconstruct.axis import AxisEstimate, find_center
 from rift_cl.reconstruct.direct.fan_rebin import rebin_fan
+from rift_cl.reconstruct.direct.fdk import FDK
 from rift_cl.reconstruct.direct.filtered_backprojection import (
     FilteredBackprojection,
     backproject,
@@ -27,6 +28,7 @@ from rift_cl.reconstruct.solvers.simultaneous_iteration import Sirt, sirt
 from rift_cl.reconstruct.solvers.tv import tv
 
 __all__ = [
+    "FDK",
     "Attenuation",
     "AxisEstimate",
     "Cgls",

@@ -5,7 +5,13 @@ what a kernel computes, from the definition and with numbers of its own. Nothing
 device. Tests and tools alone import it: an import contract in pyproject.toml keeps it so.
 """
 
-from rift_cl.reference.filters import filter_rows, ramp_taps, response_taps, shepp_logan_taps
+from rift_cl.reference.filters import (
+    filter_rows,
+    ramp_taps,
+    response_taps,
+    shepp_logan_taps,
+    weigh_rays,
+)
 from rift_cl.reference.matrix import MatrixProjector
 from rift_cl.reference.phase_table import phase_table, phase_table_matrix
 from rift_cl.reference.planes import merge, split
@@ -23,4 +29,5 @@ __all__ = [
     "response_taps",
     "shepp_logan_taps",
     "split",
+    "weigh_rays",
 ]

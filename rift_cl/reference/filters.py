@@ -72,3 +72,20 @@ def filter_rows(
     if gains is not None:
         views *= np.reshape(gains, (-1,) + (1,) * (views.ndim - 1))
     return views
+
+
+def weigh_rays(
+    projections: ArrayLike, pixels: ArrayLike, views: ArrayLike, before: int = 0
+) -> Floats:
+    """Lay projections onto a wider detector and multiply them by its factors.
+
+    Args:
+        projections: (views, rows, bins).
+        pixels: (rows, wider bins) factors of the wider detector's pixels, or (1, wider bins).
+        views: (views, wider bins) factors, or (1, wider bins).
+        before: bins of the wider detector before the first of ``projections``.
+    """
+    narrow = np.asarray(projections, dtype=np.float64)
+    factors: Floats = np.asarray(pixels)[None] * np.asarray(views, dtype=np.float64)[:, None]
+    after = factors.shape[-1] - narrow.shape[-1] - before
+    return factors * np.pad(narrow, [(0, 0), (0, 0), (before, after)])

@@ -19,6 +19,7 @@ from bench.operations import Task
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import clip_between, clip_negative, multiply, pull_to_levels
 from rift_cl.cl.reductions import dot
+from rift_cl.reconstruct.direct.ray_factors import RayFactors
 from rift_cl.reconstruct.solvers.tv_functional import TotalVariation
 
 # Of the noise in an image from 0 to 1, and the longest vector of the dual, its weight.
@@ -89,6 +90,7 @@ def _variation(axes: int) -> dict[str, Cost]:
 VECTOR_COSTS: dict[str, Cost] = {
     "axpby": _vector(3, 3, "3 flop per sample; bytes: two arrays in, one out"),
     "multiply": _vector(1, 3, "1 flop per sample; bytes: two arrays in, one out"),
+    "rays_weigh": _vector(2, 2, "2 flop per sample; bytes: rays in and out, factors stay cached"),
     "clip_negative": _vector(0, 2, "no arithmetic; bytes: an array in and out"),
     "clip_between": _vector(0, 4, "no arithmetic; bytes: an array and its bounds in, it out"),
     "level_pull": _vector(
@@ -127,9 +129,11 @@ def _runs(device: rift.Device, shape: tuple[int, ...]) -> dict[str, Callable[[],
     low, levels = device.zeros(shape), device.array(np.array([0.0, 0.5, 1.0], np.float32))
     V = TotalVariation(device, shape, (1.0,) * len(shape), np.float32)
     u = device.zeros(V.field_shape)
+    rays = RayFactors(device, np.float32, np.ones((1, shape[-1])), np.ones((shape[0], shape[-1])))
     return {
         "sum": lambda: axpby(device, 0.5, x, 0.5, y),
         "weights": lambda: multiply(device, ones, y),
+        "weights of rays": lambda: rays.widen(x, out),
         "clip": lambda: clip_negative(device, y),
         "clip between": lambda: clip_between(device, low, ones, y),
         "level pull": lambda: pull_to_levels(device, levels, 0.1, x, out),

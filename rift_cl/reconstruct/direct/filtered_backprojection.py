@@ -26,6 +26,8 @@ from rift_cl.operators.filters.compensation import Compensation
 from rift_cl.operators.filters.ramp_filters import FilterLike, Gains, ViewFilter, as_filter
 from rift_cl.operators.linear import Chunk, LinearOperator
 from rift_cl.operators.projector.parallel_projector import ParallelProjector
+from rift_cl.operators.projector.projector import Projector
+from rift_cl.reconstruct.direct.fdk import FDK, amplitude, as_cone
 from rift_cl.reconstruct.direct.view_weights import view_gains
 
 Floats = NDArray[np.float64]
@@ -115,7 +117,7 @@ class FilteredBackprojection(LinearOperator):
 
 
 def fbp(
-    A: ParallelProjector,
+    A: ParallelProjector | Projector,
     y: Any,
     filter: FilterLike = "ram-lak",
     compensate: str | None = None,
@@ -123,42 +125,62 @@ def fbp(
     diameter: float | None = None,
     out: Any = None,
 ) -> Any:
-    """Reconstruct by filtered backprojection.
+    """Reconstruct by filtered backprojection; of cones by that of Feldkamp, Davis and Kress.
 
     Args:
-        A: the projector that describes grid and scan.
-        y: sinogram (angles, bins) or projection stack (angles, rows, bins); line integrals in
-            the image's unit times the grid's unit of length.
+        A: the projector that describes grid and scan. A cone's source goes round a full turn or
+            half a turn and the fan; the rotation axis may be near one side of the detector in a
+            full turn (see ``FDK``).
+        y: sinogram (angles, bins) or projections (angles, rows, bins); line integrals in the
+            image's unit times the grid's unit of length.
         filter: a name (``ram-lak``, ``shepp-logan``, ``cosine``, ``hamming``, ``hann``,
             ``high-pass``), a filter, or a function of frequency.
-        compensate: what each view stands for, see ``FilteredBackprojection``.
-        diameter: of the object, see there.
+        compensate: what each view stands for, see ``FilteredBackprojection``; of a cone None,
+            ``voronoi`` or ``uniform``.
+        diameter: of the object, of parallel beams alone, see there.
         out: where to put the result.
 
     Returns:
         The image or volume, in the image's unit, on the side (host or device) where ``y`` is.
 
     Raises:
-        InputError: ``y`` does not fit, is not finite, or a name is unknown.
+        InputError: ``y`` does not fit, is not finite, or a name is unknown; or the views of a fan
+            or a cone do not allow it, and the sentence names the methods that take them.
     """
+    return filtered_backprojection(A, filter, compensate, diameter=diameter)(y, out, name="y")
+
+
+def filtered_backprojection(
+    A: ParallelProjector | Projector,
+    filter: FilterLike = "ram-lak",
+    compensate: str | None = None,
+    *,
+    diameter: float | None = None,
+) -> FilteredBackprojection | FDK:
+    """The operator that ``fbp`` applies, chosen by the scan of ``A``; arguments are those of it."""
+    if isinstance(A, ParallelProjector):
+        return FilteredBackprojection(A, filter, compensate=compensate, diameter=diameter)
     _check_projector(A)
-    operator = FilteredBackprojection(A, filter, compensate=compensate, diameter=diameter)
-    return operator(y, out, name="y")
+    if diameter is not None:
+        raise InputError("diameter is given, and only filters of parallel beams depend on it")
+    return FDK(A, filter, compensate=compensate)
 
 
-def backproject(A: ParallelProjector, y: Any, *, out: Any = None) -> Any:
+def backproject(A: ParallelProjector | Projector, y: Any, *, out: Any = None) -> Any:
     """Backproject without a filter, every view alike: the paper's unfiltered baseline.
 
     ``A``, ``y``, ``out`` and errors are those of ``fbp``. The result is the image convolved with
     1 / r, in the image's unit times a length; compare it after an affine fit.
     """
     _check_projector(A)
-    factor = np.pi / len(A.scan.angles) * _unspread(A)
-    return (A.T * factor)(y, out, name="y")
+    if isinstance(A, ParallelProjector):
+        return (A.T * (np.pi / len(A.scan.angles) * _unspread(A)))(y, out, name="y")
+    scan = as_cone(A.scan)
+    return (A.T * (np.pi / scan.views * amplitude(A.grid, scan)))(y, out, name="y")
 
 
 def _check_projector(A: Any) -> None:
-    if not isinstance(A, ParallelProjector):
+    if not isinstance(A, (ParallelProjector, Projector)):
         raise InputError(f"A is a {type(A).__name__}, wanted a Projector first, then the sinogram")
 
 

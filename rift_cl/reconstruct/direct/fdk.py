@@ -1,0 +1,182 @@
+"""Filtered backprojection of rays from a point: fans, and cones by Feldkamp, Davis and Kress.
+
+With A the line integrals, C the cosine of the angle at which a ray meets the detector and h the
+ramp at the pitch that bins have at the axis, the method of Feldkamp, Davis and Kress (Practical
+cone-beam algorithm, J. Opt. Soc. Am. A 1, 612, 1984) is
+
+    f = k A' C h C w y,        k = (R / S)^2 p_u p_v / dV,
+
+R and S the distances of the source from axis and detector, p the pitches, dV the volume of a voxel:
+A' spreads a ray by ``dV |d| S / (D^2 p_u p_v)``, d the way from the source to the bin and D the
+depth of the voxel, and ``|d| C = S``, so that their weight R^2 / D^2 is that of the adjoint. A
+detector on an arc about the source has the ramp ``(gamma / sin gamma)^2 h`` between fan angles, and
+before it the cosine of the fan angle as well (Kak and Slaney, Principles of Computerized
+Tomographic Imaging, section 3.4.1). ``w`` counts every line once (``redundancy``). In the plane of
+the source's orbit the result is exact; away from it the orbit does not know all (Tuy's condition),
+and densities fall off.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.errors import InputError
+from rift_cl.geometry import Cone, Grid, Parallel, Scan, Vectors
+from rift_cl.operators.filters.ramp_filters import Filter, FilterLike, ViewFilter, as_filter
+from rift_cl.operators.linear import LinearOperator
+from rift_cl.operators.projector.projector import Projector
+from rift_cl.reconstruct.direct.ray_factors import RayFactors
+from rift_cl.reconstruct.direct.redundancy import ITERATE, redundancy
+
+Floats = NDArray[np.float64]
+
+# Heights that vary by less than this share of the source's distance are one orbit.
+_LEVEL = 1e-6
+
+
+class FDK(LinearOperator):
+    """Filtered backprojection of cone beams, from projections to a volume.
+
+    Args:
+        A: the projector whose grid and scan to use.
+        filter: along the detector's rows, as ``fbp`` takes it.
+        compensate: what each view stands for: None, ``voronoi`` or ``uniform``, see ``redundancy``.
+
+    Raises:
+        InputError: the scan is not circular, or does not see enough; the sentence says what does.
+    """
+
+    def __init__(
+        self, A: Projector, filter: FilterLike = "ram-lak", *, compensate: str | None = None
+    ) -> None:
+        super().__init__(A.range, A.domain, A.device, A.dtype)
+        self._given, self._compensate, self.filter = A, compensate, as_filter(filter)
+        scan = _circle(A.scan)
+        counted = redundancy(scan, compensate)
+        before, after = counted.missing
+        wide = _widened(scan, before, after)
+        self._A = A if wide == A.scan else Projector(A.grid, wide, device=A.device, dtype=A.dtype)
+        self.sentence: str = counted.sentence
+        """What was chosen for the scan's span and detector, for a reader."""
+        self._filter = ViewFilter(
+            Parallel(wide.angles, wide.bins, wide.pitch[1] / wide.magnification),
+            self._row_filter(wide),
+            rows=wide.rows,
+            gains=counted.views * amplitude(A.grid, wide),
+            device=A.device,
+            dtype=A.dtype,
+        )
+        into, out_of = _cosines(wide)
+        rays = np.pad(counted.rays, [(0, 0), (before, after)])
+        self._into = RayFactors(A.device, A.dtype, into, rays, before)
+        self._out_of = RayFactors(A.device, A.dtype, out_of, np.ones((1, wide.bins)))
+        self._wide = (wide.views, wide.rows, wide.bins)
+
+    def _row_filter(self, scan: Cone) -> Filter:
+        if not scan.curved:
+            return self.filter
+        return _OnArc(self.filter, scan.pitch[1] / scan.source_to_detector)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(FDK, compensate=self._compensate), (self._given, self.filter)
+
+    def _facts(self) -> list[str]:
+        return [repr(self.filter), self.sentence, *self._given._facts()]
+
+    def _apply(self, x: Any, out: Any) -> None:
+        rays = self.device.empty(self._wide, self.dtype)
+        self._into.widen(x, rays)
+        filtered = self.device.empty(self._wide, self.dtype)
+        self._filter._apply(rays, filtered)
+        self._out_of.widen(filtered, filtered)
+        del rays
+        self._A._apply_adjoint(filtered, out)
+
+    def _apply_adjoint(self, y: Any, out: Any) -> None:
+        rays = self.device.empty(self._wide, self.dtype)
+        self._A._apply(y, rays)
+        self._out_of.widen(rays, rays)
+        filtered = self.device.empty(self._wide, self.dtype)
+        self._filter._apply_adjoint(rays, filtered)
+        self._into.narrow(filtered, out)
+
+    @property
+    def scratch(self) -> int:
+        """Weighted and filtered projections, and what filter and projector need."""
+        rays = self.dtype.itemsize * math.prod(self._wide)
+        factors = self._into.nbytes + self._out_of.nbytes
+        return factors + rays + max(rays + self._filter.scratch, self._A.scratch)
+
+
+@dataclass(frozen=True)
+class _OnArc:
+    """A filter between fan angles: ``(gamma / sin gamma)^2`` times that between lengths.
+
+    Args:
+        filter: between lengths at the axis.
+        step: fan angle between bins, in radians.
+    """
+
+    filter: Filter
+    step: float
+
+    def taps(self, bins: int, pitch: float) -> Floats:
+        """Convolution kernel h[-(bins-1)] .. h[bins-1], in 1 / length^2."""
+        gamma = np.arange(1 - bins, bins) * self.step
+        taps: Floats = self.filter.taps(bins, pitch) / np.sinc(gamma / np.pi) ** 2
+        return taps
+
+
+def as_cone(scan: Scan | None) -> Cone:
+    """The cone that a scan is, on a circle or not.
+
+    Raises:
+        InputError: it is none; the sentence names the methods that take it.
+    """
+    if isinstance(scan, Cone):
+        return scan
+    if not isinstance(scan, Vectors):
+        raise InputError(f"scan is {scan!r:.60}, wanted a Cone, or Vectors that are one")
+    try:
+        return Cone.of_vectors(scan)
+    except InputError as failure:
+        raise InputError(
+            f"filtered backprojection wants a circular scan; {failure}; {ITERATE}"
+        ) from None
+
+
+def _circle(scan: Scan | None) -> Cone:
+    cone = as_cone(scan)
+    if np.ptp(cone.heights) > _LEVEL * cone.source_to_axis:
+        raise InputError(
+            f"scan: heights range over {np.ptp(cone.heights):.3g}, a helix or steps, and filtered "
+            f"backprojection wants a circle; {ITERATE}"
+        )
+    return cone
+
+
+def _widened(scan: Cone, before: int, after: int) -> Cone:
+    """The scan with so many more bins before the first and after the last."""
+    row, bin = scan.center
+    return replace(scan, bins=scan.bins + before + after, center=(row, bin + before))
+
+
+def amplitude(grid: Grid, scan: Cone) -> float:
+    """k, which makes the adjoint's weights those of the inversion."""
+    return math.prod(scan.pitch) / scan.magnification**2 / math.prod(grid.spacing)
+
+
+def _cosines(scan: Cone) -> tuple[Floats, Floats]:
+    """Factors of pixels before and after the filter, (rows, bins) each."""
+    v = (np.arange(scan.rows) - scan.center[0])[:, None] * scan.pitch[0]
+    gamma = scan.fan_angles()
+    # In the orbit's plane a bin stands S / cos gamma away, or S where it is on an arc.
+    reach = scan.source_to_detector / (np.ones_like(gamma) if scan.curved else np.cos(gamma))
+    after: Floats = scan.source_to_detector / np.hypot(reach, v)
+    return (after * np.cos(gamma) if scan.curved else after), after

@@ -1,0 +1,75 @@
+"""Factors of rays, on the device: products of one for each pixel and one for each bin of a view."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from rift_cl.cl.array import DeviceArray
+from rift_cl.cl.device import Device
+
+Floats = NDArray[np.float64]
+
+# Bins and rows that one work-item of a CPU goes through.
+_CPU_BINS, _CPU_ROWS = 1024, 16
+
+
+class RayFactors:
+    """Multiplies projections by factors, laying them onto a wider detector or back.
+
+    Args:
+        device: where the projections are.
+        dtype: of the projections.
+        pixels: (rows, bins) factors of the wider detector's pixels, or (1, bins) for all rows.
+        views: (views, bins) factors of its bins, or (1, bins) for all views.
+        before: bins of the wider detector before the first one of the narrower.
+    """
+
+    def __init__(
+        self, device: Device, dtype: DTypeLike, pixels: Floats, views: Floats, before: int = 0
+    ) -> None:
+        self.device, self._before = device, before
+        self._pixels, self._views = device.array(pixels, dtype), device.array(views, dtype)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the factors."""
+        return int(self._pixels.nbytes + self._views.nbytes)
+
+    def widen(self, narrow: DeviceArray, wide: DeviceArray) -> None:
+        """Fill ``wide`` with the factors times ``narrow``, 0 where that has no bin."""
+        self._launch(narrow, wide, -self._before, 0)
+
+    def narrow(self, wide: DeviceArray, narrow: DeviceArray) -> None:
+        """The transpose: fill ``narrow`` with the factors times its part of ``wide``."""
+        self._launch(wide, narrow, self._before, self._before)
+
+    def _launch(self, x: DeviceArray, out: DeviceArray, shift: int, weight_shift: int) -> None:
+        lines, bins = math.prod(out.shape[:-1]), out.shape[-1]
+        cpu = self.device.traits.is_cpu
+        block, run = (_CPU_BINS, _CPU_ROWS) if cpu else (1, 1)
+        self.device.launch(
+            "rays_weigh",
+            (-(-bins // block), -(-lines // run)),
+            x=x,
+            out=out,
+            pixels=self._pixels,
+            views=self._views,
+            lines=lines,
+            rows=lines // out.shape[0],
+            x_bins=x.shape[-1],
+            bins=bins,
+            pixel_stride=_stride(self._pixels),
+            view_stride=_stride(self._views),
+            shift=shift,
+            weight_shift=weight_shift,
+            BINS=block,
+            RUN=run,
+            DOUBLE=int(out.dtype == np.float64),
+        )
+
+
+def _stride(factors: DeviceArray) -> int:
+    return int(factors.shape[1]) if factors.shape[0] > 1 else 0

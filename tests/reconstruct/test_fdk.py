@@ -1,0 +1,140 @@
+"""FDK is quantitative, chooses by the scan, and is the operator that it says it is.
+
+Densities are those of a uniform ball, whose exact line integrals, averaged over the bins, are the
+data: means over the ball in the middle plane say whether weights and scales are right, whatever the
+magnification, the pitch and the detector's shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from dense_cone import DenseCone
+
+import rift_cl as rift
+from rift_cl import Cone, Grid, phantom
+from rift_cl.errors import InputError
+from rift_cl.operators import as_filter
+from rift_cl.reconstruct import FDK
+from rift_cl.reference import filter_rows
+
+pytestmark = pytest.mark.once
+
+N = 32
+GRID = Grid((N, N, N))
+BALL = phantom.Ellipsoid.ball(0.35 * N, 1.7)
+AWAY = np.arange(N) - (N - 1) / 2
+RADIUS = np.sqrt(AWAY[:, None, None] ** 2 + AWAY[:, None] ** 2 + AWAY**2)
+FULL = np.arange(90) * 2 * np.pi / 90
+
+
+def circle(angles=FULL, magnification=1.5, distance=3.0, share=1.0, **changes):
+    """A scan whose detector just sees the ball about the grid, with bins of a share of a voxel."""
+    to_axis = distance * N
+    to_detector = to_axis * magnification
+    width = 2.04 * to_detector * np.tan(np.arcsin(0.5 / distance))
+    bins = round(N / share)
+    return Cone(angles, bins, bins, width / bins, to_axis, to_detector, **changes)
+
+
+def averaged(parts, scan, factor=4):
+    """Line integrals averaged over bins, as a detector measures them."""
+    pitch = tuple(length / factor for length in scan.pitch)
+    center = tuple((place + 0.5) * factor - 0.5 for place in scan.center)
+    counts = {"rows": scan.rows * factor, "bins": scan.bins * factor}
+    fine = phantom.project(parts, GRID, replace(scan, pitch=pitch, center=center, **counts))
+    return fine.reshape(scan.views, scan.rows, factor, scan.bins, factor).mean((2, 4))
+
+
+def level(volume, within):
+    """The mean in a part of the ball, over its density."""
+    return float(volume[within].mean() / BALL.value)
+
+
+def test_fdk_is_its_formula(device):
+    scan = circle(FULL[::9], heights=np.full(10, 0.7), center=(14.0, 17.2))
+    A = DenseCone(GRID, scan, device)
+    y = np.random.default_rng(0).standard_normal(A.range).astype(np.float32)
+    u = (np.arange(scan.bins) - scan.center[1]) * scan.pitch[1]
+    v = (np.arange(scan.rows) - scan.center[0]) * scan.pitch[0]
+    S, magnification = scan.source_to_detector, scan.magnification
+    cosine = S / np.sqrt(S**2 + u**2 + v[:, None] ** 2)
+    pitch = scan.pitch[1] / magnification
+    taps = as_filter("hann").taps(scan.bins, pitch)
+    factor = np.pi / 10 * scan.pitch[0] * scan.pitch[1] / magnification**2
+    expected = A.T((factor * cosine * filter_rows(cosine * y, taps, pitch)).astype(np.float32))
+    found = FDK(A, "hann")(y)
+    np.testing.assert_allclose(found, expected, atol=2e-5 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("curved", [False, True], ids=["flat", "curved"])
+@pytest.mark.parametrize("magnification", [1.2, 15.0])
+def test_the_middle_of_a_ball_has_its_density(device, magnification, curved):
+    scan = circle(magnification=magnification, curved=curved)
+    volume = FDK(DenseCone(GRID, scan, device))(averaged([BALL], scan))
+    middle = (RADIUS < 0.28 * N) & (np.abs(AWAY) < 1)[:, None, None]
+    assert level(volume, middle) == pytest.approx(1, abs=1e-3)
+
+
+@pytest.mark.full
+def test_a_whole_ball_has_its_density_in_a_narrow_cone(device):
+    scan = circle(distance=10.0)
+    volume = FDK(DenseCone(GRID, scan, device))(averaged([BALL], scan))
+    assert level(volume, RADIUS < 0.28 * N) == pytest.approx(1, abs=1e-3)
+
+
+def test_fdk_is_linear_and_has_an_adjoint(device):
+    A = DenseCone(GRID, circle(FULL[::6]), device)
+    F = FDK(A, "hann")
+    assert rift.dot_test(F) < 1e-8
+    one, other = np.random.default_rng(1).standard_normal((2, *A.range)).astype(np.float32)
+    sum_of_two = F((2 * one + other).astype(np.float32))
+    np.testing.assert_allclose(sum_of_two, 2 * F(one) + F(other), atol=1e-4 * np.ptp(sum_of_two))
+
+
+HEAD = phantom.head(GRID)
+HEAD_VOLUME = phantom.render(HEAD, GRID)
+SPAN = np.pi + 2.2 * np.arcsin(0.5 / 3)
+SHORT = 0.3 + np.arange(60) * SPAN / 60
+
+
+def quality(device, scan, data_scan=None):
+    """PSNR of the head in the ball about the grid, in dB."""
+    y = phantom.project(HEAD, GRID, scan if data_scan is None else data_scan)
+    volume = FDK(DenseCone(GRID, scan, device))(y)
+    off = (volume - HEAD_VOLUME)[RADIUS < 0.48 * N]
+    return -10 * np.log10(np.mean(off.astype(float) ** 2))
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("first", [0, 3.0], ids=["from its start", "past the full turn"])
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_short_scan_is_nearly_a_full_turn_in_either_sense(device, sense, first):
+    scan = circle((first + SHORT)[::sense])
+    assert quality(device, scan) > 22.0
+    assert quality(device, circle()) > 23.0
+
+
+@pytest.mark.full
+def test_a_short_scan_taken_in_the_wrong_sense_is_worse(device):
+    right = circle(SHORT)
+    assert quality(device, circle(-SHORT), right) < quality(device, right) - 3
+
+
+@pytest.mark.full
+def test_uneven_views_are_weighed_by_their_gaps(device):
+    angles = np.sort(np.random.default_rng(0).uniform(0, 2 * np.pi, 90))
+    assert quality(device, circle(angles)) > 22.3
+
+
+def test_a_helix_is_refused_with_the_methods_that_take_it(device):
+    scan = circle(FULL[::30], heights=[0.0, 1.0, 2.0])
+    with pytest.raises(InputError, match=r"heights.*cgls"):
+        FDK(DenseCone(GRID, scan, device))
+
+
+def test_a_short_span_is_refused_with_the_methods_that_take_it(device):
+    with pytest.raises(InputError, match=r"half a turn and the fan.*cgls"):
+        FDK(DenseCone(GRID, circle(FULL[:40]), device))
