@@ -14,55 +14,74 @@ ASTRA's detector at the angle a looks along (sin a, -cos a), with bins that grow
 the first, so that their angles change sign here; its volumes have y and z growing with the index,
 as ours have (the geometries of astra-toolbox 2.5, and its three-dimensional projector).
 
-Beams that are not parallel have no counterpart here.
+Cones pass as they are: source, detector and volume of ``cone`` and ``cone_vec`` stand where ours
+do.
+Images of fans (``fanflat``, ``fanflat_vec``) are ours upside down, ``image[::-1]``, and their
+projections as they are; no change of angles would do for both, since a fan has a side.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.geometry import Grid, Parallel
-from rift_cl.geometry.numbers import one_number, real_numbers
+from rift_cl.geometry import Fan, Grid, Parallel, Scan
+from rift_cl.geometry.numbers import one_number
+from rift_cl.interop.astra_entries import (
+    IN_PLANE,
+    Geometry,
+    count_of,
+    entry_of,
+    mapping_of,
+    vectors_of,
+)
+from rift_cl.interop.astra_point import point_proj_geom, point_scan
 
 __all__ = ["from_astra", "to_astra"]
 
 Floats = NDArray[np.float64]
-Geometry = Mapping[str, Any]
 # Views differ by this much of a bin at most, or they have no pitch and no axis in common.
 _SAME = 1e-4
 _AXES = {"X": "GridColCount", "Y": "GridRowCount", "Z": "GridSliceCount"}
-# What a vector of two dimensions holds of one of three.
-_IN_PLANE = [0, 1, 3, 4, 6, 7]
-_KINDS = {"parallel": 2, "parallel_vec": 2, "parallel3d": 3, "parallel3d_vec": 3}
+_KINDS = {
+    "parallel": 2,
+    "parallel_vec": 2,
+    "parallel3d": 3,
+    "parallel3d_vec": 3,
+    "fanflat": 2,
+    "fanflat_vec": 2,
+    "cone": 3,
+    "cone_vec": 3,
+}
 
 
-def from_astra(proj_geom: Geometry, vol_geom: Geometry) -> tuple[Grid, Parallel]:
-    """Read ASTRA's description of a parallel scan.
+def from_astra(proj_geom: Geometry, vol_geom: Geometry) -> tuple[Grid, Scan]:
+    """Read ASTRA's description of a scan.
 
     Args:
-        proj_geom: of type ``parallel``, ``parallel_vec``, ``parallel3d`` or ``parallel3d_vec``.
-            The vectors of a scan must differ by a turn about the z axis alone: one pitch, one
-            axis. The rows of a detector must be the slices of the volume.
+        proj_geom: of type ``parallel``, ``fanflat``, ``parallel3d`` or ``cone``, or one of these
+            with ``_vec``. The vectors of parallel rays and of fans must differ by a turn about the
+            z axis alone: one pitch, one axis. The rows of a detector of parallel rays must be the
+            slices of the volume.
         vol_geom: of an image for the first two, of a volume for the others.
 
     Returns:
-        The grid and the scan, in ASTRA's unit of length.
+        The grid and the scan, in ASTRA's unit of length: a ``Parallel``, a ``Fan``, a ``Cone``, or
+        ``Vectors`` where the sources of ``cone_vec`` stand on no circle.
 
     Raises:
-        InputError: the beam is not parallel, an entry is missing or no usable number, or the
-            scan is none that ``Parallel`` describes.
+        InputError: the type is not known, an entry is missing or no usable number, or the scan is
+            none that ``Parallel`` or ``Fan`` describes.
         ShapeError: an entry has the wrong shape, or image and scan are not of one dimension.
     """
-    kind = _entry(proj_geom, "proj_geom", "type")
+    kind = entry_of(proj_geom, "proj_geom", "type")
     if kind not in _KINDS:
         raise InputError(
-            f"proj_geom is of type {kind!r}, wanted one of {', '.join(_KINDS)}: only parallel "
-            "beams have a counterpart here"
+            f"proj_geom is of type {kind!r}, wanted one of {', '.join(_KINDS)}: no other has a "
+            "counterpart here"
         )
     grid = _grid(vol_geom)
     flat = len(grid.shape) == 2
@@ -71,37 +90,50 @@ def from_astra(proj_geom: Geometry, vol_geom: Geometry) -> tuple[Grid, Parallel]
             f"proj_geom is of type {kind!r} and vol_geom of {len(grid.shape)} dimensions, wanted "
             f"{_KINDS[kind]}"
         )
-    bins = _count(proj_geom, "DetectorCount" if flat else "DetectorColCount")
+    if kind.startswith(("fan", "cone")):
+        # The rows of a fan's image are ours in reverse.
+        middle = (-grid.center[0], *grid.center[1:]) if flat else grid.center
+        return Grid(grid.shape, grid.spacing, middle), point_scan(kind, proj_geom)
+    bins = count_of(proj_geom, "DetectorCount" if flat else "DetectorColCount")
     if kind.endswith("_vec"):
-        vectors = _vectors(proj_geom, 6 if flat else 12)
+        vectors = vectors_of(proj_geom, 6 if flat else 12)
         scan = _scan(vectors, bins, up=flat)
     else:
         scan, along = _turns(proj_geom, bins, up=flat)
         vectors = _turned(scan.angles, scan.pitch, along)
     if not flat:
-        _check_rows(vectors, _count(proj_geom, "DetectorRowCount"), bins, grid)
+        _check_rows(vectors, count_of(proj_geom, "DetectorRowCount"), bins, grid)
     return grid, scan
 
 
-def to_astra(grid: Grid, scan: Parallel) -> tuple[dict[str, Any], dict[str, Any]]:
+def to_astra(grid: Grid, scan: Scan) -> tuple[dict[str, Any], dict[str, Any]]:
     """Describe a grid and a scan for ASTRA.
 
     Args:
         grid: of an image or a volume.
-        scan: of it. With the axis in the middle of the bins the result has angles; otherwise, or
-            where a volume's middle is not at z = 0, it has vectors.
+        scan: of it; a fan of an image, a cone or vectors of a volume. With the axis in the middle
+            of the bins the result has angles; otherwise, or where parallel rays look at a volume
+            whose middle is not at z = 0, it has vectors.
 
     Returns:
         ``proj_geom`` and ``vol_geom``.
+
+    Raises:
+        InputError: the detector is curved.
+        ShapeError: grid and scan are not of one dimension.
     """
     flat = len(grid.shape) == 2
     sizes, option = {}, {}
     axes = zip(_AXES.items(), grid.shape[::-1], grid.spacing[::-1], grid.center[::-1], strict=False)
     for (axis, name), n, spacing, center in axes:
-        middle = -center if flat and axis == "Y" else center
+        middle = -center if flat and axis == "Y" and isinstance(scan, Parallel) else center
         sizes[name] = n
         option[f"WindowMin{axis}"] = middle - n * spacing / 2
         option[f"WindowMax{axis}"] = middle + n * spacing / 2
+    if not isinstance(scan, Parallel):
+        if flat != isinstance(scan, Fan):
+            raise ShapeError("ASTRA: a Fan is of an image, a Cone or Vectors of a volume")
+        return point_proj_geom(scan), {"option": option, **sizes}
     angles = -scan.angles if flat else scan.angles.copy()
     return _proj_geom(grid, scan, angles), {"option": option, **sizes}
 
@@ -121,18 +153,18 @@ def _proj_geom(grid: Grid, scan: Parallel, angles: Floats) -> dict[str, Any]:
     vectors = _turned(angles, scan.pitch, grid.spacing[0])
     vectors[:, 3:6] = shift * vectors[:, 6:9] + [0, 0, height]
     if flat:
-        vectors = vectors[:, _IN_PLANE]
+        vectors = vectors[:, IN_PLANE]
     return {"type": f"{kind}_vec", **counts, "Vectors": vectors}
 
 
 def _grid(vol_geom: Geometry) -> Grid:
-    option = _mapping("vol_geom", vol_geom).get("option", {})
-    option = _mapping("the option of vol_geom", option)
+    option = mapping_of("vol_geom", vol_geom).get("option", {})
+    option = mapping_of("the option of vol_geom", option)
     shape, spacing, center = [], [], []
     for axis, name in _AXES.items():
         if axis == "Z" and name not in vol_geom:
             break
-        n = _count(vol_geom, name, "vol_geom")
+        n = count_of(vol_geom, name, "vol_geom")
         low = one_number(option.get(f"WindowMin{axis}", -n / 2))
         high = one_number(option.get(f"WindowMax{axis}", n / 2))
         if not low < high:
@@ -148,27 +180,13 @@ def _grid(vol_geom: Geometry) -> Grid:
 def _turns(proj_geom: Geometry, bins: int, *, up: bool) -> tuple[Parallel, float]:
     """The scan of a geometry that has angles, and the distance of its rows."""
     names = ["DetectorWidth"] if up else ["DetectorSpacingX", "DetectorSpacingY"]
-    lengths = [one_number(_entry(proj_geom, "proj_geom", name)) for name in names]
+    lengths = [one_number(entry_of(proj_geom, "proj_geom", name)) for name in names]
     for name, length in zip(names, lengths, strict=True):
         if not length > 0:
             raise InputError(f"proj_geom: {name} is {proj_geom[name]!r}, wanted a positive length")
-    given = Parallel(_entry(proj_geom, "proj_geom", "ProjectionAngles"), bins, lengths[0])
+    given = Parallel(entry_of(proj_geom, "proj_geom", "ProjectionAngles"), bins, lengths[0])
     scan = Parallel(-given.angles, bins, lengths[0]) if up else given
     return scan, lengths[-1]
-
-
-def _vectors(proj_geom: Geometry, wide: int) -> Floats:
-    """Ray, detector's middle, and the steps from bin to bin and from row to row: (views, 12)."""
-    values = real_numbers(_entry(proj_geom, "proj_geom", "Vectors"))
-    if values is None or values.ndim != 2 or values.shape[1] != wide or not len(values):
-        raise ShapeError(f"proj_geom: Vectors must be numbers of shape (angles, {wide})")
-    if not np.isfinite(values).all():
-        raise InputError("proj_geom: Vectors holds NaN or infinity")
-    if wide == 12:
-        return values
-    vectors = np.zeros((len(values), 12))
-    vectors[:, _IN_PLANE] = values
-    return vectors
 
 
 def _turned(angles: Floats, across: float, along: float) -> Floats:
@@ -214,22 +232,3 @@ def _check_rows(vectors: Floats, rows: int, bins: int, grid: Grid) -> None:
             f"proj_geom: the {rows} rows of its detector must be the {grid.slices} slices of the "
             f"volume, {spacing:g} apart about z = {center:g}, and its rays lie in them"
         )
-
-
-def _count(geometry: Geometry, key: str, name: str = "proj_geom") -> int:
-    number = one_number(_entry(geometry, name, key))
-    if not (number >= 1 and number.is_integer()):
-        raise InputError(f"{name}: {key} is {geometry[key]!r}, wanted a positive whole number")
-    return int(number)
-
-
-def _entry(geometry: Geometry, name: str, key: str) -> Any:
-    if key not in _mapping(name, geometry):
-        raise InputError(f"{name} has no {key!r}: make it with astra.create_{name}")
-    return geometry[key]
-
-
-def _mapping(name: str, geometry: Any) -> Geometry:
-    if not isinstance(geometry, Mapping):
-        raise InputError(f"{name} is a {type(geometry).__name__}, wanted a dictionary of ASTRA's")
-    return geometry

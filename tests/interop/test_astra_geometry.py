@@ -159,8 +159,8 @@ def uneven(column, by):
 
 FLAT, DEEP = window(20, 26), window(20, 26, 3)
 BAD = {
-    "fan": (changed(parallel(), type="fanflat"), FLAT, InputError, "'fanflat'.*only parallel"),
-    "cone": (changed(parallel3d(), type="cone_vec"), DEEP, InputError, "'cone_vec'"),
+    "cylinder": (changed(parallel(), type="cyl_cone_vec"), FLAT, InputError, "no other has"),
+    "cone": (changed(parallel3d(), type="cone_vec"), DEEP, InputError, "no 'Vectors'"),
     "no type": ({}, FLAT, InputError, r"no 'type': make it with astra.create_proj_geom"),
     "an id": (5, FLAT, InputError, "proj_geom is a int, wanted a dictionary"),
     "no window": (parallel(), None, InputError, "vol_geom is a NoneType"),

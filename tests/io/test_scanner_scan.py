@@ -13,8 +13,8 @@ import scanner_files as made
 
 from rift_cl.errors import FileFormatError, InputError, PathEscapeError, RiftError, ShapeError
 from rift_cl.geometry import Cone, Fan, Vectors
+from rift_cl.geometry.rtk_views import RtkView, rtk_of_vectors, vectors_of_rtk
 from rift_cl.io import ScanFile, open_scan
-from rift_cl.io.scans.geometries.rtk_xml import RtkView, rtk_vectors
 
 POINT = np.array([3.0, -2.0, 1.5])
 LENGTHS = "unit: mm\nsource_to_axis: 50\nsource_to_detector: 200\npitch: [0.25, 0.2]"
@@ -208,8 +208,9 @@ def test_astra_vectors(tmp_path: Path, suffix: str) -> None:
 def test_rtk(tmp_path: Path) -> None:
     """A point through RTK's matrix as its documentation multiplies it, all nine numbers."""
     view = RtkView(40.0, 7.0, -5.0, 50.0, 200.0, 1.0, -2.0, 3.0, 4.0)
-    vectors = rtk_vectors([view], (0.25, 0.2))
-    found = Vectors(vectors.source, vectors.middle, vectors.across, vectors.down, 6, 10)
+    found = Vectors(*vectors_of_rtk([view], (0.25, 0.2)), 6, 10)
+    (back,), pitch = rtk_of_vectors(found)
+    assert back == pytest.approx(view) and pitch == pytest.approx((0.25, 0.2))
     fixed = np.array([POINT[0], POINT[2], -POINT[1], 1])
     u, v, w = rtk_matrix(view) @ fixed
     row, bin = seen(found, POINT, 0)
