@@ -7,8 +7,11 @@ they share kernels). Marks change that:
 
 - ``full``: only ``pytest -m full`` runs the test; another one touches the same code at less cost.
 - ``each``: plain ``pytest`` runs it with each of its parameters, for example once per file format.
-- ``dealt``: ``pytest -m full`` runs it with each of its parameters on one kind of device, which
-  alternates. It puts kernels together that have tests of their own on every kind.
+- ``dealt``: ``pytest -m full`` runs it with each row of its parameters on one kind of device. It
+  puts kernels together that have tests of their own on every kind.
+
+A test of eight and more rows is dealt in any case: each kind of device gets half of them, and,
+where there are several parameters, each value of every one.
 
 ``pytest -m rest`` is ``-m full`` without what the last plain ``pytest`` passed, for .ci/run, which
 runs one after the other and installs optional packages in between. Tests that may do something else
@@ -24,6 +27,7 @@ from __future__ import annotations
 import os
 import sys
 import zlib
+from collections import Counter
 from collections.abc import Iterable
 
 import pytest
@@ -37,6 +41,8 @@ MARKS = (
 # A worker holds its compiled kernels and its data: up to some 2 GB each.
 _WORKER_BYTES = 3 << 30
 _MOST_WORKERS = 8
+# From this many rows of parameters on, a row is run on one kind of device.
+_MANY_ROWS = 8
 # Where pytest's cache keeps what plain ``pytest`` passed.
 _PASSED_KEY = "selection/passed"
 _passed: set[str] = set()
@@ -198,26 +204,47 @@ def plain(items: Iterable[pytest.Item]) -> Iterable[pytest.Item]:
 
 
 def dealt(items: Iterable[pytest.Item]) -> Iterable[pytest.Item]:
-    """Every case, but of a test that is marked ``dealt`` each row of parameters on one device."""
+    """Every case, but of a test that is ``dealt``, or has many rows, each row on one device."""
     tests: dict[str, list[pytest.Item]] = {}
     for item in items:
-        if item.get_closest_marker("dealt") is None or _is_cpu(item) is None:
+        if _is_cpu(item) is None:
             yield item
         else:
             tests.setdefault(item.nodeid.split("[")[0], []).append(item)
     for name, cases in tests.items():
-        devices: dict[int, int] = {}
-        rows: dict[tuple[tuple[str, int], ...], int] = {}
+        devices = list(dict.fromkeys(id(case.callspec.params["device"]) for case in cases))
+        rows = _dealt_rows(map(_row, cases), len(devices), zlib.crc32(name.encode()))
+        dealt = cases[0].get_closest_marker("dealt") is not None or len(rows) >= _MANY_ROWS
         for case in cases:
-            devices.setdefault(id(case.callspec.params["device"]), len(devices))
-        for case in cases:
-            # Values are the same objects for each device, whatever they are.
-            params = {n: id(value) for n, value in case.callspec.params.items()}
-            device = devices[params.pop("device")]
-            # Tests of one row begin on different devices, the same every time.
-            turn = rows.setdefault(tuple(params.items()), len(rows)) + zlib.crc32(name.encode())
-            if turn % len(devices) == device:
+            device = devices.index(id(case.callspec.params["device"]))
+            if not dealt or rows[_row(case)] == device:
                 yield case
+
+
+def _row(case: pytest.Item) -> tuple[tuple[str, int], ...]:
+    """A row of parameters without the device; values are the same objects for each device."""
+    params = case.callspec.params.items()
+    return tuple((name, id(value)) for name, value in params if name != "device")
+
+
+def _dealt_rows(
+    rows: Iterable[tuple[tuple[str, int], ...]], devices: int, turn: int
+) -> dict[tuple[tuple[str, int], ...], int]:
+    """The device of each row: that on which its values, then all rows, were had least often.
+
+    So every value of each of several parameters is had on every device, though not beside every
+    value of the others. Tests of one row begin on different devices, always the same (``turn``).
+    """
+    chosen: dict[tuple[tuple[str, int], ...], int] = {}
+    had: Counter[tuple[object, int]] = Counter()
+    for row in rows:
+        if row in chosen:
+            continue
+        order = {n: (sum(had[v, n] for v in row), had[None, n], (n + turn) % devices)
+                 for n in range(devices)}  # fmt: skip
+        chosen[row] = min(order, key=lambda n: order[n])
+        had.update((value, chosen[row]) for value in (None, *row))
+    return chosen
 
 
 def _one(cases: list[pytest.Item]) -> pytest.Item:
