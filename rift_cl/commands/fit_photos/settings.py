@@ -73,7 +73,8 @@ class PhotosTraining:
 class FitPhotosSettings(RepeatableRun, FitOutput, PhotosTraining, PhotosInput, FitSettings):
     """Fit splats to photographs.
 
-    '--strategy default --help' lists the options of that strategy.
+    '--strategy default --help' lists the options of that strategy. Options with a dot in their name
+    (--learning-rates.means) are for experts: few fits need another value.
 
     Example: rift fit photos capture/transforms.json --out fit --steps 3000 --splats 20000
     """

@@ -92,6 +92,9 @@ class XrayTraining:
 class FitXraySettings(RepeatableRun, XrayOutput, XrayTraining, XrayInput, FitSettings):
     """Fit Gaussian densities to the projections of a parallel-beam X-ray scan.
 
+    Options with a dot in their name (--learning-rates.means) are for experts: few fits need another
+    value.
+
     Example: rift fit xray scan.h5 --out fit --steps 3000 --splats 20000
     """
 
