@@ -70,7 +70,7 @@ def test_candidates_add_up_to_the_merit_of_all_of_them(kind):
     pool = pool_of(objective, offered)
     for index in range(8):
         pool.add(index)
-    assert pool.merit_with(8) == pytest.approx(objective.value(offered), rel=1e-9)
+    assert pool.criterion_with(8) == pytest.approx(objective.value(offered), rel=1e-9)
     merit, falls = pool.mixed(np.ones(9))
     assert merit == pytest.approx(objective.value(offered), rel=1e-9)
     # Falls are minus the derivatives by the amounts.

@@ -45,7 +45,7 @@ def test_a_pool_has_the_merit_of_the_views_chosen_from_it(target, kind, fixed):
     chosen = []
     for index in (4, 1, 7):
         expected = objective.value(offered.take([*chosen, index]))
-        assert offers.merit_with(index) == pytest.approx(expected, rel=1e-9)
+        assert offers.criterion_with(index) == pytest.approx(expected, rel=1e-9)
         gain = objective.value(offered.take(chosen)) - expected if chosen else 0
         assert gain <= offers.ceilings()[index] + 1e-12
         offers.add(index)
@@ -61,7 +61,7 @@ def test_a_pool_has_the_merit_of_the_views_chosen_from_it(target, kind, fixed):
         ends = [offers.mixed(amounts + 0.5 + sign * step)[0] for sign in (1, -1)]
         assert falls[index] == pytest.approx((ends[1] - ends[0]) / 2e-5, rel=1e-5)
     offers.clear()
-    assert offers.merit_with(4) == pytest.approx(objective.value(offered.take([4])), rel=1e-9)
+    assert offers.criterion_with(4) == pytest.approx(objective.value(offered.take([4])), rel=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["wiener", "logdet"])

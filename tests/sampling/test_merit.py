@@ -12,7 +12,7 @@ from rift_cl.sampling.coverage.host import host_coverage
 from rift_cl.sampling.criteria import merit as merit_file
 from rift_cl.sampling.criteria.exact import exact
 from rift_cl.sampling.criteria.kriging import kriging
-from rift_cl.sampling.criteria.merit import merit, merit_of_coverage
+from rift_cl.sampling.criteria.merit import criterion_of_coverage, merit
 from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.prior import directions_for
 from rift_cl.sampling.targets.target import Target, half_ball
@@ -23,7 +23,7 @@ POINTS = ((0.1, 0, 0), (-0.1, 0.2, 0.05))
 
 def scored(kind, directions, target):
     observations = Observations.along(directions)
-    return merit_of_coverage(
+    return criterion_of_coverage(
         kind, host_coverage(observations, target.k, target.diameter), target
     ).value
 
@@ -59,10 +59,10 @@ def test_bits_that_a_view_brings_shrink_as_others_are_there(seed, target):
 @pytest.mark.parametrize("kind", ["wiener", "worst"])
 def test_a_share_is_between_none_and_all(kind, target):
     nothing = np.zeros((2, len(target.k)))
-    assert merit_of_coverage(kind, nothing, target).value == pytest.approx(1)
-    assert merit_of_coverage(kind, nothing + 1e9, target).value == pytest.approx(0, abs=1e-8)
+    assert criterion_of_coverage(kind, nothing, target).value == pytest.approx(1)
+    assert criterion_of_coverage(kind, nothing + 1e9, target).value == pytest.approx(0, abs=1e-8)
     assert 0 < scored(kind, scattered(8, 0), target) < 1
-    assert merit_of_coverage("logdet", nothing, target).value == 0
+    assert criterion_of_coverage("logdet", nothing, target).value == 0
 
 
 def test_many_views_all_round_know_nearly_everything(target):
@@ -140,7 +140,7 @@ def test_it_ranks_as_the_exact_error_does(flat):
         known = host_coverage(observations, target.k, 1.0)
         found.append(
             (
-                merit_of_coverage("wiener", known, target).value,
+                criterion_of_coverage("wiener", known, target).value,
                 kriging(observations, target),
                 exact(observations, target, samples),
             )

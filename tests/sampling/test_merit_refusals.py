@@ -6,7 +6,7 @@ from scattered_cameras import cameras
 
 from rift_cl.errors import InputError, NonFiniteError, RiftError, ShapeError
 from rift_cl.sampling.criteria.exact import exact
-from rift_cl.sampling.criteria.merit import merit, merit_of_coverage
+from rift_cl.sampling.criteria.merit import criterion_of_coverage, merit
 from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.prior import PowerLaw
 from rift_cl.sampling.targets.target import Target, half_ball
@@ -31,7 +31,7 @@ class Odd:
     ("call", "error", "says"),
     [
         (lambda t: merit(cameras(2), t, "best"), InputError, "kind is 'best', wanted one of"),
-        (lambda t: merit_of_coverage("exact", t.k.T[2:], t), InputError, "kind is 'exact'"),
+        (lambda t: criterion_of_coverage("exact", t.k.T[2:], t), InputError, "kind is 'exact'"),
         (lambda t: merit([], t), ShapeError, "cameras is empty"),
         (lambda t: merit(cameras(1)[0], t), InputError, "cameras in a sequence"),
         (lambda t: merit(Observations.along([[0, 0, 1]]), t), InputError, "this is a Observations"),
@@ -43,9 +43,9 @@ class Odd:
         (lambda t: merit(cameras(2), t, weights=[1.0]), ShapeError, r"weights has shape \(1,\)"),
         (lambda t: merit(cameras(2), t, weights=[1, -1]), InputError, "0 or more"),
         (lambda t: merit(cameras(2), t, weights=[1, np.nan]), InputError, "NaN"),
-        (lambda t: merit_of_coverage("wiener", [[1.0]], t), ShapeError, "coverage has shape"),
-        (lambda t: merit_of_coverage("wiener", -t.k.T[2:], t), InputError, "goes down to -"),
-        (lambda t: merit_of_coverage("worst", t.k.T[2:] + np.nan, t), NonFiniteError, "NaN"),
+        (lambda t: criterion_of_coverage("wiener", [[1.0]], t), ShapeError, "coverage has shape"),
+        (lambda t: criterion_of_coverage("wiener", -t.k.T[2:], t), InputError, "goes down to -"),
+        (lambda t: criterion_of_coverage("worst", t.k.T[2:] + np.nan, t), NonFiniteError, "NaN"),
         (lambda t: exact(Observations.along([[1, 0, 0]]), t, 99), RiftError, "99 samples across"),
         (
             lambda t: exact(Observations.along([[0, 0, 1]]), Target.flat(1.0)),

@@ -9,7 +9,7 @@ from rift_cl.errors import InputError
 from rift_cl.reference.splat_projection import spherical_harmonics
 from rift_cl.sampling.criteria.appearance import variances
 from rift_cl.sampling.criteria.merit import merit
-from rift_cl.sampling.criteria.surface import surface_merit, texture_coverage
+from rift_cl.sampling.criteria.surface import surface_criterion, texture_coverage
 from rift_cl.sampling.targets.observations import Observations
 from rift_cl.sampling.targets.prior import directions_for
 from rift_cl.sampling.targets.target import Target
@@ -40,7 +40,7 @@ def tilted(angle, turn=0.0):
 def test_a_view_from_straight_above_sees_all_and_one_from_behind_nothing():
     np.testing.assert_allclose(texture_coverage(looking([[0, 0, 2.0]]), patch()), 1)
     assert not texture_coverage(looking([[0, 0, -1.0], [1, 0, 0]]), patch()).any()
-    behind, _ = surface_merit(looking([[0, 0, -1.0]]), patch())
+    behind, _ = surface_criterion(looking([[0, 0, -1.0]]), patch())
     assert behind == pytest.approx(2)
 
 
@@ -59,7 +59,7 @@ def test_light_adds_up_and_more_views_never_make_it_worse():
     one, two = looking(views[:4]), looking([*views[:4], *views[:4]])
     np.testing.assert_allclose(texture_coverage(two, patch()), 2 * texture_coverage(one, patch()))
     for kind in ("wiener", "logdet", "worst"):
-        values = [surface_merit(looking(views[: n + 1]), patch(), kind)[0] for n in range(9)]
+        values = [surface_criterion(looking(views[: n + 1]), patch(), kind)[0] for n in range(9)]
         assert (np.diff(values) <= 1e-12).all()
         assert values[-1] < values[0]
 
@@ -68,14 +68,14 @@ def test_light_adds_up_and_more_views_never_make_it_worse():
 def test_sheen_is_that_of_the_matrix_of_harmonics(kind):
     views = np.random.default_rng(1).normal((0, 0, 2), size=(7, 3))
     observations, degree = looking(views), 2
-    both, _ = surface_merit(observations, patch(snr=20.0, degree=degree), kind)
+    both, _ = surface_criterion(observations, patch(snr=20.0, degree=degree), kind)
     # Of degree 0 the brightness is one number, whose error is known by itself.
     units = observations.direction[:, 0]
     light = units[:, 2]
     scale = np.sqrt(np.repeat(variances(degree), [1, 3, 5]))
     basis = spherical_harmonics(units, degree) * np.sqrt(4 * np.pi) * scale
     gram = np.eye(9) + 20 * (basis * light[:, None]).T @ basis
-    plain, _ = surface_merit(observations, patch(snr=20.0, degree=0), kind)
+    plain, _ = surface_criterion(observations, patch(snr=20.0, degree=0), kind)
     if kind == "wiener":
         toward = directions_for(3, 4000)
         waves = spherical_harmonics(toward, degree) * np.sqrt(4 * np.pi) * scale
@@ -91,8 +91,8 @@ def test_sheen_is_that_of_the_matrix_of_harmonics(kind):
 def test_sheen_wants_views_from_several_sides():
     close = [tilted(0.05 * n, n) for n in range(16)]
     spread = [tilted(1.2 * np.sqrt((n + 0.5) / 16), 2.4 * n) for n in range(16)]
-    appearance = [surface_merit(looking(v), patch(degree=3))[0] for v in (close, spread)]
-    matt = [surface_merit(looking(v), patch(degree=0))[0] for v in (close, spread)]
+    appearance = [surface_criterion(looking(v), patch(degree=3))[0] for v in (close, spread)]
+    matt = [surface_criterion(looking(v), patch(degree=0))[0] for v in (close, spread)]
     assert appearance[1] < appearance[0]
     assert matt[1] > matt[0]
 
@@ -148,6 +148,6 @@ def test_what_a_surface_has_not_is_refused():
     with pytest.raises(InputError, match="degree is 33"):
         patch(degree=33)
     with pytest.raises(InputError, match="kind is 'best', wanted wiener"):
-        surface_merit(looking([[0, 0, 1]]), patch(), "best")
+        surface_criterion(looking([[0, 0, 1]]), patch(), "best")
     with pytest.raises(InputError, match="no normals"):
-        surface_merit(looking([[0, 0, 1]]), Target((0, 0, 0), 1.0))
+        surface_criterion(looking([[0, 0, 1]]), Target((0, 0, 0), 1.0))

@@ -30,7 +30,7 @@ from rift_cl.sampling import Observations, Target
 from rift_cl.sampling.coverage.host import host_coverage
 from rift_cl.sampling.criteria.exact import exact
 from rift_cl.sampling.criteria.kriging import kriging
-from rift_cl.sampling.criteria.merit import CoverageMerit, merit_of_coverage
+from rift_cl.sampling.criteria.merit import CoverageCriterion, criterion_of_coverage
 
 NAME = "merit_study"
 TITLE = "A merit of views against the errors of reconstructions"
@@ -43,7 +43,7 @@ SCORES = {
     "gap": "largest gap",
     "gaps": "sum of squared gaps",
 }
-_BY_COVERAGE: tuple[CoverageMerit, ...] = ("wiener", "logdet", "worst")
+_BY_COVERAGE: tuple[CoverageCriterion, ...] = ("wiener", "logdet", "worst")
 METHODS = ("CGLS", "MAP")
 COUNTS = (12, 32)
 # Correlation that the merit must have, and what it must be ahead of the largest gap by.
@@ -148,7 +148,7 @@ def scores(angles: Floats, target: Target) -> dict[str, float]:
     between = gaps(angles)
     known = host_coverage(observations, target.k, target.diameter)
     return {
-        **{kind: merit_of_coverage(kind, known, target).value for kind in _BY_COVERAGE},
+        **{kind: criterion_of_coverage(kind, known, target).value for kind in _BY_COVERAGE},
         "kriging": kriging(observations, target),
         "exact": exact(observations, target),
         "gap": float(between.max()),

@@ -12,7 +12,7 @@ from rift_cl.commands.inputs.view_set import ViewSet
 from rift_cl.sampling.coverage.host import host_coverage
 from rift_cl.sampling.criteria.crowther import crowther, crowther_views
 from rift_cl.sampling.criteria.limits import CAUSES, Limits, limits
-from rift_cl.sampling.criteria.merit import merit_of_coverage
+from rift_cl.sampling.criteria.merit import criterion_of_coverage
 from rift_cl.sampling.criteria.orlov import Orlov, orlov
 from rift_cl.sampling.criteria.tuy import tuy
 
@@ -197,9 +197,9 @@ def _ended(found: Limits, name: str, sampled: ViewSet) -> str:
 
 def _ends(found: Limits, p: int, name: str) -> dict[str, Any]:
     """The limiting frequencies at a point, by cause."""
-    seen = found.camera[:, p] > 0
+    observed = found.camera[:, p] > 0
     parts = [
-        float(np.median(end[seen, p])) for end in (found.pixel, found.diffraction, found.focus)
+        float(np.median(end[observed, p])) for end in (found.pixel, found.diffraction, found.focus)
     ]
     ends = (*parts, float(found.number[p]), float(found.reached[p]))
     return {
@@ -222,4 +222,4 @@ def unknown_share(sampled: ViewSet) -> float:
     """The posterior variance as a fraction of the prior, for a power spectrum 1/k^2."""
     target = sampled.target
     found = host_coverage(sampled.observations(), target.k, target.diameter)
-    return merit_of_coverage("wiener", found, target).value
+    return criterion_of_coverage("wiener", found, target).value

@@ -24,7 +24,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.io.output import write_text
 from rift_cl.progress import Report
-from rift_cl.sampling.criteria.surface import surface_merit
+from rift_cl.sampling.criteria.surface import surface_criterion
 
 _STEPS = 4
 # Bytes of a view of a point: its direction, weight, pixel, cut-off and blur.
@@ -45,7 +45,7 @@ class Analysis:
         settings.check()
         self.settings = settings
         views, self.decided = open_views(settings)
-        self.sampled, self.points = _seen(views)
+        self.sampled, self.points = _observed(views)
         self.device = settings.open_device()
         self.folder = RunFolder(settings.out, "analyze", overwrite=settings.overwrite)
         self.metrics: dict[str, Any] = {}
@@ -166,7 +166,7 @@ class Analysis:
         if not sampled.opaque:
             return unknown_share(sampled)
         target = surface_of(sampled, usual_distance(sampled))
-        return surface_merit(sampled.observations(target.points), target)[0]
+        return surface_criterion(sampled.observations(target.points), target)[0]
 
     def _rows(self, cameras: tuple[Camera, ...]) -> list[tuple[Any, ...]]:
         center, up = self.sampled.target.center, self.sampled.up
@@ -180,7 +180,7 @@ class Analysis:
             write_text(self.settings.out / "views.csv", csv_text(self._rows(self.added)))
 
 
-def _seen(sampled: ViewSet) -> tuple[ViewSet, dict[str, Floats]]:
+def _observed(sampled: ViewSet) -> tuple[ViewSet, dict[str, Floats]]:
     """The views with those points of the target that one of them sees, and the points' names.
 
     Raises:

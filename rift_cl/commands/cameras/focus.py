@@ -36,14 +36,14 @@ def focus_among(cameras: Sequence[Camera], points: NDArray[np.float32] | None) -
     focus = focus_of(cameras)
     few = [cameras[k] for k in evenly(len(cameras), _CAMERAS)]
     depths = np.array([float(c.view[2, :3] @ focus + c.view[2, 3]) for c in few])
-    seen = _depths_seen(few, points)
-    if seen is None:
+    spans = _depths_seen(few, points)
+    if spans is None:
         if len(few) == 1 or axes_meet(few, focus):
             return focus
         centers = np.array([camera.center for camera in few])
         spread = float(np.linalg.norm(centers - centers.mean(axis=0), axis=1).max()) or 1.0
         return _ahead(few, np.full(len(few), spread))
-    near, middle, far = seen.T
+    near, middle, far = spans.T
     among = np.mean((depths >= near) & (depths <= far))
     return focus if among >= 0.5 else _ahead(few, middle)
 

@@ -48,13 +48,13 @@ def space_of(
     Raises:
         RiftError: the scene of the fit is damaged.
     """
-    seen = _few(cameras)
-    if seen and source.is_dir() and (source / _SCENE).is_file():
+    chosen = _few(cameras)
+    if chosen and source.is_dir() and (source / _SCENE).is_file():
         scene = OpenedScene(SceneInput(source))
         maps = depth_maps(scene, cameras, open_device(device))
         return FreeSpace(maps), "the depth of the fitted splats"
-    if seen and points is not None and len(points) >= _POINTS:
-        known = [one for one in (depth_of_points(c, points) for c in seen) if one is not None]
+    if chosen and points is not None and len(points) >= _POINTS:
+        known = [one for one in (depth_of_points(c, points) for c in chosen) if one is not None]
         if known:
             return FreeSpace(known), "the sparse points"
     return None, ""

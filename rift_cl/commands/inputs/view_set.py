@@ -69,11 +69,11 @@ class ViewSet:
         The target's highest where views have neither.
         """
         observations = self.observations(self.target.center[None])
-        seen = observations.weight[:, 0] > 0
-        if not seen.any():
+        observed = observations.weight[:, 0] > 0
+        if not observed.any():
             return self.target.highest
-        pixels = 0.5 / np.maximum(observations.pixel[seen, 0], 1e-300)
-        finest = float(np.minimum(pixels, observations.cutoff[seen, 0]).max())
+        pixels = 0.5 / np.maximum(observations.pixel[observed, 0], 1e-300)
+        finest = float(np.minimum(pixels, observations.cutoff[observed, 0]).max())
         return finest if finest < _ENDLESS else self.target.highest
 
     @property

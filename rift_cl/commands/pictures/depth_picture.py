@@ -64,10 +64,10 @@ def depth_window(
 
 def window_of(depth: Floats, alpha: Floats) -> tuple[float, float]:
     """Depths between which most of what is seen lies; near before far, both positive."""
-    seen = depth[(alpha > _SOLID) & (depth > 0)]
-    if seen.size == 0:
+    solid = depth[(alpha > _SOLID) & (depth > 0)]
+    if solid.size == 0:
         return 1.0, 2.0
-    near, far = (float(v) for v in np.quantile(seen, [_BEYOND, 1 - _BEYOND]))
+    near, far = (float(v) for v in np.quantile(solid, [_BEYOND, 1 - _BEYOND]))
     return (near, far) if far > 1.001 * near else (0.9 * near, 1.1 * near)
 
 

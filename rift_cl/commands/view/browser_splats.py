@@ -84,13 +84,15 @@ def seen_colors(scene: SplatScene, cameras: Sequence[Camera]) -> Floats:
     colors = np.empty((len(scene), 3))
     for start in range(0, len(scene), _BLOCK):
         here = slice(start, start + _BLOCK)
-        total, seen = np.zeros((len(means[here]), 3)), np.zeros(len(means[here]))
+        total, facing = np.zeros((len(means[here]), 3)), np.zeros(len(means[here]))
         for camera in chosen:
             away = means[here] - camera.center
             before = away @ camera.view[2, :3] > 0
             color = np.einsum("nk,nkc->nc", basis.functions(None, away), scene.sh[here]) + 0.5
             total += np.where(before[:, None], np.clip(color, 0, 1), 0)
-            seen += before
+            facing += before
         constant = np.clip(0.5 + basis.functions(None, [0, 0, 1])[0] * scene.sh[here, 0], 0, 1)
-        colors[here] = np.where(seen[:, None] > 0, total / np.maximum(seen, 1)[:, None], constant)
+        colors[here] = np.where(
+            facing[:, None] > 0, total / np.maximum(facing, 1)[:, None], constant
+        )
     return colors

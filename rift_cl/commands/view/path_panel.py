@@ -30,8 +30,8 @@ class KeyFrame:
 
     def camera(self, aspect: float, edge: int) -> Camera:
         """The camera of a picture with this width by height, and so many pixels along an edge."""
-        seen = dataclasses.replace(self.pose, aspect=aspect).camera(edge)
-        return Camera(seen.size, seen.K, seen.view, seen.model, self.aperture)
+        camera = dataclasses.replace(self.pose, aspect=aspect).camera(edge)
+        return Camera(camera.size, camera.K, camera.view, camera.model, self.aperture)
 
 
 def way_through(keys: Sequence[KeyFrame], between: int, edge: int) -> list[Camera]:

@@ -78,19 +78,19 @@ def taken_from(photograph: Photograph, camera: Camera, reach: float) -> bool:
 
 
 def compared(
-    drawn: Floats, seen: Floats, known: NDArray[np.bool_], how: Comparison, share: float
+    drawn: Floats, observed: Floats, known: NDArray[np.bool_], how: Comparison, share: float
 ) -> Floats:
     """What is drawn with a photograph over it.
 
     Args:
         drawn: (height, width, 3) in display light.
-        seen: the photograph as the same camera sees it, as ``seen_by`` gives it.
+        observed: the photograph as the same camera sees it, as ``seen_by`` gives it.
         known: where it shows anything.
         how: ``wipe`` shows it left of a line, ``blend`` mixes it in.
         share: of the photograph, 0 to 1.
     """
     if how == "blend":
-        return np.where(known[..., None], drawn + share * (seen - drawn), drawn)
+        return np.where(known[..., None], drawn + share * (observed - drawn), drawn)
     # The line runs through the photograph from edge to edge, whatever is beside it.
     columns = np.flatnonzero(known.any(axis=0))
     if not len(columns):
@@ -98,7 +98,7 @@ def compared(
     first, last = int(columns[0]), int(columns[-1]) + 1
     line = round(first + share * (last - first))
     left = known & (np.arange(known.shape[1]) < line)
-    picture = np.where(left[..., None], seen, drawn)
+    picture = np.where(left[..., None], observed, drawn)
     if first < line < last:
         picture[:, line - 1 : line + 1] = _LINE
     return np.asarray(picture, np.float32)

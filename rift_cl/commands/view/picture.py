@@ -62,11 +62,11 @@ class Painter:
         photograph, self.trouble = wish.photograph, ""
         if photograph is None or not taken_from(photograph, camera, self._reach):
             return np.asarray(drawn)
-        seen = self._known("seen", (photograph, camera), lambda: _seen(photograph, camera))
-        if isinstance(seen, RiftError):
-            self.trouble = str(seen)
+        observed = self._known("seen", (photograph, camera), lambda: _observed(photograph, camera))
+        if isinstance(observed, RiftError):
+            self.trouble = str(observed)
             return np.asarray(drawn)
-        image, known = seen
+        image, known = observed
         return compared(drawn, image, known, wish.comparison, wish.share)
 
     def _drawn(
@@ -103,7 +103,7 @@ def _most(integrals: Floats) -> float:
     return float(np.quantile(integrals, _WHITE)) or 1.0
 
 
-def _seen(photograph: Photograph, camera: Camera) -> Any:
+def _observed(photograph: Photograph, camera: Camera) -> Any:
     """A photograph from the page's camera, or why it cannot be had."""
     try:
         return seen_by(photograph, camera)

@@ -60,8 +60,8 @@ class _Window:
 
     def open(self, pictures: CapturePictures, title: str) -> None:
         # Projections of X-rays are no photographs to lay over a picture.
-        seen = isinstance(pictures, CapturePictures)
-        photographs = photographs_in_work(pictures) if seen else ()
+        photographed = isinstance(pictures, CapturePictures)
+        photographs = photographs_in_work(pictures) if photographed else ()
         self._viewer = SplatViewer(
             bounds_of_cameras(pictures.cameras),
             photographs=photographs,

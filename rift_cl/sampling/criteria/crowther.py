@@ -17,7 +17,7 @@ from rift_cl.geometry.numbers import one_number
 from rift_cl.sampling.coverage.work import Views
 from rift_cl.sampling.criteria.orlov import (
     frequency_directions,
-    seen_directions,
+    observed_directions,
     slice_gaps,
     wanted_frequency,
 )
@@ -71,11 +71,11 @@ def crowther(
         InputError: the point lies outside every picture, or the frequency is no frequency.
     """
     wanted = wanted_frequency(frequency, target)
-    seen = seen_directions(views, target, point)
-    gap = float(np.quantile(slice_gaps(seen, frequency_directions(target)), _MOST))
+    observed = observed_directions(views, target, point)
+    gap = float(np.quantile(slice_gaps(observed, frequency_directions(target)), _MOST))
     reached = 0.5 / (target.diameter * max(gap, 1e-12))
     needed = crowther_views(target.diameter, 1 / wanted)
-    return Crowther(len(seen), needed, wanted, reached)
+    return Crowther(len(observed), needed, wanted, reached)
 
 
 def crowther_views(diameter: float, resolution: float) -> int:

@@ -86,10 +86,10 @@ class Limits:
     def sentence(self) -> str:
         """The finding for a reader, at the point where it is worst."""
         worst = int(np.argmin(self.reached))
-        seen = self.camera[:, worst] > 0
-        if not seen.any():
+        observed = self.camera[:, worst] > 0
+        if not observed.any():
             return f"No picture shows point {worst} of the target, so that nothing is known of it."
-        one = float(np.median(self.camera[seen, worst]))
+        one = float(np.median(self.camera[observed, worst]))
         where = "" if len(self.reached) == 1 else f" at point {worst}, the worst,"
         best = "any detail" if one == np.inf else f"{one:.3g} cycles per unit"
         return (
@@ -112,24 +112,24 @@ def limits(views: Views, target: Target, *, weights: ArrayLike | None = None) ->
         InputError: every point lies outside every picture, or a number is out of its range.
     """
     observations = looks_at(views, target, weights)
-    seen = observations.weight > 0
-    if not seen.any():
+    observed = observations.weight > 0
+    if not observed.any():
         observations.check_seen()
     with np.errstate(divide="ignore"):
         parts = [0.5 / observations.pixel, _DIFFRACTION * observations.cutoff, _focus(observations)]
-    pixel, diffraction, focus = (np.where(seen, part, 0) for part in parts)
-    camera = np.where(seen, _end(observations, np.min(parts, axis=0)), 0)
-    first = np.where(seen & np.isfinite(camera), _first(observations, camera, parts[0]), -1)
+    pixel, diffraction, focus = (np.where(observed, part, 0) for part in parts)
+    camera = np.where(observed, _end(observations, np.min(parts, axis=0)), 0)
+    first = np.where(observed & np.isfinite(camera), _first(observations, camera, parts[0]), -1)
     perfect, told = (
         [_told(observations, target, p, ends[:, p]) for p in range(observations.points)]
-        for ends in (np.where(seen, np.inf, 0), camera)
+        for ends in (np.where(observed, np.inf, 0), camera)
     )
     number, reached = (np.array([_most(one) for one in found]) for found in (perfect, told))
     held = [one[one >= _SEEN / target.diameter] for one in told]
     unseen = np.array([1 - len(part) / len(one) for part, one in zip(held, told, strict=True)])
     within = np.array([float(np.median(part)) if len(part) else 0.0 for part in held])
     cause = tuple(
-        _cause(number[p], camera[seen[:, p], p], first[seen[:, p], p])
+        _cause(number[p], camera[observed[:, p], p], first[observed[:, p], p])
         for p in range(observations.points)
     )
     return Limits(pixel, diffraction, focus, camera, first, number, reached, unseen, within, cause)

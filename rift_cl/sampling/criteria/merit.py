@@ -15,7 +15,7 @@ from rift_cl.sampling.coverage.host import host_coverage, host_coverage_grad
 from rift_cl.sampling.criteria.exact import exact
 from rift_cl.sampling.criteria.kriging import kriging
 from rift_cl.sampling.criteria.optimality import Floats, Scored, scored
-from rift_cl.sampling.criteria.surface import surface_merit
+from rift_cl.sampling.criteria.surface import surface_criterion
 from rift_cl.sampling.targets.camera_gradients import CameraGradients, camera_gradients
 from rift_cl.sampling.targets.observations import Observations, ObservationsGradient
 from rift_cl.sampling.targets.prior import checked_power
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from rift_cl.sampling.targets.target import Target
 
 # Those that are functions of coverage, with a gradient.
-CoverageMerit = Literal["wiener", "logdet", "worst"]
-MeritKind = Literal["wiener", "logdet", "worst", "kriging", "exact"]
+CoverageCriterion = Literal["wiener", "logdet", "worst"]
+CriterionKind = Literal["wiener", "logdet", "worst", "kriging", "exact"]
 # Products of views, points and frequencies from which a device is faster than the host.
 _LARGE = 1 << 18
 
@@ -46,7 +46,7 @@ class Merit(NamedTuple):
 def merit(
     cameras: Sequence[Camera],
     target: Target,
-    kind: MeritKind = "wiener",
+    kind: CriterionKind = "wiener",
     *,
     weights: ArrayLike | None = None,
     device: Device | None = None,
@@ -76,35 +76,37 @@ def merit(
         InputError: what is given are no cameras, the kind is unknown or does not go with the
             target's mode, or the prior makes no sense.
     """
-    if kind not in get_args(MeritKind):
-        raise InputError(f"merit: kind is {kind!r}, wanted one of {', '.join(get_args(MeritKind))}")
-    seen = Observations.of(cameras, target.points)
-    observations = seen.weighted(weights)
+    if kind not in get_args(CriterionKind):
+        raise InputError(
+            f"merit: kind is {kind!r}, wanted one of {', '.join(get_args(CriterionKind))}"
+        )
+    unweighted = Observations.of(cameras, target.points)
+    observations = unweighted.weighted(weights)
     if kind == "kriging" or kind == "exact":  # noqa: PLR1714 - what is narrowed by its type
         if target.mode == "surface":
             raise InputError(f"merit: a surface has no {kind}; take wiener, logdet or worst")
         return Merit((kriging if kind == "kriging" else exact)(observations, target), None)
     if target.mode == "surface":
-        value, by_observations = surface_merit(observations, target, kind)
+        value, by_observations = surface_criterion(observations, target, kind)
     else:
         value, by_observations = _volume(observations, target, kind, device)
-    return Merit(value, camera_gradients(cameras, seen, by_observations))
+    return Merit(value, camera_gradients(cameras, unweighted, by_observations))
 
 
 def _volume(
-    observations: Observations, target: Target, kind: CoverageMerit, device: Device | None
+    observations: Observations, target: Target, kind: CoverageCriterion, device: Device | None
 ) -> tuple[float, ObservationsGradient]:
     k, diameter = target.k, target.diameter
     if device is None or observations.weight.size * len(k) < _LARGE:
-        scored = merit_of_coverage(kind, host_coverage(observations, k, diameter), target)
+        scored = criterion_of_coverage(kind, host_coverage(observations, k, diameter), target)
         return scored.value, host_coverage_grad(observations, k, diameter, scored.gradient)
     from rift_cl.sampling.coverage.device import coverage, coverage_grad
 
-    scored = merit_of_coverage(kind, coverage(observations, target, device=device), target)
+    scored = criterion_of_coverage(kind, coverage(observations, target, device=device), target)
     return scored.value, coverage_grad(observations, target, scored.gradient, device=device)
 
 
-def merit_of_coverage(kind: CoverageMerit, coverage: Any, target: Target) -> Scored:
+def criterion_of_coverage(kind: CoverageCriterion, coverage: Any, target: Target) -> Scored:
     """Score the coverage of a target's frequencies.
 
     Args:

@@ -65,11 +65,13 @@ class Orlov:
 def orlov(views: Views, target: Target, *, frequency: float | None = None, point: int = 0) -> Orlov:
     """Orlov's condition for slices of the target's thickness; arguments as ``sufficiency``."""
     wanted = wanted_frequency(frequency, target)
-    seen = seen_directions(views, target, point)
+    observed = observed_directions(views, target, point)
     units = frequency_directions(target)
     thickness = 0.5 / (target.diameter * wanted)
-    gaps = slice_gaps(seen, units)
-    axis, gap = _largest_hole(seen, units[int(np.argmax(gaps))], float(gaps.max()), target.is_flat)
+    gaps = slice_gaps(observed, units)
+    axis, gap = _largest_hole(
+        observed, units[int(np.argmax(gaps))], float(gaps.max()), target.is_flat
+    )
     missing = float((gaps > thickness).mean())
     return Orlov(missing, axis, math.asin(min(gap, 1.0)), wanted, gap <= thickness)
 
@@ -82,7 +84,7 @@ def slice_gaps(directions: Floats, units: Floats) -> Floats:
     return gaps
 
 
-def _largest_hole(seen: Floats, axis: Floats, gap: float, flat: bool) -> tuple[Floats, float]:
+def _largest_hole(observed: Floats, axis: Floats, gap: float, flat: bool) -> tuple[Floats, float]:
     """Climb from a direction to the middle of the hole that it lies in."""
     reach = 2 * math.pi / _IN_PLANE if flat else math.sqrt(8 * math.pi / _IN_SPACE)
     turn = 2 * np.pi * np.arange(_TRIES) * (math.sqrt(5) - 1) / 2
@@ -97,7 +99,7 @@ def _largest_hole(seen: Floats, axis: Floats, gap: float, flat: bool) -> tuple[F
             step = np.outer(radius * np.cos(turn), across) + np.outer(radius * np.sin(turn), down)
         tried = axis + step
         tried /= np.linalg.norm(tried, axis=1, keepdims=True)
-        gaps = slice_gaps(seen, tried)
+        gaps = slice_gaps(observed, tried)
         best = int(np.argmax(gaps))
         if gaps[best] > gap:
             axis, gap = tried[best], float(gaps[best])
@@ -105,7 +107,7 @@ def _largest_hole(seen: Floats, axis: Floats, gap: float, flat: bool) -> tuple[F
     return axis, gap
 
 
-def seen_directions(views: Views, target: Target, point: int) -> Floats:
+def observed_directions(views: Views, target: Target, point: int) -> Floats:
     """Directions (n, 3) of the views that see a point.
 
     Raises:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _TEXTURE = 150
 
 
-class _Seen(NamedTuple):
+class _Observed(NamedTuple):
     """Texture frequencies of one point, as V views see them; arrays (V, K) unless said.
 
     Args:
@@ -44,7 +44,7 @@ class _Seen(NamedTuple):
     transfer: Transfer
 
 
-def surface_merit(
+def surface_criterion(
     observations: Observations, target: Target, kind: str = "wiener"
 ) -> tuple[float, ObservationsGradient]:
     """Errors of a surface's texture and of its appearance, added; each from 0 to 1.
@@ -80,7 +80,10 @@ def texture_coverage(observations: Observations, target: Target) -> Floats:
     points = range(observations.weight.shape[1])
     normals = np.zeros((len(points), 3)) if target.normals is None else target.normals
     return np.stack(
-        [_sum(observations, p, _seen(observations, p, normals[p], _plane(target))) for p in points]
+        [
+            _sum(observations, p, _observed(observations, p, normals[p], _plane(target)))
+            for p in points
+        ]
     )
 
 
@@ -95,19 +98,19 @@ def _texture(
 ) -> tuple[float, ObservationsGradient]:
     plane = _plane(target)
     power = checked_power(target.prior, plane, target.diameter)
-    seen = [_seen(observations, p, normal, plane) for p, normal in enumerate(normals)]
-    coverage = np.stack([_sum(observations, p, one) for p, one in enumerate(seen)])
+    observed = [_observed(observations, p, normal, plane) for p, normal in enumerate(normals)]
+    coverage = np.stack([_sum(observations, p, one) for p, one in enumerate(observed)])
     scored = criteria.scored(kind, coverage, power, target.snr, plane)
     parts = [
         _gradient(observations, p, normals[p], one, scored.gradient[p])
-        for p, one in enumerate(seen)
+        for p, one in enumerate(observed)
     ]
     return scored.value, ObservationsGradient(
         *(np.stack(values, axis=1) for values in zip(*parts, strict=True))
     )
 
 
-def _seen(observations: Observations, point: int, normal: Floats, plane: Floats) -> _Seen:
+def _observed(observations: Observations, point: int, normal: Floats, plane: Floats) -> _Observed:
     axis = np.eye(3)[np.argmin(np.abs(normal))]
     first = np.cross(axis, normal)
     first /= np.linalg.norm(first)
@@ -118,28 +121,30 @@ def _seen(observations: Observations, point: int, normal: Floats, plane: Floats)
     k = np.sqrt((q**2).sum(1) + along**2)
     optics = (observations.pixel, observations.cutoff, observations.blur)
     transfer = optical_transfer(k, *(values[:, point, None] for values in optics))
-    return _Seen(q, cosine, along, transfer)
+    return _Observed(q, cosine, along, transfer)
 
 
-def _sum(observations: Observations, point: int, seen: _Seen) -> Floats:
-    light = observations.weight[:, point, None] * seen.cosine
-    return np.asarray((light * seen.transfer.value**2).sum(0))
+def _sum(observations: Observations, point: int, observed: _Observed) -> Floats:
+    light = observations.weight[:, point, None] * observed.cosine
+    return np.asarray((light * observed.transfer.value**2).sum(0))
 
 
 def _gradient(
-    observations: Observations, point: int, normal: Floats, seen: _Seen, upstream: Floats
+    observations: Observations, point: int, normal: Floats, observed: _Observed, upstream: Floats
 ) -> tuple[Any, ...]:
     """Of one point: by direction (V, 3), weight, pixel, cutoff and blur (V,)."""
-    passed, weight = seen.transfer, observations.weight[:, point, None]
+    passed, weight = observed.transfer, observations.weight[:, point, None]
     by_light = (upstream * passed.value**2).sum(1)
-    by_value = 2 * upstream * weight * seen.cosine * passed.value
+    by_value = 2 * upstream * weight * observed.cosine * passed.value
     # The frequency's square is |q|^2 + along^2, and along is q . v / n . v.
-    by_along = 2 * by_value * passed.square * seen.along / np.maximum(seen.cosine, 1e-9)
-    by_cosine = by_light * weight[:, 0] - (by_along * seen.along).sum(1)
-    by_direction = by_along @ seen.q + (by_cosine * (seen.cosine[:, 0] > 0))[:, None] * normal
+    by_along = 2 * by_value * passed.square * observed.along / np.maximum(observed.cosine, 1e-9)
+    by_cosine = by_light * weight[:, 0] - (by_along * observed.along).sum(1)
+    by_direction = (
+        by_along @ observed.q + (by_cosine * (observed.cosine[:, 0] > 0))[:, None] * normal
+    )
     optics = [(by_value * part).sum(1) for part in (passed.pixel, passed.cutoff, passed.blur)]
     direction = _tangential(by_direction, observations.direction[:, point])
-    return direction, by_light * seen.cosine[:, 0], *optics
+    return direction, by_light * observed.cosine[:, 0], *optics
 
 
 def _tangential(vectors: Floats, direction: Floats) -> Floats:

@@ -56,16 +56,18 @@ def surface_limits(
     observations = looks_at(views, target, weights)
     found = limits(observations, target)
     points = range(observations.points)
-    seen = [observations.weight[:, p] > 0 for p in points]
+    observed = [observations.weight[:, p] > 0 for p in points]
     pixel, diffraction, focus, camera = (
-        np.array([float(np.median(end[seen[p], p])) if seen[p].any() else 0.0 for p in points])
+        np.array(
+            [float(np.median(end[observed[p], p])) if observed[p].any() else 0.0 for p in points]
+        )
         for end in (found.pixel, found.diffraction, found.focus, found.camera)
     )
-    parallax = np.array([_parallax(observations.direction[seen[p], p]) for p in points])
+    parallax = np.array([_parallax(observations.direction[observed[p], p]) for p in points])
     with np.errstate(divide="ignore"):
         # Half a cycle is a pixel.
         depth = 0.5 / (pixel * 2 * np.tan(parallax / 2))
-    cause = tuple(_cause(found.first[seen[p], p]) for p in points)
+    cause = tuple(_cause(found.first[observed[p], p]) for p in points)
     return SurfaceLimits(pixel, diffraction, focus, camera, cause, parallax, depth)
 
 

@@ -55,8 +55,8 @@ class Limits(NamedTuple):
 def choose(pool: Pool, limits: Limits, *, again: bool = True) -> Choice:
     """Choose greedily, by gain and by gain for its cost, and keep the better choice.
 
-    Of equal candidates the first is taken. Gains of the merit ``worst`` may also grow as others are
-    chosen: there old gains are no more than a good guess.
+    Of equal candidates the first is taken. Gains of the criterion ``worst`` may also grow as others
+    are chosen: there old gains are no more than a good guess.
 
     Args:
         pool: the candidates.
@@ -91,14 +91,14 @@ def _choose(pool: Pool, limits: Limits, prices: Floats, again: bool) -> Choice:
     return Choice(order, merits)
 
 
-def _next(pool: Pool, merit: float, stale: Floats, worth: Floats) -> int:
+def _next(pool: Pool, criterion: float, stale: Floats, worth: Floats) -> int:
     """The candidate with the largest gain times worth; old gains in ``stale`` are renewed."""
     fresh = worth < 0
     while True:
         best = int(np.argmax(np.where(worth < 0, -np.inf, stale * worth)))
         if fresh[best]:
             return best
-        stale[best] = merit - pool.merit_with(best)
+        stale[best] = criterion - pool.criterion_with(best)
         fresh[best] = True
 
 
@@ -106,18 +106,18 @@ def bound(pool: Pool, limits: Limits, chosen: list[int]) -> float:
     """Lower bound of the criterion over all choices of as many candidates at the same cost.
 
     Args:
-        pool: the candidates; their merit is convex in the amount of each.
+        pool: the candidates; their criterion is convex in the amount of each.
         limits: how many, and at what cost.
         chosen: a choice to begin with.
     """
     mixture = np.bincount(chosen, minlength=len(pool)).astype(np.float64)
     best = -np.inf
     for step in range(pool.mixing):
-        merit, falls = pool.mixed(mixture)
+        criterion, falls = pool.mixed(mixture)
         least = limits.views * float(falls.max())
         if np.isfinite(limits.total):
             least = min(least, limits.total * float((falls / limits.prices).max()))
-        best = max(best, merit + float(falls @ mixture) - least)
+        best = max(best, criterion + float(falls @ mixture) - least)
         if step == 0:
             mixture = (mixture + len(chosen) / len(pool)) / 2
         elif falls.max() > 0:

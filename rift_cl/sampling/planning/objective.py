@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from rift_cl.sampling.coverage.host import host_coverage, host_coverage_grad
 from rift_cl.sampling.criteria import optimality as criteria
-from rift_cl.sampling.criteria.merit import CoverageMerit
-from rift_cl.sampling.criteria.surface import surface_merit
+from rift_cl.sampling.criteria.merit import CoverageCriterion
+from rift_cl.sampling.criteria.surface import surface_criterion
 from rift_cl.sampling.planning.design_space import (
     DISTANCE,
     ELEVATION,
@@ -48,7 +48,7 @@ class Objective:
     """
 
     design: DesignSpace
-    kind: CoverageMerit = "wiener"
+    kind: CoverageCriterion = "wiener"
     fixed: Observations | None = None
     asked: Target | None = None
 
@@ -114,7 +114,7 @@ class Objective:
     def surface(self, observations: Observations) -> tuple[float, ObservationsGradient]:
         """A surface's criterion, and its derivative by the observations."""
         known = observations if self.fixed is None else joined([self.fixed, observations])
-        value, gradient = surface_merit(known, self.design.target, self.kind)
+        value, gradient = surface_criterion(known, self.design.target, self.kind)
         return value, ObservationsGradient(*(values[-observations.views :] for values in gradient))
 
     def gradient(self, view_table: ViewTable) -> tuple[float, Floats]:
@@ -199,14 +199,14 @@ class _Sight:
     @cached_property
     def observations(self) -> Observations:
         reach = np.maximum(self.depth, 1e-9 * self.design.target.diameter)
-        seen = (self.depth > 0) & self._in_picture(reach)
+        observed = (self.depth > 0) & self._in_picture(reach)
         wavelength = self._of_type("wavelength")[:, None]
         pupil = self.pupil[:, None]
         with np.errstate(divide="ignore"):
             cutoff = pupil / (wavelength * reach)
         return Observations(
             direction=self.away / np.linalg.norm(self.away, axis=2, keepdims=True),
-            weight=self.photons[:, None] * seen,
+            weight=self.photons[:, None] * observed,
             pixel=reach * (self._of_type("pixel") / self.image)[:, None],
             cutoff=cutoff,
             blur=pupil * np.abs(1 - reach / self.plane[:, None]),

@@ -25,7 +25,7 @@ from rift_cl.sampling.planning.design_space import (
 from rift_cl.sampling.planning.view_table import ViewTable
 
 Floats = NDArray[np.float64]
-# Step of the differences with which a path's shape is derived; the merit's own derivative is exact.
+# Step of the differences with which a path's shape is derived; that of the criterion is exact.
 _STEP = 1e-6
 # Settings that all views of a path share, as shares of their range.
 _SHARED = (FOCAL, F_NUMBER, FOCUS, EXPOSURE)
@@ -103,7 +103,7 @@ class PathLayout:
 
     def pulled_back(self, numbers: Floats, by_table: Floats) -> Floats:
         """Derivatives by the numbers, (m, n), from those by the table, (m, V, 7)."""
-        # Merit and constraints ask at the same numbers.
+        # Criterion and constraints ask at the same numbers.
         if self._last.get("at") != numbers.tobytes():
             self._last.update(at=numbers.tobytes(), changes=self._changes(numbers))
         changes = self._last["changes"]

@@ -13,7 +13,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.numbers import one_number
-from rift_cl.sampling.criteria.merit import CoverageMerit
+from rift_cl.sampling.criteria.merit import CoverageCriterion
 from rift_cl.sampling.planning.baselines import Baseline, baselines
 from rift_cl.sampling.planning.candidates import candidates, looked_at, most_candidates
 from rift_cl.sampling.planning.coincident import parted
@@ -42,7 +42,7 @@ _FEW = 6
 # Starts that are moved, and for how many steps until the best of them alone goes on; none that is
 # so much worse than the best, as a share, comes to win.
 _MOVED, _TRIED, _HOPELESS = 3, 10, 0.1
-# By which part the merit may grow so that no two views stand at one place: 0.02 dB.
+# By which part the criterion may grow so that no two views stand at one place: 0.02 dB.
 _PARTING = 5e-3
 
 
@@ -55,7 +55,7 @@ def plan(
     method: Method = "greedy+mma",
     fixed: Sequence[Camera] | Plan = (),
     seed: int = 0,
-    kind: CoverageMerit = "wiener",
+    kind: CoverageCriterion = "wiener",
     compare: bool = True,
 ) -> Plan:
     """Choose camera poses that minimize a criterion.
@@ -85,7 +85,7 @@ def plan(
     """
     if not (one_number(views).is_integer() and 1 <= views <= _MOST_VIEWS):
         raise InputError(f"plan: views is {views!r}, wanted a whole number, 1 or more")
-    for name, value, known in (("method", method, Method), ("kind", kind, CoverageMerit)):
+    for name, value, known in (("method", method, Method), ("kind", kind, CoverageCriterion)):
         if value not in get_args(known):
             raise InputError(f"plan: {name} is {value!r}, wanted one of {get_args(known)}")
     limits = Constraints() if constraints is None else constraints
@@ -95,15 +95,15 @@ def plan(
     check_paid(design)
     _warn_of_few_frequencies(fine)
     taken, weights = _taken(fixed, design)
-    seen = Observations.of(taken, target.points, weights) if taken else None
-    objective = Objective(design, kind, seen, target)
+    observed = Observations.of(taken, target.points, weights) if taken else None
+    objective = Objective(design, kind, observed, target)
     simple = baselines(objective, int(views), seed) if compare else {}
     found, least = _chosen(objective, int(views), method, seed, simple)
     view_table = ViewTable(found.kind, turned(found.table, design))
     if compare and len(view_table) < views:
         simple = baselines(objective, len(view_table), seed)
-    merit = objective.value(view_table)
-    return Plan(objective, view_table, merit, min(least, merit), taken, weights, simple)
+    reached = objective.value(view_table)
+    return Plan(objective, view_table, reached, min(least, reached), taken, weights, simple)
 
 
 def next_views(
@@ -115,7 +115,7 @@ def next_views(
     *,
     method: Method = "greedy+mma",
     seed: int = 0,
-    kind: CoverageMerit = "wiener",
+    kind: CoverageCriterion = "wiener",
     compare: bool = True,
 ) -> Plan:
     """Choose further views, given those that were taken.

@@ -35,7 +35,7 @@ class Pool(Protocol):
     def clear(self) -> None:
         """Choose none."""
 
-    def merit_with(self, index: int) -> float:
+    def criterion_with(self, index: int) -> float:
         """The criterion of the chosen candidates and one more."""
 
     def add(self, index: int) -> None:
@@ -87,7 +87,7 @@ class _VolumePool:
     def clear(self) -> None:
         self._known = np.zeros_like(self._known)
 
-    def merit_with(self, index: int) -> float:
+    def criterion_with(self, index: int) -> float:
         return self._objective.scored(self._known + self._each[index]).value
 
     def add(self, index: int) -> None:
@@ -98,7 +98,7 @@ class _VolumePool:
         return _VolumePool(self._objective, np.concatenate([self._each, own]))
 
     def ceilings(self) -> Floats:
-        # A convex merit falls by no more than its slope says.
+        # A convex criterion falls by no more than its slope says.
         slope = self._objective.scored(self._known).gradient
         return np.asarray(-(self._flat @ slope.ravel()))
 

@@ -28,8 +28,8 @@ from rift_cl.sampling.planning.view_costs import cost, total
 from rift_cl.sampling.planning.view_table import ViewTable
 
 Floats = NDArray[np.float64]
-# Evaluations of the merit. One that falls little says nothing, since the method first finds out how
-# far it may go: it ends where so many together lowered the merit by less than a share of it.
+# Evaluations of the criterion. One that falls little says nothing, since the method first finds out
+# how far it may go: it ends where so many together lowered the criterion by less than a share.
 STEPS = 60
 _ENOUGH, _SEVERAL = 1e-3, 8
 # How far a keep-out may be entered while views move, in target diameters; steps back out of it.
@@ -79,23 +79,23 @@ def refine(objective: Objective, layout: Layout, steps: int = STEPS) -> ViewTabl
     optimiser.set_lower_bounds(low)
     optimiser.set_upper_bounds(high)
     optimiser.set_maxeval(steps)
-    seen: list[tuple[float, Floats]] = []
+    evaluated: list[tuple[float, Floats]] = []
 
-    def merit(numbers: Floats, slope: Floats) -> float:
+    def criterion(numbers: Floats, slope: Floats) -> float:
         value, by_table = objective.gradient(layout.view_table(numbers))
-        seen.append((value, numbers.copy()))
+        evaluated.append((value, numbers.copy()))
         if slope.size:
             slope[:] = layout.pulled_back(numbers, by_table[None])[0]
-        if _settled([entry[0] for entry in seen]):
+        if _settled([entry[0] for entry in evaluated]):
             optimiser.force_stop()
         return value
 
-    optimiser.set_min_objective(merit)
+    optimiser.set_min_objective(criterion)
     _constrain(optimiser, objective.design, layout)
     # Where it breaks off, what was seen until then stands.
     with contextlib.suppress(nlopt.RoundoffLimited, nlopt.ForcedStop):
         optimiser.optimize(np.clip(start, low, high))
-    return _best(objective, layout, sorted(seen, key=lambda entry: entry[0]))
+    return _best(objective, layout, sorted(evaluated, key=lambda entry: entry[0]))
 
 
 def _settled(merits: list[float]) -> bool:
@@ -106,19 +106,19 @@ def _settled(merits: list[float]) -> bool:
     return before - now <= _ENOUGH * abs(before)
 
 
-def _best(objective: Objective, layout: Layout, seen: list[tuple[float, Floats]]) -> ViewTable:
+def _best(objective: Objective, layout: Layout, evaluated: list[tuple[float, Floats]]) -> ViewTable:
     """The best of what was seen that keeps to the constraints; the start if nothing is better."""
     design, best = objective.design, layout.view_table(layout.start)
     value = objective.value(best)
-    for merit, numbers in seen:
-        if merit >= value:
+    for criterion, numbers in evaluated:
+        if criterion >= value:
             break
         views = layout.view_table(numbers)
         if permitted(design, views):
-            best, value = views, merit
+            best, value = views, criterion
             break
     # What is met in the limit only is left by a hair: from the lowest of all a little back.
-    views = _back(design, layout, seen[0][1])
+    views = _back(design, layout, evaluated[0][1])
     return views if permitted(design, views) and objective.value(views) < value else best
 
 

@@ -88,7 +88,7 @@ class SurfacePool:
         """Choose none."""
         self._known, self._appearance = self._base, self._given
 
-    def merit_with(self, index: int) -> float:
+    def criterion_with(self, index: int) -> float:
         """The criterion of the chosen candidates and one more."""
         texture = self._scored(self._known + self._texture[index]).value
         light, appearance = self._light[:, index], self._appearance

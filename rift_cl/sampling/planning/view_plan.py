@@ -40,7 +40,7 @@ class DiminishingReturns(NamedTuple):
 
     Args:
         merits: before the first new view, and with one, two, ...
-        gains: by how much each view lowers the merit.
+        gains: by how much each view lowers the criterion.
         views: after so many the next brings less than ``share``; None if all bring more.
         share: of what those before it brought on average.
     """
@@ -187,9 +187,9 @@ class Plan:
         """The criterion at frequencies that the plan was not optimized for."""
         return self.objective.elsewhere.value(self.view_table)
 
-    def gain(self, merit: float) -> float:
+    def gain(self, value: float) -> float:
         """The share by which the plan lies below another ``elsewhere``; negative if above."""
-        return (merit - self.elsewhere) / max(abs(merit), 1e-300)
+        return (value - self.elsewhere) / max(abs(value), 1e-300)
 
     def verdict(self) -> str:
         """In words, what planning was worth against the best of the baselines."""

@@ -32,28 +32,28 @@ class CameraGradients(NamedTuple):
 
 
 def camera_gradients(
-    cameras: Sequence[Camera], seen: Observations, gradient: ObservationsGradient
+    cameras: Sequence[Camera], observations: Observations, gradient: ObservationsGradient
 ) -> CameraGradients:
     """Chain derivatives by observations with those of observations by cameras.
 
-    Whether a point is in a picture is taken as given: a merit jumps where one leaves it.
+    Whether a point is in a picture is taken as given: a criterion jumps where one leaves it.
 
     Args:
         cameras: V of them.
-        seen: how they see the points when all weights are 1.
-        gradient: by what looks hold.
+        observations: how they see the points when all weights are 1.
+        gradient: by the observations.
     """
-    found = [_one(camera, seen, gradient, view) for view, camera in enumerate(cameras)]
+    found = [_one(camera, observations, gradient, view) for view, camera in enumerate(cameras)]
     position, focal, radius, focus = (np.array(parts) for parts in zip(*found, strict=True))
-    weight = (gradient.weight * seen.weight).sum(1)
+    weight = (gradient.weight * observations.weight).sum(1)
     return CameraGradients(position, focal, radius, focus, weight)
 
 
 def _one(
-    camera: Camera, seen: Observations, gradient: ObservationsGradient, view: int
+    camera: Camera, observations: Observations, gradient: ObservationsGradient, view: int
 ) -> tuple[Floats, float, float, float]:
     """Of one camera: by position (3,), focal length, radius, focus."""
-    fx, pixel = camera.intrinsics[0], seen.pixel[view]
+    fx, pixel = camera.intrinsics[0], observations.pixel[view]
     # How far away a point counts as, which is a pixel's edge times the focal length.
     reach = pixel * fx
     by_pixel, by_blur = gradient.pixel[view], gradient.blur[view]
@@ -61,29 +61,29 @@ def _one(
     if camera.aperture is not None:
         opening, plane = camera.aperture.radius, camera.aperture.focus
         side = 2 * opening * np.sign(1 - reach / plane) * by_blur
-        radius, focus = float(by_blur @ seen.blur[view]), float(side @ reach) / plane**2
+        radius, focus = float(by_blur @ observations.blur[view]), float(side @ reach) / plane**2
         by_reach = by_reach - side / plane
         if camera.aperture.wavelength > 0:
-            by_cutoff = gradient.cutoff[view] * seen.cutoff[view]
+            by_cutoff = gradient.cutoff[view] * observations.cutoff[view]
             radius += float(by_cutoff.sum())
             by_reach = by_reach - by_cutoff / reach
         radius /= opening
-    position = _by_position(camera, seen, gradient.direction[view], by_reach, view)
+    position = _by_position(camera, observations, gradient.direction[view], by_reach, view)
     return position, -float(by_pixel @ pixel) / fx, radius, focus
 
 
 def _by_position(
-    camera: Camera, seen: Observations, by_direction: Floats, by_reach: Floats, view: int
+    camera: Camera, observations: Observations, by_direction: Floats, by_reach: Floats, view: int
 ) -> Floats:
     if camera.model == "ortho":
         return np.zeros(3)
-    direction = seen.direction[view]
+    direction = observations.direction[view]
     if camera.model == "pinhole":
         ahead = direction @ -camera.view[2, :3]
         # Points beside and behind are not seen, so that nothing hangs on how far off they are.
-        distance = seen.pixel[view] * camera.intrinsics[0] / np.where(ahead > 0, ahead, 1)
+        distance = observations.pixel[view] * camera.intrinsics[0] / np.where(ahead > 0, ahead, 1)
         farther = np.broadcast_to(-camera.view[2, :3], direction.shape)
     else:
-        distance, farther = seen.pixel[view] * camera.intrinsics[0], direction
+        distance, farther = observations.pixel[view] * camera.intrinsics[0], direction
     across = by_direction - (by_direction * direction).sum(1, keepdims=True) * direction
     return np.asarray((across / distance[:, None] + by_reach[:, None] * farther).sum(0))

@@ -153,11 +153,13 @@ class Observations:
             raise InputError(f"row_pitch is {row_pitch!r}, wanted a positive length")
         t = np.cos(angles) * x[:, 0] + np.sin(angles) * x[:, 1]
         bins = t / scan.pitch + scan.center
-        seen = ((bins >= -0.5) & (bins <= scan.bins - 0.5)).astype(np.float64)
+        observed = ((bins >= -0.5) & (bins <= scan.bins - 0.5)).astype(np.float64)
         line = np.concatenate([-np.sin(angles), np.cos(angles), np.zeros_like(angles)], axis=1)
-        direction = np.broadcast_to(line[:, None], (*seen.shape, 3))
-        edge = np.full(seen.shape, max(scan.pitch, rows))
-        return cls(direction, seen, edge, np.full(seen.shape, np.inf), np.zeros(seen.shape))
+        direction = np.broadcast_to(line[:, None], (*observed.shape, 3))
+        edge = np.full(observed.shape, max(scan.pitch, rows))
+        return cls(
+            direction, observed, edge, np.full(observed.shape, np.inf), np.zeros(observed.shape)
+        )
 
     @classmethod
     def along(cls, directions: ArrayLike) -> Observations:
@@ -199,7 +201,7 @@ class _Sight(NamedTuple):
     """One camera's view of P points: ``Observations`` without the views' axis."""
 
     direction: Floats
-    seen: Floats
+    observed: Floats
     pixel: Floats
     cutoff: Floats
     blur: Floats
@@ -227,11 +229,11 @@ def _sight(camera: Camera, points: Floats) -> _Sight:
             side = np.hypot(local[:, 0], local[:, 1])
             bend = np.arctan2(side, depth) / np.where(side > 0, side, 1)
             flat, ahead = local[:, :2] * bend[:, None], (depth > 0) | (side > 0)
-    seen = ahead & _inside(camera, flat)
+    observed = ahead & _inside(camera, flat)
     cutoff, blur = np.full(len(points), np.inf), np.zeros(len(points))
     if camera.aperture is not None:
         cutoff, blur = camera.aperture.cutoff(reach), camera.aperture.blur(reach)
-    return _Sight(direction, seen.astype(np.float64), reach / fx, cutoff, blur)
+    return _Sight(direction, observed.astype(np.float64), reach / fx, cutoff, blur)
 
 
 def _inside(camera: Camera, flat: Floats) -> NDArray[np.bool_]:

@@ -1,8 +1,8 @@
 """What is believed about a target before it is seen: how its power falls with frequency.
 
-A merit asks how much of a target stays unknown, and that depends on what there is to know. Every
-prior gives the same quantity, the power spectrum with its mean over all directions at one cycle per
-diameter taken as 1, so that the signal-to-noise ratio of a target has one meaning.
+A criterion asks how much of a target stays unknown, and that depends on what there is to know.
+Every prior gives the same quantity, the power spectrum with its mean over all directions at one
+cycle per diameter taken as 1, so that the signal-to-noise ratio of a target has one meaning.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ class Target:
             times the prior's power. With the default and a power law of 2 one view alone has 4
             left at the end of the band. N pixels across a target of contrast c, with noise s in
             each, have about (N c / s)^2 / 40 by that law, most photographs far more; beyond the
-            default the merit counts the tails of its smooth slabs as known.
+            default the criterion counts the tails of its smooth slabs as known.
         band: the highest frequency that is wanted; 16 / diameter by default.
         degree: of the spherical harmonics of a surface's brightness, for the mode ``surface``, 0
             to 32; 0 for a surface that looks the same from all sides. Views closer together than
