@@ -44,7 +44,8 @@ def if_wrong(plan: Plan) -> tuple[WrongPrior, ...]:
     """What the plan is worth if its prior is wrong, by turns.
 
     Empty for a prior that is alike in all directions, for a surface, whose prior lies in its
-    planes, for a criterion that is no share of power, and without evenly spread views to compare with.
+    planes, for a criterion that is no share of power, and without evenly spread views to compare
+    with.
     """
     judged = plan.objective.elsewhere
     target = judged.design.target
