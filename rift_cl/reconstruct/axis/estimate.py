@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.reconstruct.axis.sense import Sense
+
 Floats = NDArray[np.float64]
 
 
@@ -17,7 +19,8 @@ class AxisEstimate:
     """Where a rotation axis is seen on the detector.
 
     Args:
-        center: bin of the axis at the middle row, ``(rows - 1) / 2``.
+        center: bin of the axis at the middle row, ``(rows - 1) / 2``; of a cone at the row of the
+            source's orbit.
         interval: the 95 % confidence interval of ``center``, in bins.
         tilt: by how many bins the axis moves from one row to the next; 0 for a single row.
         spread: root mean square distance of the rows' centres from the axis, in bins; 0 for a
@@ -29,6 +32,7 @@ class AxisEstimate:
         errors: (n,) the standard error of each, in bins.
         scores: (2, m) trial centres and their log-likelihood, all rows together, 0 where the data
             say nothing and greatest at the best.
+        sense: of rotation, as fans and cones tell it; None for parallel beams, which do not.
     """
 
     center: float
@@ -40,6 +44,7 @@ class AxisEstimate:
     centers: Floats
     errors: Floats
     scores: Floats
+    sense: Sense | None = None
 
     @property
     def tilt_error(self) -> float:
@@ -55,10 +60,11 @@ class AxisEstimate:
     def in_words(self) -> str:
         """Where the axis is, how surely, and what told it."""
         low, high = self.interval
-        return (
+        said = (
             f"at bin {self.center:.2f} ({low:.2f} to {high:.2f} at 95 % confidence, by {self.by} "
             f"in {self.rows.size} rows)"
         )
+        return said if self.sense is None else f"{said}; {self.sense.in_words()}"
 
     def _repr_html_(self) -> str:
         """What a notebook shows: where the axis is, and the curve that says so."""
@@ -67,6 +73,7 @@ class AxisEstimate:
 
     def record(self) -> dict[str, Any]:
         """The estimate in words and numbers, as reports and configurations keep it."""
+        sense = {} if self.sense is None else {"sense": self.sense.record()}
         return {
             "center": self.center,
             "interval": list(self.interval),
@@ -74,4 +81,5 @@ class AxisEstimate:
             "spread": self.spread,
             "by": self.by,
             "rows": [int(row) for row in self.rows],
+            **sense,
         }

@@ -7,15 +7,12 @@ contradict each other, nothing stands out, or the interval comes out too wide, n
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.cl.device import Device
-from rift_cl.cl.host_arrays import as_host_array
-from rift_cl.errors import InputError, ShapeError
-from rift_cl.geometry import Parallel
+from rift_cl.errors import InputError
 from rift_cl.reconstruct.axis.estimate import AxisEstimate
 from rift_cl.reconstruct.axis.measures import RowAxis, chosen_measure
 from rift_cl.reconstruct.axis.views import Views, without_rings
@@ -41,48 +38,6 @@ _OUTLIER, _STRAY = 6.0, 2.0
 _REACH, _STEP = 8.0, 0.05
 
 
-def find_center(
-    sinogram: NDArray[np.float32],
-    angles: Floats,
-    *,
-    span: tuple[float, float] | None = None,
-    device: Device | None = None,
-) -> AxisEstimate:
-    """Find the detector bin at which the rotation axis is seen.
-
-    Views from opposite sides decide where there are enough of them (full turns, and those with the
-    axis near an end of the detector), the double wedge for half turns, and the centres of mass for
-    less, where nothing leaves the field of view.
-
-    Args:
-        sinogram: line integrals, (angle, bin) or (angle, row, bin); of a stack, at most five rows
-            are looked at, evenly chosen.
-        angles: directions in radians, in any order.
-        span: where to search, in bins; for half turns the middle 60 % of the detector if not
-            given, for full turns all of it but the outermost bins.
-        device: accepted as by every method; the search runs on the host.
-
-    Returns:
-        The estimate; ``center`` is that of the middle row.
-
-    Raises:
-        InputError: the data do not tell the axis: no contrast, too few views, a wide gap between
-            them, or nothing that stands out of the noise. Also: the span is not on the detector.
-        ShapeError: the sinogram has not two or three axes, or not a view for each angle.
-        NonFiniteError: a sample is not finite.
-    """
-    shape = np.shape(sinogram)
-    if len(shape) not in (2, 3):
-        raise ShapeError(
-            f"find_center: sinogram has shape {shape}, wanted (angle, bin) or (angle, row, bin)"
-        )
-    directions = Parallel(angles, shape[-1]).angles
-    y = as_host_array(sinogram, (directions.size, *shape[1:]), name="sinogram", wants="find_center")
-    stack = y if y.ndim == 3 else y[:, None]
-    rows = searched_rows(stack.shape[1])
-    return axis_of_rows((stack[:, row] for row in rows), rows, stack.shape[1], directions, span)
-
-
 def searched_rows(count: int) -> list[int]:
     """Detector rows used by a search: evenly spaced, the middle one included."""
     taken = min(_ROWS, count)
@@ -91,7 +46,7 @@ def searched_rows(count: int) -> list[int]:
 
 def axis_of_rows(
     sinograms: Iterable[Views],
-    rows: list[int],
+    rows: Sequence[float],
     count: int,
     angles: Floats,
     span: tuple[float, float] | None = None,
@@ -106,7 +61,8 @@ def axis_of_rows(
         span: where to search, in bins.
 
     Raises:
-        InputError: as for ``find_center``.
+        InputError: the data do not tell the axis: no contrast, too few views, a wide gap between
+            them, or nothing that stands out of the noise; or the span is not on the detector.
     """
     measure = chosen_measure(angles, span)
     places, found, why = [], [], ""

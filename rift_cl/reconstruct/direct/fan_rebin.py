@@ -10,47 +10,32 @@ is missing for air; a method that explains rays one by one can use them (``whole
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rift_cl.cl.host_arrays import check_finite
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Parallel
 from rift_cl.geometry.fan import FanBeam
-from rift_cl.geometry.numbers import real_numbers
+from rift_cl.reconstruct.direct.turn_views import (
+    TurnViews,
+    in_one_turn,
+    means,
+    resampled,
+    turn_views,
+)
 
 Floats = NDArray[np.float64]
 Stack = NDArray[np.float32]
 Interpolation = Literal["linear", "cubic"]
 
 _ORDERS = {"linear": 1, "cubic": 3}
-# Views that are repeated beyond the ends of a full turn, more than a cubic spline's reach.
-_BORDER = 12
 # A view of which less is covered is not worth its place.
 _LEAST_COVERED = 0.1
-# A full turn may lack a view and a half, and an end of a scan this share of a step.
-_TURN_SLACK, _SLACK = 1.5, 1e-3
-# Angles closer than this are the same, in radians.
-_SAME = 1e-6
-
-
-class _Views(NamedTuple):
-    """Views in ascending order, some of a full turn's repeated beyond its ends.
-
-    Rays are read from ``first`` to ``last``, which for a full turn are the same direction.
-    """
-
-    angles: Floats
-    order: NDArray[np.intp]
-    turn: bool
-    first: float
-    last: float
-
-    @property
-    def step(self) -> float:
-        return float(np.median(np.diff(self.angles)))
+# Rays beyond the ends of a scan by this share of a step are still taken.
+_SLACK = 1e-3
 
 
 def rebin_fan(
@@ -90,17 +75,17 @@ def rebin_fan(
     if interpolation not in _ORDERS:
         raise InputError(f"interpolation is {interpolation!r}, wanted linear or cubic")
     check_finite(stack, name="projections")
-    turned, group = _in_one_turn(angles)
+    turned, group = in_one_turn(angles)
     scan, _ = covered_rays(turned, stack.shape[-1], fan, whole=whole)
-    stack = _means(stack, group) if len(turned) < len(group) else stack[np.argsort(group)]
-    views, order = _views(turned), _ORDERS[interpolation]
+    stack = means(stack, group) if len(turned) < len(group) else stack[np.argsort(group)]
+    views, order = turn_views(turned), _ORDERS[interpolation]
     ways = _readings(views, scan, fan, stack.shape[-1])
     seen = np.maximum(sum(weight for _, weight in ways), 1)
     places = [(place, weight / seen) for place, weight in ways if weight.any()]
     rows = stack[:, None] if stack.ndim == 2 else stack
     out = np.empty((len(scan.angles), rows.shape[1], scan.bins), np.float32)
     for row in range(rows.shape[1]):
-        out[:, row] = _resampled(rows[views.order, row], places, order)
+        out[:, row] = resampled(rows[views.order, row], places, order)
     return (out[:, 0] if stack.ndim == 2 else out), scan
 
 
@@ -121,7 +106,7 @@ def covered_rays(
     Raises:
         InputError: the views are fewer than two, or cover no parallel view.
     """
-    views = _views(_in_one_turn(angles)[0])
+    views = turn_views(in_one_turn(angles)[0])
     gamma = fan.fan_angles(bins)
     pitch = fan.pitch / fan.magnification
     low, high = fan.source_to_axis * np.sin(gamma[[0, -1]]) / pitch
@@ -149,50 +134,8 @@ def covered_rays(
     return Parallel(directions[covered], scan.bins, pitch, -first), seen[covered]
 
 
-def _in_one_turn(angles: ArrayLike) -> tuple[Floats, NDArray[np.intp]]:
-    """The distinct angles of views, those of further turns brought into the first; ascending.
-
-    Returns:
-        (n,) angles, and (views,) which of them each view has.
-    """
-    values = real_numbers(angles)
-    if values is None or values.ndim != 1 or values.size < 1 or not np.isfinite(values).all():
-        raise InputError("angles of a fan scan are wanted as finite numbers, in radians")
-    if np.ptp(values) > 2 * np.pi + _SAME:
-        lowest = values.min()
-        values = lowest + np.mod(values - lowest + _SAME, 2 * np.pi) - _SAME
-    order = np.argsort(values, kind="stable")
-    new = np.concatenate([[True], np.diff(values[order]) > _SAME])
-    group = np.empty(values.size, np.intp)
-    group[order] = np.cumsum(new) - 1
-    return values[order][new], group
-
-
-def _means(stack: Stack, group: NDArray[np.intp]) -> Stack:
-    """The mean of the views of each group."""
-    sums = np.zeros((group.max() + 1, *stack.shape[1:]))
-    np.add.at(sums, group, stack)
-    counts = np.bincount(group).reshape((-1,) + (1,) * (stack.ndim - 1))
-    return (sums / counts).astype(np.float32)
-
-
-def _views(ascending: Floats) -> _Views:
-    if ascending.size < 2:
-        raise InputError("the fan scan has views of one angle alone, wanted two or more angles")
-    span, step = np.ptp(ascending), np.median(np.diff(ascending))
-    order = np.arange(ascending.size)
-    if span < 2 * np.pi - _TURN_SLACK * step:
-        return _Views(ascending, order, False, float(ascending[0]), float(ascending[-1]))
-    once = ascending < ascending[0] + 2 * np.pi - step / 2
-    ascending, order = ascending[once], order[once]
-    border, first = min(_BORDER, ascending.size), float(ascending[0])
-    beyond = [ascending[-border:] - 2 * np.pi, ascending, ascending[:border] + 2 * np.pi]
-    order = np.concatenate([order[-border:], order, order[:border]])
-    return _Views(np.concatenate(beyond), order, True, first, first + 2 * np.pi)
-
-
 def _readings(
-    views: _Views, scan: Parallel, fan: FanBeam, bins: int
+    views: TurnViews, scan: Parallel, fan: FanBeam, bins: int
 ) -> list[tuple[Floats, Floats]]:
     """(view, bin) at which every parallel ray may be read, and 1 where there is such a reading.
 
@@ -213,20 +156,3 @@ def _readings(
             place = np.stack([view, np.broadcast_to(bin, view.shape)])
             ways.append((place, inside.astype(np.float64)))
     return ways
-
-
-def _resampled(sinogram: Stack, places: list[tuple[Floats, Floats]], order: int) -> Stack:
-    from scipy.ndimage import map_coordinates, spline_filter1d
-
-    smooth = sinogram.astype(np.float64)
-    if order > 1:
-        for axis in (0, 1):
-            smooth = spline_filter1d(smooth, order, axis=axis, mode="mirror")
-    total = np.zeros(places[0][1].shape)
-    for place, weight in places:
-        used = weight > 0
-        values = map_coordinates(
-            smooth, place[:, used], order=order, mode="mirror", prefilter=False
-        )
-        total[used] += weight[used] * values
-    return total.astype(np.float32)

@@ -1,0 +1,103 @@
+"""The axis of fans and cones and the sense of their rotation, from opposite rays."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fan_scenes import FULL, KINDS, SHORT, cone, fan, projections, sinogram
+
+import rift_cl as rift
+from rift_cl.errors import InputError, ShapeError
+
+TURNS = {
+    "full": FULL,
+    "short": SHORT,
+    "uneven": np.random.default_rng(2).uniform(0, 2 * np.pi, 260),
+}
+
+
+def _unknown(scan):
+    """What is known before the search: all but the centre."""
+    return replace(scan, center=None)
+
+
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_axis_is_found(kind, turn):
+    scan = fan(TURNS[turn])
+    found = rift.find_center(sinogram(KINDS[kind], scan), _unknown(scan))
+    assert found.center == pytest.approx(83.7, abs=0.1)
+    assert found.interval[0] <= found.center <= found.interval[1]
+    assert found.sense is not None
+    assert found.sense.sign == 1
+
+
+def test_the_sense_is_told():
+    scan = fan()
+    y = sinogram(KINDS["porous"], scan)
+    for wrong, data in ((replace(scan, angles=-FULL), y), (scan, y[:, ::-1])):
+        found = rift.find_center(data, _unknown(wrong))
+        assert found.sense.sign == -1
+        assert found.sense.disagreement[0] > 2 * found.sense.disagreement[1]
+        right = 83.7 if data is y else y.shape[1] - 1 - 83.7
+        assert found.center == pytest.approx(right, abs=0.1)
+    both = rift.find_center(y[:, ::-1], _unknown(replace(scan, angles=-FULL)))
+    assert both.sense.sign == 1
+
+
+def test_a_narrow_fan_does_not_tell_the_sense():
+    scan = replace(fan(), source_to_axis=1e6, source_to_detector=1.5e6)
+    found = rift.find_center(sinogram(KINDS["porous"], scan), _unknown(scan))
+    assert found.sense.sign == 0
+    assert found.center == pytest.approx(83.7, abs=0.1)
+
+
+def test_a_detector_moved_aside():
+    scan = fan(center=118.0)
+    found = rift.find_center(sinogram(KINDS["wider than the detector"], scan), _unknown(scan))
+    assert found.center == pytest.approx(118.0, abs=0.1)
+
+
+def test_a_curved_detector():
+    scan = replace(fan(), curved=True)
+    y = sinogram(KINDS["porous"], scan)
+    assert rift.find_center(y, _unknown(scan)).center == pytest.approx(83.7, abs=0.1)
+
+
+def test_cones_are_searched_near_the_orbit():
+    scan = cone()
+    y = projections(scan)
+    found = rift.find_center(y, replace(scan, center=(11.5, 79.5)))
+    assert found.center == pytest.approx(83.7, abs=0.1)
+    assert found.sense.sign == 1
+    assert abs(found.rows - 11.5).max() < 8
+    order = np.random.default_rng(0).permutation(scan.views)
+    again = rift.find_center(y[order], replace(scan, angles=scan.angles[order]))
+    assert again.center == pytest.approx(found.center, abs=0.01)
+
+
+def test_what_cannot_be_told_is_refused():
+    scan = fan()
+    with pytest.raises(InputError, match="no contrast"):
+        rift.find_center(np.ones((scan.views, scan.bins), np.float32), scan)
+    with pytest.raises(InputError, match="span"):
+        rift.find_center(sinogram(KINDS["parts"], fan(FULL[:10])), fan(FULL[:10]))
+    with pytest.raises(ShapeError):
+        rift.find_center(np.ones((3, 3), np.float32), scan)
+    helix = cone(heights=np.arange(FULL.size // 2))
+    with pytest.raises(InputError, match="heights"):
+        rift.find_center(np.ones((helix.views, helix.rows, helix.bins), np.float32), helix)
+    with pytest.raises(InputError, match="row"):
+        aside = cone(center=(-4.0, 80.0))
+        rift.find_center(np.ones((aside.views, aside.rows, aside.bins), np.float32), aside)
+
+
+@pytest.mark.full
+def test_real_walnut(shared_data):
+    with np.load(shared_data / "walnut" / "walnut_cone.npz") as data:
+        y, angles = data["sinogram"].astype(np.float32), data["angles"]
+        lengths = float(data["du"]), float(data["sid"]), float(data["sdd"])
+    for sign in (1, -1):
+        found = rift.find_center(y, rift.Cone(sign * angles, *y.shape[1:], *lengths))
+        assert found.center == pytest.approx(128.0, abs=0.1)
+        assert found.sense.sign == sign
