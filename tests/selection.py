@@ -10,6 +10,9 @@ they share kernels). Marks change that:
 - ``dealt``: ``pytest -m full`` runs it with each row of its parameters on one kind of device. It
   puts kernels together that have tests of their own on every kind.
 
+- ``study``: no selection runs it. It computes a study of ``tools/`` at length, as whoever writes
+  the figures down does; ``-m study`` runs all of them.
+
 A test of eight and more rows is dealt in any case: each kind of device gets half of them, and,
 where there are several parameters, each value of every one.
 
@@ -37,6 +40,7 @@ MARKS = (
     "each: plain `pytest` runs it with each of its parameters, not with the first alone",
     "once: a CPU runs it as a CPU alone; others test its kernels on every kind of device",
     "dealt: all cases together run each of its parameters once, on the devices in turn",
+    "study: computes a study of tools/ at length; `pytest -m study` runs it, or whoever names it",
 )
 # A worker holds its compiled kernels and its data: up to some 2 GB each.
 _WORKER_BYTES = 3 << 30
@@ -157,15 +161,13 @@ class _Notes:
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what the selection does not run."""
-    if config.selection == "plain":
-        chosen = set(plain(items))
-    elif config.selection == "full":
-        chosen = set(dealt(items))
-    elif config.selection == "rest":
-        passed = set(config.cache.get(_PASSED_KEY, ()) if hasattr(config, "cache") else ())
-        chosen = {item for item in dealt(items) if item.nodeid not in passed}
-    else:
+    if config.selection == "named":
         return
+    offered = [item for item in items if item.get_closest_marker("study") is None]
+    chosen = set((plain if config.selection == "plain" else dealt)(offered))
+    if config.selection == "rest":
+        passed = set(config.cache.get(_PASSED_KEY, ()) if hasattr(config, "cache") else ())
+        chosen = {item for item in chosen if item.nodeid not in passed}
     config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
     items[:] = [item for item in items if item in chosen]
 

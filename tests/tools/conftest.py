@@ -4,6 +4,8 @@ Tools are for who works on the package and are no part of it: only ``pytest -m f
 """
 
 import importlib
+import runpy
+import sys
 from pathlib import Path
 
 import pytest
@@ -16,6 +18,23 @@ def tool(monkeypatch):
     """Import a module as the script does."""
     monkeypatch.syspath_prepend(TOOLS)
     return importlib.import_module
+
+
+@pytest.fixture
+def ended(monkeypatch, capsys):
+    """Run a script in this process: its status, and what it said on stderr.
+
+    For what ends before there is much work: a process of its own would load torch for one sentence.
+    """
+
+    def run(path, *arguments):
+        monkeypatch.syspath_prepend(TOOLS)
+        monkeypatch.setattr(sys, "argv", [str(path), *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            runpy.run_path(str(path), run_name="__main__")
+        return end.value.code, capsys.readouterr().err
+
+    return run
 
 
 def pytest_collection_modifyitems(items):

@@ -26,6 +26,7 @@ def run(*arguments):
     return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False)
 
 
+@pytest.mark.study
 def test_a_study_is_computed_kept_and_drawn_again(tmp_path):
     first = run("--tiny", "--only", "angular_fixed", "volumes", "--seeds", 4, "--out", tmp_path)
     assert first.returncode == 0, first.stderr
@@ -60,11 +61,11 @@ def test_a_study_is_computed_kept_and_drawn_again(tmp_path):
         (("--seeds", -1), "--seeds"),
     ],
 )
-def test_bad_arguments(tmp_path, arguments, word):
-    result = run(*arguments, "--out", tmp_path / "out")
-    assert result.returncode == 3
-    assert word in result.stderr
-    assert "Traceback" not in result.stderr
+def test_bad_arguments(ended, tmp_path, arguments, word):
+    status, said = ended(TOOL, *arguments, "--out", tmp_path / "out")
+    assert status == 3
+    assert word in said
+    assert "Traceback" not in said
 
 
 @pytest.mark.parametrize("name", STUDIES)
