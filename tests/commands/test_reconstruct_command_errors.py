@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from rift_cl.commands.cli import main
+from rift_cl.commands.reconstruct import slice_input
 
 DEVICE, INPUT, OUTPUT = 4, 3, 5
 
@@ -96,6 +97,18 @@ def test_bad_arguments_are_told(scan, tmp_path, capsys, extra, status, words):
     assert words in captured.err
     assert "Traceback" not in captured.err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("how", [(), ("--dry-run",), ("--method", "sirt", "--steps", 2)])
+def test_a_memory_too_small_is_told_before_the_axis_is_looked_for(
+    scan, tmp_path, capsys, monkeypatch, how
+):
+    searched = []
+    monkeypatch.setattr(slice_input, "find_axis", lambda *_: searched.append(1))
+    out = tmp_path / "out"
+    assert run("reconstruct", scan.counts, *how, "--out", out, "--memory", "100K") == INPUT
+    assert "one slice needs" in capsys.readouterr().err
+    assert not searched and not out.exists()
 
 
 def test_debug_shows_the_traceback(tmp_path, capsys):

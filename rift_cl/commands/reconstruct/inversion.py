@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections.abc import Generator
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from rift_cl.operators import (
     ParallelProjector,
     cheapest_projector,
 )
+from rift_cl.operators.projector.phase_projector import PhaseProjector
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp, poisson_weights
 from rift_cl.reconstruct.solvers.direction_weights import DirectionWeights
@@ -84,7 +84,9 @@ class Inversion:
     @property
     def need(self) -> int:
         """Bytes that a slice takes, on host and device together, besides the projector's own."""
-        A = self.projector(1)
+        return self._need(self.projector(1))
+
+    def _need(self, A: ParallelProjector) -> int:
         images, sinograms = _ARRAYS[self.settings.method]
         views, bins = len(A.scan.angles), max(A.scan.bins, self.source.scan.shape[2])
         views = max(views, self.source.scan.shape[0])
@@ -99,6 +101,14 @@ class Inversion:
             self._projectors[count] = self._projector(slices)
         return self._projectors[count]
 
+    def check_memory(self) -> None:
+        """Make sure that a slice fits the budget, before the axis is known.
+
+        Raises:
+            ResourceLimitError: it does not.
+        """
+        self._fitting(1, self._projector(1))
+
     def slabs(self, runs: list[slice]) -> list[slice]:
         """Cut runs of slices into slabs that fit the budget.
 
@@ -106,16 +116,28 @@ class Inversion:
             ResourceLimitError: not even one slice does.
         """
         A = self.projector(1)
-        array = 4 * max(int(np.prod(A.grid.shape[-2:])), len(A.scan.angles) * A.scan.bins)
-        fitting = partial(plan_chunks, array=array, largest=self.device.traits.allocation)
         most = _ITERATIVE_SLAB if self.settings.iterative else _SLAB
         cut = []
         for run in runs:
-            count, budget = run.stop - run.start, self.device.budget
-            for chunk in fitting(count, self.need, A.scratch, budget, what="slice"):
+            for chunk in self._fitting(run.stop - run.start, A):
                 first, stop = run.start + chunk.start, run.start + chunk.stop
                 cut += [slice(at, min(at + most, stop)) for at in range(first, stop, most)]
         return cut
+
+    def _fitting(self, count: int, A: ParallelProjector) -> list[slice]:
+        """Chunks of so many slices; a formula takes arrays of a slice in parts where it must."""
+        array = 4 * max(int(np.prod(A.grid.shape[-2:])), len(A.scan.angles) * A.scan.bins)
+        if not self.settings.iterative and isinstance(A, PhaseProjector):
+            array = 0
+        return plan_chunks(
+            count,
+            self._need(A),
+            A.scratch,
+            self.device.budget,
+            what="slice",
+            array=array,
+            largest=self.device.traits.allocation,
+        )
 
     def slices(self, first: int, projections: Floats) -> Generator[Report, None, Floats]:
         """Reconstruct a slab; a report after every step of every slice.

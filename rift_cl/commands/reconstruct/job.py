@@ -111,7 +111,7 @@ class Reconstruction:
 
     def plan(self) -> dict[str, str]:
         """What would be done, for ``--dry-run``; one slice is reconstructed to tell the time."""
-        self.source.locate()
+        self._locate()
         return planned(self, self._seconds_per_slice() * self.shape[0])
 
     def run(self) -> Iterator[Report]:
@@ -159,7 +159,7 @@ class Reconstruction:
         axis = self._kept.axis() if going_on and self.settings.center is None else None
         if axis is not None:
             self.source.center, self.source.tilt = axis
-        self.source.locate()
+        self._locate()
         if going_on and not self.settings.preview:
             self._kept.go_on(self._facts())
             self._ours = self._gone_on = True
@@ -171,6 +171,13 @@ class Reconstruction:
             )
         for note in self.source.notes:
             self.announce(note)
+
+    def _locate(self) -> None:
+        """Find the axis, and tell before any other work, this search too, that memory is short."""
+        if not self.source.settled:
+            self.inversion.check_memory()
+        self.source.locate()
+        self.inversion.slabs([slice(0, 1)])
 
     def _finished_before(self) -> bool:
         """Whether ``--resume`` met a run that had come to its end.
