@@ -6,6 +6,7 @@ pickled as the selector that opens it: contexts do not travel, names do.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import threading
 from typing import Any, NamedTuple
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import check_array, memory_budget
-from rift_cl.cl.build.driver_record import driver_identity
+from rift_cl.cl.build.driver_record import OTHER_KIND, driver_identity, read_record
 from rift_cl.cl.failures import named_errors
 from rift_cl.cl.host_arrays import as_plain, as_real_array, download, send, upload
 from rift_cl.cl.process import claim_process
@@ -43,7 +44,7 @@ class Device:
         self.platform: str = handle.platform.name.strip()
         self.driver: str = handle.driver_version.strip()
         self.selector = selector
-        self.traits = traits or Traits.of(handle)
+        self.traits = traits or _traits_of(handle)
         self._limit = memory
         self._handle = handle
         self._opened: _Opened | None = None
@@ -70,6 +71,11 @@ class Device:
         # A CPU in the guise of a GPU (``traits``) is one.
         gpu = self._handle.type & (cl.device_type.GPU | cl.device_type.CPU)
         return "GPU" if gpu else "accelerator"
+
+    @property
+    def in_other_guise(self) -> bool:
+        """Whether it is taken for a GPU where it is a CPU, or the reverse."""
+        return self.traits.is_cpu != Traits.of(self._handle).is_cpu
 
     @property
     def identity(self) -> dict[str, str]:
@@ -195,6 +201,13 @@ class Device:
     def release(self) -> None:
         """Give memory that no array uses any more back to the driver."""
         self._open().pool.free_held()
+
+
+def _traits_of(handle: Any) -> Traits:
+    """The traits of a device, in the guise of the other kind where its driver's test took that."""
+    traits = Traits.of(handle)
+    other = read_record(driver_identity(handle)).get("way") == OTHER_KIND
+    return dataclasses.replace(traits, is_cpu=not traits.is_cpu) if other else traits
 
 
 class _Opened(NamedTuple):

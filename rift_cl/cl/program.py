@@ -16,6 +16,7 @@ import numpy as np
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.build.builder import Builder, Key, building
 from rift_cl.cl.build.kernel_cache import build_lock
+from rift_cl.cl.build.kernel_features import feature_of
 from rift_cl.cl.build.source import kernel_source
 from rift_cl.cl.failures import named_errors
 from rift_cl.cl.grid_parts import GridPart, Size, grid_parts
@@ -176,9 +177,9 @@ class Programs:
             return _Kernel(handle, found, group)
         if group == 1 or _COOPERATES in kernel_source(name):
             raise DeviceError(
-                f"kernel {name} works in groups of {group} work-items, and {self._device.name} "
-                f"runs it in groups of at most {needs.group}: what needs it does not work there; "
-                "use another device (--device)"
+                f"{feature_of(name)}: works in groups of {group} work-items, and "
+                f"{self._device.name} runs it in groups of at most {needs.group}: use another "
+                "device (--device)"
             )
         smaller = {**dict(macros), "GROUP": str(group // 2)}
         return self._built((name, tuple(sorted(smaller.items()))), group // 2)
@@ -192,9 +193,8 @@ class Programs:
         there = self._device.traits.local_memory
         if needs.local_memory > there:
             raise DeviceError(
-                f"kernel {name} needs {format_bytes(needs.local_memory)} of local memory, "
-                f"{self._device.name} has {format_bytes(there)}: what needs it does not work "
-                "there; use another device (--device)"
+                f"{feature_of(name)}: needs {format_bytes(needs.local_memory)} of local memory, "
+                f"{self._device.name} has {format_bytes(there)}: use another device (--device)"
             )
 
 

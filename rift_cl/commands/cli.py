@@ -7,7 +7,9 @@ imports its own settings to parse or to help, and its job only to run; ``rift --
 from __future__ import annotations
 
 import dataclasses
+import shutil
 import sys
+import textwrap
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
@@ -155,7 +157,15 @@ def _devices(settings: Any, output: Output) -> None:
     for name, facts in device_facts():
         print(name)
         for what, value in facts.items():
-            print(f"     {what:<10} {value}")
+            lines = [part for line in value.splitlines() for part in _wrapped(line)]
+            for label, line in zip([what, *[""] * len(lines)], lines, strict=False):
+                print(f"     {label:<10} {line}")
+
+
+def _wrapped(line: str) -> list[str]:
+    """A line as lines that fit the terminal behind a column of names."""
+    width = shutil.get_terminal_size().columns - 16
+    return textwrap.wrap(line, max(width, 40), break_long_words=False, subsequent_indent="  ")
 
 
 def _demo(settings: Any, output: Output) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from rift_cl.cl import Device
 from rift_cl.cl.build import source
+from rift_cl.cl.build.kernel_features import feature_of
 from rift_cl.errors import KernelBuildError
 
 KERNELS = source.kernel_names()
@@ -187,6 +188,16 @@ def test_include_is_expanded_once_and_cycles_end(kernels):
     lines = source.kernel_source("probe").splitlines()
     assert [line for line in lines if line.startswith("int")] == ["int b;", "int a;", "int c;"]
     assert lines[-3:] == ["", "", "int c;"] or '#line 2 "probe.cl"' in lines
+
+
+def test_every_kernel_is_for_something_that_a_user_knows():
+    for name in source.kernel_names():
+        assert feature_of(name).endswith(f" (kernel {name})")
+        assert not feature_of(name).startswith("RiFT-CL")
+    assert (
+        feature_of("hermite_dilate")
+        == "X-ray fits and splats summed at voxels (kernel hermite_dilate)"
+    )
 
 
 def test_unknown_kernel_is_a_named_error(device):

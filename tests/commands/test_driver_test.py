@@ -11,7 +11,7 @@ import pytest
 import rift_cl as rift
 from rift_cl.cl import Device
 from rift_cl.cl.build import builder, driver_record, program_store, source
-from rift_cl.cl.build.driver_record import add_to_record, read_record
+from rift_cl.cl.build.driver_record import OTHER_KIND, add_to_record, read_record
 from rift_cl.cl.reductions import total
 from rift_cl.commands.devices import driver_test
 from rift_cl.commands.devices.driver_test import (
@@ -113,7 +113,7 @@ def test_wrong_numbers_are_found_and_refused_by_name(tested, monkeypatch, fault)
     assert "wrong" in findings(tested)[1].lower()
     tested = _fresh()
     x = tested.array(np.ones(5))
-    with pytest.raises(DeviceError, match=r"dot_product is refused.*sums"):
+    with pytest.raises(DeviceError, match=r"dot_product\): refused.*sums"):
         total(tested, x)
     assert np.array_equal(tested.get(tested.array(np.ones(5))), np.ones(5))
 
@@ -132,6 +132,23 @@ def test_way_that_puts_a_driver_right_is_taken_for_every_kernel(tested, monkeypa
     tested = _fresh()
     total(tested, tested.array(np.ones(5)))
     assert seen == ["noinline"]
+
+
+def test_kernels_of_the_other_kind_of_device_are_taken_where_they_alone_are_right(tested):
+    def attempt(_, families):
+        good = read_record(tested.identity)["way"] == OTHER_KIND
+        for name in families:
+            yield {"family": name, **(RIGHT if good else {"deviation": 0.1, "kernels": ["c"]})}
+
+    record = _examined(tested, attempt)
+    assert (record["way"], record["refused"]) == (OTHER_KIND, {})
+    assert OTHER_KIND in findings(tested)[1]
+    # A device that was opened before goes on with kernels that are wrong.
+    with pytest.raises(DeviceError, match="start again"):
+        total(tested, tested.array(np.ones(5)))
+    again = Device(tested._handle, tested.selector)
+    assert again.traits.is_cpu != tested.traits.is_cpu
+    assert total(again, again.array(np.ones(5))) == 5
 
 
 def test_kernels_that_a_right_family_uses_are_not_refused(tested):

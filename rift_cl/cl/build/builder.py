@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rift_cl.cl.build.driver_record import keeps_programs, read_record
+from rift_cl.cl.build.driver_record import OTHER_KIND, keeps_programs, read_record
 from rift_cl.cl.build.guarded_build import Request, guarded_build, way_to_build
 from rift_cl.cl.build.kernel_cache import build_lock
+from rift_cl.cl.build.kernel_features import feature_of
 from rift_cl.cl.build.program_store import Stored, begun, load, program_name, remove, save
 from rift_cl.cl.build.source import fault_place, kernel_source
 from rift_cl.cl.failures import named_errors
@@ -104,11 +105,17 @@ class Builder:
         return keeps_programs(self._driver, self._device.context)
 
     def _check_known(self, name: str) -> None:
-        said = self._known.get("refused", {}).get(name)
+        known = self._known
+        if known.get("way") == OTHER_KIND and not self._device.in_other_guise:
+            raise DeviceError(
+                f"{self._device.name} is right with the {OTHER_KIND} alone, as the test of its "
+                "driver has just found: start again, and they are used"
+            )
+        said = known.get("refused", {}).get(name)
         if said is not None:
             device = self._device
             raise DeviceError(
-                f"kernel {name} is refused on {device.name} ({device.platform}, driver "
+                f"{feature_of(name)}: refused on {device.name} ({device.platform}, driver "
                 f"{device.driver}), which failed its test: {said}; use another device (--device) "
                 "or another version of the driver ('rift devices --retest' tests it again)"
             )
@@ -125,7 +132,8 @@ class Builder:
         for pause in _PAUSES:
             time.sleep(pause)
             try:
-                with build_lock(name), begun(entry) as first:
+                # Its first launch, which compiles as well, writes down what both left.
+                with build_lock(name, write_down=False), begun(entry) as first:
                     if not first:
                         return None
                     return cl.Program(self._device.context, source).build(options)
@@ -171,10 +179,10 @@ class Builder:
         if not about["built"]:
             macros = " ".join(f"{macro}={value}" for macro, value in about["macros"].items())
             raise KernelBuildError(
-                f"{device.name} ({device.platform}, driver {device.driver}) cannot build kernel "
-                f"{name} ({macros}): {about['fault']}, and no workaround helped; what needs it "
-                "does not work there: use another device (--device) or another version of the "
-                "driver ('rift devices --retest' tries again)"
+                f"{feature_of(name)}: {device.name} ({device.platform}, driver {device.driver}) "
+                f"cannot build it ({macros}): {about['fault']}, and no workaround helped; use "
+                "another device (--device) or another version of the driver ('rift devices "
+                "--retest' tries again)"
             )
         context = device.context
         if not stored.binary:

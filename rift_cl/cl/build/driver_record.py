@@ -18,6 +18,8 @@ from rift_cl.cl.build.cache_check import files_kept
 from rift_cl.cl.build.kernel_cache import build_lock, cache_folder
 from rift_cl.cl.build.program_store import write_whole
 
+# The way of a driver that is right with kernels for GPUs on a CPU alone, or the reverse.
+OTHER_KIND = "kernels of the other kind of device"
 _FORMAT = 1
 # A program that no cache can hold: its text is new each time.
 _PROBE = "/* {} */ __kernel void probe(__global int *p) {{ p[get_global_id(0)] = 1; }}"

@@ -66,8 +66,8 @@ class Request(NamedTuple):
 
 
 def way_to_build(way: str, source: str, options: list[str]) -> tuple[str, list[str]]:
-    """The source and the options that a workaround stands for; ``""`` is none."""
-    before, further = WAYS[way]
+    """The source and the options that a workaround stands for; others than ``WAYS`` change none."""
+    before, further = WAYS.get(way, WAYS[""])
     return before + source, [*options, *further]
 
 

@@ -97,11 +97,13 @@ def _temporary() -> Path:
 
 
 @contextlib.contextmanager
-def build_lock(kernel: str = "") -> Iterator[None]:
+def build_lock(kernel: str = "", *, write_down: bool = True) -> Iterator[None]:
     """Hold one kernel in the cache, or the whole cache, against every other process of this user.
 
     Args:
         kernel: the name of a kernel, all of whose variants are held; empty for the whole cache.
+        write_down: whether files that are new are recorded afterwards, which walks the cache; not
+            where the next to hold it does.
 
     Raises:
         DeviceError: the cache folder cannot be used any more.
@@ -123,6 +125,8 @@ def build_lock(kernel: str = "") -> Iterator[None]:
                 "writable, or set RIFT_CACHE_DIR to a folder that you own"
             ) from error
         yield
+        if not write_down:
+            return
         # What cannot be recorded is trusted, as any driver trusts its cache. What others build
         # meanwhile is not whole yet: the last of them records it all.
         with contextlib.suppress(OSError):

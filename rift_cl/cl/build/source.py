@@ -37,6 +37,13 @@ def kernel_names() -> list[str]:
 
 
 @cache
+def kernel_room(name: str) -> str:
+    """The folder that a kernel stands in, its subject; empty where there is no such kernel."""
+    found = sorted(kernel_folder().rglob(f"{name}.cl"))
+    return found[0].parent.name if found else ""
+
+
+@cache
 def kernel_source(name: str) -> str:
     """The source of one kernel with its includes in line."""
     folder = kernel_folder()

@@ -2,8 +2,9 @@
 
 It runs in a child process, which may die or hang. What is found is kept beside the compiled
 kernels, and holds for this driver, its version and this release. A driver that fails is tried again
-with all kernels built in another way (``rift_cl.cl.build.guarded_build``); what no way puts right
-is refused from then on, kernel by kernel.
+with all kernels built in another way (``rift_cl.cl.build.guarded_build``), and with those of the
+other kind of device, a GPU's on a CPU or the reverse; what no way puts right is refused from then
+on, kernel by kernel.
 """
 
 from __future__ import annotations
@@ -19,8 +20,14 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, Any
 
-from rift_cl.cl.build.driver_record import add_to_record, forget_record, read_record
+from rift_cl.cl.build.driver_record import (
+    OTHER_KIND,
+    add_to_record,
+    forget_record,
+    read_record,
+)
 from rift_cl.cl.build.guarded_build import WAYS, death_of
+from rift_cl.cl.build.kernel_features import feature_of
 from rift_cl.cl.build.program_store import forget, stored_programs
 from rift_cl.cl.device import Device
 from rift_cl.progress import Report
@@ -72,7 +79,7 @@ def examine_driver(
     forget_record(driver)
     forget(driver)
     best: tuple[str, dict[str, Found]] = ("", {})
-    for way in WAYS:
+    for way in (*WAYS, OTHER_KIND):
         # The child builds in the way that the record tells it.
         add_to_record(driver, way=way)
         results: dict[str, Found] = {}
@@ -130,9 +137,9 @@ def findings(device: Device) -> list[str]:
         if about["fault"]:
             macros = " ".join(f"{macro}={value}" for macro, value in about["macros"].items())
             taken = f"built with a workaround: {about['way']}" if about["built"] else "refused"
-            said.append(f"kernel {about['kernel']} ({macros}): {about['fault']}; {taken}")
+            said.append(f"{feature_of(about['kernel'])} {macros}: {about['fault']}; {taken}")
     if record["refused"]:
-        said.append(f"refused kernels: {', '.join(record['refused'])}")
+        said.append(f"refused: {', '.join(map(feature_of, record['refused']))}")
     return said
 
 

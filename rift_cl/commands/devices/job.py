@@ -45,5 +45,5 @@ def _facts(device: Device) -> dict[str, str]:
         "local": f"{format_bytes(traits.local_memory)}, groups of at most {traits.group}",
         "traits": ", ".join(name for name, there in features.items() if there) or "none",
         "self-test": f"{'passed' if test.passed else 'FAILED'}: {test.detail}",
-        "driver": "; ".join(findings(device)) or "not tested",
+        "driver": "\n".join(findings(device)) or "not tested",
     }
