@@ -5,6 +5,7 @@ what a kernel computes, from the definition and with numbers of its own. Nothing
 device. Tests and tools alone import it: an import contract in pyproject.toml keeps it so.
 """
 
+from rift_cl.reference.fan import fan, fan_matrix
 from rift_cl.reference.filters import (
     filter_rows,
     ramp_taps,
@@ -19,6 +20,8 @@ from rift_cl.reference.radon import radon, radon_matrix
 
 __all__ = [
     "MatrixProjector",
+    "fan",
+    "fan_matrix",
     "filter_rows",
     "merge",
     "phase_table",

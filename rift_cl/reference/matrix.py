@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rift_cl.geometry import Grid, Parallel
+from rift_cl.geometry import Fan, Grid, Parallel
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ class MatrixProjector:
         scan: how it is looked at.
     """
 
-    def __init__(self, matrix: Any, grid: Grid, scan: Parallel) -> None:
+    def __init__(self, matrix: Any, grid: Grid, scan: Parallel | Fan) -> None:
         self.matrix = matrix
         self._grid, self._scan = grid, scan
 

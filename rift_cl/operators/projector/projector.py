@@ -12,7 +12,7 @@ from numpy.typing import DTypeLike
 
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
-from rift_cl.geometry import Grid, Parallel
+from rift_cl.geometry import Fan, Grid, Parallel
 from rift_cl.operators.linear import LinearOperator
 
 if TYPE_CHECKING:
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 class Projector(LinearOperator):
     """Line integrals of an image or a volume, and their exact adjoint.
 
-    Of a ``Parallel`` scan this is a ``PhaseProjector``, whose documentation says more of its
-    footprints and types.
+    Of a ``Parallel`` scan this is a ``PhaseProjector``, of a ``Fan`` and one slice a
+    ``FanProjector``; their documentation says more of footprints and types.
 
     Args:
         grid: the grid of the image, (ny, nx), or of the volume, (nz, ny, nx).
@@ -57,7 +57,7 @@ class Projector(LinearOperator):
     def __new__(cls, grid: Grid, scan: Any, *given: Any, **named: Any) -> Projector: ...
     def __new__(cls, grid: Grid, scan: Any, *given: Any, **named: Any) -> Projector:
         """Make the subclass that the scan asks for, whose ``__init__`` reads the arguments."""
-        return object.__new__(_kind() if cls is Projector else cls)
+        return object.__new__(_kind(grid, scan) if cls is Projector else cls)
 
     # Not abstract, since for a type checker a call of Projector may make one of these.
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
@@ -67,7 +67,11 @@ class Projector(LinearOperator):
         raise NotImplementedError
 
 
-def _kind() -> type[Projector]:
+def _kind(grid: Grid, scan: Any) -> type[Projector]:
+    if isinstance(scan, Fan) and isinstance(grid, Grid) and len(grid.shape) == 2:
+        from rift_cl.operators.projector.fan_projector import FanProjector
+
+        return FanProjector
     from rift_cl.operators.projector.phase_projector import PhaseProjector
 
     return PhaseProjector

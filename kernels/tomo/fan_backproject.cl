@@ -1,0 +1,131 @@
+/* A fan's views to an image, pixel by pixel: the transpose of fan_project.
+ *
+ *     image[y][x] = before + sum over views of weight(b) * sum over bins of share(ray, b, i) * value
+ *
+ * with the weights and shares of include/fan_footprint.h; before = image[y][x] if `add` is set,
+ * else 0. The first bin in reach is found from the place on the detector at which the pixel's near
+ * end is seen, a ratio of linear forms (its arc tangent, where the detector is an arc); shares do
+ * not depend on that.
+ *
+ * Of strips the sum runs over edges: bins before the first have no share, and with y the values
+ * and G the part of the pixel before an edge,
+ *
+ *     sum over bins of y (G[after] - G[before]) = y[last] + sum over edges of (y[before] - y[after]) G.
+ *
+ * Index space: (runs of LANES pixels of a row, runs of ROWS rows). */
+
+#include "include/portable.h"
+#include "include/fan_footprint.h"
+#include "include/lane_quads.h"
+
+#ifndef ROWS
+#define ROWS (LANES == 8 ? 16 : 1)
+#endif
+#ifndef CURVED
+#define CURVED 0
+#endif
+#if CURVED
+/* arc tangent of |t| < 4 to 1e-5, by half the angle and a polynomial through its Chebyshev points. */
+static lanes root(lanes v) {
+#if LANES == 8
+  lanes x = 0.5f * (1.0f + v);
+  UNROLL for (int n = 0; n < 5; n++) x = 0.5f * (x + v / x);
+  return x;
+#else
+  return sqrt(v);
+#endif
+}
+static lanes arc(lanes t) {
+  const lanes h = t / (1.0f + root(1.0f + t * t)), v = h * h;
+  return 2.0f * h *
+      (0.99999611f + v * (-0.33317368f + v * (0.19807848f + v * (-0.13233519f +
+      v * (0.07962632f - v * 0.0336064f)))));
+}
+#endif
+
+/* The first ray that a pixel of line `a` reaches in slab s. */
+static lanes_int first_ray(lanes a, lanes s, lanes rho, __global const real *view, int bins) {
+#if FOOTPRINT == 0
+  const lanes slope = (view[MIDDLE_SLOPE] + a * view[INVERSE_DEPTH]) * rho;
+  const lanes near = a - view[WIDEST] * (1.0f + absolute(slope));
+#else
+  const lanes near = a - (view[WIDEST] > rho ? view[WIDEST] / rho : (lanes)1.0f);
+#endif
+  lanes place = (view[ACROSS] + near * view[ACROSS + 1] + s * view[ACROSS + 2]) /
+      (1.0f + near * view[AHEAD] + s * view[AHEAD + 1]);
+#if CURVED
+  place = arc(place) * view[ARC];
+#endif
+  place = place + view[FIRST_RAY];
+  place = place > -1.0f ? place : -1.0f;
+  place = place < (real)bins ? place : (real)bins;
+  return floor_int(place) + 1;
+}
+
+/* What a pixel of line `a` has of `count` rays in slab s, the first of them being `at`. */
+static lanes of_rays(
+    lanes a, lanes s, lanes rho, __global const real *rays, const int *at, int count)
+{
+  lanes sum = 0;
+#if FOOTPRINT == 0
+  lanes last = 0;
+#endif
+  for (int n = 0; n < count; n++) {
+    const lane_quad ray = quads_at(rays + 4 * n, 4, at);
+    const lanes z = (ray.s0 + s * ray.s1) - a;
+#if FOOTPRINT == 0
+    const lanes c = slant_of(ray.s1), half_inverse = 0.5f / c;
+    sum = sum + ray.s2 * (ramp(z, c, half_inverse) - ramp(z - 1.0f, c, half_inverse));
+    last = ray.s3;
+#else
+    sum = sum + ray.s3 * hat(z, ray.s2 > rho ? rho / ray.s2 : (lanes)1.0f);
+#endif
+  }
+#if FOOTPRINT == 0
+  sum = sum + last;
+#endif
+  return SLAB_WEIGHT(rho) * sum;
+}
+
+KERNEL void fan_backproject(
+    __global real *restrict image, __global const real *restrict records,
+    __global const real *restrict numbers, int first, int count, int bins, int stride, int height,
+    int width, int add)
+{
+  const int x = (int)get_global_id(0) * LANES, y = (int)get_global_id(1) * ROWS;
+  if (x >= width) return;
+  const int rows = y + ROWS < height ? ROWS : height - y;
+  const lanes column = (real)x + LANE_NUMBERS;
+  const real middle_x = (real)0.5f * (width - 1), middle_y = (real)0.5f * (height - 1);
+  lanes sums[ROWS], depths[ROWS];
+  int rays[ROWS * LANES] __attribute__((aligned(sizeof(int) * LANES)));
+  for (int n = 0; n < rows; n++) sums[n] = 0;
+  for (int k = 0; k < count; k++) {
+    __global const real *view = numbers + (long)(first + k) * VIEW_NUMBERS;
+    __global const real *record = records + 4L * k * stride;
+    const int along_y = view[ALONG_Y] > 0;
+    const real inverse_depth = view[INVERSE_DEPTH];
+    for (int n = 0; n < rows; n++) {
+      const lanes row = (lanes)(real)(y + n);
+      const lanes s = along_y ? row - middle_y : column - middle_x;
+      const lanes rho = 1.0f / (1.0f + s * inverse_depth);
+      depths[n] = rho;
+      KEEP_INTS(rays + n * LANES, first_ray(along_y ? column : row, s, rho, view, bins));
+    }
+    for (int n = 0; n < rows; n++) {
+      const lanes row = (lanes)(real)(y + n);
+      const lanes s = along_y ? row - middle_y : column - middle_x;
+      const lanes rho = depths[n];
+      const real spanned = view[RAYS] * largest_lane(rho);
+      const real most = spanned > view[LEAST_RAYS] ? spanned : view[LEAST_RAYS];
+      const int reached = (int)(most < view[MOST_RAYS] - 1 ? most : view[MOST_RAYS] - 1) + 1;
+      sums[n] = sums[n] + of_rays(along_y ? column : row, s, rho, record, rays + n * LANES, reached);
+    }
+  }
+  for (int n = 0; n < rows; n++) {
+    __global real *out = image + (long)(y + n) * width + x;
+    real sum[LANES] __attribute__((aligned(sizeof(lanes))));
+    *(lanes *)sum = sums[n];
+    for (int m = 0; m < LANES && x + m < width; m++) out[m] = add ? out[m] + sum[m] : sum[m];
+  }
+}
