@@ -183,9 +183,9 @@ def _demo(settings: Any, output: Output) -> None:
 
 
 def _reconstruct(settings: Any, output: Output) -> None:
-    from rift_cl.commands.reconstruct.job import Reconstruction
+    from rift_cl.commands.reconstruct.choice import reconstruction_of
 
-    job = Reconstruction(settings)
+    job = reconstruction_of(settings)
     if not output.quiet:
         job.announce = print_line
     if not ran(job, settings, output):

@@ -55,13 +55,13 @@ def reconstruct_scan(
     Raises:
         RiftError: a setting, the scan, the device or the folder cannot be used.
     """
-    from rift_cl.commands.reconstruct.job import Reconstruction
+    from rift_cl.commands.reconstruct.choice import reconstruction_of
     from rift_cl.commands.reconstruct.settings import ReconstructSettings
     from rift_cl.commands.reconstruct.volume import volume_path
 
     with _folder(out) as (folder, keep):
         given = {"scan": scan, "out": folder, **settings}
-        job = Reconstruction(_settings(given, "reconstruct", ReconstructSettings))
+        job = reconstruction_of(_settings(given, "reconstruct", ReconstructSettings))
         _run(job.run(), progress)
         record = (folder, job.decided, dict(job.metrics), tuple(job.source.notes))
         return keep(ReconstructedScan(*record, path=volume_path(job.settings)))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
+from rift_cl.geometry import Cone, Vectors
 from rift_cl.io.scans.scan_file import Part, RowSource, ScanFile, ScanRows
 from rift_cl.reconstruct.preprocess import binned, binned_center
 
@@ -50,6 +51,19 @@ def row_binning(scan: ScanFile, binning: int) -> int:
     return 1 if scan.shape[1] == 1 else binning
 
 
+def _binned_cone(cone: Cone | Vectors, rows: int, bins: int) -> Cone | Vectors:
+    """A detector of which blocks of pixels are one; what fills none at the far ends is cut."""
+    counts = cone.rows // rows, cone.bins // bins
+    if isinstance(cone, Cone):
+        center = binned_center(cone.center[0], rows), binned_center(cone.center[1], bins)
+        pitch = cone.pitch[0] * rows, cone.pitch[1] * bins
+        lengths = cone.source_to_axis, cone.source_to_detector
+        return Cone(cone.angles, *counts, pitch, *lengths, center, cone.heights, cone.curved)
+    lost = cone.rows - counts[0] * rows, cone.bins - counts[1] * bins
+    middle = cone.middle - lost[0] / 2 * cone.down - lost[1] / 2 * cone.across
+    return Vectors(cone.source, middle, bins * cone.across, rows * cone.down, *counts)
+
+
 def binned_file(scan: ScanFile, binning: int) -> ScanFile:
     """A scan of which blocks of detector pixels are averaged to one; see ``row_binning``.
 
@@ -68,11 +82,15 @@ def binned_file(scan: ScanFile, binning: int) -> ScanFile:
     if fan is not None:
         center = binned_center(fan.center, binning)
         fan = dataclasses.replace(fan, pitch=fan.pitch * binning, center=center)
+    cone = scan.cone
+    if cone is not None:
+        cone = _binned_cone(cone, block, binning)
     return dataclasses.replace(
         scan,
         shape=(views, rows // block, bins // binning),
         pitch=None if scan.pitch is None else scan.pitch * binning,
         rows=BinnedRows(scan.rows, block, binning),
         fan=fan,
+        cone=cone,
         background=-(-scan.background // binning),
     )

@@ -1,9 +1,9 @@
 """Rows of a scan as clean line integrals: what a detector gets wrong is put right here.
 
 In this order, each step where it was asked for or is called for: flat-field correction and the
-logarithm, zingers, phase retrieval, stripes, a tilted or wandering axis. A step that looks at
-neighbouring rows is given as many more as it needs, so that slices do not depend on how the rows
-were cut into slabs.
+logarithm, zingers, phase retrieval, beam hardening, stripes, a tilted or wandering axis. A step
+that looks at neighbouring rows is given as many more as it needs, so that slices do not depend on
+how the rows were cut into slabs.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.reconstruct import Attenuation
 from rift_cl.reconstruct.preprocess import (
     Propagation,
+    linearised,
     paganin,
     remove_rings,
     remove_zingers,
@@ -151,6 +152,8 @@ class CleanRows:
         if self.phase is not None:
             rows = paganin(np.exp(-rows), **_arguments(self.phase))
         rows = np.ascontiguousarray(rows[:, kept])
+        if self._settings.hardening is not None:
+            rows = linearised(rows, self._settings.hardening)
         if self.rings is not None:
             rows = remove_rings(rows, method=self.rings, device=self._device)
         if self.alignment is not None:
@@ -188,6 +191,12 @@ class CleanRows:
                 "Zingers, single pixels that stand out of their neighbours by "
                 f"{self._settings.zingers:g} standard deviations, were removed."
             )
+        if self._settings.hardening is not None:
+            terms = " + ".join(
+                f"{a:g} y^{k}" if k > 1 else f"{a:g} y"
+                for k, a in enumerate(self._settings.hardening, 1)
+            )
+            notes.append(f"Beam hardening: line integrals y were replaced by {terms}.")
         if self.rings is not None:
             notes.append(f"Stripes were removed from the projections, method {self.rings} (rings).")
         if self.alignment is not None and self.alignment.centers is not None:
@@ -220,9 +229,9 @@ class CleanRows:
                 f"phase retrieval needs --delta-beta, --energy and --propagation: --{missing[0]} "
                 "is missing"
             )
-        if self._scan.fan is not None:
+        if self._scan.fan is not None or self._scan.cone is not None:
             raise InputError(
-                f"{self._scan.path}: phase retrieval is for parallel rays, these are those of a fan"
+                f"{self._scan.path}: phase retrieval is for parallel rays, these diverge"
             )
         if pixel is None:
             raise InputError(

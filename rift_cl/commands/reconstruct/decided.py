@@ -58,12 +58,13 @@ def decided_settings(
     if settings.iterative:
         decided["steps"] = settings.most_steps
     if settings.method == "fbp":
-        decided |= _filter(settings)
+        decided |= filter_settings(settings)
         decided["compensate"] = settings.compensate or _weights(source.formula_geometry().angles)
     return dataclasses.replace(settings, **decided)
 
 
-def _filter(settings: ReconstructSettings) -> dict[str, Any]:
+def filter_settings(settings: ReconstructSettings) -> dict[str, Any]:
+    """The filter along the detector, with the values that were left open."""
     if settings.filter == "high-pass":
         return {"exponent": 1.0 if settings.exponent is None else settings.exponent}
     cutoff = 1.0 if settings.cutoff is None else settings.cutoff
@@ -82,7 +83,8 @@ def in_words(decided: ReconstructSettings) -> str:
     if decided.method == "fbp":
         high_pass = decided.filter == "high-pass"
         shape = f"exponent {decided.exponent:g}" if high_pass else f"cut-off {decided.cutoff:g}"
-        words += [f"{decided.filter} filter, {shape}", f"{decided.compensate} view weights"]
+        words += [f"{decided.filter} filter, {shape}"]
+        words += [f"{decided.compensate} view weights"] if decided.compensate else []
     if decided.iterative:
         words += [f"at most {decided.steps} steps"]
         words += [f"{decided.subsets} subsets"] if decided.subsets else []

@@ -200,18 +200,7 @@ class Inversion:
         if settings.method == "levels":
             return self._few_levels(sinogram)
         A, options = self._seen_rays(sinogram)
-        options["noise"] = settings.noise
-        if settings.method == "sirt" and settings.subsets not in (None, 1):
-            subsets, nonnegative = settings.subsets, settings.nonnegative
-            return OrderedSubsets(A, sinogram, subsets, nonnegative=nonnegative, **options), 1.0
-        options["precondition"] = settings.precondition
-        if settings.method == "cgls":
-            return Cgls(A, sinogram, **options), 1.0
-        options["nonnegative"] = settings.nonnegative
-        if settings.method == "sirt":
-            return Sirt(A, sinogram, **options), 1.0
-        weight = usual_weight(sinogram) if settings.weight is None else settings.weight
-        return Pdhg(A, sinogram, weight, **options), 1.0
+        return least_squares(settings, A, sinogram, **options), 1.0
 
     def _few_levels(self, sinogram: Floats) -> tuple[Solver, float]:
         """One material in a disc of it: lengths of material are solved for, from 0 to 1."""
@@ -265,6 +254,31 @@ class Inversion:
         return float(2 * reach * scan.pitch)
 
 
+def least_squares(
+    settings: ReconstructSettings, A: LinearOperator, data: Floats, **options: Any
+) -> Solver:
+    """The solver of ``sirt``, ``cgls`` or ``tv`` at its beginning.
+
+    Args:
+        settings: the method and its options.
+        A: the projector.
+        data: line integrals.
+        **options: further arguments of the solver, such as the weights of the rays.
+    """
+    options["noise"] = settings.noise
+    if settings.method == "sirt" and settings.subsets not in (None, 1):
+        subsets, nonnegative = settings.subsets, settings.nonnegative
+        return OrderedSubsets(A, data, subsets, nonnegative=nonnegative, **options)
+    options["precondition"] = settings.precondition
+    if settings.method == "cgls":
+        return Cgls(A, data, **options)
+    options["nonnegative"] = settings.nonnegative
+    if settings.method == "sirt":
+        return Sirt(A, data, **options)
+    weight = usual_weight(data) if settings.weight is None else settings.weight
+    return Pdhg(A, data, weight, **options)
+
+
 def _direction_weights(angles: NDArray[np.float64]) -> DirectionWeights | None:
     """Less weight along directions that no view looks across; None where views go all round."""
     directions = np.sort(np.mod(angles, np.pi))
@@ -280,6 +294,6 @@ def usual_weight(sinogram: Floats) -> float:
     given number of bins by a given share goes with u, the views and the distance of bins. The
     greatest line integrals over half of the detector's width stand for u.
     """
-    views, bins = sinogram.shape
+    views, bins = sinogram.shape[0], sinogram.shape[-1]
     strong = float(np.percentile(np.abs(sinogram), 99))
     return float(_VARIATION * views * strong / (bins / 2))

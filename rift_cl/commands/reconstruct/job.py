@@ -38,6 +38,7 @@ from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.slice_input import SliceInput
 from rift_cl.commands.reconstruct.volume import check_place, open_slices, volume_path
 from rift_cl.errors import StoppedError
+from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.io.volumes import VOLUME_NAMES, suggested_window
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Attenuation
@@ -55,16 +56,17 @@ class Reconstruction:
 
     Args:
         settings: what to do.
+        file: the scan, where it was opened before.
 
     Raises:
         RiftError: anything about the settings, the file, the device or the folder is wrong.
     """
 
-    def __init__(self, settings: ReconstructSettings) -> None:
+    def __init__(self, settings: ReconstructSettings, file: ScanFile | None = None) -> None:
         settings.check()
         self.settings = settings
         self.device: Device = settings.open_device(settings.memory_limit)
-        self.source = SliceInput(settings, self.device)
+        self.source = SliceInput(settings, self.device, file)
         self.inversion = Inversion(settings, self.source, self.device)
         # Made now, so that a part that is not inside the slice is told before any work.
         self._kept = SlabFolder(settings.out / "slabs", self.shape)

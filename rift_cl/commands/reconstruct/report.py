@@ -29,6 +29,7 @@ from rift_cl.report.html_page import Page
 from rift_cl.report.plot import curves, figure_png, figure_svgs, image_grid
 
 if TYPE_CHECKING:
+    from rift_cl.commands.reconstruct.cone_job import ConeReconstruction
     from rift_cl.commands.reconstruct.job import Reconstruction
 
 _PANELS = 6
@@ -115,7 +116,7 @@ def write_preview(path: Path, image: NDArray[np.float32], title: str) -> None:
         part.write_bytes(figure_png(figure))
 
 
-def reconstruction_page(job: Reconstruction, preview: Preview) -> Page:
+def reconstruction_page(job: Reconstruction | ConeReconstruction, preview: Preview) -> Page:
     """The report of a finished reconstruction."""
     page = Page(f"Reconstruction of {job.source.scan.path.name}", f"{job.shape[0]} slices")
     images = [preview.slices[index] for index in preview.panels]
@@ -186,12 +187,12 @@ def _histogram(page: Page, images: list[NDArray[np.float32]], unit: str) -> None
     )
 
 
-def _axis(job: Reconstruction) -> str:
+def _axis(job: Reconstruction | ConeReconstruction) -> str:
     axis = job.source.axis
     return f"bin {axis['center']:.2f}, by {axis['by']}"
 
 
-def _facts(job: Reconstruction) -> dict[str, Any]:
+def _facts(job: Reconstruction | ConeReconstruction) -> dict[str, Any]:
     scan, window = job.source.scan, job.inversion.window
     return {
         "projections": f"{scan.shape} (angle, row, bin)",

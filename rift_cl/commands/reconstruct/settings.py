@@ -156,6 +156,9 @@ class CorrectionOptions:
     zingers: Auto[float] = None
     """Replace zingers (single pixels hit by cosmic rays or scattered photons) that exceed their
     neighbours by this many standard deviations of the noise, such as 6. Default: off."""
+    hardening: Auto[tuple[float, ...]] = None
+    """Beam hardening of one material: coefficients a1 a2 ... of the polynomial a1 y + a2 y^2 + ...
+    that makes line integrals y proportional to thickness. Default: off."""
     binning: int = 1
     """Average blocks of N detector rows and N bins first; --center, --rows, --pitch and --tilt
     still refer to the detector before binning."""
@@ -237,6 +240,10 @@ class ReconstructSettings(
                 f"--footprint {self.footprint} does not apply with --error, which projects through "
                 "the Fourier transform: leave one of them out"
             )
+        if self.hardening is not None:
+            from rift_cl.reconstruct.preprocess.hardening import checked_coefficients
+
+            checked_coefficients(self.hardening)
         self._check_samples()
         if self.tilt is not None and not abs(self.tilt) <= _MOST_TILT:
             raise InputError(f"--tilt is {self.tilt:g} degrees, wanted {_MOST_TILT:g} at most")

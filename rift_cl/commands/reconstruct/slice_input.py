@@ -28,6 +28,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Parallel
 from rift_cl.geometry.length_units import length_unit
 from rift_cl.io.number_list import read_numbers
+from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.reconstruct import Attenuation
 from rift_cl.reconstruct.axis import AxisEstimate
 from rift_cl.reconstruct.direct.fan_rebin import covered_rays, rebin_fan
@@ -53,20 +54,18 @@ class SliceInput:
     Args:
         settings: where the scan is and what is to be done with it.
         device: where the rotation axis is looked for.
+        file: the scan, where it was opened before.
 
     Raises:
         RiftError: the scan cannot be read, or an option does not fit it.
     """
 
-    def __init__(self, settings: ReconstructSettings, device: Device) -> None:
+    def __init__(
+        self, settings: ReconstructSettings, device: Device, file: ScanFile | None = None
+    ) -> None:
         self.settings, self.device = settings, device
         # The scan as the file has it, and as it is worked on.
-        self.file = settings.open_scan(fan=True)
-        if self.file.cone is not None:
-            raise InputError(
-                f"{self.file.path}: is a cone-beam scan, whose slices are not independent: project "
-                "and reconstruct it from Python, with open_scan(...).geometry"
-            )
+        self.file = settings.open_scan(fan=True) if file is None else file
         check_center(settings.center, self.file)
         binning = settings.binning
         self.scan = binned_file(self.file, binning)

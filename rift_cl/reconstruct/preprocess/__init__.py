@@ -1,6 +1,6 @@
 """Corrections of projections before reconstruction: flat field, rings, zingers, phase, alignment.
 
-Stripes, zingers and phase; binning, a tilted axis, and half acquisitions.
+Stripes, zingers, beam hardening and phase; binning, a tilted axis, and half acquisitions.
 """
 
 from rift_cl.reconstruct.preprocess.alignment import straightened, tilt_halo, upright
@@ -11,6 +11,7 @@ from rift_cl.reconstruct.preprocess.binning import (
     binning_note,
 )
 from rift_cl.reconstruct.preprocess.half_acquisition import stitched
+from rift_cl.reconstruct.preprocess.hardening import linearised
 from rift_cl.reconstruct.preprocess.paganin import Propagation, halo_rows, paganin
 from rift_cl.reconstruct.preprocess.rings import STRIPE_METHODS, remove_rings
 from rift_cl.reconstruct.preprocess.zingers import remove_zingers
@@ -23,6 +24,7 @@ __all__ = [
     "binned_scan",
     "binning_note",
     "halo_rows",
+    "linearised",
     "paganin",
     "remove_rings",
     "remove_zingers",

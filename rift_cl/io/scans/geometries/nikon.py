@@ -47,6 +47,7 @@ def read_nikon(path: Path) -> Beam:
             f"The tilt of the axis along the beam, {tilt:g} degrees, is not used: give vectors "
             "with geometry= (--geometry) to include it."
         )
+    notes += _hardening(file)
     return Beam(
         source_to_axis=to_axis,
         source_to_detector=to_detector,
@@ -62,6 +63,18 @@ def read_nikon(path: Path) -> Beam:
         prefix=file.text("Name"),
         notes=tuple(notes),
     )
+
+
+def _hardening(file: IniFile) -> list[str]:
+    """A word where the scanner names a polynomial against beam hardening that does something."""
+    powers = [file.number(f"CoefX{k}", 1.0 if k == 1 else 0.0) for k in range(5)]
+    if powers == [0, 1, 0, 0, 0]:
+        return []
+    terms = " ".join(f"{power:g}" for power in powers[1:])
+    return [
+        f"The scanner names a polynomial against beam hardening, which is not applied: --hardening "
+        f"{terms} does."
+    ]
 
 
 def _axis(file: IniFile, height: float, magnification: float) -> tuple[float, float]:

@@ -1,0 +1,307 @@
+"""The projections of a cone-beam scan, all rows of them, and where the volume lies."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rift_cl.cl.budget import format_bytes
+from rift_cl.cl.device import Device
+from rift_cl.commands.inputs.scan_rows import check_center, scan_identity
+from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
+from rift_cl.commands.reconstruct.clean_rows import CleanRows
+from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.commands.reconstruct.slice_window import check_window
+from rift_cl.errors import InputError, ResourceLimitError
+from rift_cl.geometry import Cone, Grid, Vectors
+from rift_cl.geometry.seen_grid import scan_lengths, seen_grid
+from rift_cl.io.scans.beam import leaning
+from rift_cl.io.scans.scan_file import ScanFile
+from rift_cl.reconstruct import Attenuation
+from rift_cl.reconstruct.preprocess import binned_center, binning_note
+
+# Options that do not apply to cones, with what they are where they are not used.
+_REFUSED: dict[str, Any] = {
+    "error": None,
+    "centers": None,
+    "half_acquisition": "weighted",
+    "resume": False,
+}
+# Volumes and stacks of projections that a method holds at a time, on host and device together.
+_HELD = {"fbp": (3, 5), "backproject": (3, 4), "sirt": (6, 6), "cgls": (6, 6), "tv": (16, 7)}
+
+
+@dataclass(frozen=True)
+class VolumeWindow:
+    """Where the volume lies.
+
+    Args:
+        whole: all that the detector sees, or what was asked for, about the axis.
+        roi: first column, the one after the last, first line, the one after the last.
+        slices: first slice, and the one after the last.
+    """
+
+    whole: Grid
+    roi: tuple[int, int, int, int]
+    slices: tuple[int, int]
+
+    @classmethod
+    def of(cls, settings: ReconstructSettings, scan: Cone | Vectors) -> VolumeWindow:
+        """What the settings ask for.
+
+        Raises:
+            InputError: a part is not inside the volume, or the volume holds the source.
+        """
+        whole = seen_grid(scan, settings.pixel)
+        if settings.size is not None:
+            across = (settings.size, settings.size)
+            whole = Grid((whole.shape[0], *across), whole.spacing, whole.center)
+        size, count = whole.shape[-1], whole.shape[0]
+        roi = settings.roi or (0, size, 0, size)
+        check_window(roi, size)
+        slices = settings.rows or (0, count)
+        if not 0 <= slices[0] < slices[1] <= count:
+            raise InputError(
+                f"--rows is {slices[0]} {slices[1]}, the volume has the slices 0 to {count}: give "
+                "the first and the one after the last"
+            )
+        window = cls(whole, roi, slices)
+        corner, source = window.reach, scan_lengths(scan).source_to_axis
+        if corner >= source:
+            raise InputError(
+                f"the volume reaches {corner:g} from the axis, and the source is {source:g} away: "
+                "it would be inside; reconstruct less (--size, --roi), or mend the distances "
+                "(--geometry)"
+            )
+        return window
+
+    @property
+    def reach(self) -> float:
+        """Distance of the farthest corner of the part from the axis."""
+        grid = self.grid
+        edges = [
+            abs(grid.center[axis]) + grid.shape[axis] * grid.spacing[axis] / 2 for axis in (1, 2)
+        ]
+        return math.hypot(*edges)
+
+    @property
+    def pixel(self) -> float:
+        """Edge of a voxel."""
+        return self.whole.spacing[-1]
+
+    @property
+    def grid(self) -> Grid:
+        """The part that is wanted."""
+        left, right, top, bottom = self.roi
+        starts = (self.slices[0], top, left)
+        counts = (self.slices[1] - self.slices[0], bottom - top, right - left)
+        centers = [
+            c + (start + (n - 1) / 2 - (whole - 1) / 2) * d
+            for c, start, n, whole, d in zip(
+                self.whole.center, starts, counts, self.whole.shape, self.whole.spacing, strict=True
+            )
+        ]
+        return Grid(counts, self.whole.spacing, centers)
+
+
+class ConeInput:
+    """The projections of a cone-beam scan, and its geometry.
+
+    Args:
+        settings: what is to be done with it.
+        file: the scan as its file has it.
+        device: where to work.
+
+    Raises:
+        RiftError: an option does not fit the scan.
+    """
+
+    def __init__(self, settings: ReconstructSettings, file: ScanFile, device: Device) -> None:
+        check_options(settings)
+        check_center(settings.center, file)
+        self.settings, self.file, self.device = settings, file, device
+        # The scan as it is worked on.
+        self.scan = binned_file(file, settings.binning)
+        self.unit = (file.unit or "") if settings.unit is None else settings.unit
+        self.geometry = self._geometry()
+        self.clean = CleanRows(self.scan, settings, None, device)
+        self.notes: list[str] = [*file.notes]
+        self.axis: dict[str, Any] = {}
+        self.window = VolumeWindow.of(settings, self.geometry)
+        self._check_memory()
+
+    @property
+    def grid(self) -> Grid:
+        """The voxels that are wanted."""
+        return self.window.grid
+
+    @property
+    def solved(self) -> Grid:
+        """The voxels that a method needs: all that rays meet, where it explains every ray."""
+        return self.window.whole if self.settings.iterative else self.grid
+
+    @property
+    def part(self) -> tuple[slice, ...]:
+        """Where in the voxels that are solved for those that are wanted lie."""
+        if not self.settings.iterative:
+            return (slice(None),) * 3
+        left, right, top, bottom = self.window.roi
+        return slice(*self.window.slices), slice(top, bottom), slice(left, right)
+
+    def read(self) -> Attenuation:
+        """Line integrals of all rows, corrected."""
+        return self.clean.read(0, self.scan.shape[1])
+
+    def identity(self) -> dict[str, str]:
+        """The file and the geometry, which decide the volume besides the settings."""
+        return {**scan_identity(self.file), "geometry": repr(hash(self.geometry))}
+
+    def say(self, sentence: str) -> None:
+        """Write down what is decided: the axis, corrections, and the method's own sentence."""
+        self.axis = self._axis()
+        if self.settings.center is None:
+            self.notes.append(
+                f"The axis was taken to be {self.axis['by']}, bin {self.axis['center']:.2f}; if it "
+                "is not, give --center."
+            )
+        n, (_, rows, bins) = self.settings.binning, self.file.shape
+        if n > 1:
+            block = row_binning(self.file, n)
+            lost = binning_note(rows, bins, rows=block, bins=n)
+            averaged = f"Blocks of {block} x {n} (rows x bins) detector pixels were averaged."
+            self.notes.append(f"{averaged} {lost}".rstrip())
+        self.notes += self.clean.notes()
+        if self.scan.background:
+            self.notes.append(
+                f"The mean of the outermost {self.scan.background} bins at each end (air) was "
+                "subtracted."
+            )
+        if sentence:
+            self.notes.append(sentence)
+
+    def _axis(self) -> dict[str, Any]:
+        """Bin of the axis on the detector as the file has it."""
+        if self.settings.center is not None:
+            return {"center": self.settings.center, "by": "--center"}
+        cone = self.file.cone
+        if not isinstance(cone, Cone):
+            return {"center": (self.file.shape[2] - 1) / 2, "by": "where the vectors say"}
+        middle = cone.center[1] == (cone.bins - 1) / 2
+        where = "at the detector's middle" if middle else "where the file says"
+        return {"center": cone.center[1], "by": where}
+
+    def _geometry(self) -> Cone | Vectors:
+        """The file's geometry with the axis, the pitch and the tilt that a person says."""
+        scan, settings = self.scan.cone, self.settings
+        assert scan is not None
+        changes = {name: getattr(settings, name) for name in ("center", "pitch", "tilt")}
+        given = [name for name, value in changes.items() if value is not None]
+        if not given:
+            return scan
+        if not isinstance(scan, Cone):
+            raise InputError(
+                f"{self.file.path}: --{given[0]} does not apply to a scan that vectors describe: "
+                "mend the vectors (--geometry)"
+            )
+        row, bin = scan.center
+        pitch = scan.pitch
+        if settings.center is not None:
+            bin = binned_center(settings.center, settings.binning)
+        if settings.pitch is not None:
+            scale = settings.pitch * settings.binning / pitch[1]
+            pitch = pitch[0] * scale, pitch[1] * scale
+        lengths = scan.source_to_axis, scan.source_to_detector
+        cone = Cone(
+            scan.angles,
+            scan.rows,
+            scan.bins,
+            pitch,
+            *lengths,
+            (row, bin),
+            scan.heights,
+            scan.curved,
+        )
+        return leaning(cone, math.radians(settings.tilt)) if settings.tilt else cone
+
+    def _check_memory(self) -> None:
+        """Refuse what does not fit before anything is read.
+
+        Raises:
+            ResourceLimitError: volume and projections are larger than the budget.
+        """
+        volumes, stacks = _HELD[self.settings.method]
+        need = 4 * (
+            volumes * int(np.prod(self.solved.shape)) + stacks * int(np.prod(self.scan.shape))
+        )
+        if need > self.device.budget:
+            raise ResourceLimitError(
+                f"{self.file.path}: a volume of {self.solved.shape} from projections of "
+                f"{self.scan.shape} takes {format_bytes(need)}, the memory budget is "
+                f"{format_bytes(self.device.budget)}: average pixels (--binning 2), take larger "
+                "voxels (--pixel), or reconstruct a part (--rows, --roi)"
+            )
+
+
+def check_options(settings: ReconstructSettings) -> None:
+    """Refuse options that cones have no use for.
+
+    Raises:
+        InputError: one is given.
+    """
+    for name, unused in _REFUSED.items():
+        if getattr(settings, name) != unused:
+            option = name.replace("_", "-")
+            raise InputError(f"--{option} does not apply to cone-beam scans: leave it out")
+    if settings.pad == "on":
+        raise InputError("--pad on does not apply to cone-beam scans: leave it out")
+    if settings.method == "levels":
+        raise InputError(
+            "--method levels does not apply to cone-beam scans: choose fbp, cgls, sirt or tv"
+        )
+    if settings.compensate not in (None, "uniform", "voronoi"):
+        raise InputError(
+            f"--compensate {settings.compensate} does not apply to cone-beam scans: choose uniform "
+            "or voronoi"
+        )
+
+
+def decided_cone_settings(
+    source: ConeInput, values: tuple[float, float] | None
+) -> ReconstructSettings:
+    """The settings with a value for everything that was left open.
+
+    Args:
+        source: the scan; read.
+        values: what the integers of the volume stand for; None for floating samples.
+    """
+    from rift_cl.commands.reconstruct.decided import filter_settings
+
+    settings, window = source.settings, source.window
+    lengths = scan_lengths(source.geometry)
+    decided: dict[str, Any] = {
+        "scan": source.file.path,
+        "kind": source.file.kind,
+        "out": settings.out.absolute(),
+        "rings": source.clean.rings or "off",
+        "pad": "off",
+        "rows": window.slices,
+        "unit": source.unit,
+        "pixel": window.pixel,
+        "size": window.whole.shape[-1],
+        "background": source.file.background,
+        "window": values,
+    }
+    if isinstance(source.file.cone, Cone):
+        decided["center"] = source.axis["center"]
+        decided["pitch"] = lengths.pitch[1] / settings.binning
+    if settings.geometry is not None:
+        decided["geometry"] = settings.geometry.absolute()
+    if settings.iterative:
+        decided["steps"] = settings.most_steps
+    if settings.method == "fbp":
+        decided |= filter_settings(settings)
+    return dataclasses.replace(settings, **decided)

@@ -1,0 +1,288 @@
+"""``rift reconstruct`` of cone beams: all rows of all views become a volume at once.
+
+No slice of a cone-beam scan is independent of its neighbours, so that nothing is cut into slabs
+here: projections and volume are in memory together, and what does not fit is told before any work.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Generator, Iterator
+from contextlib import suppress
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.budget import format_bytes
+from rift_cl.cl.device import Device
+from rift_cl.commands.pictures.coverage_pictures import add_missed_planes
+from rift_cl.commands.pictures.slice_pictures import display_window
+from rift_cl.commands.reconstruct.cone_input import ConeInput, VolumeWindow, decided_cone_settings
+from rift_cl.commands.reconstruct.inversion import least_squares
+from rift_cl.commands.reconstruct.report import PREVIEW_PICTURE, Preview, reconstruction_page
+from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.commands.reconstruct.volume import volume_path
+from rift_cl.commands.run_folder.run_folder import RunFolder
+from rift_cl.errors import InputError
+from rift_cl.io.output import atomic_path
+from rift_cl.io.scans.scan_file import ScanFile
+from rift_cl.io.volumes import VOLUME_NAMES, VolumeWriter, open_volume, suggested_window
+from rift_cl.operators import Projector
+from rift_cl.progress import Report
+from rift_cl.reconstruct import FDK, backproject, poisson_weights
+from rift_cl.report.html_page import Page
+from rift_cl.report.plot import figure_png, image_grid
+
+Floats = NDArray[np.float32]
+# Slices that are written together.
+_WRITTEN = 16
+
+
+@dataclasses.dataclass
+class ConeInversion:
+    """What the report asks of a method.
+
+    Args:
+        window: where the volume lies.
+        residuals: root mean square of the residual after each step, under one number.
+    """
+
+    window: VolumeWindow
+    residuals: dict[int, list[float]] = dataclasses.field(default_factory=dict)
+
+
+class ConeReconstruction:
+    """A reconstruction of a cone-beam scan that is planned: nothing is read or written yet.
+
+    Args:
+        settings: what to do.
+        file: the scan.
+
+    Raises:
+        RiftError: anything about the settings, the file, the device or the folder is wrong.
+    """
+
+    def __init__(self, settings: ReconstructSettings, file: ScanFile) -> None:
+        settings.check()
+        self.settings = settings
+        self.device: Device = settings.open_device(settings.memory_limit)
+        self.source = ConeInput(settings, file, self.device)
+        self.inversion = ConeInversion(self.source.window)
+        # Made now, so that a scan that the method does not take is told before any work.
+        self._fdk = self._formula()
+        out = settings.out
+        alone = out.is_dir() and {p.name for p in out.iterdir()} <= {PREVIEW_PICTURE, "config.json"}
+        overwrite = settings.overwrite or alone
+        self.folder = RunFolder(out, "reconstruct", overwrite=overwrite)
+        self.metrics: dict[str, Any] = {}
+        self.announce: Callable[[str], None] = lambda line: None
+        self._values: tuple[float, float] | None = None
+        self._begin = time.perf_counter()
+
+    @property
+    def rows(self) -> tuple[int, int]:
+        """First slice, and the one after the last."""
+        return self.source.window.slices
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Shape of the volume, (z, y, x)."""
+        nz, ny, nx = self.source.grid.shape
+        return nz, ny, nx
+
+    @property
+    def result(self) -> str:
+        """What there is when it is done, and where."""
+        if self.settings.preview:
+            return f"{self.settings.out / PREVIEW_PICTURE} shows the middle slice"
+        return f"slices and report.html are in {self.settings.out}"
+
+    @property
+    def decided(self) -> ReconstructSettings:
+        """The settings with all that was decided."""
+        return decided_cone_settings(self.source, self._values)
+
+    @cached_property
+    def projector(self) -> Projector:
+        """The projector of the voxels that are solved for."""
+        options: dict[str, Any] = {"device": self.device}
+        if self.settings.footprint is not None:
+            options["footprint"] = self.settings.footprint
+        return Projector(self.source.solved, self.source.geometry, **options)
+
+    def plan(self) -> dict[str, str]:
+        """What would be done, for ``--dry-run``."""
+        scan, device = self.source.scan, self.device
+        self.source.say(self._sentence)
+        volume = 4 * int(np.prod(self.shape))
+        return {
+            "scan": f"{scan.path} ({scan.source}, {scan.kind})",
+            "projections": f"{scan.shape} (angle, row, bin)",
+            "volume": f"{self.shape} (z, y, x), {format_bytes(volume)}",
+            "method": self.settings.method,
+            "assumed": " ".join(self.source.notes) or "nothing",
+            "device": f"{device.name}, budget {format_bytes(device.budget)}",
+            "output": str(volume_path(self.settings)),
+        }
+
+    def run(self) -> Iterator[Report]:
+        """Do it; a report after every step."""
+        self._begin = time.perf_counter()
+        total = 1 + self.settings.most_steps
+        yield Report(0, total, "steps")
+        self.source.say(self._sentence)
+        for note in self.source.notes:
+            self.announce(note)
+        self.folder.make()
+        try:
+            if self.settings.preview:
+                self._show(self._preview())
+                yield Report(total, total, "steps")
+                return
+            self._check_place()
+            integrals = self.source.read()
+            self.metrics = {"dead_pixels": integrals.dead, "starved_samples": integrals.starved}
+            yield Report(1, total, "steps")
+            volume = yield from self._solve(integrals.projections, total)
+        except BaseException:
+            self.folder.discard()
+            raise
+        self._finish(volume)
+        yield Report(total, total, "steps")
+
+    @property
+    def _sentence(self) -> str:
+        """What the formula chose for the scan's span and detector."""
+        if self._fdk is None:
+            return ""
+        return f"Method of Feldkamp, Davis and Kress (FDK): {self._fdk.sentence}."
+
+    def _formula(self) -> FDK | None:
+        if self.settings.method != "fbp":
+            return None
+        settings = self.settings
+        return FDK(self.projector, settings.view_filter(), compensate=settings.compensate)
+
+    def _solve(self, projections: Floats, total: int) -> Generator[Report, None, Floats]:
+        """The volume, after a report for every step."""
+        if self._fdk is not None:
+            return np.asarray(self._fdk(projections))
+        if self.settings.method == "backproject":
+            return np.asarray(backproject(self.projector, projections))
+        options: dict[str, Any] = {}
+        if self.settings.weights is not None:
+            options["weights"] = poisson_weights(projections).weights
+        solver = least_squares(self.settings, self.projector, projections, **options)
+        curve = self.inversion.residuals.setdefault(0, [])
+        for report in solver.run(self.settings.most_steps):
+            curve.append(report.values["residual"])
+            yield Report(1 + report.done, total, "steps", report.values)
+        volume = np.asarray(self.device.get(solver.image))
+        self.metrics |= {"steps": len(curve), "residual": curve[-1] if curve else 0.0}
+        return np.ascontiguousarray(volume[self.source.part])
+
+    def _preview(self) -> list[Floats]:
+        """The middle slice alone, which a formula makes without the others."""
+        if self._fdk is None:
+            raise InputError(
+                "--preview of a cone-beam scan is for --method fbp: steps need the whole volume"
+            )
+        first, stop = self.rows
+        middle = (first + stop) // 2
+        settings = dataclasses.replace(self.settings, rows=(middle, middle + 1))
+        grid = VolumeWindow.of(settings, self.source.geometry).grid
+        A = Projector(grid, self.source.geometry, device=self.device)
+        fdk = FDK(A, settings.view_filter(), compensate=settings.compensate)
+        return [np.asarray(fdk(self.source.read().projections))[0]]
+
+    def _finish(self, volume: Floats) -> None:
+        """Write the volume, its pictures and the report."""
+        self._values = self._value_window(volume)
+        preview = Preview(len(volume))
+        with self._open(self.settings, self._values) as writer:
+            for start in range(0, len(volume), _WRITTEN):
+                block = volume[start : start + _WRITTEN]
+                writer.write(start, block)
+                preview.take(start, block)
+        if self._values is not None:
+            below, above = writer.clipped
+            self.metrics |= {"clipped_below": below, "clipped_above": above}
+        self.folder.mark()
+        self.folder.drop(*set(VOLUME_NAMES.values()) - {volume_path(self.settings).name})
+        nz, ny, nx = (n // 2 for n in volume.shape)
+        self._show([volume[nz], volume[:, ny], volume[:, :, nx]])
+        if self.settings.zingers is not None:
+            self.metrics["zingers"] = self.source.clean.zingers
+        self.metrics = {"center": self.source.axis["center"], **self.metrics}
+        self.metrics.update(preview.statistics())
+        self.metrics["seconds"] = time.perf_counter() - self._begin
+        record = {**self.metrics, "assumed": self.source.notes}
+        facts = {**self.settings.decisive(), **self.source.identity(), "volume": str(self.shape)}
+        self.folder.finish(
+            self.decided,
+            record,
+            self._page(preview),
+            self.device,
+            asked=self.settings,
+            axis=self.source.axis,
+            run=facts,
+        )
+
+    def _page(self, preview: Preview) -> Page:
+        page = reconstruction_page(self, preview)
+        whole = self.source.window.whole
+        add_missed_planes(
+            page,
+            self.source.geometry,
+            radius=whole.shape[-1] * whole.spacing[-1] / 2,
+            half_height=whole.shape[0] * whole.spacing[0] / 2,
+            unit=self.source.unit or "unit of length",
+        )
+        return page
+
+    def _value_window(self, volume: Floats) -> tuple[float, float] | None:
+        """What the integers of the volume stand for, from a few slices where it was not said."""
+        if self.settings.dtype == "float32" or self.settings.window is not None:
+            return self.settings.window
+        low, high = suggested_window([volume[n] for n in Preview(len(volume)).panels])
+        self.source.notes.append(
+            f"Samples are {self.settings.dtype} from {low:g} to {high:g}, a window chosen from a "
+            "few slices (--window)."
+        )
+        return low, high
+
+    def _open(
+        self, settings: ReconstructSettings, values: tuple[float, float] | None
+    ) -> VolumeWriter:
+        grid = self.source.grid
+        return open_volume(
+            volume_path(settings),
+            self.shape,
+            format=settings.format,
+            spacing=grid.spacing,
+            unit=self.source.unit,
+            origin=[float(grid.coordinates(axis)[0]) for axis in range(3)],
+            dtype=settings.dtype,
+            window=values,
+        )
+
+    def _check_place(self) -> None:
+        """Tell before the work, not after it, that the volume cannot be written."""
+        plain = dataclasses.replace(self.settings, dtype="float32", window=None)
+        with suppress(_PlaceFoundError), self._open(plain, None):
+            raise _PlaceFoundError
+
+    def _show(self, planes: list[Floats]) -> None:
+        """Leave the middle planes across the three axes as a picture."""
+        titles = ["z, across the axis", "y, along the axis", "x, along the axis"][: len(planes)]
+        window = display_window([np.concatenate([plane.ravel() for plane in planes])])
+        figure = image_grid(planes, titles=titles, columns=len(planes), window=window, size=5.0)
+        with atomic_path(self.settings.out / PREVIEW_PICTURE) as part:
+            part.write_bytes(figure_png(figure))
+
+
+class _PlaceFoundError(Exception):
+    """Leaves a volume that was opened only to see whether it can be."""
