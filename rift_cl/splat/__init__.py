@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from rift_cl.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from rift_cl.splat.batch import draw_views, views_grad
     from rift_cl.splat.renderer import Frame, FrameGradients, Renderer
     from rift_cl.splat.settings import SplatSettings
     from rift_cl.splat.splats import Splats
@@ -21,14 +20,11 @@ __all__ = [
     "Renderer",
     "SplatSettings",
     "Splats",
-    "draw_views",
-    "views_grad",
 ]
 
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "batch": ("draw_views", "views_grad"),
         "renderer": ("Frame", "FrameGradients", "Renderer"),
         "settings": ("SplatSettings",),
         "splats": ("Splats",),

@@ -98,8 +98,6 @@ class FrameGradients:
         aperture: (2,): by the aperture's radius and focus; None if the camera's is not asked
             for, or has none.
         background: by the background as it was given; None where there was none.
-        shape_modes: (N, K - 1) by the modes of the densities; None where there are none.
-        color_modes: (N, K - 1, C) by those of the colours; None where there are none.
         lobes: (N, G) by the geometry of the lobes; None where there are none.
     """
 
@@ -109,9 +107,17 @@ class FrameGradients:
     camera: DeviceArray | None
     aperture: DeviceArray | None
     background: DeviceArray | None
-    shape_modes: DeviceArray | None = None
-    color_modes: DeviceArray | None = None
     lobes: DeviceArray | None = None
+
+    @property
+    def shape_modes(self) -> DeviceArray | None:
+        """(N, K - 1) by the modes of the densities; None where there are none."""
+        return self.splats.shape_modes
+
+    @property
+    def color_modes(self) -> DeviceArray | None:
+        """(N, K - 1, C) by the modes of the colours; None where there are none."""
+        return self.splats.color_modes
 
 
 def check_depth(depth: str | None, settings: SplatSettings) -> None:
@@ -230,8 +236,6 @@ class Renderer:
             camera=_summed(device, gradients.camera),
             aperture=_summed(device, gradients.aperture),
             background=self._background_grad(frame, grad_image) if with_background else None,
-            shape_modes=gradients.shape_modes,
-            color_modes=gradients.color_modes,
             lobes=lobes,
         )
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
-from hermite_frames import SIZE, camera, drawn, few, image
+from hermite_frames import SIZE, drawn, few, image
 
 from rift_cl.basis.angular import angular_basis
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.splat import Renderer, Splats, SplatSettings, draw_views, views_grad
 
 pytestmark = pytest.mark.dealt
 
@@ -49,29 +46,6 @@ def test_gradients_of_lobes_are_differences(device, kind):
         assert gradient.any()
         scale = np.linalg.norm(gradient) * np.linalg.norm(way)
         assert abs((gradient * way).sum() - right) < 3e-3 * scale, name
-
-
-@pytest.mark.full
-def test_gradients_of_several_views_add_up(device):
-    """Of modes and lobes too, to the bit of a sum in the order of the cameras."""
-    renderer = Renderer(SplatSettings(angular="lg"), device=device)
-    splats = Splats.upload(device, **lobed("lg"))
-    nearer = camera().view.copy()
-    nearer[2, 3] -= 0.5
-    cameras = [camera(), camera(view=nearer), camera("ortho")]
-    frames = draw_views(renderer, splats, cameras)
-    random = np.random.default_rng(8)
-    coming = [device.array(random.normal(size=(*SIZE, 3)).astype(np.float32)) for _ in frames]
-    total, views = views_grad(renderer, frames, coming)
-    alone = [renderer.backward(*given) for given in zip(frames, coming, strict=True)]
-    names = {field.name for field in dataclasses.fields(total)} - {"covars", "colors"}
-    assert names > {"shape_modes", "color_modes", "lobes", "sh", "means"}
-    for name in names:
-        parts = (getattr(one if hasattr(one, name) else one.splats, name) for one in alone)
-        first, second, third = (device.get(part) for part in parts)
-        assert first.any() and second.any() and third.any(), name
-        assert np.array_equal(device.get(getattr(total, name)), (first + second) + third), name
-    assert len(views) == 3 and total.covars is None and total.colors is None
 
 
 def test_lobes_that_do_not_fit_are_refused(device):

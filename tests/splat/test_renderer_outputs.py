@@ -5,7 +5,6 @@ import pytest
 from projection_scenes import camera_of, random_splats
 
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.splat.batch import draw_views, views_grad
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
@@ -13,7 +12,6 @@ from rift_cl.splat.splats import Splats
 pytestmark = pytest.mark.dealt
 
 SIZE = (97, 143)
-SHARED = ("means", "quats", "scales", "opacities")
 
 
 def splats_of(device, count=80, *, sh=True, channels=0):
@@ -134,31 +132,6 @@ def test_depth_gradient_is_that_of_differences(device):
     assert difference == pytest.approx(slope, rel=2e-2, abs=1.0)
 
 
-@pytest.mark.parametrize("with_camera", [False, True])
-def test_gradients_of_several_cameras_add_up(device, with_camera):
-    renderer = Renderer(SplatSettings(absgrad=True), device=device)
-    splats = splats_of(device, channels=2)
-    cameras = [camera_of("pinhole", focal=focal) for focal in (90.0, 120.0, 150.0)]
-    behind = [device.array(noise(5, seed)) for seed in range(3)]
-    frames = draw_views(renderer, splats, cameras, backgrounds=behind)
-    grads = [device.array(noise(frame.image.shape, 9)) for frame in frames]
-    total, views = views_grad(renderer, frames, grads, with_camera=with_camera)
-    alone = [
-        gradients_of(device, renderer.backward(frame, grad, with_camera=with_camera))
-        for frame, grad in zip(frames, grads, strict=True)
-    ]
-    for name in (*SHARED, "colors", "sh"):
-        key = f"splats.{name}" if name in SHARED else name
-        wanted = (alone[0][key] + alone[1][key]) + alone[2][key]
-        assert np.array_equal(device.get(getattr(total, name)), wanted), name
-    assert total.covars is None
-    for view, one in zip(views, alone, strict=True):
-        assert np.array_equal(device.get(view.means2d), one["splats.means2d"])
-        assert np.array_equal(device.get(view.means2d_abs), one["splats.means2d_abs"])
-        assert np.array_equal(device.get(view.background), one["background"])
-        assert (view.camera is None) != with_camera
-
-
 def test_what_cannot_be_drawn_is_named(device):
     renderer, camera = Renderer(device=device), camera_of("pinhole")
     splats = splats_of(device)
@@ -169,12 +142,6 @@ def test_what_cannot_be_drawn_is_named(device):
         xray.forward(splats, camera, depth="expected")
     with pytest.raises(ShapeError, match="background has shape"):
         renderer.forward(splats, camera, depth="expected", background=device.zeros(4))
-    with pytest.raises(ShapeError, match="backgrounds has 1 entries"):
-        draw_views(renderer, splats, [camera, camera], backgrounds=[None])
-    with pytest.raises(ShapeError, match="there are no frames"):
-        views_grad(renderer, [], [])
-    frames = draw_views(renderer, splats, [camera])
-    with pytest.raises(ShapeError, match="grad_images has 0 entries"):
-        views_grad(renderer, frames, [])
+    frame = renderer.forward(splats, camera)
     with pytest.raises(ShapeError, match="grad_image has shape"):
-        renderer.backward(frames[0], device.zeros((3, 3, 3)))
+        renderer.backward(frame, device.zeros((3, 3, 3)))
