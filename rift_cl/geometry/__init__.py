@@ -1,6 +1,7 @@
 """Grids of samples, scans, cameras and poses: frozen values that are checked, without OpenCL."""
 
 from rift_cl.geometry.aperture import Aperture
+from rift_cl.geometry.at_axis import at_axis
 from rift_cl.geometry.camera import Camera
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.cone import Cone
@@ -22,4 +23,5 @@ __all__ = [
     "Parallel",
     "Scan",
     "Vectors",
+    "at_axis",
 ]

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.geometry import Cone, Grid, Parallel, Scan, Vectors
+from rift_cl.geometry import Cone, Grid, Scan, Vectors, at_axis
 from rift_cl.operators.filters.ramp_filters import Filter, FilterLike, ViewFilter, as_filter
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.operators.projector.projector import Projector
@@ -61,11 +61,11 @@ class FDK(LinearOperator):
         counted = redundancy(scan, compensate)
         before, after = counted.missing
         wide = _widened(scan, before, after)
-        self._A = A if wide == A.scan else Projector(A.grid, wide, device=A.device, dtype=A.dtype)
+        self._A = A if wide == A.scan else _of_scan(A, wide)
         self.sentence: str = counted.sentence
         """What was chosen for the scan's span and detector, for a reader."""
         self._filter = ViewFilter(
-            Parallel(wide.angles, wide.bins, wide.pitch[1] / wide.magnification),
+            at_axis(wide),
             self._row_filter(wide),
             rows=wide.rows,
             gains=counted.views * amplitude(A.grid, wide),
@@ -159,6 +159,10 @@ def _circle(scan: Scan | None) -> Cone:
             f"backprojection wants a circle; {ITERATE}"
         )
     return cone
+
+
+def _of_scan(A: Projector, scan: Cone) -> Projector:
+    return Projector(A.grid, scan, A.footprint, device=A.device, dtype=A.dtype)
 
 
 def _widened(scan: Cone, before: int, after: int) -> Cone:

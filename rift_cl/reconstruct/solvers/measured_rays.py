@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rift_cl.errors import DTypeError, ShapeError
-from rift_cl.operators.projector.parallel_projector import ParallelProjector
+from rift_cl.operators.linear import LinearOperator
 from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays
 
 
@@ -20,15 +20,15 @@ class MeasuredRays(WeightedRays):
     """A projector whose unseen rays are zero: weights that are 0 or 1.
 
     Args:
-        A: the projector of one slice.
-        seen: (angle, bin) whether a ray was measured.
+        A: the projector.
+        seen: of its range's shape, whether a ray was measured.
 
     Raises:
         ShapeError: the rays are not those of the projector.
         DTypeError: they are not booleans.
     """
 
-    def __init__(self, A: ParallelProjector, seen: ArrayLike) -> None:
+    def __init__(self, A: LinearOperator, seen: ArrayLike) -> None:
         mask = np.asarray(seen)
         if mask.shape != A.range:
             raise ShapeError(f"seen has shape {mask.shape}, wanted the projector's {A.range}")

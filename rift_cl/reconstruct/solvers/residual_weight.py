@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.host_arrays import download
 from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
-from rift_cl.geometry import Parallel
+from rift_cl.geometry import Parallel, at_axis
 from rift_cl.operators.filters.compensation import COMPENSATIONS, Compensation
 from rift_cl.operators.filters.ramp_filters import Ramp, Response, ViewFilter
 from rift_cl.operators.linear import LinearOperator
@@ -88,7 +88,8 @@ def residual_weight(
             f"precondition is {precondition!r}, but A ({type(A).__name__}) has no scan to build it "
             "for: pass a LinearOperator on A.range"
         )
-    return _ramp(A, scan, precondition, _kept_share(A, scan, y, noise))
+    rows = at_axis(scan)
+    return _ramp(A, rows, precondition, _kept_share(A, rows, y, noise))
 
 
 def _checked(A: LinearOperator, F: LinearOperator) -> LinearOperator:

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.elementwise import copy
 from rift_cl.cl.host_arrays import download
+from rift_cl.geometry import Parallel, at_axis
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.operators.projector.fast_projector import FastProjector
-from rift_cl.operators.projector.phase_projector import PhaseProjector
+from rift_cl.operators.projector.projector import Projector
 from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays
 
 Views = NDArray[np.intp]
@@ -33,11 +34,13 @@ def view_subsets(A: LinearOperator, count: int) -> list[Views]:
     """
     views = A.range[0]
     order = np.arange(views)
-    if A.scan is not None and len(A.scan.angles) == views:
-        order = np.argsort(np.mod(A.scan.angles, np.pi), kind="stable")
+    if A.scan is not None and A.scan.views == views:
+        # Opposite views of parallel rays are alike; those from a point are not.
+        turn = np.pi if isinstance(A.scan, Parallel) else 2 * np.pi
+        order = np.argsort(np.mod(at_axis(A.scan).angles, turn), kind="stable")
     bits = max(count - 1, 0).bit_length()
-    turn = sorted(range(count), key=lambda k: f"{k:0{bits}b}"[::-1])
-    return [np.sort(order[first::count]) for first in turn]
+    firsts = sorted(range(count), key=lambda k: f"{k:0{bits}b}"[::-1])
+    return [np.sort(order[first::count]) for first in firsts]
 
 
 def restricted(A: LinearOperator, views: Views) -> LinearOperator:
@@ -49,9 +52,9 @@ def restricted(A: LinearOperator, views: Views) -> LinearOperator:
     """
     if isinstance(A, WeightedRays):
         return WeightedRays(restricted(A.inner, views), A.weights[views])
-    if type(A) is PhaseProjector:
+    if isinstance(A, Projector):
         part = A.scan.subset(views)
-        return PhaseProjector(A.grid, part, A.footprint, device=A.device, dtype=A.dtype)
+        return Projector(A.grid, part, A.footprint, device=A.device, dtype=A.dtype)
     if type(A) is FastProjector:
         return FastProjector(A.grid, A.scan.subset(views), A.error, lobes=A.lobes, device=A.device)
     return ChosenViews(A, views)
