@@ -8,9 +8,12 @@ cone-beam algorithm, J. Opt. Soc. Am. A 1, 612, 1984) is
 
 R and S the distances of the source from axis and detector, p the pitches, dV the volume of a voxel:
 A' spreads a ray by ``dV |d| S / (D^2 p_u p_v)``, d the way from the source to the bin and D the
-depth of the voxel, and ``|d| C = S``, so that their weight R^2 / D^2 is that of the adjoint. A
-detector on an arc about the source has the ramp ``(gamma / sin gamma)^2 h`` between fan angles, and
-before it the cosine of the fan angle as well (Kak and Slaney, Principles of Computerized
+depth of the voxel, and ``|d| C = S``, so that their weight R^2 / D^2 is that of the adjoint. In a
+fan, whose slices are apart, A' has 1 / D alone: the projector is then asked for the other one, and
+k is R p_u / (S dA).
+
+A detector on an arc about the source has the ramp ``(gamma / sin gamma)^2 h`` between fan angles,
+and before it the cosine of the fan angle as well (Kak and Slaney, Principles of Computerized
 Tomographic Imaging, section 3.4.1). ``w`` counts every line once (``redundancy``). In the plane of
 the source's orbit the result is exact; away from it the orbit does not know all (Tuy's condition),
 and densities fall off.
@@ -27,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.geometry import Cone, Grid, Scan, Vectors, at_axis
+from rift_cl.geometry import Cone, Fan, Grid, Scan, Vectors, at_axis
 from rift_cl.operators.filters.ramp_filters import Filter, FilterLike, ViewFilter, as_filter
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.operators.projector.projector import Projector
@@ -41,7 +44,7 @@ _LEVEL = 1e-6
 
 
 class FDK(LinearOperator):
-    """Filtered backprojection of cone beams, from projections to a volume.
+    """Filtered backprojection of a cone or a fan, from projections to a volume or an image.
 
     Args:
         A: the projector whose grid and scan to use.
@@ -61,13 +64,13 @@ class FDK(LinearOperator):
         counted = redundancy(scan, compensate)
         before, after = counted.missing
         wide = _widened(scan, before, after)
-        self._A = A if wide == A.scan else _of_scan(A, wide)
+        self._A = _backprojector(A, wide)
         self.sentence: str = counted.sentence
         """What was chosen for the scan's span and detector, for a reader."""
         self._filter = ViewFilter(
             at_axis(wide),
             self._row_filter(wide),
-            rows=wide.rows,
+            rows=self._A.range[1] if len(self._A.range) == 3 else None,
             gains=counted.views * amplitude(A.grid, wide),
             device=A.device,
             dtype=A.dtype,
@@ -76,12 +79,12 @@ class FDK(LinearOperator):
         rays = np.pad(counted.rays, [(0, 0), (before, after)])
         self._into = RayFactors(A.device, A.dtype, into, rays, before)
         self._out_of = RayFactors(A.device, A.dtype, out_of, np.ones((1, wide.bins)))
-        self._wide = (wide.views, wide.rows, wide.bins)
+        self._wide = self._A.range
 
-    def _row_filter(self, scan: Cone) -> Filter:
+    def _row_filter(self, scan: Fan | Cone) -> Filter:
         if not scan.curved:
             return self.filter
-        return _OnArc(self.filter, scan.pitch[1] / scan.source_to_detector)
+        return _OnArc(self.filter, at_axis(scan).pitch / scan.source_to_axis)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return partial(FDK, compensate=self._compensate), (self._given, self.filter)
@@ -133,16 +136,16 @@ class _OnArc:
         return taps
 
 
-def as_cone(scan: Scan | None) -> Cone:
-    """The cone that a scan is, on a circle or not.
+def as_beam(scan: Scan | None) -> Fan | Cone:
+    """The fan or the cone that a scan is, on a circle or not.
 
     Raises:
         InputError: it is none; the sentence names the methods that take it.
     """
-    if isinstance(scan, Cone):
+    if isinstance(scan, (Fan, Cone)):
         return scan
     if not isinstance(scan, Vectors):
-        raise InputError(f"scan is {scan!r:.60}, wanted a Cone, or Vectors that are one")
+        raise InputError(f"scan is {scan!r:.60}, wanted a Fan, a Cone, or Vectors that are one")
     try:
         return Cone.of_vectors(scan)
     except InputError as failure:
@@ -151,34 +154,45 @@ def as_cone(scan: Scan | None) -> Cone:
         ) from None
 
 
-def _circle(scan: Scan | None) -> Cone:
-    cone = as_cone(scan)
-    if np.ptp(cone.heights) > _LEVEL * cone.source_to_axis:
-        raise InputError(
-            f"scan: heights range over {np.ptp(cone.heights):.3g}, a helix or steps, and filtered "
-            f"backprojection wants a circle; {ITERATE}"
-        )
-    return cone
-
-
-def _of_scan(A: Projector, scan: Cone) -> Projector:
-    return Projector(A.grid, scan, A.footprint, device=A.device, dtype=A.dtype)
-
-
-def _widened(scan: Cone, before: int, after: int) -> Cone:
-    """The scan with so many more bins before the first and after the last."""
-    row, bin = scan.center
-    return replace(scan, bins=scan.bins + before + after, center=(row, bin + before))
-
-
-def amplitude(grid: Grid, scan: Cone) -> float:
-    """k, which makes the adjoint's weights those of the inversion."""
+def amplitude(grid: Grid, scan: Fan | Cone) -> float:
+    """k, which makes the adjoint's weights those of the inversion, and about 1 at the axis."""
+    if isinstance(scan, Fan):
+        return scan.pitch / scan.magnification / math.prod(grid.spacing[-2:])
     return math.prod(scan.pitch) / scan.magnification**2 / math.prod(grid.spacing)
 
 
-def _cosines(scan: Cone) -> tuple[Floats, Floats]:
-    """Factors of pixels before and after the filter, (rows, bins) each."""
-    v = (np.arange(scan.rows) - scan.center[0])[:, None] * scan.pitch[0]
+def _circle(scan: Scan | None) -> Fan | Cone:
+    beam = as_beam(scan)
+    if isinstance(beam, Cone) and np.ptp(beam.heights) > _LEVEL * beam.source_to_axis:
+        raise InputError(
+            f"scan: heights range over {np.ptp(beam.heights):.3g}, a helix or steps, and filtered "
+            f"backprojection wants a circle; {ITERATE}"
+        )
+    return beam
+
+
+def _widened(scan: Fan | Cone, before: int, after: int) -> Fan | Cone:
+    """The scan with so many more bins before the first and after the last."""
+    bins = scan.bins + before + after
+    if isinstance(scan, Fan):
+        return replace(scan, bins=bins, center=scan.center + before)
+    row, bin = scan.center
+    return replace(scan, bins=bins, center=(row, bin + before))
+
+
+def _backprojector(A: Projector, scan: Fan | Cone) -> Projector:
+    """The projector whose adjoint has the weights of the inversion."""
+    given: Any = {"device": A.device, "dtype": A.dtype}
+    if isinstance(scan, Fan):
+        return type(A)(A.grid, scan, A.footprint, depth_power=2, **given)
+    return A if scan == A.scan else Projector(A.grid, scan, A.footprint, **given)
+
+
+def _cosines(scan: Fan | Cone) -> tuple[Floats, Floats]:
+    """Factors of pixels before and after the filter, (rows, bins), or (1, bins) of a fan."""
+    v: Floats = np.zeros((1, 1))
+    if isinstance(scan, Cone):
+        v = (np.arange(scan.rows, dtype=np.float64) - scan.center[0])[:, None] * scan.pitch[0]
     gamma = scan.fan_angles()
     # In the orbit's plane a bin stands S / cos gamma away, or S where it is on an arc.
     reach = scan.source_to_detector / (np.ones_like(gamma) if scan.curved else np.cos(gamma))

@@ -27,7 +27,7 @@ from rift_cl.operators.filters.ramp_filters import FilterLike, Gains, ViewFilter
 from rift_cl.operators.linear import Chunk, LinearOperator
 from rift_cl.operators.projector.parallel_projector import ParallelProjector
 from rift_cl.operators.projector.projector import Projector
-from rift_cl.reconstruct.direct.fdk import FDK, amplitude, as_cone
+from rift_cl.reconstruct.direct.fdk import FDK, amplitude, as_beam
 from rift_cl.reconstruct.direct.view_weights import view_gains
 
 Floats = NDArray[np.float64]
@@ -175,7 +175,7 @@ def backproject(A: ParallelProjector | Projector, y: Any, *, out: Any = None) ->
     _check_projector(A)
     if isinstance(A, ParallelProjector):
         return (A.T * (np.pi / len(A.scan.angles) * _unspread(A)))(y, out, name="y")
-    scan = as_cone(A.scan)
+    scan = as_beam(A.scan)
     return (A.T * (np.pi / scan.views * amplitude(A.grid, scan)))(y, out, name="y")
 
 

@@ -52,7 +52,7 @@ def restricted(A: LinearOperator, views: Views) -> LinearOperator:
     """
     if isinstance(A, WeightedRays):
         return WeightedRays(restricted(A.inner, views), A.weights[views])
-    if isinstance(A, Projector):
+    if isinstance(A, Projector) and A.scan is not None:
         part = A.scan.subset(views)
         return Projector(A.grid, part, A.footprint, device=A.device, dtype=A.dtype)
     if type(A) is FastProjector:
