@@ -34,6 +34,7 @@ typedef double real;
 typedef long integer;
 #if LANES == 8
 typedef double8 real8;
+typedef double4 real4;
 typedef long8 integer8;
 #endif
 #define TO_INTEGER8(v) convert_long8(v)
@@ -43,6 +44,7 @@ typedef float real;
 typedef int integer;
 #if LANES == 8
 typedef float8 real8;
+typedef float4 real4;
 typedef int8 integer8;
 #endif
 #define TO_INTEGER8(v) convert_int8(v)
@@ -80,12 +82,15 @@ typedef integer lanes_int;
 
 #if LANES == 8 && RIFT_POCL
 typedef real8 lanes_at __attribute__((aligned(sizeof(real))));
+typedef real4 half_at __attribute__((aligned(sizeof(real))));
 #define LOAD(p) (*(const __global lanes_at *)(p))
+#define LOAD_HALF(p) (*(const __global half_at *)(p))
 #define STORE(p, v) (*(__global lanes_at *)(p) = (v))
 #define TO_INT(v) __builtin_convertvector(v, integer8)
 #define TO_FLOAT(v) __builtin_convertvector(v, real8)
 #elif LANES == 8
 #define LOAD(p) vload8(0, p)
+#define LOAD_HALF(p) vload4(0, p)
 #define STORE(p, v) vstore8(v, 0, p)
 #define TO_INT(v) TO_INTEGER8(v)
 #define TO_FLOAT(v) TO_REAL8(v)

@@ -22,6 +22,19 @@ static void transpose8(real8 *v) {
   UNROLL for (int t = 0; t < 8; t += 2) EXCHANGE1(v[t], v[t + 1], v[t], v[t + 1])
 }
 #define TRANSPOSE(v) transpose8(v);
+
+/* Transpose 4 x 4 numbers within the lower halves of four vectors, and within the upper ones: no
+ * number changes sides, which spares the slow shuffles. */
+static void transpose_halves(real8 *v) {
+  const real8 a = (real8)(v[0].s0, v[1].s0, v[0].s1, v[1].s1, v[0].s4, v[1].s4, v[0].s5, v[1].s5);
+  const real8 b = (real8)(v[0].s2, v[1].s2, v[0].s3, v[1].s3, v[0].s6, v[1].s6, v[0].s7, v[1].s7);
+  const real8 c = (real8)(v[2].s0, v[3].s0, v[2].s1, v[3].s1, v[2].s4, v[3].s4, v[2].s5, v[3].s5);
+  const real8 d = (real8)(v[2].s2, v[3].s2, v[2].s3, v[3].s3, v[2].s6, v[3].s6, v[2].s7, v[3].s7);
+  v[0] = (real8)(a.s01, c.s01, a.s45, c.s45);
+  v[1] = (real8)(a.s23, c.s23, a.s67, c.s67);
+  v[2] = (real8)(b.s01, d.s01, b.s45, d.s45);
+  v[3] = (real8)(b.s23, d.s23, b.s67, d.s67);
+}
 #define SUM_OF_LANES(v) \
   ((((v).s0 + (v).s4) + ((v).s2 + (v).s6)) + (((v).s1 + (v).s5) + ((v).s3 + (v).s7)))
 #else

@@ -40,7 +40,7 @@ from rift_cl.cl.host_arrays import (
 )
 from rift_cl.cl.real_type import real_type
 from rift_cl.errors import DeviceMemoryError, InputError, ResourceLimitError
-from rift_cl.geometry import Grid, Parallel
+from rift_cl.geometry import Grid, Scan
 
 Shape = tuple[int, ...]
 _HALVINGS = 6
@@ -90,7 +90,7 @@ class LinearOperator(ABC):
     """
 
     grid: Grid | None = None
-    scan: Parallel | None = None
+    scan: Scan | None = None
     # NumPy's arrays leave ``array * A`` and ``array @ A`` to the operator, which refuses them,
     # instead of making an array of operators.
     __array_ufunc__ = None

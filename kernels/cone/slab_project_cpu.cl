@@ -1,0 +1,148 @@
+/* A volume to slab tables: the transpose of slab_backproject_cpu.
+ *
+ *     table[view][r][c] = sum over slabs, lines and z of
+ *         amplitude[view][slab] f(line, c) g(z, r) volume[slab][line][z].
+ *
+ * Index space: (runs of WIDTH columns, groups of VIEWS views). Each item owns these columns of its
+ * views' tables and walks the volume, slab after slab, DEPTH z at a time. Lines follow each other in
+ * the order of their columns, so that the sums of TAPS columns wait in registers until the last line
+ * that reaches the first of them has come; z does so along the rows, once 8 columns are transposed
+ * into lanes. No atomics, one order of summation. Views are grouped since each of them reads the
+ * same slab, which is then in the cache.
+ *
+ * The volume is that of slab_backproject_cpu; its z behind the last are zeros. */
+
+#include "include/portable.h"
+#include "include/slab_table.h"
+#include "include/transpose.h"
+
+#ifndef DEPTH
+#define DEPTH 64
+#endif
+#ifndef WIDTH
+#define WIDTH 64
+#endif
+#ifndef VIEWS
+#define VIEWS 8
+#endif
+#define GROUPS (DEPTH / LANES)
+/* Columns of a tile: those before the item's own that its lines may reach, then whole lanes. */
+#define BEFORE (TAPS - 1)
+#define TILE (BEFORE + WIDTH)
+
+/* The part of a slab's lines in an item's columns, all z of a run: tile[c][z]; returns its width. */
+static int blend_lines(
+    lanes (*tile)[GROUPS], __global const real *restrict volume, __global const int *restrict places,
+    __global const real *restrict shares, int *begin, int lines, long line_stride, int column0)
+{
+  const int upwards = places[0] <= places[lines - 1];
+  const int first_column = column0 - BEFORE, end_column = column0 + WIDTH;
+  /* The first line of the item is near that of the slab before. */
+  int k = *begin;
+#define LINE(k) (upwards ? (k) : lines - 1 - (k))
+  while (k > 0 && places[LINE(k - 1)] >= first_column) k--;
+  while (k < lines && places[LINE(k)] < first_column) k++;
+  *begin = k;
+  if (k == lines || places[LINE(k)] >= end_column) return 0;
+  lanes sums[TAPS][GROUPS];
+  UNROLL for (int t = 0; t < TAPS; t++)
+    UNROLL for (int g = 0; g < GROUPS; g++) sums[t][g] = 0;
+  int column = 0;
+  for (; k < lines; k++) {
+    const int line = LINE(k), place = places[line] - first_column;
+    if (place >= TILE) break;
+    for (; column < place; column++) {
+      UNROLL for (int g = 0; g < GROUPS; g++) {
+        tile[column][g] = sums[0][g];
+        UNROLL for (int t = 1; t < TAPS; t++) sums[t - 1][g] = sums[t][g];
+        sums[TAPS - 1][g] = 0;
+      }
+    }
+    real weight[TAPS];
+    weight[0] = 1;
+    UNROLL for (int t = 1; t < TAPS; t++) {
+      weight[t] = shares[line * (TAPS - 1) + t - 1];
+      weight[0] -= weight[t];
+    }
+    __global const real *values = volume + line * line_stride;
+    UNROLL for (int g = 0; g < GROUPS; g++) {
+      const lanes value = LOAD(values + g * LANES);
+      UNROLL for (int t = 0; t < TAPS; t++) sums[t][g] = sums[t][g] + weight[t] * value;
+    }
+  }
+  UNROLL for (int t = 0; t < TAPS; t++, column++)
+    if (column < TILE)
+      UNROLL for (int g = 0; g < GROUPS; g++) tile[column][g] = sums[t][g];
+  column = column < TILE ? column : TILE;
+  for (; (column - BEFORE) % LANES != 0; column++)
+    UNROLL for (int g = 0; g < GROUPS; g++) tile[column][g] = 0;
+  return column - BEFORE;
+}
+
+/* Add tile[c][z] of 8 columns to a table's rows. */
+static void add_rows(
+    __global real *restrict table, lanes (*tile)[GROUPS], __global const int *restrict places,
+    __global const real *restrict shares, real amplitude, int columns)
+{
+  lanes sums[ROW_TAPS];
+  UNROLL for (int t = 0; t < ROW_TAPS; t++) sums[t] = 0;
+  int row = places[0];
+  __global real *at = table + (long)row * columns;
+  for (int g = 0; g < GROUPS; g++)
+    for (int upper = 0; upper < 2; upper++) {
+      lanes values[4];
+      UNROLL for (int n = 0; n < 4; n++)
+        values[n] = upper ? (lanes)(tile[n][g].hi, tile[n + 4][g].hi)
+                          : (lanes)(tile[n][g].lo, tile[n + 4][g].lo);
+      transpose_halves(values);
+      UNROLL for (int n = 0; n < 4; n++) {
+        const int z = g * LANES + 4 * upper + n;
+        for (; row < places[z]; row++, at += columns) {
+          STORE(at, LOAD(at) + sums[0]);
+          UNROLL for (int t = 1; t < ROW_TAPS; t++) sums[t - 1] = sums[t];
+          sums[ROW_TAPS - 1] = 0;
+        }
+        real rest = amplitude;
+        UNROLL for (int t = 1; t < ROW_TAPS; t++) {
+          const real weight = amplitude * shares[z * (ROW_TAPS - 1) + t - 1];
+          sums[t] = sums[t] + weight * values[n];
+          rest -= weight;
+        }
+        sums[0] = sums[0] + rest * values[n];
+      }
+    }
+  UNROLL for (int t = 0; t < ROW_TAPS; t++, at += columns) STORE(at, LOAD(at) + sums[t]);
+}
+
+KERNEL void slab_project_cpu(
+    __global real *restrict table, __global const real *restrict volume,
+    __global const int *restrict places, __global const real *restrict shares,
+    __global const int *restrict row_places, __global const real *restrict row_shares,
+    __global const real *restrict amplitudes, int first, int count, int rows, int columns, int pad,
+    int lines, int padded_lines, int slabs, int depth, long line_stride, long slab_stride)
+{
+  const int column0 = pad + (int)get_global_id(0) * WIDTH, view0 = (int)get_global_id(1) * VIEWS;
+  const int view1 = view0 + VIEWS < count ? view0 + VIEWS : count;
+  const int own = columns - column0 < WIDTH ? columns - column0 : WIDTH;
+  for (int view = view0; view < view1; view++)
+    for (int r = 0; r < rows; r++)
+      for (int c = 0; c < own; c += LANES) STORE(table + ENTRY(view, r, column0 + c), (lanes)0);
+  lanes tile[TILE][GROUPS];
+  for (int z0 = 0; z0 < depth; z0 += DEPTH) {
+    int begin[VIEWS];
+    for (int v = 0; v < VIEWS; v++) begin[v] = 0;
+    for (int slab = 0; slab < slabs; slab++)
+      for (int view = view0; view < view1; view++) {
+        const long of_slab = (long)view * slabs + slab, of_line = of_slab * padded_lines;
+        const long of_row = of_slab * depth + z0;
+        const int width = blend_lines(
+            tile, volume + slab * slab_stride + z0, places + of_line,
+            shares + of_line * (TAPS - 1), begin + (view - view0), lines, line_stride, column0);
+        for (int c = 0; c < width && c < own; c += LANES)
+          add_rows(
+              table + ENTRY(view, 0, column0 + c), tile + BEFORE + c, row_places + of_row,
+              row_shares + of_row * (ROW_TAPS - 1), amplitudes[(long)(first + view) * slabs + slab],
+              columns);
+      }
+  }
+}

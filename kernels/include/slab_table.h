@@ -1,0 +1,86 @@
+/* The slab table: a view of a cone stretched so that backprojection needs no gathers.
+ *
+ * A source at distance R from the axis looks at a detector at distance S. Walk the volume in slabs,
+ * planes across the axis (x or y) that the view mainly looks along; b is a slab's coordinate, b_s
+ * the source's, and a counts the lines of a slab, which run along z. The ray of detector column u
+ * has the slope d(u) across the slabs: from source to detector it passes S |d(u)| of them. A point
+ * of depth D lies on the ray of its column, so that D = |b - b_s| / |d(u)|, and the row at which it
+ * is seen,
+ *
+ *     v = S (z - z_s) / D = |d(u)| * S (z - z_s) / |b - b_s|,
+ *
+ * is a product: one factor belongs to the column, the other to the slab. So stretch the view once,
+ * column by column, by the first factor,
+ *
+ *     T[r][u] = gain(u) * sum over rows i of kernel(step(u) (r + first) + center - i) P[i][u],
+ *
+ * in which step(u) is |d(u)| times the table's pitch, and gain(u) its square. In T a whole slab has one magnification: its
+ * samples meet the rows r at equal steps, whatever the line, and the columns at places that are the
+ * same for all z of a line,
+ *
+ *     out[a][z] += A / (b - b_s)^2 * sum over columns and rows of  f(a, u) g(z, r) T[r][u],
+ *
+ * f and g being the shares of a sample's footprint in columns and in rows. The blend of rows takes
+ * columns as lanes, the blend of columns takes z as lanes: no gathers. With A = dV S^2 / (p_u p_v)
+ * and the length of a ray in units of its reach, |(S, u, v)| / S, multiplied into P, this is the
+ * transpose of line integrals; the projector is the transpose of these steps in reverse order.
+ *
+ * A sample's footprint lies in TAPS columns from its `place` on. The first takes what the others
+ * leave; `shares` has TAPS - 1 numbers for each sample. Rows have ROW_TAPS alike. Both come from
+ * slab_places, once for both halves of the pair, which therefore read the same numbers.
+ *
+ * Table entries of samples that the detector does not see are zeros beyond its edges. On a CPU the
+ * columns of a table are contiguous, on a GPU its rows, along which its items lie. */
+
+#ifndef TAPS
+#define TAPS 2
+#endif
+#ifndef ROW_TAPS
+#define ROW_TAPS 2
+#endif
+
+#if LANES == 8
+#define ENTRY(view, row, column) (((long)(view) * rows + (row)) * columns + (column))
+#else
+#define ENTRY(view, row, column) (((long)(view) * columns + (column)) * rows + (row))
+#endif
+
+/* 24 times the integral from 0 on of Keys' cubic convolution kernel (IEEE Trans. Acoust. Speech
+ * Signal Process. 29, 1981), which reaches 2 samples to either side. */
+#define KERNEL_REACH 2.0f
+static lanes cubic_integral(lanes distance) {
+  const lanes far = absolute(distance);
+  const lanes d = far < KERNEL_REACH ? far : (lanes)KERNEL_REACH;
+  const lanes near = d * (24.0f + d * d * (9.0f * d - 20.0f));
+  const lanes beyond = d * (48.0f + d * (d * (20.0f - 3.0f * d) - 48.0f)) - 4.0f;
+  const lanes found = d < 1.0f ? near : beyond;
+  return distance < 0.0f ? -found : found;
+}
+
+/* The least and the largest of LANES numbers. */
+#if LANES == 8
+static real least(lanes v) {
+  real found = v.s0;
+  UNROLL for (int n = 1; n < 8; n++) found = ((real *)&v)[n] < found ? ((real *)&v)[n] : found;
+  return found;
+}
+static real largest(lanes v) { return -least(-v); }
+#else
+#define least(v) (v)
+#define largest(v) (v)
+#endif
+
+static lanes at_least_one(lanes v) { return v > 1.0f ? v : (lanes)1.0f; }
+
+/* Weight of detector row i in table row r of a column: the kernel, as wide as the wider of the two
+ * rows, averaged over the narrower. So a table's row reads weights that add up to 1, and gives away
+ * all that it has, wherever it lies. Both stretching kernels ask here, so that they weight alike. */
+static lanes row_weight(int r, lanes step, real center, int i) {
+  const lanes width = at_least_one(step), extent = step < 1.0f ? step : (lanes)1.0f;
+  const lanes away = step * (real)r + (center - (real)i);
+  return (cubic_integral((away + 0.5f * extent) / width) -
+          cubic_integral((away - 0.5f * extent) / width)) / (24.0f * extent);
+}
+
+/* Detector rows to either side of a table's row that have such weights. */
+static lanes row_reach(lanes step) { return KERNEL_REACH * at_least_one(step) + 0.5f; }

@@ -1,0 +1,377 @@
+"""Line integrals along the rays of a cone, and their exact adjoint, by slab tables.
+
+Forward: volume -> slabs (y, x, z) -> slab tables -> detector. Adjoint: the same steps transposed,
+in reverse, with the same numbers. ``kernels/include/slab_table.h`` derives the method;
+``rift_cl/reference/cone.py`` has the matrix.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from rift_cl.cl.array import DeviceArray
+from rift_cl.cl.device import Device
+from rift_cl.cl.discovery import default_device
+from rift_cl.errors import InputError
+from rift_cl.geometry import Cone, Grid
+from rift_cl.operators.projector.projector import Projector
+from rift_cl.operators.projector.slab_stretch import SlabStretch
+from rift_cl.operators.projector.slab_table import ROW_TAPS, Samples, SlabTable, slab_table
+
+_FOOTPRINTS = ("strip", "linear")
+# Tables and places of a run of views together: on a CPU they should stay in its caches.
+_TABLE_BYTES = {"cpu": 8 << 20, "gpu": 64 << 20}
+_FEWEST_VIEWS = 16
+# What an item of a CPU takes: z at once, columns and views of the projector, and of the
+# backprojector as many lines as are seen in so many columns.
+_DEPTH, _COLUMNS, _GROUPED_VIEWS = 64, 64, 8
+_WIDTHS, _LINES = (24, 48, 72, 96), (64, 32, 16, 8, 4, 2, 1)
+# Numbers between lines and between slabs, so that they do not compete for the same cache lines.
+_APART = 16
+
+
+class SlabProjector(Projector):
+    """Line integrals of a volume along the rays of a ``Cone``.
+
+    A value of the range is that of the line integral, value times length, from the source through
+    the centre of a bin. Sampled rays see a volume by the shadows of its samples:
+
+    Args:
+        grid: the grid of the volume, (nz, ny, nx).
+        scan: source and detector.
+        footprint: how a sample's shadow is shared among bins, along the detector's rows and its
+            columns alike. ``strip``: by what of each bin it covers. ``linear``: by linear
+            interpolation between the two bins about its centre; where bins are finer than the
+            shadow the hat widens to that shadow.
+        device: the device to use; the default device if not given.
+        dtype: ``float32``, or ``float64`` where the device has it.
+
+    The domain is ``grid.shape``; the range is (views, rows, bins).
+
+    Raises:
+        InputError: the grid is no volume, the footprint or the type is unknown, the source stands
+            in the volume, the fan is wider than some 90 degrees, or bins and samples are of very
+            different sizes.
+        DeviceError: the device has no float64.
+    """
+
+    scan: Cone
+
+    def __init__(
+        self,
+        grid: Grid,
+        scan: Cone,
+        footprint: str = "strip",
+        device: Device | None = None,
+        dtype: DTypeLike = np.float32,
+    ) -> None:
+        if not isinstance(grid, Grid) or len(grid.shape) != 3:
+            raise InputError(
+                f"grid is {grid!r:.60}, wanted a volume such as Grid((256, 256, 256)): a cone "
+                "looks at one"
+            )
+        if footprint not in _FOOTPRINTS:
+            raise InputError(f"footprint is {footprint!r}, wanted 'strip' or 'linear'")
+        shape = scan.views, scan.rows, scan.bins
+        super().__init__(grid.shape, shape, device or default_device(), dtype)
+        self.grid, self.scan, self.footprint = grid, scan, footprint
+        self._tables = [slab_table(grid, scan, footprint, along_x=way) for way in (True, False)]
+        self._precision = {"DOUBLE": int(self.dtype == np.float64)}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return SlabProjector, (self.grid, self.scan, self.footprint, self.device, self.dtype)
+
+    def _facts(self) -> list[str]:
+        scan = self.scan
+        return [
+            f"grid {' x '.join(map(str, self.grid.shape))}",
+            f"{scan.views} cone views of {scan.rows} x {scan.bins} bins",
+            f"magnification {scan.magnification:.3g}",
+            f"footprint {self.footprint}",
+        ]
+
+    def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
+        slabs = self._layout.slabs(self.device, x)
+        for walk in self._walks:
+            for first, count in self._runs(walk):
+                tables = self.device.empty(
+                    (count, walk.table.rows * walk.table.columns), self.dtype
+                )
+                walk.project(slabs, tables, first, count)
+                walk.stage.collect(tables, out, first, count)
+
+    def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
+        slabs = self.device.empty(self._layout.size, self.dtype)
+        add = False
+        for walk in self._walks:
+            for first, count in self._runs(walk):
+                tables = self.device.empty(
+                    (count, walk.table.rows * walk.table.columns), self.dtype
+                )
+                walk.stage.fill(y, tables, first, count)
+                walk.backproject(tables, slabs, first, count, add=add)
+                add = True
+        self._layout.volume(self.device, slabs, out)
+
+    @cached_property
+    def _layout(self) -> _Layout:
+        return _Layout.of(self.grid, self.device, self.dtype)
+
+    @cached_property
+    def _walks(self) -> list[_Walk]:
+        column = Samples.of(self.grid, 0)
+        return [
+            _Walk(self, table, column, along_x=way)
+            for way, table in zip((True, False), self._tables, strict=True)
+        ]
+
+    def _runs(self, walk: _Walk) -> Iterator[tuple[int, int]]:
+        """Runs of views, first and count, whose tables exist at the same time."""
+        kind = "cpu" if self.device.traits.is_cpu else "gpu"
+        most = max(_FEWEST_VIEWS, _TABLE_BYTES[kind] // walk.each)
+        most = max(1, min(most, self.device.traits.allocation // walk.each))
+        total = len(walk.table.views)
+        for first in range(0, total, most):
+            yield first, min(most, total - first)
+
+    @property
+    def scratch(self) -> int:
+        """Bytes needed besides the arrays that go in and come out."""
+        kind = "cpu" if self.device.traits.is_cpu else "gpu"
+        tables = max(_TABLE_BYTES[kind], *(_FEWEST_VIEWS * walk.each for walk in self._walks))
+        records = sum(walk.nbytes for walk in self._walks)
+        return self.dtype.itemsize * self._layout.size + tables + records
+
+
+class _Layout(NamedTuple):
+    """A volume in slabs, (y, x, z), z padded to whole runs.
+
+    Args:
+        shape: of the volume, (nz, ny, nx).
+        run: z that an item of a CPU takes at once.
+        depth: z with the padding.
+        strides: numbers from y to y and from x to x.
+        size: numbers in all.
+        double: whether they are float64.
+    """
+
+    shape: tuple[int, ...]
+    run: int
+    depth: int
+    strides: tuple[int, int]
+    size: int
+    double: int
+
+    @classmethod
+    def of(cls, grid: Grid, device: Device, dtype: np.dtype[Any]) -> _Layout:
+        nz, ny, nx = grid.shape
+        lanes = device.traits.macros["LANES"]
+        runs = -(-nz // _DEPTH) if lanes > 1 else nz
+        run = -(-nz // (runs * lanes)) * lanes
+        along_x = runs * run + _APART
+        along_y = nx * along_x + _APART
+        double = int(dtype == np.float64)
+        return cls(grid.shape, run, runs * run, (along_y, along_x), ny * along_y, double)
+
+    def slabs(self, device: Device, volume: DeviceArray) -> DeviceArray:
+        """The volume in slabs."""
+        slabs = device.empty(self.size, volume.dtype)
+        self._turn(device, volume, slabs, back=0)
+        return slabs
+
+    def volume(self, device: Device, slabs: DeviceArray, out: DeviceArray) -> None:
+        """Write slabs to a volume."""
+        self._turn(device, out, slabs, back=1)
+
+    def _turn(self, device: Device, volume: DeviceArray, slabs: DeviceArray, *, back: int) -> None:
+        nz, ny, nx = self.shape
+        tile = 16 if device.traits.is_cpu else 1
+        device.launch(
+            "volume_turn",
+            (-(-nx // tile), -(-self.depth // tile), ny),
+            volume=volume,
+            slabs=slabs,
+            lines=nx,
+            depth=nz,
+            padded_depth=self.depth,
+            volume_i=nx,
+            volume_j=1,
+            volume_k=ny * nx,
+            slab_stride=self.strides[0],
+            line_stride=self.strides[1],
+            TILE=tile,
+            BACK=back,
+            DOUBLE=self.double,
+        )
+
+
+class _Walk:
+    """Views that are walked alike: their records on the device, and the kernels' launches."""
+
+    def __init__(
+        self, projector: SlabProjector, table: SlabTable, column: Samples, *, along_x: bool
+    ) -> None:
+        self._device, self._dtype = projector.device, projector.dtype
+        self._layout, self._column = projector._layout, column
+        self._strip = int(projector.footprint == "strip")
+        self._arc = int(projector.scan.curved)
+        self._precision = projector._precision
+        self.table = table
+        self.stage = SlabStretch(self._device, projector.scan, table, self._dtype)
+        self._column_forms = self._device.array(table.column_forms, self._dtype)
+        self._row_forms = self._device.array(table.row_forms, self._dtype)
+        self._amplitudes = self._device.array(table.amplitudes, self._dtype)
+        strides = self._layout.strides
+        self._slab_stride, self._line_stride = strides if along_x else reversed(strides)
+        lanes = self._device.traits.macros["LANES"]
+        self._padded_lines = -(-table.lines.count // lanes) * lanes
+
+    @property
+    def each(self) -> int:
+        """Bytes of one view's table and places."""
+        item, table = self._dtype.itemsize, self.table
+        samples = self._padded_lines * (4 + item * (table.taps - 1))
+        samples += self._layout.depth * (4 + item * (ROW_TAPS - 1))
+        return item * table.rows * table.columns + table.slabs.count * samples
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the device that the records take."""
+        arrays = self._column_forms, self._row_forms, self._amplitudes
+        return sum(array.nbytes for array in arrays) + self.stage.nbytes
+
+    def project(self, slabs: DeviceArray, tables: DeviceArray, first: int, count: int) -> None:
+        """Write the tables of a run of views."""
+        table, on_cpu = self.table, self._device.traits.is_cpu
+        given = self._given(tables, slabs, first, count)
+        if on_cpu:
+            groups = -(-count // _GROUPED_VIEWS)
+            work = (-(-self._seen_columns // _COLUMNS), groups)
+            more = {"pad": table.pad, "DEPTH": self._layout.run}
+            more |= {"WIDTH": _COLUMNS, "VIEWS": _GROUPED_VIEWS, "lines": table.lines.count}
+            self._device.launch("slab_project_cpu", work, **given, **more)
+        else:
+            everything = (table.rows, table.columns, count)
+            self._device.launch("slab_project_gpu", everything, **given, lines=table.lines.count)
+
+    @property
+    def _seen_columns(self) -> int:
+        return self.table.columns - self.table.pad
+
+    def backproject(
+        self, tables: DeviceArray, slabs: DeviceArray, first: int, count: int, *, add: bool
+    ) -> None:
+        """Write or add what the tables of a run of views give to the volume."""
+        table, layout = self.table, self._layout
+        given = self._given(tables, slabs, first, count)
+        if self._device.traits.is_cpu:
+            lines, width = self._tile
+            work = (-(-table.lines.count // lines), table.slabs.count, layout.depth // layout.run)
+            more = {"DEPTH": layout.run, "LINES": lines, "WIDTH": width}
+            self._device.launch(
+                "slab_backproject_cpu", work, **given, **more, add=add, lines=table.lines.count
+            )
+        else:
+            work = (layout.depth, table.lines.count, table.slabs.count)
+            self._device.launch("slab_backproject_gpu", work, **given, add=add)
+
+    @property
+    def _tile(self) -> tuple[int, int]:
+        """Lines of an item, and columns that they are seen in at most."""
+        table = self.table
+        for lines in _LINES:
+            columns = math.ceil((lines - 1) * table.widest) + table.taps + 8
+            width = next((w for w in _WIDTHS if w >= columns), None)
+            if width is not None:
+                break
+        return lines, width or -(-columns // 8) * 8
+
+    def _given(
+        self, tables: DeviceArray, slabs: DeviceArray, first: int, count: int
+    ) -> dict[str, Any]:
+        """What both halves of the pair are told alike."""
+        table = self.table
+        places, shares = self._places(
+            self._column_forms,
+            table.lines,
+            self._padded_lines,
+            table.columns,
+            first,
+            count,
+            TAPS=table.taps,
+            ARC=self._arc,
+        )
+        row_places, row_shares = self._places(
+            self._row_forms,
+            self._column,
+            self._layout.depth,
+            table.rows,
+            first,
+            count,
+            TAPS=ROW_TAPS,
+            ARC=0,
+        )
+        return {
+            "table": tables,
+            "volume": slabs,
+            "places": places,
+            "shares": shares,
+            "row_places": row_places,
+            "row_shares": row_shares,
+            "amplitudes": self._amplitudes,
+            "first": first,
+            "count": count,
+            "rows": table.rows,
+            "columns": table.columns,
+            "padded_lines": self._padded_lines,
+            "slabs": table.slabs.count,
+            "depth": self._layout.depth,
+            "slab_stride": self._slab_stride,
+            "line_stride": self._line_stride,
+            "TAPS": table.taps,
+            "ROW_TAPS": ROW_TAPS,
+            **self._precision,
+        }
+
+    def _places(
+        self,
+        forms: DeviceArray,
+        samples: Samples,
+        padded: int,
+        entries: int,
+        first: int,
+        count: int,
+        **macros: int,
+    ) -> tuple[DeviceArray, DeviceArray]:
+        """Where samples are seen in the tables of a run of views, and their shares."""
+        slabs = self.table.slabs
+        shape = count, slabs.count, padded
+        places = self._device.empty(shape, np.int32)
+        shares = self._device.empty((*shape, macros["TAPS"] - 1), self._dtype)
+        run = padded if self._device.traits.is_cpu else 1
+        self._device.launch(
+            "slab_places",
+            (padded // run, slabs.count, count),
+            places=places,
+            shares=shares,
+            forms=forms,
+            first=first,
+            samples=padded,
+            slabs=slabs.count,
+            entries=entries,
+            a0=samples.start,
+            da=samples.step,
+            b0=slabs.start,
+            db=slabs.step,
+            RUN=run,
+            STRIP=self._strip,
+            **macros,
+            **self._precision,
+        )
+        return places, shares

@@ -1,0 +1,145 @@
+"""The projector of a cone by slabs, from first principles.
+
+A view crosses planes of samples, its slabs: those across y where it looks along y rather than
+along x, else those across x. Along the detector's rows a sample's shadow ends where its edges are
+seen. Along its columns everything is seen twice: first in rows ``q`` apart of a detector that
+stands along the slabs, where a sample at z above the source, in a slab at the distance e from it,
+has its shadow at ``S z / e``, whatever its fan angle,
+
+    seen[n] = sum over samples of  area / (p_u p_v) (S / e)^2 / q^2 * column_share * row_share * x,
+
+and then in the rows of the real one, to which a column passes them on by cubic convolution, since
+its ray leaves the slabs at the slope d,
+
+    y[i] = (q d)^2 sum over n of  weight(q d n + center - i) * seen[n] * length,
+
+in which the convolution's kernel is as wide as the larger of ``q d`` and one row, averaged over the
+smaller of the two, and ``length`` that of the ray over its reach. ``q`` is one row of the detector,
+or the largest shadow of the view where that is more.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rift_cl.geometry import Cone, Grid
+
+Floats = NDArray[np.float64]
+
+
+class ConeProjector:
+    """A pair of projection and backprojection, exactly adjoint since both read one matrix.
+
+    Args:
+        grid: the volume, (nz, ny, nx).
+        scan: how it is looked at.
+        footprint: ``strip`` or ``linear``.
+    """
+
+    def __init__(self, grid: Grid, scan: Cone, footprint: str = "strip") -> None:
+        views = [_view(grid, scan, k, footprint) for k in range(scan.views)]
+        self.matrix = np.concatenate(views)
+        self._domain, self._range = grid.shape, (scan.views, scan.rows, scan.bins)
+
+    def project(self, volume: ArrayLike) -> Floats:
+        """Projections (views, rows, bins) of a volume."""
+        seen: Floats = self.matrix @ np.asarray(volume, float).ravel()
+        return seen.reshape(self._range)
+
+    def backproject(self, projections: ArrayLike) -> Floats:
+        """Volume of projections: the transposed matrix applied to them."""
+        back: Floats = self.matrix.T @ np.asarray(projections, float).ravel()
+        return back.reshape(self._domain)
+
+
+def _view(grid: Grid, scan: Cone, view: int, footprint: str) -> Any:
+    """The matrix of one view, (rows * bins, nz * ny * nx)."""
+    angle, height = scan.angles[view], scan.heights[view]
+    (dz, dy, dx), (z, y, x) = grid.spacing, (grid.coordinates(axis) for axis in range(3))
+    across_y = dx * abs(np.cos(angle)) >= dy * abs(np.sin(angle))
+    lines, slabs, step = (x, y, dx) if across_y else (y, x, dy)
+    ahead = np.cos(angle) if across_y else -np.sin(angle)
+    source = -scan.source_to_axis * ahead
+    reach, (row_pitch, pitch) = scan.source_to_detector, scan.pitch
+    distances = np.abs(slabs - source)
+    gamma = scan.fan_angles()
+    turned = angle - gamma
+    slopes = np.abs(np.cos(turned) if across_y else np.sin(turned))
+    slopes = slopes if scan.curved else slopes / np.cos(gamma)
+    q: Any = max(1.0, (1 + 1e-4) * reach * dz / row_pitch / distances.min())
+    columns = np.arange(scan.bins) - scan.center[1]
+    passed, numbers = _passed_on(scan, q * slopes)
+    matrix = np.zeros((scan.rows, scan.bins, len(z), len(y), len(x)))
+    for j, (slab, distance) in enumerate(zip(slabs, distances, strict=True)):
+        edges = np.stack([lines - step / 2, lines + step / 2])
+        place = (edges, slab) if across_y else (slab, edges)
+        seen = _column(scan, angle, *place) / pitch
+        column_shares = _shares(columns, seen, footprint)
+        edges = np.stack([z - dz / 2, z + dz / 2]) - height
+        row_shares = _shares(numbers, reach * edges / distance / row_pitch / q, footprint)
+        weight = dz * dy * dx * (reach / distance) ** 2 / (pitch * row_pitch) / q**2
+        rows = np.einsum("inu,nz->iuz", passed, row_shares)
+        part = weight * np.einsum("iuz,ua->iuza", rows, column_shares)
+        if across_y:
+            matrix[:, :, :, j, :] = part
+        else:
+            matrix[:, :, :, :, j] = part
+    return (matrix * _lengths(scan)).reshape(scan.rows * scan.bins, -1)
+
+
+def _passed_on(scan: Cone, steps: Floats) -> tuple[Floats, Floats]:
+    """Weights in the detector's rows of those along the slabs, (rows, n, bins), and their n."""
+    reach = 1 + 2 * max(1.0, steps.max())
+    ends = (np.array([-reach, scan.rows - 1 + reach]) - scan.center[0])[:, None] / steps
+    numbers = np.arange(np.floor(ends.min()), np.ceil(ends.max()) + 1)
+    width, extent = np.maximum(1, steps), np.minimum(1, steps)
+    off = numbers[:, None] * steps + scan.center[0] - np.arange(scan.rows)[:, None, None]
+    high, low = ((off + side * extent / 2) / width for side in (1, -1))
+    return steps**2 * (_cubic_integral(high) - _cubic_integral(low)) / extent, numbers
+
+
+def _column(scan: Cone, angle: float, x: Any, y: Any) -> Any:
+    """Where points are seen along a row, from the foot of the source, as a length."""
+    aside = x * np.cos(angle) + y * np.sin(angle)
+    depth = scan.source_to_axis - x * np.sin(angle) + y * np.cos(angle)
+    seen = np.arctan2(aside, depth) if scan.curved else aside / depth
+    return scan.source_to_detector * seen
+
+
+def _lengths(scan: Cone) -> Floats:
+    v = (np.arange(scan.rows) - scan.center[0]) * scan.pitch[0]
+    u = (np.arange(scan.bins) - scan.center[1]) * scan.pitch[1] * (not scan.curved)
+    lengths = np.sqrt(scan.source_to_detector**2 + v[:, None] ** 2 + u**2)
+    return (lengths / scan.source_to_detector)[:, :, None, None, None]
+
+
+def _shares(entries: Any, edges: Any, footprint: str) -> Floats:
+    """What each entry receives of samples whose shadows end at ``edges``, (entries, samples)."""
+    low, high = edges.min(axis=0), edges.max(axis=0)
+    middle, width = (low + high) / 2, high - low
+    if footprint == "strip":
+        above = np.minimum(high, entries[:, None] + 0.5) - np.maximum(low, entries[:, None] - 0.5)
+        overlaps: Floats = np.maximum(above, 0) / width
+        return overlaps
+    half_width = np.maximum(1, width)
+
+    def heights(at: Any) -> Floats:
+        found: Floats = np.maximum(0, 1 - np.abs(at - middle) / half_width)
+        return found
+
+    # Entries that do not exist take their part as well.
+    first = entries[0] + np.floor(middle - half_width - entries[0])
+    every = first + np.arange(np.ceil(2 * half_width.max()) + 2)[:, None]
+    shares: Floats = heights(entries[:, None]) / heights(every).sum(axis=0)
+    return shares
+
+
+def _cubic_integral(distance: Floats) -> Floats:
+    """Of the kernel of cubic convolution, from 0 on."""
+    d = np.minimum(np.abs(distance), 2)
+    near = d - 2.5 / 3 * d**3 + 0.375 * d**4
+    far = 2 * d - 2 * d**2 + 2.5 / 3 * d**3 - 0.125 * d**4 - 1 / 6
+    return np.sign(distance) * np.where(d < 1, near, far)
