@@ -53,8 +53,9 @@ def restricted(A: LinearOperator, views: Views) -> LinearOperator:
     if isinstance(A, WeightedRays):
         return WeightedRays(restricted(A.inner, views), A.weights[views])
     if isinstance(A, Projector) and A.scan is not None:
-        part = A.scan.subset(views)
-        return Projector(A.grid, part, A.footprint, device=A.device, dtype=A.dtype)
+        scan = A.scan.subset(views)
+        part: LinearOperator = Projector(A.grid, scan, A.footprint, device=A.device, dtype=A.dtype)
+        return part
     if type(A) is FastProjector:
         return FastProjector(A.grid, A.scan.subset(views), A.error, lobes=A.lobes, device=A.device)
     return ChosenViews(A, views)
