@@ -65,6 +65,7 @@ if TYPE_CHECKING:
         dot_test,
         register_filter,
     )
+    from rift_cl.progress import Report
     from rift_cl.reconstruct import AxisEstimate, backproject, cgls, fbp, find_center, sirt, tv
     from rift_cl.sampling import Constraints, Observations, Plan, Target, next_views, plan
     from rift_cl.sampling.coverage.device import coverage
@@ -92,6 +93,7 @@ __all__ = [
     "Projector",
     "Ramp",
     "Renderer",
+    "Report",
     "Response",
     "RiftError",
     "SplatScene",
@@ -177,6 +179,7 @@ __getattr__, __dir__ = lazy_names(
             "dot_test",
             "register_filter",
         ),
+        "progress": ("Report",),
         "reconstruct": ("AxisEstimate", "backproject", "cgls", "fbp", "find_center", "sirt", "tv"),
         "sampling": ("Constraints", "Observations", "Plan", "Target", "next_views", "plan"),
         "sampling.coverage.device": ("coverage",),

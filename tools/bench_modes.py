@@ -25,9 +25,8 @@ from bench.command import report, say
 from bench.splats import SplatCase
 from bench.surroundings import surroundings
 from bench.tables import Table
-from rift_cl.basis.indices import n_coeff
-from rift_cl.splat import SplatSettings
-from rift_cl.splat.raster import ScreenModes, ScreenSplats, raster_grad, rasterize
+from rift_cl.basis import n_coeff
+from rift_cl.splat import ScreenModes, ScreenSplats, SplatSettings, raster_grad, rasterize
 
 _GAUSSIAN = "Gaussian"
 # Orders of the shape's and of the colours' polynomials.

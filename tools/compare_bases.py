@@ -27,13 +27,12 @@ import tyro
 from bases import angular_dense, angular_fixed, angular_views, images, radiance, slices, volumes
 from bases.plan import Plan
 from bench.table import Table, markdown_lines, show
-from rift_cl import RiftError
+from rift_cl import Report, RiftError
 from rift_cl.cl import Device, open_device
 from rift_cl.commands.progress_bar import show_progress
 from rift_cl.commands.run_folder.run_folder import environment
 from rift_cl.errors import InputError
 from rift_cl.io import atomic_path, make_folder, write_json, write_text
-from rift_cl.progress import Report
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_png
 

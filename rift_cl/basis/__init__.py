@@ -19,6 +19,7 @@ from rift_cl.basis.angular import (
 from rift_cl.basis.footprint import Footprint, footprint
 from rift_cl.basis.gaussian import Gaussian
 from rift_cl.basis.hermite import Hermite
+from rift_cl.basis.indices import laguerre_place, n_coeff, order_of, place
 from rift_cl.basis.laguerre import Laguerre
 from rift_cl.basis.protocol import Basis, Evaluation
 from rift_cl.basis.registry import BASES
@@ -43,5 +44,9 @@ __all__ = [
     "SquaredHermite",
     "angular_basis",
     "footprint",
+    "laguerre_place",
+    "n_coeff",
+    "order_of",
+    "place",
     "register_angular_basis",
 ]

@@ -7,6 +7,7 @@ from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.cone import Cone
 from rift_cl.geometry.fan import Fan, FanBeam
 from rift_cl.geometry.grid import Grid
+from rift_cl.geometry.pose import look_at
 from rift_cl.geometry.scan import Parallel
 from rift_cl.geometry.vectors import Vectors
 
@@ -24,4 +25,5 @@ __all__ = [
     "Scan",
     "Vectors",
     "at_axis",
+    "look_at",
 ]

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         check_photographs,
         pose_photographs,
     )
+    from rift_cl.io.images.display_light import to_display, to_linear
     from rift_cl.io.images.image import read_image, write_png
     from rift_cl.io.lenses.lens_file import open_lens
     from rift_cl.io.output import atomic_path, make_folder, write_json, write_text
@@ -59,6 +60,8 @@ __all__ = [
     "register_scan_reader",
     "scan_of_arrays",
     "suggested_window",
+    "to_display",
+    "to_linear",
     "write_json",
     "write_png",
     "write_text",
@@ -76,6 +79,7 @@ __getattr__, __dir__ = lazy_names(
             "read_view",
         ),
         "captures.photographs": ("PosedPhotographs", "check_photographs", "pose_photographs"),
+        "images.display_light": ("to_display", "to_linear"),
         "images.image": ("read_image", "write_png"),
         "lenses.lens_file": ("open_lens",),
         "output": ("atomic_path", "make_folder", "write_json", "write_text"),

@@ -23,22 +23,20 @@ from rift_cl.cl.elementwise import copy
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.operators import LinearOperator
-from rift_cl.splat import Renderer, Splats
-from rift_cl.splat.orders import WHITENING
-from rift_cl.splat.projection import (
-    SplatGradients,
-    project,
-    project_grad,
-)
-from rift_cl.splat.raster import (
-    MOMENTS,
-    Raster,
+from rift_cl.splat import (
+    Renderer,
     ScreenModes,
     ScreenSplats,
+    SplatGradients,
+    Splats,
+    project,
+    project_grad,
     raster_grad,
     rasterize,
     sum_slots,
 )
+from rift_cl.splat.orders import WHITENING
+from rift_cl.splat.raster import MOMENTS, Raster
 from rift_cl.splat.tile_lists import Tiles, tile_lists
 
 Floats = NDArray[np.float64]

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.basis import Hermite, Laguerre
-from rift_cl.basis.indices import graded, n_coeff, order_of, place
+from rift_cl.basis import Hermite, Laguerre, n_coeff, order_of, place
+from rift_cl.basis.indices import graded
 from rift_cl.basis.projection import gamma_matrix
 
 Floats = NDArray[np.float64]

@@ -18,10 +18,8 @@ import rift_cl as rift
 from bench.costs import Cost
 from bench.operations import Task
 from rift_cl import coverage
-from rift_cl.geometry import Aperture, Camera
-from rift_cl.geometry.pose import look_at
-from rift_cl.sampling import Observations, Target
-from rift_cl.sampling.coverage.density import half_sphere
+from rift_cl.geometry import Aperture, Camera, look_at
+from rift_cl.sampling import Observations, Target, half_sphere
 from rift_cl.sampling.coverage.device import coverage_grad
 
 # Numbers of a view, and beyond how many u = n . k, in cycles per diameter, a slab is over.

@@ -18,10 +18,9 @@ import rift_cl as rift
 from bench.costs import Cost
 from bench.operations import Task
 from bench.splats import SPLAT_COSTS, SplatCase
-from rift_cl.basis.indices import n_coeff
-from rift_cl.splat import Frame, Renderer, Splats, SplatSettings
+from rift_cl.basis import n_coeff
+from rift_cl.splat import Frame, Renderer, Splats, SplatSettings, voxelise
 from rift_cl.splat.projection import moment_count, table_width
-from rift_cl.splat.voxels import voxelise
 
 SHAPE_ORDER, COLOR_ORDER = 2, 1
 _FUNCTIONS, _GEOMETRY, _CHANNELS = 8, 5, 3

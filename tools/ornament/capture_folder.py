@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl import RiftError
+from rift_cl import Report, RiftError
 from rift_cl.errors import OutputError
 from rift_cl.io import atomic_path, make_folder, write_json, write_png
 from rift_cl.io.images.pixels import write_pixels
 from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import writing
-from rift_cl.progress import Report
 
 TRANSFORMS, PLAN = "transforms.json", "render.json"
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ornament.cameras import Shot
 from ornament.scene import scenes as ornament
 from rift_cl.errors import InputError
-from rift_cl.io.images.display_light import to_display, to_linear
+from rift_cl.io import to_display, to_linear
 
 FAST, SLOW = "llvm_ad_rgb", "scalar_rgb"
 BACKGROUND = 0.5

@@ -22,9 +22,17 @@ from paper.view_choice import write_capture
 from rift_cl import Device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Aperture, Camera
-from rift_cl.io import SplatScene, make_folder, open_capture, read_view, write_json, write_png
+from rift_cl.io import (
+    SplatScene,
+    make_folder,
+    open_capture,
+    read_view,
+    to_display,
+    to_linear,
+    write_json,
+    write_png,
+)
 from rift_cl.io.captures.transforms_record import transforms_of
-from rift_cl.io.images.display_light import to_display, to_linear
 from rift_cl.splat import Renderer, SplatSettings
 
 # Every so many-th azimuth is scored and never trained on.

@@ -19,8 +19,7 @@ from paper.aperture_pictures import Drawn, linear_pictures, pinhole
 from paper.images import encode
 from paper.spectra import radial_power, ring_edges
 from rift_cl.geometry import Camera
-from rift_cl.io import open_capture
-from rift_cl.io.images.display_light import to_linear
+from rift_cl.io import open_capture, to_linear
 
 Floats = NDArray[np.float64]
 

@@ -26,7 +26,7 @@ from rift_cl.commands.pictures.coverage_pictures import LEAST, PLANES, near_band
 from rift_cl.io.captures.capture import capture_name, holds_capture
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import FrequencySlice, curves, figure_png, frequency_maps
-from rift_cl.sampling.coverage.density import half_sphere, window_width
+from rift_cl.sampling import half_sphere, window_width
 
 NAME = "capture_support"
 TITLE = "What real captures sample"

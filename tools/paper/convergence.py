@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from paper.images import decode, encode
 from paper.plan import Plan
-from rift_cl import Device, Grid, Parallel, Projector, metrics, phantom
-from rift_cl.progress import Report
+from rift_cl import Device, Grid, Parallel, Projector, Report, metrics, phantom
 from rift_cl.reconstruct import Cgls, Fista, Pdhg, Sirt
 from rift_cl.reconstruct.solvers.solver import Solver
 from rift_cl.reference.radon import radon

@@ -21,8 +21,8 @@ from rift_cl import Device, Grid, Parallel, Projector, backproject
 from rift_cl.phantom import shepp_logan
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import FrequencySlice, curves, figure_png, frequency_maps, image_grid
-from rift_cl.sampling import Observations, Target
-from rift_cl.sampling.coverage.density import density, half_sphere, mean_density, power_slope
+from rift_cl.sampling import Observations, Target, half_sphere, mean_density, power_slope
+from rift_cl.sampling.coverage.density import density
 
 NAME = "figure_02_04"
 TITLE = "Figures 2 to 4: slices of the spectrum, and how densely they lie"

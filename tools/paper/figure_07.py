@@ -19,12 +19,11 @@ from numpy.typing import NDArray
 from paper.images import decode, encode
 from paper.plan import Plan
 from rift_cl import Camera, Device
-from rift_cl.geometry import CameraType
-from rift_cl.geometry.pose import look_at
+from rift_cl.geometry import CameraType, look_at
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import FrequencySlice, curves, figure_png, frequency_maps
-from rift_cl.sampling import Target
-from rift_cl.sampling.coverage.density import density, half_circle, ring_density
+from rift_cl.sampling import Target, half_circle, ring_density
+from rift_cl.sampling.coverage.density import density
 from rift_cl.sampling.criteria.crowther import crowther
 from rift_cl.sampling.criteria.limits import limits
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from paper.mode_gallery import packed, show_gallery
 from paper.plan import Plan
 from rift_cl import Device
-from rift_cl.basis import Hermite, Laguerre
-from rift_cl.basis.indices import laguerre_place
+from rift_cl.basis import Hermite, Laguerre, laguerre_place
 from rift_cl.report.html_page import Page
 
 NAME = "figure_13"

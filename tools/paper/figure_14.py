@@ -11,8 +11,7 @@ from paper.figure_13 import EXTENT, on_plane, orthonormality
 from paper.mode_gallery import packed, show_gallery
 from paper.plan import Plan
 from rift_cl import Device
-from rift_cl.basis import Hermite
-from rift_cl.basis.indices import place
+from rift_cl.basis import Hermite, place
 from rift_cl.report.html_page import Page
 
 NAME = "figure_14"

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from paper.mode_gallery import packed, show_gallery
 from paper.plan import Plan
 from rift_cl import Device
-from rift_cl.basis import AngularBasis, HGLobe, LGLobe, SphericalHarmonics
-from rift_cl.basis.indices import laguerre_place, laguerre_rows, place, rows
+from rift_cl.basis import AngularBasis, HGLobe, LGLobe, SphericalHarmonics, laguerre_place, place
+from rift_cl.basis.indices import laguerre_rows, rows
 from rift_cl.report.html_page import Page
 
 NAME = "figure_15"

@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from paper.random_objects import RADIUS, mean_power, random_objects
 from rift_cl import Projector
-from rift_cl.sampling import PowerLaw, Spectrum, Target
-from rift_cl.sampling.targets.prior import Prior
-from rift_cl.sampling.targets.target import half_disc
+from rift_cl.sampling import PowerLaw, Prior, Spectrum, Target, half_disc
 
 KINDS = {"isotropic": 1.0, "anisotropic": 8.0}
 SIZE, NOISE = 96, 0.25

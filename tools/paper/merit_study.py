@@ -26,11 +26,11 @@ from rift_cl import Device, Grid, Parallel, Projector, cgls
 from rift_cl.metrics import disc
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_png
-from rift_cl.sampling import Observations, Target
+from rift_cl.sampling import Observations, Target, criterion_of_coverage
 from rift_cl.sampling.coverage.host import host_coverage
 from rift_cl.sampling.criteria.exact import exact
 from rift_cl.sampling.criteria.kriging import kriging
-from rift_cl.sampling.criteria.merit import CoverageCriterion, criterion_of_coverage
+from rift_cl.sampling.criteria.merit import CoverageCriterion
 
 NAME = "merit_study"
 TITLE = "A merit of views against the errors of reconstructions"

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from paper.merit_study import NOISE, SIZE, Objects, best_linear
 from paper.random_objects import RADIUS
 from rift_cl import Camera, Device, Grid, Parallel, Projector, cgls
-from rift_cl.geometry.pose import look_at
+from rift_cl.geometry import look_at
 from rift_cl.metrics import disc, psnr
-from rift_cl.sampling import Constraints, Pilot, Target, next_views, plan
-from rift_cl.sampling.targets.target import half_disc
+from rift_cl.sampling import Constraints, Pilot, Target, half_disc, next_views, plan
 
 METHODS = ("CGLS", "MAP")
 # Views of the first look, from which the rest are planned.

@@ -21,8 +21,7 @@ from paper.blob_volumes import (
     random_volumes,
 )
 from rift_cl.metrics import psnr
-from rift_cl.sampling import Constraints, Plan, PowerLaw, Target, plan
-from rift_cl.sampling.targets.target import half_ball
+from rift_cl.sampling import Constraints, Plan, PowerLaw, Target, half_ball, plan
 
 SIZE, VIEWS, NOISE = 36, 24, 0.5
 SECTOR = Constraints(elevation=(0, np.pi / 3), azimuth=(-np.pi / 3, np.pi / 3))

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from paper.plan import Plan
 from paper.score_scatter import score_scatter
 from rift_cl import Device, merit
-from rift_cl.geometry import Camera
-from rift_cl.geometry.pose import look_at
+from rift_cl.geometry import Camera, look_at
 from rift_cl.reference.splat_projection import spherical_harmonics
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_png

@@ -19,11 +19,9 @@ from rift_cl.cl.reductions import dot, norm, total
 from rift_cl.operators.fourier.spectrum import SpectralFilter
 from rift_cl.sampling import Observations, Target
 from rift_cl.sampling.coverage.device import coverage_grad
-from rift_cl.splat.features import shade, shade_grad
+from rift_cl.splat import SplatGradients, shade, shade_grad, voxelise
 from rift_cl.splat.orders import count_of
-from rift_cl.splat.projection import SplatGradients
 from rift_cl.splat.tile_lists import Tiles, tile_lists
-from rift_cl.splat.voxels import voxelise
 from rift_cl.train import ImageLoss
 
 Arrays = dict[str, np.ndarray]
