@@ -16,10 +16,11 @@ from rift_cl.commands.inputs.scan_rows import read_attenuation
 from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import InputError
-from rift_cl.geometry import Grid, Parallel
+from rift_cl.geometry import Cone, Fan, Grid, Parallel
 from rift_cl.operators import Projector
 from rift_cl.progress import Report
 from rift_cl.reconstruct import AxisEstimate, fbp
+from rift_cl.reconstruct.axis.fan_rays import parallel_views
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import curves, figure_svgs, framed
 
@@ -43,9 +44,14 @@ class CenterJob:
     def __init__(self, settings: CenterSettings) -> None:
         self.settings = settings
         self.device = settings.open_device(settings.memory_limit)
-        self.scan = settings.open_scan()
+        self.scan = settings.open_scan(fan=True)
         self.folder = RunFolder(settings.out, "center", overwrite=settings.overwrite)
-        self.row = self.scan.shape[1] // 2 if settings.row is None else settings.row
+        # Of a cone, only the row of the source's orbit is a fan.
+        self._middle = (self.scan.shape[1] - 1) / 2
+        if isinstance(self.scan.cone, Cone):
+            self._middle = self.scan.cone.center[0]
+        usual = min(max(round(self._middle + 1e-9), 0), self.scan.shape[1] - 1)
+        self.row = usual if settings.row is None else settings.row
         if not 0 <= self.row < self.scan.shape[1]:
             raise InputError(f"--row is {self.row}, {self.scan.path} has {self.scan.shape[1]} rows")
         self.metrics: dict[str, Any] = {}
@@ -72,22 +78,36 @@ class CenterJob:
         yield Report(0, total, "steps")
         found = find_axis(self.scan, self.device, span=self.settings.span)
         self.metrics = {**found.record(), "row": self.row}
-        middle = (self.scan.shape[1] - 1) / 2
-        here = found.center + found.tilt * (self.row - middle)
+        here = found.center + found.tilt * (self.row - self._middle)
+        turned = found.sense is not None and found.sense.sign < 0
         sinogram = read_attenuation(self.scan, self.row, self.row + 1).projections[:, 0]
         slices = {}
         for step, offset in enumerate(_SLIDER, start=1):
             yield Report(step, total, "steps", {"center": found.center})
-            slices[offset] = self._slice(sinogram, here + offset)
+            slices[offset] = self._slice(sinogram, here + offset, turned=turned)
         self.folder.make()
         page = self._page(found, here, slices)
         decided = replace(absolute_paths(self.settings), kind=self.scan.kind, row=self.row)
         self.folder.finish(decided, self.metrics, page, self.device, asked=self.settings)
         yield Report(total, total, "steps", {"center": found.center})
 
-    def _slice(self, sinogram: NDArray[np.float32], center: float) -> NDArray[np.float32]:
+    def _slice(
+        self, sinogram: NDArray[np.float32], center: float, *, turned: bool
+    ) -> NDArray[np.float32]:
         bins = self.scan.shape[2]
-        geometry = Parallel(self.scan.angles, bins, center=center)
+        scan = self.scan.geometry
+        if isinstance(scan, Fan | Cone):
+            fan = scan if isinstance(scan, Fan) else scan.fan()
+            angles = -fan.angles if turned else fan.angles
+            rows = sinogram[:, None]
+            views, directions, places = parallel_views(
+                rows, replace(fan, angles=angles, center=center)
+            )
+            sinogram = np.ascontiguousarray(views[:, 0], np.float32)
+            middle = float(np.interp(center, places, np.arange(places.size)))
+            geometry = Parallel(directions, places.size, center=middle)
+        else:
+            geometry = Parallel(self.scan.angles, bins, center=center)
         A = Projector(Grid((bins, bins)), geometry, device=self.device)
         return _middle(np.asarray(fbp(A, sinogram)))
 
@@ -138,12 +158,14 @@ class CenterJob:
 
 def _facts(found: AxisEstimate) -> dict[str, object]:
     low, high = found.interval
+    sense = {} if found.sense is None else {"sense of rotation": found.sense.in_words()}
     return {
         "axis, bins": f"{found.center:.2f}, at the middle row",
         "95 % interval": f"{low:.2f} to {high:.2f}",
         "tilt, bins per row": found.tilt,
         "spread between rows, bins": found.spread,
         "found by": found.by,
+        **sense,
     }
 
 

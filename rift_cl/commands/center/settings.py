@@ -22,14 +22,14 @@ class CenterSearch:
     over 180 degrees, all of it for full turns."""
     row: Auto[int] = None
     """Detector row that the pictures show; the search uses several rows, whichever this is.
-    Default: the middle row."""
+    Default: the middle row; of a cone beam that of the source's orbit."""
     out: Path = Path("rift-center")
     """Folder for report.html, with pictures and the score curve, config.json and metrics.json."""
 
 
 @dataclass(frozen=True)
 class CenterSettings(RepeatableRun, CenterSearch, ScanInput):
-    """Find the rotation axis of a parallel-beam scan.
+    """Find the rotation axis of a scan, and of fan and cone beams the sense of rotation.
 
     Example: rift center scan.h5 --out center
     """

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from rift_cl.cl.device import Device
 from rift_cl.commands.inputs.scan_rows import read_attenuation
 from rift_cl.errors import InputError
+from rift_cl.geometry import Cone, Fan, Vectors
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.reconstruct.axis import AxisEstimate, axis_of_rows, searched_rows
+from rift_cl.reconstruct.axis.circular import axis_of_fan, axis_of_scan, orbit_rows
 
 
 def find_axis(
     scan: ScanFile, device: Device | None = None, *, span: tuple[float, float] | None = None
 ) -> AxisEstimate:
-    """Find the rotation axis of a parallel-beam scan.
+    """Find the rotation axis of a scan.
 
-    Reads a few rows, evenly spread over the whole detector whichever of them are wanted as slices,
-    one after the other, and uses their line integrals as they are: rings do not turn with the
-    object, so that they contradict every centre alike.
+    Reads a few rows, of a cone those next to the source's orbit, else evenly spread over the whole
+    detector whichever of them are wanted as slices, and uses their line integrals as they are:
+    rings do not turn with the object, so that they contradict every centre alike.
 
     Args:
         scan: the scan.
@@ -28,10 +32,33 @@ def find_axis(
         NonFiniteError: a sample is not finite.
     """
     del device
-    count = scan.shape[1]
-    rows = searched_rows(count)
-    sinograms = (read_attenuation(scan, row, row + 1).projections[:, 0] for row in rows)
+    geometry = scan.geometry
     try:
+        if isinstance(geometry, Cone | Vectors):
+            return _of_cone(scan, geometry, span)
+        if isinstance(geometry, Fan):
+            row = scan.shape[1] // 2
+            line = read_attenuation(scan, row, row + 1).projections[:, 0]
+            return axis_of_scan(line, geometry, span)
+        count = scan.shape[1]
+        rows = searched_rows(count)
+        sinograms = (read_attenuation(scan, row, row + 1).projections[:, 0] for row in rows)
         return axis_of_rows(sinograms, rows, count, scan.angles, span)
     except InputError as error:
         raise type(error)(f"{scan.path}: {error}") from error
+
+
+def _of_cone(
+    scan: ScanFile, cone: Cone | Vectors, span: tuple[float, float] | None
+) -> AxisEstimate:
+    if not isinstance(cone, Cone) or not cone.circular:
+        raise InputError(
+            "the axis is found from sources on one circle, and these are on none: the geometry "
+            "must tell it (--geometry)"
+        )
+    groups = orbit_rows(cone)
+    first, stop = int(groups[0][0]), int(groups[-1][-1]) + 1
+    read = read_attenuation(scan, first, stop).projections
+    rows = np.stack([read[:, group - first].mean(axis=1) for group in groups], axis=1)
+    places = np.array([group.mean() for group in groups])
+    return axis_of_fan(rows, places, cone.center[0], cone.fan(), span)

@@ -11,15 +11,16 @@ import numpy as np
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
+from rift_cl.commands.inputs.scan_axis import find_axis
 from rift_cl.commands.inputs.scan_rows import check_center, scan_identity
 from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
-from rift_cl.commands.reconstruct.clean_rows import CleanRows
+from rift_cl.commands.reconstruct.clean_rows import Alignment, CleanRows
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.commands.reconstruct.slice_input import tilt_worth_turning
 from rift_cl.commands.reconstruct.slice_window import check_window
 from rift_cl.errors import InputError, ResourceLimitError
 from rift_cl.geometry import Cone, Grid, Vectors
 from rift_cl.geometry.seen_grid import scan_lengths, seen_grid
-from rift_cl.io.scans.beam import leaning
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.reconstruct import Attenuation
 from rift_cl.reconstruct.preprocess import binned_center, binning_note
@@ -127,10 +128,17 @@ class ConeInput:
         # The scan as it is worked on.
         self.scan = binned_file(file, settings.binning)
         self.unit = (file.unit or "") if settings.unit is None else settings.unit
-        self.geometry = self._geometry()
+        # Bin of the axis on the detector as the file has it, where that is said or found.
+        self.center = settings.center
+        # Degrees by which the axis leans, and by which projections are turned.
+        self.tilt = settings.tilt or 0.0
+        # Whether the angles run the other way than the file was taken to say.
+        self.turned = False
         self.clean = CleanRows(self.scan, settings, None, device)
         self.notes: list[str] = [*file.notes]
         self.axis: dict[str, Any] = {}
+        # Made now, so that what does not fit is told before any work.
+        self.geometry = self._geometry()
         self.window = VolumeWindow.of(settings, self.geometry)
         self._check_memory()
 
@@ -160,14 +168,17 @@ class ConeInput:
         """The file and the geometry, which decide the volume besides the settings."""
         return {**scan_identity(self.file), "geometry": repr(hash(self.geometry))}
 
-    def say(self, sentence: str) -> None:
-        """Write down what is decided: the axis, corrections, and the method's own sentence."""
-        self.axis = self._axis()
-        if self.settings.center is None:
-            self.notes.append(
-                f"The axis was taken to be {self.axis['by']}, bin {self.axis['center']:.2f}; if it "
-                "is not, give --center."
-            )
+    def locate(self) -> None:
+        """Find the axis and the sense of rotation, unless they are said, and say what is done."""
+        self.axis = self._found_axis()
+        self.geometry = self._geometry()
+        self.window = VolumeWindow.of(self.settings, self.geometry)
+        if self.tilt and isinstance(self.geometry, Cone):
+            row, bin = self.geometry.center
+            self.clean.alignment = Alignment(bin, row, math.radians(self.tilt))
+        self._say()
+
+    def _say(self) -> None:
         n, (_, rows, bins) = self.settings.binning, self.file.shape
         if n > 1:
             block = row_binning(self.file, n)
@@ -180,43 +191,61 @@ class ConeInput:
                 f"The mean of the outermost {self.scan.background} bins at each end (air) was "
                 "subtracted."
             )
-        if sentence:
-            self.notes.append(sentence)
 
-    def _axis(self) -> dict[str, Any]:
-        """Bin of the axis on the detector as the file has it."""
+    def _found_axis(self) -> dict[str, Any]:
+        """Bin of the axis on the detector as the file has it, and how it is known."""
         if self.settings.center is not None:
             return {"center": self.settings.center, "by": "--center"}
         cone = self.file.cone
         if not isinstance(cone, Cone):
-            return {"center": (self.file.shape[2] - 1) / 2, "by": "where the vectors say"}
+            return {"center": (self.file.shape[2] - 1) / 2, "by": "the vectors"}
         middle = cone.center[1] == (cone.bins - 1) / 2
-        where = "at the detector's middle" if middle else "where the file says"
-        return {"center": cone.center[1], "by": where}
+        told = "the detector's middle" if middle else "the file"
+        try:
+            found = find_axis(self.file, self.device)
+        except InputError as error:
+            self.notes.append(
+                f"The axis was taken to be that of {told}, bin {cone.center[1]:.2f}, since it was "
+                f"not found (--center): {error}"
+            )
+            return {"center": cone.center[1], "by": told}
+        self.center = found.center
+        if self.settings.tilt is None:
+            self.tilt = tilt_worth_turning(found, self.file.shape[1])
+        self.notes.append(
+            f"The rotation axis was found {found.in_words()}; {told} has bin {cone.center[1]:.2f}."
+        )
+        self.turned = found.sense is not None and found.sense.sign < 0
+        if self.turned:
+            self.notes.append(
+                "The angles were therefore taken with the other sign; --reversed does so without "
+                "asking the data, and --center leaves them as they are."
+            )
+        return found.record()
 
     def _geometry(self) -> Cone | Vectors:
-        """The file's geometry with the axis, the pitch and the tilt that a person says."""
+        """The file's geometry with the axis and the pitch that are said or found."""
         scan, settings = self.scan.cone, self.settings
         assert scan is not None
-        changes = {name: getattr(settings, name) for name in ("center", "pitch", "tilt")}
-        given = [name for name, value in changes.items() if value is not None]
-        if not given:
-            return scan
         if not isinstance(scan, Cone):
+            changes = {name: getattr(settings, name) for name in ("center", "pitch", "tilt")}
+            given = [name for name, value in changes.items() if value is not None]
+            if not given:
+                return scan
             raise InputError(
                 f"{self.file.path}: --{given[0]} does not apply to a scan that vectors describe: "
                 "mend the vectors (--geometry)"
             )
         row, bin = scan.center
         pitch = scan.pitch
-        if settings.center is not None:
-            bin = binned_center(settings.center, settings.binning)
+        if self.center is not None:
+            bin = binned_center(self.center, settings.binning)
         if settings.pitch is not None:
             scale = settings.pitch * settings.binning / pitch[1]
             pitch = pitch[0] * scale, pitch[1] * scale
         lengths = scan.source_to_axis, scan.source_to_detector
-        cone = Cone(
-            scan.angles,
+        return Cone(
+            -scan.angles if self.turned else scan.angles,
             scan.rows,
             scan.bins,
             pitch,
@@ -225,7 +254,6 @@ class ConeInput:
             scan.heights,
             scan.curved,
         )
-        return leaning(cone, math.radians(settings.tilt)) if settings.tilt else cone
 
     def _check_memory(self) -> None:
         """Refuse what does not fit before anything is read.
@@ -298,6 +326,8 @@ def decided_cone_settings(
     if isinstance(source.file.cone, Cone):
         decided["center"] = source.axis["center"]
         decided["pitch"] = lengths.pitch[1] / settings.binning
+        decided["tilt"] = source.tilt
+        decided["reversed"] = settings.reversed != source.turned
     if settings.geometry is not None:
         decided["geometry"] = settings.geometry.absolute()
     if settings.iterative:

@@ -10,7 +10,6 @@ import dataclasses
 import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -72,7 +71,7 @@ class ConeReconstruction:
         self.source = ConeInput(settings, file, self.device)
         self.inversion = ConeInversion(self.source.window)
         # Made now, so that a scan that the method does not take is told before any work.
-        self._fdk = self._formula()
+        self.projector, self._fdk = self._operators()
         out = settings.out
         alone = out.is_dir() and {p.name for p in out.iterdir()} <= {PREVIEW_PICTURE, "config.json"}
         overwrite = settings.overwrite or alone
@@ -105,18 +104,31 @@ class ConeReconstruction:
         """The settings with all that was decided."""
         return decided_cone_settings(self.source, self._values)
 
-    @cached_property
-    def projector(self) -> Projector:
-        """The projector of the voxels that are solved for."""
+    def _operators(self) -> tuple[Projector, FDK | None]:
+        """The projector of the voxels that are solved for, and the formula where it is one."""
+        settings = self.settings
         options: dict[str, Any] = {"device": self.device}
-        if self.settings.footprint is not None:
-            options["footprint"] = self.settings.footprint
-        return Projector(self.source.solved, self.source.geometry, **options)
+        if settings.footprint is not None:
+            options["footprint"] = settings.footprint
+        A = Projector(self.source.solved, self.source.geometry, **options)
+        if settings.method != "fbp":
+            return A, None
+        return A, FDK(A, settings.view_filter(), compensate=settings.compensate)
+
+    def _locate(self) -> None:
+        """Find the axis, and make the operators again for it."""
+        self.source.locate()
+        self.inversion.window = self.source.window
+        self.projector, self._fdk = self._operators()
+        if self._fdk is not None:
+            self.source.notes.append(
+                f"Method of Feldkamp, Davis and Kress (FDK): {self._fdk.sentence}."
+            )
 
     def plan(self) -> dict[str, str]:
         """What would be done, for ``--dry-run``."""
         scan, device = self.source.scan, self.device
-        self.source.say(self._sentence)
+        self._locate()
         volume = 4 * int(np.prod(self.shape))
         return {
             "scan": f"{scan.path} ({scan.source}, {scan.kind})",
@@ -133,7 +145,7 @@ class ConeReconstruction:
         self._begin = time.perf_counter()
         total = 1 + self.settings.most_steps
         yield Report(0, total, "steps")
-        self.source.say(self._sentence)
+        self._locate()
         for note in self.source.notes:
             self.announce(note)
         self.folder.make()
@@ -152,19 +164,6 @@ class ConeReconstruction:
             raise
         self._finish(volume)
         yield Report(total, total, "steps")
-
-    @property
-    def _sentence(self) -> str:
-        """What the formula chose for the scan's span and detector."""
-        if self._fdk is None:
-            return ""
-        return f"Method of Feldkamp, Davis and Kress (FDK): {self._fdk.sentence}."
-
-    def _formula(self) -> FDK | None:
-        if self.settings.method != "fbp":
-            return None
-        settings = self.settings
-        return FDK(self.projector, settings.view_filter(), compensate=settings.compensate)
 
     def _solve(self, projections: Floats, total: int) -> Generator[Report, None, Floats]:
         """The volume, after a report for every step."""

@@ -155,7 +155,7 @@ class SliceInput:
             self.estimate = find_axis(self.file, self.device)
             self.center = self.estimate.center
             if self.settings.tilt is None:
-                self.tilt = _tilt_worth_turning(self.estimate, self.file.shape[1])
+                self.tilt = tilt_worth_turning(self.estimate, self.file.shape[1])
         self.geometry = self._parallel()
         self.axis = self._axis_record()
         self.clean.alignment = self._alignment()
@@ -271,7 +271,7 @@ class SliceInput:
         return self.estimate.record()
 
 
-def _tilt_worth_turning(estimate: AxisEstimate, rows: int) -> float:
+def tilt_worth_turning(estimate: AxisEstimate, rows: int) -> float:
     """The tilt that was found, in degrees, where it is sure and moves the axis; else 0."""
     sure = abs(estimate.tilt) > _SURE_TILT * estimate.tilt_error
     moves = abs(estimate.tilt) * (rows - 1) / 2 >= _TILT_MATTERS
