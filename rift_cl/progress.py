@@ -1,12 +1,15 @@
 """What long work tells its caller between two steps.
 
 The library prints nothing and draws no bar: everything that takes a while is a generator of
-``Report`` records, and whoever runs it decides what to show.
+``Report`` records, and whoever runs it decides what to show. Between two reports kernels may have
+to be built, which can take longer than the step itself: ``BUILDS`` says so to whoever asks then.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 
@@ -28,3 +31,40 @@ class Report:
     what: str
     values: Mapping[str, float] = field(default_factory=dict)
     work: tuple[float, float] | None = None
+
+
+class Builds:
+    """Kernels that this process builds, one at a time; any thread may ask."""
+
+    def __init__(self) -> None:
+        self.kernels = 0
+        """How many were built."""
+        self._seconds = 0.0
+        self._now: tuple[str, float] | None = None
+
+    @property
+    def now(self) -> str:
+        """The kernel that is being built, empty for none."""
+        now = self._now
+        return "" if now is None else now[0]
+
+    @property
+    def seconds(self) -> float:
+        """Seconds that all builds have taken, the one at work included."""
+        seconds, now = self._seconds, self._now
+        return seconds if now is None else seconds + time.monotonic() - now[1]
+
+    @contextmanager
+    def of(self, kernel: str) -> Iterator[None]:
+        """Count what is done inside as the building of a kernel."""
+        began = time.monotonic()
+        self._now = kernel, began
+        try:
+            yield
+        finally:
+            self._now = None
+            self._seconds += time.monotonic() - began
+            self.kernels += 1
+
+
+BUILDS = Builds()

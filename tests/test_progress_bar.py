@@ -6,12 +6,15 @@ The clock is ours, so that rates are exact.
 from __future__ import annotations
 
 import sys
+from threading import Event
+from types import SimpleNamespace
 
 import pytest
 
+from rift_cl import progress
 from rift_cl.commands import progress_bar
-from rift_cl.commands.progress_bar import show_progress
-from rift_cl.progress import Report
+from rift_cl.commands.progress_bar import BuildsBetween, show_progress
+from rift_cl.progress import Builds, Report
 
 
 @pytest.fixture
@@ -98,3 +101,44 @@ def test_a_terminal_shows_the_same_rate(clock, capsys, monkeypatch):
 def test_who_is_quiet_prints_nothing(clock, capsys):
     show_progress(clock.reports([(0, 1, 1, "steps")]), quiet=True)
     assert capsys.readouterr().err == ""
+
+
+def test_kernels_that_take_long_to_build_are_told_until_the_next_report(monkeypatch):
+    now, found = [0.0], Builds()
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(progress_bar, "BUILDS", found)
+    builds = BuildsBetween()
+    with found.of("adam"):
+        now[0] += 0.9
+        assert builds.told() == ""
+    with found.of("ssim_map"):
+        now[0] += 0.3
+        assert builds.told() == "building kernels: 1 in 1 s, now ssim_map"
+        builds.reported()
+        assert builds.told() == ""
+    now[0] += 100
+    assert builds.told() == "", "nothing is being built"
+
+
+def test_lines_tell_of_kernels_while_the_work_waits_for_them(capsys, monkeypatch):
+    found, told = Builds(), Event()
+    monkeypatch.setattr(progress_bar, "BUILDS", found)
+    monkeypatch.setattr(progress_bar, "_WORTH_TELLING", 0.0)
+    monkeypatch.setattr(progress_bar, "_LOOK", 0.001)
+    say = progress_bar.print_line
+
+    def said(line):
+        say(line)
+        if "building" in line:
+            told.set()
+
+    monkeypatch.setattr(progress_bar, "print_line", said)
+
+    def work():
+        with found.of("adam"):
+            assert told.wait(60)
+        yield Report(1, 1, "steps")
+
+    show_progress(work(), quiet=False)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == ["building kernels: 0 in 0 s, now adam", "1/1 steps"]

@@ -24,6 +24,7 @@ from rift_cl.cl.launch_times import LaunchTimes
 from rift_cl.cl.process import claim_process
 from rift_cl.cl.signature import Parameter, check_names, check_numbers, in_order, parameters
 from rift_cl.errors import DeviceError
+from rift_cl.progress import BUILDS
 
 if TYPE_CHECKING:
     from rift_cl.cl.device import Device
@@ -146,7 +147,7 @@ class Programs:
             cl.enqueue_nd_range_kernel(queue, kernel, size, local, offset)
             return
         # PoCL compiles again for the first launch, into the same cache.
-        with building, build_lock(key[0]):
+        with building, build_lock(key[0]), BUILDS.of(key[0]):
             cl.enqueue_nd_range_kernel(queue, kernel, size, local, offset)
             queue.finish()
             self._started.add(started)

@@ -1,21 +1,28 @@
-"""Progress on stderr: a bar with rate and time left on a terminal, plain lines elsewhere."""
+"""Progress on stderr: a bar with rate and time left on a terminal, plain lines elsewhere.
+
+Kernels that are built between two steps are told as well, once that takes longer than a second.
+"""
 
 from __future__ import annotations
 
 import math
 import sys
+import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+from rich.text import Text
 
-from rift_cl.progress import Report
+from rift_cl.progress import BUILDS, Report
 
 # Plain lines come no closer together than this, in seconds, except the last.
 _PAUSE = 5.0
+# Seconds of building between two reports from which on it is told, and between two looks at it.
+_WORTH_TELLING, _LOOK = 1.0, 0.25
 # Share of the work so far that counts as later, of it the share that is taken for undisturbed, and
 # the least share of all work that makes a stretch. Measured with ``tools/time_left.py``.
 _LATER, _QUICK, _SHORTEST = 0.7, 1 / 3, 1 / 400
@@ -88,15 +95,70 @@ def show_progress(reports: Iterable[Report], *, quiet: bool) -> None:
         _print_lines(reports)
 
 
+class BuildsBetween:
+    """The building of kernels since the last report, in words."""
+
+    def __init__(self) -> None:
+        self.reported()
+
+    def reported(self) -> None:
+        """Begin again: a step of the work is done."""
+        self._seconds, self._kernels = BUILDS.seconds, BUILDS.kernels
+
+    def told(self) -> str:
+        """What is being built, where building takes long; else nothing."""
+        kernel, seconds = BUILDS.now, BUILDS.seconds - self._seconds
+        if not kernel or seconds < _WORTH_TELLING:
+            return ""
+        done = BUILDS.kernels - self._kernels
+        return f"building kernels: {done} in {seconds:.0f} s, now {kernel}"
+
+
+class _BuildColumn(ProgressColumn):
+    """The building of kernels, on a terminal."""
+
+    def __init__(self, builds: BuildsBetween) -> None:
+        super().__init__()
+        self._builds = builds
+
+    def render(self, task: Task) -> Text:
+        return Text(self._builds.told())
+
+
+@contextmanager
+def _lines_of_builds(builds: BuildsBetween) -> Iterator[None]:
+    """Print lines of the building of kernels while the work goes on."""
+    over = threading.Event()
+
+    def watch() -> None:
+        last = -math.inf
+        while not over.wait(_LOOK):
+            told = builds.told()
+            if told and time.monotonic() - last >= _PAUSE:
+                last = time.monotonic()
+                print_line(told)
+
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        over.set()
+        watcher.join()
+
+
 def _draw_bar(reports: Iterable[Report]) -> None:
+    builds = BuildsBetween()
     columns = (
         BarColumn(),
         TextColumn("{task.completed}/{task.total} {task.description}"),
         TextColumn("{task.fields[pace]}"),
+        _BuildColumn(builds),
     )
     with Progress(*columns, console=Console(stderr=True)) as progress:
         task, pace = progress.add_task("", pace=""), Pace()
         for report in reports:
+            builds.reported()
             progress.update(
                 task,
                 completed=report.done,
@@ -107,14 +169,16 @@ def _draw_bar(reports: Iterable[Report]) -> None:
 
 
 def _print_lines(reports: Iterable[Report]) -> None:
-    pace, last = Pace(), -math.inf
-    for report in reports:
-        told, now = _told(report, *pace.after(report)), time.monotonic()
-        if now - last < _PAUSE and report.done < report.total:
-            continue
-        last = now
-        parts = [f"{report.done}/{report.total} {report.what}", *told]
-        print_line(", ".join(parts) + _figures(report))
+    pace, last, builds = Pace(), -math.inf, BuildsBetween()
+    with _lines_of_builds(builds):
+        for report in reports:
+            builds.reported()
+            told, now = _told(report, *pace.after(report)), time.monotonic()
+            if now - last < _PAUSE and report.done < report.total:
+                continue
+            last = now
+            parts = [f"{report.done}/{report.total} {report.what}", *told]
+            print_line(", ".join(parts) + _figures(report))
 
 
 def _told(report: Report, rate: float, left: float) -> list[str]:

@@ -27,6 +27,7 @@ from rift_cl.cl.build.source import fault_place, kernel_source
 from rift_cl.cl.failures import named_errors
 from rift_cl.cl.real_type import real_type
 from rift_cl.errors import DeviceError, KernelBuildError
+from rift_cl.progress import BUILDS
 
 if TYPE_CHECKING:
     from rift_cl.cl.device import Device
@@ -74,7 +75,8 @@ class Builder:
         with building:
             if key not in self._programs:
                 self._check_known(key[0])
-                self._programs[key] = self._build(key)
+                with BUILDS.of(key[0]):
+                    self._programs[key] = self._build(key)
             return self._programs[key]
 
     def _build(self, key: Key) -> Any:
