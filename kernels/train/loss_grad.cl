@@ -11,7 +11,8 @@
  * target; the gradient is zero there.
  *
  * `parts` gets the sum of the first part over each item's floats, one number for each item from
- * `first_part` on. Index space: (strips of floats, runs of rows), a group for each tile. */
+ * `first_part` on. Index space: (strips of floats, runs of rows from `first_run` on), a group for each
+ * tile. The maps hold `map_rows` rows of the image, from `map_first` on, and all that these tiles read. */
 
 #include "include/portable.h"
 #include "include/transpose.h"
@@ -45,9 +46,10 @@ KERNEL void loss_grad(
     __global const float *restrict image, __global const float *restrict target,
     __global const float *restrict weights, __global const float *restrict maps,
     __global float *restrict grad, __global float *restrict parts, int first_part,
-    int height, int width, int pitch, float pixel_scale, float ssim_scale)
+    int first_run, int map_first, int map_rows, int height, int width, int pitch,
+    float pixel_scale, float ssim_scale)
 {
-  const int first = GROUP_NUMBER(0) * STRIP, row0 = GROUP_NUMBER(1) * ROWS;
+  const int first = GROUP_NUMBER(0) * STRIP, row0 = (first_run + GROUP_NUMBER(1)) * ROWS;
   const int item = (int)get_local_id(0);
   const long image_width = (long)width / CHANNELS * IMAGE_CHANNELS;
 #if SSIM
@@ -60,7 +62,7 @@ KERNEL void loss_grad(
       lanes sums[ROWS];
       UNROLL for (int o = 0; o < ROWS; o++) sums[o] = 0;
       UNROLL for (int r = 0; r < ROWS + 2 * RADIUS; r++) {
-        const long row = (long)map * height + mirrored(row0 + r - RADIUS, height);
+        const long row = (long)map * map_rows - map_first + mirrored(row0 + r - RADIUS, height);
         add_row(sums, r, LOAD(maps + row * pitch + f));
       }
       UNROLL for (int o = 0; o < ROWS; o++) STORE_LOCAL(rows[map][o] + f - first + HALO, sums[o]);

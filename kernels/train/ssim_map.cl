@@ -20,7 +20,8 @@
  *
  * with P and p of the shifted sum alike in the last line. Those three maps are written, planes of
  * `pitch` floats a row, and the sum of scale m e of the items, one number each. m is one where
- * there are no weights. Index space: (strips of floats, runs of rows), a group for each tile. */
+ * there are no weights. Index space: (strips of floats, runs of rows from `first_run` on), a group
+ * for each tile. The maps hold `map_rows` rows of the image, from `map_first` on. */
 
 #include "include/portable.h"
 #include "include/transpose.h"
@@ -33,10 +34,11 @@
 KERNEL void ssim_map(
     __global const float *restrict image, __global const float *restrict target,
     __global const float *restrict weights, __global float *restrict maps,
-    __global float *restrict parts, int height, int width, int pitch, float scale)
+    __global float *restrict parts, int first_run, int map_first, int map_rows, int height,
+    int width, int pitch, float scale)
 {
   __local float rows[MOMENTS][ROWS][SPAN];
-  const int first = GROUP_NUMBER(0) * STRIP, row0 = GROUP_NUMBER(1) * ROWS;
+  const int first = GROUP_NUMBER(0) * STRIP, row0 = (first_run + GROUP_NUMBER(1)) * ROWS;
   const int item = (int)get_local_id(0);
   const long image_width = (long)width / CHANNELS * IMAGE_CHANNELS;
   for (int n = item * LANES; n < SPAN; n += GROUP * LANES) {
@@ -82,8 +84,8 @@ KERNEL void ssim_map(
 #endif
       const lanes m1 = 2 * m * (1 - a) * (1 - 0.5f * b) * V, m2 = -m * (1 - a) * b * V;
       const lanes m0 = m * (1 - b) * M * ((2 - a) * D - a * (P + 1)) - D * m1 - P * m2;
-      __global float *out = maps + (long)(row0 + o) * pitch + f;
-      const long plane = (long)height * pitch;
+      __global float *out = maps + (long)(row0 + o - map_first) * pitch + f;
+      const long plane = (long)map_rows * pitch;
       STORE(out, m0);
       STORE(out + plane, m1);
       STORE(out + 2 * plane, m2);

@@ -86,6 +86,7 @@ def plan_chunks(
     what: str,
     array: int = 0,
     largest: int = _MOST,
+    instead: str = "",
 ) -> list[slice]:
     """Cut equal items of work into chunks that fit the memory (images: ``rift_cl.splat.bands``).
 
@@ -97,6 +98,7 @@ def plan_chunks(
         what: the name of one item, for the error.
         array: bytes of one item in the largest of its arrays, which grows with the items.
         largest: bytes of the largest array that the device takes (``traits.allocation``).
+        instead: what does it where not even one item fits, for the error.
 
     Returns:
         Slices over the items, as even as can be, one for each chunk.
@@ -109,9 +111,9 @@ def plan_chunks(
         raise ResourceLimitError(
             f"one {what} needs {format_bytes(fixed + each)}, the memory budget is "
             f"{format_bytes(budget)}: raise the budget (RIFT_MEMORY or --memory), use a device "
-            "with more memory, or make the problem smaller"
+            f"with more memory, or make the problem smaller{_or(instead)}"
         )
-    check_array(array, largest, what=f"an array of one {what}")
+    check_array(array, largest, what=f"an array of one {what}", instead=instead)
     return cut_evenly(count, min(most, largest // max(array, 1)))
 
 
@@ -121,13 +123,14 @@ def cut_evenly(count: int, most: int) -> list[slice]:
     return [slice(count * k // runs, count * (k + 1) // runs) for k in range(runs)]
 
 
-def check_array(size: int, largest: int, *, what: str) -> None:
+def check_array(size: int, largest: int, *, what: str, instead: str = "") -> None:
     """Refuse an array that the device does not take in one piece.
 
     Args:
         size: bytes of the array.
         largest: bytes of the largest array that the device takes.
         what: the array, for the error.
+        instead: what does it without that array, for the error.
 
     Raises:
         ResourceLimitError: it is larger.
@@ -137,7 +140,12 @@ def check_array(size: int, largest: int, *, what: str) -> None:
             f"{what} takes {format_bytes(size)}, the largest single array that the device takes is "
             f"{format_bytes(largest)}, however much memory it has: work on parts of it, make the "
             "problem smaller, or use a device that takes larger arrays (rift devices)"
+            f"{_or(instead)}"
         )
+
+
+def _or(instead: str) -> str:
+    return f"; {instead}" if instead else ""
 
 
 def format_bytes(amount: float) -> str:

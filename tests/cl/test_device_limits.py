@@ -83,6 +83,13 @@ def loss(device: rift.Device) -> Arrays:
     return [device.get(value), device.get(grad)]
 
 
+def tall_loss(device: rift.Device) -> Arrays:
+    # The last run of rows ends behind the image.
+    image, target = map(device.array, pair((61, 90)))
+    value, grad = ImageLoss()(device, image, target, weights=device.array(mask((61, 90))))
+    return [device.get(value), device.get(grad)]
+
+
 def spectrum(device: rift.Device) -> Arrays:
     apply = SpectralFilter(device, (33, 20), lambda ky, kx: np.sqrt(ky**2 + kx**2 + 1e-4))
     return [device.get(apply(device.array(normal(33, 20, 3))))]
@@ -98,6 +105,12 @@ def coverages(device: rift.Device) -> Arrays:
 def voxelised(device: rift.Device) -> Arrays:
     grid = rift.Grid((12, 20, 30), 0.06, (0.1, 0, 0))
     return [voxels(device, random_splats(300, order=1, scales=(0.03, 0.12)), grid)]
+
+
+def crowded_voxels(device: rift.Device) -> Arrays:
+    # Lists longer than the table of splats, and than the volume.
+    grid = rift.Grid((4, 60, 120), 0.04)
+    return [voxels(device, random_splats(500, order=1, scales=(0.3, 0.6)), grid)]
 
 
 def columns(device: rift.Device) -> Arrays:
@@ -137,6 +150,8 @@ every_job = pytest.mark.parametrize("job", JOBS.values(), ids=list(JOBS))
         (coverages, 30_000),
         (columns, 1 << 14),
         (splats, 40_000),
+        (tall_loss, 100_000),
+        (crowded_voxels, 130_000),
     ],
 )
 def test_no_array_is_larger_than_the_largest_buffer(device, job, largest, monkeypatch):

@@ -129,6 +129,8 @@ class FastProjector(ParallelProjector):
             samples.
     """
 
+    _instead = "FastProjector cannot take a slice in parts, rift.Projector can"
+
     def __init__(
         self,
         grid: Grid,

@@ -34,6 +34,8 @@ class ParallelProjector(LinearOperator):
 
     grid: Grid
     scan: Parallel
+    # What a refusal says of a slice that is too large for this projector.
+    _instead = ""
 
     def __init__(
         self,
@@ -90,6 +92,7 @@ class ParallelProjector(LinearOperator):
             what="slice",
             array=max(self.dtype.itemsize * max(image, sinogram), self._largest_scratch),
             largest=self.device.traits.allocation,
+            instead=self._instead,
         )
         if len(self.grid.shape) == 2:
             return [Chunk((), ())]

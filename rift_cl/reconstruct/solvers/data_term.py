@@ -73,6 +73,7 @@ class DataTerm:
             what="solver",
             array=self.dtype.itemsize * max(images, sinograms),
             largest=self.device.traits.allocation,
+            instead="a solver cannot take a slice in parts, rift.fbp can",
         )
         self.samples = max(math.prod(A.range), 1)
         """Samples of y that count."""

@@ -1,7 +1,9 @@
 """The loss of a splat trainer, pixel differences and SSIM, with its gradient on the device.
 
 Two kernels, each of which blurs down and along at once: ``kernels/train/ssim_map.cl`` derives the
-gradient, ``kernels/train/loss_grad.cl`` finishes it. Nothing waits for the device.
+gradient, ``kernels/train/loss_grad.cl`` finishes it. Nothing waits for the device. Between the two
+are maps, three times as large as the image: where one buffer cannot hold them, the image is gone
+through in bands of rows, whose maps reach as far as the window does, to the same bits.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from dataclasses import dataclass
 
 from rift_cl.cl.arithmetic import sum_columns
 from rift_cl.cl.array import DeviceArray
+from rift_cl.cl.budget import check_array, cut_evenly
 from rift_cl.cl.device import Device
 from rift_cl.cl.host_arrays import as_device_array
 from rift_cl.errors import InputError, ShapeError
@@ -18,6 +21,9 @@ from rift_cl.train.loss.pixel_loss import PIXEL_LOSSES
 
 _WINDOW, _CHANNELS = 11, 4
 _ROWS, _STRIP, _MAPS = 4, 256, 3
+# Runs of rows on either side of a band that its gradient reads the maps of: half a window, and the
+# rows that a run may have beyond the image.
+_BESIDE = 2
 
 
 @dataclass(frozen=True)
@@ -73,6 +79,7 @@ class ImageLoss:
             ShapeError: shapes do not fit, or a side is shorter than the window of SSIM.
             DTypeError: an array is not float32 on a device.
             DeviceError: an array belongs to another device.
+            ResourceLimitError: a few rows are larger than the device's largest buffer.
         """
         _check(device, image, target, weights)
         _check_window(target.shape[:2], self.ssim_weight)
@@ -92,29 +99,60 @@ class ImageLoss:
         arrays, maps = {"image": image, "target": target}, target
         arrays["weights"] = target if weights is None else weights
         grad, parts = device.empty(image.shape), device.empty(((2 if w else 1) * items, 1))
-        pitch, first = _pitch(floats), 0
-        sizes = {"height": height, "width": floats, "pitch": pitch}
+        sizes = {"height": height, "width": floats, "pitch": _pitch(floats)}
+        bands = _bands(device, tiles[1], sizes["pitch"]) if w else [slice(0, tiles[1])]
         if w:
-            maps, first = device.empty((_MAPS, height, pitch)), items
+            most = max(_rows_beside(band, height)[1] for band in bands)
+            maps = device.empty((_MAPS, most, sizes["pitch"]))
+        for band in bands:
+            first, rows = _rows_beside(band, height)
+            of_maps = {"maps": maps, "parts": parts, "map_first": first, "map_rows": rows}
+            if w:
+                device.launch(
+                    "ssim_map",
+                    (size[0], -(-rows // _ROWS)),
+                    **arrays,
+                    **of_maps,
+                    first_run=first // _ROWS,
+                    **sizes,
+                    scale=w / n,
+                    **macros,
+                )
             device.launch(
-                "ssim_map", size, **arrays, maps=maps, parts=parts, **sizes, scale=w / n, **macros
+                "loss_grad",
+                (size[0], band.stop - band.start),
+                **arrays,
+                **of_maps,
+                grad=grad,
+                first_part=items if w else 0,
+                first_run=band.start,
+                **sizes,
+                pixel_scale=(1 - w) / n,
+                ssim_scale=w / n,
+                **macros,
+                SSIM=w > 0,
+                **PIXEL_LOSSES[self.kind].macros(),
             )
-        device.launch(
-            "loss_grad",
-            size,
-            **arrays,
-            maps=maps,
-            grad=grad,
-            parts=parts,
-            first_part=first,
-            **sizes,
-            pixel_scale=(1 - w) / n,
-            ssim_scale=w / n,
-            **macros,
-            SSIM=w > 0,
-            **PIXEL_LOSSES[self.kind].macros(),
-        )
         return sum_columns(device, parts), grad
+
+
+def _bands(device: Device, runs: int, pitch: int) -> list[slice]:
+    """Runs of rows whose maps a buffer of the device holds, with those beside them.
+
+    Raises:
+        ResourceLimitError: it does not hold those of one run.
+    """
+    largest, each = device.traits.allocation, 4 * _MAPS * _ROWS * pitch
+    if runs * each <= largest:
+        return [slice(0, runs)]
+    check_array((1 + 2 * _BESIDE) * each, largest, what="the map of SSIM of a few rows")
+    return cut_evenly(runs, largest // each - 2 * _BESIDE)
+
+
+def _rows_beside(band: slice, height: int) -> tuple[int, int]:
+    """The first row of the maps of a band, and how many there are."""
+    first = _ROWS * max(band.start - _BESIDE, 0)
+    return first, min(_ROWS * (band.stop + _BESIDE), height) - first
 
 
 def _pitch(floats: int) -> int:
