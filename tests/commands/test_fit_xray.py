@@ -13,6 +13,7 @@ from rift_cl.commands.fit.kind import kind_of_fit
 from rift_cl.commands.fit_xray.job import XrayFit
 from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.errors import InputError, StoppedError
+from rift_cl.geometry.seen_grid import seen_grid
 from rift_cl.io.scans.formats import open_scan
 from rift_cl.io.volumes import read_volume
 from rift_cl.metrics import psnr
@@ -191,3 +192,49 @@ def test_the_real_tooth_from_one_command(shared_data, tmp_path):
     assert fit(path, tmp_path / "fit", "--rows", "0", "1", "--center", "296") == 0
     scores = json.loads((tmp_path / "fit" / "metrics.json").read_text())["scores"]["held out"]
     assert scores["fit_error"] < 0.15
+
+
+@pytest.fixture(scope="module")
+def cone(tmp_path_factory):
+    """Two balls, one of them off the middle, from 32 views of a cone; and the true volume."""
+    scan = rift.Cone(np.arange(32) * np.pi / 16, 20, 26, 1.0, 40, 80, center=(8.5, 12.5))
+    balls = [
+        rift.phantom.Ellipsoid((0.0, 0.0, 0.0), (3.0, 4.0, 4.0), 0.0, 0.2),
+        rift.phantom.Ellipsoid((1.2, -1.0, 1.5), (1.0, 1.0, 1.0), 0.0, 0.3),
+    ]
+    path = tmp_path_factory.mktemp("cone") / "cone.npz"
+    np.savez(
+        path,
+        sinogram=rift.phantom.project(balls, seen_grid(scan), scan),
+        angles=scan.angles,
+        source_to_axis=40.0,
+        source_to_detector=80.0,
+        pitch=1.0,
+        center=np.array(scan.center),
+    )
+    return path, balls
+
+
+def test_a_cone_beam_becomes_densities(cone, tmp_path):
+    path, balls = cone
+    given = settings(path, tmp_path / "fit", center=None, splats=800)
+    list(XrayFit(given).run())
+    slices = read_volume(tmp_path / "fit" / "slices")
+    grid = seen_grid(open_scan(path).cone)
+    truth = rift.phantom.render(balls, grid)
+    assert slices.shape == truth.shape == (20, 26, 26)
+    assert slices.sum() == pytest.approx(truth.sum(), rel=0.03)
+    # Upside down, or from the other side, they would be no better than nothing.
+    assert psnr(slices, truth, peak=0.5) > psnr(slices, truth[::-1], peak=0.5) + 6
+    assert psnr(slices, truth, peak=0.5) > psnr(slices, truth[:, ::-1], peak=0.5) + 3
+    scores = json.loads((tmp_path / "fit" / "metrics.json").read_text())["scores"]["held out"]
+    assert scores["fit_error"] < 0.09
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--rows", ("0", "4")), ("--pitch", ("2",))], ids=["rows", "pitch"]
+)
+def test_what_a_cones_geometry_has_settled_is_no_option(cone, tmp_path, capsys, option, value):
+    assert main(["fit", "xray", str(cone[0]), "--out", str(tmp_path / "f"), option, *value]) == 3
+    assert option in capsys.readouterr().err
+    assert not (tmp_path / "f").exists()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rift_cl.commands.fit_xray.input import Projections, XrayPictures
+from rift_cl.geometry import Parallel
 from rift_cl.splat.orders import count_of
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
@@ -19,11 +20,11 @@ def projections(views, rows, values=None):
     angles = np.arange(views) * np.pi / views
     if values is None:
         values = np.zeros((views, rows, SIZE), np.float32)
-    return Projections(angles, values, (SIZE - 1) / 2, 1.0)
+    return Projections(Parallel(angles, SIZE), values, 1.0)
 
 
 def cameras_of(views, rows):
-    return projections(views, rows).cameras()
+    return projections(views, rows).views.cameras
 
 
 def scene(order, seed=0, flat=False):

@@ -1,13 +1,18 @@
-"""The projections of a fit to X-rays: read, corrected, in one scale, as orthographic views.
+"""The projections of a fit to X-rays: read, corrected, in one scale, as views of cameras.
 
-A fit works in lengths of detector bins and in shares of the strongest line integrals, so that its
-rates and its noise mean the same for every scan; ``scene_of`` gives the scan's units back.
+A fit works in lengths of detector bins, as they are seen at the rotation axis, and in shares of the
+strongest line integrals, so that its rates and its noise mean the same for every scan; what is left
+in the run's folder has the scan's units again. Parallel beams are orthographic cameras, cone beams
+pinholes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -24,7 +29,9 @@ from rift_cl.commands.inputs.scan_rows import (
     read_attenuation,
 )
 from rift_cl.errors import InputError
-from rift_cl.geometry import Camera, Grid, Parallel
+from rift_cl.geometry import Camera, Cone, Grid, Parallel, Vectors
+from rift_cl.geometry.scan_cameras import ScanCameras, scan_cameras
+from rift_cl.geometry.seen_grid import scan_lengths, seen_grid
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.scans.scan_file import ScanFile
 
@@ -60,28 +67,68 @@ class XrayInput:
             kind=settings.kind,
             axes=settings.axes,
             angle_unit=settings.angle_unit,
+            geometry=settings.geometry,
+            reversed=settings.reversed,
             memory=settings.memory,
         )
-        self.scan: ScanFile = self.source.open_scan()
+        self.scan: ScanFile = self.source.open_scan(fan=True)
+        if self.scan.fan is not None:
+            raise InputError(
+                f"{self.scan.path}: is a fan-beam scan, a fit takes parallel and cone beams; "
+                "'rift reconstruct' takes fans as well"
+            )
         self.device = device
+        self._refuse_for_cones(settings)
         self.rows = chosen_rows(settings.rows, self.scan)
         check_center(settings.center, self.scan)
         self.center = settings.center
         solve = settings.training.solve
         self._solved = solve.views if solve.every else 0
-        self.pitch = (self.scan.pitch or 1.0) if settings.pitch is None else settings.pitch
+        self.pitch = self._length(settings)
         self.unit = settings.unit or self.scan.unit or ("bin" if self.pitch == 1.0 else "")
         # Made now, so that a bad pitch is told before any work.
         Parallel(self.scan.angles, self.scan.shape[2], self.pitch, self.center)
         check_claim(self.scan.path, "a fit of these rows", self.need, settings.budget())
 
+    def _refuse_for_cones(self, settings: FitXraySettings) -> None:
+        """Refuse options whose meaning a cone beam's geometry has settled.
+
+        Raises:
+            InputError: one of them is given.
+        """
+        given = {"rows": settings.rows, "pitch": settings.pitch}
+        if isinstance(self.scan.cone, Vectors):
+            given["center"] = settings.center
+        for name, value in given.items():
+            if self.scan.cone is not None and value is not None:
+                raise InputError(
+                    f"--{name} is for parallel beams, {self.scan.path} is a cone-beam scan: its "
+                    "rows belong together, and its lengths and axis are in its geometry "
+                    "(--geometry)"
+                )
+
+    def _length(self, settings: FitXraySettings) -> float:
+        """A bin as it is seen at the axis, in the scan's unit."""
+        if self.scan.cone is not None:
+            return scan_lengths(self.scan.cone).pixel[1]
+        return (self.scan.pitch or 1.0) if settings.pitch is None else settings.pitch
+
+    @property
+    def grid(self) -> Grid:
+        """The voxels of the slices that are written, in lengths of bins."""
+        rows = self.rows[1] - self.rows[0]
+        if self.scan.cone is None:
+            return Grid((rows, self.scan.shape[2], self.scan.shape[2]))
+        return seen_grid(self.scan.cone.scaled(1 / self.pitch), 1.0)
+
     @property
     def need(self) -> int:
         """Bytes of host memory that a fit takes."""
-        views, _, bins = self.scan.shape
-        each = 8 * _VOLUMES * bins * bins + 4 * _STACKS * views * bins
-        each += 8 * _SOLVED * min(self._solved, views) * bins
-        return each * (self.rows[1] - self.rows[0])
+        views, rows, bins = len(self.scan.angles), self.rows[1] - self.rows[0], self.scan.shape[2]
+        solved = 8 * _SOLVED * min(self._solved, views) * bins
+        return 8 * _VOLUMES * math.prod(self.grid.shape) + rows * (
+            4 * _STACKS * views * bins + solved
+        )
 
     def read(self) -> Projections:
         """All line integrals, and the rotation axis.
@@ -90,9 +137,6 @@ class XrayInput:
             InputError: nothing is attenuated.
         """
         integrals = read_attenuation(self.scan, *self.rows).projections
-        center = self.center
-        if center is None:
-            center = find_axis(self.scan, self.device).center
         scale = float(np.quantile(integrals, _STRONG))
         if scale <= 0:
             raise InputError(
@@ -100,58 +144,101 @@ class XrayInput:
                 "there is nothing to fit"
             )
         values = integrals / np.float32(scale)
-        return Projections(np.asarray(self.scan.angles), values, float(center), scale)
+        return Projections(self._geometry(), values, scale)
+
+    def _geometry(self) -> Parallel | Cone | Vectors:
+        """The rays, in lengths of bins as they are seen at the axis."""
+        cone, center = self.scan.cone, self.center
+        if cone is None:
+            if center is None:
+                center = find_axis(self.scan, self.device).center
+            return Parallel(self.scan.angles, self.scan.shape[2], 1.0, float(center))
+        if isinstance(cone, Cone) and center is not None:
+            cone = dataclasses.replace(cone, center=(cone.center[0], center))
+        return cone.scaled(1 / self.pitch)
 
 
 @dataclass(frozen=True)
 class Projections:
-    """Line integrals of a parallel beam.
+    """Line integrals of a parallel or a cone beam.
 
     Args:
-        angles: (V,) in radians.
+        scan: the rays, in lengths of bins as they are seen at the axis.
         values: (V, rows, bins), times ``scale`` the line integrals.
-        center: bin of the rotation axis.
         scale: what a value of one stands for.
     """
 
-    angles: NDArray[np.float64]
+    scan: Parallel | Cone | Vectors
     values: Floats
-    center: float
     scale: float
 
     def of(self, numbers: Sequence[int]) -> Projections:
         """Some of the views."""
         chosen = list(numbers)
-        return Projections(self.angles[chosen], self.values[chosen], self.center, self.scale)
+        return Projections(self.scan.subset(chosen), self.values[chosen], self.scale)
+
+    @property
+    def angles(self) -> NDArray[np.float64]:
+        """(V,) in radians; of vectors the directions that the sources stand in."""
+        if isinstance(self.scan, Vectors):
+            source = self.scan.source
+            return np.asarray(np.arctan2(source[:, 0], -source[:, 1]), np.float64)
+        return self.scan.angles
+
+    @property
+    def center(self) -> float | None:
+        """Bin at which the rotation axis is seen; None for vectors."""
+        if isinstance(self.scan, Vectors):
+            return None
+        return self.scan.center if isinstance(self.scan, Parallel) else self.scan.center[1]
 
     @property
     def grid(self) -> Grid:
-        """The voxels of a reconstruction: a slice for each row, as wide as the detector."""
-        _, rows, bins = self.values.shape
-        return Grid((rows, bins, bins))
-
-    @property
-    def geometry(self) -> Parallel:
-        """The rays, in lengths of bins."""
-        return Parallel(self.angles, self.values.shape[2], 1.0, self.center)
+        """The voxels of a reconstruction, as large as bins at the axis."""
+        if isinstance(self.scan, Parallel):
+            _, rows, bins = self.values.shape
+            return Grid((rows, bins, bins))
+        return seen_grid(self.scan, 1.0)
 
     @property
     def reach(self) -> float:
-        """Distance from the rotation axis to the farther end of the detector, in bins."""
-        return float(max(self.center + 0.5, self.values.shape[2] - 0.5 - self.center))
+        """Distance from the axis to the outermost ray of the detector's longer side, in bins."""
+        if isinstance(self.scan, Parallel):
+            center = self.scan.center
+            return float(max(center + 0.5, self.values.shape[2] - 0.5 - center))
+        return self.grid.shape[-1] / 2
 
-    def cameras(self) -> list[Camera]:
-        """Every view as an orthographic camera: x along the detector, y along the rotation axis."""
+    @property
+    def flat(self) -> bool:
+        """Whether there is but one detector row, which says nothing about what is across it."""
+        return bool(self.values.shape[1] == 1)
+
+    @cached_property
+    def views(self) -> ScanCameras:
+        """The cameras, and whose pictures are the projections with their rows in reverse."""
+        if isinstance(self.scan, Parallel):
+            return ScanCameras(tuple(self._ortho(self.scan)), np.zeros(len(self.values), bool))
+        return scan_cameras(self.scan)
+
+    def picture(self, number: int) -> Floats:
+        """A projection as its camera sees it, (rows, bins)."""
+        return flipped(self.values[number], self.views.reversed_rows[number])
+
+    def _ortho(self, scan: Parallel) -> Iterator[Camera]:
+        """Orthographic cameras: x along the detector, y along the rotation axis."""
         _, rows, bins = self.values.shape
-        K = [[1, 0, self.center + 0.5], [0, 1, rows / 2], [0, 0, 1]]
-        cameras = []
-        for cos, sin in zip(np.cos(self.angles), np.sin(self.angles), strict=True):
+        K = [[1, 0, scan.center + 0.5], [0, 1, rows / 2], [0, 0, 1]]
+        for cos, sin in zip(np.cos(scan.angles), np.sin(scan.angles), strict=True):
             view = np.eye(4)
             view[:3, :3] = [[cos, sin, 0], [0, 0, 1], [sin, -cos, 0]]
             # All that any view sees lies before it.
             view[2, 3] = 2 * self.reach
-            cameras.append(Camera((rows, bins), K, view, "ortho"))
-        return cameras
+            yield Camera((rows, bins), K, view, "ortho")
+
+
+def flipped(image: Floats, reverse: bool) -> Floats:
+    """An image with its rows in reverse, or as it is."""
+    return np.ascontiguousarray(image[::-1] if reverse else image)
 
 
 class XrayPictures:
@@ -167,7 +254,7 @@ class XrayPictures:
     def __init__(self, device: Device, projections: Projections) -> None:
         self.device = device
         self.projections = projections
-        self.cameras: Sequence[Camera] = projections.cameras()
+        self.cameras: Sequence[Camera] = projections.views.cameras
         self.behind: Floats = np.zeros(3, np.float32)
 
     def begin(self, step: int) -> None:
@@ -175,7 +262,7 @@ class XrayPictures:
 
     def target(self, number: int) -> Any:
         """(rows, bins, 1) line integrals on the device."""
-        return self.device.array(np.ascontiguousarray(self.projections.values[number][..., None]))
+        return self.device.array(self.projections.picture(number)[..., None])
 
     def weights(self, number: int) -> Any:
         """None: every ray counts."""

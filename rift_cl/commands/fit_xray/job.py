@@ -1,10 +1,11 @@
-"""``rift fit xray``: the projections of a parallel beam become Gaussian densities."""
+"""``rift fit xray``: the projections of a parallel or a cone beam become Gaussian densities."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
 from math import log
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,13 @@ from rift_cl.commands.fit_photos.scores import score_record
 from rift_cl.commands.fit_photos.view_split import split_views
 from rift_cl.commands.fit_xray.input import Projections, XrayInput, XrayPictures
 from rift_cl.commands.fit_xray.report import xray_page
-from rift_cl.commands.fit_xray.scores import backprojected, drawn, relative_error, score_projections
+from rift_cl.commands.fit_xray.scores import (
+    backprojected,
+    drawn,
+    first_volume,
+    relative_error,
+    score_projections,
+)
 from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.io.scenes.splat_scene import XrayScene
@@ -76,7 +83,7 @@ class XrayFit(FitRun[FitXraySettings]):
             "rows": f"{rows[0]} to {rows[1] - 1}, {bins} bins each",
             "splats": ", ".join(filter(None, [str(most), words])),
             "output": f"scene.ply and {VOLUME_NAMES[settings.format]}, "
-            f"{(rows[1] - rows[0], bins, bins)} (z, y, x)",
+            f"{self.input.grid.shape} (z, y, x)",
             "host memory": f"{self.input.need / 2**20:.0f} MiB",
             "device": self.device.name,
             "time": time_words(seconds) + solves,
@@ -102,8 +109,7 @@ class XrayFit(FitRun[FitXraySettings]):
             self.settings.decided(len(self.training_views)),
             training=trainer.settings,
             center=whole.center,
-            rows=self.input.rows,
-            pitch=self.input.pitch,
+            **self._parallel_facts(),
             unit=self.input.unit,
             kind=self.input.scan.kind,
         )
@@ -130,15 +136,18 @@ class XrayFit(FitRun[FitXraySettings]):
         }
         self._leave(splats, volume, whole)
 
+    def _parallel_facts(self) -> dict[str, Any]:
+        """Settings that were decided and apply to parallel beams alone."""
+        if self.input.scan.cone is not None:
+            return {}
+        return {"rows": self.input.rows, "pitch": self.input.pitch}
+
     def _trainer(
         self, measured: Projections, pictures: XrayPictures, given: FitXraySettings | None = None
     ) -> XrayTrainer:
-        settings, rows = given or self.settings, measured.values.shape[1]
+        settings = given or self.settings
         training = settings.training.decided(len(self.training_views))
-        volume = np.maximum(backprojected(self.device, measured, "hann"), 0)
-        # Without what was negative there is too much of it: as much as the projections say.
-        mass = np.maximum(measured.values.sum(axis=2, dtype=float).mean(axis=0), 0)
-        volume *= (mass / np.maximum(volume.sum(axis=(1, 2)), 1e-12))[:, None, None]
+        volume = first_volume(self.device, measured)
         raw = density_splats(
             volume,
             measured.grid,
@@ -149,17 +158,18 @@ class XrayFit(FitRun[FitXraySettings]):
         )
         first = Parameters.of(self.device, raw, density=True)
         if training.needs_noise and min(len(self.training_views), measured.values.shape[2]) >= _FEW:
-            few = evenly(rows, _FEW)
+            few = evenly(measured.values.shape[1], _FEW)
             noise = noise_of([measured.values[:, row, :, None] for row in few])
             training = dataclasses.replace(training, noise=noise)
-        return XrayTrainer(pictures, first, training, settings.rendering, flat=rows == 1)
+        return XrayTrainer(pictures, first, training, settings.rendering, flat=measured.flat)
 
     def _start_error(self, trainer: XrayTrainer, measured: Projections) -> float:
         """The relative error of a few training projections before the first step."""
         few = evenly(len(self.training_views), _FEW)
         splats, cameras = trainer.parameters.drawn, trainer.pictures.cameras
         images = [drawn(trainer.renderer, splats, cameras[number]) for number in few]
-        return relative_error(np.stack(images), measured.values[few])
+        truth = [measured.picture(number) for number in few]
+        return relative_error(np.stack(images), np.stack(truth))
 
     def _leave(self, splats: Splats, volume: Floats, whole: Projections) -> None:
         """Write splats, slices and report, in the scan's units."""

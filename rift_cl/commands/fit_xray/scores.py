@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.commands.fit_photos.scores import ViewScore
-from rift_cl.commands.fit_xray.input import Projections
-from rift_cl.geometry import Camera
+from rift_cl.commands.fit_xray.input import Projections, flipped
+from rift_cl.geometry import Camera, Parallel
 from rift_cl.metrics import psnr
 from rift_cl.operators import Projector
 from rift_cl.reconstruct import fbp
@@ -45,14 +45,28 @@ def score_rows(metrics: Mapping[str, Any]) -> list[tuple[Any, ...]]:
 
 def backprojected(device: Device, training: Projections, filter: str = "ram-lak") -> Floats:
     """The filtered backprojection of some views, zero where not every view sees."""
-    A = Projector(training.grid, training.geometry, device=device)
+    A = Projector(training.grid, training.scan, device=device)
     volume = np.asarray(fbp(A, training.values, filter))
     y, x = np.meshgrid(*(training.grid.coordinates(axis) for axis in (1, 2)), indexing="ij")
     return np.where(np.hypot(x, y) <= training.reach, volume, 0).astype(np.float32)
 
 
+def first_volume(device: Device, training: Projections) -> NDArray[np.float64]:
+    """What a fit begins with: smoothed, nowhere negative, and of the mass that was measured."""
+    volume = np.maximum(backprojected(device, training, "hann"), 0)
+    # Without what was negative there is too much of it: as much as the projections say.
+    if isinstance(training.scan, Parallel):
+        mass = np.maximum(training.values.sum(axis=2, dtype=float).mean(axis=0), 0)
+        volume *= (mass / np.maximum(volume.sum(axis=(1, 2)), 1e-12))[:, None, None]
+    else:
+        again = Projector(training.grid, training.scan, device=device)(volume)
+        mass = max(float(training.values.sum(dtype=float)), 0.0)
+        volume *= mass / max(float(np.sum(again, dtype=float)), 1e-12)
+    return volume.astype(np.float64)
+
+
 def drawn(renderer: Renderer, splats: Splats, camera: Camera) -> Floats:
-    """What a view measures of splats, (rows, bins)."""
+    """What a camera sees of splats, (rows, bins)."""
     return np.asarray(renderer.device.get(renderer.forward(splats, camera).image)[..., 0])
 
 
@@ -60,15 +74,15 @@ def score_projections(
     renderer: Renderer, splats: Splats, test: Projections, training: Projections, volume: Floats
 ) -> Iterator[ViewScore]:
     """Render and score every view of ``test``; ``volume`` is the reconstruction of ``training``."""
-    A = Projector(test.grid, test.geometry, device=renderer.device)
+    A = Projector(test.grid, test.scan, device=renderer.device)
     again = np.asarray(A(volume))
     peak = float(max(test.values.max(), training.values.max()))
-    for number, camera in enumerate(test.cameras()):
+    for number, (camera, reverse) in enumerate(zip(*test.views, strict=True)):
         truth, angle = test.values[number], test.angles[number]
         turned = np.mod(training.angles - angle + np.pi, 2 * np.pi) - np.pi
         nearest = np.argsort(np.abs(turned), kind="stable")[:2]
         images = {
-            "fit": drawn(renderer, splats, camera),
+            "fit": flipped(drawn(renderer, splats, camera), reverse),
             "fbp": again[number],
             "blend": training.values[nearest].mean(axis=0),
         }

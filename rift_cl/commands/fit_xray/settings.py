@@ -44,12 +44,18 @@ class XrayInput(SplitOptions):
     file."""
     angle_unit: Auto[AngleUnit] = None
     """Unit of the angles. Default: read from the file."""
+    geometry: Auto[Path] = None
+    """File with the positions of source and detector for cone beams; see rift reconstruct. Default:
+    that of the scan, otherwise parallel rays."""
+    reversed: bool = False
+    """Negate the angles, for an object that turned in the other sense than assumed."""
     center: Auto[float] = None
-    """Detector bin of the rotation axis. Default: found automatically."""
+    """Detector bin of the rotation axis. Default: found automatically; of cone beams that of their
+    geometry."""
     rows: Auto[tuple[int, int]] = None
-    """First detector row, and the one after the last. Default: all rows."""
+    """First detector row, and the one after the last, of parallel beams. Default: all rows."""
     pitch: Auto[float] = None
-    """Distance between detector bins. Default: the file's own, or 1 bin."""
+    """Distance between detector bins of parallel beams. Default: the file's own, or 1 bin."""
     unit: Auto[str] = None
     """Unit of the pitch, such as mm. Default: the file's."""
     memory: Auto[str] = None
@@ -90,7 +96,7 @@ class XrayTraining:
 
 @dataclass(frozen=True, kw_only=True)
 class FitXraySettings(RepeatableRun, XrayOutput, XrayTraining, XrayInput, FitSettings):
-    """Fit Gaussian densities to the projections of a parallel-beam X-ray scan.
+    """Fit Gaussian densities to the projections of a parallel-beam or cone-beam X-ray scan.
 
     Options with a dot in their name (--learning-rates.means) are for experts: few fits need another
     value.
