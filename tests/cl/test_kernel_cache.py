@@ -102,6 +102,17 @@ def test_second_run_builds_nothing(cache, python):
     assert _files(cache) == before
 
 
+def test_a_driver_keeps_programs_whoever_asked_before(cache, python):
+    code = (
+        "from rift_cl.cl.build.driver_record import forget_record, keeps_programs\n"
+        "for _ in range(2):\n"
+        "    forget_record(device.identity)\n"
+        "    print(keeps_programs(device.identity, device.context))\n"
+    )
+    done = python(PROGRAM + code, RIFT_CACHE_DIR=str(cache))
+    assert done.stdout.split() == ["True"] * 3, done.stderr
+
+
 def test_clearing_frees_what_it_says_and_spares_the_rest(folder):
     root = folder.parents[1]
     (root / "mine.txt").write_text("a person's own file")

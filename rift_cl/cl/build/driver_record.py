@@ -21,8 +21,8 @@ from rift_cl.cl.build.program_store import write_whole
 # The way of a driver that is right with kernels for GPUs on a CPU alone, or the reverse.
 OTHER_KIND = "kernels of the other kind of device"
 _FORMAT = 1
-# A program that no cache can hold: its text is new each time.
-_PROBE = "/* {} */ __kernel void probe(__global int *p) {{ p[get_global_id(0)] = 1; }}"
+# A program that no cache can hold: its code is new each time (PoCL looks past comments).
+_PROBE = "__kernel void probe(__global uint *p) {{ p[get_global_id(0)] = 0x{}u; }}"
 
 
 def driver_identity(handle: Any) -> dict[str, str]:
@@ -73,7 +73,7 @@ def keeps_programs(driver: dict[str, str], context: Any) -> bool:
     with build_lock():
         before = files_kept(cache_folder())
         try:
-            cl.Program(context, _PROBE.format(os.urandom(8).hex())).build()
+            cl.Program(context, _PROBE.format(os.urandom(4).hex())).build()
         except cl.Error:
             return False
         kept = files_kept(cache_folder()) > before
