@@ -138,8 +138,8 @@ def test_both_axes_of_curves_can_be_logarithmic():
         curves({"law": ([1.0], [0.0])}, xlabel="k", ylabel="views", log_y=True)
 
 
-def section(values, half_edges=(2.0, 1.0)):
-    return section_map(values, half_edges=half_edges, axes=("x", "z"), label="missed", unit="mm")
+def section(values, edges=((-2, 2), (-1, 1))):
+    return section_map(values, edges=edges, axes=("x", "z"), label="missed", unit="mm")
 
 
 def test_the_first_row_of_a_section_is_its_lowest_place():
@@ -155,9 +155,9 @@ def test_the_first_row_of_a_section_is_its_lowest_place():
 @pytest.mark.parametrize(
     ("values", "edges", "error"),
     [
-        (np.zeros(4), (1, 1), ShapeError),
-        (np.full((3, 3), np.nan), (1, 1), NonFiniteError),
-        (np.zeros((3, 3)), (0, 1), InputError),
+        (np.zeros(4), ((0, 1), (0, 1)), ShapeError),
+        (np.full((3, 3), np.nan), ((0, 1), (0, 1)), NonFiniteError),
+        (np.zeros((3, 3)), ((0, 1), (1, 1)), InputError),
     ],
 )
 def test_sections_that_cannot_be_drawn_are_refused(values, edges, error):

@@ -213,3 +213,15 @@ def test_of_a_narrow_wedge_the_detail_within_it_is_said_and_the_share_outside(sc
     assert 1 / first["reached"] > sampled.target.diameter
     words = " ".join(found.sentences)
     assert "Within those that are" in words and f"{1 / first['reached']:.3g}" not in words
+
+
+def test_a_cone_beam_is_a_volume_whose_source_misses_planes(tmp_path, capsys):
+    path, angles = tmp_path / "cone.npz", np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    lengths = {"source_to_axis": 30.0, "source_to_detector": 60.0, "pitch": 1.0}
+    np.savez(path, projections=np.ones((40, 24, 24), np.float32), angles=angles, **lengths)
+    out = tmp_path / "out"
+    assert analyze(path, out, "--add", "2") == 0
+    metrics = json.loads((out / "metrics.json").read_text())
+    assert metrics["tuy"]["unmet"] > 0
+    assert len(metrics["add"]) == 2 and metrics["largest_gap_degrees"] == pytest.approx(9)
+    assert "never crossed" in (out / "report.html").read_text()

@@ -19,7 +19,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Camera, Parallel
 from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.scan_cameras import scan_cameras
-from rift_cl.geometry.seen_grid import scan_lengths
+from rift_cl.geometry.seen_grid import scan_lengths, seen_grid
 from rift_cl.io.captures.capture import Capture, capture_name, holds_capture, open_capture
 from rift_cl.io.scans.formats import open_scan
 from rift_cl.io.scans.scan_file import ScanFile
@@ -211,6 +211,7 @@ def _scan(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
     if file.pitch is None:
         notes.append("The file gives no detector pitch: lengths are in bins.")
     cameras, scan, edge = _rays(settings, file, pitch, notes)
+    center = np.zeros(3) if file.cone is None else np.array(seen_grid(file.cone).center[::-1])
     diameter = edge * file.shape[2] if settings.diameter is None else settings.diameter
     if settings.diameter is None:
         notes.append(
@@ -226,11 +227,12 @@ def _scan(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
     )
     sampled = ViewSet(
         name=Path(file.path).name,
-        target=_target(decided, np.zeros(3), diameter, up, flat=True),
+        target=_target(decided, center, diameter, up, flat=file.cone is None),
         up=up,
         unit=unit,
         cameras=cameras,
         scan=scan,
+        orbit=file.cone,
         facts={"projections": file.shape[0], "rows": file.shape[1], "bins": file.shape[2]},
         notes=tuple(notes),
     )

@@ -110,7 +110,7 @@ class Analysis:
     def _added(self) -> tuple[tuple[Camera, ...], Findings]:
         """Cameras to add, and what is to be said of them or of angles to add."""
         sampled, count = self.sampled, self.settings.add
-        if sampled.is_flat:
+        if sampled.is_flat or sampled.orbit is not None:
             return (), self._angles()
         if not count:
             return (), Findings({"add": []}, (), ())

@@ -10,10 +10,12 @@ from rift_cl.commands.analyze.facts import Findings
 from rift_cl.commands.inputs.view_set import Floats, ViewSet, place_of
 from rift_cl.commands.pictures.coverage_pictures import (
     add_coverage,
+    add_missed_planes,
     camera_figure,
     direction_figure,
 )
 from rift_cl.geometry import Camera
+from rift_cl.geometry.seen_grid import seen_grid
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_svg
 
@@ -50,6 +52,8 @@ def analysis_page(
             page.paragraph(sentence)
         for columns, rows, caption in found.tables:
             page.table(columns, rows, caption=caption)
+    if sampled.orbit is not None:
+        add_missed_planes(page, sampled.orbit, seen_grid(sampled.orbit), unit=sampled.units)
     if not sampled.opaque:
         page.section("Coverage")
         add_coverage(page, sampled, points, device)

@@ -25,7 +25,7 @@ class AnalyzeInput(ScanArrays):
 
     source: Annotated[Path, Positional]
     """A capture (transforms.json, a folder with one, or a COLMAP model; its photographs need not
-    be there), or a parallel-beam or fan-beam scan."""
+    be there), or a parallel-beam, fan-beam or cone-beam scan."""
     aperture: Auto[float] = None
     """Radius of the lens aperture in world units, for cameras whose file gives none. Default:
     pinholes."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.geometry import Camera, Parallel
+from rift_cl.geometry import Camera, Cone, Parallel, Vectors
 from rift_cl.sampling.coverage.device import coverage
 from rift_cl.sampling.targets.free_space import FreeSpace
 from rift_cl.sampling.targets.observations import Observations
@@ -33,6 +33,7 @@ class ViewSet:
         unit: of length, for people.
         cameras: the views; empty for a scan with parallel rays.
         scan: parallel rays; None where there are cameras.
+        orbit: the cone or the vectors whose views the cameras are; None where they are none.
         weights: (V,) relative photons of the cameras; None where they are all alike.
         facts: what is known of the views, for people, by name.
         notes: what had to be assumed, a sentence each.
@@ -46,6 +47,7 @@ class ViewSet:
     unit: str
     cameras: tuple[Camera, ...] = ()
     scan: Parallel | None = None
+    orbit: Cone | Vectors | None = None
     weights: Floats | None = None
     facts: Mapping[str, object] = field(default_factory=dict)
     notes: tuple[str, ...] = ()

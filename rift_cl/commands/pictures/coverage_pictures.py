@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.commands.inputs.view_set import ViewSet
-from rift_cl.geometry import Camera, Cone, Vectors
+from rift_cl.geometry import Camera, Cone, Grid, Vectors
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import curves, figure_svg
 from rift_cl.report.plot.camera_plot import Stands, camera_plot
@@ -168,22 +168,27 @@ def camera_figure(groups: Mapping[str, Sequence[Camera]], sampled: ViewSet) -> F
     )
 
 
-def add_missed_planes(
-    page: Page, scan: Cone | Vectors, *, radius: float, half_height: float, unit: str
-) -> None:
+def add_missed_planes(page: Page, scan: Cone | Vectors, grid: Grid, *, unit: str) -> None:
     """Add to a report what the path of a scanner's source cannot tell, place by place.
 
     Args:
         page: the report.
         scan: the views.
-        radius: of the volume about the axis.
-        half_height: of the volume.
+        grid: the volume; its section along the axis is shown.
         unit: of length.
     """
-    longer = max(radius, half_height)
-    across, up = (max(5, round(_SECTION * edge / longer)) for edge in (radius, half_height))
-    x, z = np.linspace(-radius, radius, across), np.linspace(-half_height, half_height, up)
-    points = np.stack([np.tile(x, up), np.zeros(across * up), np.repeat(z, across)], axis=1)
+    edges = tuple(
+        (middle - count * step / 2, middle + count * step / 2)
+        for count, step, middle in (
+            (grid.shape[axis], grid.spacing[axis], grid.center[axis]) for axis in (2, 0)
+        )
+    )
+    lengths = [high - low for low, high in edges]
+    across, up = (max(5, round(_SECTION * length / max(lengths))) for length in lengths)
+    x, z = (np.linspace(*ends, n) for ends, n in zip(edges, (across, up), strict=True))
+    points = np.stack(
+        [np.tile(x, up), np.full(across * up, grid.center[1]), np.repeat(z, across)], axis=1
+    )
     missed = missed_planes(scan, points)
     page.section("What the source's path cannot tell")
     if not missed.any():
@@ -202,7 +207,7 @@ def add_missed_planes(
         figure_svg(
             section_map(
                 missed.reshape(up, across),
-                half_edges=(radius, half_height),
+                edges=(edges[0], edges[1]),
                 axes=("x", "z"),
                 label="planes never crossed",
                 unit=unit,

@@ -232,14 +232,8 @@ class ConeReconstruction:
 
     def _page(self, preview: Preview) -> Page:
         page = reconstruction_page(self, preview)
-        whole = self.source.window.whole
-        add_missed_planes(
-            page,
-            self.source.geometry,
-            radius=whole.shape[-1] * whole.spacing[-1] / 2,
-            half_height=whole.shape[0] * whole.spacing[0] / 2,
-            unit=self.source.unit or "unit of length",
-        )
+        unit = self.source.unit or "unit of length"
+        add_missed_planes(page, self.source.geometry, self.source.window.whole, unit=unit)
         return page
 
     def _value_window(self, volume: Floats) -> tuple[float, float] | None:

@@ -25,7 +25,7 @@ _CONTOURS = 5
 def section_map(
     values: ArrayLike,
     *,
-    half_edges: tuple[float, float],
+    edges: tuple[tuple[float, float], tuple[float, float]],
     axes: tuple[str, str],
     label: str,
     unit: str,
@@ -34,7 +34,7 @@ def section_map(
 
     Args:
         values: (rows, columns) from 0 to 1, row 0 at the lowest coordinate of ``axes[1]``.
-        half_edges: from the middle to the map's edge, to the right and upwards.
+        edges: coordinates of the map's ends, to the right and upwards.
         axes: names of what runs to the right and upwards, such as x and z.
         label: what the shares are of, for the scale.
         unit: of length.
@@ -43,17 +43,17 @@ def section_map(
         ShapeError: the values have other axes.
         DTypeError: they are not real numbers.
         NonFiniteError: one is NaN or infinite.
-        InputError: an edge is not positive.
+        InputError: the coordinates do not rise.
     """
     percent = 100 * real_values("values of a section", values, axes=2)
-    right, up = half_edges
+    right, up = (high - low for low, high in edges)
     if not min(right, up) > 0:
-        raise InputError(f"section_map: half_edges is {half_edges!r}, wanted positive lengths")
+        raise InputError(f"section_map: edges is {edges!r}, wanted rising coordinates")
     wide = max(_LEAST, round(_EDGE * min(1, right / up)))
     high = max(_LEAST, round(_EDGE * min(1, up / right)))
     figure = new_figure(_LEFT + wide + _SCALE, _ABOVE + high + _BELOW)
     panel = add_panel(figure, _LEFT, _ABOVE, wide, high)
-    extent = (-right, right, -up, up)
+    extent = (*edges[0], *edges[1])
     most = max(float(percent.max()), 0.1)
     shown = panel.imshow(
         percent, cmap=_MAP, vmin=0, vmax=most, extent=extent, origin="lower", aspect="auto"
