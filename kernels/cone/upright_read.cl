@@ -1,0 +1,48 @@
+/* Upright views to those of tilted detectors (include/upright.h):
+ *
+ *     data[view][i][k] = sum over r, c of keys(v - r) keys(u - c) upright[view][r][c].
+ *
+ * Pixels whose four rows and columns are not all there are zero. `first` is the first view of the
+ * run, `views` tells which view of the data each is. Index space: (runs of LANES columns, rows of
+ * the tilted detector, views of the run). */
+
+#include "include/portable.h"
+#include "include/lane_quads.h"
+#include "include/upright.h"
+
+KERNEL void upright_read(
+    __global real *restrict data, __global const real *restrict upright,
+    __global const real *restrict forms, __global const int *restrict views, int first, int rows,
+    int bins, int upright_rows, int upright_bins)
+{
+  const int k0 = (int)get_global_id(0) * LANES, i = (int)get_global_id(1);
+  const int view = (int)get_global_id(2);
+  if (k0 >= bins) return;
+  lanes u, v, depth;
+  const lanes k = (real)k0 + LANE_NUMBERS - (real)0.5f * (bins - 1);
+  seen_at(
+      forms + (long)(first + view) * VIEW_FORMS, k, (lanes)(i - (real)0.5f * (rows - 1)), &u, &v,
+      &depth);
+  u = u + (real)0.5f * (upright_bins - 1);
+  v = v + (real)0.5f * (upright_rows - 1);
+  const lanes_int inside =
+      depth > 0 && u >= 1.0f && u < (real)(upright_bins - 2) && v >= 1.0f && v < (real)(upright_rows - 2);
+  u = inside ? u : 1.0f;
+  v = inside ? v : 1.0f;
+  const lanes_int c = floor_int(u) - 1, r = floor_int(v) - 1;
+  int at[LANES] __attribute__((aligned(sizeof(int) * LANES)));
+  KEEP_INTS(at, r * upright_bins + c);
+  __global const real *seen = upright + (long)view * upright_rows * upright_bins;
+  const lanes x = u - TO_FLOAT(c), y = v - TO_FLOAT(r);
+  lanes sum = 0;
+  for (int n = 0; n < 4; n++) {
+    const lane_quad q = quads_at(seen + (long)n * upright_bins, 1, at);
+    const lanes row = keys(x) * q.s0 + keys(x - 1.0f) * q.s1 + keys(x - 2.0f) * q.s2 + keys(x - 3.0f) * q.s3;
+    sum = sum + keys(y - (real)n) * row;
+  }
+  sum = inside ? sum : 0;
+  __global real *out = data + ((long)views[first + view] * rows + i) * bins + k0;
+  real last[LANES] __attribute__((aligned(sizeof(lanes))));
+  *(lanes *)last = sum;
+  for (int n = 0; n < LANES && k0 + n < bins; n++) out[n] = last[n];
+}

@@ -1,0 +1,30 @@
+/* Where the pixels of a tilted detector are seen on an upright one, and what they read there.
+ *
+ * The ray to pixel (i, k) of a view meets the view's upright detector, whose rows run along the
+ * volume's slabs, at the row v and the column u that are ratios of linear forms,
+ *
+ *     u = (h0 + h1 k + h2 i) / (h6 + h7 k + h8 i),   v = (h3 + h4 k + h5 i) / (the same),
+ *
+ * k, i, u and v counted from the middles of both detectors. A pixel's value is the upright view's,
+ * interpolated by Keys' cubic (IEEE Trans. ASSP 29, 1153, 1981) along both axes. */
+
+/* Numbers of a view: the forms, then those of the way back from (v, u) to (i, k). */
+#define VIEW_FORMS 18
+#define WAY_BACK 9
+
+static lanes keys(lanes d) {
+  const lanes a = absolute(d);
+  const lanes near = 1.0f + a * a * (1.5f * a - 2.5f);
+  const lanes far = 2.0f + a * (-4.0f + a * (2.5f - 0.5f * a));
+  const lanes zero = 0;
+  return a < 1.0f ? near : (a < 2.0f ? far : zero);
+}
+
+/* Column and row at which (k, i) is seen by the forms h, and what they are divided by. */
+static void seen_at(
+    __global const real *h, lanes k, lanes i, lanes *u, lanes *v, lanes *depth)
+{
+  *depth = h[6] + h[7] * k + h[8] * i;
+  *u = (h[0] + h[1] * k + h[2] * i) / *depth;
+  *v = (h[3] + h[4] * k + h[5] * i) / *depth;
+}

@@ -1,0 +1,59 @@
+"""What the pixels of tilted detectors read of upright ones, as a matrix.
+
+A pixel's ray is followed to the plane of the upright detector behind the same source, and the view
+there is interpolated by Keys' cubic along rows and columns (R. G. Keys, IEEE Trans. ASSP 29, 1153,
+1981).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def reading_matrix(places: Floats, rows: int, bins: int) -> Any:
+    """The matrix from an upright view to the pixels that see these places.
+
+    Args:
+        places: (row, column) of each pixel's ray on the upright detector, (pixels, 2).
+        rows: of the upright detector.
+        bins: of each of its rows.
+
+    Returns:
+        (pixels, rows * bins) float64; pixels that are not wholly inside read nothing.
+    """
+    size = np.array([rows, bins])
+    inside = ((places >= 1) & (places < size - 2)).all(axis=1)
+    by_row, by_column = (keys(places[:, axis, None] - np.arange(size[axis])) for axis in (0, 1))
+    weights = by_row[:, :, None] * by_column[:, None, :] * inside[:, None, None]
+    return weights.reshape(len(places), -1)
+
+
+def keys(distance: Floats) -> Floats:
+    """Keys' cubic: 1 at 0, 0 at all other whole numbers and beyond 2."""
+    d = np.abs(distance)
+    near = 1 + d**2 * (1.5 * d - 2.5)
+    far = 2 + d * (-4 + d * (2.5 - 0.5 * d))
+    weights: Floats = np.where(d < 1, near, np.where(d < 2, far, 0))
+    return weights
+
+
+def places_on_plane(
+    rays: Floats, foot: Floats, along: Floats, up: Floats, normal: Floats
+) -> Floats:
+    """Where rays from the source meet a plane, (row, column) in its steps.
+
+    Args:
+        rays: directions, (n, 3).
+        foot: from the source to where row 0 and column 0 are counted from.
+        along: from column to column.
+        up: from row to row, at a right angle to ``along``.
+        normal: of the plane.
+    """
+    meets = rays * ((foot @ normal) / (rays @ normal))[:, None] - foot
+    columns, rows = meets @ along / (along @ along), meets @ up / (up @ up)
+    return np.stack([rows, columns], axis=1)
