@@ -27,7 +27,7 @@ def reading_matrix(places: Floats, rows: int, bins: int) -> Any:
         (pixels, rows * bins) float64; pixels that are not wholly inside read nothing.
     """
     size = np.array([rows, bins])
-    inside = ((places >= 1) & (places < size - 2)).all(axis=1)
+    inside = np.asarray(((places >= 1) & (places < size - 2)).all(axis=1))
     by_row, by_column = (keys(places[:, axis, None] - np.arange(size[axis])) for axis in (0, 1))
     weights = by_row[:, :, None] * by_column[:, None, :] * inside[:, None, None]
     return weights.reshape(len(places), -1)

@@ -110,7 +110,8 @@ def rectified(grid: Grid, scan: Vectors, *, along_z: bool) -> Rectified:
     source = (scan.source[views] - grid.center[::-1])[:, axes]
     reach = (scan.middle - scan.source)[views][:, axes]
     steps = (vectors[views][:, axes] for vectors in (scan.across, scan.down))
-    seen = Grid(*([values[::-1][n] for n in axes[::-1]] for values in (grid.shape, grid.spacing)))
+    shape, spacing = grid.shape[::-1], grid.spacing[::-1]
+    seen = Grid([shape[n] for n in axes[::-1]], [spacing[n] for n in axes[::-1]])
     distance = np.hypot(source[:, 0], source[:, 1])
     if not np.min(distance, initial=1) > 0:
         raise InputError(
