@@ -131,7 +131,7 @@ def test_views_are_told_by_where_they_look():
 def test_what_no_upright_detector_sees_is_refused():
     scan = circle(2)
     aside = Vectors(
-        scan.source, np.add(scan.source, [[1.0, 300.0, 0.0]]), scan.across, scan.down, 26, 3000
+        scan.source, np.add(scan.source, [[1.0, 300.0, 0.0]]), scan.across, scan.down, 26, 9000
     )
     with pytest.raises(InputError, match="view"):
         rectified(GRID, aside, along_z=False)

@@ -57,7 +57,7 @@ class FanProjector(Projector):
         DeviceError: the device has no float64.
     """
 
-    scan: Fan  # type: ignore[assignment]
+    scan: Fan
 
     def __init__(
         self,

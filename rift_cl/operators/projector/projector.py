@@ -12,7 +12,7 @@ from numpy.typing import DTypeLike
 
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
-from rift_cl.geometry import Cone, Fan, Grid, Parallel
+from rift_cl.geometry import Cone, Fan, Grid, Parallel, Vectors
 from rift_cl.operators.linear import LinearOperator
 
 if TYPE_CHECKING:
@@ -23,8 +23,8 @@ class Projector(LinearOperator):
     """Line integrals of an image or a volume, and their exact adjoint.
 
     Of a ``Parallel`` scan this is a ``PhaseProjector``, of a ``Fan`` and one slice a
-    ``FanProjector``, of a ``Cone`` a ``SlabProjector``; their documentation says more of footprints
-    and types.
+    ``FanProjector``, of a ``Cone`` a ``SlabProjector``, of ``Vectors`` a ``VectorProjector``;
+    their documentation says more of footprints and types.
 
     Args:
         grid: the grid of the image, (ny, nx), or of the volume, (nz, ny, nx).
@@ -35,8 +35,8 @@ class Projector(LinearOperator):
         dtype: ``float32`` (the default), or ``float64`` where the device has it.
 
     The domain is ``grid.shape``; the range is (angles, bins), or (angles, nz, bins) for a volume,
-    or (views, rows, bins) of a cone. Values of the range are in the image's unit times the grid's
-    unit of length.
+    or (views, rows, bins) of a cone or of vectors. Values of the range are in the image's unit
+    times the grid's unit of length.
 
     Raises:
         InputError: ``grid`` is no ``Grid``, ``scan`` no scan, or the footprint or the type unknown.
@@ -78,6 +78,10 @@ def _kind(grid: Grid, scan: Any) -> type[Projector]:
         from rift_cl.operators.projector.slab_projector import SlabProjector
 
         return SlabProjector
+    if isinstance(scan, Vectors):
+        from rift_cl.operators.projector.vector_projector import VectorProjector
+
+        return VectorProjector
     from rift_cl.operators.projector.phase_projector import PhaseProjector
 
     return PhaseProjector

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Grid
+from rift_cl.operators.projector.upright import Upright
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int32]
@@ -97,7 +98,7 @@ class SlabTable:
         return self.rows * self.columns
 
 
-def slab_table(grid: Grid, scan: Cone, footprint: str, *, along_x: bool) -> SlabTable:
+def slab_table(grid: Grid, scan: Cone | Upright, footprint: str, *, along_x: bool) -> SlabTable:
     """The table of the views whose slabs have lines along x, or of those with lines along y.
 
     Args:
@@ -139,7 +140,7 @@ def slab_table(grid: Grid, scan: Cone, footprint: str, *, along_x: bool) -> Slab
     )
 
 
-def ray_lengths(scan: Cone) -> Floats:
+def ray_lengths(scan: Cone | Upright) -> Floats:
     """Length of each pixel's ray from source to detector over its reach across, (rows, bins).
 
     The reach is that to the detector's plane, or that within the fan's plane of a curved one.
@@ -150,7 +151,7 @@ def ray_lengths(scan: Cone) -> Floats:
     return lengths
 
 
-def walked_along_x(grid: Grid, scan: Cone) -> NDArray[np.bool_]:
+def walked_along_x(grid: Grid, scan: Cone | Upright) -> NDArray[np.bool_]:
     """Which views are walked in slabs across y: those that look along y rather than along x.
 
     Raises:
@@ -182,25 +183,31 @@ class _Walk:
         ahead, aside: direction from the source to the axis and that of the detector's rows, each
             as (line, slab) coordinates, (2, n).
         heights: of the source, (n,).
+        source: of each view, as (line, slab) coordinates, (2, n).
     """
 
-    scan: Cone
+    scan: Cone | Upright
     lines: Samples
     slabs: Samples
     column: Samples
     ahead: Floats
     aside: Floats
     heights: Floats
+    source: Floats
 
     @classmethod
-    def of(cls, grid: Grid, scan: Cone, views: NDArray[np.intp], *, along_x: bool) -> _Walk:
+    def of(
+        cls, grid: Grid, scan: Cone | Upright, views: NDArray[np.intp], *, along_x: bool
+    ) -> _Walk:
         cosine, sine = np.cos(scan.angles[views]), np.sin(scan.angles[views])
         ahead, aside = np.stack([-sine, cosine]), np.stack([cosine, sine])
         if not along_x:
             ahead, aside = ahead[::-1], aside[::-1]
         z, *yx = (Samples.of(grid, axis) for axis in range(3))
         lines, slabs = reversed(yx) if along_x else yx
-        return cls(scan, lines, slabs, z, ahead, aside, scan.heights[views])
+        distances, offsets = (places[views] for places in _sources(scan))
+        source = offsets * aside - distances * ahead
+        return cls(scan, lines, slabs, z, ahead, aside, scan.heights[views], source)
 
     @property
     def slopes(self) -> Floats:
@@ -212,8 +219,7 @@ class _Walk:
 
     def reaches(self, places: Floats) -> Floats:
         """Distance of the source from places across the slabs, (n, places); not above 0 beyond."""
-        source = -self.scan.source_to_axis * self.ahead[1]
-        reaches: Floats = (places - source[:, None]) * np.sign(self.ahead[1])[:, None]
+        reaches: Floats = (places - self.source[1][:, None]) * np.sign(self.ahead[1])[:, None]
         return reaches
 
     def possible(self) -> NDArray[np.bool_]:
@@ -228,8 +234,8 @@ class _Walk:
     @property
     def _fractions(self) -> Floats:
         """Tangent of the fan angle at (a, b) as n0 n1 n2 d0 d1 d2, (n, 6)."""
-        distance = np.full(len(self.heights), self.scan.source_to_axis)
-        return np.stack([0 * distance, *self.aside, distance, *self.ahead], axis=1)
+        across, along = (-(self.source * way).sum(axis=0) for way in (self.aside, self.ahead))
+        return np.stack([across, *self.aside, along, *self.ahead], axis=1)
 
     def shadows(self) -> tuple[float, float]:
         """The widest shadow of a sample of a line in bins, and the narrowest."""
@@ -295,9 +301,8 @@ class _Walk:
         """Where samples along z are seen along the rows."""
         scale = self._rows_per_tangent / pitches
         sign, zero = np.sign(self.ahead[1]), np.zeros_like(pitches)
-        source = -self.scan.source_to_axis * self.ahead[1]
         numerators = -self.heights * scale, scale, zero
-        return np.stack([*numerators, -sign * source, zero, sign, -firsts, zero], axis=1)
+        return np.stack([*numerators, -sign * self.source[1], zero, sign, -firsts, zero], axis=1)
 
     def amplitudes(self, pitches: Floats) -> Floats:
         """Weight of each slab, (n, slabs)."""
@@ -307,7 +312,7 @@ class _Walk:
         return weights
 
 
-def _taps(widest: float, narrowest: float, footprint: str, scan: Cone) -> int:
+def _taps(widest: float, narrowest: float, footprint: str, scan: Cone | Upright) -> int:
     touched = widest * (1 + _SLACK) + 1 if footprint == "strip" else 2 * max(1.0, widest)
     taps = next((n for n in _TAPS if n >= touched), None)
     if taps is None or narrowest < _SMALLEST:
@@ -319,15 +324,23 @@ def _taps(widest: float, narrowest: float, footprint: str, scan: Cone) -> int:
     return taps
 
 
-def _check_source(grid: Grid, scan: Cone) -> None:
+def _check_source(grid: Grid, scan: Cone | Upright) -> None:
     y, x = (Samples.of(grid, axis).ends for axis in (1, 2))
     corners = np.array([(a, b) for a in x for b in y])
     aside = corners @ np.stack([np.sin(scan.angles), -np.cos(scan.angles)])
-    depth = scan.source_to_axis - aside.max(axis=0)
+    distances, _ = _sources(scan)
+    depth = distances - aside.max(axis=0)
     if not (depth > 0).all():
         view = int(np.argmin(depth))
         raise InputError(
-            f"Cone: source_to_axis is {scan.source_to_axis:g}, but the volume reaches "
+            f"Cone: source_to_axis is {distances[view]:g}, but the volume reaches "
             f"{aside[:, view].max():.4g} towards the source in view {view}, which would stand in "
             "it or beside it: give a smaller grid, or all lengths in one unit"
         )
+
+
+def _sources(scan: Cone | Upright) -> tuple[Floats, Floats]:
+    """Where each view's source stands from the axis: how far behind it, and how far aside."""
+    if isinstance(scan, Upright):
+        return scan.source_to_axis, scan.offsets
+    return np.full(scan.views, scan.source_to_axis), np.zeros(scan.views)

@@ -1,10 +1,9 @@
 """Upright detectors in the place of those of a ``Vectors`` scan, and the way from one to the other.
 
-Slab tables want detectors whose columns run along the axis that slabs have in common. Behind any
-source such a detector can be thought of: at a right angle to the line from the source to the axis
-through the grid's middle. Where a pixel's ray meets it is a ratio of linear forms of the pixel's
-row and column, a homography. Views that look along z rather than across are seen with y and z
-exchanged.
+Slab tables want detectors whose columns run along the axis that slabs have in common. Before any
+source such a detector can be thought of, upright in the place of the tilted one. Where a pixel's
+ray meets it is a ratio of linear forms of the pixel's row and column, a homography. Views that look
+along z rather than across are seen with y and z exchanged.
 """
 
 from __future__ import annotations
@@ -23,18 +22,21 @@ Floats = NDArray[np.float64]
 _BESIDE = 4
 # An upright detector this many times larger than the tilted one is no sensible way to go.
 _LARGEST = 64
-# Tangent of the angle that a ray may have with the line from the source to the axis.
+# Tangent of the angle that a ray may have with the normal of its upright detector.
 _WIDEST = 12.0
+# Cosine of the tilt up to which upright detectors are turned as the tilted ones are.
+_LEVEL = 0.5
 
 
 @dataclass(frozen=True)
 class Upright:
-    """Upright detectors of some views of a scan; a ``Cone`` whose source may move to and fro.
+    """Upright detectors of some views of a scan; a ``Cone`` whose source may stand anywhere.
 
     Args:
         angles: of the source in radians, (n,).
         heights: of source and detector along the axis, (n,).
-        source_to_axis: of each source, (n,).
+        source_to_axis: of each source, along the line at a right angle to its detector, (n,).
+        offsets: of the axis from that line, along the rows, of the source's side, (n,).
         source_to_detector: of all of them.
         rows, bins: of a detector.
         pitch: distance between rows and between bins.
@@ -44,6 +46,7 @@ class Upright:
     angles: Floats
     heights: Floats
     source_to_axis: Floats
+    offsets: Floats
     source_to_detector: float
     rows: int
     bins: int
@@ -74,15 +77,17 @@ class Rectified:
 
     Args:
         views: which of the scan, (n,) int32.
-        upright: their upright detectors, in coordinates about the grid's middle.
-        grid: the grid in those coordinates.
+        upright: their upright detectors.
+        grid: the grid in their coordinates.
         forms: as ``kernels/include/upright.h`` reads them, (n, 18).
+        along_z: whether they look along z.
     """
 
     views: NDArray[np.int32]
     upright: Upright
     grid: Grid
     forms: Floats
+    along_z: bool
 
 
 def looking_along_z(scan: Vectors) -> NDArray[np.bool_]:
@@ -93,7 +98,7 @@ def looking_along_z(scan: Vectors) -> NDArray[np.bool_]:
 
 
 def rectified(grid: Grid, scan: Vectors, *, along_z: bool) -> Rectified:
-    """The views that look along z, with y and z exchanged, or those that look across.
+    """The views that look along z, with y and z exchanged, or those that look across; at least one.
 
     Args:
         grid: the volume.
@@ -101,29 +106,34 @@ def rectified(grid: Grid, scan: Vectors, *, along_z: bool) -> Rectified:
         along_z: which of the two.
 
     Raises:
-        InputError: a source stands on the axis, or a ray runs along or away from its upright
-            detector.
+        InputError: a ray runs along or away from its upright detector.
     """
     views = np.flatnonzero(looking_along_z(scan) == along_z)
     # Coordinates count as (x, y, z), axes of a grid as (z, y, x).
     axes = [0, 2, 1] if along_z else [0, 1, 2]
-    source = (scan.source[views] - grid.center[::-1])[:, axes]
+    source = scan.source[views][:, axes]
     reach = (scan.middle - scan.source)[views][:, axes]
-    steps = (vectors[views][:, axes] for vectors in (scan.across, scan.down))
-    shape, spacing = grid.shape[::-1], grid.spacing[::-1]
-    seen = Grid([shape[n] for n in axes[::-1]], [spacing[n] for n in axes[::-1]])
-    distance = np.hypot(source[:, 0], source[:, 1])
-    if not np.min(distance, initial=1) > 0:
-        raise InputError(
-            f"Vectors: the source of view {views[distance.argmin()]} stands on the axis through "
-            "the grid's middle, but its detector lies to one side"
-        )
-    angles = np.arctan2(source[:, 0], -source[:, 1])
+    across, down = (vectors[views][:, axes] for vectors in (scan.across, scan.down))
+    seen = Grid(
+        *([v[::-1][n] for n in axes[::-1]] for v in (grid.shape, grid.spacing, grid.center))
+    )
+    angles = _angles(reach, np.cross(across, down))
+    steps = across, down
     forms = _frames(angles) @ np.stack([reach, *steps], axis=2)
     _check_ahead(views, forms, scan)
-    forms = forms / forms[:, 2:, :1]
-    upright = _detectors(forms, scan, seen, angles, source)
-    return Rectified(views.astype(np.int32), upright, seen, _counted(forms, upright))
+    depths = forms[:, 2, 0]
+    forms = forms / depths[:, None, None]
+    upright = _detectors(forms, scan, seen, angles, source, depths)
+    return Rectified(views.astype(np.int32), upright, seen, _counted(forms, upright), along_z)
+
+
+def _angles(reach: Floats, normal: Floats) -> Floats:
+    """Angles of upright detectors: those of the tilted ones, or where these lie, of the rays."""
+    normal = normal * np.sign((reach * normal).sum(axis=1))[:, None]
+    level = np.hypot(normal[:, 0], normal[:, 1]) >= _LEVEL * np.linalg.norm(normal, axis=1)
+    ahead = np.where(level[:, None], normal, reach)
+    angles: Floats = np.arctan2(-ahead[:, 0], ahead[:, 1])
+    return angles
 
 
 def _frames(angles: Floats) -> Floats:
@@ -147,27 +157,32 @@ def _check_ahead(views: NDArray[np.intp], forms: Floats, scan: Vectors) -> None:
     beside = ~(depth > 0).all(axis=1) | wide.any(axis=1)
     if beside.any():
         raise InputError(
-            f"Vectors: view {views[beside.argmax()]} has rays at a right angle to the line from "
-            "its source to the grid's middle, or nearly: check the source, or leave out the "
-            "detector's outer rows and columns"
+            f"Vectors: view {views[beside.argmax()]} has rays at a right angle to its upright "
+            "detector, or nearly: check the source, or leave out the detector's outer rows and "
+            "columns"
         )
 
 
-def _detectors(forms: Floats, scan: Vectors, grid: Grid, angles: Floats, source: Floats) -> Upright:
+def _detectors(
+    forms: Floats, scan: Vectors, grid: Grid, angles: Floats, source: Floats, depths: Floats
+) -> Upright:
     """Upright detectors that hold what the tilted ones and the grid's shadow have in common."""
-    distance = np.hypot(source[:, 0], source[:, 1])
-    to_detector = float(np.median(distance)) if len(angles) else 1.0
+    to_detector = float(np.median(depths))
+    frames = _frames(angles)
     # Columns and rows of the forms are per unit of tangent, whose steps should stay what they are.
     slopes = forms[:, :2, 1:] - forms[:, :2, :1] * forms[:, 2:, 1:]
     steps = np.hypot(slopes[..., 0], slopes[..., 1])
-    step = np.median(steps, axis=0) if len(angles) else np.ones(2)
+    step = np.median(steps, axis=0)
     seen = forms @ _corners(scan)
     pixels = seen[:, :2] / seen[:, 2:]
     shadow = _shadow(grid, angles, source)
     low = np.maximum(pixels.min(axis=2), shadow.min(axis=2)) / step
     high = np.minimum(pixels.max(axis=2), shadow.max(axis=2)) / step
-    first = np.floor(np.min(low, axis=0, initial=0)).astype(int) - _BESIDE
-    count = np.ceil(np.max(high, axis=0, initial=0)).astype(int) + _BESIDE + 1 - first
+    # Where a detector is upright, its pixels are those of the scan.
+    shift = pixels[0, :, 0] / step % 1.0
+    first = np.floor(np.min(low, axis=0) - shift).astype(int) - _BESIDE
+    last = np.ceil(np.maximum(np.max(high, axis=0) - shift, first)).astype(int) + _BESIDE
+    first, count = first + shift, last + 1 - first
     if (count > _LARGEST * max(scan.rows, scan.bins)).any():
         raise InputError(
             f"Vectors: upright detectors would have {count[1]} x {count[0]} pixels in the place of "
@@ -176,7 +191,8 @@ def _detectors(forms: Floats, scan: Vectors, grid: Grid, angles: Floats, source:
     return Upright(
         angles=angles,
         heights=source[:, 2],
-        source_to_axis=distance,
+        source_to_axis=-(frames[:, 2] * source).sum(axis=1),
+        offsets=(frames[:, 0] * source).sum(axis=1),
         source_to_detector=to_detector,
         rows=int(count[1]),
         bins=int(count[0]),
@@ -187,9 +203,9 @@ def _detectors(forms: Floats, scan: Vectors, grid: Grid, angles: Floats, source:
 
 def _shadow(grid: Grid, angles: Floats, source: Floats) -> Floats:
     """Tangents (along rows, along columns) at which the grid's corners are seen, (n, 2, 8)."""
-    half = [n * step / 2 for n, step in zip(grid.shape[::-1], grid.spacing[::-1], strict=True)]
+    half = np.array(grid.shape[::-1]) * grid.spacing[::-1] / 2
     signs = np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, 8)
-    places = signs * np.array(half)[:, None] - source[:, :, None]
+    places = signs * half[:, None] + np.array(grid.center[::-1])[:, None] - source[:, :, None]
     across, up, ahead = np.moveaxis(_frames(angles) @ places, 1, 0)
     with np.errstate(divide="ignore", invalid="ignore"):
         shadow = np.where(ahead[:, None] > 0, np.stack([across, up], axis=1) / ahead[:, None], 0)
