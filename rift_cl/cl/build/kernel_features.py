@@ -7,6 +7,8 @@ from rift_cl.cl.build.source import kernel_room
 # By the beginning of a kernel's name, the most telling first.
 _BY_NAME = {
     "radon_": "the projector of parallel beams",
+    "fan_": "the projector of fans",
+    "upright_": "the projector of vectors",
     "plane_": "the projector of parallel beams",
     "rays_": "the projector by Fourier transforms (FastProjector)",
     "filter_views": "filters along the detector",
@@ -29,6 +31,7 @@ _BY_NAME = {
 }
 _BY_ROOM = {
     "tomo": "tomography",
+    "cone": "the projector of cones",
     "fourier": "Fourier transforms",
     "splat": "splats",
     "train": "training",

@@ -114,9 +114,8 @@ def rectified(grid: Grid, scan: Vectors, *, along_z: bool) -> Rectified:
     source = scan.source[views][:, axes]
     reach = (scan.middle - scan.source)[views][:, axes]
     across, down = (vectors[views][:, axes] for vectors in (scan.across, scan.down))
-    seen = Grid(
-        *([v[::-1][n] for n in axes[::-1]] for v in (grid.shape, grid.spacing, grid.center))
-    )
+    shape, *lengths = (v[::-1] for v in (grid.shape, grid.spacing, grid.center))
+    seen = Grid([int(shape[n]) for n in axes[::-1]], *([v[n] for n in axes[::-1]] for v in lengths))
     angles = _angles(reach, np.cross(across, down))
     steps = across, down
     forms = _frames(angles) @ np.stack([reach, *steps], axis=2)
