@@ -130,6 +130,9 @@ def test_our_own_file(tmp_path: Path) -> None:
     path = made.described(tmp_path, f"# a comment\n{LENGTHS}\n{more}")
     cone = cone_of(open_scan(path, kind="counts", flats="mean"))
     assert cone.center == (2, 4) and cone.curved and cone.heights[11] == 11
+    listed = path.read_text().replace("[2, 4]", "\n- 2\n- 4")
+    path.write_text(listed)
+    assert cone_of(open_scan(path, kind="counts", flats="mean")) == cone
     named = open_scan(tmp_path / "images", geometry=path, kind="counts", flats="mean")
     assert cone_of(named) == cone
 
@@ -141,6 +144,8 @@ def test_our_own_file(tmp_path: Path) -> None:
         ("center: [1]", FileFormatError, r"center .*row, bin"),
         ("curved: 3", FileFormatError, "curved"),
         ("unit mm", FileFormatError, "line"),
+        ("white: 10:50", FileFormatError, "white is '10:50'"),
+        ("white: &w 3\nlean: *w", FileFormatError, "refers to another"),
         ("angles: other.txt", InputError, "other.txt"),
         ("heights: [1, x]", FileFormatError, "heights"),
         ("heights: [1, 2]", ShapeError, "heights"),

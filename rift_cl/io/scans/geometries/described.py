@@ -9,9 +9,9 @@
     center: [127.5, 128.0]       # row and bin; default: the middle
     angles: 0:360                # a turn in degrees, a list, or a file; default: those of the scan
 
-``name: value`` to a line, or the same as JSON. ``heights``, ``curved``, ``lean`` (degrees) and
-``white`` may follow; ``geometry`` names a file of another kind (RTK's, ASTRA's vectors) in place of
-the lengths. Names that are not known are refused, so that none is passed over for a slip.
+YAML, or the same as JSON. ``heights``, ``curved``, ``lean`` (degrees) and ``white`` may follow;
+``geometry`` names a file of another kind (RTK's, ASTRA's vectors) in place of the lengths. Names
+that are not known are refused, so that none is passed over for a slip.
 """
 
 from __future__ import annotations
@@ -104,38 +104,49 @@ def _fields(path: Path) -> dict[str, Any]:
     with reading(path, "the geometry"):
         check_claim(path, "the geometry", path.stat().st_size, _LARGEST)
         text = path.read_text(encoding="utf-8-sig")
-        if path.suffix.lower() == ".json" or text.lstrip().startswith("{"):
-            values = json.loads(text)
-        else:
-            values = dict(_line(path, k, line) for k, line in _lines(text))
+        values = _read(text)
     if not isinstance(values, dict):
         raise FileFormatError(f"{path}: holds {type(values).__name__}, wanted names and values")
     return {str(name): value for name, value in values.items() if value is not None}
 
 
-def _lines(text: str) -> list[tuple[int, str]]:
-    """Lines without comments; a list may go on over several."""
-    found: list[tuple[int, str]] = []
-    for number, line in enumerate(text.splitlines(), 1):
-        plain = line.split("#")[0].rstrip()
-        if not plain.strip() or plain.strip() == "---":
-            continue
-        if found and found[-1][1].count("[") > found[-1][1].count("]"):
-            found[-1] = (found[-1][0], found[-1][1] + plain.strip())
-        else:
-            found.append((number, plain))
-    return found
+def _read(text: str) -> Any:
+    """The values of YAML or JSON, whose scalars mean what they mean in JSON, and else are text.
 
+    YAML's own rules would make seconds of ``10:50``, and no number of ``1e3``.
 
-def _line(path: Path, number: int, line: str) -> tuple[str, Any]:
-    name, colon, value = line.partition(":")
-    if not colon or line[0].isspace() or not value.strip():
-        raise FileFormatError(f"{path}: line {number} is {line[:40]!r}, wanted 'name: value'")
-    text = value.strip()
+    Raises:
+        ValueError: it is neither.
+    """
+    if text.lstrip().startswith("{"):
+        return json.loads(text)
+    import yaml
+
+    class Plain(yaml.BaseLoader):
+        """Text alone, and no value that is written once and counts often."""
+
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            if self.check_event(yaml.AliasEvent):
+                raise ValueError("a value refers to another (*), which is not read here")
+            return super().compose_node(parent, index)
+
     try:
-        return name.strip(), json.loads(text)
+        return _meant(yaml.load(text, Plain))
+    except yaml.YAMLError as failure:
+        where = getattr(failure, "problem_mark", None)
+        line = "" if where is None else f"line {where.line + 1}: "
+        raise ValueError(line + str(getattr(failure, "problem", None) or failure)) from failure
+
+
+def _meant(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _meant(entry) for name, entry in value.items()}
+    if isinstance(value, list):
+        return [_meant(entry) for entry in value]
+    try:
+        return json.loads(value) if value else None
     except ValueError:
-        return name.strip(), text.strip("'\"")
+        return value
 
 
 def _number(path: Path, fields: Mapping[str, Any], name: str) -> float | None:
