@@ -5,7 +5,7 @@
  * with ARC 1 origin + radius * atan of the fraction; a is the coordinate of a sample, b that of its
  * slab. The edges of the sample, a -+ da/2, end its shadow. STRIP 1 shares it among the entries that
  * the shadow overlaps; otherwise a hat as wide as the shadow, or two entries at least, is shared in
- * proportion to its heights. `places` is the first entry of TAPS, `shares` what the others receive
+ * proportion to its heights; with POINT 1 it is two entries wide in any case. `places` is the first entry of TAPS, `shares` what the others receive
  * of 1 (see include/slab_table.h). A sample that is seen off the table is put on its edge, where
  * entries are zero.
  *
@@ -41,7 +41,7 @@ static lanes height(lanes ahead, lanes half_width) {
   return above > below ? above - below : (lanes)0;
 }
 #else
-#define HALF_WIDTH(width) ((width) > 1.0f ? (width) : (lanes)1.0f)
+#define HALF_WIDTH(width) (POINT ? (lanes)1.0f : ((width) > 1.0f ? (width) : (lanes)1.0f))
 #define FIRST 1.0f
 static lanes height(lanes ahead, lanes half_width) {
   const lanes left = half_width - absolute(ahead + 1.0f - half_width);

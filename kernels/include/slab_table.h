@@ -38,6 +38,10 @@
 #ifndef ROW_TAPS
 #define ROW_TAPS 2
 #endif
+/* Whether samples read the data at their places, and nothing of their shadows' extent counts. */
+#ifndef POINT
+#define POINT 0
+#endif
 
 #if LANES == 8
 #define ENTRY(view, row, column) (((long)(view) * rows + (row)) * columns + (column))
@@ -57,6 +61,15 @@ static lanes cubic_integral(lanes distance) {
   return distance < 0.0f ? -found : found;
 }
 
+/* The kernel itself, which interpolates. */
+static lanes cubic_kernel(lanes distance) {
+  const lanes d = absolute(distance);
+  const lanes near = 1.0f + d * d * (1.5f * d - 2.5f);
+  const lanes far = 2.0f + d * (-4.0f + d * (2.5f - 0.5f * d));
+  const lanes inside = d < 1.0f ? near : far;
+  return d < KERNEL_REACH ? inside : (lanes)0;
+}
+
 /* The least and the largest of LANES numbers. */
 #if LANES == 8
 static real least(lanes v) {
@@ -74,12 +87,17 @@ static lanes at_least_one(lanes v) { return v > 1.0f ? v : (lanes)1.0f; }
 
 /* Weight of detector row i in table row r of a column: the kernel, as wide as the wider of the two
  * rows, averaged over the narrower. So a table's row reads weights that add up to 1, and gives away
- * all that it has, wherever it lies. Both stretching kernels ask here, so that they weight alike. */
+ * all that it has, wherever it lies. With POINT 1 it reads what lies between the rows. Both
+ * stretching kernels ask here, so that they weight alike. */
 static lanes row_weight(int r, lanes step, real center, int i) {
+#if POINT
+  return cubic_kernel(step * (real)r + (center - (real)i));
+#else
   const lanes width = at_least_one(step), extent = step < 1.0f ? step : (lanes)1.0f;
   const lanes away = step * (real)r + (center - (real)i);
   return (cubic_integral((away + 0.5f * extent) / width) -
           cubic_integral((away - 0.5f * extent) / width)) / (24.0f * extent);
+#endif
 }
 
 /* Detector rows to either side of a table's row that have such weights. */

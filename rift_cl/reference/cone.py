@@ -15,7 +15,9 @@ its ray leaves the slabs at the slope d,
 
 in which the convolution's kernel is as wide as the larger of ``q d`` and one row, averaged over the
 smaller of the two, and ``length`` that of the ray over its reach. ``q`` is one row of the detector,
-or the largest shadow of the view where that is more.
+or the largest shadow of the view where that is more. The footprint ``point`` takes samples for
+points instead: shares are those of linear interpolation, ``q`` is half a row, and the kernel of the
+convolution interpolates between rows.
 """
 
 from __future__ import annotations
@@ -36,7 +38,7 @@ class ConeProjector:
     Args:
         grid: the volume, (nz, ny, nx).
         scan: how it is looked at.
-        footprint: ``strip`` or ``linear``.
+        footprint: ``strip``, ``linear`` or ``point``.
     """
 
     def __init__(self, grid: Grid, scan: Cone, footprint: str = "strip") -> None:
@@ -69,9 +71,10 @@ def _view(grid: Grid, scan: Cone, view: int, footprint: str) -> Any:
     turned = angle - gamma
     slopes = np.abs(np.cos(turned) if across_y else np.sin(turned))
     slopes = slopes if scan.curved else slopes / np.cos(gamma)
-    q: Any = max(1.0, (1 + 1e-4) * reach * dz / row_pitch / distances.min())
+    point = footprint == "point"
+    q: Any = 0.5 if point else max(1.0, (1 + 1e-4) * reach * dz / row_pitch / distances.min())
     columns = np.arange(scan.bins) - scan.center[1]
-    passed, numbers = _passed_on(scan, q * slopes)
+    passed, numbers = _passed_on(scan, q * slopes, point=point)
     matrix = np.zeros((scan.rows, scan.bins, len(z), len(y), len(x)))
     for j, (slab, distance) in enumerate(zip(slabs, distances, strict=True)):
         edges = np.stack([lines - step / 2, lines + step / 2])
@@ -90,13 +93,15 @@ def _view(grid: Grid, scan: Cone, view: int, footprint: str) -> Any:
     return (matrix * _lengths(scan)).reshape(scan.rows * scan.bins, -1)
 
 
-def _passed_on(scan: Cone, steps: Floats) -> tuple[Floats, Floats]:
+def _passed_on(scan: Cone, steps: Floats, *, point: bool) -> tuple[Floats, Floats]:
     """Weights in the detector's rows of those along the slabs, (rows, n, bins), and their n."""
     reach = 1 + 2 * max(1.0, steps.max())
     ends = (np.array([-reach, scan.rows - 1 + reach]) - scan.center[0])[:, None] / steps
     numbers = np.arange(np.floor(ends.min()), np.ceil(ends.max()) + 1)
     width, extent = np.maximum(1, steps), np.minimum(1, steps)
     off = numbers[:, None] * steps + scan.center[0] - np.arange(scan.rows)[:, None, None]
+    if point:
+        return steps**2 * _cubic(off), numbers
     high, low = ((off + side * extent / 2) / width for side in (1, -1))
     return steps**2 * (_cubic_integral(high) - _cubic_integral(low)) / extent, numbers
 
@@ -124,7 +129,7 @@ def _shares(entries: Any, edges: Any, footprint: str) -> Floats:
         above = np.minimum(high, entries[:, None] + 0.5) - np.maximum(low, entries[:, None] - 0.5)
         overlaps: Floats = np.maximum(above, 0) / width
         return overlaps
-    half_width = np.maximum(1, width)
+    half_width = np.ones_like(width) if footprint == "point" else np.maximum(1, width)
 
     def heights(at: Any) -> Floats:
         found: Floats = np.maximum(0, 1 - np.abs(at - middle) / half_width)
@@ -135,6 +140,13 @@ def _shares(entries: Any, edges: Any, footprint: str) -> Floats:
     every = first + np.arange(np.ceil(2 * half_width.max()) + 2)[:, None]
     shares: Floats = heights(entries[:, None]) / heights(every).sum(axis=0)
     return shares
+
+
+def _cubic(distance: Floats) -> Floats:
+    """The kernel of cubic convolution (Keys 1981)."""
+    d = np.minimum(np.abs(distance), 2)
+    far = 2 - 4 * d + 2.5 * d**2 - 0.5 * d**3
+    return np.where(d < 1, 1 - 2.5 * d**2 + 1.5 * d**3, far)
 
 
 def _cubic_integral(distance: Floats) -> Floats:

@@ -43,7 +43,7 @@ def relative(value, truth):
 
 
 @pytest.fixture(
-    scope="module", params=[(n, f) for f in ("strip", "linear") for n in SCANS], ids=str
+    scope="module", params=[(n, f) for f in ("strip", "linear", "point") for n in SCANS], ids=str
 )
 def scan(request):
     """A grid, a scan, a footprint and the projector's twin."""

@@ -24,7 +24,7 @@ from rift_cl.operators.projector.projector import Projector
 from rift_cl.operators.projector.slab_stretch import SlabStretch
 from rift_cl.operators.projector.slab_table import ROW_TAPS, Samples, SlabTable, slab_table
 
-_FOOTPRINTS = ("strip", "linear")
+_FOOTPRINTS = ("strip", "linear", "point")
 # Tables and places of a run of views together: on a CPU they should stay in its caches.
 _TABLE_BYTES = {"cpu": 8 << 20, "gpu": 64 << 20}
 _FEWEST_VIEWS = 16
@@ -48,7 +48,10 @@ class SlabProjector(Projector):
         footprint: how a sample's shadow is shared among bins, along the detector's rows and its
             columns alike. ``strip``: by what of each bin it covers. ``linear``: by linear
             interpolation between the two bins about its centre; where bins are finer than the
-            shadow the hat widens to that shadow.
+            shadow the hat widens to that shadow. ``point``: by interpolation at its centre, linear
+            between columns and cubic between rows, whatever the shadow: the sharpest adjoint, that
+            of filtered backprojection. As a projector it leaves holes where bins are finer than
+            shadows.
         device: the device to use; the default device if not given.
         dtype: ``float32``, or ``float64`` where the device has it.
 
@@ -77,7 +80,7 @@ class SlabProjector(Projector):
                 "looks at one"
             )
         if footprint not in _FOOTPRINTS:
-            raise InputError(f"footprint is {footprint!r}, wanted 'strip' or 'linear'")
+            raise InputError(f"footprint is {footprint!r}, wanted 'strip', 'linear' or 'point'")
         shape = scan.views, scan.rows, scan.bins
         super().__init__(grid.shape, shape, device or default_device(), dtype)
         self.grid, self.scan, self.footprint = grid, scan, footprint
@@ -220,10 +223,13 @@ class _Walk:
         self._device, self._dtype = projector.device, projector.dtype
         self._layout, self._column = projector._layout, column
         self._strip = int(projector.footprint == "strip")
+        self._point = int(projector.footprint == "point")
         self._arc = int(projector.scan.curved)
         self._precision = projector._precision
         self.table = table
-        self.stage = SlabStretch(self._device, projector.scan, table, self._dtype)
+        self.stage = SlabStretch(
+            self._device, projector.scan, table, self._dtype, point=bool(self._point)
+        )
         self._column_forms = self._device.array(table.column_forms, self._dtype)
         self._row_forms = self._device.array(table.row_forms, self._dtype)
         self._amplitudes = self._device.array(table.amplitudes, self._dtype)
@@ -371,6 +377,7 @@ class _Walk:
             db=slabs.step,
             RUN=run,
             STRIP=self._strip,
+            POINT=self._point,
             **macros,
             **self._precision,
         )

@@ -24,9 +24,18 @@ class SlabStretch:
         scan: the scan.
         table: of the views that are walked alike.
         dtype: of data and tables.
+        point: whether tables read what lies between rows, whatever the distance of theirs.
     """
 
-    def __init__(self, device: Device, scan: Cone, table: SlabTable, dtype: np.dtype[Any]) -> None:
+    def __init__(
+        self,
+        device: Device,
+        scan: Cone,
+        table: SlabTable,
+        dtype: np.dtype[Any],
+        *,
+        point: bool = False,
+    ) -> None:
         self._device, self._table = device, table
         self._run = 1 << 30 if device.traits.is_cpu else 1
         self._shape = scan.rows, scan.bins
@@ -42,6 +51,7 @@ class SlabStretch:
             "columns": table.columns,
             "pad": table.pad,
             "center": scan.center[0],
+            "POINT": int(point),
             "DOUBLE": int(dtype == np.float64),
             "RUN": self._run,
         }

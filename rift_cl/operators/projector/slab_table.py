@@ -25,6 +25,10 @@ ROW_TAPS = 2
 _TAPS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
 # Entries of a table stand in whole groups of so many, with empty ones before the first.
 _GROUP = 8
+# Distance of table rows, in detector rows, that are read at points: linear interpolation between
+# them then costs next to nothing of what the cubic one between the detector's leaves, while one
+# row apart costs 0.5 dB on the head of 128^3 voxels.
+_POINT_ROWS = 0.5
 # Cosine of the angle to a slab beyond which no ray is walked by it, and the smallest shadow of a
 # sample in bins, next to which float32 still tells places apart.
 _STEEPEST, _SMALLEST = 0.1, 1e-3
@@ -104,7 +108,7 @@ def slab_table(grid: Grid, scan: Cone | Upright, footprint: str, *, along_x: boo
     Args:
         grid: the volume.
         scan: the scan.
-        footprint: ``strip`` or ``linear``.
+        footprint: ``strip``, ``linear`` or ``point``.
         along_x: which of the two.
 
     Raises:
@@ -118,7 +122,7 @@ def slab_table(grid: Grid, scan: Cone | Upright, footprint: str, *, along_x: boo
     pad = -(-taps // _GROUP) * _GROUP
     columns = -(-(pad + scan.bins + taps) // _GROUP) * _GROUP
     slopes = np.abs(walk.slopes)
-    pitches = walk.row_pitches()
+    pitches = walk.row_pitches(footprint)
     firsts, rows = walk.row_ranges(pitches, slopes)
     padding = (0, 0), (pad, columns - pad - scan.bins)
     steps = np.pad(pitches[:, None] * slopes, padding, mode="edge")
@@ -263,11 +267,13 @@ class _Walk:
         ends = np.broadcast_to([origin, scale], (len(forms), 2))
         return np.concatenate([forms, ends], axis=1)
 
-    def row_pitches(self) -> Floats:
+    def row_pitches(self, footprint: str) -> Floats:
         """Distance of a table's rows in detector rows at slope 1, (n,).
 
-        It is one, or as much more as the widest shadow of a sample asks.
+        It is one, or as much more as the widest shadow of a sample asks; for points, less.
         """
+        if footprint == "point":
+            return np.full(len(self.heights), _POINT_ROWS)
         nearest = self.reaches(self.slabs.places).min(axis=1, initial=np.inf)
         widest = self._rows_per_tangent * self.column.step / nearest
         pitches: Floats = np.maximum(1.0, widest * (1 + _SLACK) / (ROW_TAPS - 1))
@@ -313,6 +319,8 @@ class _Walk:
 
 
 def _taps(widest: float, narrowest: float, footprint: str, scan: Cone | Upright) -> int:
+    if footprint == "point":
+        return 2
     touched = widest * (1 + _SLACK) + 1 if footprint == "strip" else 2 * max(1.0, widest)
     taps = next((n for n in _TAPS if n >= touched), None)
     if taps is None or narrowest < _SMALLEST:

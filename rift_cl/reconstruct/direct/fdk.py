@@ -185,7 +185,8 @@ def _backprojector(A: Projector, scan: Fan | Cone) -> Projector:
     given: Any = {"device": A.device, "dtype": A.dtype}
     if isinstance(scan, Fan):
         return type(A)(A.grid, scan, A.footprint, depth_power=2, **given)
-    return A if scan == A.scan else Projector(A.grid, scan, A.footprint, **given)
+    # An integral's value stands for its ray: read at a voxel's centre it stays as sharp as it is.
+    return Projector(A.grid, scan, "point", **given)
 
 
 def _cosines(scan: Fan | Cone) -> tuple[Floats, Floats]:
