@@ -60,7 +60,9 @@ def turned(point: np.ndarray, angle: float) -> np.ndarray:
 
 
 def test_nikon_axis_that_leans(tmp_path: Path) -> None:
-    scan = open_scan(made.nikon(tmp_path, top=-0.2, bottom=0.2)).cone
+    file = open_scan(made.nikon(tmp_path, top=-0.2, bottom=0.2))
+    scan = file.geometry
+    assert isinstance(file.cone, Cone) and file.lean == pytest.approx(math.atan(0.4 / 1.5))
     assert isinstance(scan, Vectors)
     rows = []
     for z in (-0.15, 0.15):

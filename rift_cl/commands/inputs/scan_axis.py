@@ -34,8 +34,8 @@ def find_axis(
     del device
     geometry = scan.geometry
     try:
-        if isinstance(geometry, Cone | Vectors):
-            return _of_cone(scan, geometry, span)
+        if scan.cone is not None:
+            return _of_cone(scan, scan.cone, span)
         if isinstance(geometry, Fan):
             row = scan.shape[1] // 2
             line = read_attenuation(scan, row, row + 1).projections[:, 0]

@@ -131,7 +131,7 @@ class ConeInput:
         # Bin of the axis on the detector as the file has it, where that is said or found.
         self.center = settings.center
         # Degrees by which the axis leans, and by which projections are turned.
-        self.tilt = settings.tilt or 0.0
+        self.tilt = math.degrees(file.lean) if settings.tilt is None else settings.tilt
         # Whether the angles run the other way than the file was taken to say.
         self.turned = False
         self.clean = CleanRows(self.scan, settings, None, device)
@@ -211,7 +211,7 @@ class ConeInput:
             return {"center": cone.center[1], "by": told}
         self.center = found.center
         if self.settings.tilt is None:
-            self.tilt = tilt_worth_turning(found, self.file.shape[1])
+            self.tilt = tilt_worth_turning(found, self.file.shape[1]) or self.tilt
         self.notes.append(
             f"The rotation axis was found {found.in_words()}; {told} has bin {cone.center[1]:.2f}."
         )

@@ -82,8 +82,12 @@ class Beam:
         """Distance between bins on the detector."""
         return self.pitch[1]
 
+    def lean_over(self, rows: int) -> float:
+        """``lean`` where it moves the axis by a quarter of a bin or more over so many rows."""
+        return self.lean if abs(math.tan(self.lean)) * (rows - 1) / 2 >= _CIRCULAR else 0.0
+
     def over(self, path: Path, shape: tuple[int, int, int], angles: Floats) -> Geometry:
-        """The geometry of projections: a fan's of one row, otherwise a cone's.
+        """The geometry of projections: a fan's of one row, otherwise a cone's, its axis upright.
 
         Args:
             path: the file, for errors.
@@ -103,7 +107,7 @@ class Beam:
         if flat_row:
             return _named(path, lambda: FanBeam(*lengths, self.pitch[1], bin))
         _check_seen(path, bin, bins)
-        cone = _named(
+        return _named(
             path,
             lambda: Cone(
                 angles,
@@ -116,13 +120,13 @@ class Beam:
                 curved=self.curved,
             ),
         )
-        if abs(math.tan(self.lean)) * (rows - 1) / 2 < _CIRCULAR:
-            return cone
-        return leaning(cone, self.lean)
 
     def words(self, geometry: Geometry) -> str:
         """What is told of it in the line about the file."""
-        return beam_words(geometry, self.unit)
+        lean = math.degrees(self.lean)
+        return beam_words(geometry, self.unit) + (
+            f" and leaning by {lean:.3g} degrees" if lean else ""
+        )
 
     def _check_lengths(self, path: Path, bins: int) -> None:
         to_axis, to_detector = self.source_to_axis, self.source_to_detector
@@ -185,6 +189,11 @@ class ViewVectors:
         """Number of the projections."""
         return len(self.source)
 
+    def lean_over(self, rows: int) -> float:
+        """0: the vectors say how an axis leans."""
+        del rows
+        return 0.0
+
     @property
     def bin_pitch(self) -> float:
         """Distance between bins on the detector, on the average over the views."""
@@ -236,31 +245,6 @@ def circular(vectors: Vectors) -> Cone | Vectors:
         return Cone.of_vectors(vectors, tolerance=_CIRCULAR)
     except InputError:
         return vectors
-
-
-def leaning(cone: Cone, lean: float) -> Vectors:
-    """A cone whose detector is turned in its plane, about the middle of the axis.
-
-    Args:
-        cone: the cone whose axis runs along the columns.
-        lean: of the axis as the detector shows it, in radians, positive where its bin grows with
-            the row.
-    """
-    straight = cone.vectors()
-    rows, bins = cone.pitch
-    across = straight.across / bins
-    down = straight.down / rows
-    cosine, sine = math.cos(lean), math.sin(lean)
-    # The axis is along z and shows as down + lean * across: the detector is turned against it.
-    turned_across = cosine * across + sine * down
-    turned_down = cosine * down - sine * across
-    row = (cone.rows - 1) / 2 - cone.center[0]
-    bin = (cone.bins - 1) / 2 - cone.center[1]
-    foot = straight.middle - row * straight.down - bin * straight.across
-    middle = foot + row * rows * turned_down + bin * bins * turned_across
-    return Vectors(
-        straight.source, middle, bins * turned_across, rows * turned_down, cone.rows, cone.bins
-    )
 
 
 def beam_words(geometry: Geometry, unit: str) -> str:

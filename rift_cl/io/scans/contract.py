@@ -173,7 +173,8 @@ def _reversed(found: Finding) -> Finding:
 def _rays(found: Finding, geometry: Geometry | None) -> dict[str, Any]:
     if geometry is None or isinstance(geometry, FanBeam):
         return {"fan": found.fan if geometry is None else geometry}
-    return {"cone": geometry}
+    assert found.beam is not None
+    return {"cone": geometry, "lean": found.beam.lean_over(found.shape[1])}
 
 
 def _unseen(found: Finding, geometry: Geometry | None) -> ScanFile:

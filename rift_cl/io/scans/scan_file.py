@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.geometry import Cone, Fan, FanBeam, Parallel, Scan, Vectors
+from rift_cl.geometry.leaning import leaning
 from rift_cl.io.scans.literals import AngleUnit, Kind
 
 Frames = NDArray[np.float32]
@@ -98,6 +99,8 @@ class ScanFile:
             ``unit``, and ``pitch`` is its pitch, on the detector. None for other rays.
         cone: source and detector where the rays are those of a cone beam, of which no row is
             independent of the others; as for ``fan``. None for other rays.
+        lean: of a cone's axis in the detector's plane, in radians, positive where its bin grows
+            with the row; 0 where it is too little to matter. ``geometry`` includes it.
         background: bins at each end of the detector that see nothing but air: the mean line
             integral over these bins of both ends is 0 in truth, and is to be subtracted from the
             view. 0 where no such bins are known.
@@ -119,6 +122,7 @@ class ScanFile:
     rows: RowSource
     fan: FanBeam | None = None
     cone: Cone | Vectors | None = None
+    lean: float = 0.0
     background: int = 0
     notes: tuple[str, ...] = ()
     flats_at: NDArray[np.float64] | None = None
@@ -141,6 +145,8 @@ class ScanFile:
 
         The axis of parallel rays, which no file tells, is taken to be at the middle.
         """
+        if isinstance(self.cone, Cone) and self.lean:
+            return leaning(self.cone, self.lean)
         if self.cone is not None:
             return self.cone
         bins = self.shape[2]
