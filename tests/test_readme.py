@@ -12,6 +12,7 @@ import pytest
 
 from rift_cl.commands.cli import main
 from rift_cl.io.scans.formats import SCAN_READERS
+from rift_cl.metrics import psnr
 from rift_cl.operators.filters.ramp_filters import FILTERS
 from rift_cl.train.loss.pixel_loss import PIXEL_LOSSES
 from rift_cl.train.strategy import STRATEGIES
@@ -42,13 +43,14 @@ ELSEWHERE = {"--tyro-print-completion", "--extra", "--prefix", "--durations"}
 
 def test_code_runs(capsys):
     code = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
-    assert len(code) == 4
+    assert len(code) == 5
     names = {}
     for block in code:
         if "import torch" not in block or find_spec("torch"):
             exec(block, names)
     printed = capsys.readouterr().out
     assert float(printed.split()[0]) > 20
+    assert psnr(names["volume"], names["head"], peak=1.0) > 20
     assert names["gradients"].splats.means.shape == (1000, 3)
 
 

@@ -122,7 +122,7 @@ def _read(text: str) -> Any:
         return json.loads(text)
     import yaml
 
-    class Plain(yaml.BaseLoader):
+    class Plain(yaml.BaseLoader):  # type: ignore[misc]
         """Text alone, and no value that is written once and counts often."""
 
         def compose_node(self, parent: Any, index: Any) -> Any:
