@@ -2,13 +2,20 @@
  *
  *     data[view][i][k] = sum over r, c of keys(v - r) keys(u - c) upright[view][r][c].
  *
- * Pixels whose four rows and columns are not all there are zero. `first` is the first view of the
+ * With SLOPE 1 it is the derivative by u, with SLOPE 2 that by v. Pixels whose four rows and columns
+ * are not all there are zero. `first` is the first view of the
  * run, `views` tells which view of the data each is. Index space: (runs of LANES columns, rows of
  * the tilted detector, views of the run). */
 
 #include "include/portable.h"
 #include "include/lane_quads.h"
 #include "include/upright.h"
+
+#ifndef SLOPE
+#define SLOPE 0
+#endif
+#define BY_COLUMN(d) (SLOPE == 1 ? keys_slope(d) : keys(d))
+#define BY_ROW(d) (SLOPE == 2 ? keys_slope(d) : keys(d))
 
 KERNEL void upright_read(
     __global real *restrict data, __global const real *restrict upright,
@@ -37,8 +44,9 @@ KERNEL void upright_read(
   lanes sum = 0;
   for (int n = 0; n < 4; n++) {
     const lane_quad q = quads_at(seen + (long)n * upright_bins, 1, at);
-    const lanes row = keys(x) * q.s0 + keys(x - 1.0f) * q.s1 + keys(x - 2.0f) * q.s2 + keys(x - 3.0f) * q.s3;
-    sum = sum + keys(y - (real)n) * row;
+    const lanes row = BY_COLUMN(x) * q.s0 + BY_COLUMN(x - 1.0f) * q.s1 +
+        BY_COLUMN(x - 2.0f) * q.s2 + BY_COLUMN(x - 3.0f) * q.s3;
+    sum = sum + BY_ROW(y - (real)n) * row;
   }
   sum = inside ? sum : 0;
   __global real *out = data + ((long)views[first + view] * rows + i) * bins + k0;

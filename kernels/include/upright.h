@@ -20,6 +20,16 @@ static lanes keys(lanes d) {
   return a < 1.0f ? near : (a < 2.0f ? far : zero);
 }
 
+/* The derivative of keys. */
+static lanes keys_slope(lanes d) {
+  const lanes a = absolute(d);
+  const lanes near = a * (4.5f * a - 5.0f);
+  const lanes far = -4.0f + a * (5.0f - 1.5f * a);
+  const lanes zero = 0;
+  const lanes slope = a < 1.0f ? near : (a < 2.0f ? far : zero);
+  return d < 0 ? -slope : slope;
+}
+
 /* Column and row at which (k, i) is seen by the forms h, and what they are divided by. */
 static void seen_at(
     __global const real *h, lanes k, lanes i, lanes *u, lanes *v, lanes *depth)

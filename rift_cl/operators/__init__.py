@@ -16,6 +16,7 @@ from rift_cl.operators.filters.ramp_filters import (
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.operators.projector.fast_projector import FastProjector
 from rift_cl.operators.projector.footprint import FOOTPRINTS
+from rift_cl.operators.projector.geometry_gradient import GeometryGradient, geometry_gradient
 from rift_cl.operators.projector.parallel_projector import ParallelProjector
 from rift_cl.operators.projector.projector import Projector
 from rift_cl.operators.projector.projector_choice import cheapest_projector
@@ -27,6 +28,7 @@ __all__ = [
     "Compensation",
     "FastProjector",
     "Filter",
+    "GeometryGradient",
     "HighPass",
     "LinearOperator",
     "ParallelProjector",
@@ -38,6 +40,7 @@ __all__ = [
     "central_planes",
     "cheapest_projector",
     "dot_test",
+    "geometry_gradient",
     "radial_lines",
     "register_filter",
 ]

@@ -36,9 +36,20 @@ class Rectification:
         """Bytes of the device that the records take."""
         return int(self._forms.nbytes + self._views.nbytes)
 
-    def read(self, upright: DeviceArray, data: DeviceArray, first: int, count: int) -> None:
-        """Write the views of a run, from their upright ones, (count, rows, bins)."""
-        self._launch("upright_read", upright, data, first, (self._bins, self._rows, count))
+    def read(
+        self, upright: DeviceArray, data: DeviceArray, first: int, count: int, slope: int = 0
+    ) -> None:
+        """Write the views of a run, from their upright ones, (count, rows, bins).
+
+        Args:
+            upright: the upright views of the run.
+            data: all views.
+            first: view of the run.
+            count: of views.
+            slope: 1 for derivatives by the upright views' column, 2 for those by their row.
+        """
+        work = self._bins, self._rows, count
+        self._launch("upright_read", upright, data, first, work, SLOPE=slope)
 
     def spread(self, data: DeviceArray, upright: DeviceArray, first: int, count: int) -> None:
         """The transpose: write the upright views of a run."""
@@ -52,6 +63,7 @@ class Rectification:
         data: DeviceArray,
         first: int,
         work: tuple[int, int, int],
+        **macros: int,
     ) -> None:
         lanes = self._device.traits.macros["LANES"]
         self._device.launch(
@@ -67,4 +79,5 @@ class Rectification:
             upright_rows=self._upright.rows,
             upright_bins=self._upright.bins,
             DOUBLE=self._double,
+            **macros,
         )

@@ -126,6 +126,37 @@ def rectified(grid: Grid, scan: Vectors, *, along_z: bool) -> Rectified:
     return Rectified(views.astype(np.int32), upright, seen, _counted(forms, upright), along_z)
 
 
+def pixel_slopes(scan: Vectors, found: Rectified, by_column: Floats, by_row: Floats) -> Floats:
+    """Derivatives of views by the places of their pixels, (3, n, rows, bins), as (x, y, z).
+
+    Args:
+        scan: the scan.
+        found: some of its views.
+        by_column: derivatives by the column at which a pixel is seen upright, (n, rows, bins).
+        by_row: and by the row.
+    """
+    axes = [0, 2, 1] if found.along_z else [0, 1, 2]
+    k, i = (np.arange(n) - (n - 1) / 2 for n in (scan.bins, scan.rows))
+    slopes = np.empty((3, *by_column.shape))
+    frames = _frames(found.upright.angles)
+    scale = found.upright.source_to_detector / np.array(found.upright.pitch[::-1])
+    for n, view in enumerate(found.views):
+        # From the source, along the upright detector's rows, its columns and ahead.
+        places = [
+            reach + across * k + down * i[:, None]
+            for reach, across, down in zip(
+                frames[n] @ (scan.middle - scan.source)[view, axes],
+                frames[n] @ scan.across[view, axes],
+                frames[n] @ scan.down[view, axes],
+                strict=True,
+            )
+        ]
+        along, up = by_column[n] * scale[0] / places[2], by_row[n] * scale[1] / places[2]
+        ahead = -(along * places[0] + up * places[1]) / places[2]
+        slopes[:, n] = np.einsum("aij,ab->bij", np.stack([along, up, ahead]), frames[n])[axes]
+    return slopes
+
+
 def _angles(reach: Floats, normal: Floats) -> Floats:
     """Angles of upright detectors: those of the tilted ones, or where these lie, of the rays."""
     normal = normal * np.sign((reach * normal).sum(axis=1))[:, None]

@@ -12,18 +12,24 @@ from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import DTypeLike
+from numpy.typing import DTypeLike, NDArray
 
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
+from rift_cl.cl.host_arrays import download
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Grid, Vectors
 from rift_cl.operators.projector.projector import Projector
 from rift_cl.operators.projector.rectification import Rectification
 from rift_cl.operators.projector.slab_projector import SlabProjector
-from rift_cl.operators.projector.upright import Rectified, looking_along_z, rectified
+from rift_cl.operators.projector.upright import (
+    Rectified,
+    looking_along_z,
+    pixel_slopes,
+    rectified,
+)
 
 
 class VectorProjector(Projector):
@@ -98,6 +104,32 @@ class VectorProjector(Projector):
             if number > 0:
                 axpby(self.device, 1.0, volume, 1.0, out)
 
+    def slopes(self, x: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """How ``A(x)`` changes as each pixel moves, the source staying where it is.
+
+        Args:
+            x: the volume.
+
+        Returns:
+            The data, and their derivatives by the pixel's place, (3, views, rows, bins), in the
+            order (x, y, z).
+        """
+        volume = self.device.array(x, self.dtype)
+        data = np.zeros(self.range)
+        slopes = np.zeros((3, *self.range))
+        for part in self._parts:
+            upright = self.device.empty(part.projector.range, self.dtype)
+            part.projector._apply(part.seen(volume), upright)
+            read = []
+            for slope in range(3):
+                out = self.device.empty(self.range, self.dtype)
+                part.rectification.read(upright, out, 0, part.count, slope)
+                host = download(self.device, out)
+                read.append(host[part.found.views].astype(np.float64))
+            data[part.found.views] = read[0]
+            slopes[:, part.found.views] = pixel_slopes(self.scan, part.found, read[1], read[2])
+        return data, slopes
+
     @property
     def scratch(self) -> int:
         """Bytes needed besides the arrays that go in and come out."""
@@ -109,7 +141,7 @@ class _Part:
     """Views that look alike: the projector of their upright detectors, and the way from these."""
 
     def __init__(self, owner: VectorProjector, found: Rectified) -> None:
-        self._owner, self._found = owner, found
+        self._owner, self.found = owner, found
         self._exchanged = found.along_z
         self.count = len(found.views)
         self.projector = SlabProjector(
@@ -119,7 +151,7 @@ class _Part:
     @cached_property
     def rectification(self) -> Rectification:
         owner = self._owner
-        return Rectification(owner.device, owner.scan, self._found, owner.dtype)
+        return Rectification(owner.device, owner.scan, self.found, owner.dtype)
 
     def seen(self, volume: DeviceArray) -> DeviceArray:
         """The volume as these views see it, with y and z exchanged or as it is."""
