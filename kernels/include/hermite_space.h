@@ -32,17 +32,17 @@ static int place_along(int dimension, int n, int p, int q) {
   return dimension == 0 ? mode_place(n, p, q) : dimension == 1 ? mode_place(p, n, q) : mode_place(p, q, n);
 }
 
-/* Multiply a homogeneous polynomial of this degree by a linear form, in place. */
+/* Multiply a homogeneous polynomial of this degree by a linear form, in place. One term after the other:
+ * with conditions inside of a single sum Intel's compiler for CPUs dies of ORDER 2 or 3. */
 static void times_form(float *p, int degree, float3 form) {
-  for (int j = degree + 1; j >= 0; j--) {
+  for (int j = degree + 1; j > 0; j--) {
     float *here = p + j * (j + 1) / 2, *before = here - j;
-    for (int c = j; c >= 0; c--) {
-      float sum = j <= degree ? form.x * here[c] : 0;
-      if (c < j) sum += form.y * before[c];
-      if (c > 0) sum += form.z * before[c - 1];
-      here[c] = sum;
-    }
+    if (j > degree) for (int c = 0; c <= j; c++) here[c] = 0;
+    else for (int c = 0; c <= j; c++) here[c] *= form.x;
+    for (int c = 0; c < j; c++) here[c] += form.y * before[c];
+    for (int c = 0; c < j; c++) here[c + 1] += form.z * before[c];
   }
+  p[0] *= form.x;
 }
 
 /* Turn coefficients c~_n of He~_n(x') into those of He_m(u), u = A x': columns of A are given. */

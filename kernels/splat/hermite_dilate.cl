@@ -82,7 +82,8 @@ static float mass_factor(const row6 *rows, float det) {
 
 /* The shape's numbers, extents, the map A's columns and det F / det U; whether there is a splat. */
 static int dilate(
-    const Gaussian *g, float3 per_length, float3 blur, float *row, float *extents, float3 *columns, float *factor)
+    const Gaussian *g, float3 per_length, float3 blur, float *row, __global float *extents, float3 *columns,
+    float *factor)
 {
   row6 rows[3] = {{g->root.x * per_length.x, (float3)(blur.x, 0, 0)},
                   {g->root.y * per_length.y, (float3)(0, blur.y, 0)},
@@ -135,9 +136,9 @@ KERNEL void hermite_dilate(
   const long i = get_global_id(0);
   if (i >= count) return;
   Gaussian g;
-  float row[6], sides[3], modes[MODES], factor = 0;
+  float row[6], modes[MODES], factor = 0;
   float3 columns[3];
-  __global float *out = table + WIDTH * i;
+  __global float *out = table + WIDTH * i, *sides = extents + 3 * i;
   int drawn = read_shape(&g, SHAPE, i) == VISIBLE &&
       dilate(&g, (float3)(per_x, per_y, per_z), (float3)(blur_x, blur_y, blur_z), row, sides, columns, &factor);
   if (drawn) {
@@ -151,5 +152,6 @@ KERNEL void hermite_dilate(
     map_modes(modes, columns[0], columns[1], columns[2]);
     drawn &= write_powers(modes, opacities[i] * factor, out + SHAPE_NUMBERS);
   }
-  for (int k = 0; k < 3; k++) extents[3 * i + k] = drawn ? sides[k] : -1;
+  /* A choice between an array of the item's own and -1 is what clspv dies of. */
+  if (!drawn) for (int k = 0; k < 3; k++) sides[k] = -1;
 }
