@@ -5,9 +5,9 @@
  * with ARC 1 origin + radius * atan of the fraction; a is the coordinate of a sample, b that of its
  * slab. The edges of the sample, a -+ da/2, end its shadow. STRIP 1 shares it among the entries that
  * the shadow overlaps; otherwise a hat as wide as the shadow, or two entries at least, is shared in
- * proportion to its heights; with POINT 1 it is two entries wide in any case. `places` is the first entry of TAPS, `shares` what the others receive
- * of 1 (see include/slab_table.h). A sample that is seen off the table is put on its edge, where
- * entries are zero.
+ * proportion to its heights; with POINT 1 it is two entries wide in any case. `places` is the first
+ * entry of TAPS, `shares` what the others receive of 1 (see include/slab_table.h). A sample that is
+ * seen off the table is put on its edge, where entries are zero.
  *
  * forms[view] = n0 n1 n2 d0 d1 d2 origin radius.
  *
@@ -18,6 +18,9 @@
 
 #ifndef STRIP
 #define STRIP 1
+#endif
+#ifndef POINT
+#define POINT 0
 #endif
 #ifndef ARC
 #define ARC 0

@@ -38,9 +38,9 @@
 #ifndef ROW_TAPS
 #define ROW_TAPS 2
 #endif
-/* Whether samples read the data at their places, and nothing of their shadows' extent counts. */
-#ifndef POINT
-#define POINT 0
+/* Whether the rows of tables are further apart than the detector's. */
+#ifndef WIDE
+#define WIDE 0
 #endif
 
 #if LANES == 8
@@ -49,9 +49,17 @@
 #define ENTRY(view, row, column) (((long)(view) * columns + (column)) * rows + (row))
 #endif
 
-/* 24 times the integral from 0 on of Keys' cubic convolution kernel (IEEE Trans. Acoust. Speech
- * Signal Process. 29, 1981), which reaches 2 samples to either side. */
+/* Keys' cubic convolution kernel (IEEE Trans. Acoust. Speech Signal Process. 29, 1981), and 24 times
+ * its integral from 0 on. It reaches 2 samples to either side. */
 #define KERNEL_REACH 2.0f
+static lanes cubic_kernel(lanes distance) {
+  const lanes d = absolute(distance);
+  const lanes near = 1.0f + d * d * (1.5f * d - 2.5f);
+  const lanes far = 2.0f + d * (-4.0f + d * (2.5f - 0.5f * d));
+  const lanes inside = d < 1.0f ? near : far;
+  return d < KERNEL_REACH ? inside : (lanes)0;
+}
+
 static lanes cubic_integral(lanes distance) {
   const lanes far = absolute(distance);
   const lanes d = far < KERNEL_REACH ? far : (lanes)KERNEL_REACH;
@@ -59,15 +67,6 @@ static lanes cubic_integral(lanes distance) {
   const lanes beyond = d * (48.0f + d * (d * (20.0f - 3.0f * d) - 48.0f)) - 4.0f;
   const lanes found = d < 1.0f ? near : beyond;
   return distance < 0.0f ? -found : found;
-}
-
-/* The kernel itself, which interpolates. */
-static lanes cubic_kernel(lanes distance) {
-  const lanes d = absolute(distance);
-  const lanes near = 1.0f + d * d * (1.5f * d - 2.5f);
-  const lanes far = 2.0f + d * (-4.0f + d * (2.5f - 0.5f * d));
-  const lanes inside = d < 1.0f ? near : far;
-  return d < KERNEL_REACH ? inside : (lanes)0;
 }
 
 /* The least and the largest of LANES numbers. */
@@ -83,22 +82,21 @@ static real largest(lanes v) { return -least(-v); }
 #define largest(v) (v)
 #endif
 
-static lanes at_least_one(lanes v) { return v > 1.0f ? v : (lanes)1.0f; }
-
-/* Weight of detector row i in table row r of a column: the kernel, as wide as the wider of the two
- * rows, averaged over the narrower. So a table's row reads weights that add up to 1, and gives away
- * all that it has, wherever it lies. With POINT 1 it reads what lies between the rows. Both
- * stretching kernels ask here, so that they weight alike. */
+/* Weight of detector row i in table row r of a column; those of a table's row add up to 1. Rows one
+ * detector row apart are interpolated; of WIDE 1 the kernel is as wide as their step, integrated over
+ * the detector's rows. Both stretching kernels ask here, so that they weight alike. */
 static lanes row_weight(int r, lanes step, real center, int i) {
-#if POINT
-  return cubic_kernel(step * (real)r + (center - (real)i));
-#else
-  const lanes width = at_least_one(step), extent = step < 1.0f ? step : (lanes)1.0f;
   const lanes away = step * (real)r + (center - (real)i);
-  return (cubic_integral((away + 0.5f * extent) / width) -
-          cubic_integral((away - 0.5f * extent) / width)) / (24.0f * extent);
+#if WIDE
+  return (cubic_integral((away + 0.5f) / step) - cubic_integral((away - 0.5f) / step)) / 24.0f;
+#else
+  return cubic_kernel(away);
 #endif
 }
 
 /* Detector rows to either side of a table's row that have such weights. */
-static lanes row_reach(lanes step) { return KERNEL_REACH * at_least_one(step) + 0.5f; }
+#if WIDE
+static lanes row_reach(lanes step) { return KERNEL_REACH * step + 0.5f; }
+#else
+static lanes row_reach(lanes step) { return (lanes)KERNEL_REACH; }
+#endif

@@ -13,11 +13,10 @@ its ray leaves the slabs at the slope d,
 
     y[i] = (q d)^2 sum over n of  weight(q d n + center - i) * seen[n] * length,
 
-in which the convolution's kernel is as wide as the larger of ``q d`` and one row, averaged over the
-smaller of the two, and ``length`` that of the ray over its reach. ``q`` is one row of the detector,
-or the largest shadow of the view where that is more. The footprint ``point`` takes samples for
-points instead: shares are those of linear interpolation, ``q`` is half a row, and the kernel of the
-convolution interpolates between rows.
+with the length of the ray over its reach. ``q`` is one row of the detector, unless a shadow is more
+than 7 of them: it is a seventh of the largest one then, and the convolution's kernel is as wide as
+``q d``, integrated over the detector's rows. The footprint ``point`` takes samples for points
+instead: shares are those of linear interpolation, and ``q`` is half a row.
 """
 
 from __future__ import annotations
@@ -42,7 +41,9 @@ class ConeProjector:
     """
 
     def __init__(self, grid: Grid, scan: Cone, footprint: str = "strip") -> None:
-        views = [_view(grid, scan, k, footprint) for k in range(scan.views)]
+        shadow = max(_row_shadow(grid, scan, view) for view in range(scan.views))
+        pitch = 0.5 if footprint == "point" else max(1.0, shadow / 7)
+        views = [_view(grid, scan, view, footprint, pitch) for view in range(scan.views)]
         self.matrix = np.concatenate(views)
         self._domain, self._range = grid.shape, (scan.views, scan.rows, scan.bins)
 
@@ -57,24 +58,33 @@ class ConeProjector:
         return back.reshape(self._domain)
 
 
-def _view(grid: Grid, scan: Cone, view: int, footprint: str) -> Any:
+def _slabs(grid: Grid, scan: Cone, view: int) -> tuple[bool, Floats]:
+    """Whether a view is seen in slabs across y, and their distances from the source."""
+    angle, (_, dy, dx) = scan.angles[view], grid.spacing
+    if dx * abs(np.cos(angle)) >= dy * abs(np.sin(angle)):
+        return True, np.abs(grid.coordinates(1) + scan.source_to_axis * np.cos(angle))
+    return False, np.abs(grid.coordinates(2) - scan.source_to_axis * np.sin(angle))
+
+
+def _row_shadow(grid: Grid, scan: Cone, view: int) -> float:
+    distances = _slabs(grid, scan, view)[1]
+    shadow = scan.source_to_detector * grid.spacing[0] / scan.pitch[0] / distances.min()
+    return float(shadow) * (1 + 1e-4)
+
+
+def _view(grid: Grid, scan: Cone, view: int, footprint: str, q: float) -> Any:
     """The matrix of one view, (rows * bins, nz * ny * nx)."""
     angle, height = scan.angles[view], scan.heights[view]
     (dz, dy, dx), (z, y, x) = grid.spacing, (grid.coordinates(axis) for axis in range(3))
-    across_y = dx * abs(np.cos(angle)) >= dy * abs(np.sin(angle))
+    across_y, distances = _slabs(grid, scan, view)
     lines, slabs, step = (x, y, dx) if across_y else (y, x, dy)
-    ahead = np.cos(angle) if across_y else -np.sin(angle)
-    source = -scan.source_to_axis * ahead
     reach, (row_pitch, pitch) = scan.source_to_detector, scan.pitch
-    distances = np.abs(slabs - source)
     gamma = scan.fan_angles()
     turned = angle - gamma
     slopes = np.abs(np.cos(turned) if across_y else np.sin(turned))
     slopes = slopes if scan.curved else slopes / np.cos(gamma)
-    point = footprint == "point"
-    q: Any = 0.5 if point else max(1.0, (1 + 1e-4) * reach * dz / row_pitch / distances.min())
     columns = np.arange(scan.bins) - scan.center[1]
-    passed, numbers = _passed_on(scan, q * slopes, point=point)
+    passed, numbers = _passed_on(scan, q * slopes, wide=q > 1)
     matrix = np.zeros((scan.rows, scan.bins, len(z), len(y), len(x)))
     for j, (slab, distance) in enumerate(zip(slabs, distances, strict=True)):
         edges = np.stack([lines - step / 2, lines + step / 2])
@@ -93,17 +103,16 @@ def _view(grid: Grid, scan: Cone, view: int, footprint: str) -> Any:
     return (matrix * _lengths(scan)).reshape(scan.rows * scan.bins, -1)
 
 
-def _passed_on(scan: Cone, steps: Floats, *, point: bool) -> tuple[Floats, Floats]:
+def _passed_on(scan: Cone, steps: Floats, *, wide: bool) -> tuple[Floats, Floats]:
     """Weights in the detector's rows of those along the slabs, (rows, n, bins), and their n."""
     reach = 1 + 2 * max(1.0, steps.max())
     ends = (np.array([-reach, scan.rows - 1 + reach]) - scan.center[0])[:, None] / steps
     numbers = np.arange(np.floor(ends.min()), np.ceil(ends.max()) + 1)
-    width, extent = np.maximum(1, steps), np.minimum(1, steps)
     off = numbers[:, None] * steps + scan.center[0] - np.arange(scan.rows)[:, None, None]
-    if point:
+    if not wide:
         return steps**2 * _cubic(off), numbers
-    high, low = ((off + side * extent / 2) / width for side in (1, -1))
-    return steps**2 * (_cubic_integral(high) - _cubic_integral(low)) / extent, numbers
+    weights = _cubic_integral((off + 0.5) / steps) - _cubic_integral((off - 0.5) / steps)
+    return steps**2 * weights, numbers
 
 
 def _column(scan: Cone, angle: float, x: Any, y: Any) -> Any:

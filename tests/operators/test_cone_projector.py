@@ -29,6 +29,7 @@ SCANS: dict[str, tuple[Grid, Cone]] = {
     "taller than a tile": (Grid((66, 2, 3)), Cone([0.1, 2], 70, 5, 1.4, 150, 200)),
     "wider than a tile": (Grid((2, 2, 66)), Cone([0.1, 3], 4, 70, 1.4, 150, 200)),
     "bins finer than shadows": (Grid((4, 5, 6)), Cone(TURN, 16, 18, 0.4, 30, 45)),
+    "bins much finer": (Grid((3, 2, 2)), Cone(TURN[:5], 50, 20, (0.1, 0.4), 30, 45)),
     "bins much wider": (Grid((9, 9, 9)), Cone(TURN, 4, 5, 6, 40, 60)),
     "curved": (Grid((9, 10, 11)), Cone(TURN, 12, 13, 1.5, 20, 30, curved=True)),
     "source near the volume": (Grid((8, 8, 8)), Cone(TURN, 14, 14, 3, 9, 25)),

@@ -22,7 +22,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Grid
 from rift_cl.operators.projector.projector import Projector
 from rift_cl.operators.projector.slab_stretch import SlabStretch
-from rift_cl.operators.projector.slab_table import ROW_TAPS, Samples, SlabTable, slab_table
+from rift_cl.operators.projector.slab_table import Samples, SlabTable, slab_table
 
 _FOOTPRINTS = ("strip", "linear", "point")
 # Tables and places of a run of views together: on a CPU they should stay in its caches.
@@ -227,9 +227,7 @@ class _Walk:
         self._arc = int(projector.scan.curved)
         self._precision = projector._precision
         self.table = table
-        self.stage = SlabStretch(
-            self._device, projector.scan, table, self._dtype, point=bool(self._point)
-        )
+        self.stage = SlabStretch(self._device, projector.scan, table, self._dtype)
         self._column_forms = self._device.array(table.column_forms, self._dtype)
         self._row_forms = self._device.array(table.row_forms, self._dtype)
         self._amplitudes = self._device.array(table.amplitudes, self._dtype)
@@ -243,7 +241,7 @@ class _Walk:
         """Bytes of one view's table and places."""
         item, table = self._dtype.itemsize, self.table
         samples = self._padded_lines * (4 + item * (table.taps - 1))
-        samples += self._layout.depth * (4 + item * (ROW_TAPS - 1))
+        samples += self._layout.depth * (4 + item * (table.row_taps - 1))
         return item * table.rows * table.columns + table.slabs.count * samples
 
     @property
@@ -320,7 +318,7 @@ class _Walk:
             table.rows,
             first,
             count,
-            TAPS=ROW_TAPS,
+            TAPS=table.row_taps,
             ARC=0,
         )
         return {
@@ -341,7 +339,7 @@ class _Walk:
             "slab_stride": self._slab_stride,
             "line_stride": self._line_stride,
             "TAPS": table.taps,
-            "ROW_TAPS": ROW_TAPS,
+            "ROW_TAPS": table.row_taps,
             **self._precision,
         }
 

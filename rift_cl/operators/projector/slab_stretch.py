@@ -24,7 +24,6 @@ class SlabStretch:
         scan: the scan.
         table: of the views that are walked alike.
         dtype: of data and tables.
-        point: whether tables read what lies between rows, whatever the distance of theirs.
     """
 
     def __init__(
@@ -33,8 +32,6 @@ class SlabStretch:
         scan: Cone,
         table: SlabTable,
         dtype: np.dtype[Any],
-        *,
-        point: bool = False,
     ) -> None:
         self._device, self._table = device, table
         self._run = 1 << 30 if device.traits.is_cpu else 1
@@ -51,8 +48,8 @@ class SlabStretch:
             "columns": table.columns,
             "pad": table.pad,
             "center": scan.center[0],
-            "POINT": int(point),
             "DOUBLE": int(dtype == np.float64),
+            "WIDE": int(table.wide),
             "RUN": self._run,
         }
 

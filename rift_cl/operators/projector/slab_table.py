@@ -19,9 +19,9 @@ from rift_cl.operators.projector.upright import Upright
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int32]
 
-# Entries along a table's rows that a sample's shadow may touch; rows are as far apart as that asks.
-ROW_TAPS = 2
-# Counts of columns that a shadow may touch: kernels are built for each.
+# Counts of columns or rows that a shadow may touch: kernels are built for each. Table rows are one
+# detector row apart, or as much more as keeps a shadow in the most of them.
+_MOST_ROW_TAPS = 8
 _TAPS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
 # Entries of a table stand in whole groups of so many, with empty ones before the first.
 _GROUP = 8
@@ -34,7 +34,7 @@ _POINT_ROWS = 0.5
 _STEEPEST, _SMALLEST = 0.1, 1e-3
 # Room for rounding in shadows that just fit their entries.
 _SLACK = 1e-4
-# Rows over which the stretch averages, on either side, in units of the wider of the two pitches.
+# Rows that the stretch reads to either side, in units of the wider of the two pitches.
 _REACH = 2
 
 
@@ -77,8 +77,9 @@ class SlabTable:
         gains: what a column of the table is multiplied by, (n, columns).
         rows, columns: entries of a table along each axis.
         pad: empty columns before the first.
-        taps: columns that a sample's shadow touches at most.
+        taps, row_taps: columns and rows that a sample's shadow touches at most.
         widest: columns from one line to the next at most.
+        wide: whether a table's rows are further apart than the detector's.
     """
 
     views: Whole
@@ -94,7 +95,9 @@ class SlabTable:
     columns: int
     pad: int
     taps: int
+    row_taps: int
     widest: float
+    wide: bool
 
     @property
     def entries(self) -> int:
@@ -115,24 +118,31 @@ def slab_table(grid: Grid, scan: Cone | Upright, footprint: str, *, along_x: boo
         InputError: the source stands in the volume, a ray runs along the slabs of either walk, or
             bins and samples are of very different sizes.
     """
-    views = np.flatnonzero(walked_along_x(grid, scan) == along_x)
+    by_y = walked_along_x(grid, scan)
+    shadow = max(
+        _Walk.of(grid, scan, np.flatnonzero(by_y == way), along_x=way).row_shadow()
+        for way in (True, False)
+    )
+    pitch = max(1.0, shadow / (_MOST_ROW_TAPS - 1))
+    pitch = _POINT_ROWS if footprint == "point" else pitch
+    row_taps = _fitting(shadow / pitch, footprint)
+    views = np.flatnonzero(by_y == along_x)
     walk = _Walk.of(grid, scan, views, along_x=along_x)
     widest, narrowest = walk.shadows()
     taps = _taps(widest, narrowest, footprint, scan)
     pad = -(-taps // _GROUP) * _GROUP
     columns = -(-(pad + scan.bins + taps) // _GROUP) * _GROUP
     slopes = np.abs(walk.slopes)
-    pitches = walk.row_pitches(footprint)
-    firsts, rows = walk.row_ranges(pitches, slopes)
+    firsts, rows = walk.row_ranges(pitch, slopes, row_taps)
     padding = (0, 0), (pad, columns - pad - scan.bins)
-    steps = np.pad(pitches[:, None] * slopes, padding, mode="edge")
+    steps = np.pad(pitch * slopes, padding, mode="edge")
     return SlabTable(
         views=views.astype(np.int32),
         lines=walk.lines,
         slabs=walk.slabs,
         column_forms=walk.column_forms(scan.center[1] + pad),
-        row_forms=walk.row_forms(pitches, firsts),
-        amplitudes=walk.amplitudes(pitches),
+        row_forms=walk.row_forms(pitch, firsts),
+        amplitudes=walk.amplitudes(pitch),
         firsts=firsts.astype(np.int32),
         steps=steps,
         gains=steps**2,
@@ -140,7 +150,9 @@ def slab_table(grid: Grid, scan: Cone | Upright, footprint: str, *, along_x: boo
         columns=columns,
         pad=pad,
         taps=taps,
+        row_taps=row_taps,
         widest=widest,
+        wide=pitch > 1,
     )
 
 
@@ -267,69 +279,67 @@ class _Walk:
         ends = np.broadcast_to([origin, scale], (len(forms), 2))
         return np.concatenate([forms, ends], axis=1)
 
-    def row_pitches(self, footprint: str) -> Floats:
-        """Distance of a table's rows in detector rows at slope 1, (n,).
-
-        It is one, or as much more as the widest shadow of a sample asks; for points, less.
-        """
-        if footprint == "point":
-            return np.full(len(self.heights), _POINT_ROWS)
-        nearest = self.reaches(self.slabs.places).min(axis=1, initial=np.inf)
-        widest = self._rows_per_tangent * self.column.step / nearest
-        pitches: Floats = np.maximum(1.0, widest * (1 + _SLACK) / (ROW_TAPS - 1))
-        return pitches
+    def row_shadow(self) -> float:
+        """The widest shadow of a sample along the columns, in detector rows at slope 1."""
+        nearest = self.reaches(self.slabs.places).min(initial=np.inf)
+        return float(self._rows_per_tangent * self.column.step / nearest) * (1 + _SLACK)
 
     @property
     def _rows_per_tangent(self) -> float:
         return self.scan.source_to_detector / self.scan.pitch[0]
 
-    def row_ranges(self, pitches: Floats, slopes: Floats) -> tuple[NDArray[np.intp], int]:
+    def row_ranges(self, pitch: float, slopes: Floats, taps: int) -> tuple[NDArray[np.intp], int]:
         """The first row of each view's table, (n,), and rows of a table.
 
         Rows that neither the volume nor the detector reaches are left out.
         """
-        if not len(pitches):
+        if not len(slopes):
             return np.zeros(0, np.intp), 1
         ends = self.column.ends - self.heights[:, None]
         near, far = (self.reaches(self.slabs.places[[at]])[:, 0] for at in (0, -1))
-        scale = self._rows_per_tangent / pitches
+        scale = self._rows_per_tangent / pitch
         seen = np.stack([end * scale / reach for end in ends.T for reach in (near, far)])
-        steps = pitches * np.stack([slopes.min(axis=1), slopes.max(axis=1)])
+        steps = pitch * np.stack([slopes.min(axis=1), slopes.max(axis=1)])
         reach = _REACH * np.maximum(1, steps) + 1
         row0, row1 = -self.scan.center[0], self.scan.rows - 1 - self.scan.center[0]
         low = np.maximum(seen.min(axis=0) - 1, ((row0 - reach) / steps).min(axis=0))
         high = np.minimum(seen.max(axis=0) + 1, ((row1 + reach) / steps).max(axis=0))
-        firsts = np.floor(low).astype(np.intp) - ROW_TAPS
-        lasts = np.maximum(np.ceil(high).astype(np.intp), firsts) + ROW_TAPS
+        firsts = np.floor(low).astype(np.intp) - taps
+        lasts = np.maximum(np.ceil(high).astype(np.intp), firsts) + taps
         return firsts, int((lasts - firsts).max()) + 1
 
-    def row_forms(self, pitches: Floats, firsts: NDArray[np.intp]) -> Floats:
+    def row_forms(self, pitch: float, firsts: NDArray[np.intp]) -> Floats:
         """Where samples along z are seen along the rows."""
-        scale = self._rows_per_tangent / pitches
-        sign, zero = np.sign(self.ahead[1]), np.zeros_like(pitches)
+        sign, zero = np.sign(self.ahead[1]), np.zeros(len(firsts))
+        scale = zero + self._rows_per_tangent / pitch
         numerators = -self.heights * scale, scale, zero
         return np.stack([*numerators, -sign * self.source[1], zero, sign, -firsts, zero], axis=1)
 
-    def amplitudes(self, pitches: Floats) -> Floats:
+    def amplitudes(self, pitch: float) -> Floats:
         """Weight of each slab, (n, slabs)."""
         volume = self.lines.step * self.slabs.step * self.column.step
-        scale = volume * self._bins_per_tangent * self._rows_per_tangent / pitches**2
-        weights: Floats = scale[:, None] / self.reaches(self.slabs.places) ** 2
+        scale = volume * self._bins_per_tangent * self._rows_per_tangent / pitch**2
+        weights: Floats = scale / self.reaches(self.slabs.places) ** 2
         return weights
 
 
 def _taps(widest: float, narrowest: float, footprint: str, scan: Cone | Upright) -> int:
-    if footprint == "point":
-        return 2
-    touched = widest * (1 + _SLACK) + 1 if footprint == "strip" else 2 * max(1.0, widest)
-    taps = next((n for n in _TAPS if n >= touched), None)
-    if taps is None or narrowest < _SMALLEST:
+    taps = _fitting(widest, footprint)
+    if not taps or (narrowest < _SMALLEST and footprint != "point"):
         raise InputError(
             f"Cone: pitch is {scan.pitch}, so that a sample's shadow is {narrowest:.3g} to "
             f"{widest:.3g} bins wide, {_SMALLEST} to {_TAPS[-1] - 1} are allowed: see that all "
             "lengths have one unit, or bin the data or the volume"
         )
     return taps
+
+
+def _fitting(shadow: float, footprint: str) -> int:
+    """Entries that a shadow may touch, or 0 where they are too many."""
+    if footprint == "point":
+        return 2
+    touched = shadow * (1 + _SLACK) + 1 if footprint == "strip" else 2 * max(1.0, shadow)
+    return next((n for n in _TAPS if n >= touched), 0)
 
 
 def _check_source(grid: Grid, scan: Cone | Upright) -> None:
