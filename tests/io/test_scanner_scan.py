@@ -82,6 +82,21 @@ def test_nikon_angles_beside(tmp_path: Path) -> None:
     assert np.rad2deg(open_scan(path, theta="0:360").angles[1]) == pytest.approx(30)
 
 
+def test_one_image_of_a_symmetric_sample(tmp_path: Path) -> None:
+    """A radiograph whose text names more: refused, or repeated where a person says so."""
+    path = made.nikon(tmp_path, views=3142)
+    for image in sorted(tmp_path.glob("*.tif"))[1:]:
+        image.unlink()
+    with pytest.raises(ShapeError, match="3142"):
+        open_scan(path)
+    scan = open_scan(path, repeat=36)
+    assert scan.shape == (36, 6, 10) and np.rad2deg(scan.angles[1]) == pytest.approx(10)
+    rows = scan.read(2, 4).projections
+    np.testing.assert_array_equal(rows, np.broadcast_to(made.counts()[0, 2:4], rows.shape))
+    with pytest.raises(InputError, match="--repeat"):
+        open_scan(made.nikon(tmp_path / "more"), repeat=36)
+
+
 def test_skyscan(tmp_path: Path) -> None:
     scan = open_scan(made.skyscan(tmp_path))
     cone = cone_of(scan)

@@ -249,6 +249,7 @@ def _opened(settings: AnalyzeSettings, *, values: bool) -> ScanFile:
         angle_unit=settings.angle_unit,
         geometry=settings.geometry,
         reversed=settings.reversed,
+        repeat=settings.repeat,
         values=values,
     )
 

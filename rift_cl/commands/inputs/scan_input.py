@@ -44,6 +44,9 @@ class ScanArrays:
     reversed: bool = False
     """Negate the angles, for an object that turned in the other sense than assumed; a wrong sense
     doubles edges in fan and cone beams."""
+    repeat: Auto[int] = None
+    """For a sample that is symmetric about the axis: number of views over a full turn that its one
+    TIFF image is taken for. Default: every image is one view."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +104,7 @@ class ScanInput(ScanArrays):
             angle_unit=self.angle_unit,
             geometry=self.geometry,
             reversed=self.reversed,
+            repeat=self.repeat,
             budget=self.memory_limit,
         )
         if not (fan or (scan.fan is None and scan.cone is None)):

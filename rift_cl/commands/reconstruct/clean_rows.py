@@ -215,7 +215,8 @@ class CleanRows:
             return None
         if wanted != "auto":
             return _USUAL_RINGS if wanted == "on" else wanted
-        wide = np.ptp(self._scan.angles) >= _RINGS_FROM
+        # In views that are all alike, everything is a stripe.
+        wide = np.ptp(self._scan.angles) >= _RINGS_FROM and self._settings.repeat is None
         return _USUAL_RINGS if self._scan.kind != "attenuation" and wide else None
 
     def _propagation(self, pixel: float | None) -> Propagation | None:

@@ -98,6 +98,7 @@ def open_scan(
     values: bool = True,
     geometry: str | os.PathLike[str] | None = None,
     reversed: bool = False,
+    repeat: int | None = None,
     budget: int | None = None,
 ) -> ScanFile:
     """Find the scan in a file or a folder, and settle what it holds.
@@ -147,6 +148,8 @@ def open_scan(
             .npy, .txt), or ours (.yaml, .json), whose names ``docs/tomography.md`` lists.
         reversed: the object turned the other way than the file is taken to say; the angles change
             their sign.
+        repeat: for a sample that is symmetric about the axis: its one TIFF image is taken for as
+            many views evenly over a full turn.
         budget: bytes that one ``read`` may take; 60 % of the free memory when not given.
 
     Raises:
@@ -171,6 +174,7 @@ def open_scan(
         values=values,
         geometry=None if geometry is None else os.fspath(geometry),
         reversed=reversed,
+        repeat=repeat,
     )
     if path.suffix.lower() in DESCRIPTIONS and path.is_file():
         request = replace(request, geometry=request.geometry or str(path))
@@ -181,6 +185,8 @@ def open_scan(
 def _opened(path: Path, request: ScanRequest, budget: int | None) -> ScanFile:
     """The scan in a file or a folder that holds projections."""
     suffix = path.suffix.lower()
+    if request.repeat is not None and not (path.is_dir() or suffix in (".tif", ".tiff")):
+        raise InputError(f"{path}: repeat= (--repeat) is for one TIFF image")
     known_suffix = suffix in _READERS or suffix in SCAN_READERS
     if not known_suffix and path.is_dir():
         return open_tiff_scan(path, request, budget=budget)

@@ -55,6 +55,7 @@ class ScanRequest:
         values: whether what the values are is to be settled; ``kind`` means nothing otherwise.
         geometry: a file that says where source and detector stand: see ``open_scan``.
         reversed: the object turned the other way than the file is taken to say.
+        repeat: number of views over a full turn that one image stands for; see ``open_scan``.
     """
 
     dataset: str | None = None
@@ -68,6 +69,7 @@ class ScanRequest:
     values: bool = True
     geometry: str | None = None
     reversed: bool = False
+    repeat: int | None = None
 
 
 class RowSource(Protocol):

@@ -34,6 +34,8 @@ from rift_cl.io.scans.tiff_folder import (
 from rift_cl.io.scans.tiff_frames import TiffRows, TiffStack, tiff_stack
 
 _SINOGRAMS = frozenset(("sino", "sinos", "sinogram", "sinograms"))
+# Views that an image may be repeated for.
+_MOST_REPEATED = 100_000
 _ANGLE_NAMES = tuple(name + suffix for name in ("angles", "theta") for suffix in SUFFIXES)
 
 
@@ -74,8 +76,11 @@ def open_tiff_scan(path: Path, request: ScanRequest, *, budget: int | None) -> S
     place = _folder(path, beam) if path.is_dir() else _file(path)
     place = replace(place, beam=beam, notes=(*told, *place.notes))
     stack = tiff_stack(place.files)
-    _check_complete(place, stack, request)
     angles, notes = _angles(place, request.theta)
+    if request.repeat is not None:
+        stack, angles, notes = _repeated(place, stack, request.repeat)
+    else:
+        _check_complete(place, stack, request)
     stack = replace(stack, axes=_axes(place, stack, angles, request))
     flats, flats_from = _calibration(place, "flats", request.flats, stack)
     darks, darks_from = _calibration(place, "darks", request.darks, stack)
@@ -111,6 +116,26 @@ def _beam(path: Path, request: ScanRequest) -> tuple[AnyBeam | None, tuple[str, 
     if described is None:
         return None, ()
     return read_beam(described), (f"Source and detector are those of {described.name}.",)
+
+
+def _repeated(
+    place: _Place, stack: TiffStack, count: int
+) -> tuple[TiffStack, AngleList | None, tuple[str, ...]]:
+    """One image as so many views of a sample that looks the same from all sides."""
+    images = len(stack.files) * stack.pages
+    if images != 1 or not 2 <= count <= _MOST_REPEATED:
+        raise InputError(
+            f"{place.path}: repeat is {count} (--repeat) with {images} images: wanted one image, "
+            f"and from 2 to {_MOST_REPEATED} views"
+        )
+    return (
+        replace(stack, files=stack.files * count),
+        angle_list.even_turn("360"),
+        (
+            f"The one image was taken for {count} views over a full turn, as of a sample that is "
+            "symmetric about the axis (--repeat).",
+        ),
+    )
 
 
 def _check_complete(place: _Place, stack: TiffStack, request: ScanRequest) -> None:
