@@ -78,11 +78,16 @@ def matrices(scan, found, along_z):
         yield reading_matrix(places, upright.rows, upright.bins)
 
 
+def reading(device, scan, found):
+    tilted, upright = (scan.rows, scan.bins), (found.upright.rows, found.upright.bins)
+    return Rectification(device, tilted, upright, found.views, found.forms, np.dtype(np.float32))
+
+
 def test_reading_and_its_transpose_equal_the_matrices(device, case):
     scan, along_z = case
     found = rectified(GRID, scan, along_z=along_z)
     assert len(found.views) == scan.views
-    read = Rectification(device, scan, found, np.dtype(np.float32))
+    read = reading(device, scan, found)
     random = np.random.default_rng(1)
     upright = random.standard_normal((scan.views, found.upright.rows, found.upright.bins))
     data = random.standard_normal((scan.views, scan.rows, scan.bins))
@@ -105,7 +110,7 @@ def test_smooth_views_are_read_as_they_are(device):
     rows = (np.arange(upright.rows) - upright.center[0]) * upright.pitch[0]
     columns = (np.arange(upright.bins) - upright.center[1]) * upright.pitch[1]
     smooth = np.exp(-(rows[:, None] ** 2 + columns**2) / (2 * 6.0**2))
-    read = Rectification(device, scan, found, np.dtype(np.float32))
+    read = reading(device, scan, found)
     out = device.empty((scan.views, scan.rows, scan.bins))
     views = np.broadcast_to(smooth, (scan.views, *smooth.shape))
     read.read(device.array(views, np.float32), out, 0, scan.views)

@@ -180,3 +180,22 @@ def test_vectors_that_are_no_circle_are_refused_with_the_methods_that_take_them(
     source[4, 2] += 3.0
     with pytest.raises(InputError, match=r"view 4.*cgls"):
         fbp(Projector(GRID, replace(vectors, source=source), device=device), np.zeros(1))
+
+
+def test_tilted_detectors_are_read_as_upright_ones(device):
+    scan = circle(FULL[::2])
+    level, random = scan.vectors(), np.random.default_rng(4)
+    turn, shift = np.deg2rad(3) * random.standard_normal((2, 45)), random.standard_normal((45, 1))
+    roll = turn[0][:, None] * scan.pitch[1]
+    across, down = level.across + roll * [0, 0, 1], level.down - roll * level.across / scan.pitch[1]
+    tilted = replace(level, middle=level.middle + shift * across, across=across, down=down)
+    y = phantom.project(HEAD, GRID, tilted)
+
+    def off(volume):
+        return np.sqrt(np.mean((volume - HEAD_VOLUME)[RADIUS < 0.45 * N] ** 2))
+
+    F = FDK(Projector(GRID, tilted, device=device))
+    best = off(fbp(Projector(GRID, scan, device=device), phantom.project(HEAD, GRID, scan)))
+    assert off(F(y)) < 1.3 * best
+    assert off(fbp(Projector(GRID, scan, device=device), y)) > 1.5 * best
+    assert rift.dot_test(F) < 1e-7

@@ -5,30 +5,36 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
-from rift_cl.geometry import Vectors
-from rift_cl.operators.projector.upright import Rectified
 
 
 class Rectification:
-    """The map from upright views to those of a ``Vectors`` scan, by Keys' cubic.
+    """The map from upright views to those of tilted detectors, by Keys' cubic.
 
     Args:
         device: where it runs.
-        scan: the scan.
-        rectified: some of its views, and their upright detectors.
+        tilted: (rows, bins) of the detectors that read.
+        upright: (rows, bins) of those that are read.
+        views: (n,) int32, which views of the tilted data they are.
+        forms: (n, 18), as ``kernels/include/upright.h`` reads them.
         dtype: of all arrays.
     """
 
     def __init__(
-        self, device: Device, scan: Vectors, rectified: Rectified, dtype: np.dtype[Any]
+        self,
+        device: Device,
+        tilted: tuple[int, int],
+        upright: tuple[int, int],
+        views: NDArray[np.int32],
+        forms: NDArray[np.float64],
+        dtype: np.dtype[Any],
     ) -> None:
-        self._device, self._rows, self._bins = device, scan.rows, scan.bins
-        self._upright = rectified.upright
-        self._forms = device.array(rectified.forms, dtype)
-        self._views = device.array(rectified.views)
+        self._device, (self._rows, self._bins), self._upright = device, tilted, upright
+        self._forms = device.array(forms, dtype)
+        self._views = device.array(views)
         self._double = int(dtype == np.float64)
 
     @property
@@ -53,7 +59,8 @@ class Rectification:
 
     def spread(self, data: DeviceArray, upright: DeviceArray, first: int, count: int) -> None:
         """The transpose: write the upright views of a run."""
-        work = self._upright.bins, self._upright.rows, count
+        rows, bins = self._upright
+        work = bins, rows, count
         self._launch("upright_spread", upright, data, first, work)
 
     def _launch(
@@ -76,8 +83,8 @@ class Rectification:
             first=first,
             rows=self._rows,
             bins=self._bins,
-            upright_rows=self._upright.rows,
-            upright_bins=self._upright.bins,
+            upright_rows=self._upright[0],
+            upright_bins=self._upright[1],
             DOUBLE=self._double,
             **macros,
         )

@@ -150,8 +150,10 @@ class _Part:
 
     @cached_property
     def rectification(self) -> Rectification:
-        owner = self._owner
-        return Rectification(owner.device, owner.scan, self.found, owner.dtype)
+        owner, found = self._owner, self.found
+        tilted = owner.scan.rows, owner.scan.bins
+        upright = found.upright.rows, found.upright.bins
+        return Rectification(owner.device, tilted, upright, found.views, found.forms, owner.dtype)
 
     def seen(self, volume: DeviceArray) -> DeviceArray:
         """The volume as these views see it, with y and z exchanged or as it is."""

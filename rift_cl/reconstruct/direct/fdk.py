@@ -34,8 +34,10 @@ from rift_cl.geometry import Cone, Fan, Grid, Scan, Vectors, at_axis
 from rift_cl.operators.filters.ramp_filters import Filter, FilterLike, ViewFilter, as_filter
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.operators.projector.projector import Projector
+from rift_cl.operators.projector.rectification import Rectification
 from rift_cl.reconstruct.direct.ray_factors import RayFactors
 from rift_cl.reconstruct.direct.redundancy import ITERATE, redundancy
+from rift_cl.reconstruct.direct.upright_views import upright_cone
 
 Floats = NDArray[np.float64]
 
@@ -47,7 +49,8 @@ class FDK(LinearOperator):
     """Filtered backprojection of a cone or a fan, from projections to a volume or an image.
 
     Args:
-        A: the projector whose grid and scan to use.
+        A: the projector whose grid and scan to use. The detectors of ``Vectors`` may be tilted,
+            rolled and shifted in every view, as long as the source goes round a circle.
         filter: along the detector's rows, as ``fbp`` takes it.
         compensate: what each view stands for: None, ``voronoi`` or ``uniform``, see ``redundancy``.
 
@@ -60,7 +63,7 @@ class FDK(LinearOperator):
     ) -> None:
         super().__init__(A.range, A.domain, A.device, A.dtype)
         self._given, self._compensate, self.filter = A, compensate, as_filter(filter)
-        scan = _circle(A.scan)
+        scan, self._reading = _circle(A)
         counted = redundancy(scan, compensate)
         before, after = counted.missing
         wide = _widened(scan, before, after)
@@ -93,6 +96,9 @@ class FDK(LinearOperator):
         return [repr(self.filter), self.sentence, *self._given._facts()]
 
     def _apply(self, x: Any, out: Any) -> None:
+        if self._reading is not None:
+            tilted, x = x, self.device.empty(self.domain, self.dtype)
+            self._reading.read(tilted, x, 0, len(x))
         rays = self.device.empty(self._wide, self.dtype)
         self._into.widen(x, rays)
         filtered = self.device.empty(self._wide, self.dtype)
@@ -107,7 +113,12 @@ class FDK(LinearOperator):
         self._out_of.widen(rays, rays)
         filtered = self.device.empty(self._wide, self.dtype)
         self._filter._apply_adjoint(rays, filtered)
-        self._into.narrow(filtered, out)
+        if self._reading is None:
+            self._into.narrow(filtered, out)
+            return
+        upright = self.device.empty(self.domain, self.dtype)
+        self._into.narrow(filtered, upright)
+        self._reading.spread(upright, out, 0, len(out))
 
     @property
     def scratch(self) -> int:
@@ -161,14 +172,35 @@ def amplitude(grid: Grid, scan: Fan | Cone) -> float:
     return math.prod(scan.pitch) / scan.magnification**2 / math.prod(grid.spacing)
 
 
-def _circle(scan: Scan | None) -> Fan | Cone:
-    beam = as_beam(scan)
+def _circle(A: Projector) -> tuple[Fan | Cone, Rectification | None]:
+    """The circular scan that a projector's is, and how its upright views are read if any are not.
+
+    Raises:
+        InputError: the source leaves a circle; the sentence names the methods that take it.
+    """
+    if isinstance(A.scan, Vectors):
+        try:
+            return Cone.of_vectors(A.scan), None
+        except InputError:
+            return _untilted(A, A.scan)
+    beam = as_beam(A.scan)
     if isinstance(beam, Cone) and np.ptp(beam.heights) > _LEVEL * beam.source_to_axis:
         raise InputError(
             f"scan: heights range over {np.ptp(beam.heights):.3g}, a helix or steps, and filtered "
             f"backprojection wants a circle; {ITERATE}"
         )
-    return beam
+    return beam, None
+
+
+def _untilted(A: Projector, scan: Vectors) -> tuple[Cone, Rectification]:
+    try:
+        cone, forms = upright_cone(scan)
+    except InputError as failure:
+        raise InputError(
+            f"filtered backprojection wants a circular scan; {failure}; {ITERATE}"
+        ) from None
+    shape, views = (scan.rows, scan.bins), np.arange(scan.views, dtype=np.int32)
+    return cone, Rectification(A.device, shape, shape, views, forms, A.dtype)
 
 
 def _widened(scan: Fan | Cone, before: int, after: int) -> Fan | Cone:
