@@ -66,7 +66,17 @@ if TYPE_CHECKING:
         register_filter,
     )
     from rift_cl.progress import Report
-    from rift_cl.reconstruct import AxisEstimate, backproject, cgls, fbp, find_center, sirt, tv
+    from rift_cl.reconstruct import (
+        AxisEstimate,
+        Calibration,
+        backproject,
+        calibrate,
+        cgls,
+        fbp,
+        find_center,
+        sirt,
+        tv,
+    )
     from rift_cl.sampling import Constraints, Observations, Plan, Target, next_views, plan
     from rift_cl.sampling.coverage.device import coverage
     from rift_cl.sampling.criteria.merit import merit
@@ -76,6 +86,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Aperture",
     "AxisEstimate",
+    "Calibration",
     "Camera",
     "CameraType",
     "Cone",
@@ -104,6 +115,7 @@ __all__ = [
     "analyze",
     "backproject",
     "basis",
+    "calibrate",
     "cgls",
     "cheapest_projector",
     "coverage",
@@ -180,7 +192,17 @@ __getattr__, __dir__ = lazy_names(
             "register_filter",
         ),
         "progress": ("Report",),
-        "reconstruct": ("AxisEstimate", "backproject", "cgls", "fbp", "find_center", "sirt", "tv"),
+        "reconstruct": (
+            "AxisEstimate",
+            "Calibration",
+            "backproject",
+            "calibrate",
+            "cgls",
+            "fbp",
+            "find_center",
+            "sirt",
+            "tv",
+        ),
         "sampling": ("Constraints", "Observations", "Plan", "Target", "next_views", "plan"),
         "sampling.coverage.device": ("coverage",),
         "sampling.criteria.merit": ("merit",),

@@ -4,6 +4,7 @@ Methods see linear operators only.
 """
 
 from rift_cl.reconstruct.axis import AxisEstimate, find_center
+from rift_cl.reconstruct.calibration import Calibration, calibrate
 from rift_cl.reconstruct.direct.fan_rebin import rebin_fan
 from rift_cl.reconstruct.direct.fdk import FDK
 from rift_cl.reconstruct.direct.filtered_backprojection import (
@@ -31,6 +32,7 @@ __all__ = [
     "FDK",
     "Attenuation",
     "AxisEstimate",
+    "Calibration",
     "Cgls",
     "DirectionWeights",
     "Disc",
@@ -44,6 +46,7 @@ __all__ = [
     "Sirt",
     "attenuation",
     "backproject",
+    "calibrate",
     "cgls",
     "extended",
     "fbp",

@@ -9,11 +9,13 @@ them leave the detector on one side.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from rift_cl.geometry import Fan
 
 Floats = NDArray[np.float64]
 Kind = Literal["porous", "parts", "texture"]
@@ -53,14 +55,50 @@ class AxisCase:
         views = round(VIEWS * self.bins * self.turn / 180)
         return np.arange(views) * np.deg2rad(self.turn) / views
 
+    def fan(self, half_angle: float) -> Fan:
+        """A fan to so many degrees on either side, half a turn longer by its whole angle."""
+        span = 2 * np.pi if self.turn == 360 else np.pi + 2.6 * np.deg2rad(half_angle)
+        views = round(VIEWS * self.bins * span / np.pi)
+        detector = 1.5 * self.bins / 2 / np.tan(np.deg2rad(half_angle))
+        angles = np.arange(views) * span / views
+        return Fan(angles, self.bins, 1.5, detector / 1.5, detector, self.center)
+
+    def fan_sinogram(self, half_angle: float) -> NDArray[np.float32]:
+        """Noisy line integrals of that fan, (angle, bin)."""
+        random = np.random.default_rng(self.seed)
+        ellipses = _objects(self.kind, self.bins, random)
+        return _noisy(fan_project(ellipses, self.fan(half_angle)), self.noise, random)
+
     def sinogram(self, angles: Floats | None = None) -> NDArray[np.float32]:
         """Noisy line integrals, (angle, bin)."""
         angles = self.angles if angles is None else angles
         random = np.random.default_rng(self.seed)
         ellipses = _objects(self.kind, self.bins, random)
         clean = project(ellipses, angles, self.bins, self.center)
-        noisy = clean + self.noise * clean.max() * random.standard_normal(clean.shape)
-        return noisy.astype(np.float32)
+        return _noisy(clean, self.noise, random)
+
+
+def fan_project(ellipses: Floats, fan: Fan) -> Floats:
+    """Line integrals of a sum of ellipses along a fan's rays, the mean of two in each bin.
+
+    Args:
+        ellipses: as for ``project``.
+        fan: its bins are one apart at the axis.
+
+    Returns:
+        (angle, bin), in values times bins.
+    """
+    fine = replace(fan, bins=2 * fan.bins, pitch=fan.pitch / 2, center=2 * fan.center + 0.5)
+    gamma = fine.fan_angles()
+    angles = fan.angles[:, None] - gamma
+    t = fan.source_to_axis * np.sin(gamma)
+    total = np.zeros(angles.shape)
+    for value, x, y, long, short, turned in ellipses:
+        square = (long * np.cos(angles - turned)) ** 2 + (short * np.sin(angles - turned)) ** 2
+        away = t - x * np.cos(angles) - y * np.sin(angles)
+        total += 2 * value * long * short * np.sqrt(np.maximum(square - away**2, 0)) / square
+    means: Floats = total.reshape(fan.views, fan.bins, 2).mean(axis=2)
+    return means
 
 
 def project(ellipses: Floats, angles: Floats, bins: int, center: float) -> Floats:
@@ -94,6 +132,11 @@ def project(ellipses: Floats, angles: Floats, bins: int, center: float) -> Float
             mean,
         )
     return total[:, :bins]
+
+
+def _noisy(clean: Floats, noise: float, random: np.random.Generator) -> NDArray[np.float32]:
+    noisy = clean + noise * clean.max() * random.standard_normal(clean.shape)
+    return noisy.astype(np.float32)
 
 
 def _objects(kind: Kind, bins: int, random: np.random.Generator) -> Floats:

@@ -1,0 +1,57 @@
+"""A scan's geometry from its data: centre, sense, roll and distance of the detector."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fan_scenes import FULL, KINDS, body, cone, fan, noisy, projections, sinogram
+
+import rift_cl as rift
+from rift_cl.phantom import project
+from rift_cl.reconstruct.calibration import rolled
+
+
+def test_centre_sense_and_roll_of_a_cone():
+    true = cone(rows=40, center=(19.5, 83.7))
+    vectors = rolled(true, np.deg2rad(0.8))
+    y = noisy(project(body(), rift.Grid((4, 4, 4)), vectors, dtype=np.float64), 0.01, 0)
+    found = rift.calibrate(y, replace(true, angles=-true.angles, center=(19.5, 82.0)))
+    assert found.axis.sense.sign == -1
+    assert found.axis.center == pytest.approx(83.7, abs=0.1)
+    assert np.rad2deg(found.roll[0]) == pytest.approx(0.8, abs=0.15)
+    assert abs(found.roll[0]) > found.roll[1]
+    assert isinstance(found.scan, rift.Vectors)
+    assert np.abs(found.scan.middle - vectors.middle).max() < 0.2
+    assert "roll" in found.in_words()
+    assert found.disagreement[1] < found.disagreement[0]
+
+
+@pytest.mark.full
+def test_an_upright_detector_stays_a_cone():
+    scan = cone(rows=40, center=(19.5, 83.7))
+    found = rift.calibrate(projections(scan), replace(scan, center=(19.5, 83.0)))
+    assert isinstance(found.scan, rift.Cone)
+    assert found.scan.center == (19.5, found.axis.center)
+    assert found.scan.source_to_detector == scan.source_to_detector
+
+
+def test_the_distance_of_the_detector():
+    scan = fan(FULL)
+    y = sinogram(KINDS["porous"], scan)
+    wrong = replace(scan, source_to_detector=1.05 * scan.source_to_detector)
+    found = rift.calibrate(y, wrong, distance=True)
+    assert found.roll is None
+    assert found.distance[0] == pytest.approx(1 / 1.05, abs=0.02)
+    assert abs(found.distance[0] - 1 / 1.05) < found.distance[1]
+    assert found.scan.source_to_detector == pytest.approx(scan.source_to_detector, rel=0.02)
+
+
+def test_a_rolled_detector_shows_the_axis_along_a_slope():
+    scan = cone(rows=40, center=(10.0, 83.7))
+    vectors = rolled(scan, np.deg2rad(10.0))
+    row, bin = 30.0, 83.7 + 20 * np.tan(np.deg2rad(10.0))
+    place = vectors.middle + (row - 19.5) * vectors.down
+    place = place + (bin - (scan.bins - 1) / 2) * vectors.across
+    across = place - scan.vectors().source
+    along = np.stack([np.cos(scan.angles), np.sin(scan.angles)], axis=1)
+    assert np.abs((across[:, :2] * along).sum(axis=1)).max() < 1e-9
