@@ -62,6 +62,13 @@ static lanes_int first_ray(lanes a, lanes s, lanes rho, __global const real *vie
   return floor_int(place) + 1;
 }
 
+/* How many rays a pixel of a slab reaches at most. */
+static int rays_in_reach(real rho, __global const real *view) {
+  const real spanned = view[RAYS] * rho;
+  const real most = spanned > view[LEAST_RAYS] ? spanned : view[LEAST_RAYS];
+  return (int)(most < view[MOST_RAYS] - 1 ? most : view[MOST_RAYS] - 1) + 1;
+}
+
 /* What a pixel of line `a` has of `count` rays in slab s, the first of them being `at`. */
 static lanes of_rays(
     lanes a, lanes s, lanes rho, __global const real *rays, const int *at, int count)
@@ -98,6 +105,7 @@ KERNEL void fan_backproject(
   const lanes column = (real)x + LANE_NUMBERS;
   const real middle_x = (real)0.5f * (width - 1), middle_y = (real)0.5f * (height - 1);
   lanes sums[ROWS], depths[ROWS];
+  int counts[ROWS];
   int rays[ROWS * LANES] __attribute__((aligned(sizeof(int) * LANES)));
   for (int n = 0; n < rows; n++) sums[n] = 0;
   for (int k = 0; k < count; k++) {
@@ -105,21 +113,29 @@ KERNEL void fan_backproject(
     __global const real *record = records + 4L * k * stride;
     const int along_y = view[ALONG_Y] > 0;
     const real inverse_depth = view[INVERSE_DEPTH];
-    for (int n = 0; n < rows; n++) {
-      const lanes row = (lanes)(real)(y + n);
-      const lanes s = along_y ? row - middle_y : column - middle_x;
-      const lanes rho = 1.0f / (1.0f + s * inverse_depth);
-      depths[n] = rho;
-      KEEP_INTS(rays + n * LANES, first_ray(along_y ? column : row, s, rho, view, bins));
+    if (along_y) {
+      for (int n = 0; n < rows; n++) {
+        const real rho = 1.0f / (1.0f + (y + n - middle_y) * inverse_depth);
+        depths[n] = rho;
+        counts[n] = rays_in_reach(rho, view);
+      }
+    } else {
+      const lanes rho = 1.0f / (1.0f + (column - middle_x) * inverse_depth);
+      const int reached = rays_in_reach(largest_lane(rho), view);
+      for (int n = 0; n < rows; n++) {
+        depths[n] = rho;
+        counts[n] = reached;
+      }
     }
     for (int n = 0; n < rows; n++) {
-      const lanes row = (lanes)(real)(y + n);
-      const lanes s = along_y ? row - middle_y : column - middle_x;
-      const lanes rho = depths[n];
-      const real spanned = view[RAYS] * largest_lane(rho);
-      const real most = spanned > view[LEAST_RAYS] ? spanned : view[LEAST_RAYS];
-      const int reached = (int)(most < view[MOST_RAYS] - 1 ? most : view[MOST_RAYS] - 1) + 1;
-      sums[n] = sums[n] + of_rays(along_y ? column : row, s, rho, record, rays + n * LANES, reached);
+      const lanes row = (lanes)(real)(y + n), s = along_y ? row - middle_y : column - middle_x;
+      const lanes_int ray = first_ray(along_y ? column : row, s, depths[n], view, bins);
+      KEEP_INTS(rays + n * LANES, ray);
+    }
+    for (int n = 0; n < rows; n++) {
+      const lanes row = (lanes)(real)(y + n), s = along_y ? row - middle_y : column - middle_x;
+      sums[n] = sums[n] + of_rays(
+          along_y ? column : row, s, depths[n], record, rays + n * LANES, counts[n]);
     }
   }
   for (int n = 0; n < rows; n++) {
