@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import rift_cl as rift
 from bench.case import Case
+from bench.cones import CONE_COSTS, cone_tasks
 from bench.corrections import CORRECTION_COSTS, correction_tasks
 from bench.costs import Cost
 from bench.coverages import COVERAGE_COSTS, coverage_tasks
@@ -31,6 +32,7 @@ KNOWN: Mapping[str, Cost] = {
     **VOLUME_COSTS,
     **SPLINE_COSTS,
     **COVERAGE_COSTS,
+    **CONE_COSTS,
     **CORRECTION_COSTS,
     **COSTS,
 }
@@ -65,6 +67,7 @@ def groups(device: rift.Device, case: Case) -> list[Group]:
         Group(f"a step of conjugate gradients, {case.name}", partial(step_tasks, *at)),
         Group(f"splines, {case.name}", partial(spline_tasks, *at)),
         Group(f"the fast projector, {case.name}", partial(fast_tasks, *at)),
+        Group("beams from a point", partial(cone_tasks, *at)),
         Group("corrections of projections", partial(correction_tasks, device, views, n)),
         Group("coverage", partial(coverage_tasks, device, views, quarter)),
         Group("splats with modes", partial(mode_tasks, device, 16 * n, n // 2)),
