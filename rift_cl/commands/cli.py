@@ -326,13 +326,13 @@ COMMANDS = {
         _reconstruct,
         "reconstruct.settings",
         "ReconstructSettings",
-        "Reconstruct a parallel-beam or fan-beam scan, slice by slice.",
+        "Reconstruct a scan of parallel, fan or cone beams.",
     ),
     "center": Command(
         _center,
         "center.settings",
         "CenterSettings",
-        "Find the rotation axis of a parallel-beam scan.",
+        "Find the rotation axis of a scan.",
     ),
     "fit photos": Command(
         _fit_photos,

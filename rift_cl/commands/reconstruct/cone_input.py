@@ -204,9 +204,10 @@ class ConeInput:
         try:
             found = find_axis(self.file, self.device)
         except InputError as error:
+            reason = str(error).removeprefix(f"{self.file.path}: ")
             self.notes.append(
-                f"The axis was taken to be that of {told}, bin {cone.center[1]:.2f}, since it was "
-                f"not found (--center): {error}"
+                f"The axis was taken to be that of {told}, bin {cone.center[1]:.2f} (--center), "
+                f"since the data do not tell it: {reason}."
             )
             return {"center": cone.center[1], "by": told}
         self.center = found.center

@@ -206,7 +206,7 @@ class ResumableRun(RepeatableRun):
 class ReconstructSettings(
     ResumableRun, VolumeOutput, CorrectionOptions, GeometryOptions, MethodOptions, ScanInput
 ):
-    """Reconstruct a parallel-beam or fan-beam scan, slice by slice.
+    """Reconstruct a scan: parallel and fan beams slice by slice, a cone beam's volume at once.
 
     Example: rift reconstruct scan.h5 --out slices --filter shepp-logan --format zarr
     """
