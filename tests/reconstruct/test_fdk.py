@@ -16,7 +16,7 @@ import rift_cl as rift
 from rift_cl import Cone, Grid, Projector, backproject, fbp, phantom
 from rift_cl.errors import InputError
 from rift_cl.operators import as_filter
-from rift_cl.reconstruct import FDK
+from rift_cl.reconstruct import FDK, extended
 from rift_cl.reference import filter_rows
 
 pytestmark = pytest.mark.once
@@ -199,3 +199,18 @@ def test_tilted_detectors_are_read_as_upright_ones(device):
     assert off(F(y)) < 1.3 * best
     assert off(fbp(Projector(GRID, scan, device=device), y)) > 1.5 * best
     assert rift.dot_test(F) < 1e-7
+
+
+def test_a_ball_wider_than_the_detector_is_level_where_rows_are_continued(device):
+    cut = replace(circle(FULL[::2]), bins=16, center=(15.5, 7.5))
+    y = phantom.project([BALL], GRID, cut)
+    longer, wide = extended(y, cut, bins=6)
+    assert (wide.bins, wide.center) == (28, (15.5, 13.5))
+
+    def rise(scan, data):
+        """How much brighter the border of what is seen is than its middle."""
+        plane = fbp(Projector(GRID, scan, device=device), data)[15:17]
+        away = np.hypot(AWAY[:, None], AWAY)
+        return plane[:, (away > 6) & (away < 7)].mean() - plane[:, away < 3].mean()
+
+    assert abs(rise(wide, longer)) < 0.5 * rise(cut, y)

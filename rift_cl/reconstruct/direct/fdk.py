@@ -22,7 +22,7 @@ and densities fall off.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -35,6 +35,7 @@ from rift_cl.operators.filters.ramp_filters import Filter, FilterLike, ViewFilte
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.operators.projector.projector import Projector
 from rift_cl.operators.projector.rectification import Rectification
+from rift_cl.reconstruct.direct.padding import wider
 from rift_cl.reconstruct.direct.ray_factors import RayFactors
 from rift_cl.reconstruct.direct.redundancy import ITERATE, redundancy
 from rift_cl.reconstruct.direct.upright_views import upright_cone
@@ -66,7 +67,7 @@ class FDK(LinearOperator):
         scan, self._reading = _circle(A)
         counted = redundancy(scan, compensate)
         before, after = counted.missing
-        wide = _widened(scan, before, after)
+        wide = wider(scan, before, after)
         self._A = _backprojector(A, wide)
         self.sentence: str = counted.sentence
         """What was chosen for the scan's span and detector, for a reader."""
@@ -201,15 +202,6 @@ def _untilted(A: Projector, scan: Vectors) -> tuple[Cone, Rectification]:
         ) from None
     shape, views = (scan.rows, scan.bins), np.arange(scan.views, dtype=np.int32)
     return cone, Rectification(A.device, shape, shape, views, forms, A.dtype)
-
-
-def _widened(scan: Fan | Cone, before: int, after: int) -> Fan | Cone:
-    """The scan with so many more bins before the first and after the last."""
-    bins = scan.bins + before + after
-    if isinstance(scan, Fan):
-        return replace(scan, bins=bins, center=scan.center + before)
-    row, bin = scan.center
-    return replace(scan, bins=bins, center=(row, bin + before))
 
 
 def _backprojector(A: Projector, scan: Fan | Cone) -> Projector:

@@ -10,13 +10,17 @@ stays unknown, so that the level inside is right only up to a slow change.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.geometry import Parallel
+from rift_cl.geometry import Cone, Fan, Parallel
 
 Stack = NDArray[np.float32]
+Beam = TypeVar("Beam", bound=Parallel | Fan | Cone)
 
 # Bins at each end whose mean is the value that is continued, as a share of the detector.
 _END = 0.01
@@ -36,14 +40,12 @@ def is_truncated(projections: Stack) -> bool:
     return strong > 0 and float(max(ends)) > _TRUNCATED * strong
 
 
-def extended(
-    projections: Stack, scan: Parallel, *, bins: int | None = None
-) -> tuple[Stack, Parallel]:
+def extended(projections: Stack, scan: Beam, *, bins: int | None = None) -> tuple[Stack, Beam]:
     """Continue every view on both sides by its last value, which falls off to zero.
 
     Args:
         projections: line integrals, (angle, bin) or (angle, row, bin).
-        scan: their geometry.
+        scan: their geometry, parallel, a fan or a cone.
         bins: added on each side; the detector's own width if not given.
 
     Returns:
@@ -62,8 +64,16 @@ def extended(
     fall = (0.5 + 0.5 * np.cos(np.pi * (np.arange(added) + 0.5) / added)).astype(np.float32)
     left, right = (end[..., None] for end in _ends(stack))
     longer = np.concatenate([left * fall[::-1], stack, right * fall], axis=-1)
-    wide = Parallel(scan.angles, scan.bins + 2 * added, scan.pitch, scan.center + added)
-    return longer, wide
+    return longer, wider(scan, added, added)
+
+
+def wider(scan: Beam, before: int, after: int) -> Beam:
+    """The scan with so many more bins before the first of its detector and after the last."""
+    bins = scan.bins + before + after
+    if isinstance(scan, Cone):
+        row, bin = scan.center
+        return replace(scan, bins=bins, center=(row, bin + before))
+    return replace(scan, bins=bins, center=scan.center + before)
 
 
 def _ends(projections: Stack) -> tuple[Stack, Stack]:
