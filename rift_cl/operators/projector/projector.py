@@ -74,6 +74,10 @@ def _kind(grid: Grid, scan: Any) -> type[Projector]:
         from rift_cl.operators.projector.fan_projector import FanProjector
 
         return FanProjector
+    if isinstance(scan, Fan):
+        from rift_cl.operators.projector.fan_slices_projector import FanSlicesProjector
+
+        return FanSlicesProjector
     if isinstance(scan, Cone):
         from rift_cl.operators.projector.slab_projector import SlabProjector
 

@@ -122,15 +122,24 @@ class SlabProjector(Projector):
                 add = True
         self._layout.volume(self.device, slabs, out)
 
+    @property
+    def _beam(self) -> Cone:
+        """The rays as those of a cone."""
+        return self.scan
+
+    @property
+    def _column(self) -> Samples:
+        """The samples along z, in the unit in which tables have them."""
+        return Samples.of(self.grid, 0)
+
     @cached_property
     def _layout(self) -> _Layout:
         return _Layout.of(self.grid, self.device, self.dtype)
 
     @cached_property
     def _walks(self) -> list[_Walk]:
-        column = Samples.of(self.grid, 0)
         return [
-            _Walk(self, table, column, along_x=way)
+            _Walk(self, table, along_x=way)
             for way, table in zip((True, False), self._tables, strict=True)
         ]
 
@@ -217,17 +226,15 @@ class _Layout(NamedTuple):
 class _Walk:
     """Views that are walked alike: their records on the device, and the kernels' launches."""
 
-    def __init__(
-        self, projector: SlabProjector, table: SlabTable, column: Samples, *, along_x: bool
-    ) -> None:
+    def __init__(self, projector: SlabProjector, table: SlabTable, *, along_x: bool) -> None:
         self._device, self._dtype = projector.device, projector.dtype
-        self._layout, self._column = projector._layout, column
+        self._layout, self._column = projector._layout, projector._column
         self._strip = int(projector.footprint == "strip")
         self._point = int(projector.footprint == "point")
-        self._arc = int(projector.scan.curved)
+        self._arc = int(projector._beam.curved)
         self._precision = projector._precision
         self.table = table
-        self.stage = SlabStretch(self._device, projector.scan, table, self._dtype)
+        self.stage = SlabStretch(self._device, projector._beam, table, self._dtype)
         self._column_forms = self._device.array(table.column_forms, self._dtype)
         self._row_forms = self._device.array(table.row_forms, self._dtype)
         self._amplitudes = self._device.array(table.amplitudes, self._dtype)

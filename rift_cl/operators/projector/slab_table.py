@@ -156,6 +156,51 @@ def slab_table(grid: Grid, scan: Cone | Upright, footprint: str, *, along_x: boo
     )
 
 
+def fan_table(
+    grid: Grid, beam: Cone, footprint: str, depth_power: int, *, along_x: bool
+) -> SlabTable:
+    """As ``slab_table``, of a fan that sees every slice alike: a table's rows are the slices.
+
+    Args:
+        grid: the volume.
+        beam: the fan as a cone that has a row for each slice.
+        footprint: ``strip``, ``linear`` or ``point``.
+        depth_power: of the inverse of the depth that a sample is weighted by; 1 is that of line
+            integrals, 2 has another factor ``source_to_axis / depth``.
+        along_x: which of the two.
+    """
+    views = np.flatnonzero(walked_along_x(grid, beam) == along_x)
+    walk = _Walk.of(grid, beam, views, along_x=along_x)
+    widest, narrowest = walk.shadows()
+    taps, row_taps = _taps(widest, narrowest, footprint, beam), 2
+    pad = -(-taps // _GROUP) * _GROUP
+    columns = -(-(pad + beam.bins + taps) // _GROUP) * _GROUP
+    padding = (0, 0), (pad, columns - pad - beam.bins)
+    slopes = np.pad(np.abs(walk.slopes), padding, mode="edge")
+    reaches = walk.reaches(walk.slabs.places)
+    area = walk.lines.step * walk.slabs.step * beam.source_to_detector / beam.pitch[1]
+    # Sample i is seen in row i, behind the empty ones.
+    form = np.array([0.0, 1.0, 0.0, 1.0, 0.0, 0.0, row_taps, 0.0])
+    return SlabTable(
+        views=views.astype(np.int32),
+        lines=walk.lines,
+        slabs=walk.slabs,
+        column_forms=walk.column_forms(beam.center[1] + pad),
+        row_forms=np.broadcast_to(form, (len(views), len(form))),
+        amplitudes=area / reaches * (beam.source_to_axis / reaches) ** (depth_power - 1),
+        firsts=np.full(len(views), -row_taps, np.int32),
+        steps=np.ones_like(slopes),
+        gains=slopes**depth_power,
+        rows=grid.slices + 2 * row_taps,
+        columns=columns,
+        pad=pad,
+        taps=taps,
+        row_taps=row_taps,
+        widest=widest,
+        wide=False,
+    )
+
+
 def ray_lengths(scan: Cone | Upright) -> Floats:
     """Length of each pixel's ray from source to detector over its reach across, (rows, bins).
 

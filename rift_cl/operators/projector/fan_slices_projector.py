@@ -1,0 +1,103 @@
+"""Line integrals of every slice of a volume along the rays of a fan, by slab tables.
+
+Slices fill the lanes as the z of a cone's volume do; a table's rows are the slices themselves.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from rift_cl.cl.device import Device
+from rift_cl.cl.discovery import default_device
+from rift_cl.errors import InputError
+from rift_cl.geometry import Cone, Fan, Grid
+from rift_cl.operators.projector.slab_projector import SlabProjector
+from rift_cl.operators.projector.slab_table import Samples, fan_table
+
+_FOOTPRINTS = ("strip", "linear")
+# Rows next to which a detector is far away: slices have no height on it.
+_FLAT = 1e-12
+
+
+class FanSlicesProjector(SlabProjector):
+    """Line integrals of every slice of a volume along the rays of a ``Fan``.
+
+    Args:
+        grid: the grid of the volume, (nz, ny, nx).
+        scan: source and detector.
+        footprint: ``strip`` or ``linear``, as those of ``SlabProjector`` along the rows.
+        device: the device to use; the default device if not given.
+        dtype: ``float32``, or ``float64`` where the device has it.
+        depth_power: of the inverse of the depth that a sample is weighted by: 1 gives line
+            integrals, 2 multiplies by ``source_to_axis / depth`` again, as filtered backprojection
+            wants it.
+
+    The domain is ``grid.shape``; the range is (views, nz, bins).
+
+    Raises:
+        InputError: as ``SlabProjector``, or ``depth_power`` is neither 1 nor 2.
+        DeviceError: the device has no float64.
+    """
+
+    scan: Any
+
+    def __init__(
+        self,
+        grid: Grid,
+        scan: Fan,
+        footprint: str = "strip",
+        device: Device | None = None,
+        dtype: DTypeLike = np.float32,
+        *,
+        depth_power: int = 1,
+    ) -> None:
+        if not isinstance(grid, Grid):
+            raise InputError(f"grid is {grid!r:.60}, wanted a Grid such as Grid((8, 256, 256))")
+        if footprint not in _FOOTPRINTS:
+            raise InputError(f"footprint is {footprint!r}, wanted 'strip' or 'linear'")
+        if depth_power not in (1, 2):
+            raise InputError(f"depth_power is {depth_power!r}, wanted 1 or 2")
+        shape = scan.views, grid.slices, scan.bins
+        # Not that of a SlabProjector, which sees rows.
+        super(SlabProjector, self).__init__(grid.shape, shape, device or default_device(), dtype)
+        self.grid, self.scan, self.footprint = grid, scan, footprint
+        self.depth_power = depth_power
+        self._tables = [
+            fan_table(grid, self._beam, footprint, depth_power, along_x=way)
+            for way in (True, False)
+        ]
+        self._precision = {"DOUBLE": int(self.dtype == np.float64)}
+
+    @cached_property
+    def _beam(self) -> Cone:  # type: ignore[override]
+        scan = self.scan
+        return Cone(
+            scan.angles,
+            self.grid.slices,
+            scan.bins,
+            (_FLAT * scan.pitch, scan.pitch),
+            scan.source_to_axis,
+            scan.source_to_detector,
+            (0, scan.center),
+            curved=scan.curved,
+        )
+
+    @property
+    def _column(self) -> Samples:
+        return Samples(self.grid.slices, 0.0, 1.0)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        make = partial(FanSlicesProjector, depth_power=self.depth_power)
+        return make, (self.grid, self.scan, self.footprint, self.device, self.dtype)
+
+    def _facts(self) -> list[str]:
+        return [
+            f"grid {' x '.join(map(str, self.grid.shape))}",
+            f"{self.scan.views} fan views of {self.scan.bins} bins",
+            f"magnification {self.scan.magnification:.3g}",
+            f"footprint {self.footprint}",
+        ]
