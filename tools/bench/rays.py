@@ -81,6 +81,7 @@ RAY_COSTS: dict[str, Cost] = {
     "slab_stretch_adjoint": _moved("ray", 0, 2, _RAYS),
     "upright_read": _moved("ray", 0, 2, _RAYS),
     "upright_spread": _moved("ray", 0, 2, _RAYS),
+    "plane_split": _moved("sample", 3, 0, "the image in, two planes out"),
     "volume_turn": _moved("sample", 2, 0, "samples in and out"),
 }
 
