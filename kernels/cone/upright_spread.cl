@@ -39,17 +39,16 @@ KERNEL void upright_spread(
     low_i = smaller(low_i, i + middle_i);
     high_i = greater(high_i, i + middle_i);
   }
-  low_k = ends > 0 ? low_k : 0.0f;
-  low_i = ends > 0 ? low_i : 0.0f;
-  high_k = ends > 0 ? high_k : (real)bins;
-  high_i = ends > 0 ? high_i : (real)rows;
-  low_k = greater(low_k - 0.01f, 0.0f);
-  high_k = smaller(high_k + 0.01f, (real)(bins - 1));
-  const real from = -largest_lane(-low_i), to = largest_lane(high_i);
-  const int i0 = from > 0 ? (int)from : 0, i1 = to < rows - 1 ? (int)to + 1 : rows - 1;
+  /* Weights end at these edges: pixels strictly between them count, and those that round to them. */
+  low_k = greater(ends > 0 ? low_k - 0.01f : -1.0f, -1.0f);
+  low_i = greater(ends > 0 ? low_i - 0.01f : -1.0f, -1.0f);
+  high_k = smaller(ends > 0 ? high_k + 0.01f : (real)bins, (real)(bins - 1));
+  high_i = smaller(ends > 0 ? high_i + 0.01f : (real)rows, (real)(rows - 1));
   low_k = smaller(low_k, (real)(bins - 1));
-  const lanes_int k0 = floor_int(low_k);
-  const int count = (int)largest_lane(high_k - TO_FLOAT(k0)) + 2;
+  const real from = -largest_lane(-low_i), to = largest_lane(high_i);
+  const int i0 = from < 0 ? 0 : (int)(from < rows ? from : rows) + 1, i1 = to < 0 ? -1 : (int)to;
+  const lanes_int k0 = floor_int(low_k) + 1;
+  const int count = (int)largest_lane(high_k - TO_FLOAT(k0)) + 1;
   lanes sum = 0;
   for (int i = i0; i <= i1; i++)
     for (int n = 0; n < count; n++) {

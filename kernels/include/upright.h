@@ -35,6 +35,7 @@ static void seen_at(
     __global const real *h, lanes k, lanes i, lanes *u, lanes *v, lanes *depth)
 {
   *depth = h[6] + h[7] * k + h[8] * i;
-  *u = (h[0] + h[1] * k + h[2] * i) / *depth;
-  *v = (h[3] + h[4] * k + h[5] * i) / *depth;
+  const lanes over = 1.0f / *depth;
+  *u = (h[0] + h[1] * k + h[2] * i) * over;
+  *v = (h[3] + h[4] * k + h[5] * i) * over;
 }
