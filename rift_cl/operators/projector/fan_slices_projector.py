@@ -73,7 +73,7 @@ class FanSlicesProjector(SlabProjector):
         self._precision = {"DOUBLE": int(self.dtype == np.float64)}
 
     @cached_property
-    def _beam(self) -> Cone:  # type: ignore[override]
+    def _beam(self) -> Cone:
         scan = self.scan
         return Cone(
             scan.angles,
