@@ -12,8 +12,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rift_cl import Cone, Grid, Parallel, Projector, dot_test, phantom
-from rift_cl.errors import InputError
+from rift_cl import Cone, Grid, Parallel, Projector, dot_test, open_device, phantom
+from rift_cl.errors import InputError, ResourceLimitError
+from rift_cl.operators.projector import slab_projector
 from rift_cl.reference.cone import ConeProjector
 
 ROUNDING = 6e-6
@@ -189,6 +190,24 @@ def test_a_source_far_away_sees_parallel_rays(device):
 def test_what_cannot_be_projected_is_refused(device, grid, scan, about):
     with pytest.raises(InputError, match=about):
         Projector(grid, scan, device=device)
+
+
+def test_runs_of_any_length_give_the_same_bits(device, monkeypatch):
+    A = Projector(Grid((9, 10, 11)), covering(11), device=device)
+    random = np.random.default_rng(10)
+    x, y = random.standard_normal(A.domain), random.standard_normal(A.range)
+    whole = A(x), A.T(y)
+    monkeypatch.setattr(slab_projector, "_TABLE_BYTES", {"cpu": 1, "gpu": 1})
+    monkeypatch.setattr(slab_projector, "_FEWEST_VIEWS", 3)
+    assert np.array_equal(A(x), whole[0])
+    assert np.array_equal(A.T(y), whole[1])
+
+
+def test_memory_is_counted_before_it_is_taken():
+    device = open_device(memory=10_000)
+    A = Projector(Grid((9, 10, 11)), covering(11), device=device)
+    with pytest.raises(ResourceLimitError, match="SlabProjector"):
+        A(np.zeros(A.domain))
 
 
 def test_an_unknown_footprint_is_refused(device):
