@@ -277,6 +277,7 @@ def test_zeiss(shared_data: Path, tmp_path: Path) -> None:
     scan = open_scan(path, flats="mean")
     assert scan.shape == (7, 256, 256) and scan.cone is None and scan.unit == "um"
     assert np.rad2deg(scan.angles[[0, -1]]) == pytest.approx([-45, 45], abs=0.1)
+    assert any("1.3 bins and 0.25 rows" in note for note in scan.notes)
     rows = scan.read(100, 102).projections
     assert rows.shape == (7, 2, 256) and 20 < rows.mean() < 400
     (tmp_path / "cone.yaml").write_text(f"{LENGTHS}\n")

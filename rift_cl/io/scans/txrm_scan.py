@@ -29,6 +29,8 @@ _TYPES = {3: "<u1", 5: "<u2", 10: "<f4"}
 _FOLDER = 100
 _REFERENCES = ("ReferenceData/Image", "MultiReferenceData/Image1")
 _CONE = 1
+# Shifts of images, in pixels, below which nothing is said of them.
+_MOVED = 0.1
 # Images, and rows and bins of one, beyond which a header is forged.
 _MOST, _WIDEST = 1 << 20, 1 << 16
 
@@ -112,6 +114,7 @@ def open_txrm_scan(path: Path, request: ScanRequest, *, budget: int | None) -> S
             reference = None
         angles = AngleList("ImageInfo/Angles", header.numbers("Angles", views), unit="degrees")
         cone, pixel = _beam(header, views)
+        shifts = header.shifts(views)
     if cone is not None:
         # The sense that CIL reads; ours is the opposite.
         angles = AngleList(angles.name, -angles.values, unit="degrees")
@@ -142,9 +145,21 @@ def open_txrm_scan(path: Path, request: ScanRequest, *, budget: int | None) -> S
         pitch=pixel,
         unit="" if pixel is None else "um",
         beam=beam,
-        notes=doubts,
+        notes=(*doubts, *_unapplied(shifts)),
     )
     return scan_of(found, request)
+
+
+def _unapplied(shifts: tuple[float, float]) -> tuple[str, ...]:
+    """A sentence about shifts of the images, which are left as they are."""
+    if max(shifts) < _MOVED:
+        return ()
+    bins, rows = shifts
+    return (
+        f"The file holds shifts of its images of up to {bins:.2g} bins and {rows:.2g} rows "
+        "(Alignment), which are not applied: where they belong to the sample, edges blur by as "
+        "much.",
+    )
 
 
 def _beam(header: _Header, views: int) -> tuple[Beam | None, float | None]:
@@ -193,6 +208,16 @@ class _Header:
         if not 1 <= value <= most:
             raise FileFormatError(f"{self.path}: ImageInfo/{name} is {value:g}, wanted 1 to {most}")
         return int(value)
+
+    def shifts(self, views: int) -> tuple[float, float]:
+        """How far images are shifted at most, in bins and rows; 0 where the file says nothing."""
+        most = []
+        for name in ("Alignment/X-Shifts", "Alignment/Y-Shifts"):
+            values = np.zeros(1, "<f4")
+            if self.ole.exists(name) and self.ole.get_size(name) >= 4 * views:
+                values = np.frombuffer(_stream(self.path, self.ole, name, 4 * views), "<f4")
+            most.append(float(np.abs(values[np.isfinite(values)]).max(initial=0)))
+        return most[0], most[1]
 
     def dtype(self) -> str:
         """Type of a sample."""
