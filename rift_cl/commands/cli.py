@@ -344,7 +344,7 @@ COMMANDS = {
         _fit_xray,
         "fit_xray.settings",
         "FitXraySettings",
-        "Fit Gaussian densities to the projections of a parallel-beam X-ray scan.",
+        "Fit Gaussian densities to the projections of a parallel-beam or cone-beam X-ray scan.",
     ),
     "eval": Command(
         _eval,

@@ -63,7 +63,7 @@ def test_a_fit_that_was_broken_off_goes_on_to_the_same_bits(scan, tmp_path):
 
 def test_negative_steps_between_solves_are_refused(scan, tmp_path, capsys):
     assert fit(scan, tmp_path / "fit", "--solve", "-5") == 3
-    assert "every is -5, wanted a whole number >= 0" in capsys.readouterr().err
+    assert "--solve is -5, wanted a whole number >= 0" in capsys.readouterr().err
     assert fit(scan, tmp_path / "fit", "--solve", "9" * 20) == 3
-    assert "every is 99999999999999999999, wanted a whole number up to" in capsys.readouterr().err
+    assert "--solve is 99999999999999999999, wanted a whole number up to" in capsys.readouterr().err
     assert not (tmp_path / "fit").exists()

@@ -172,7 +172,5 @@ def test_bad_settings_are_refused_by_name(given, words):
 def test_splats_that_hide_one_another_are_not_solved_for(device):
     pictures = pictures_of(device, scene(0))
     settings = replace(TrainSettings(steps=5), solve=SolveSettings(2))
-    with pytest.raises(
-        InputError, match=r"solve\.every is 2, which is for the densities of X-rays"
-    ):
+    with pytest.raises(InputError, match=r"every is 2, which is for the densities of X-rays"):
         Trainer(pictures, Parameters.of(device, scene(0)), settings)

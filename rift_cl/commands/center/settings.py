@@ -29,7 +29,9 @@ class CenterSearch:
 
 @dataclass(frozen=True)
 class CenterSettings(RepeatableRun, CenterSearch, ScanInput):
-    """Find the rotation axis of a scan, and of fan and cone beams the sense of rotation.
+    """Find the rotation axis of a scan.
+
+    Of fan and cone beams it finds the sense of rotation as well.
 
     Example: rift center scan.h5 --out center
     """

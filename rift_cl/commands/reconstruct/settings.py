@@ -206,7 +206,7 @@ class ResumableRun(RepeatableRun):
 class ReconstructSettings(
     ResumableRun, VolumeOutput, CorrectionOptions, GeometryOptions, MethodOptions, ScanInput
 ):
-    """Reconstruct a scan: parallel and fan beams slice by slice, a cone beam's volume at once.
+    """Reconstruct a scan of parallel, fan or cone beams.
 
     Example: rift reconstruct scan.h5 --out slices --filter shepp-logan --format zarr
     """
