@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rift_cl import FastProjector, Grid, Parallel, fbp
+from rift_cl import Cone, FastProjector, Grid, Parallel, fbp
 from rift_cl.errors import InputError
 from rift_cl.metrics import psnr
 from rift_cl.operators import cheapest_projector
@@ -75,3 +75,9 @@ def test_the_formula_loses_nothing_by_its_error(device, views, bins, pitch, nois
     fast = FastProjector(grid, scan, error, device=device)
     direct = PhaseProjector(grid, scan, device=device)
     assert psnr(fbp(fast, y), truth) > psnr(fbp(direct, y), truth) - 0.05
+
+
+def test_scans_that_are_not_parallel_have_one_projector():
+    cone = Cone([0.0, 1.0], 8, 8, 1.0, 20, 30)
+    with pytest.raises(InputError, match="Cone"):
+        cheapest_projector(Grid((4, 8, 8)), cone)

@@ -79,8 +79,14 @@ def cheapest_projector(
         device: the device to use; the default device if not given.
 
     Raises:
-        InputError: footprint and error are both given, or one of them cannot be.
+        InputError: footprint and error are both given, or one of them cannot be, or the scan is
+            not parallel.
     """
+    if not isinstance(scan, Parallel):
+        raise InputError(
+            f"scan is a {type(scan).__name__}, wanted a Parallel: other scans have one projector, "
+            "Projector(grid, scan)"
+        )
     if footprint is not None and error is not None:
         raise InputError(
             f"footprint is {footprint!r} and error {error!r}: a footprint is Projector's, an error "
