@@ -2,8 +2,8 @@
  *
  *     place(a) = origin + (n0 + n1 a + n2 b) / (d0 + d1 a + d2 b),
  *
- * with ARC 1 origin + radius * atan of the fraction; a is the coordinate of a sample, b that of its
- * slab. The edges of the sample, a -+ da/2, end its shadow. STRIP 1 shares it among the entries that
+ * with ARC 1 origin + radius * atan of the fraction; a = a0 + da (sample0 + i) is the coordinate of
+ * sample i, b that of its slab. The edges of the sample, a -+ da/2, end its shadow. STRIP 1 shares it among the entries that
  * the shadow overlaps; otherwise a hat as wide as the shadow, or two entries at least, is shared in
  * proportion to its heights; with POINT 1 it is two entries wide in any case. `places` is the first
  * entry of TAPS, `shares` what the others receive of 1 (see include/slab_table.h). A sample that is
@@ -55,7 +55,7 @@ static lanes height(lanes ahead, lanes half_width) {
 KERNEL void slab_places(
     __global int *restrict places, __global real *restrict shares,
     __global const real *restrict forms, int first, int samples, int slabs, int entries,
-    real a0, real da, real b0, real db)
+    int sample0, real a0, real da, real b0, real db)
 {
   const int i0 = (int)get_global_id(0) * RUN, slab = (int)get_global_id(1);
   const int view = (int)get_global_id(2);
@@ -64,7 +64,7 @@ KERNEL void slab_places(
   const long at = ((long)view * slabs + slab) * samples;
   const real b = b0 + db * slab, origin = f[6];
   for (int i = i0; i < i1; i += LANES) {
-    const lanes a = a0 + da * ((real)i + LANE_NUMBERS);
+    const lanes a = a0 + da * ((real)(sample0 + i) + LANE_NUMBERS);
     const lanes one = seen(f, a - 0.5f * da, b), other = seen(f, a + 0.5f * da, b);
     const lanes low = one < other ? one : other, high = one < other ? other : one;
     const lanes half_width = HALF_WIDTH(high - low);

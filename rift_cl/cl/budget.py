@@ -9,6 +9,8 @@ from __future__ import annotations
 import os
 import re
 import time
+from bisect import bisect_left
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
@@ -121,6 +123,15 @@ def cut_evenly(count: int, most: int) -> list[slice]:
     """Cut ``count`` items into as few runs of at most ``most`` as can be, as even as can be."""
     runs = -(-count // most)
     return [slice(count * k // runs, count * (k + 1) // runs) for k in range(runs)]
+
+
+def largest_pair(fits: Callable[[int, int], bool], first: int, second: int) -> tuple[int, int]:
+    """The largest numbers that fit, the second halved only where no first one does; else ones."""
+    while True:
+        most = bisect_left(range(1, first + 1), True, key=lambda n: not fits(n, second))
+        if most or second == 1:
+            return max(most, 1), second
+        second = -(-second // 2)
 
 
 def check_array(size: int, largest: int, *, what: str, instead: str = "") -> None:

@@ -264,6 +264,11 @@ class LinearOperator(ABC):
         """Bytes of device memory needed besides the input and the output."""
         return 0
 
+    @property
+    def largest_scratch(self) -> int:
+        """Bytes of the largest array among these."""
+        return 0
+
     def _chunks(self, budget: int) -> Iterable[Chunk]:
         """Chunks that fit a budget in bytes; one for the whole unless a subclass overrides it."""
         sizes = [self.dtype.itemsize * math.prod(shape) for shape in (self.domain, self.range)]
@@ -273,7 +278,7 @@ class LinearOperator(ABC):
             self.scratch,
             budget,
             what=f"{type(self).__name__} application",
-            array=max(sizes),
+            array=max(*sizes, self.largest_scratch),
             largest=self.device.traits.allocation,
         )
         return [Chunk((), ())]

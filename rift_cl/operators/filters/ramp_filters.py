@@ -255,6 +255,11 @@ class ViewFilter(LinearOperator):
         """Bytes needed besides the views that go in and come out."""
         return self._convolve.scratch
 
+    @property
+    def largest_scratch(self) -> int:
+        """Bytes of the largest array besides the views."""
+        return self._convolve.largest_array
+
     def _chunks(self, budget: int) -> Iterable[Chunk]:
         """Some views, where all are filtered alike; else some rows of all, or views by theirs."""
         if self._alike:
@@ -281,7 +286,7 @@ class ViewFilter(LinearOperator):
         """Cut an axis of so many samples."""
         array = self.dtype.itemsize * (math.prod(self.domain) // max(count, 1))
         largest = self.device.traits.allocation
-        check_array(self._convolve.largest_array, largest, what="the responses of all views")
+        check_array(self.largest_scratch, largest, what="the responses of all views")
         return plan_chunks(
             count, 2 * array, self.scratch, budget, what=what, array=array, largest=largest
         )
@@ -295,17 +300,17 @@ class ViewFilter(LinearOperator):
         views, largest = self.domain[0], self.device.traits.allocation
 
         def fits(count: int) -> bool:
-            run = self._of_views(slice(0, count))
+            run = self.of_views(slice(0, count))
             array = self.dtype.itemsize * math.prod(run.domain)
             enough = 2 * array + run.scratch <= budget
-            return enough and max(array, run._convolve.largest_array) <= largest
+            return enough and max(array, run.largest_scratch) <= largest
 
         most = bisect_left(range(1, views + 1), True, key=lambda count: not fits(count))
-        self._of_views(slice(0, max(most, 1)))._parts(1, budget, what="view with its gain")
+        self.of_views(slice(0, max(most, 1)))._parts(1, budget, what="view with its gain")
         for run in cut_evenly(views, most):
-            yield Chunk((run,), (run,), self._of_views(run))
+            yield Chunk((run,), (run,), self.of_views(run))
 
-    def _of_views(self, run: slice) -> ViewFilter:
+    def of_views(self, run: slice) -> ViewFilter:
         """The filter of some views."""
         part = ViewFilter.__new__(ViewFilter)
         shape = (run.stop - run.start, *self.domain[1:])

@@ -5,8 +5,9 @@ Slices fill the lanes as the z of a cone's volume do; a table's rows are the sli
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -16,7 +17,7 @@ from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Fan, Grid
 from rift_cl.operators.projector.slab_projector import SlabProjector
-from rift_cl.operators.projector.slab_table import Samples, fan_table
+from rift_cl.operators.projector.slab_table import Samples, SlabTable, fan_table
 
 _FOOTPRINTS = ("strip", "linear")
 # Rows next to which a detector is far away: slices have no height on it.
@@ -86,9 +87,25 @@ class FanSlicesProjector(SlabProjector):
             curved=scan.curved,
         )
 
-    @property
+    @cached_property
     def _column(self) -> Samples:
         return Samples(self.grid.slices, 0.0, 1.0)
+
+    def _part(self, z: slice, views: slice) -> FanSlicesProjector:
+        part = cast(FanSlicesProjector, super()._part(z, views))
+        part.depth_power = self.depth_power
+        # Slices are counted from the part's first, as its rows are.
+        part._column = Samples(part.grid.slices, 0.0, 1.0)
+        return part
+
+    def _rows(self, slices: int) -> int:
+        return slices
+
+    def _lower(self, table: SlabTable, slices: int) -> SlabTable:
+        return replace(table, rows=slices + 2 * table.row_taps)
+
+    def _seen(self, z: slice, views: slice) -> tuple[slice, ...]:
+        return views, z
 
     def __reduce__(self) -> tuple[Any, ...]:
         make = partial(FanSlicesProjector, depth_power=self.depth_power)

@@ -66,11 +66,6 @@ class ParallelProjector(LinearOperator):
             f"pitch {self.scan.pitch:g}",
         ]
 
-    @property
-    def _largest_scratch(self) -> int:
-        """Bytes of the largest array that a slice needs besides itself and its sinogram."""
-        return 0
-
     def _chunks(self, budget: int) -> Iterable[Chunk]:
         return self.chunks(budget)
 
@@ -90,7 +85,7 @@ class ParallelProjector(LinearOperator):
             self.scratch + fixed,
             budget,
             what="slice",
-            array=max(self.dtype.itemsize * max(image, sinogram), self._largest_scratch),
+            array=max(self.dtype.itemsize * max(image, sinogram), self.largest_scratch),
             largest=self.device.traits.allocation,
             instead=self._instead,
         )

@@ -12,8 +12,7 @@ added up in float, to the rounding of the sums.
 
 from __future__ import annotations
 
-from bisect import bisect_left
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -21,7 +20,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from rift_cl.cl.array import DeviceArray
-from rift_cl.cl.budget import cut_evenly, plan_chunks
+from rift_cl.cl.budget import cut_evenly, largest_pair, plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.errors import ResourceLimitError
 from rift_cl.geometry import Grid, Parallel
@@ -285,7 +284,8 @@ class PhaseProjector(ParallelProjector, Projector):
         return self.dtype.itemsize * numbers + self._table_bytes + records
 
     @property
-    def _largest_scratch(self) -> int:
+    def largest_scratch(self) -> int:
+        """Bytes of the larger plane, or of the orders of rows."""
         planes = self.dtype.itemsize * max(self._planes)
         return max(planes, *(table.orders.nbytes for table in self._tables))
 
@@ -348,9 +348,9 @@ class PhaseProjector(ParallelProjector, Projector):
             return need <= budget and array <= largest
 
         if image_first:
-            bands, views = _largest_pair(fits, bands, views)
+            bands, views = largest_pair(fits, bands, views)
         else:
-            views, bands = _largest_pair(lambda views, bands: fits(bands, views), views, bands)
+            views, bands = largest_pair(lambda views, bands: fits(bands, views), views, bands)
         need, array = self._part_need(min(bands * segment, rows), views)
         what = f"part of a slice ({min(bands * segment, rows)} rows in {views} views)"
         plan_chunks(1, need, 0, budget, what=what, array=array, largest=largest)
@@ -384,15 +384,6 @@ class _Walk:
         self.footprints = device.array(table.footprints.records, dtype)
         self.orders = device.array(table.orders)
         self.starts = device.array(table.starts)
-
-
-def _largest_pair(fits: Callable[[int, int], bool], first: int, second: int) -> tuple[int, int]:
-    """The largest numbers that fit, the second halved only where no first one does."""
-    while True:
-        most = bisect_left(range(1, first + 1), True, key=lambda n: not fits(n, second))
-        if most or second == 1:
-            return max(most, 1), second
-        second = -(-second // 2)
 
 
 class _Cut(NamedTuple):

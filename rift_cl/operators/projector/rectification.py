@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -33,14 +34,35 @@ class Rectification:
         dtype: np.dtype[Any],
     ) -> None:
         self._device, (self._rows, self._bins), self._upright = device, tilted, upright
-        self._forms = device.array(forms, dtype)
-        self._views = device.array(views)
+        self._host, self._dtype = (views, forms), dtype
         self._double = int(dtype == np.float64)
+
+    @cached_property
+    def _forms(self) -> DeviceArray:
+        return self._device.array(self._host[1], self._dtype)
+
+    @cached_property
+    def _views(self) -> DeviceArray:
+        return self._device.array(self._host[0])
 
     @property
     def nbytes(self) -> int:
         """Bytes of the device that the records take."""
-        return int(self._forms.nbytes + self._views.nbytes)
+        views, forms = self._host
+        return views.nbytes + self._dtype.itemsize * forms.size
+
+    def of_views(self, run: slice) -> Rectification:
+        """That of a run of the tilted views."""
+        views, forms = self._host
+        chosen = (views >= run.start) & (views < run.stop)
+        return Rectification(
+            self._device,
+            (self._rows, self._bins),
+            self._upright,
+            (views[chosen] - run.start).astype(np.int32),
+            forms[chosen],
+            self._dtype,
+        )
 
     def read(
         self, upright: DeviceArray, data: DeviceArray, first: int, count: int, slope: int = 0

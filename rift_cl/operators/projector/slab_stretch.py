@@ -53,12 +53,6 @@ class SlabStretch:
             "RUN": self._run,
         }
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the device that its records take."""
-        arrays = (a for a in self._arguments.values() if hasattr(a, "nbytes"))
-        return sum(array.nbytes for array in arrays)
-
     def fill(self, data: DeviceArray, tables: DeviceArray, first: int, count: int) -> None:
         """Write the tables of ``count`` views from ``first`` on from all data."""
         items = self._items(self._table.columns)

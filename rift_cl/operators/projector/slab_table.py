@@ -7,7 +7,7 @@ across x; both see lines along z.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,11 +40,19 @@ _REACH = 2
 
 @dataclass(frozen=True)
 class Samples:
-    """An axis of the grid: ``count`` samples from ``start`` on, ``step`` apart."""
+    """An axis of the grid, or a part of one.
+
+    Args:
+        count: how many samples there are.
+        start: coordinate of the axis' first sample.
+        step: from sample to sample.
+        first: which sample of the axis they begin with.
+    """
 
     count: int
     start: float
     step: float
+    first: int = 0
 
     @classmethod
     def of(cls, grid: Grid, axis: int) -> Samples:
@@ -54,12 +62,14 @@ class Samples:
     @property
     def places(self) -> Floats:
         """Coordinates of all of them."""
-        return self.start + self.step * np.arange(self.count, dtype=np.float64)
+        return self.start + self.step * np.arange(
+            self.first, self.first + self.count, dtype=np.float64
+        )
 
     @property
     def ends(self) -> Floats:
         """Outer edges of the first and of the last."""
-        return self.start + self.step * np.array([-0.5, self.count - 0.5], dtype=np.float64)
+        return self.start + self.step * (self.first + np.array([-0.5, self.count - 0.5]))
 
 
 @dataclass(frozen=True)
@@ -103,6 +113,20 @@ class SlabTable:
     def entries(self) -> int:
         """Numbers in one view's table."""
         return self.rows * self.columns
+
+    def of_views(self, run: slice) -> SlabTable:
+        """The table of a run of the scan's views, with the numbers of the whole."""
+        chosen = (self.views >= run.start) & (self.views < run.stop)
+        return replace(
+            self,
+            views=(self.views[chosen] - run.start).astype(np.int32),
+            column_forms=self.column_forms[chosen],
+            row_forms=self.row_forms[chosen],
+            amplitudes=self.amplitudes[chosen],
+            firsts=self.firsts[chosen],
+            steps=self.steps[chosen],
+            gains=self.gains[chosen],
+        )
 
 
 def slab_table(grid: Grid, scan: Cone | Upright, footprint: str, *, along_x: bool) -> SlabTable:

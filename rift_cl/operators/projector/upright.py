@@ -8,7 +8,7 @@ along z rather than across are seen with y and z exchanged.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +58,11 @@ class Upright:
     def views(self) -> int:
         """Number of views."""
         return len(self.angles)
+
+    def subset(self, views: NDArray[np.intp]) -> Upright:
+        """The upright detectors of some views, given by their numbers."""
+        names = "angles", "heights", "source_to_axis", "offsets"
+        return replace(self, **{name: getattr(self, name)[views] for name in names})
 
     @property
     def magnification(self) -> float:

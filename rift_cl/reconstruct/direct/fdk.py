@@ -22,6 +22,8 @@ and densities fall off.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -29,10 +31,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import InputError
+from rift_cl.cl.budget import cut_evenly, plan_chunks
+from rift_cl.errors import InputError, ResourceLimitError
 from rift_cl.geometry import Cone, Fan, Grid, Scan, Vectors, at_axis
 from rift_cl.operators.filters.ramp_filters import Filter, FilterLike, ViewFilter, as_filter
-from rift_cl.operators.linear import LinearOperator
+from rift_cl.operators.linear import Chunk, LinearOperator
 from rift_cl.operators.projector.projector import Projector
 from rift_cl.operators.projector.rectification import Rectification
 from rift_cl.reconstruct.direct.padding import wider
@@ -64,14 +67,14 @@ class FDK(LinearOperator):
     ) -> None:
         super().__init__(A.range, A.domain, A.device, A.dtype)
         self._given, self._compensate, self.filter = A, compensate, as_filter(filter)
-        scan, self._reading = _circle(A)
+        scan, reading = _circle(A)
         counted = redundancy(scan, compensate)
         before, after = counted.missing
         wide = wider(scan, before, after)
         self._A = _backprojector(A, wide)
         self.sentence: str = counted.sentence
         """What was chosen for the scan's span and detector, for a reader."""
-        self._filter = ViewFilter(
+        filter_of_rows = ViewFilter(
             at_axis(wide),
             self._row_filter(wide),
             rows=self._A.range[1] if len(self._A.range) == 3 else None,
@@ -81,9 +84,13 @@ class FDK(LinearOperator):
         )
         into, out_of = _cosines(wide)
         rays = np.pad(counted.rays, [(0, 0), (before, after)])
-        self._into = RayFactors(A.device, A.dtype, into, rays, before)
-        self._out_of = RayFactors(A.device, A.dtype, out_of, np.ones((1, wide.bins)))
-        self._wide = self._A.range
+        self._weighting = _Weighting(
+            filter_of_rows,
+            RayFactors(A.device, A.dtype, into, rays, before),
+            RayFactors(A.device, A.dtype, out_of, np.ones((1, wide.bins))),
+            self.domain,
+            reading,
+        )
 
     def _row_filter(self, scan: Fan | Cone) -> Filter:
         if not scan.curved:
@@ -97,22 +104,72 @@ class FDK(LinearOperator):
         return [repr(self.filter), self.sentence, *self._given._facts()]
 
     def _apply(self, x: Any, out: Any) -> None:
-        if self._reading is not None:
-            tilted, x = x, self.device.empty(self.domain, self.dtype)
-            self._reading.read(tilted, x, 0, len(x))
-        rays = self.device.empty(self._wide, self.dtype)
-        self._into.widen(x, rays)
-        filtered = self.device.empty(self._wide, self.dtype)
-        self._filter._apply(rays, filtered)
-        self._out_of.widen(filtered, filtered)
-        del rays
+        filtered = self.device.empty(self._weighting.range, self.dtype)
+        self._weighting._apply(x, filtered)
         self._A._apply_adjoint(filtered, out)
 
     def _apply_adjoint(self, y: Any, out: Any) -> None:
-        rays = self.device.empty(self._wide, self.dtype)
+        rays = self.device.empty(self._weighting.range, self.dtype)
         self._A._apply(y, rays)
-        self._out_of.widen(rays, rays)
-        filtered = self.device.empty(self._wide, self.dtype)
+        self._weighting._apply_adjoint(rays, out)
+
+    def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
+        try:
+            super()._apply_host(x, y)
+        except ResourceLimitError:
+            # One after the other, each of which takes its work in parts where it must.
+            filtered = np.empty(self._weighting.range, self.dtype)
+            self._weighting._apply_host(x, filtered)
+            self._A.T._apply_host(filtered, y)
+
+    @property
+    def scratch(self) -> int:
+        """Filtered projections, and what the steps need."""
+        filtered = self.dtype.itemsize * math.prod(self._weighting.range)
+        return filtered + self._weighting.records + max(self._weighting.scratch, self._A.scratch)
+
+    @property
+    def largest_scratch(self) -> int:
+        """Bytes of the largest array among these."""
+        filtered = self.dtype.itemsize * math.prod(self._weighting.range)
+        return max(filtered, self._weighting.largest_scratch, self._A.largest_scratch)
+
+
+class _Weighting(LinearOperator):
+    """All that is done to projections before they are backprojected, to each view by itself.
+
+    Args:
+        filter: of the rows.
+        into: factors before it, onto the detector that it is as wide as.
+        out_of: factors after it.
+        domain: shape of the projections.
+        reading: what upright detectors read of tilted ones, where these are.
+    """
+
+    def __init__(
+        self,
+        filter: ViewFilter,
+        into: RayFactors,
+        out_of: RayFactors,
+        domain: tuple[int, ...],
+        reading: Rectification | None,
+    ) -> None:
+        super().__init__(domain, filter.range, filter.device, filter.dtype)
+        self._filter, self._into, self._out_of, self._reading = filter, into, out_of, reading
+
+    def _apply(self, x: Any, out: Any) -> None:
+        if self._reading is not None:
+            tilted, x = x, self.device.empty(self.domain, self.dtype)
+            self._reading.read(tilted, x, 0, len(x))
+        rays = self.device.empty(self.range, self.dtype)
+        self._into.widen(x, rays)
+        self._filter._apply(rays, out)
+        self._out_of.widen(out, out)
+
+    def _apply_adjoint(self, y: Any, out: Any) -> None:
+        rays = self.device.empty(self.range, self.dtype)
+        self._out_of.widen(y, rays)
+        filtered = self.device.empty(self.range, self.dtype)
         self._filter._apply_adjoint(rays, filtered)
         if self._reading is None:
             self._into.narrow(filtered, out)
@@ -122,11 +179,59 @@ class FDK(LinearOperator):
         self._reading.spread(upright, out, 0, len(out))
 
     @property
+    def records(self) -> int:
+        """Bytes of the factors."""
+        return self._into.nbytes + self._out_of.nbytes
+
+    @property
     def scratch(self) -> int:
-        """Weighted and filtered projections, and what filter and projector need."""
-        rays = self.dtype.itemsize * math.prod(self._wide)
-        factors = self._into.nbytes + self._out_of.nbytes
-        return factors + rays + max(rays + self._filter.scratch, self._A.scratch)
+        """Weighted and filtered projections, upright ones, and what the filter needs."""
+        upright, rays = (math.prod(shape) for shape in (self.domain, self.range))
+        numbers = 2 * rays + (upright if self._reading is not None else 0)
+        return self.dtype.itemsize * numbers + self._filter.scratch
+
+    @property
+    def largest_scratch(self) -> int:
+        """Bytes of the largest array that the filter needs."""
+        return self._filter.largest_scratch
+
+    def _chunks(self, budget: int) -> Iterable[Chunk]:
+        """Runs of views.
+
+        Raises:
+            ResourceLimitError: not even one view fits.
+        """
+        views, largest = self.domain[0], self.device.traits.allocation
+
+        def needs(count: int) -> tuple[int, int]:
+            run = self._of_views(slice(0, count))
+            sizes = [self.dtype.itemsize * math.prod(s) for s in (run.domain, run.range)]
+            array = max(*sizes, run.largest_scratch)
+            return sum(sizes) + run.scratch + run.records, array
+
+        def fits(count: int) -> bool:
+            need, array = needs(count)
+            return need <= budget and array <= largest
+
+        most = bisect_left(range(1, views + 1), True, key=lambda count: not fits(count))
+        if most == views:
+            return [Chunk((), ())]
+        need, array = needs(max(most, 1))
+        what = "view with its weights and its filter"
+        plan_chunks(1, need, 0, budget, what=what, array=array, largest=largest)
+        runs = cut_evenly(views, most)
+        return (Chunk((run,), (run,), self._of_views(run)) for run in runs)
+
+    def _of_views(self, run: slice) -> _Weighting:
+        """That of some views."""
+        reading = None if self._reading is None else self._reading.of_views(run)
+        return _Weighting(
+            self._filter.of_views(run),
+            self._into.of_views(run),
+            self._out_of.of_views(run),
+            (run.stop - run.start, *self.domain[1:]),
+            reading,
+        )
 
 
 @dataclass(frozen=True)

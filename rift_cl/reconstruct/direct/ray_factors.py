@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -30,13 +31,27 @@ class RayFactors:
     def __init__(
         self, device: Device, dtype: DTypeLike, pixels: Floats, views: Floats, before: int = 0
     ) -> None:
-        self.device, self._before = device, before
-        self._pixels, self._views = device.array(pixels, dtype), device.array(views, dtype)
+        self.device, self._before, self._dtype = device, before, np.dtype(dtype)
+        self._host = pixels, views
+
+    @cached_property
+    def _pixels(self) -> DeviceArray:
+        return self.device.array(self._host[0], self._dtype)
+
+    @cached_property
+    def _views(self) -> DeviceArray:
+        return self.device.array(self._host[1], self._dtype)
 
     @property
     def nbytes(self) -> int:
         """Bytes of the factors."""
-        return int(self._pixels.nbytes + self._views.nbytes)
+        return self._dtype.itemsize * sum(factors.size for factors in self._host)
+
+    def of_views(self, run: slice) -> RayFactors:
+        """The factors of some views."""
+        pixels, views = self._host
+        views = views[run] if len(views) > 1 else views
+        return RayFactors(self.device, self._dtype, pixels, views, self._before)
 
     def widen(self, narrow: DeviceArray, wide: DeviceArray) -> None:
         """Fill ``wide`` with the factors times ``narrow``, 0 where that has no bin."""

@@ -1,0 +1,89 @@
+"""Volumes and projections of cones and fans that are larger than a device's memory, or its largest
+array, are taken in parts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from limited_devices import assert_same, limited, normal
+
+from rift_cl import Cone, Fan, Grid, Projector, fbp
+from rift_cl.errors import ResourceLimitError
+from rift_cl.geometry.leaning import leaning
+from rift_cl.reconstruct import FDK
+
+# Off the middle, no whole number of lanes, and looked at along both axes.
+GRID = Grid((22, 18, 20), (1.3, 0.8, 1.1), (1, 2, -1))
+ANGLES = np.arange(40) * 2 * np.pi / 40
+CONE = Cone(ANGLES, 16, 24, (1.8, 2.0), 60, 90, center=(7.2, 11.1))
+HELIX = Cone(ANGLES, 16, 24, (1.8, 2.0), 60, 90, heights=np.linspace(-3, 3, 40))
+FAN = Fan(ANGLES, 24, 2.0, 60, 90, center=11.1)
+
+
+def parts(A: Any, budget: int | None = None) -> tuple[int, int]:
+    """Runs of views of a projection, and of slices of a backprojection."""
+    budget = budget or A.device.budget
+    forward, back = A._chunks(budget), A._adjoint_chunks(budget)
+    return len({str(c.outside) for c in forward}), len({str(c.outside) for c in back})
+
+
+def both(A: Any) -> list[np.ndarray[Any, Any]]:
+    return [A(normal(*A.domain)), A.T(normal(*A.range))]
+
+
+def memory_of(A: Any, slices: int, views: int) -> int:
+    """Bytes that some slices of all views, and all slices of some views, can be worked on in."""
+    (nz, *_), (n, *_) = A.domain, A.range
+    return max(A._need(slices, n, sparing=True)[0], A._need(nz, views, sparing=True)[0])
+
+
+@pytest.mark.parametrize(
+    ("scan", "dtype", "footprint"),
+    [
+        (CONE, "float32", "strip"),
+        (FAN, "float32", "strip"),
+        pytest.param(HELIX, "float64", "linear", marks=pytest.mark.full),
+        pytest.param(CONE, "float32", "point", marks=pytest.mark.full),
+    ],
+    ids=["cone", "fan", "helix", "points"],
+)
+def test_runs_of_views_and_slabs_of_slices_have_the_same_bits(device, scan, dtype, footprint):
+    whole = Projector(GRID, scan, footprint, device=device, dtype=dtype)
+    small = limited(device, memory_of(whole, 8, 20))
+    A = Projector(GRID, scan, footprint, device=small, dtype=dtype)
+    assert min(parts(A)) >= 2
+    assert_same(both(A), both(whole))
+
+
+def test_what_is_cut_both_ways_is_added_up_to_rounding(device):
+    """Neither the padded volume nor the projections are as small as the largest array."""
+    small = limited(device, allocation=40_000)
+    A, whole = (Projector(GRID, CONE, device=each) for each in (small, device))
+    assert len({str(chunk.inside) for chunk in A._chunks(A.device.budget)}) >= 2
+    assert min(parts(A)) >= 2
+    for one, other in zip(both(A), both(whole), strict=True):
+        assert np.abs(one - other).max() <= 1e-6 * np.abs(other).max()
+
+
+def test_not_even_a_part_fits(device):
+    A = Projector(GRID, CONE, device=limited(device, 20_000))
+    for operator in (A, A.T, FDK(A)):
+        with pytest.raises(ResourceLimitError, match=r"needs .* 19.5 KiB"):
+            operator(normal(*operator.domain))
+
+
+@pytest.mark.parametrize(
+    "scan",
+    [CONE, FAN, pytest.param(leaning(CONE, 0.05), marks=pytest.mark.full)],
+    ids=["cone", "fan", "leaning"],
+)
+def test_fdk_filters_runs_of_views_and_backprojects_slabs(device, scan):
+    whole = FDK(Projector(GRID, scan, device=device))
+    A = Projector(GRID, scan, device=limited(device, memory_of(whole._A, 8, 1)))
+    small, y = FDK(A), normal(*A.range)
+    assert parts(small._A)[1] >= 2
+    assert_same([fbp(A, y)], [whole(y)])
+    few = small._weighting.records + 60_000
+    assert len(list(small._weighting._chunks(few))) >= 2
