@@ -106,11 +106,6 @@ class Cone(ScanValue):
         object.__setattr__(self, "curved", checked_flag("Cone", "curved", curved))
 
     @property
-    def views(self) -> int:
-        """Number of views."""
-        return len(self.angles)
-
-    @property
     def magnification(self) -> float:
         """How much larger the detector shows what stands at the axis."""
         return self.source_to_detector / self.source_to_axis

@@ -129,11 +129,6 @@ class Fan(ScanValue):
         object.__setattr__(self, "curved", checked_flag("Fan", "curved", curved))
 
     @property
-    def views(self) -> int:
-        """Number of views."""
-        return len(self.angles)
-
-    @property
     def magnification(self) -> float:
         """How much larger the detector shows what stands at the axis."""
         return self.source_to_detector / self.source_to_axis

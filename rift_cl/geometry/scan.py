@@ -54,11 +54,6 @@ class Parallel(ScanValue):
         middle = (self.bins - 1) / 2
         object.__setattr__(self, "center", checked_center("Parallel", center, middle))
 
-    @property
-    def views(self) -> int:
-        """Number of views."""
-        return len(self.angles)
-
     def coordinates(self) -> NDArray[np.float64]:
         """The coordinate t of every bin's centre, in the unit of ``pitch``."""
         t: NDArray[np.float64] = (np.arange(self.bins, dtype=np.float64) - self.center) * self.pitch

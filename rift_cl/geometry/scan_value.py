@@ -26,7 +26,8 @@ _TURN_TOLERANCE = 1e-5
 class ScanValue:
     """A frozen dataclass whose fields are its constructor's arguments, arrays among them.
 
-    Every array has an entry for each view; ``_lengths`` names the fields that are lengths.
+    Every array, and the first field is one, has an entry for each view; ``_lengths`` names the
+    fields that are lengths.
     """
 
     _lengths: ClassVar[tuple[str, ...]] = ()
@@ -42,6 +43,11 @@ class ScanValue:
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies are made by the constructor, so that their arrays are read-only as well."""
         return type(self), self._values()
+
+    @property
+    def views(self) -> int:
+        """Number of views."""
+        return len(self._values()[0])
 
     def subset(self, views: ArrayLike) -> Self:
         """The scan of some views.

@@ -72,11 +72,6 @@ class Vectors(ScanValue):
         object.__setattr__(self, "bins", checked_count("Vectors", "bins", bins))
         self._check_planes()
 
-    @property
-    def views(self) -> int:
-        """Number of views."""
-        return len(self.source)
-
     def corners(self) -> tuple[NDArray[np.float64], ...]:
         """Centres of the four outermost pixels, first row first, (views, 3) each."""
         across = (self.bins - 1) / 2 * self.across
