@@ -1,5 +1,4 @@
-"""Volumes and projections of cones and fans that are larger than a device's memory, or its largest
-array, are taken in parts."""
+"""Volumes and projections of cones, fans and vectors that are larger than a device's memory."""
 
 from __future__ import annotations
 
@@ -9,7 +8,7 @@ import numpy as np
 import pytest
 from limited_devices import assert_same, limited, normal
 
-from rift_cl import Cone, Fan, Grid, Projector, fbp
+from rift_cl import Cone, Fan, Grid, Projector, Vectors, fbp
 from rift_cl.errors import ResourceLimitError
 from rift_cl.geometry.leaning import leaning
 from rift_cl.reconstruct import FDK
@@ -20,6 +19,16 @@ ANGLES = np.arange(40) * 2 * np.pi / 40
 CONE = Cone(ANGLES, 16, 24, (1.8, 2.0), 60, 90, center=(7.2, 11.1))
 HELIX = Cone(ANGLES, 16, 24, (1.8, 2.0), 60, 90, heights=np.linspace(-3, 3, 40))
 FAN = Fan(ANGLES, 24, 2.0, 60, 90, center=11.1)
+LEANING = leaning(CONE.subset(np.arange(0, 40, 5)), 0.05)
+# Seen from beside and from below.
+ANYWHERE = Vectors(
+    [[0.0, -60, 0], [60, 3, 1], [2, 1, -60], [-3, 0, -60]],
+    [[0.0, 30, 0], [-30, 0, 0], [0, 0, 30], [2, 0, 30]],
+    [[2.0, 0, 0.1], [0, 2, 0], [2, 0, 0], [2, 0.1, 0]],
+    [[0, 0, 2.0], [0, 0.1, 2], [0, 2, 0], [0, 2, 0]],
+    30,
+    32,
+)
 
 
 def parts(A: Any, budget: int | None = None) -> tuple[int, int]:
@@ -44,14 +53,15 @@ def memory_of(A: Any, slices: int, views: int) -> int:
     [
         (CONE, "float32", "strip"),
         (FAN, "float32", "strip"),
+        (LEANING, "float32", "strip"),
         pytest.param(HELIX, "float64", "linear", marks=pytest.mark.full),
         pytest.param(CONE, "float32", "point", marks=pytest.mark.full),
     ],
-    ids=["cone", "fan", "helix", "points"],
+    ids=["cone", "fan", "vectors", "helix", "points"],
 )
 def test_runs_of_views_and_slabs_of_slices_have_the_same_bits(device, scan, dtype, footprint):
     whole = Projector(GRID, scan, footprint, device=device, dtype=dtype)
-    small = limited(device, memory_of(whole, 8, 20))
+    small = limited(device, memory_of(whole, 8, scan.views // 2))
     A = Projector(GRID, scan, footprint, device=small, dtype=dtype)
     assert min(parts(A)) >= 2
     assert_same(both(A), both(whole))
@@ -67,6 +77,17 @@ def test_what_is_cut_both_ways_is_added_up_to_rounding(device):
         assert np.abs(one - other).max() <= 1e-6 * np.abs(other).max()
 
 
+@pytest.mark.full
+def test_views_along_z_are_taken_in_runs_of_all_slices(device):
+    """Whose walk goes from slice to slice: a backprojection of such is cut into views, too."""
+    whole = Projector(GRID, ANYWHERE, device=device)
+    A = Projector(GRID, ANYWHERE, device=limited(device, whole._need(22, 2, sparing=True)[0]))
+    assert parts(A)[0] >= 2
+    (seen, volume), (seen_whole, volume_whole) = both(A), both(whole)
+    assert_same([seen], [seen_whole])
+    assert np.abs(volume - volume_whole).max() <= 1e-6 * np.abs(volume_whole).max()
+
+
 def test_not_even_a_part_fits(device):
     A = Projector(GRID, CONE, device=limited(device, 20_000))
     for operator in (A, A.T, FDK(A)):
@@ -76,7 +97,7 @@ def test_not_even_a_part_fits(device):
 
 @pytest.mark.parametrize(
     "scan",
-    [CONE, FAN, pytest.param(leaning(CONE, 0.05), marks=pytest.mark.full)],
+    [CONE, FAN, pytest.param(LEANING, marks=pytest.mark.full)],
     ids=["cone", "fan", "leaning"],
 )
 def test_fdk_filters_runs_of_views_and_backprojects_slabs(device, scan):

@@ -3,17 +3,12 @@
 Forward: volume -> slabs (y, x, z) -> slab tables -> detector. Adjoint: the same steps transposed,
 in reverse, with the same numbers. ``kernels/include/slab_table.h`` derives the method;
 ``rift_cl/reference/cone.py`` has the matrix.
-
-What is too large for the device is taken in parts from the host, slices of the volume and a run of
-views each. Slices are independent of each other in a backprojection and views in a projection, so
-that those have the bits of the whole; what must be cut the other way as well is added up in float,
-to the rounding of the sums.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -22,15 +17,13 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from rift_cl.cl.array import DeviceArray
-from rift_cl.cl.budget import cut_evenly, largest_pair, plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Grid
-from rift_cl.operators.linear import Chunk, LinearOperator
-from rift_cl.operators.projector.projector import Projector
 from rift_cl.operators.projector.slab_stretch import SlabStretch
 from rift_cl.operators.projector.slab_table import Samples, SlabTable, slab_table
+from rift_cl.operators.projector.volume_in_parts import VolumeInParts
 
 _FOOTPRINTS = ("strip", "linear", "point")
 # Tables and places of a run of views together: on a CPU they should stay in its caches.
@@ -42,13 +35,11 @@ _DEPTH, _COLUMNS, _GROUPED_VIEWS = 64, 64, 8
 _WIDTHS, _LINES = (24, 48, 72, 96), (64, 32, 16, 8, 4, 2, 1)
 # Numbers between lines and between slabs, so that they do not compete for the same cache lines.
 _APART = 16
-# A volume is cut between whole lanes of any device.
-_SLICES = 8
 # Numbers in a view's forms.
 _FORMS = 16
 
 
-class SlabProjector(Projector):
+class SlabProjector(VolumeInParts):
     """Line integrals of a volume along the rays of a ``Cone``.
 
     A value of the range is that of the line integral, value times length, from the source through
@@ -77,8 +68,6 @@ class SlabProjector(Projector):
     """
 
     scan: Cone
-    # Whether tables of views take no more memory than those of the fewest.
-    _sparing = False
 
     def __init__(
         self,
@@ -167,17 +156,6 @@ class SlabProjector(Projector):
         for first in range(0, total, most):
             yield first, min(most, total - first)
 
-    @property
-    def scratch(self) -> int:
-        """Bytes needed besides the arrays that go in and come out."""
-        need, _ = self._need(self.domain[0], self.range[0], sparing=self._sparing)
-        return need - self.dtype.itemsize * sum(self.shape)
-
-    @property
-    def largest_scratch(self) -> int:
-        """Bytes of the largest array: the slabs, or one of a view's."""
-        return self._need(self.domain[0], self.range[0], sparing=self._sparing)[1]
-
     def _together(self, each: int, *, sparing: bool | None = None) -> int:
         """Views whose tables exist at the same time, of so many bytes each."""
         if self._sparing if sparing is None else sparing:
@@ -197,13 +175,6 @@ class SlabProjector(Projector):
         return [item * table.entries, *of_lines, *of_rows]
 
     def _need(self, slices: int, views: int, *, sparing: bool) -> tuple[int, int]:
-        """Bytes that so many slices and views take with all their records, and the largest array.
-
-        Args:
-            slices: of the volume.
-            views: of the scan.
-            sparing: whether only the fewest views have tables at a time.
-        """
         item, rows, bins = self.dtype.itemsize, self._rows(slices), self.range[2]
         layout = _Layout.of((slices, *self.domain[1:]), self.device, self.dtype)
         whole = [item * n for n in (slices * math.prod(self.domain[1:]), views * rows * bins)]
@@ -218,85 +189,17 @@ class SlabProjector(Projector):
             arrays += of_a_view
         return sum(whole) + tables + records, max(arrays)
 
-    def _chunks(self, budget: int) -> Iterable[Chunk]:
-        return self._parts(budget, volume_first=False)
-
-    def _adjoint_chunks(self, budget: int) -> Iterable[Chunk]:
-        return (chunk.transposed for chunk in self._parts(budget, volume_first=True))
-
-    def _parts(self, budget: int, *, volume_first: bool) -> Iterator[Chunk]:
-        """Parts that fit, and are there while they are worked on; the whole where that does.
-
-        Args:
-            budget: bytes that there are.
-            volume_first: whether rather slices are cut than views.
-
-        Raises:
-            ResourceLimitError: not even the least part fits.
-        """
-        (slices, *_), (views, *_) = self.domain, self.range
-        largest = self.device.traits.allocation
-        need, array = self._need(slices, views, sparing=self._sparing)
-        if need <= budget and array <= largest:
-            yield Chunk((), ())
-            return
-        runs_of_z, runs_of_views = self._cut(budget, volume_first=volume_first)
-        pairs = [(z, run) for z in runs_of_z for run in runs_of_views]
-        if not volume_first:
-            pairs = [(z, run) for run in runs_of_views for z in runs_of_z]
-        for z, run in pairs:
-            yield Chunk((z,), self._seen(z, run), self._part(z, run))
-
-    def _cut(self, budget: int, *, volume_first: bool) -> tuple[list[slice], list[slice]]:
-        """Runs of slices and of views of which any two fit, one or the other cut first."""
-        (slices, *_), (views, *_) = self.domain, self.range
-        blocks, largest = -(-slices // _SLICES), self.device.traits.allocation
-
-        def needs(blocks: int, views: int) -> tuple[int, int]:
-            return self._need(min(blocks * _SLICES, slices), views, sparing=True)
-
-        def fits(blocks: int, views: int) -> bool:
-            need, array = needs(blocks, views)
-            return need <= budget and array <= largest
-
-        if volume_first:
-            most, run = largest_pair(fits, blocks, views)
-        else:
-            run, most = largest_pair(lambda views, blocks: fits(blocks, views), views, blocks)
-        need, array = needs(most, run)
-        what = f"part of a volume ({min(most * _SLICES, slices)} slices in {run} views)"
-        plan_chunks(1, need, 0, budget, what=what, array=array, largest=largest)
-        cuts = cut_evenly(blocks, most)
-        cut = [slice(_SLICES * at.start, min(_SLICES * at.stop, slices)) for at in cuts]
-        return cut, cut_evenly(views, run)
-
     def _part(self, z: slice, views: slice) -> SlabProjector:
-        """The projector of some slices and a run of views, with the numbers of the whole."""
-        part, grid, count = object.__new__(type(self)), self.grid, z.stop - z.start
-        domain = count, *self.domain[1:]
-        seen = views.stop - views.start, self._rows(count), self.range[2]
-        LinearOperator.__init__(part, domain, seen, self.device, self.dtype)
-        middle = grid.center[0] + (z.start + z.stop - grid.shape[0]) / 2 * grid.spacing[0]
-        part.grid = Grid(domain, grid.spacing, (middle, *grid.center[1:]))
-        part.scan = self.scan.subset(np.arange(views.start, views.stop))
-        part.footprint, part._precision = self.footprint, self._precision
-        part._tables = [self._lower(table.of_views(views), count) for table in self._tables]
-        column = self._column
-        part._column = replace(column, count=count, first=column.first + z.start)
-        part._sparing = True
+        part = self._bare_part(z, views)
+        slices, column = z.stop - z.start, self._column
+        part._precision = self._precision
+        part._tables = [self._lower(table.of_views(views), slices) for table in self._tables]
+        part._column = replace(column, count=slices, first=column.first + z.start)
         return part
-
-    def _rows(self, slices: int) -> int:
-        """Rows of the data that so many slices are seen in."""
-        return self.range[1]
 
     def _lower(self, table: SlabTable, slices: int) -> SlabTable:
         """A table of views, for so many slices."""
         return table
-
-    def _seen(self, z: slice, views: slice) -> tuple[slice, ...]:
-        """Where in the data some slices are seen by a run of views."""
-        return (views,)
 
 
 class _Layout(NamedTuple):

@@ -8,6 +8,8 @@ exchanged, so that their slabs lie across z.
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, cast
 
@@ -21,7 +23,6 @@ from rift_cl.cl.discovery import default_device
 from rift_cl.cl.host_arrays import download
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Grid, Vectors
-from rift_cl.operators.projector.projector import Projector
 from rift_cl.operators.projector.rectification import Rectification
 from rift_cl.operators.projector.slab_projector import SlabProjector
 from rift_cl.operators.projector.upright import (
@@ -30,9 +31,10 @@ from rift_cl.operators.projector.upright import (
     pixel_slopes,
     rectified,
 )
+from rift_cl.operators.projector.volume_in_parts import VolumeInParts
 
 
-class VectorProjector(Projector):
+class VectorProjector(VolumeInParts):
     """Line integrals of a volume along the rays of a ``Vectors`` scan.
 
     Args:
@@ -131,50 +133,105 @@ class VectorProjector(Projector):
         return data, slopes
 
     @property
-    def scratch(self) -> int:
-        """Bytes needed besides the arrays that go in and come out."""
-        volume = self.dtype.itemsize * self.shape[1]
-        return max(part.scratch for part in self._parts) + 2 * volume
+    def _block(self) -> int:
+        # Views that look along z walk from slice to slice.
+        whole = any(part.exchanged for part in self._parts)
+        return self.domain[0] if whole else super()._block
+
+    def _need(self, slices: int, views: int, *, sparing: bool) -> tuple[int, int]:
+        item, of_a_slice = self.dtype.itemsize, math.prod(self.domain[1:])
+        data = item * views * math.prod(self.range[1:])
+        needs, arrays = zip(
+            *(part.need(slices, views, sparing=sparing) for part in self._parts), strict=True
+        )
+        # The volume besides that of a part, which may be exchanged or one of two to be added.
+        volumes = len(self._parts) if self._block == self.domain[0] else 0
+        return data + volumes * item * slices * of_a_slice + max(needs), max(data, *arrays)
+
+    def _part(self, z: slice, views: slice) -> VectorProjector:
+        part = self._bare_part(z, views)
+        part._parts = [each.of(part, z, views) for each in self._parts if each.count_in(views)]
+        return part
 
 
 class _Part:
-    """Views that look alike: the projector of their upright detectors, and the way from these."""
+    """Views that look alike: the projector of their upright detectors, and the way from these.
 
-    def __init__(self, owner: VectorProjector, found: Rectified) -> None:
-        self._owner, self.found = owner, found
-        self._exchanged = found.along_z
+    Args:
+        owner: the projector whose views they are.
+        found: the views and their upright detectors.
+        projector: that of the upright detectors; made if not given.
+    """
+
+    def __init__(
+        self, owner: VectorProjector, found: Rectified, projector: SlabProjector | None = None
+    ) -> None:
+        # Not the owner, which would be kept in a circle of references with its arrays.
+        self._device, self._dtype, self._domain = owner.device, owner.dtype, owner.domain
+        self._tilted, self.found = (owner.scan.rows, owner.scan.bins), found
+        self.exchanged = found.along_z
         self.count = len(found.views)
-        self.projector = SlabProjector(
+        self.projector = projector or SlabProjector(
             found.grid, cast(Cone, found.upright), owner.footprint, owner.device, owner.dtype
         )
 
+    def _run(self, views: slice) -> slice:
+        """Which of these views a run of the scan's holds."""
+        first, stop = np.searchsorted(self.found.views, [views.start, views.stop])
+        return slice(int(first), int(stop))
+
+    def count_in(self, views: slice) -> int:
+        """Number of these views in a run of the scan's."""
+        run = self._run(views)
+        return int(run.stop - run.start)
+
+    def of(self, owner: VectorProjector, z: slice, views: slice) -> _Part:
+        """A part's views and slices; all slices if these look along z."""
+        run, found = self._run(views), self.found
+        chosen = replace(
+            found,
+            views=(found.views[run] - views.start).astype(np.int32),
+            upright=found.upright.subset(np.arange(run.start, run.stop)),
+            forms=found.forms[run],
+        )
+        depth = slice(0, self.projector.domain[0]) if self.exchanged else z
+        return _Part(owner, chosen, self.projector._part(depth, run))
+
+    def need(self, slices: int, views: int, *, sparing: bool) -> tuple[int, int]:
+        """Bytes of volume, upright views and records of a part, and of the largest array."""
+        views = min(views, self.count)
+        depth = self.projector.domain[0] if self.exchanged else slices
+        need, array = self.projector._need(depth, views, sparing=sparing)
+        return need + self.rectification.nbytes, array
+
     @cached_property
     def rectification(self) -> Rectification:
-        owner, found = self._owner, self.found
-        tilted = owner.scan.rows, owner.scan.bins
+        found = self.found
         upright = found.upright.rows, found.upright.bins
-        return Rectification(owner.device, tilted, upright, found.views, found.forms, owner.dtype)
+        return Rectification(
+            self._device, self._tilted, upright, found.views, found.forms, self._dtype
+        )
 
     def seen(self, volume: DeviceArray) -> DeviceArray:
         """The volume as these views see it, with y and z exchanged or as it is."""
-        if not self._exchanged:
+        if not self.exchanged:
             return volume
-        turned = self._owner.device.empty(self.projector.domain, volume.dtype)
+        turned = self._device.empty(self.projector.domain, volume.dtype)
         self._exchange(volume, turned, back=0)
         return turned
 
     def backproject(self, upright: DeviceArray, volume: DeviceArray) -> None:
         """Write what upright views give to the volume."""
-        if not self._exchanged:
+        if not self.exchanged:
             self.projector._apply_adjoint(upright, volume)
             return
-        turned = self._owner.device.empty(self.projector.domain, volume.dtype)
+        turned = self._device.empty(self.projector.domain, volume.dtype)
         self.projector._apply_adjoint(upright, turned)
         self._exchange(volume, turned, back=1)
 
     def _exchange(self, volume: DeviceArray, turned: DeviceArray, *, back: int) -> None:
-        device = self._owner.device
-        nz, ny, nx = self._owner.domain
+        device = self._device
+        nz, ny, nx = self._domain
         tile = 16 if device.traits.is_cpu else 1
         device.launch(
             "volume_turn",
@@ -193,9 +250,3 @@ class _Part:
             BACK=back,
             DOUBLE=int(volume.dtype == np.float64),
         )
-
-    @property
-    def scratch(self) -> int:
-        """Bytes of its upright views and of what their projector needs."""
-        item = self._owner.dtype.itemsize
-        return self.projector.scratch + item * self.projector.shape[0] + self.rectification.nbytes
