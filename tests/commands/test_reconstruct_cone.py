@@ -11,6 +11,7 @@ from scipy.ndimage import gaussian_filter
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
+from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Grid
 from rift_cl.geometry.leaning import leaning
 from rift_cl.io import read_volume
@@ -119,6 +120,24 @@ def test_methods_that_take_steps(ball: Path, tmp_path: Path, method: str) -> Non
 def test_binning_keeps_the_density(ball: Path, tmp_path: Path) -> None:
     found = rift.reconstruct_scan(ball, tmp_path / "a", center=CENTER, binning=2, pixel=1.0)
     assert middle_of(found.read()) == pytest.approx(0.02, rel=0.05)
+
+
+def test_a_volume_larger_than_the_memory_is_made_in_slabs(tmp_path: Path) -> None:
+    angles = 2 * np.pi * np.arange(8) / 8
+    cone = Cone(angles, 64, 64, 2.0, 160.0, 320.0)
+    views = project([Ellipsoid.ball(14.0, 0.02, (3.0, 1.0, -2.0))], Grid((2, 2, 2)), cone)
+    lengths = {"source_to_axis": 160.0, "source_to_detector": 320.0, "pitch": 2.0}
+    path = tmp_path / "ball.npz"
+    np.savez(path, projections=views, angles=angles, **lengths)
+    common = {"center": 31.5, "format": "h5"}
+    whole = rift.reconstruct_scan(path, tmp_path / "a", **common)
+    slabs = rift.reconstruct_scan(path, tmp_path / "b", memory="3.2M", **common)
+    assert "slabs" in " ".join(slabs.notes) and "slabs" not in " ".join(whole.notes)
+    np.testing.assert_array_equal(slabs.read(), whole.read())
+    pictures = [(tmp_path / run / "preview.png").read_bytes() for run in "ab"]
+    assert pictures[0] == pictures[1]
+    with pytest.raises(InputError, match="--window"):
+        rift.reconstruct_scan(path, tmp_path / "c", memory="3.2M", dtype="uint8", **common)
 
 
 def test_a_preview_and_a_plan(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,8 @@ _REFUSED: dict[str, Any] = {
 }
 # Volumes and stacks of projections that a method holds at a time, on host and device together.
 _HELD = {"fbp": (3, 5), "backproject": (3, 4), "sirt": (6, 6), "cgls": (6, 6), "tv": (16, 7)}
+# Those on the host where a volume is made in slabs: projections as read, corrected, and filtered.
+_HELD_BESIDE_SLABS = 3
 
 
 @dataclass(frozen=True)
@@ -256,16 +259,34 @@ class ConeInput:
             scan.curved,
         )
 
+    @property
+    def _need(self) -> int:
+        """Bytes that the method takes of host and device together."""
+        volumes, stacks = _HELD[self.settings.method]
+        return 4 * (
+            volumes * int(np.prod(self.solved.shape)) + stacks * int(np.prod(self.scan.shape))
+        )
+
+    @cached_property
+    def slab_budget(self) -> int | None:
+        """Bytes for slabs of the volume, where it is made in such; None where all fits at once."""
+        budget = self.device.budget
+        if self.settings.method != "fbp" or self._need <= budget:
+            return None
+        left = budget - 4 * _HELD_BESIDE_SLABS * int(np.prod(self.scan.shape))
+        # A slab is on the host as well, and is half of what the device holds for it at most.
+        return left * 2 // 3
+
     def _check_memory(self) -> None:
         """Refuse what does not fit before anything is read.
 
         Raises:
-            ResourceLimitError: volume and projections are larger than the budget.
+            ResourceLimitError: volume and projections are larger than the budget, or where the
+                volume can be made in slabs, the projections.
         """
-        volumes, stacks = _HELD[self.settings.method]
-        need = 4 * (
-            volumes * int(np.prod(self.solved.shape)) + stacks * int(np.prod(self.scan.shape))
-        )
+        need, left = self._need, self.slab_budget
+        if left is not None and left > 0:
+            return
         if need > self.device.budget:
             raise ResourceLimitError(
                 f"{self.file.path}: a volume of {self.solved.shape} from projections of "

@@ -1,14 +1,15 @@
 """``rift reconstruct`` of cone beams: all rows of all views become a volume at once.
 
-No slice of a cone-beam scan is independent of its neighbours, so that nothing is cut into slabs
-here: projections and volume are in memory together, and what does not fit is told before any work.
+No slice of a cone-beam scan is independent of its neighbours: every one needs all projections, and
+these are in memory together. Of ``fbp`` the volume need not be: where both do not fit, it is made
+and written in slabs. Other methods hold it as well; what does not fit is told before any work.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
 from typing import Any
 
@@ -72,6 +73,7 @@ class ConeReconstruction:
         self.inversion = ConeInversion(self.source.window)
         # Made now, so that a scan that the method does not take is told before any work.
         self.projector, self._fdk = self._operators()
+        self._check_slabs()
         out = settings.out
         alone = out.is_dir() and {p.name for p in out.iterdir()} <= {PREVIEW_PICTURE, "config.json"}
         overwrite = settings.overwrite or alone
@@ -115,6 +117,19 @@ class ConeReconstruction:
             return A, None
         return A, FDK(A, settings.view_filter(), compensate=settings.compensate)
 
+    def _check_slabs(self) -> None:
+        """Refuse slabs that find no room, or of which no window of values can be chosen."""
+        settings, left = self.settings, self.source.slab_budget
+        if self._fdk is None or left is None:
+            return
+        self._fdk.check_slabs(left)
+        if settings.dtype != "float32" and settings.window is None and not settings.preview:
+            raise InputError(
+                f"--dtype {settings.dtype} wants --window LOW HIGH here: volume and projections do "
+                f"not fit the memory budget of {format_bytes(self.device.budget)} at once, and a "
+                "volume that is made in slabs has no window of values until it is written"
+            )
+
     def _locate(self) -> None:
         """Find the axis, and make the operators again for it."""
         self.source.locate()
@@ -123,6 +138,11 @@ class ConeReconstruction:
         if self._fdk is not None:
             self.source.notes.append(
                 f"Method of Feldkamp, Davis and Kress (FDK): {self._fdk.sentence}."
+            )
+        if self.source.slab_budget is not None:
+            self.source.notes.append(
+                "The volume is made in slabs of slices, since it does not fit the memory budget "
+                "with its projections."
             )
 
     def plan(self) -> dict[str, str]:
@@ -158,19 +178,22 @@ class ConeReconstruction:
             integrals = self.source.read()
             self.metrics = {"dead_pixels": integrals.dead, "starved_samples": integrals.starved}
             yield Report(1, total, "steps")
-            volume = yield from self._solve(integrals.projections, total)
+            slabs = yield from self._solve(integrals.projections, total)
+            self._finish(slabs)
         except BaseException:
             self.folder.discard()
             raise
-        self._finish(volume)
         yield Report(total, total, "steps")
 
-    def _solve(self, projections: Floats, total: int) -> Generator[Report, None, Floats]:
-        """The volume, after a report for every step."""
+    def _solve(self, projections: Floats, total: int) -> Generator[Report, None, Iterable[Floats]]:
+        """The volume in slabs, or in one, after a report for every step."""
+        left = self.source.slab_budget
         if self._fdk is not None:
-            return np.asarray(self._fdk(projections))
+            if left is not None:
+                return self._fdk.slabs(projections, left)
+            return [np.asarray(self._fdk(projections))]
         if self.settings.method == "backproject":
-            return np.asarray(backproject(self.projector, projections))
+            return [np.asarray(backproject(self.projector, projections))]
         options: dict[str, Any] = {}
         if self.settings.weights is not None:
             options["weights"] = poisson_weights(projections).weights
@@ -181,7 +204,7 @@ class ConeReconstruction:
             yield Report(1 + report.done, total, "steps", report.values)
         volume = np.asarray(self.device.get(solver.image))
         self.metrics |= {"steps": len(curve), "residual": curve[-1] if curve else 0.0}
-        return np.ascontiguousarray(volume[self.source.part])
+        return [np.ascontiguousarray(volume[self.source.part])]
 
     def _preview(self) -> list[Floats]:
         """The middle slice alone, which a formula makes without the others."""
@@ -197,22 +220,25 @@ class ConeReconstruction:
         fdk = FDK(A, settings.view_filter(), compensate=settings.compensate)
         return [np.asarray(fdk(self.source.read().projections))[0]]
 
-    def _finish(self, volume: Floats) -> None:
+    def _finish(self, slabs: Iterable[Floats]) -> None:
         """Write the volume, its pictures and the report."""
-        self._values = self._value_window(volume)
-        preview = Preview(len(volume))
+        if self.source.slab_budget is None:
+            slabs = list(slabs)
+            self._values = self._value_window(slabs[0])
+        else:
+            self._values = self.settings.window
+        preview, sections = Preview(self.shape[0]), _Sections(self.shape)
         with self._open(self.settings, self._values) as writer:
-            for start in range(0, len(volume), _WRITTEN):
-                block = volume[start : start + _WRITTEN]
+            for start, block in _blocks(slabs):
                 writer.write(start, block)
                 preview.take(start, block)
+                sections.take(start, block)
         if self._values is not None:
             below, above = writer.clipped
             self.metrics |= {"clipped_below": below, "clipped_above": above}
         self.folder.mark()
         self.folder.drop(*set(VOLUME_NAMES.values()) - {volume_path(self.settings).name})
-        nz, ny, nx = (n // 2 for n in volume.shape)
-        self._show([volume[nz], volume[:, ny], volume[:, :, nx]])
+        self._show(sections.planes)
         if self.settings.zingers is not None:
             self.metrics["zingers"] = self.source.clean.zingers
         self.metrics = {"center": self.source.axis["center"], **self.metrics}
@@ -275,6 +301,35 @@ class ConeReconstruction:
         figure = image_grid(planes, titles=titles, columns=len(planes), window=window, size=5.0)
         with atomic_path(self.settings.out / PREVIEW_PICTURE) as part:
             part.write_bytes(figure_png(figure))
+
+
+def _blocks(slabs: Iterable[Floats]) -> Iterator[tuple[int, Floats]]:
+    """Slices that are written together, and the first one's number."""
+    first = 0
+    for slab in slabs:
+        for start in range(0, len(slab), _WRITTEN):
+            block = slab[start : start + _WRITTEN]
+            yield first, block
+            first += len(block)
+
+
+class _Sections:
+    """The middle planes across the three axes of a volume of which blocks of slices pass."""
+
+    def __init__(self, shape: tuple[int, int, int]) -> None:
+        nz, ny, nx = shape
+        self._middle = nz // 2, ny // 2, nx // 2
+        shapes = (ny, nx), (nz, nx), (nz, ny)
+        self.planes: list[Floats] = [np.empty(each, np.float32) for each in shapes]
+
+    def take(self, start: int, block: Floats) -> None:
+        """Look at slices from number ``start`` on."""
+        z, y, x = self._middle
+        across, along_y, along_x = self.planes
+        if start <= z < start + len(block):
+            across[...] = block[z - start]
+        along_y[start : start + len(block)] = block[:, y]
+        along_x[start : start + len(block)] = block[:, :, x]
 
 
 class _PlaceFoundError(Exception):

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -121,6 +121,42 @@ class FDK(LinearOperator):
             filtered = np.empty(self._weighting.range, self.dtype)
             self._weighting._apply_host(x, filtered)
             self._A.T._apply_host(filtered, y)
+
+    def slabs(self, y: NDArray[Any], budget: int) -> Iterator[NDArray[Any]]:
+        """The volume in slabs of slices, from the first on, with the bits of the whole.
+
+        Args:
+            y: projections on the host, as the operator takes them.
+            budget: bytes of the device to work in, besides arrays on the host: those of the
+                filtered projections and of a slab.
+
+        Raises:
+            ResourceLimitError: not even the smallest part fits.
+        """
+        filtered = np.empty(self._weighting.range, self.dtype)
+        for chunk in self._weighting._chunks(budget):
+            self._weighting._apply_chunk(y, filtered, chunk, add=False)
+        back, slab, place = self._A.T, np.empty(0, self.dtype), None
+        for chunk in back._chunks(budget):
+            if chunk.outside != place:
+                if place is not None:
+                    yield slab
+                place = chunk.outside
+                first, stop, _ = (place[0] if place else slice(None)).indices(self.range[0])
+                slab = np.empty((stop - first, *self.range[1:]), self.dtype)
+                add = False
+            back._apply_chunk(filtered, slab, chunk._replace(outside=()), add=add)
+            add = True
+        yield slab
+
+    def check_slabs(self, budget: int) -> None:
+        """Refuse a budget in which ``slabs`` would find no room.
+
+        Raises:
+            ResourceLimitError: not even the smallest part fits.
+        """
+        for operator in (self._weighting, self._A.T):
+            next(iter(operator._chunks(budget)))
 
     @property
     def scratch(self) -> int:
