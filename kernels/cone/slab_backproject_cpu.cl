@@ -9,8 +9,10 @@
  * table's rows for its z, in the columns that its lines see, LANES columns at a time: half rows of
  * two z that are 4 apart fill the lanes, so that a transposition of 4 x 4 numbers within halves puts
  * z into the lanes. The blend, WIDTH columns of DEPTH numbers, stays in the first-level cache. Then
- * each line blends its columns: per LANES samples and view TAPS loads and multiply-adds. VIEWS views
- * are taken together, so that sums are loaded and stored half as often.
+ * each line blends its columns: per LANES samples and view TAPS loads and multiply-adds. Of shadows
+ * a little wider than an entry few samples touch a third one, so that what has a share of zero is
+ * left out: it would change no bit. VIEWS views are taken together, so that sums are loaded and
+ * stored half as often.
  *
  * Lines lie `line_stride` apart in the volume, slabs `slab_stride`; z is padded to whole runs, and
  * what is written there means nothing. */
@@ -32,41 +34,50 @@
 #define VIEWS 2
 #endif
 #define GROUPS (DEPTH / LANES)
+/* Lines in whole lanes, which an item's begin within where LINES is less than LANES. */
+#define LINE_GROUPS ((LINES + LANES - 1) / LANES)
+/* Lines that sums are asked for ahead of their use. */
+#define AHEAD 4
 
-/* Columns from `begin` on of one view's table, blended for the z of an item. */
+/* Columns of one view's table that `table` begins with, blended for the z of an item. */
 static void blend_rows(
     lanes (*tile)[GROUPS], __global const real *restrict table, __global const int *restrict places,
-    __global const real *restrict shares, real amplitude, int columns, int width)
+    __global const real *restrict shares, real amplitude, int columns, int depth, int width)
 {
   long row[DEPTH];
-  real weight[ROW_TAPS][DEPTH];
-  for (int z = 0; z < DEPTH; z++) {
-    real rest = amplitude;
-    row[z] = (long)places[z] * columns;
-    for (int t = 1; t < ROW_TAPS; t++) {
-      weight[t][z] = amplitude * shares[z * (ROW_TAPS - 1) + t - 1];
-      rest -= weight[t][z];
+  lanes weight[ROW_TAPS][GROUPS];
+  for (int z = 0; z < DEPTH; z++) row[z] = (long)places[z] * columns;
+  for (int g = 0; g < GROUPS; g++) {
+    lanes rest = amplitude;
+    UNROLL for (int t = 1; t < ROW_TAPS; t++) {
+      weight[t][g] = amplitude * LOAD(shares + (t - 1) * depth + g * LANES);
+      rest = rest - weight[t][g];
     }
-    weight[0][z] = rest;
+    weight[0][g] = rest;
   }
   for (int g = 0; g < GROUPS; g++) {
-    lanes weights[ROW_TAPS][4];
     __global const real *low[4], *high[4];
+    lanes weights[ROW_TAPS][4], beyond = 0;
+    UNROLL for (int t = 2; t < ROW_TAPS; t++) beyond = beyond + weight[t][g];
+    const int taps = ROW_TAPS > 2 && largest(beyond) > 0 ? ROW_TAPS : 2;
     UNROLL for (int n = 0; n < 4; n++) {
       const int z = g * LANES + n;
       low[n] = table + row[z];
       high[n] = table + row[z + 4];
-      UNROLL for (int t = 0; t < ROW_TAPS; t++)
-        weights[t][n] = (lanes)((real4)weight[t][z], (real4)weight[t][z + 4]);
+      UNROLL for (int t = 0; t < ROW_TAPS; t++) {
+        const real *of_tap = (const real *)weight[t];
+        weights[t][n] = (lanes)((real4)of_tap[z], (real4)of_tap[z + 4]);
+      }
     }
     for (int c = 0; c < width; c += 4) {
       lanes sums[4];
-      UNROLL for (int n = 0; n < 4; n++) {
+      UNROLL for (int n = 0; n < 4; n++)
         sums[n] = weights[0][n] * (lanes)(LOAD_HALF(low[n] + c), LOAD_HALF(high[n] + c));
-        UNROLL for (int t = 1; t < ROW_TAPS; t++) {
-          const int next = t * columns + c;
+      UNROLL for (int t = 1; t < ROW_TAPS; t++) {
+        if (t >= taps) break;
+        const int next = t * columns + c;
+        UNROLL for (int n = 0; n < 4; n++)
           sums[n] += weights[t][n] * (lanes)(LOAD_HALF(low[n] + next), LOAD_HALF(high[n] + next));
-        }
       }
       transpose_halves(sums);
       UNROLL for (int n = 0; n < 4; n++) tile[c + n][g] = sums[n];
@@ -81,13 +92,14 @@ KERNEL void slab_backproject_cpu(
     __global const real *restrict amplitudes, int first, int count, int rows, int columns,
     int lines, int padded_lines, int slabs, int depth, long line_stride, long slab_stride, int add)
 {
-  const int line0 = (int)get_global_id(0) * LINES, slab = (int)get_global_id(1);
+  const int line = (int)get_global_id(0) * LINES, slab = (int)get_global_id(1);
   const int z0 = (int)get_global_id(2) * DEPTH;
-  const int here = lines - line0 < LINES ? lines - line0 : LINES;
+  const int line0 = line / LANES * LANES, begin_line = line - line0;
+  const int end_line = begin_line + LINES < lines - line0 ? begin_line + LINES : lines - line0;
   __global real *out = volume + slab * slab_stride + line0 * line_stride + z0;
   lanes tiles[VIEWS][WIDTH][GROUPS];
-  int at[VIEWS][LINES];
-  real weight[VIEWS][TAPS][LINES];
+  int at[VIEWS][LINE_GROUPS * LANES];
+  lanes weight[VIEWS][TAPS][LINE_GROUPS];
   for (int view0 = 0; view0 < count; view0 += VIEWS) {
     for (int v = 0; v < VIEWS; v++) {
       /* Behind the last view the last one is taken again, with weights of zero. */
@@ -95,35 +107,47 @@ KERNEL void slab_backproject_cpu(
       const real some = view0 + v < count;
       const long of_slab = (long)view * slabs + slab;
       __global const int *place = places + of_slab * padded_lines + line0;
-      __global const real *share = shares + (of_slab * padded_lines + line0) * (TAPS - 1);
-      const int last = place[here - 1];
-      const int begin = (place[0] < last ? place[0] : last) & ~3;
-      const int end = (place[0] < last ? last : place[0]) + TAPS;
-      for (int i = 0; i < here; i++) {
-        real rest = some;
-        at[v][i] = place[i] - begin;
-        for (int t = 1; t < TAPS; t++) {
-          weight[v][t][i] = some * share[i * (TAPS - 1) + t - 1];
-          rest -= weight[v][t][i];
+      __global const real *share = shares + of_slab * (TAPS - 1) * padded_lines + line0;
+      if (view + VIEWS < count) {
+        const long next = of_slab + (long)VIEWS * slabs;
+        ask_for(
+            places + next * padded_lines + line0, shares + next * (TAPS - 1) * padded_lines + line0,
+            TAPS, padded_lines, end_line);
+        ask_for(
+            row_places + next * depth + z0, row_shares + next * (ROW_TAPS - 1) * depth + z0,
+            ROW_TAPS, depth, DEPTH);
+      }
+      const int one = place[begin_line], other = place[end_line - 1];
+      const int begin = (one < other ? one : other) & ~3;
+      const int end = (one < other ? other : one) + TAPS;
+      for (int i = 0; i < end_line; i += LANES) {
+        lanes rest = some;
+        UNROLL for (int t = 1; t < TAPS; t++) {
+          weight[v][t][i / LANES] = some * LOAD(share + (t - 1) * padded_lines + i);
+          rest = rest - weight[v][t][i / LANES];
         }
-        weight[v][0][i] = rest;
+        weight[v][0][i / LANES] = rest;
+        UNROLL for (int n = 0; n < LANES; n++) at[v][i + n] = place[i + n] - begin;
       }
       blend_rows(
           tiles[v], table + ENTRY(view, 0, begin), row_places + of_slab * depth + z0,
-          row_shares + (of_slab * depth + z0) * (ROW_TAPS - 1),
-          amplitudes[(long)(first + view) * slabs + slab], columns, end - begin);
+          row_shares + of_slab * (ROW_TAPS - 1) * depth + z0,
+          amplitudes[(long)(first + view) * slabs + slab], columns, depth, end - begin);
     }
-    for (int i = 0; i < here; i++) {
+    const int before = add || view0 > 0;
+    for (int i = begin_line; i < end_line; i++) {
       __global real *o = out + i * line_stride;
       lanes sum[GROUPS];
-      if (add || view0 > 0) {
+      if (before) {
+        UNROLL for (int g = 0; g < GROUPS; g += 2) PREFETCH(o + AHEAD * line_stride + g * LANES);
         UNROLL for (int g = 0; g < GROUPS; g++) sum[g] = LOAD(o + g * LANES);
       } else {
         UNROLL for (int g = 0; g < GROUPS; g++) sum[g] = 0;
       }
       UNROLL for (int v = 0; v < VIEWS; v++)
         UNROLL for (int t = 0; t < TAPS; t++) {
-          const real w = weight[v][t][i];
+          const real w = ((const real *)weight[v][t])[i];
+          if (t > 1 && w == 0) continue;
           const lanes(*column)[GROUPS] = tiles[v] + at[v][i] + t;
           UNROLL for (int g = 0; g < GROUPS; g++) sum[g] = sum[g] + w * (*column)[g];
         }

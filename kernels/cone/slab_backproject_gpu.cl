@@ -26,12 +26,14 @@ KERNEL void slab_backproject_gpu(
     const long of_slab = (long)view * slabs + slab;
     const long of_line = of_slab * padded_lines + line, of_row = of_slab * depth + z;
     __global const real *entries = table + ENTRY(view, row_places[of_row], places[of_line]);
+    __global const real *share_of = shares + of_slab * (TAPS - 1) * padded_lines + line;
+    __global const real *row_share_of = row_shares + of_slab * (ROW_TAPS - 1) * depth + z;
     real seen = 0, rest = 1;
     for (int c = TAPS - 1; c >= 0; c--) {
-      const real share = c > 0 ? shares[of_line * (TAPS - 1) + c - 1] : rest;
+      const real share = c > 0 ? share_of[(long)(c - 1) * padded_lines] : rest;
       real part = 0, rest_of_rows = 1;
       for (int r = ROW_TAPS - 1; r >= 0; r--) {
-        const real row_share = r > 0 ? row_shares[of_row * (ROW_TAPS - 1) + r - 1] : rest_of_rows;
+        const real row_share = r > 0 ? row_share_of[(long)(r - 1) * depth] : rest_of_rows;
         part += row_share * entries[(long)c * rows + r];
         rest_of_rows -= row_share;
       }

@@ -6,8 +6,9 @@
  * sample i, b that of its slab. The edges of the sample, a -+ da/2, end its shadow. STRIP 1 shares it among the entries that
  * the shadow overlaps; otherwise a hat as wide as the shadow, or two entries at least, is shared in
  * proportion to its heights; with POINT 1 it is two entries wide in any case. `places` is the first
- * entry of TAPS, `shares` what the others receive of 1 (see include/slab_table.h). A sample that is
- * seen off the table is put on its edge, where entries are zero.
+ * entry of TAPS, `shares` what the others receive of 1 (see include/slab_table.h): those of a slab's
+ * samples in their second entries, then in their third ones, and so on. A sample that is seen off
+ * the table is put on its edge, where entries are zero.
  *
  * forms[view] = n0 n1 n2 d0 d1 d2 origin radius.
  *
@@ -82,10 +83,8 @@ KERNEL void slab_places(
       sum = sum + heights[t];
     }
     for (int n = 0; n < LANES; n++) places[at + i + n] = (int)((integer *)&place)[n];
-    UNROLL for (int t = 1; t < TAPS; t++) {
-      const lanes share = seen_here ? heights[t] / sum : (lanes)0;
-      for (int n = 0; n < LANES; n++)
-        shares[(at + i + n) * (TAPS - 1) + t - 1] = ((real *)&share)[n];
-    }
+    UNROLL for (int t = 1; t < TAPS; t++)
+      STORE(shares + at * (TAPS - 1) + (t - 1) * samples + i,
+            seen_here ? heights[t] / sum : (lanes)0);
   }
 }

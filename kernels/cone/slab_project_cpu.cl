@@ -30,30 +30,40 @@
 #define BEFORE (TAPS - 1)
 #define TILE (BEFORE + WIDTH)
 
-/* The part of a slab's lines in an item's columns, all z of a run: tile[c][z]; returns its width. */
-static int blend_lines(
-    lanes (*tile)[GROUPS], __global const real *restrict volume, __global const int *restrict places,
-    __global const real *restrict shares, int *begin, int lines, long line_stride, int column0)
-{
-  const int upwards = places[0] <= places[lines - 1];
-  const int first_column = column0 - BEFORE, end_column = column0 + WIDTH;
-  /* The first line of the item is near that of the slab before. */
-  int k = *begin;
+/* Lanes of z whose sums of TAPS columns wait in registers at a time: some twelve registers, which
+ * leaves a few of a CPU's sixteen for values and weights. All parts are equally long, so that the
+ * last may overlap the one before, whose numbers it then computes again. */
+#define PARTS ((TAPS * GROUPS + 11) / 12 < GROUPS ? (TAPS * GROUPS + 11) / 12 : GROUPS)
+#define HELD ((GROUPS + PARTS - 1) / PARTS)
+
+/* The first line of a slab that an item's columns see, in the order of columns, or `lines`. */
 #define LINE(k) (upwards ? (k) : lines - 1 - (k))
+static int first_line(
+    __global const int *restrict places, int before, int lines, int upwards, int first_column)
+{
+  int k = before;
   while (k > 0 && places[LINE(k - 1)] >= first_column) k--;
   while (k < lines && places[LINE(k)] < first_column) k++;
-  *begin = k;
-  if (k == lines || places[LINE(k)] >= end_column) return 0;
-  lanes sums[TAPS][GROUPS];
+  return k;
+}
+
+/* The part of a slab's lines from the k-th on in an item's columns, HELD lanes of z from `group`
+ * on: tile[c][z]; returns its width. `volume` begins with that z. */
+static int blend_lines(
+    lanes (*tile)[GROUPS], __global const real *restrict volume, __global const int *restrict places,
+    __global const real *restrict shares, int group, int k, int lines, int padded_lines, int upwards,
+    long line_stride, int first_column)
+{
+  lanes sums[TAPS][HELD];
   UNROLL for (int t = 0; t < TAPS; t++)
-    UNROLL for (int g = 0; g < GROUPS; g++) sums[t][g] = 0;
+    UNROLL for (int g = 0; g < HELD; g++) sums[t][g] = 0;
   int column = 0;
   for (; k < lines; k++) {
     const int line = LINE(k), place = places[line] - first_column;
     if (place >= TILE) break;
     for (; column < place; column++) {
-      UNROLL for (int g = 0; g < GROUPS; g++) {
-        tile[column][g] = sums[0][g];
+      UNROLL for (int g = 0; g < HELD; g++) {
+        tile[column][group + g] = sums[0][g];
         UNROLL for (int t = 1; t < TAPS; t++) sums[t - 1][g] = sums[t][g];
         sums[TAPS - 1][g] = 0;
       }
@@ -61,28 +71,42 @@ static int blend_lines(
     real weight[TAPS];
     weight[0] = 1;
     UNROLL for (int t = 1; t < TAPS; t++) {
-      weight[t] = shares[line * (TAPS - 1) + t - 1];
+      weight[t] = shares[(t - 1) * padded_lines + line];
       weight[0] -= weight[t];
     }
     __global const real *values = volume + line * line_stride;
-    UNROLL for (int g = 0; g < GROUPS; g++) {
+    UNROLL for (int g = 0; g < HELD; g++) {
       const lanes value = LOAD(values + g * LANES);
       UNROLL for (int t = 0; t < TAPS; t++) sums[t][g] = sums[t][g] + weight[t] * value;
     }
   }
   UNROLL for (int t = 0; t < TAPS; t++, column++)
     if (column < TILE)
-      UNROLL for (int g = 0; g < GROUPS; g++) tile[column][g] = sums[t][g];
+      UNROLL for (int g = 0; g < HELD; g++) tile[column][group + g] = sums[t][g];
   column = column < TILE ? column : TILE;
   for (; (column - BEFORE) % LANES != 0; column++)
-    UNROLL for (int g = 0; g < GROUPS; g++) tile[column][g] = 0;
+    UNROLL for (int g = 0; g < HELD; g++) tile[column][group + g] = 0;
   return column - BEFORE;
+}
+
+/* Shares of the rows that a run of z reaches, times a slab's amplitude. */
+static void weigh_rows(
+    lanes (*weight)[GROUPS], __global const real *restrict shares, real amplitude, int depth)
+{
+  for (int g = 0; g < GROUPS; g++) {
+    lanes rest = amplitude;
+    UNROLL for (int t = 1; t < ROW_TAPS; t++) {
+      weight[t][g] = amplitude * LOAD(shares + (t - 1) * depth + g * LANES);
+      rest = rest - weight[t][g];
+    }
+    weight[0][g] = rest;
+  }
 }
 
 /* Add tile[c][z] of 8 columns to a table's rows. */
 static void add_rows(
     __global real *restrict table, lanes (*tile)[GROUPS], __global const int *restrict places,
-    __global const real *restrict shares, real amplitude, int columns)
+    const lanes (*weight)[GROUPS], int columns)
 {
   lanes sums[ROW_TAPS];
   UNROLL for (int t = 0; t < ROW_TAPS; t++) sums[t] = 0;
@@ -102,13 +126,8 @@ static void add_rows(
           UNROLL for (int t = 1; t < ROW_TAPS; t++) sums[t - 1] = sums[t];
           sums[ROW_TAPS - 1] = 0;
         }
-        real rest = amplitude;
-        UNROLL for (int t = 1; t < ROW_TAPS; t++) {
-          const real weight = amplitude * shares[z * (ROW_TAPS - 1) + t - 1];
-          sums[t] = sums[t] + weight * values[n];
-          rest -= weight;
-        }
-        sums[0] = sums[0] + rest * values[n];
+        UNROLL for (int t = 0; t < ROW_TAPS; t++)
+          sums[t] = sums[t] + ((const real *)weight[t])[z] * values[n];
       }
     }
   UNROLL for (int t = 0; t < ROW_TAPS; t++, at += columns) STORE(at, LOAD(at) + sums[t]);
@@ -127,22 +146,44 @@ KERNEL void slab_project_cpu(
   for (int view = view0; view < view1; view++)
     for (int r = 0; r < rows; r++)
       for (int c = 0; c < own; c += LANES) STORE(table + ENTRY(view, r, column0 + c), (lanes)0);
-  lanes tile[TILE][GROUPS];
+  lanes tile[TILE][GROUPS], weight[ROW_TAPS][GROUPS];
   for (int z0 = 0; z0 < depth; z0 += DEPTH) {
     int begin[VIEWS];
     for (int v = 0; v < VIEWS; v++) begin[v] = 0;
     for (int slab = 0; slab < slabs; slab++)
       for (int view = view0; view < view1; view++) {
-        const long of_slab = (long)view * slabs + slab, of_line = of_slab * padded_lines;
-        const long of_row = of_slab * depth + z0;
-        const int width = blend_lines(
-            tile, volume + slab * slab_stride + z0, places + of_line,
-            shares + of_line * (TAPS - 1), begin + (view - view0), lines, line_stride, column0);
+        const long of_slab = (long)view * slabs + slab;
+        __global const int *place = places + of_slab * padded_lines;
+        const int upwards = place[0] <= place[lines - 1], first_column = column0 - BEFORE;
+        /* The first line of the item is near that of the slab before. */
+        const int k = first_line(place, begin[view - view0], lines, upwards, first_column);
+        begin[view - view0] = k;
+        if (k == lines || place[LINE(k)] >= column0 + WIDTH) continue;
+        const long next = view + 1 < view1 ? of_slab + slabs : (long)view0 * slabs + slab + 1;
+        if (next < (long)count * slabs) {
+          const int last = lines - 1 - k, near = upwards ? k : last > WIDTH ? last - WIDTH : 0;
+          ask_for(
+              places + next * padded_lines + near,
+              shares + next * (TAPS - 1) * padded_lines + near, TAPS, padded_lines, WIDTH);
+          ask_for(
+              row_places + next * depth + z0, row_shares + next * (ROW_TAPS - 1) * depth + z0,
+              ROW_TAPS, depth, DEPTH);
+        }
+        int width = 0;
+        for (int part = 0; part < PARTS; part++) {
+          const int group = part * HELD < GROUPS - HELD ? part * HELD : GROUPS - HELD;
+          width = blend_lines(
+              tile, volume + slab * slab_stride + z0 + group * LANES, place,
+              shares + of_slab * (TAPS - 1) * padded_lines, group, k, lines, padded_lines, upwards,
+              line_stride, first_column);
+        }
+        weigh_rows(
+            weight, row_shares + of_slab * (ROW_TAPS - 1) * depth + z0,
+            amplitudes[(long)(first + view) * slabs + slab], depth);
         for (int c = 0; c < width && c < own; c += LANES)
           add_rows(
-              table + ENTRY(view, 0, column0 + c), tile + BEFORE + c, row_places + of_row,
-              row_shares + of_row * (ROW_TAPS - 1), amplitudes[(long)(first + view) * slabs + slab],
-              columns);
+              table + ENTRY(view, 0, column0 + c), tile + BEFORE + c,
+              row_places + of_slab * depth + z0, weight, columns);
       }
   }
 }

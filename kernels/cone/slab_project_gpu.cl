@@ -11,11 +11,12 @@
 #include "include/portable.h"
 #include "include/slab_table.h"
 
-/* What entry `entry` receives of a sample whose shares begin at `place`. */
-static real share_of(__global const real *shares, int taps, int tap) {
-  if (tap > 0) return shares[tap - 1];
+/* What one of a sample's entries receives, of which `shares` has the second one's; those of the
+ * entries behind it are `samples` apart. */
+static real share_of(__global const real *shares, int samples, int taps, int tap) {
+  if (tap > 0) return shares[(long)(tap - 1) * samples];
   real rest = 1;
-  for (int t = taps - 1; t > 0; t--) rest -= shares[t - 1];
+  for (int t = taps - 1; t > 0; t--) rest -= shares[(long)(t - 1) * samples];
   return rest;
 }
 
@@ -43,13 +44,13 @@ KERNEL void slab_project_gpu(
     while (z0 < depth && row_place[z0] <= row - ROW_TAPS) z0++;
     real seen = 0;
     for (int n = k; n < lines && place[LINE(n)] <= column; n++) {
-      const long line = LINE(n), of_line = (of_slab * padded_lines + line) * (TAPS - 1);
+      const long line = LINE(n), of_line = of_slab * (TAPS - 1) * padded_lines + line;
       __global const real *values = volume + slab * slab_stride + line * line_stride;
       real part = 0;
       for (int z = z0; z < depth && row_place[z] <= row; z++)
-        part += share_of(row_shares + (of_slab * depth + z) * (ROW_TAPS - 1), ROW_TAPS,
+        part += share_of(row_shares + of_slab * (ROW_TAPS - 1) * depth + z, depth, ROW_TAPS,
                          row - row_place[z]) * values[z];
-      seen += share_of(shares + of_line, TAPS, column - place[line]) * part;
+      seen += share_of(shares + of_line, padded_lines, TAPS, column - place[line]) * part;
     }
     sum += amplitudes[(long)(first + view) * slabs + slab] * seen;
   }

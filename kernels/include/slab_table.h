@@ -26,8 +26,9 @@
  * transpose of line integrals; the projector is the transpose of these steps in reverse order.
  *
  * A sample's footprint lies in TAPS columns from its `place` on. The first takes what the others
- * leave; `shares` has TAPS - 1 numbers for each sample. Rows have ROW_TAPS alike. Both come from
- * slab_places, once for both halves of the pair, which therefore read the same numbers.
+ * leave; `shares` has TAPS - 1 runs of numbers, one for each sample of a slab. Rows have ROW_TAPS
+ * alike. Both come from slab_places, once for both halves of the pair, which therefore read the same
+ * numbers.
  *
  * Table entries of samples that the detector does not see are zeros beyond its edges. On a CPU the
  * columns of a table are contiguous, on a GPU its rows, along which its items lie. */
@@ -67,6 +68,18 @@ static lanes cubic_integral(lanes distance) {
   const lanes beyond = d * (48.0f + d * (d * (20.0f - 3.0f * d) - 48.0f)) - 4.0f;
   const lanes found = d < 1.0f ? near : beyond;
   return distance < 0.0f ? -found : found;
+}
+
+/* Asks for the places and shares of `count` samples, before they are needed: each item takes runs
+ * that are too short and too far apart for a CPU to see them coming. */
+#define IN_CACHE_LINE (64 / (int)sizeof(real))
+static void ask_for(
+    __global const int *places, __global const real *shares, int taps, int samples, int count)
+{
+  for (int i = 0; i < count; i += IN_CACHE_LINE) {
+    PREFETCH(places + i);
+    UNROLL for (int t = 0; t < taps - 1; t++) PREFETCH(shares + (long)t * samples + i);
+  }
 }
 
 /* The least and the largest of LANES numbers. */
