@@ -132,7 +132,7 @@ def test_words_say_what_splats_are():
     ("more", "words"),
     [
         (["--order", "1"], "order is 1"),
-        (["--color-order", "1"], "color_order is 1"),
+        (["--color-order", "1"], "color-order is 1"),
         (["--basis", "hermite", "--order", "9"], "order is 9, wanted 0 to 8"),
         (["--basis", "hermite", "--order", "-1"], "order is -1"),
         (["--modes", "4"], "--modes counts lobes: add --angular"),

@@ -69,7 +69,7 @@ def test_more_captures_are_scored_beside_it(capture, tmp_path):
         (["--downscale", "0"], "--downscale is 0"),
         (["--steps", "0"], "steps is 0"),
         (["--eps2d", "-1"], "eps2d is -1"),
-        (["--sh-degree", "9"], "sh_degree is 9"),
+        (["--sh-degree", "9"], "sh-degree is 9"),
         (["--test", "nowhere"], "nowhere"),
         (["--homogenise", "0", "--homogenise-by", "coverage"], "--homogenise-by coverage has no"),
     ],

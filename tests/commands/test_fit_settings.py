@@ -19,6 +19,7 @@ CLASSES = {"fit photos": FitPhotosSettings, "fit xray": FitXraySettings}
 # Other values, for options that do not take every one of their type.
 OTHERS = {
     "basis": "hermite",
+    "geometry": Path("geometry.yaml"),
     "activation": "exp",
     "angular": "lg",
     "loss": "l2",
