@@ -53,8 +53,9 @@ def test_counted_work_is_that_of_the_arrays(tool):
     device, case = rift.default_device(), tool("bench.case").Case(32, 24)
     tasks = tool("bench.projections").projection_tasks(device, case)
     for group in tool("bench.groups").groups(device, case):
-        # Work on splats is counted in pairs of a splat and a tile, which no array's size tells.
-        if not group.name.startswith("splats"):
+        # Work on splats is counted in pairs of a splat and a tile, which no array's size tells;
+        # the tables of cones are padded to whole blocks, which are most of them at this size.
+        if not group.name.startswith(("splats", "beams")):
             tasks += group.tasks()
     checked = set()
     for task in tasks:

@@ -120,9 +120,9 @@ _RAY = Cost(
     "update",
     20,
     lambda c: c.updates,
-    _volume_and_data,
+    lambda c: 4 * (2 * c.samples + c.pixels),
     "20 flop per update (a pixel in a view): its place, two edges' shares and multiply-adds; "
-    "bytes: the image and the data",
+    "bytes: the image by rows and by columns, and the data",
 )
 
 CONE_COSTS: dict[str, Cost] = {

@@ -20,7 +20,6 @@ from bench.fast_projections import FAST_COSTS, fast_tasks
 from bench.modes import MODE_COSTS, mode_tasks
 from bench.operations import Task
 from bench.projections import COSTS, footprint_tasks
-from bench.rays import RAY_COSTS, ray_tasks
 from bench.row_filters import filter_tasks
 from bench.solver_steps import step_tasks
 from bench.splines import SPLINE_COSTS, spline_tasks
@@ -35,7 +34,6 @@ KNOWN: Mapping[str, Cost] = {
     **COVERAGE_COSTS,
     **CONE_COSTS,
     **CORRECTION_COSTS,
-    **RAY_COSTS,
     **COSTS,
 }
 
@@ -71,7 +69,6 @@ def groups(device: rift.Device, case: Case) -> list[Group]:
         Group(f"the fast projector, {case.name}", partial(fast_tasks, *at)),
         Group("beams from a point", partial(cone_tasks, *at)),
         Group("corrections of projections", partial(correction_tasks, device, views, n)),
-        Group("fans, cones and tilted detectors", partial(ray_tasks, device, quarter, quarter)),
         Group("coverage", partial(coverage_tasks, device, views, quarter)),
         Group("splats with modes", partial(mode_tasks, device, 16 * n, n // 2)),
     ]
