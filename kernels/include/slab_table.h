@@ -14,9 +14,9 @@
  *
  *     T[r][u] = gain(u) * sum over rows i of kernel(step(u) (r + first) + center - i) P[i][u],
  *
- * in which step(u) is |d(u)| times the table's pitch, and gain(u) its square. In T a whole slab has one magnification: its
- * samples meet the rows r at equal steps, whatever the line, and the columns at places that are the
- * same for all z of a line,
+ * in which step(u) is |d(u)| times the table's pitch, and gain(u) its square. In T a whole slab has
+ * one magnification: its samples meet the rows r at equal steps, whatever the line, and the columns
+ * at places that are the same for all z of a line,
  *
  *     out[a][z] += A / (b - b_s)^2 * sum over columns and rows of  f(a, u) g(z, r) T[r][u],
  *

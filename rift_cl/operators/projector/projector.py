@@ -29,8 +29,9 @@ class Projector(LinearOperator):
     Args:
         grid: the grid of the image, (ny, nx), or of the volume, (nz, ny, nx).
         scan: angles and detector.
-        footprint: the projection of a pixel onto the detector, ``strip`` (the default), ``joseph``
-            or ``linear``.
+        footprint: the projection of a sample onto the detector: ``strip`` (the default) or
+            ``linear``; parallel beams and fans of one slice take ``joseph`` as well, cones
+            ``point``.
         device: the device to use; the default device if not given.
         dtype: ``float32`` (the default), or ``float64`` where the device has it.
 
