@@ -20,6 +20,7 @@
 
 #include "include/portable.h"
 #include "include/alpha_threshold.h"
+#include "include/logarithm.h"
 #include "include/small_matrix.h"
 #include "include/camera.h"
 #include "include/aperture.h"
@@ -39,8 +40,6 @@
 #endif
 /* Extents are held at this, so that rounded up they fit an int with room to add. */
 #define MOST_PIXELS 1e9f
-/* Below it some devices take a number for zero. */
-#define LEAST_NORMAL 1.2e-38f
 
 /* Largest whole number not above v, and smallest not below, held between 0 and most. */
 static int whole_below(float v, int most) { return v < 0 ? 0 : v > most ? most : (int)v; }
@@ -48,15 +47,6 @@ static int whole_below(float v, int most) { return v < 0 ? 0 : v > most ? most :
 static int whole_above(float v, int most) {
   const int below = whole_below(v, most);
   return below < most && below < v ? below + 1 : below;
-}
-
-/* ln x of a positive normal number, to 2e-7 of it or of 1: with x = m 2^e, m about 1,
- * ln m = 2 artanh((m - 1) / (m + 1)). The built-in takes longer than all else here on PoCL. */
-static float natural_log(float x) {
-  const int e = (as_int(x) - 0x3f3504f3) >> 23;
-  const float m = as_float(as_int(x) - (e << 23)), s = (m - 1) / (m + 1), t = s * s;
-  const float series = 1 + t * (1 / 3.0f + t * (1 / 5.0f + t * (1 / 7.0f + t * (1 / 9.0f))));
-  return e * 0.69314718f + 2 * s * series;
 }
 
 #if MODAL

@@ -9,7 +9,7 @@ Features of more than 32 channels are drawn 32 at a time, without modes alone.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,8 @@ from rift_cl.splat.tile_lists import TileLists, Tiles
 
 # Moments of dL/dsigma that stand before the features' gradients in a record.
 MOMENTS = 6
+# Numbers of a splat's packed record.
+RECORD_NUMBERS = 16
 # The most channels that the kernels are made for.
 _CHANNELS = 32
 _TILES = (8, 16, 32)
@@ -131,11 +133,14 @@ class ScreenSplats:
         screen: (N, 8): mean x, mean y, conic a, b, c, weight, extent x, extent y.
         features: (N, D), the channels that are drawn.
         modes: the polynomials of splats that have some; None for Gaussians.
+        records: (N, 16), what tiles want of them in one line each, see
+            ``kernels/include/screen_record.h``; None until ``packed`` makes them.
     """
 
     screen: DeviceArray
     features: DeviceArray
     modes: ScreenModes | None = None
+    records: DeviceArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +156,27 @@ class Raster:
     image: DeviceArray
     transmittance: DeviceArray
     last: DeviceArray
+
+
+def packed(device: Device, splats: ScreenSplats) -> ScreenSplats:
+    """The splats with their packed records, which are made where they are not there yet."""
+    if splats.records is not None:
+        return splats
+    count, modes = len(splats.screen), splats.modes
+    records = device.empty((count, RECORD_NUMBERS))
+    device.launch(
+        "splat_pack",
+        (count,),
+        screen=splats.screen,
+        features=splats.features,
+        packed=records,
+        count=count,
+        modes=modes.table if modes else None,
+        row=modes.width if modes else None,
+        CHANNELS=splats.features.shape[1],
+        MODAL=modes is not None,
+    )
+    return replace(splats, records=records)
 
 
 def rasterize(
