@@ -19,6 +19,7 @@ import rift_cl as rift
 from bench.case import Floats
 from bench.costs import Cost
 from bench.operations import Task
+from bench.splat_scenes import random_splats
 from bench.training import TRAINING_COSTS, training_operations
 from rift_cl.geometry import Camera
 from rift_cl.splat import Frame, FrameGradients, Renderer, Splats
@@ -27,7 +28,6 @@ from rift_cl.splat.raster import MOMENTS
 # Operations per lane, forward and backward: the count that the design's prototype used.
 _FORWARD, _BACKWARD = 32, 62
 _STRIP = 8
-_COEFFICIENTS = 16
 
 
 @dataclass(frozen=True)
@@ -52,15 +52,7 @@ class SplatCase:
     @cached_property
     def parameters(self) -> dict[str, Floats]:
         """The cube of Gaussians: host arrays by the names that ``Splats`` gives them."""
-        random = np.random.default_rng(0)
-        values = {
-            "means": random.uniform(-1, 1, (self.count, 3)),
-            "quats": random.normal(size=(self.count, 4)),
-            "scales": np.exp(random.normal(np.log(0.02), 0.4, (self.count, 3))),
-            "opacities": random.uniform(0.1, 0.9, self.count),
-            "sh": 0.2 * random.normal(size=(self.count, _COEFFICIENTS, 3)),
-        }
-        return {name: array.astype(np.float32) for name, array in values.items()}
+        return random_splats(self.count)
 
     @cached_property
     def splats(self) -> Splats:

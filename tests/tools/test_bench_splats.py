@@ -1,0 +1,102 @@
+"""Scenes of the splat benchmark, its count of used lanes, and two versions in one process.
+
+No test looks at how long anything took.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.errors import InputError
+from rift_cl.geometry import Camera
+from rift_cl.splat import Renderer, Splats
+
+ROOT = Path(__file__).parents[2]
+SCENE = "cube:40:20x12"
+
+
+@pytest.mark.parametrize(
+    "text", ["cube:512x512", "cube:0:5x5", "fitted:480", "no_file.ply:9x9", ""]
+)
+def test_a_scene_that_is_none_is_refused(tool, text):
+    with pytest.raises(InputError, match="wanted cube:SPLATS"):
+        tool("bench.splat_scenes").DrawnScene.parse(text)
+
+
+@pytest.mark.parametrize("text", ["fitted:64x48", SCENE, "needles:40:20x12"])
+def test_a_scene_fills_its_picture(tool, text):
+    scene = tool("bench.splat_scenes").DrawnScene.parse(text)
+    device = rift.default_device()
+    splats = Splats.upload(device, **scene.parameters)
+    frame = Renderer(device=device).forward(splats, Camera(*scene.lens))
+    hidden = 1 - device.get(frame.transmittance)
+    assert hidden.shape == scene.size
+    assert 0.1 < hidden.mean() < 0.999
+
+
+def test_needles_are_long_and_hold_the_volume_of_the_cubes_splats(tool):
+    random_splats = tool("bench.splat_scenes").random_splats
+    round_ones, long_ones = random_splats(9)["scales"], random_splats(9, long=True)["scales"]
+    np.testing.assert_allclose(
+        (long_ones / round_ones).prod(axis=1), 0.25**3 * np.ones(9), rtol=1e-5
+    )
+    np.testing.assert_allclose(
+        long_ones[:, 0] / long_ones[:, 1] / (round_ones[:, 0] / round_ones[:, 1]), 40, rtol=1e-5
+    )
+
+
+def test_used_lanes_are_the_pairs_that_count(tool):
+    scene = tool("bench.splat_scenes").DrawnScene.parse("cube:300:24x20")
+    device = rift.default_device()
+    values = scene.parameters | {"scales": 4 * scene.parameters["scales"]}
+    splats, camera = Splats.upload(device, **values), Camera(*scene.lens)
+    frame = Renderer(device=device).forward(splats, camera)
+    found = tool("bench.used_lanes").used_lanes(device, frame)
+    screen, depths = (
+        device.get(array) for array in (frame.projection.screen, frame.projection.depths)
+    )
+    order = [k for k in np.argsort(depths, kind="stable") if screen[k, 5] > 0]
+    assert found == _one_by_one(screen[order].tolist(), camera.size)
+
+
+def _one_by_one(screen: list[list[float]], size: tuple[int, int]) -> int:
+    """The definition, pixel by pixel and splat by splat."""
+    used = 0
+    for pixel in range(size[0] * size[1]):
+        y, x, left = pixel // size[1] + 0.5, pixel % size[1] + 0.5, 1.0
+        for mean_x, mean_y, a, b, c, weight, *_ in screen:
+            dx, dy = mean_x - x, mean_y - y
+            sigma = 0.5 * (a * dx * dx + c * dy * dy) + b * dx * dy
+            alpha = min(weight * math.exp(-sigma), 0.99)
+            if alpha < 1 / 255:
+                continue
+            left *= 1 - alpha
+            if left <= 1e-4:
+                break
+            used += 1
+    return used
+
+
+def test_two_versions_take_turns(tool, tmp_path, capsys, monkeypatch):
+    bench = tool("bench_splats")
+    out = tmp_path / "splats.json"
+    arguments = ["--scenes", SCENE, "--training", "60:24x16", "--rounds", "1"]
+    monkeypatch.setattr(
+        sys, "argv", ["bench_splats", *arguments, "--against", str(ROOT), "--json", str(out)]
+    )
+    assert bench.main() == 0
+    record = json.loads(out.read_text(encoding="utf-8"))
+    (scene,), (training,) = record["scenes"], record["training"]
+    assert scene["apart"] == 0
+    assert scene["used_lanes"] > 0
+    both = {"this version", "the other"}
+    assert set(scene["cpu_s"]) == set(training["cpu_s"]) == both
+    assert set(scene["cpu_s"]["the other"]) >= {"draw", "raster", "raster gradient"}
+    assert "ns per used lane" in capsys.readouterr().out

@@ -1,0 +1,272 @@
+"""Splats drawn and differentiated, and steps of training: this version beside another one.
+
+    python tools/bench_splats.py --against ../checkout-of-79177a8
+    python tools/bench_splats.py --scenes fitted:480x360 cube:1000000:1920x1080 --training
+
+Both versions work in one process and take turns, with the same splats and cameras. Times are
+processor time of all threads divided by the number of cores, the least of the rounds: what else
+the machine does hardly enters. ``raster`` and ``raster gradient`` are the kernels that composite,
+alone. A used lane is a pixel in which a listed splat counts, whatever a version evaluates besides.
+``--scenes`` understands what ``bench/splat_scenes.py`` says, ``--training`` what
+``bench/training_case.py`` says.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tyro
+
+import rift_cl as rift
+from bench.checkout import Checkout
+from bench.command import say
+from bench.splat_scenes import DrawnScene
+from bench.surroundings import surroundings
+from bench.table import NONE, Table, show
+from bench.used_lanes import used_lanes
+from rift_cl.io import write_text
+
+_SCENES = ("fitted:480x360", "cube:100000:512x512", "needles:20000:512x512")
+_TRAINING = ("10000:160x120", "60000:224x168")
+_GROWTH = (
+    *(
+        f"cube:{count}:512x512"
+        for count in (10_000, 30_000, 100_000, 300_000, 1_000_000, 2_000_000)
+    ),
+    *(f"fitted:{size}" for size in ("160x120", "480x360", "960x720", "1920x1080", "3840x2160")),
+)
+# Steps in a turn of training, and those before anything counts.
+_STEPS, _WARM = 8, 8
+_RASTER = ("raster", "raster gradient")
+
+
+@dataclass(frozen=True)
+class Options:
+    """Measure splats.
+
+    Args:
+        scenes: what is drawn, any number.
+        training: what is trained on, any number; none to leave training out.
+        growth: draw cubes of 10,000 to 2 million splats and the fitted scene up to 4K instead.
+        against: checkout of another version.
+        rounds: how often each version has its turn.
+        lanes: count used lanes, on the host.
+        json: file for every figure.
+        device: which OpenCL device, as RIFT_DEVICE selects it.
+    """
+
+    scenes: tuple[str, ...] = _SCENES
+    training: tuple[str, ...] = _TRAINING
+    growth: bool = False
+    against: Path | None = None
+    rounds: int = 5
+    lanes: bool = True
+    json: Path | None = None
+    device: str | None = None
+
+
+@dataclass
+class Version:
+    """A version of the package, and how it takes its turn.
+
+    Args:
+        name: how tables call it.
+        turn: what holds while it works.
+        device: its device.
+    """
+
+    name: str
+    turn: Callable[[], AbstractContextManager[Any]]
+    device: Any
+    seconds: dict[str, list[float]] = field(default_factory=dict)
+
+    def timed(self, what: str, run: Callable[[], Any]) -> Any:
+        """Do something and keep the processor time a core of it."""
+        self.device.finish()
+        began = time.process_time()
+        found = run()
+        self.device.finish()
+        took = (time.process_time() - began) / (os.cpu_count() or 1)
+        self.seconds.setdefault(what, []).append(took)
+        return found
+
+
+class Drawing:
+    """A version that draws a scene.
+
+    Args:
+        version: which.
+        scene: what.
+    """
+
+    def __init__(self, version: Version, scene: DrawnScene) -> None:
+        self.version = version
+        device, splat = version.device, import_module("rift_cl.splat")
+        raster = import_module("rift_cl.splat.raster")
+        self._rasterize, self._raster_grad = raster.rasterize, raster.raster_grad
+        self._splats = splat.Splats.upload(device, **scene.parameters)
+        self._camera = import_module("rift_cl.geometry").Camera(*scene.lens)
+        self._renderer = splat.Renderer(device=device)
+        self._grad = device.array(scene.grad_image)
+        self._behind = device.array(np.float32([0.1, 0.2, 0.3]))
+
+    def turn(self) -> Any:
+        """Everything once; the frame."""
+        timed, renderer = self.version.timed, self._renderer
+        frame = timed("draw", self._draw)
+        timed("draw and gradient", lambda: renderer.backward(self._draw(), self._grad))
+        if frame.lists is None:
+            return frame
+        given: dict[str, Any] = {"settings": renderer.settings, "background": self._behind}
+        drawn = self.version.device, _on_screen(frame), frame.lists
+        again = timed(_RASTER[0], lambda: self._rasterize(*drawn, self._camera.size, **given))
+        timed(_RASTER[1], lambda: self._raster_grad(*drawn, again, self._grad, **given))
+        return frame
+
+    def image(self, frame: Any) -> Any:
+        """The picture on the host."""
+        return self.version.device.get(frame.image)
+
+    def _draw(self) -> Any:
+        return self._renderer.forward(self._splats, self._camera, background=self._behind)
+
+
+def _on_screen(frame: Any) -> Any:
+    """What a frame drew; versions differ in where they keep it."""
+    for name in ("raster_pass", "drawing", "drawn"):
+        if (kept := getattr(frame, name, None)) is not None:
+            return kept.screen
+    raise AttributeError(f"{type(frame)} keeps no splats of the screen")
+
+
+def draw(scene: DrawnScene, versions: list[Version], options: Options) -> dict[str, Any]:
+    """The record of a scene: times of all versions, and how far their pictures are apart."""
+    drawings = []
+    for version in versions:
+        version.seconds = {}
+        with version.turn():
+            drawings.append(Drawing(version, scene))
+    frames: list[Any] = []
+    for turn in range(options.rounds + 1):
+        if turn == 1:
+            for version in versions:
+                version.seconds = {}
+        frames = []
+        for drawing in drawings:
+            with drawing.version.turn():
+                frames.append(drawing.turn())
+    images = [drawing.image(frame) for drawing, frame in zip(drawings, frames, strict=True)]
+    record = {
+        "name": scene.name,
+        "splats": len(scene.parameters["means"]),
+        "apart": float(np.linalg.norm(images[0] - images[-1]) / np.linalg.norm(images[-1])),
+        "cpu_s": {version.name: version.seconds for version in versions},
+    }
+    lists = frames[0].lists
+    if lists is not None:
+        record["entries"] = lists.n_entries
+    if options.lanes and lists is not None:
+        record["used_lanes"] = used_lanes(versions[0].device, frames[0])
+    return record
+
+
+def train(name: str, versions: list[Version], options: Options) -> dict[str, Any]:
+    """The record of a case of training: the time of a step."""
+    trainers = []
+    for version in versions:
+        version.seconds = {}
+        with version.turn():
+            case = import_module("bench.training_case").TrainingCase.parse(name, version.device)
+            trainers.append(case.trainer())
+            for _ in range(_WARM):
+                trainers[-1].step()
+    for _ in range(options.rounds):
+        for version, trainer in zip(versions, trainers, strict=True):
+            with version.turn():
+                version.timed("step", lambda trainer=trainer: _steps(trainer))
+    return {"name": name, "cpu_s": {version.name: version.seconds for version in versions}}
+
+
+def _steps(trainer: Any) -> None:
+    for _ in range(_STEPS):
+        trainer.step()
+
+
+def measure_all(options: Options) -> Iterator[dict[str, Any]]:
+    """Run the benchmark; all that was measured so far, after each scene."""
+    device = rift.open_device(options.device)
+    versions = [Version("this version", nullcontext, device)]
+    if options.against is not None:
+        other = Checkout(options.against, bench=True)
+        with other.active() as package:
+            theirs = package.open_device(device.selector)
+        versions.append(Version("the other", other.active, theirs))
+    head = {**surroundings(device), "steps": _STEPS}
+    drawn, trained = list[dict[str, Any]](), list[dict[str, Any]]()
+    for text in _GROWTH if options.growth else options.scenes:
+        say(text)
+        drawn.append(draw(DrawnScene.parse(text), versions, options))
+        yield {**head, "scenes": drawn, "training": trained}
+    for text in () if options.growth else options.training:
+        say(f"training, {text}")
+        trained.append(train(text, versions, options))
+        yield {**head, "scenes": drawn, "training": trained}
+
+
+def tables(record: dict[str, Any]) -> Iterator[Table]:
+    """A table of the scenes, and one of training."""
+    columns = ("scene", "operation", "ms", "other", "times", "ns per used lane", "other")
+    notes = (
+        "Processor time of all threads over the number of cores, least of the rounds.",
+        *(f"{s['name']}: pictures {s['apart']:.1e} apart (L2)" for s in record["scenes"]),
+    )
+    rows = [row for scene in record["scenes"] for row in _rows(scene, 1)]
+    yield Table(record["device"]["name"], columns, rows, notes, texts=2)
+    if record["training"]:
+        steps = [row[:5] for case in record["training"] for row in _rows(case, record["steps"])]
+        yield Table("Training", columns[:5], steps, texts=2)
+
+
+def _rows(case: dict[str, Any], parts: int) -> Iterator[tuple[str, ...]]:
+    ours, *others = ({k: min(v) / parts for k, v in s.items()} for s in case["cpu_s"].values())
+    for what, took in ours.items():
+        other = others[0].get(what) if others else None
+        lanes = case.get("used_lanes") if what in _RASTER else None
+        yield (
+            case["name"],
+            what,
+            f"{took * 1e3:.2f}",
+            f"{other * 1e3:.2f}" if other else NONE,
+            f"{other / took:.2f}" if other else NONE,
+            f"{took / lanes * 1e9:.3f}" if lanes else NONE,
+            f"{other / lanes * 1e9:.3f}" if lanes and other else NONE,
+        )
+
+
+def main() -> int:
+    """Run with the command line's arguments; the exit status."""
+    options = tyro.cli(Options)
+    record: dict[str, Any] = {}
+    try:
+        for record in measure_all(options):
+            if options.json is not None:
+                write_text(options.json, json.dumps(record, indent=1) + "\n")
+    except rift.RiftError as error:
+        say(f"bench_splats: {error}")
+        return error.exit_status
+    show(tables(record))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
