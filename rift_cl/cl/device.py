@@ -7,8 +7,10 @@ pickled as the selector that opens it: contexts do not travel, names do.
 from __future__ import annotations
 
 import dataclasses
-import math
 import threading
+from collections.abc import Callable
+from copy import copy
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +19,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import check_array, memory_budget
 from rift_cl.cl.build.driver_record import OTHER_KIND, driver_identity, read_record
-from rift_cl.cl.failures import named_errors
+from rift_cl.cl.failures import driver_errors, named_error, named_errors
 from rift_cl.cl.host_arrays import as_plain, as_real_array, download, send, upload
 from rift_cl.cl.process import claim_process
 from rift_cl.cl.program import Programs
@@ -25,6 +27,8 @@ from rift_cl.cl.traits import Traits
 
 # Asking how much memory the host has free costs more than a smaller array is worth.
 _LARGE = 1 << 20
+# Shapes of arrays that are remembered.
+_SHAPES = 256
 
 
 class Device:
@@ -109,6 +113,8 @@ class Device:
             ForkedContextError: OpenCL was used before this process was forked.
         """
         claim_process()
+        if self._opened is not None:
+            return self._opened
         with self._opening:
             if self._opened is None:
                 with named_errors("opening it", self.name):
@@ -127,20 +133,28 @@ class Device:
             ResourceLimitError: it is larger than the device takes in one piece.
             DeviceMemoryError: the device's memory ran out.
         """
-        from pyopencl.array import Array
-
         opened = self._open()
-        # Blocks that are kept for the next array count as well, until the room is needed.
-        count = shape if isinstance(shape, int) else math.prod(shape)
-        wanted = int(count) * np.dtype(dtype).itemsize
+        array: Any = copy(opened.plain_array(shape, dtype))
+        array.events = []
+        if array.nbytes:
+            self._allocate(opened, array)
+        made: DeviceArray = array
+        return made
+
+    def _allocate(self, opened: _Opened, array: Any) -> None:
+        """Give an array memory."""
+        wanted, shape = array.nbytes, array.shape
         self.check_array(wanted, shape)
+        # Blocks that are kept for the next array count as well, until the room is needed.
         room = self.budget if wanted >= _LARGE else self._limit or self.traits.usable_memory
         if opened.pool.managed_bytes + wanted > room:
             opened.pool.free_held()
-        with named_errors(f"allocating an array of shape {shape}", self.name):
-            allocator = opened.allocator(wanted, self.traits.allocation)
-            array: DeviceArray = Array(opened.queue, shape, dtype, allocator=allocator)
-            return array
+        array.allocator = opened.allocator(wanted, self.traits.allocation)
+        try:
+            array.base_data = array.allocator(wanted)
+        except driver_errors() as error:
+            doing = f"allocating an array of shape {shape}"
+            raise named_error(error, doing, self.name) from error
 
     def check_array(self, size: int, shape: int | tuple[int, ...]) -> None:
         """Refuse an array that this device does not take in one piece.
@@ -148,8 +162,9 @@ class Device:
         Raises:
             ResourceLimitError: its ``size`` in bytes is larger than the device's largest buffer.
         """
-        what = f"an array of shape {shape} on {self.name}"
-        check_array(size, self.traits.allocation, what=what)
+        if size > self.traits.allocation:
+            what = f"an array of shape {shape} on {self.name}"
+            check_array(size, self.traits.allocation, what=what)
 
     def zeros(self, shape: int | tuple[int, ...], dtype: DTypeLike = np.float32) -> DeviceArray:
         """A new device array of zeros."""
@@ -211,12 +226,21 @@ def _traits_of(handle: Any) -> Traits:
 
 
 class _Opened(NamedTuple):
-    """What is made once a device is needed."""
+    """What is made once a device is needed.
+
+    Args:
+        context: the ``pyopencl.Context``.
+        queue: the ``pyopencl.CommandQueue``.
+        pool: memory for arrays, which keeps what they leave for the next ones.
+        direct: memory for arrays, from the driver.
+        plain_array: an array without memory, by shape and type; copies of it are given some.
+    """
 
     context: Any
     queue: Any
     pool: Any
     direct: Any
+    plain_array: Callable[..., Any]
 
     def allocator(self, size: int, largest: int) -> Any:
         """What makes a buffer of ``size`` bytes: the pool, unless its own would be too large.
@@ -229,9 +253,19 @@ class _Opened(NamedTuple):
     @classmethod
     def of(cls, handle: Any) -> _Opened:
         import pyopencl as cl
+        from pyopencl.array import Array
         from pyopencl.tools import ImmediateAllocator, MemoryPool
 
         context = cl.Context([handle])
         queue = cl.CommandQueue(context)
         direct = ImmediateAllocator(queue)
-        return cls(context, queue, MemoryPool(direct), direct)
+
+        # A step of a fit makes some fifty arrays, mostly of the shapes of the step before, and what
+        # pyopencl looks at for each of them takes longer than to launch a kernel.
+        @lru_cache(_SHAPES)
+        def plain_array(shape: int | tuple[int, ...], dtype: DTypeLike) -> Any:
+            array = Array(queue, shape, dtype, allocator=lambda size: None)
+            assert array.flags.c_contiguous  # The flags are kept with it, for the copies as well.
+            return array
+
+        return cls(context, queue, MemoryPool(direct), direct, plain_array)

@@ -5,7 +5,13 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
-from rift_cl.errors import DeviceError, DeviceLostError, DeviceMemoryError, ResourceLimitError
+from rift_cl.errors import (
+    DeviceError,
+    DeviceLostError,
+    DeviceMemoryError,
+    ResourceLimitError,
+    RiftError,
+)
 
 _MEMORY = ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES")
 _MEMORY_TOO = ("OUT_OF_HOST_MEMORY",)
@@ -15,11 +21,7 @@ _LOST = ("DEVICE_NOT_AVAILABLE", "INVALID_COMMAND_QUEUE", "INVALID_CONTEXT")
 
 @contextlib.contextmanager
 def named_errors(doing: str, device: str) -> Iterator[None]:
-    """Turn a driver's exception into one of ours.
-
-    Args:
-        doing: what was being done, to stand in the sentence.
-        device: the device's name.
+    """Turn a driver's exception into one of ours; see ``named_error`` for the arguments.
 
     Raises:
         DeviceMemoryError: the driver ran out of memory.
@@ -27,25 +29,41 @@ def named_errors(doing: str, device: str) -> Iterator[None]:
         DeviceLostError: the device went away.
         DeviceError: any other failure of the driver.
     """
-    import pyopencl as cl
-
     try:
         yield
-    except (cl.Error, MemoryError) as error:
-        text = str(error)
-        if isinstance(error, MemoryError) or any(code in text for code in _MEMORY + _MEMORY_TOO):
-            raise DeviceMemoryError(
-                f"{device} ran out of memory while {doing} ({text}): give it less at a time, for "
-                "example a smaller memory budget (RIFT_MEMORY or --memory)"
-            ) from error
-        if _SIZE in text:
-            raise ResourceLimitError(
-                f"{device} takes no single array of the size that it was asked for while {doing} "
-                f"({text}): work on parts of it, or make the problem smaller"
-            ) from error
-        if any(code in text for code in _LOST):
-            raise DeviceLostError(
-                f"{device} went away while {doing} ({text}): what was on the device is lost, "
-                "what was saved is not; start again from the last saved result"
-            ) from error
-        raise DeviceError(f"{device} failed while {doing}: {text}") from error
+    except driver_errors() as error:
+        raise named_error(error, doing, device) from error
+
+
+def driver_errors() -> tuple[type[Exception], ...]:
+    """What a driver's failure is raised as; an ``except`` asks only when something was raised."""
+    import pyopencl as cl
+
+    return cl.Error, MemoryError
+
+
+def named_error(error: Exception, doing: str, device: str) -> RiftError:
+    """What a driver's failure means.
+
+    Args:
+        error: what the driver raised.
+        doing: what was being done, to stand in the sentence.
+        device: the device's name.
+    """
+    text = str(error)
+    if isinstance(error, MemoryError) or any(code in text for code in _MEMORY + _MEMORY_TOO):
+        return DeviceMemoryError(
+            f"{device} ran out of memory while {doing} ({text}): give it less at a time, for "
+            "example a smaller memory budget (RIFT_MEMORY or --memory)"
+        )
+    if _SIZE in text:
+        return ResourceLimitError(
+            f"{device} takes no single array of the size that it was asked for while {doing} "
+            f"({text}): work on parts of it, or make the problem smaller"
+        )
+    if any(code in text for code in _LOST):
+        return DeviceLostError(
+            f"{device} went away while {doing} ({text}): what was on the device is lost, "
+            "what was saved is not; start again from the last saved result"
+        )
+    return DeviceError(f"{device} failed while {doing}: {text}")

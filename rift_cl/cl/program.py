@@ -3,6 +3,9 @@
 A ``cl.Kernel`` object holds its arguments, so two threads that share one silently compute with each
 other's; each thread keeps its own. Arguments are named, and checked against what the kernel's
 source says that it takes.
+
+A step of a fit is some fifty launches. So what can be known of a launch from the names that it
+gives and from its compile-time constants is found out once (``_Launch``) and then looked up.
 """
 
 from __future__ import annotations
@@ -18,11 +21,11 @@ from rift_cl.cl.build.builder import Builder, Key, building
 from rift_cl.cl.build.kernel_cache import build_lock
 from rift_cl.cl.build.kernel_features import feature_of
 from rift_cl.cl.build.source import kernel_source
-from rift_cl.cl.failures import named_errors
+from rift_cl.cl.failures import driver_errors, named_error, named_errors
 from rift_cl.cl.grid_parts import GridPart, Size, grid_parts
 from rift_cl.cl.launch_times import LaunchTimes
 from rift_cl.cl.process import claim_process
-from rift_cl.cl.signature import Parameter, check_names, check_numbers, in_order, parameters
+from rift_cl.cl.signature import Arguments, Parameter, check_numbers, parameters
 from rift_cl.errors import DeviceError
 from rift_cl.progress import BUILDS
 
@@ -33,16 +36,45 @@ if TYPE_CHECKING:
 _SMALL_GRID = 65534
 # Items of a group that know of each other: the kernel's driver in Python counts in groups as well.
 _COOPERATES = "get_local_id"
-# A variant of a kernel as it was launched: PoCL also compiles apart for a part of a grid.
-_Started = tuple[Key, bool, bool]
+# Ways in which PoCL compiles a kernel apart: for a large grid, and for a part of a grid.
+_Way = tuple[bool, bool]
 
 
 class _Kernel(NamedTuple):
-    """A kernel object of one thread, what the kernel takes, and the size of its groups."""
+    """A kernel object of one thread, what the kernel takes, and the size of its groups.
 
+    Args:
+        key: the kernel and its macros.
+        handle: the ``pyopencl.Kernel``.
+        parameters: what it takes.
+        group: work-items of a group.
+        started: ways in which any thread has launched it before.
+    """
+
+    key: Key
     handle: Any
     parameters: tuple[Parameter, ...]
     group: int
+    started: set[_Way]
+
+
+class _Launch(NamedTuple):
+    """A kernel, and how what one place gives it becomes its arguments."""
+
+    kernel: _Kernel
+    arguments: Arguments
+
+
+class _Place(NamedTuple):
+    """A kernel with the names that a launch gives it, as they stand somewhere in the program.
+
+    Args:
+        macros: those in capitals, sorted.
+        launches: by the values of the macros and their types (1 and 1.0 are other constants).
+    """
+
+    macros: tuple[str, ...]
+    launches: dict[tuple[Any, ...], _Launch]
 
 
 class _ThreadKernels(threading.local):
@@ -50,6 +82,7 @@ class _ThreadKernels(threading.local):
 
     def __init__(self) -> None:
         self.kernels: dict[Key, _Kernel] = {}
+        self.places: dict[tuple[str, ...], _Place] = {}
 
 
 class Programs:
@@ -62,9 +95,7 @@ class Programs:
     def __init__(self, device: Device) -> None:
         self._device = device
         self._builder = Builder(device)
-        self._started: set[_Started] = set()
-        # The macros among the names that launches give, for each set of names that was given.
-        self._macros: dict[tuple[str, ...], tuple[str, ...]] = {}
+        self._started: dict[Key, set[_Way]] = {}
         self._own = _ThreadKernels()
         seconds = device.traits.seconds
         self._times = None if seconds is None else LaunchTimes(seconds, device.finish)
@@ -105,52 +136,65 @@ class Programs:
         claim_process()
         if 0 in size:
             return
-        names = tuple(given)
-        macros = self._macros.get(names)
-        if macros is None:
-            macros = self._macros[names] = tuple(sorted(filter(str.isupper, names)))
-        key = (name, tuple([(macro, literal(given[macro])) for macro in macros]))
-        kernel = self._kernel(key)
-        if len(given) != len(macros) + len(kernel.parameters):
-            check_names(name, kernel.parameters, given)
-        values = in_order(name, kernel.parameters, given)
+        kernel, arguments = self._launch_of(name, given)
+        values = arguments.in_order(given)
         group = kernel.group
         rounded = (-(-size[0] // group) * group, *size[1:])
         local = (group,) + (1,) * (len(size) - 1)
-        with named_errors(f"running {name}", self._device.name):
+        try:
             try:
                 kernel.handle.set_args(*values)
             except RuntimeError:
                 check_numbers(name, kernel.parameters, values)
                 raise
             if max(rounded) <= self._longest:
-                self._enqueue(key, kernel.handle, rounded, local)
+                self._enqueue(kernel, rounded, local)
                 return
 
             def start(part: GridPart) -> None:
-                self._enqueue(key, kernel.handle, part.size, local, part.offset)
+                self._enqueue(kernel, part.size, local, part.offset)
 
             for part in grid_parts(rounded, self._device.traits.items, group):
                 if self._times is None:
                     start(part)
                 else:
-                    self._times.launch((key, _magnitudes(values)), part, group, start)
+                    self._times.launch((kernel.key, _magnitudes(values)), part, group, start)
+        except driver_errors() as error:
+            raise named_error(error, f"running {name}", self._device.name) from error
+
+    def _launch_of(self, name: str, given: dict[str, Any]) -> _Launch:
+        """What is known of such a launch, found out by the calling thread's first one."""
+        names = (name, *given)
+        place = self._own.places.get(names)
+        if place is None:
+            place = _Place(tuple(sorted(filter(str.isupper, given))), {})
+            self._own.places[names] = place
+        constants = tuple([given[macro] for macro in place.macros])
+        values = constants, tuple(map(type, constants))
+        launch = place.launches.get(values)
+        if launch is None:
+            macros = zip(place.macros, map(literal, constants), strict=True)
+            kernel = self._kernel((name, tuple(macros)))
+            launch = _Launch(kernel, Arguments(name, kernel.parameters, given))
+            place.launches[values] = launch
+        return launch
 
     def _enqueue(
-        self, key: Key, kernel: Any, size: Size, local: Size, offset: Size | None = None
+        self, kernel: _Kernel, size: Size, local: Size, offset: Size | None = None
     ) -> None:
         import pyopencl as cl
 
         queue = self._device.queue
-        started = key, max(size) > _SMALL_GRID, offset is not None
-        if started in self._started:
-            cl.enqueue_nd_range_kernel(queue, kernel, size, local, offset)
+        way = max(size) > _SMALL_GRID, offset is not None
+        if way in kernel.started:
+            cl.enqueue_nd_range_kernel(queue, kernel.handle, size, local, offset)
             return
         # PoCL compiles again for the first launch, into the same cache.
-        with building, build_lock(key[0]), BUILDS.of(key[0]):
-            cl.enqueue_nd_range_kernel(queue, kernel, size, local, offset)
+        name = kernel.key[0]
+        with building, build_lock(name), BUILDS.of(name):
+            cl.enqueue_nd_range_kernel(queue, kernel.handle, size, local, offset)
             queue.finish()
-            self._started.add(started)
+            kernel.started.add(way)
 
     def _kernel(self, key: Key) -> _Kernel:
         kernel = self._own.kernels.get(key)
@@ -175,7 +219,7 @@ class Programs:
             needs = kernel_needs(handle, self._device._handle)
         self._check_local(name, needs)
         if needs.group >= group:
-            return _Kernel(handle, found, group)
+            return _Kernel(key, handle, found, group, self._started.setdefault(key, set()))
         if group == 1 or _COOPERATES in kernel_source(name):
             raise DeviceError(
                 f"{feature_of(name)}: works in groups of {group} work-items, and "

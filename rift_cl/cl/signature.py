@@ -80,32 +80,51 @@ def parameters(name: str, source: str, macros: Mapping[str, str]) -> tuple[Param
     return tuple(_parameter(text.strip(), aliases) for text in listed)
 
 
-def in_order(name: str, wanted: tuple[Parameter, ...], given: Mapping[str, Any]) -> list[Any]:
-    """The arguments of a launch as the driver takes them, in the kernel's own order.
+class Arguments:
+    """Arguments of one place that launches a kernel: names are checked once, types each time.
 
     Args:
         name: the kernel.
         wanted: what it takes.
-        given: arguments by name, and macros in capitals.
+        given: what that place gives, by name, and macros in capitals; other launches from there
+            have the same names.
 
     Raises:
-        KernelArgumentError: an argument is missing, or an array of another type.
+        KernelArgumentError: an argument is missing or unknown.
     """
-    values = []
-    for parameter in wanted:
-        key, dtype, lanes = parameter
-        if key not in given:
-            check_names(name, wanted, given)
-        value = given[key]
-        if lanes == 0 and value is not None:
-            # Kernels see buffers and know nothing of views into them.
-            if getattr(value, "offset", -1) != 0 or value.dtype != dtype:
-                _refuse(name, parameter, value)
-            value = value.base_data
-        elif lanes > 1 and (getattr(value, "dtype", None) != dtype or value.shape != (lanes,)):
-            _refuse(name, parameter, value)
-        values.append(value)
-    return values
+
+    def __init__(self, name: str, wanted: tuple[Parameter, ...], given: Mapping[str, Any]) -> None:
+        check_names(name, wanted, given)
+        self._name, self._wanted = name, wanted
+        self._takes = [parameter.name for parameter in wanted]
+        takes = set(self._takes)
+        self._spare = [key for key in given if key not in takes and not key.isupper()]
+        self._arrays = [(k, each.dtype) for k, each in enumerate(wanted) if each.lanes == 0]
+        self._vectors = [k for k, each in enumerate(wanted) if each.lanes > 1]
+
+    def in_order(self, given: Mapping[str, Any]) -> list[Any]:
+        """The arguments as the driver takes them, in the kernel's own order.
+
+        Raises:
+            KernelArgumentError: one that the kernel does not take is not None, or an array or a
+                vector is of another type.
+        """
+        for key in self._spare:
+            if given[key] is not None:
+                check_names(self._name, self._wanted, given)
+        values = list(map(given.__getitem__, self._takes))
+        for k, dtype in self._arrays:
+            value = values[k]
+            if value is not None:
+                # Kernels see buffers and know nothing of views into them.
+                if getattr(value, "offset", -1) != 0 or value.dtype != dtype:
+                    _refuse(self._name, self._wanted[k], value)
+                values[k] = value.base_data
+        for k in self._vectors:
+            value, wanted = values[k], self._wanted[k]
+            if getattr(value, "dtype", None) != wanted.dtype or value.shape != (wanted.lanes,):
+                _refuse(self._name, wanted, value)
+        return values
 
 
 def check_names(name: str, wanted: tuple[Parameter, ...], given: Mapping[str, Any]) -> None:
