@@ -1,6 +1,5 @@
 """What ``rift reconstruct`` must not lose, mix up or keep to itself."""
 
-import dataclasses
 import json
 import os
 
@@ -16,9 +15,7 @@ from rift_cl.commands.reconstruct import report as reconstruct_report
 from rift_cl.commands.reconstruct.job import Reconstruction
 from rift_cl.commands.reconstruct.kept_slabs import SlabFolder
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
-from rift_cl.geometry.fan import FanBeam
 from rift_cl.io import read_volume
-from rift_cl.io.scans import formats
 
 INPUT, INTERRUPTED, OUTPUT = 3, 130, 5
 HALF, FULL = np.arange(90) * np.pi / 90, np.arange(180) * np.pi / 90
@@ -146,19 +143,6 @@ def test_a_part_of_an_offset_slice_may_lie_beyond_the_detector(tmp_path, capsys)
     assert run(*arguments, tmp_path / "no", "--roi", 0, 68, 30, 60) == INPUT
     assert "0 to 67" in capsys.readouterr().err
     assert not (tmp_path / "no").exists()
-
-
-def test_the_axis_of_a_fan_is_not_searched_and_that_is_said(tmp_path, monkeypatch):
-    path = tmp_path / "fan.npz"
-    save_phantom(path, FULL, 72)
-    fan, opened = FanBeam(200, 300, 1.5, 35.5), formats.open_scan
-    monkeypatch.setattr(
-        formats, "open_scan", lambda *a, **k: dataclasses.replace(opened(*a, **k), fan=fan)
-    )
-    said = "The axis was taken to be at the detector's middle, bin 35.50"
-    for name, center in (("not", ()), ("given", ("--center", 35.5))):
-        assert run("reconstruct", path, "--out", tmp_path / name, *center) == 0
-        assert (said in assumed(tmp_path / name)) == (not center)
 
 
 def test_a_found_axis_is_told_with_its_interval(tmp_path):

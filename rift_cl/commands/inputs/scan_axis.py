@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 
 from rift_cl.cl.device import Device
@@ -11,6 +14,7 @@ from rift_cl.geometry import Cone, Fan, Vectors
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.reconstruct.axis import AxisEstimate, axis_of_rows, searched_rows
 from rift_cl.reconstruct.axis.circular import axis_of_fan, axis_of_scan, orbit_rows
+from rift_cl.reconstruct.axis.search import GIVE_IT
 
 
 def find_axis(
@@ -46,6 +50,57 @@ def find_axis(
         return axis_of_rows(sinograms, rows, count, scan.angles, span)
     except InputError as error:
         raise type(error)(f"{scan.path}: {error}") from error
+
+
+@dataclass(frozen=True)
+class SettledAxis:
+    """The axis of a fan or of a cone: as the data tell it, or else as the file has it.
+
+    Args:
+        center: its bin on the detector as the file has it.
+        turned: whether the data say that the angles run the other way than the file's.
+        found: what the search found; None where the data do not tell.
+        record: how it is known, as configurations keep it.
+        notes: the same for people, a sentence each.
+    """
+
+    center: float
+    turned: bool
+    found: AxisEstimate | None
+    record: dict[str, Any]
+    notes: tuple[str, ...]
+
+
+def settled_axis(scan: ScanFile, center: float, device: Device | None = None) -> SettledAxis:
+    """Find the axis and the sense of rotation of a fan or a cone, and say what is done.
+
+    Args:
+        scan: the scan.
+        center: bin of the axis that its file tells, or that is assumed.
+        device: as for ``find_axis``.
+
+    Raises:
+        NonFiniteError: a sample is not finite.
+    """
+    middle = center == (scan.shape[2] - 1) / 2
+    told = "the detector's middle" if middle else "the file"
+    try:
+        found = find_axis(scan, device)
+    except InputError as error:
+        reason = str(error).removeprefix(f"{scan.path}: ").removesuffix(GIVE_IT)
+        note = (
+            f"The axis was taken to be that of {told}, bin {center:.2f} (--center), since the data "
+            f"do not tell it: {reason}."
+        )
+        return SettledAxis(center, False, None, {"center": center, "by": told}, (note,))
+    notes = [f"The rotation axis was found {found.in_words()}; {told} has bin {center:.2f}."]
+    turned = found.sense is not None and found.sense.sign < 0
+    if turned:
+        notes.append(
+            "The angles were therefore taken with the other sign; --reversed does so without "
+            "asking the data, and --center leaves them as they are."
+        )
+    return SettledAxis(found.center, turned, found, found.record(), tuple(notes))
 
 
 def _of_cone(

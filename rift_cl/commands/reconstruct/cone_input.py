@@ -12,7 +12,7 @@ import numpy as np
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
-from rift_cl.commands.inputs.scan_axis import find_axis
+from rift_cl.commands.inputs.scan_axis import settled_axis
 from rift_cl.commands.inputs.scan_rows import check_center, scan_identity
 from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
 from rift_cl.commands.reconstruct.clean_rows import Alignment, CleanRows
@@ -202,30 +202,12 @@ class ConeInput:
         cone = self.file.cone
         if not isinstance(cone, Cone):
             return {"center": (self.file.shape[2] - 1) / 2, "by": "the vectors"}
-        middle = cone.center[1] == (cone.bins - 1) / 2
-        told = "the detector's middle" if middle else "the file"
-        try:
-            found = find_axis(self.file, self.device)
-        except InputError as error:
-            reason = str(error).removeprefix(f"{self.file.path}: ")
-            self.notes.append(
-                f"The axis was taken to be that of {told}, bin {cone.center[1]:.2f} (--center), "
-                f"since the data do not tell it: {reason}."
-            )
-            return {"center": cone.center[1], "by": told}
-        self.center = found.center
-        if self.settings.tilt is None:
-            self.tilt = tilt_worth_turning(found, self.file.shape[1]) or self.tilt
-        self.notes.append(
-            f"The rotation axis was found {found.in_words()}; {told} has bin {cone.center[1]:.2f}."
-        )
-        self.turned = found.sense is not None and found.sense.sign < 0
-        if self.turned:
-            self.notes.append(
-                "The angles were therefore taken with the other sign; --reversed does so without "
-                "asking the data, and --center leaves them as they are."
-            )
-        return found.record()
+        axis = settled_axis(self.file, cone.center[1], self.device)
+        self.center, self.turned = axis.center, axis.turned
+        if self.settings.tilt is None and axis.found is not None:
+            self.tilt = tilt_worth_turning(axis.found, self.file.shape[1]) or self.tilt
+        self.notes += axis.notes
+        return axis.record
 
     def _geometry(self) -> Cone | Vectors:
         """The file's geometry with the axis and the pitch that are said or found."""

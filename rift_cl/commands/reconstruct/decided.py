@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
-from rift_cl.operators import FastProjector, Projector
+from rift_cl.operators import FastProjector, ParallelProjector, Projector
 from rift_cl.reconstruct.direct.view_weights import view_weights
 
 if TYPE_CHECKING:
@@ -57,9 +57,12 @@ def decided_settings(
         decided |= {"center": None, "tilt": None, "centers": settings.centers.absolute()}
     if settings.iterative:
         decided["steps"] = settings.most_steps
+    if source.turned:
+        decided["reversed"] = not settings.reversed
     if settings.method == "fbp":
         decided |= filter_settings(settings)
-        decided["compensate"] = settings.compensate or _weights(source.formula_geometry().angles)
+        if isinstance(A, ParallelProjector):
+            decided["compensate"] = settings.compensate or _weights(A.scan.angles)
     return dataclasses.replace(settings, **decided)
 
 

@@ -19,12 +19,15 @@ from rift_cl.cl.device import Device
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.slice_input import SliceInput
 from rift_cl.commands.reconstruct.slice_window import Window
+from rift_cl.geometry import Fan, Grid, Parallel, at_axis
 from rift_cl.operators import (
     FastProjector,
     LinearOperator,
     ParallelProjector,
+    Projector,
     cheapest_projector,
 )
+from rift_cl.operators.projector.fan_slices_projector import FanSlicesProjector
 from rift_cl.operators.projector.phase_projector import PhaseProjector
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp, poisson_weights
@@ -36,6 +39,9 @@ from rift_cl.reconstruct.solvers.ordered_subsets import OrderedSubsets
 from rift_cl.reconstruct.solvers.solver import Solver
 
 Floats = NDArray[np.float32]
+AnyProjector = ParallelProjector | Projector
+# Projectors of which a formula takes arrays of a slice in parts where it must.
+_IN_PARTS = PhaseProjector, FanSlicesProjector
 # Images and sinograms, float32, that a slice needs on host and device at a time: a formula's are
 # counts, line integrals, two temporaries and the filtered ones; a method's are its state as well.
 # The next slab is read and the last one written at the same time: an image and two sinograms more.
@@ -74,7 +80,7 @@ class Inversion:
     source: SliceInput
     device: Device
     residuals: dict[int, list[float]] = field(default_factory=dict)
-    _projectors: dict[int, ParallelProjector] = field(default_factory=dict)
+    _projectors: dict[int, AnyProjector] = field(default_factory=dict)
 
     @property
     def window(self) -> Window:
@@ -86,15 +92,15 @@ class Inversion:
         """Bytes that a slice takes, on host and device together, besides the projector's own."""
         return self._need(self.projector(1))
 
-    def _need(self, A: ParallelProjector) -> int:
+    def _need(self, A: AnyProjector) -> int:
         images, sinograms = _ARRAYS[self.settings.method]
-        views, bins = len(A.scan.angles), max(A.scan.bins, self.source.scan.shape[2])
+        views, bins = A.range[0], max(A.range[-1], self.source.scan.shape[2])
         views = max(views, self.source.scan.shape[0])
         # What is binned is read as it is.
         fine = (self.settings.binning**2 - 1) * _READ * self.source.scan.shape[0] * bins
         return 4 * (images * int(np.prod(A.grid.shape[-2:])) + sinograms * views * bins + fine)
 
-    def projector(self, slices: int) -> ParallelProjector:
+    def projector(self, slices: int) -> AnyProjector:
         """The projector of a number of slices, kept for the next slab of the same size."""
         count = 0 if self.settings.iterative else slices
         if count not in self._projectors:
@@ -124,10 +130,10 @@ class Inversion:
                 cut += [slice(at, min(at + most, stop)) for at in range(first, stop, most)]
         return cut
 
-    def _fitting(self, count: int, A: ParallelProjector) -> list[slice]:
+    def _fitting(self, count: int, A: AnyProjector) -> list[slice]:
         """Chunks of so many slices; a formula takes arrays of a slice in parts where it must."""
-        array = 4 * max(int(np.prod(A.grid.shape[-2:])), len(A.scan.angles) * A.scan.bins)
-        if not self.settings.iterative and isinstance(A, PhaseProjector):
+        array = 4 * max(int(np.prod(A.grid.shape[-2:])), A.range[0] * A.range[-1])
+        if not self.settings.iterative and isinstance(A, _IN_PARTS):
             array = 0
         return plan_chunks(
             count,
@@ -189,10 +195,13 @@ class Inversion:
     def _formula(self, projections: Floats) -> Floats:
         prepared, _ = self.source.for_formula(projections)
         A = self.projector(projections.shape[1])
-        if self.settings.method == "backproject":
-            return np.asarray(backproject(A, prepared))
         settings = self.settings
-        return np.asarray(fbp(A, prepared, settings.view_filter(), settings.compensate))
+        rays = prepared.reshape(A.range)
+        if settings.method == "backproject":
+            slab = backproject(A, rays)
+        else:
+            slab = fbp(A, rays, settings.view_filter(), settings.compensate)
+        return np.asarray(slab).reshape(-1, *A.domain[-2:])
 
     def _solver(self, sinogram: Floats) -> tuple[Solver, float]:
         """The method at its beginning, and the attenuation that its image is in units of."""
@@ -204,9 +213,10 @@ class Inversion:
 
     def _few_levels(self, sinogram: Floats) -> tuple[Solver, float]:
         """One material in a disc of it: lengths of material are solved for, from 0 to 1."""
-        A, seen = self.projector(1), self.source.seen
-        disc = find_disc(sinogram, A.scan, seen=seen)
-        material = material_lengths(sinogram, A.scan, disc, seen=seen)
+        A, scan, seen = self.projector(1), self.source.geometry, self.source.seen
+        assert isinstance(scan, Parallel)
+        disc = find_disc(sinogram, scan, seen=seen)
+        material = material_lengths(sinogram, scan, disc, seen=seen)
         lengths = np.asarray(material.lengths, np.float32)
         weight = self.settings.weight
         solver = FewLevels(
@@ -215,7 +225,7 @@ class Inversion:
             usual_weight(lengths) if weight is None else weight,
             support=disc.coverage(A.grid),
             weights=None if seen is None else seen.astype(np.float32),
-            direction_weights=_direction_weights(A.scan.angles),
+            direction_weights=_direction_weights(scan.angles),
         )
         return solver, material.attenuation
 
@@ -229,12 +239,14 @@ class Inversion:
             weights[~seen] = 0
         return whole, {"weights": weights}
 
-    def _projector(self, slices: int) -> ParallelProjector:
+    def _projector(self, slices: int) -> AnyProjector:
         settings, device = self.settings, self.device
         if settings.iterative:
             grid, scan = self.window.around(self._width())[0], self.source.geometry
         else:
             grid, scan = self.window.grid(slices), self.source.formula_geometry()
+        if isinstance(scan, Fan):
+            return self._fan_projector(grid, scan)
         if settings.error is not None:
             # A whole lobe of the bins' spectrum, as cheapest_projector takes for solvers.
             lobes: Any = 1 if settings.iterative else "image"
@@ -247,9 +259,17 @@ class Inversion:
             device=device,
         )
 
+    def _fan_projector(self, grid: Grid, scan: Fan) -> Projector:
+        """The projector of a fan; of a detector of one row, that of a single slice."""
+        if self.source.scan.shape[1] == 1:
+            grid = Grid(grid.shape[-2:], grid.spacing[-2:], grid.center[-2:])
+        footprint = self.settings.footprint
+        options = {} if footprint is None else {"footprint": footprint}
+        return Projector(grid, scan, device=self.device, **options)
+
     def _width(self) -> float:
         """What the rays meet: twice the way from the axis to the farther end of the detector."""
-        scan = self.source.geometry
+        scan = at_axis(self.source.geometry)
         reach = max(scan.center + 0.5, scan.bins - 0.5 - scan.center) + self.source.pad
         return float(2 * reach * scan.pitch)
 

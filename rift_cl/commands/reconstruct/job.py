@@ -47,7 +47,7 @@ from rift_cl.reconstruct import Attenuation
 _PREVIEW_FROM = 8
 
 # What decides the slices and is found on the way.
-_FOUND = ("axis", "tilt of the axis", "volume")
+_FOUND = ("axis", "tilt of the axis", "angles", "volume")
 Floats = NDArray[np.float32]
 
 
@@ -160,7 +160,7 @@ class Reconstruction:
         going_on = self.settings.resume and self._kept.begun
         axis = self._kept.axis() if going_on and self.settings.center is None else None
         if axis is not None:
-            self.source.center, self.source.tilt = axis
+            self.source.center, self.source.tilt, self.source.turned = axis
         self._locate()
         if going_on and not self.settings.preview:
             self._kept.go_on(self._facts())

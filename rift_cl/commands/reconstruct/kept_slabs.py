@@ -57,11 +57,16 @@ class SlabFolder:
         check_space(self.path / _RUN, 2 * 4 * int(np.prod(self.shape)))
         write_json(self.path / _RUN, dict(run))
 
-    def axis(self) -> tuple[float, float] | None:
-        """Bin and tilt of the rotation axis of the run that was cut off, if it had one."""
+    def axis(self) -> tuple[float, float, bool] | None:
+        """The rotation axis of the run that was cut off, if it had one.
+
+        Returns:
+            Its bin, its tilt, and whether a fan's angles were reversed.
+        """
         recorded = self._recorded()
+        turned = recorded.get("angles") == "reversed"
         try:
-            return float(recorded["axis"]), float(recorded["tilt of the axis"])
+            return float(recorded["axis"]), float(recorded["tilt of the axis"]), turned
         except (KeyError, TypeError, ValueError):
             return None
 

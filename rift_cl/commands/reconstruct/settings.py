@@ -102,8 +102,8 @@ class GeometryOptions:
     group: ClassVar[str] = "geometry"
 
     center: Auto[float] = None
-    """Detector bin of the rotation axis. Default: found automatically; for fan beams that of the
-    file, or the middle of the detector."""
+    """Detector bin of the rotation axis. Default: found automatically; if the data of a fan or a
+    cone do not tell it, that of the file, or the middle of the detector."""
     tilt: Auto[float] = None
     """Tilt of the rotation axis in the detector plane in degrees, positive where its bin grows with
     the row. Default: the tilt found with the axis if it moves the axis by a quarter of a bin or

@@ -1,7 +1,8 @@
 """From a scan in a file to projections that a method can take: what is mended, and what assumed.
 
 Clean line integrals (``clean_rows``) go through these steps, each of which is said in ``notes``:
-fan to parallel, offset axis, continuation beyond the detector.
+offset axis, continuation beyond the detector. Fans stay fans, but where a method or a span wants
+parallel views.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.commands.inputs.scan_axis import find_axis
+from rift_cl.commands.inputs.scan_axis import SettledAxis, find_axis, settled_axis
 from rift_cl.commands.inputs.scan_rows import (
     check_center,
     chosen_rows,
@@ -24,7 +25,7 @@ from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
 from rift_cl.commands.reconstruct.clean_rows import Alignment, CleanRows, LoadedRows
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.errors import InputError
-from rift_cl.geometry import Parallel
+from rift_cl.geometry import Fan, Parallel, at_axis
 from rift_cl.geometry.length_units import length_unit
 from rift_cl.io.number_list import read_numbers
 from rift_cl.io.scans.scan_file import ScanFile
@@ -36,7 +37,8 @@ from rift_cl.reconstruct.direct.offset_axis import (
     is_offset,
     widened,
 )
-from rift_cl.reconstruct.direct.padding import extended, is_truncated
+from rift_cl.reconstruct.direct.padding import extended, is_truncated, wider
+from rift_cl.reconstruct.direct.redundancy import redundancy
 from rift_cl.reconstruct.preprocess import binned_center, binning_note, stitched
 
 Floats = NDArray[np.float32]
@@ -50,7 +52,7 @@ _GAP_STEPS, _GAP = 2.0, np.deg2rad(5)
 
 
 class SliceInput:
-    """The projections of some rows, as parallel ones about a known axis.
+    """The projections of some rows, of parallel rays or of a fan's, about a known axis.
 
     Args:
         settings: where the scan is and what is to be done with it.
@@ -72,17 +74,8 @@ class SliceInput:
         self.scan = binned_file(self.file, binning)
         self.rows = self._binned_rows()
         pitch = (self.file.pitch or 1.0) if settings.pitch is None else settings.pitch
-        self.fan = self.scan.fan
-        if self.fan is not None:
-            if settings.tilt:
-                raise InputError(
-                    f"{self.file.path}: --tilt is for parallel rays, these are a fan's"
-                )
-            if settings.pitch is not None:
-                self.fan = dataclasses.replace(self.fan, pitch=settings.pitch * binning)
-            if settings.center is not None:
-                center = binned_center(settings.center, binning)
-                self.fan = dataclasses.replace(self.fan, center=center)
+        if self.file.fan is not None and settings.tilt:
+            raise InputError(f"{self.file.path}: --tilt is for parallel rays, these are a fan's")
         unit = self.file.unit or ("bin" if pitch == 1.0 else "")
         self.unit = unit if settings.unit is None else settings.unit
         self._pitch = pitch * binning
@@ -96,6 +89,9 @@ class SliceInput:
         self.tilt = settings.tilt or 0.0
         # What the search for the axis found, where there was one.
         self.estimate: AxisEstimate | None = None
+        # What became of a fan's, and whether its angles run the other way than the file's.
+        self.settled_by: SettledAxis | None = None
+        self.turned = False
         # The axis as the configuration records it: the bin, and how it was found.
         self.axis: dict[str, Any] = {}
         self.pad = 0
@@ -105,7 +101,8 @@ class SliceInput:
         # The geometry of a full turn whose opposite views are stitched; None where none are.
         self.stitched: Parallel | None = None
         # Made now, so that a bad pitch or center is told before any work.
-        self.geometry = self._parallel()
+        self.fan = self._fan()
+        self.geometry = self._geometry()
         # Whether a full turn's axis is so far off the middle that slices reach beyond the detector.
         self.offset = self._sees_farther()
         length = length_unit(self.unit)
@@ -114,8 +111,8 @@ class SliceInput:
 
     @property
     def pitch(self) -> float:
-        """Distance between parallel rays, at the rotation axis."""
-        return self.geometry.pitch
+        """Distance between rays at the rotation axis."""
+        return at_axis(self.geometry).pitch
 
     @property
     def detector_pitch(self) -> float:
@@ -133,8 +130,13 @@ class SliceInput:
 
     @property
     def settled(self) -> bool:
-        """Whether the axis is known, or nothing has to look for it."""
-        return self.fan is not None or self.center is not None
+        """Whether the axis is known."""
+        return self.center is not None
+
+    @property
+    def rebinned(self) -> bool:
+        """Whether a fan's views are resampled to parallel ones."""
+        return self.fan is not None and isinstance(self.geometry, Parallel)
 
     @property
     def most_bins(self) -> int:
@@ -153,31 +155,48 @@ class SliceInput:
         middle = sum(self.rows) // 2
         row = self.clean.read(middle, middle + 1).projections
         if not self.settled:
-            self.estimate = find_axis(self.file, self.device)
-            self.center = self.estimate.center
-            if self.settings.tilt is None:
-                self.tilt = tilt_worth_turning(self.estimate, self.file.shape[1])
-        self.geometry = self._parallel()
+            self._find_axis()
+        self.fan = self._fan()
+        self.geometry = self._geometry()
         self.axis = self._axis_record()
         self.clean.alignment = self._alignment()
         self.offset = self._sees_farther()
-        if self.offset and self.settings.half_acquisition == "stitched":
+        if (
+            self.offset
+            and self.settings.half_acquisition == "stitched"
+            and isinstance(self.geometry, Parallel)
+        ):
             self.stitched, self.offset = self.geometry, False
             self.geometry = stitched(np.zeros((*row.shape[::2],), np.float32), self.stitched)[1]
         wanted = self.settings.pad == "auto" and is_truncated(row) and not self.offset
         if wanted or self.settings.pad == "on":
             self.pad = max(1, self.scan.shape[2] // _PAD_SHARE)
+            self.geometry = self.geometry if self.fan is None else self._geometry()
         self.notes += _notes_of(self)
+
+    def _find_axis(self) -> None:
+        """Find the axis, of a fan the sense of rotation too."""
+        geometry = self.file.geometry
+        if isinstance(geometry, Fan):
+            self.settled_by = settled_axis(self.file, geometry.center, self.device)
+            self.center, self.turned = self.settled_by.center, self.settled_by.turned
+            return
+        self.estimate = find_axis(self.file, self.device)
+        self.center = self.estimate.center
+        if self.settings.tilt is None:
+            self.tilt = tilt_worth_turning(self.estimate, self.file.shape[1])
 
     def identity(self) -> dict[str, str]:
         """The file and the axis, which decide the slices besides the settings."""
         axis = {"axis": repr(self.center), "tilt of the axis": repr(self.tilt)}
         if self.centers is not None:
             axis["axes of the rows"] = str(self.centers.tolist())
+        if self.fan is not None:
+            axis["angles"] = "reversed" if self.turned else "as given"
         return {**scan_identity(self.file), **axis}
 
     def read(self, start: int, stop: int) -> Attenuation:
-        """Parallel projections of some rows of the file, before a formula's weights and margins."""
+        """Projections of some rows of the file, before a formula's weights and margins."""
         return self.projections(self.clean.load(start, stop))
 
     def projections(self, loaded: LoadedRows) -> Attenuation:
@@ -186,36 +205,64 @@ class SliceInput:
         if self.stitched is not None:
             wide, _ = stitched(integrals.projections, self.stitched, device=self.device)
             return dataclasses.replace(integrals, projections=wide)
-        if self.fan is None:
+        if self.fan is None or not self.rebinned:
             return integrals
         parallel, _ = rebin_fan(
-            integrals.projections, self.scan.angles, self.fan, whole=not self.settings.iterative
+            integrals.projections,
+            self.fan.angles,
+            self.fan.beam,
+            whole=not self.settings.iterative,
         )
         return dataclasses.replace(integrals, projections=parallel)
 
-    def for_formula(self, projections: Floats) -> tuple[Floats, Parallel]:
+    def for_formula(self, projections: Floats) -> tuple[Floats, Parallel | Fan]:
         """Projections as a backprojection wants them, and their geometry."""
         scan = self.geometry
-        if self.offset:
+        if self.offset and isinstance(scan, Parallel):
             projections, scan = widened(projections, scan)
         if self.pad:
             projections, scan = extended(projections, scan, bins=self.pad)
         return np.ascontiguousarray(projections), scan
 
-    def formula_geometry(self) -> Parallel:
+    def formula_geometry(self) -> Parallel | Fan:
         """What ``for_formula`` would say of the geometry."""
         return self.for_formula(np.zeros((1, 1, self.geometry.bins), np.float32))[1]
 
-    def _parallel(self) -> Parallel:
-        if self.fan is not None:
-            whole = not self.settings.iterative
-            bins = self.scan.shape[2]
-            scan, rays = covered_rays(self.scan.angles, bins, self.fan, whole=whole)
-            self.seen = None if rays.all() else rays
-            return scan
-        binning = self.settings.binning
-        center = None if self.center is None else binned_center(self.center, binning)
-        return Parallel(self.scan.angles, self.scan.shape[2], self._pitch, center)
+    def _fan(self) -> Fan | None:
+        """The fan with the axis, the sense and the pitch that are said or found."""
+        fan, settings = self.scan.geometry, self.settings
+        if not isinstance(fan, Fan):
+            return None
+        if settings.pitch is not None:
+            fan = dataclasses.replace(fan, pitch=self._pitch)
+        if self.center is not None:
+            fan = dataclasses.replace(fan, center=binned_center(self.center, settings.binning))
+        return dataclasses.replace(fan, angles=-fan.angles) if self.turned else fan
+
+    def _geometry(self) -> Parallel | Fan:
+        fan, settings = self.fan, self.settings
+        if fan is None:
+            center = None if self.center is None else binned_center(self.center, settings.binning)
+            return Parallel(self.scan.angles, self.scan.shape[2], self._pitch, center)
+        if not self._wants_parallel(fan):
+            return fan
+        whole = not settings.iterative
+        scan, rays = covered_rays(fan.angles, fan.bins, fan.beam, whole=whole)
+        self.seen = None if rays.all() else rays
+        return scan
+
+    def _wants_parallel(self, fan: Fan) -> bool:
+        """Whether the method takes parallel views alone, or the span is too short for a fan's."""
+        settings = self.settings
+        if settings.method == "levels" or settings.error is not None:
+            return True
+        if settings.method != "fbp":
+            return False
+        try:
+            redundancy(wider(fan, self.pad, self.pad), settings.compensate)
+        except InputError:
+            return True
+        return False
 
     def _binned_rows(self) -> tuple[int, int]:
         """The rows that are asked for, of the scan as it is worked on."""
@@ -257,16 +304,15 @@ class SliceInput:
         return Alignment(self.geometry.center, pivot, tilt)
 
     def _sees_farther(self) -> bool:
-        return self.fan is None and is_offset(self.geometry)
+        return not self.rebinned and is_offset(self.geometry)
 
     def _axis_record(self) -> dict[str, Any]:
         if self.settings.center is not None:
             return {"center": self.settings.center, "by": "--center"}
         if self.centers is not None:
             return {"center": self.center, "by": "--centers", "rows": list(self.centers)}
-        if self.fan is not None:
-            assert self.file.fan is not None
-            return {"center": self.file.fan.center, "by": "the file"}
+        if self.settled_by is not None:
+            return self.settled_by.record
         if self.estimate is None:
             return {"center": self.center, "by": "search"}
         return self.estimate.record()
@@ -287,11 +333,7 @@ def _notes_of(source: SliceInput) -> list[str]:
     """
     notes = _axis_note(source)
     if source.fan is not None:
-        angles = source.geometry.angles
-        notes.append(
-            f"Fan-beam views were resampled to {len(angles)} parallel ones, over "
-            f"{np.rad2deg(np.ptp(angles)):.1f} degrees."
-        )
+        notes += _fan_note(source)
     if source.settings.binning > 1:
         notes.append(_binning_note(source))
     if source.stitched is not None:
@@ -324,15 +366,26 @@ def _axis_note(source: SliceInput) -> list[str]:
     """Where the axis is, unless a person said it."""
     if source.settings.center is not None or source.centers is not None:
         return []
-    if source.fan is not None:
-        assert source.file.fan is not None
-        center = source.file.fan.center
-        middle = center == (source.file.shape[2] - 1) / 2
-        where = "at the detector's middle" if middle else "where the file says"
-        return [f"The axis was taken to be {where}, bin {center:.2f}; if it is not, give --center."]
+    if source.settled_by is not None:
+        return list(source.settled_by.notes)
     if source.estimate is None:
         return [f"The rotation axis was found before, at bin {source.center:.2f}."]
     return [f"The rotation axis was found {source.estimate.in_words()}."]
+
+
+def _fan_note(source: SliceInput) -> list[str]:
+    """How filtered backprojection, or what else takes parallel views, takes a fan's."""
+    angles = source.geometry.angles
+    if source.rebinned:
+        return [
+            f"Fan-beam views were resampled to {len(angles)} parallel ones, over "
+            f"{np.rad2deg(np.ptp(angles)):.1f} degrees."
+        ]
+    if source.settings.method != "fbp":
+        return []
+    assert source.fan is not None
+    counted = redundancy(source.fan, source.settings.compensate)
+    return [f"Filtered backprojection of a fan: {counted.sentence}."]
 
 
 def _binning_note(source: SliceInput) -> str:

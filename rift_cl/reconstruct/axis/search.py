@@ -19,6 +19,8 @@ from rift_cl.reconstruct.axis.views import Views, without_rings
 
 Floats = NDArray[np.float64]
 
+# How a refusal ends.
+GIVE_IT = "; give it yourself (--center)"
 # A search needs some detail, and views from several directions.
 _FEWEST_BINS, _FEWEST_VIEWS = 8, 4
 # Most rows that are looked at.
@@ -122,7 +124,7 @@ def _too_wide(half: float) -> str:
 
 
 def _refusal(why: str) -> InputError:
-    return InputError(f"the rotation axis cannot be found: {why}; give it yourself (--center)")
+    return InputError(f"the rotation axis cannot be found: {why}{GIVE_IT}")
 
 
 def _line(places: Floats, found: list[RowAxis], middle: float) -> AxisEstimate:

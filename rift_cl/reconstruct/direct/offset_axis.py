@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.geometry import Parallel
+from rift_cl.geometry import Fan, Parallel
 
 Floats = NDArray[np.float64]
 Stack = NDArray[np.float32]
@@ -38,7 +38,7 @@ def is_full_turn(angles: Floats) -> bool:
     return angles.size > 2 and bool(gaps.max() <= max(_SLACK * 2 * np.pi / distinct, _HOLE))
 
 
-def is_offset(scan: Parallel) -> bool:
+def is_offset(scan: Parallel | Fan) -> bool:
     """Whether a full turn's axis lies so far from the detector's middle that it sees further."""
     return is_full_turn(scan.angles) and sees_further(scan.center, scan.bins)
 
