@@ -13,7 +13,7 @@
 #include "include/tile_box.h"
 
 KERNEL void tile_count(
-    __global const int4 *restrict boxes, __global const uint *restrict depths,
+    __global const int4 *restrict boxes, __global const float *restrict depths,
     __global int *restrict counts, __global uint *restrict keys,
     int splats, int run, int tiles_x, int first_tile_row, int tiles_y)
 {
@@ -21,7 +21,7 @@ KERNEL void tile_count(
   const long stop = first + run < splats ? first + run : splats;
   for (long i = first; i < stop; i++) {
     const int4 box = clipped_box(boxes[i], tiles_x, first_tile_row, tiles_y);
-    uint bits = depths[i];
+    uint bits = as_uint(depths[i]);
     const int nan = (bits & 0x7fffffffu) > 0x7f800000u;
     if (bits == 0x80000000u) bits = 0;
     counts[i] = !nan && box.z > box.x && box.w > box.y ? (box.z - box.x) * (box.w - box.y) : 0;

@@ -7,6 +7,7 @@ gives back C-ordered native float32 (float64 where wanted) of the wanted shape, 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
@@ -164,6 +165,29 @@ def download(device: Device, array: DeviceArray, out: NDArray[Any] | None = None
         with named_errors(f"copying {host.nbytes} bytes from it", device.name):
             cl.enqueue_copy(device.queue, host, array.base_data, is_blocking=True)
     return host
+
+
+def fetch(device: Device, array: DeviceArray, count: int) -> Callable[[], NDArray[Any]]:
+    """Start to copy the first numbers of a device array to the host.
+
+    Returns:
+        A function that waits for them and returns them, (count,), while the device goes on with
+        what was enqueued after this call.
+    """
+    import pyopencl as cl
+
+    host = np.empty(count, array.dtype)
+    doing = f"copying {host.nbytes} bytes from it"
+    with named_errors(doing, device.name):
+        event = cl.enqueue_copy(device.queue, host, array.base_data, is_blocking=False)
+        device.queue.flush()
+
+    def wait() -> NDArray[Any]:
+        with named_errors(doing, device.name):
+            event.wait()
+        return host
+
+    return wait
 
 
 def as_device_array(

@@ -79,10 +79,10 @@ def draw(
         ResourceLimitError: not even one row of tiles fits the budget.
     """
     tiles, sort = Tiles.of(size, settings.tile), settings.mode == "light"
-    counts = count_tiles(device, boxes, depths, tiles)
+    counts = count_tiles(device, boxes, depths, tiles, sort=sort)
     lists, raster = None, None
     if memory.fits(counts.n_entries, tiles.count, device.budget, device.traits.allocation):
-        lists = list_tiles(device, counts, sort=sort)
+        lists = list_tiles(device, counts)
         raster = rasterize(device, screen, lists, size, settings=settings, background=background)
         return RasterPass(screen, boxes, depths, size, settings, background, memory, lists, raster)
     del counts

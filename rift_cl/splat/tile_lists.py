@@ -8,24 +8,28 @@ the order of the chunks, the lists are the same whatever the device and the numb
 Prefix sums go up and down a pyramid of sums; ``kernels/vector/scan_sum.cl`` and ``scan_place.cl``
 are one step each way. Integers are exact, so the result does not depend on how a list was cut.
 
-Only M, the number of entries, comes to the host on the way: it is needed to allocate them.
+Only M, the number of entries, comes to the host on the way: it is needed to allocate them. All that
+goes by splats is enqueued before it is waited for, so that the device works on meanwhile.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
-from rift_cl.cl.host_arrays import as_device_array
-from rift_cl.errors import DTypeError, InputError, ResourceLimitError, ShapeError
+from rift_cl.cl.host_arrays import as_device_array, fetch
+from rift_cl.errors import InputError, ResourceLimitError, ShapeError
 
 # A CPU's cores take so many chunks each, which evens their loads, of at least so many elements,
 # below which starting a kernel costs more than running it.
-_CPU_CHUNKS, _CPU_LEAST = 4, 4096
+_CPU_CHUNKS, _CPU_LEAST = 4, 16384
 # A GPU's work-items are many: each takes so few elements of a list.
 GPU_RUN = 64
 
@@ -55,10 +59,13 @@ def scan_levels(device: Device, most: int) -> Levels:
 def exclusive_scan(
     device: Device, values: DeviceArray, count: int, levels: Levels, *, wide: bool = False
 ) -> DeviceArray:
-    """Replace int32 numbers (``wide``: int64) by the sum of all before; (1,) int64, the total."""
+    """Replace int32 numbers (``wide``: int64) by the sum of all before.
+
+    Returns:
+        An int64 array whose first number is the total; the next scan with these levels takes it.
+    """
     (run, sums), *above = levels
-    runs = pieces(count, run)
-    total = sums[:1]
+    runs, total = pieces(count, run), sums
     scanning = {"values": values, "sums": sums, "count": count, "run": run}
     if runs > 1:
         device.launch("scan_sum", (runs,), **scanning, WIDE=wide)
@@ -141,34 +148,50 @@ class TileLists:
 
 @dataclass(frozen=True, eq=False)
 class TileCounts:
-    """Lengths of the tile lists, which are counted before they are filled.
+    """The splats of the tile lists in their order, and how many entries each has.
 
     Args:
-        boxes: the splats' boxes.
         slots: (N + 1,) int32, as in ``TileLists``.
-        keys: (N,) uint32, depths as numbers that sort.
-        n_entries: M.
+        ranks: (N, 4) int32, what the lists need of each splat, in the order of the lists: see
+            ``kernels/splat/tile_ranks.cl``.
+        offsets: (N + 1,) int32, how many entries the ranks before have.
         tiles: the tiles that are to be listed.
+        total: waits for M and gives it, (1,).
     """
 
-    boxes: DeviceArray
     slots: DeviceArray
-    keys: DeviceArray
-    n_entries: int
+    ranks: DeviceArray
+    offsets: DeviceArray
     tiles: Tiles
+    total: Callable[[], NDArray[np.int64]]
+
+    @cached_property
+    def n_entries(self) -> int:
+        """M, which is waited for.
+
+        Raises:
+            ResourceLimitError: there are 2^31 entries or more.
+        """
+        entries = int(self.total()[0])
+        if entries > _MOST:
+            raise ResourceLimitError(
+                f"the {len(self.ranks)} splats cover {entries} tiles in all, at most {_MOST} can "
+                "be listed: use larger tiles, a smaller image, or fewer or smaller splats"
+            )
+        return entries
 
 
 def tile_lists(
     device: Device, boxes: DeviceArray, depths: DeviceArray, tiles: Tiles, *, sort: bool = True
 ) -> TileLists:
     """List the splats of every tile: ``count_tiles`` and ``list_tiles``, which say more."""
-    return list_tiles(device, count_tiles(device, boxes, depths, tiles), sort=sort)
+    return list_tiles(device, count_tiles(device, boxes, depths, tiles, sort=sort))
 
 
 def count_tiles(
-    device: Device, boxes: DeviceArray, depths: DeviceArray, tiles: Tiles
+    device: Device, boxes: DeviceArray, depths: DeviceArray, tiles: Tiles, *, sort: bool = True
 ) -> TileCounts:
-    """Count the tiles of every splat.
+    """Order the splats and count the tiles of each; nothing waits for the device.
 
     Args:
         device: where the arrays are.
@@ -177,74 +200,55 @@ def count_tiles(
         depths: (N,) float32 device array: any number, infinite ones and negative ones too. A
             splat whose depth is NaN is culled.
         tiles: which tiles to list.
+        sort: front to back, equal depths by index; otherwise all in index order.
 
     Raises:
         ShapeError: an array has the wrong shape or is a strided view.
         DTypeError: an array has the wrong type.
-        ResourceLimitError: there are 2^31 entries or more, or not even counts fit the budget.
+        ResourceLimitError: not even counts fit the budget.
     """
     splats = _checked_splats(device, boxes, depths)
     _check_room(device, splats, 0, tiles)
     slots, keys = device.empty(splats + 1, np.int32), device.empty(splats, np.uint32)
+    levels = scan_levels(device, _longest_scan(device, splats))
     run = run_length(device, splats, gpu=1)
-    device.launch(
-        "tile_count",
-        (pieces(splats, run),),
-        boxes=boxes,
-        depths=depths.view(np.uint32),
-        counts=slots,
-        keys=keys,
-        splats=splats,
-        run=run,
-        **_rectangle(tiles),
-    )
-    total = exclusive_scan(device, slots, splats + 1, scan_levels(device, splats + 1))
-    entries = int(device.get(total)[0])
-    if entries > _MOST:
-        raise ResourceLimitError(
-            f"the {splats} splats cover {entries} tiles in all, at most {_MOST} can be listed: "
-            "use larger tiles, a smaller image, or fewer or smaller splats"
-        )
-    return TileCounts(boxes, slots, keys, entries, tiles)
-
-
-def list_tiles(device: Device, counts: TileCounts, *, sort: bool = True) -> TileLists:
-    """Make the lists that were counted.
-
-    Args:
-        device: where the arrays are.
-        counts: from ``count_tiles``.
-        sort: front to back, equal depths by index; otherwise all in index order.
-
-    Raises:
-        ResourceLimitError: the lists do not fit the memory budget.
-    """
-    slots, entries, tiles = counts.slots, counts.n_entries, counts.tiles
-    splats = counts.keys.size
-    _check_room(device, splats, entries, tiles)
-    if entries == 0:
-        nothing = device.empty((0, 2), np.int32)
-        return TileLists(slots, nothing, device.zeros(tiles.count + 1, np.int32), 0, tiles)
-    levels = scan_levels(device, _longest_scan(device, splats, tiles))
-    order, visible = _depth_order(device, counts.keys, slots, levels) if sort else (None, None)
+    by_splat = {"boxes": boxes, "splats": splats, "run": run, **_rectangle(tiles)}
+    runs = (pieces(splats, run),)
+    device.launch("tile_count", runs, **by_splat, depths=depths, counts=slots, keys=keys)
+    total = fetch(device, exclusive_scan(device, slots, splats + 1, levels), 1)
+    order, visible = _depth_order(device, keys, slots, levels) if sort else (None, None)
     ranks, offsets = device.empty((splats, 4), np.int32), device.empty(splats + 1, np.int32)
-    run = run_length(device, splats, gpu=1)
     device.launch(
         "tile_ranks",
-        (pieces(splats, run),),
-        boxes=counts.boxes,
+        runs,
+        **by_splat,
         slots=slots,
         order=order,
         visible=visible,
         ranks=ranks,
         counts=offsets,
-        splats=splats,
-        run=run,
-        **_rectangle(tiles),
         SORTED=sort,
     )
     exclusive_scan(device, offsets, splats + 1, levels)
-    listed, starts = _sort_by_tile(device, ranks, offsets, entries, tiles, levels)
+    return TileCounts(slots, ranks, offsets, tiles, total)
+
+
+def list_tiles(device: Device, counts: TileCounts) -> TileLists:
+    """Make the lists that were counted.
+
+    Args:
+        device: where the arrays are.
+        counts: from ``count_tiles``.
+
+    Raises:
+        ResourceLimitError: there are 2^31 entries or more, or they do not fit the memory budget.
+    """
+    slots, entries, tiles = counts.slots, counts.n_entries, counts.tiles
+    _check_room(device, len(counts.ranks), entries, tiles)
+    if entries == 0:
+        nothing = device.empty((0, 2), np.int32)
+        return TileLists(slots, nothing, device.zeros(tiles.count + 1, np.int32), 0, tiles)
+    listed, starts = _sort_by_tile(device, counts)
     return TileLists(slots, listed, starts, entries, tiles)
 
 
@@ -264,10 +268,7 @@ def tile_lists_bytes(n: int, m: int, *, tiles: int = 0) -> int:
 def _checked_splats(device: Device, boxes: DeviceArray, depths: DeviceArray) -> int:
     if len(boxes.shape) != 2 or boxes.shape[1] != 4:
         raise ShapeError(f"boxes has shape {boxes.shape}, wanted (splats, 4)")
-    if boxes.dtype != np.int32:
-        raise DTypeError(f"boxes has type {boxes.dtype} on the device, wanted int32")
-    # The gate wants float32; what else it looks at is the same for any type of four bytes.
-    as_device_array(device, boxes.view(np.float32), boxes.shape, name="boxes")
+    as_device_array(device, boxes, boxes.shape, name="boxes", dtype=np.int32)
     as_device_array(device, depths, (boxes.shape[0],), name="depths")
     return int(boxes.shape[0])
 
@@ -278,10 +279,10 @@ def _check_room(device: Device, splats: int, entries: int, tiles: Tiles) -> None
     plan_chunks(1, need, 0, device.budget, what=what)
 
 
-def _longest_scan(device: Device, splats: int, tiles: Tiles) -> int:
-    """Most numbers of any scan: over splats, tiles, or the digits of a radix pass."""
+def _longest_scan(device: Device, splats: int) -> int:
+    """Most numbers of any scan by splats: of these, or of the digits of a radix pass."""
     bits, chunks = _radix(device, splats)
-    return max(splats + 1, tiles.count + 1, chunks << bits)
+    return max(splats + 1, chunks << bits)
 
 
 def _rectangle(tiles: Tiles) -> dict[str, int]:
@@ -337,31 +338,24 @@ def _radix(device: Device, splats: int) -> tuple[int, int]:
     return bits, pieces(splats, run_length(device, splats, gpu=GPU_RUN))
 
 
-def _sort_by_tile(
-    device: Device,
-    ranks: DeviceArray,
-    offsets: DeviceArray,
-    pairs: int,
-    place: Tiles,
-    levels: Levels,
-) -> tuple[DeviceArray, DeviceArray]:
+def _sort_by_tile(device: Device, counts: TileCounts) -> tuple[DeviceArray, DeviceArray]:
     """Place the pairs of all ranks by tile: entries and starts."""
-    tiles = place.count
+    pairs, across, tiles = counts.n_entries, counts.tiles.across, counts.tiles.count
     chunks = pieces(pairs, run_length(device, pairs, gpu=_GPU_PAIRS))
     chunks = min(chunks, max(1, _TABLE_SHARE * pairs // tiles))
     chunks = min(chunks, max(1, device.traits.allocation // (4 * tiles)))
     table = device.empty((chunks, tiles), np.int32)
     starts = device.empty(tiles + 1, np.int32)
     entries = device.empty((pairs, 2), np.int32)
-    walk = {"ranks": ranks, "offsets": offsets, "table": table}
+    walk = {"ranks": counts.ranks, "offsets": counts.offsets, "table": table}
     sizes = {"chunks": chunks, "tiles": tiles}
-    many = {"splats": len(ranks), "pairs": pairs, "tiles_x": place.across}
+    many = {"splats": len(counts.ranks), "pairs": pairs, "tiles_x": across}
     run = run_length(device, tiles, gpu=1)
     device.launch("tile_histogram", (chunks,), **walk, **sizes, **many)
     device.launch(
         "tile_offsets", (pieces(tiles, run),), table=table, counts=starts, **sizes, run=run
     )
-    exclusive_scan(device, starts, tiles + 1, levels)
+    exclusive_scan(device, starts, tiles + 1, scan_levels(device, tiles + 1))
     device.launch(
         "tile_scatter", (chunks,), **walk, starts=starts, entries=entries, **sizes, **many
     )

@@ -93,9 +93,9 @@ def test_every_row_of_a_table_has_its_columns(bench):
 def test_the_page_names_the_waits(bench):
     waits = bench[0]["scenes"][0]["host"]["waits"]
     places = {way: {wait["function"] for wait in found} for way, found in waits.items()}
-    assert "count_tiles" in places["plain"]
+    assert "n_entries" in places["plain"]
     assert places["poses and exposures"] > places["plain"]
-    assert "count_tiles" in bench[1]
+    assert "n_entries" in bench[1]
 
 
 def test_bad_scene_is_one_sentence_and_the_input_status(tmp_path):

@@ -30,7 +30,7 @@ class Wait:
     """One blocking call.
 
     Args:
-        kind: ``to the device``, ``to the host`` or ``finish``.
+        kind: ``to the device``, ``to the host``, ``event`` (of a copy begun before) or ``finish``.
         place: file and line in the package, or of this tool, that asked for it.
         function: the function there.
         bytes: that were copied.
@@ -47,7 +47,8 @@ class Wait:
 @contextmanager
 def each_wait() -> Iterator[list[Wait]]:
     """Note every blocking call of this process while this lasts."""
-    copy, finish, log = cl.enqueue_copy, cl.CommandQueue.finish, list[Wait]()
+    copy, finish, wait = cl.enqueue_copy, cl.CommandQueue.finish, cl.Event.wait
+    log = list[Wait]()
 
     def note(kind: str, size: int, run: Callable[[], Any]) -> Any:
         place, function = _caller()
@@ -68,9 +69,13 @@ def each_wait() -> Iterator[list[Wait]]:
     def finished(queue: Any) -> None:
         note("finish", 0, lambda: finish(queue))
 
+    def waited(event: Any) -> None:
+        note("event", 0, lambda: wait(event))
+
     with (
         mock.patch.object(cl, "enqueue_copy", copied),
         mock.patch.object(cl.CommandQueue, "finish", finished),
+        mock.patch.object(cl.Event, "wait", waited),
     ):
         yield log
 
