@@ -1,4 +1,4 @@
-"""The tools of fans and vectors print what they say: tilts that are known cost next to nothing."""
+"""The tools of fans, cones and vectors print what they say: what is true, and what tilts cost."""
 
 import re
 
@@ -17,6 +17,26 @@ def test_known_tilts_cost_little(tool, monkeypatch, capsys):
     upright, known, ignored = numbers(capsys.readouterr().out)
     assert known > upright - 0.6
     assert ignored < known - 1
+
+
+def test_levels_are_true_in_the_middle_and_fall_off_with_the_cone(tool, monkeypatch, capsys):
+    levels = tool("check_fdk")
+    for name, few in {"MAGNIFICATIONS": (3.0,), "PITCHES": (0.75,), "ROLLS": (2.0,)}.items():
+        monkeypatch.setattr(levels, name, few)
+    monkeypatch.setattr(levels, "HALF_ANGLES", (2.0, 15.0))
+    arguments = ["--size", "32", "--views", "40", "--steps", "15"]
+    monkeypatch.setattr("sys.argv", ["check_fdk.py", *arguments])
+    levels.main()
+    said = capsys.readouterr().out
+    middle = [float(value) for value in re.findall(r"middle plane.*: ([\d.]+)", said)]
+    assert len(middle) == 4
+    assert middle == pytest.approx([1] * 4, abs=1e-3)
+    (narrow, _), (wide, solved) = re.findall(r"half-angle.*: ([\d.]+), CGLS ([\d.]+)", said)
+    assert float(narrow) == pytest.approx(1, abs=1e-3)
+    assert 0.97 < float(wide) < 0.99
+    assert float(solved) == pytest.approx(1, abs=0.01)
+    known, ignored, upright = numbers(said)
+    assert min(known, ignored) > upright - 2
 
 
 def test_fans_are_as_true_as_the_peer_s(tool, monkeypatch, capsys):

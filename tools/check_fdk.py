@@ -1,0 +1,157 @@
+"""How true filtered backprojection of cones is: levels of a uniform ball, and what a roll costs.
+
+    python tools/check_fdk.py
+    python tools/check_fdk.py --size 128 --views 240
+
+Data are exact line integrals, averaged over the bins as a detector does. Means are taken within 0.8
+of the ball's radius, over its density, which is 1 at best: in the plane of the source's orbit, for
+magnifications and for bins of so many voxels; and over the whole ball, for half-angles of the cone
+that the ball fills, beside the iterative result. A ball of few bins is off by the ripple that the
+bins' band limit leaves of its edge, whatever the rays. The head shows what a detector's roll costs.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+import rift_cl as rift
+
+MAGNIFICATIONS = (1.2, 1.5, 3.0, 6.0, 15.0)
+PITCHES = (0.5, 0.75, 1.0, 1.3, 2.0)
+HALF_ANGLES = (2.0, 5.0, 10.0, 15.0)
+ROLLS = (0.5, 2.0)
+# Radius of the ball, as a share of the volume's edge, and what of it is looked at.
+BALL, INNER = 0.35, 0.8
+
+
+def main() -> None:
+    """Print a line for each figure."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--size", type=int, default=64, help="edge of the volume in samples")
+    parser.add_argument("--views", type=int, default=120, help="number of views")
+    parser.add_argument("--steps", type=int, default=30, help="steps of CGLS")
+    given = parser.parse_args()
+    for curved in (False, True):
+        name = "curved" if curved else "flat"
+        for magnification in MAGNIFICATIONS:
+            mean = middle_plane(given, magnification=magnification, curved=curved)
+            print(f"middle plane, {name}, magnification {magnification:g}: {mean:.4f}", flush=True)
+        for pitch in PITCHES:
+            mean = middle_plane(given, pitch=pitch, curved=curved)
+            across = 2 * BALL * given.size / pitch
+            line = f"middle plane, {name}, bins of {pitch:g} voxels, {across:.0f} across the ball"
+            print(f"{line}: {mean:.4f}", flush=True)
+    for degrees in HALF_ANGLES:
+        fdk, cgls = whole_ball(given, degrees)
+        print(f"whole ball, half-angle {degrees:g} degrees: {fdk:.4f}, CGLS {cgls:.4f}", flush=True)
+    for degrees in ROLLS:
+        upright, known, ignored = rolled(given, degrees)
+        line = f"head, roll of {degrees:g} degrees: {known:.2f} dB, {ignored:.2f} dB if ignored"
+        print(f"{line}, {upright:.2f} dB without", flush=True)
+
+
+def middle_plane(given: argparse.Namespace, **changes: Any) -> float:
+    """The mean in the two slices next to the orbit, of ``circle`` with these changes."""
+    scan = circle(given, **changes)
+    # Those that the two slices are seen in, and those next to them.
+    rows = 2 * int(np.ceil(scan.magnification / scan.pitch[0])) + 4
+    scan = replace(scan, rows=rows, center=((rows - 1) / 2, scan.center[1]))
+    grid = rift.Grid((2, given.size, given.size))
+    data = averaged(ball(given), grid, scan, 12)
+    return level(rift.fbp(rift.Projector(grid, scan), data))
+
+
+def whole_ball(given: argparse.Namespace, degrees: float) -> tuple[float, float]:
+    """The mean in the ball by filtered backprojection and by CGLS, for a cone's half-angle."""
+    grid, scan = volume(given), circle(given, distance=BALL / np.sin(np.deg2rad(degrees)))
+    A, data = rift.Projector(grid, scan), averaged(ball(given), grid, scan, 4)
+    return level(rift.fbp(A, data)), level(rift.cgls(A, data, given.steps))
+
+
+def volume(given: argparse.Namespace) -> rift.Grid:
+    """The volume, of voxels of length 1."""
+    return rift.Grid((given.size,) * 3)
+
+
+def circle(
+    given: argparse.Namespace,
+    *,
+    pitch: float = 1.0,
+    magnification: float = 1.5,
+    distance: float = 3.0,
+    curved: bool = False,
+) -> rift.Cone:
+    """A full turn whose detector just sees the ball in the volume.
+
+    Args:
+        given: size and views.
+        pitch: of the bins at the axis, in voxels.
+        magnification: of the detector.
+        distance: of the source from the axis, in edges of the volume.
+        curved: whether rows are arcs about the source.
+    """
+    angles = 2 * np.pi * np.arange(given.views) / given.views
+    to_axis = distance * given.size
+    bins = 2 * int(np.ceil(to_axis * np.tan(np.arcsin(0.51 / distance)) / pitch))
+    on_detector, to_detector = pitch * magnification, to_axis * magnification
+    return rift.Cone(angles, bins, bins, on_detector, to_axis, to_detector, curved=curved)
+
+
+def ball(given: argparse.Namespace) -> list[rift.phantom.Ellipsoid]:
+    """The uniform ball."""
+    return [rift.phantom.Ellipsoid.ball(BALL * given.size)]
+
+
+def averaged(
+    parts: list[rift.phantom.Ellipsoid], grid: rift.Grid, scan: rift.Cone, fine: int
+) -> np.ndarray:
+    """Line integrals averaged over the bins, each read at so many places along its edges."""
+    pitch = tuple(length / fine for length in scan.pitch)
+    center = tuple((place + 0.5) * fine - 0.5 for place in scan.center)
+    rows, bins = scan.rows * fine, scan.bins * fine
+    rays = rift.phantom.project(
+        parts, grid, replace(scan, pitch=pitch, center=center, rows=rows, bins=bins)
+    )
+    return rays.reshape(scan.views, scan.rows, fine, scan.bins, fine).mean((2, 4))
+
+
+def level(volume: np.ndarray) -> float:
+    """The mean within the ball."""
+    places = [np.arange(n) - (n - 1) / 2 for n in volume.shape]
+    z, y, x = np.meshgrid(*places, indexing="ij")
+    inside = x**2 + y**2 + z**2 < (INNER * BALL * volume.shape[-1]) ** 2
+    return float(volume[inside].mean(dtype=float))
+
+
+def rolled(given: argparse.Namespace, degrees: float) -> tuple[float, float, float]:
+    """PSNR of the head without a roll, with one that is known, and with one that is ignored."""
+    grid, scan = volume(given), circle(given)
+    head = rift.phantom.head(grid)
+    truth, upright = rift.phantom.render(head, grid), scan.vectors()
+    cosine, sine = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
+    across = cosine * upright.across + sine * upright.down
+    down = cosine * upright.down - sine * upright.across
+    turned = replace(upright, across=across, down=down)
+    straight, data = (rift.phantom.project(head, grid, each) for each in (scan, turned))
+
+    def quality(scan: rift.Cone | rift.Vectors, data: np.ndarray) -> float:
+        return psnr(rift.fbp(rift.Projector(grid, scan), data), truth)
+
+    return quality(scan, straight), quality(turned, data), quality(scan, data)
+
+
+def psnr(volume: np.ndarray, truth: np.ndarray) -> float:
+    """Within the ball of 0.48 of the edge, against the largest value, in dB."""
+    half = (len(truth) - 1) / 2
+    places = np.mgrid[tuple(slice(n) for n in truth.shape)] - half
+    inside = (places**2).sum(axis=0) <= (0.48 * len(truth)) ** 2
+    mean = np.mean((volume - truth)[inside] ** 2)
+    return float(10 * np.log10(truth.max() ** 2 / mean))
+
+
+if __name__ == "__main__":
+    main()
