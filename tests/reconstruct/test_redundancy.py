@@ -37,13 +37,18 @@ def test_the_two_rays_of_a_line_count_once_in_a_short_scan(excess):
         np.testing.assert_allclose(here[:, k] + other, 1, atol=1e-9)
 
 
-@pytest.mark.parametrize("ends", [(-0.1, 0.3), (-0.3, 0.1)])
-def test_the_two_rays_of_a_line_count_twice_a_half_on_a_displaced_detector(ends):
+@pytest.mark.parametrize("share", [1.0, 0.3])
+@pytest.mark.parametrize("ends", [(-0.1, 0.3), (-0.3, 0.1), (-0.28, 0.3)])
+def test_the_two_rays_of_a_line_count_twice_a_half_on_a_displaced_detector(ends, share):
     gamma = np.linspace(*ends, 401)
-    weights = displaced_detector(gamma)
+    weights = displaced_detector(gamma, share)
     opposite = np.interp(-gamma, gamma, weights, left=0, right=0)
-    np.testing.assert_allclose(weights + opposite, 2, atol=2e-4)
+    np.testing.assert_allclose(weights + opposite, 2, atol=5e-3 if share < 1 else 2e-4)
     assert weights.min() == 0
+    # What is measured once cannot count less, whatever the weights of the rest.
+    once = np.abs(gamma) > np.abs(ends).min()
+    np.testing.assert_allclose(weights[once], 2)
+    assert np.abs(np.diff(weights)).max() < 0.1
 
 
 def test_a_full_turn_counts_every_ray_half():
@@ -104,6 +109,21 @@ def test_a_detector_to_one_side_is_completed(center):
     assert counted.missing[0 if center == 12 else 1] == 40
     assert counted.rays.shape == (1, 65)
     assert "Wang" in counted.sentence
+
+
+@pytest.mark.parametrize("center", [31.0, 33.0, 35.5])
+def test_lines_beyond_the_shorter_side_count_twice_where_the_axis_is_off_by_a_little(center):
+    counted = redundancy(fan(TURN, center=center))
+    short, off = min(center, 64 - center), round(2 * abs(center - 32))
+    assert sum(counted.missing) == off
+    away = np.abs(np.arange(65) - center)
+    np.testing.assert_allclose(counted.rays[0, away > short], 2)
+    assert np.count_nonzero(counted.rays == 2) >= off
+    np.testing.assert_allclose(counted.rays[0, away < short - 13], 1)
+
+
+def test_an_axis_off_the_middle_by_a_rounding_changes_nothing():
+    assert (redundancy(fan(TURN, center=32.1)).rays == 1).all()
 
 
 def test_a_cone_counts_as_its_fan():

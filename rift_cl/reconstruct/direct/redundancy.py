@@ -6,7 +6,9 @@ in the view at ``beta + pi - 2 gamma``. Filtered backprojection counts every lin
 - a full turn measures each line twice, and every view counts half the angle that it stands for;
 - a full turn whose axis is seen near one end of the detector measures the lines near the axis
   twice and those beyond once: weights go smoothly from 0 to 2 across what is measured twice
-  (Wang, X-ray micro-CT with a displaced detector array, Medical Physics 29, 1634, 2002);
+  (Wang, X-ray micro-CT with a displaced detector array, Medical Physics 29, 1634, 2002). Where
+  the axis is off the middle by a little they do so next to the ends of the shorter side alone,
+  so that noise averages out between the two rays of all other lines;
 - a short scan of half a turn and the fan measures some lines twice, and weights rise and fall
   smoothly over those (Parker, Optimal short scan convolution reconstruction for fanbeam CT,
   Medical Physics 9, 254, 1982). With half the excess over half a turn in the place of the fan's
@@ -35,6 +37,10 @@ Floats = NDArray[np.float64]
 _SLACK = 1.5
 # A gap within the span that is wider than this, and than so many mean gaps, is no sampling.
 _HOLE, _HOLE_MEANS = np.pi / 12, 4.0
+# Sides of a detector that differ by no more bins than this reach as far as each other. Where they
+# do not, and the axis is near the middle, weights go over within this share of the shorter side,
+# and within no fewer bins than these.
+_EVEN, _SHARE, _FEWEST_BINS = 0.5, 0.2, 12.0
 ITERATE = "cgls, sirt and tv reconstruct from any views"
 
 
@@ -82,13 +88,20 @@ def redundancy(scan: Fan | Cone, compensate: str | None = None) -> Redundancy:
         sentence = f"full turn of {scan.views} views, every line measured twice"
         center = scan.center[1] if isinstance(scan, Cone) else scan.center
         left, right = center, scan.bins - 1 - center
-        if sees_further(center, scan.bins):
-            rays = displaced_detector(gamma)[None]
+        if min(left, right) > 0 and abs(right - left) > _EVEN:
+            short = min(left, right)
+            width = min(max(_FEWEST_BINS, _SHARE * short), short)
+            width = short if sees_further(center, scan.bins) else width
+            rays = displaced_detector(gamma, width / short)[None]
             missing = int(np.ceil(abs(right - left)))
-            sentence = (
-                f"full turn of {scan.views} views, axis at bin {center:g} of {scan.bins}: Wang's "
-                f"weights across the {2 * min(left, right):.0f} bins about it"
+            where = f"axis at bin {center:g} of {scan.bins}"
+            which = (
+                f"Wang's weights across the {2 * short:.0f} bins about it"
+                if width == short
+                else f"lines beyond {short:g} bins from it are measured once and count twice, with "
+                f"weights that go over within {width:.0f} bins"
             )
+            sentence = f"full turn of {scan.views} views, {where}: {which}"
         elif not min(left, right) > 0:
             raise InputError(
                 f"scan: the axis is seen at bin {center:g}, off a detector of {scan.bins} bins, so "
@@ -133,18 +146,24 @@ def short_scan(beta: Floats, gamma: Floats, excess: float) -> Floats:
     return weights
 
 
-def displaced_detector(gamma: Floats) -> Floats:
-    """Wang's weights of a full turn whose detector reaches further on one side of the axis.
+def displaced_detector(gamma: Floats, share: float = 1.0) -> Floats:
+    """Weights of a full turn whose detector reaches further on one side of the axis.
 
     Args:
         gamma: (bins,) ascending fan angles in radians.
+        share: of the shorter side, from its end on, within which weights leave 1. They are Wang's
+            with the whole of it.
 
     Returns:
-        (bins,) weights from 0 to 2, which add up to 2 for the two rays of a line.
+        (bins,) weights from 0 to 2, which add up to 2 for the two rays of a line, and are 2 for
+        rays of lines that are measured once.
     """
     short = min(-gamma[0], gamma[-1])
-    away = gamma if gamma[-1] > -gamma[0] else -gamma
-    weights: Floats = 1 + np.sin(np.pi / 2 * np.clip(away / short, -1, 1))
+    away = (gamma if gamma[-1] > -gamma[0] else -gamma) / short
+    phase = np.clip((np.abs(away) - (1 - share)) / share, 0, 1)
+    # Level where it begins, but for Wang's, which passes through the axis on a slope.
+    rise = np.sin(np.pi / 2 * phase) ** (1 if share == 1 else 2)
+    weights: Floats = 1 + np.sign(away) * rise
     return weights
 
 
