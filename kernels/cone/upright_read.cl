@@ -43,7 +43,7 @@ KERNEL void upright_read(
   const lanes x = u - TO_FLOAT(c), y = v - TO_FLOAT(r);
   lanes sum = 0;
   for (int n = 0; n < 4; n++) {
-    const lane_quad q = quads_at(seen + (long)n * upright_bins, 1, at);
+    const lane_quad q = quads_at(seen + (long)n * upright_bins, at);
     const lanes row = BY_COLUMN(x) * q.s0 + BY_COLUMN(x - 1.0f) * q.s1 +
         BY_COLUMN(x - 2.0f) * q.s2 + BY_COLUMN(x - 3.0f) * q.s3;
     sum = sum + BY_ROW(y - (real)n) * row;

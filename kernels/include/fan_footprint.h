@@ -15,7 +15,9 @@
  *     ramp(z) = z^2 / (2 c) for 0 < z < c,   z - c / 2 beyond,   0 before.
  *
  * A bin's share of the pixel is the difference between its two edges, exactly the area of the
- * pixel between them.
+ * pixel between them. With u and l what z and z - 1 are when clamped to 0 .. c, the part before an
+ * edge is (u - l) (u + l) / (2 c), and z - c clamped to 0 .. 1 added to it: that is 0 and 1 to the
+ * bit beside the pixel, so that both halves leave the same bins out.
  *
  * FOOTPRINT 1, joseph, and 2, linear: the rays are those of the bins' centres, and pixel i counts by
  * the hat max(0, 1 - |a - i| / h) / h; h is one line, or for `linear` the bin's width in lines if
@@ -49,15 +51,18 @@
 #define STEEPEST 1e-6f
 
 static lanes slant_of(lanes q) {
-  const lanes c = absolute(q);
+  const lanes c = q > -q ? q : -q;
   return c > STEEPEST ? c : STEEPEST;
 }
 
-static lanes ramp(lanes z, lanes c, lanes half_inverse) {
-  lanes m = z > 0 ? z : 0;
-  const lanes beyond = z > c ? z - c : 0;
-  m = m < c ? m : c;
-  return m * m * half_inverse + beyond;
+static lanes clamped(lanes z, lanes high) {
+  const lanes above = z > 0 ? z : 0;
+  return above < high ? above : high;
+}
+
+/* The part of a pixel before an edge, given z - c, and u and l. */
+static lanes part_before(lanes beyond, lanes u, lanes l, lanes half_inverse) {
+  return (u - l) * (u + l) * half_inverse + clamped(beyond, (lanes)1.0f);
 }
 
 static lanes hat(lanes distance, lanes inverse) {

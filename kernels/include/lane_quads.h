@@ -16,12 +16,13 @@ typedef real4_any quad_at __attribute__((aligned(sizeof(real))));
 #else
 #define QUAD(p) vload4(0, p)
 #endif
-#define QUAD_PAIR(p, step, i, j) ((real8)(QUAD(p + (long)(i) * step), QUAD(p + (long)(j) * step)))
+/* The zero, which a compiler may not leave out, keeps it from taking the two apart again. */
+#define QUAD_PAIR(p, i, j) ((real8)(QUAD(p + (i)), QUAD(p + (j))) + (real)0)
 
-/* Lane n has p[step * at[n]] and the three numbers behind it. */
-static lane_quad quads_at(__global const real *p, const int step, const int *at) {
-  const real8 a = QUAD_PAIR(p, step, at[0], at[4]), b = QUAD_PAIR(p, step, at[1], at[5]);
-  const real8 c = QUAD_PAIR(p, step, at[2], at[6]), d = QUAD_PAIR(p, step, at[3], at[7]);
+/* Lane n has p[at[n]] and the three numbers behind it. */
+static lane_quad quads_at(__global const real *p, const int *at) {
+  const real8 a = QUAD_PAIR(p, at[0], at[4]), b = QUAD_PAIR(p, at[1], at[5]);
+  const real8 c = QUAD_PAIR(p, at[2], at[6]), d = QUAD_PAIR(p, at[3], at[7]);
   const real8 e = (real8)(a.s0, b.s0, a.s1, b.s1, a.s4, b.s4, a.s5, b.s5);
   const real8 f = (real8)(a.s2, b.s2, a.s3, b.s3, a.s6, b.s6, a.s7, b.s7);
   const real8 g = (real8)(c.s0, d.s0, c.s1, d.s1, c.s4, d.s4, c.s5, d.s5);
@@ -35,8 +36,8 @@ static lane_quad quads_at(__global const real *p, const int step, const int *at)
 }
 #else
 typedef struct { real s0, s1, s2, s3; } lane_quad;
-static lane_quad quads_at(__global const real *p, const int step, const int *at) {
-  __global const real *from = p + (long)at[0] * step;
+static lane_quad quads_at(__global const real *p, const int *at) {
+  __global const real *from = p + at[0];
   lane_quad found;
   found.s0 = from[0];
   found.s1 = from[1];

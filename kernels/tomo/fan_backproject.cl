@@ -21,6 +21,8 @@
 #ifndef ROWS
 #define ROWS (LANES == 8 ? 16 : 1)
 #endif
+/* Views that are summed before they are added to the others. Sums of sums round less. */
+#define TOGETHER 8
 #ifndef CURVED
 #define CURVED 0
 #endif
@@ -69,7 +71,7 @@ static int rays_in_reach(real rho, __global const real *view) {
   return (int)(most < view[MOST_RAYS] - 1 ? most : view[MOST_RAYS] - 1) + 1;
 }
 
-/* What a pixel of line `a` has of `count` rays in slab s, the first of them being `at`. */
+/* What a pixel of line `a` has of `count` rays in slab s, the records of which begin `at`. */
 static lanes of_rays(
     lanes a, lanes s, lanes rho, __global const real *rays, const int *at, int count)
 {
@@ -78,11 +80,11 @@ static lanes of_rays(
   lanes last = 0;
 #endif
   for (int n = 0; n < count; n++) {
-    const lane_quad ray = quads_at(rays + 4 * n, 4, at);
+    const lane_quad ray = quads_at(rays + 4 * n, at);
     const lanes z = (ray.s0 + s * ray.s1) - a;
 #if FOOTPRINT == 0
     const lanes c = slant_of(ray.s1), half_inverse = 0.5f / c;
-    sum = sum + ray.s2 * (ramp(z, c, half_inverse) - ramp(z - 1.0f, c, half_inverse));
+    sum = sum + ray.s2 * part_before(z - c, clamped(z, c), clamped(z - 1.0f, c), half_inverse);
     last = ray.s3;
 #else
     sum = sum + ray.s3 * hat(z, ray.s2 > rho ? rho / ray.s2 : (lanes)1.0f);
@@ -104,11 +106,16 @@ KERNEL void fan_backproject(
   const int rows = y + ROWS < height ? ROWS : height - y;
   const lanes column = (real)x + LANE_NUMBERS;
   const real middle_x = (real)0.5f * (width - 1), middle_y = (real)0.5f * (height - 1);
-  lanes sums[ROWS], depths[ROWS];
+  lanes totals[ROWS], sums[ROWS], depths[ROWS];
   int counts[ROWS];
-  int rays[ROWS * LANES] __attribute__((aligned(sizeof(int) * LANES)));
-  for (int n = 0; n < rows; n++) sums[n] = 0;
+  int begins[ROWS * LANES] __attribute__((aligned(sizeof(int) * LANES)));
+  for (int n = 0; n < rows; n++) totals[n] = sums[n] = 0;
   for (int k = 0; k < count; k++) {
+    if (k % TOGETHER == 0)
+      for (int n = 0; n < rows; n++) {
+        totals[n] = totals[n] + sums[n];
+        sums[n] = 0;
+      }
     __global const real *view = numbers + (long)(first + k) * VIEW_NUMBERS;
     __global const real *record = records + 4L * k * stride;
     const int along_y = view[ALONG_Y] > 0;
@@ -130,18 +137,18 @@ KERNEL void fan_backproject(
     for (int n = 0; n < rows; n++) {
       const lanes row = (lanes)(real)(y + n), s = along_y ? row - middle_y : column - middle_x;
       const lanes_int ray = first_ray(along_y ? column : row, s, depths[n], view, bins);
-      KEEP_INTS(rays + n * LANES, ray);
+      KEEP_INTS(begins + n * LANES, 4 * ray);
     }
     for (int n = 0; n < rows; n++) {
       const lanes row = (lanes)(real)(y + n), s = along_y ? row - middle_y : column - middle_x;
       sums[n] = sums[n] + of_rays(
-          along_y ? column : row, s, depths[n], record, rays + n * LANES, counts[n]);
+          along_y ? column : row, s, depths[n], record, begins + n * LANES, counts[n]);
     }
   }
   for (int n = 0; n < rows; n++) {
     __global real *out = image + (long)(y + n) * width + x;
     real sum[LANES] __attribute__((aligned(sizeof(lanes))));
-    *(lanes *)sum = sums[n];
+    *(lanes *)sum = totals[n] + sums[n];
     for (int m = 0; m < LANES && x + m < width; m++) out[m] = add ? out[m] + sum[m] : sum[m];
   }
 }

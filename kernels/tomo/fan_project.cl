@@ -18,9 +18,8 @@
 #define ROWS (LANES == 8 ? 16 : 1)
 #endif
 
-/* Most pixels of a slab that a bin reaches, given what its rays span in lines. */
-#define MOST(span) ((int)((span) * 1.02f) + 2)
-
+/* Slabs that are summed before they are added to the others. Sums of sums round less. */
+#define TOGETHER 16
 
 KERNEL void fan_project(
     __global real *restrict sinogram, __global const real *restrict plane,
@@ -43,6 +42,7 @@ KERNEL void fan_project(
 #endif
   const real middle = (real)0.5f * (slabs - 1), inverse_depth = view[INVERSE_DEPTH];
   int first[ROWS * LANES] __attribute__((aligned(sizeof(int) * LANES)));
+  lanes total = 0;
   lanes sum = 0;
   for (int b0 = 0; b0 < slabs; b0 += ROWS) {
     const int rows = b0 + ROWS < slabs ? ROWS : slabs - b0;
@@ -67,26 +67,29 @@ KERNEL void fan_project(
       lanes part = 0, z = (low + s * low_q) - i;
 #if FOOTPRINT == 0
       lanes x = (high + s * high_q) - i;
-      const lanes span = (x - z) + low_c;
-      const int count = MOST(largest_lane(span));
-      lanes before = ramp(z, low_c, low_half), upto = ramp(x, high_c, high_half);
+      const lanes end = x;
+      lanes upper_z = clamped(z, low_c), upper_x = clamped(x, high_c);
 #define TAKE(pixel) { \
+        const lanes beyond_z = z - low_c, beyond_x = x - high_c; \
         z = z - 1.0f; \
         x = x - 1.0f; \
-        const lanes p = ramp(z, low_c, low_half), q = ramp(x, high_c, high_half); \
-        part = part + ((upto - q) - (before - p)) * (pixel); \
-        before = p; \
-        upto = q; }
+        const lanes lower_z = clamped(z, low_c), lower_x = clamped(x, high_c); \
+        part = part + (part_before(beyond_x, upper_x, lower_x, high_half) - \
+                       part_before(beyond_z, upper_z, lower_z, low_half)) * (pixel); \
+        upper_z = lower_z; \
+        upper_x = lower_x; }
 #else
       const lanes reach = width > rho ? width / rho : 1.0f, inverse = 1.0f / reach;
-      const int count = MOST(2.0f * largest_lane(reach)) - 1;
+      const lanes end = z + reach;
 #define TAKE(pixel) { \
         part = part + hat(z, inverse) * (pixel); \
         z = z - 1.0f; }
 #endif
-      const int most = count < lines + 2 ? count : lines + 2;
+      /* Pixels from `end` on have no share, and those behind the last line are zeros. */
+      const lanes rest = (real)lines - i;
+      const int most = (int)largest_lane(end < rest ? end : rest) + 1;
       for (int m = 0; m < most; m += 4) {
-        const lane_quad pixels = quads_at(slab + m, 1, first + n * LANES);
+        const lane_quad pixels = quads_at(slab + m, first + n * LANES);
         TAKE(pixels.s0)
         if (m + 1 < most) TAKE(pixels.s1)
         if (m + 2 < most) TAKE(pixels.s2)
@@ -94,12 +97,16 @@ KERNEL void fan_project(
       }
       sum = sum + SLAB_WEIGHT(rho) * part;
     }
+    if ((b0 + ROWS) % TOGETHER == 0) {
+      total = total + sum;
+      sum = 0;
+    }
   }
-  sum = sum * LOAD(factors + at);
+  total = (total + sum) * LOAD(factors + at);
   __global real *out = sinogram + (long)views[number] * bins;
   const int mirrored = (int)view[MIRRORED];
   real last[LANES] __attribute__((aligned(sizeof(lanes))));
-  *(lanes *)last = sum;
+  *(lanes *)last = total;
   for (int n = 0; n < LANES && r + n < bins; n++)
     out[mirrored ? bins - 1 - r - n : r + n] = last[n];
 }
