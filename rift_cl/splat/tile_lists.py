@@ -296,9 +296,11 @@ def _depth_order(
     """Sort the splats that have slots by key: their order (N, visible in front) and number."""
     splats = keys.size
     bits, chunks = _radix(device, splats)
-    table = device.empty(chunks << bits, np.int32)
     here = keys, device.empty(splats, np.int32)
     there = device.empty(splats, np.uint32), device.empty(splats, np.int32)
+    if device.traits.is_cpu and chunks == 1:
+        return _sorted_at_once(device, here, there, slots)
+    table = device.empty(chunks << bits, np.int32)
     # The first pass finds out how many are visible, and all later ones find the same.
     visible = None
     for shift in range(0, _KEY_BITS, bits):
@@ -329,6 +331,28 @@ def _depth_order(
             **macros,
         )
         here, there = there, here
+    return here[1], visible
+
+
+def _sorted_at_once(
+    device: Device,
+    here: tuple[DeviceArray, DeviceArray],
+    there: tuple[DeviceArray, DeviceArray],
+    slots: DeviceArray,
+) -> tuple[DeviceArray, DeviceArray]:
+    """The same by one work-item, which a list of one chunk keeps busy anyway."""
+    visible = device.empty(1, np.int64)
+    device.launch(
+        "radix_sort_cpu",
+        (1,),
+        keys=here[0],
+        order=here[1],
+        other_keys=there[0],
+        other_order=there[1],
+        slots=slots,
+        visible=visible,
+        splats=here[0].size,
+    )
     return here[1], visible
 
 

@@ -83,7 +83,10 @@ class CoefficientSchedule:
     def rendering(self, parameters: Parameters, rendering: SplatSettings) -> SplatSettings:
         """Rendering settings for the coefficients that are active at this step."""
         angular = self.settings.angular.kind if "lobes" in parameters.raw else "sh"
-        return replace(rendering, activation=self.settings.basis.activation, angular=angular)
+        activation = self.settings.basis.activation
+        if (rendering.activation, rendering.angular) == (activation, angular):
+            return rendering
+        return replace(rendering, activation=activation, angular=angular)
 
     def after_step(self, parameters: Parameters) -> None:
         """Add what is due after the steps that were taken; before the first one, too."""

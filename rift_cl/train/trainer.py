@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, Protocol, final
 
 import numpy as np
@@ -307,7 +308,7 @@ class Trainer:
     def _update_renderer(self) -> None:
         """Rebuild the renderer where splats have become others than it renders."""
         rendering = self.coefficient_schedule.rendering(self.parameters, self.renderer.settings)
-        if rendering != self.renderer.settings:
+        if rendering is not self.renderer.settings:
             self.renderer = Renderer(rendering, device=self.device)
 
     def _limit_band(self) -> None:
@@ -317,8 +318,14 @@ class Trainer:
     def view_at(self, step: int) -> int:
         """The view of a step: all of them once, then all again in another random order."""
         count = len(self.pictures.cameras)
-        order = np.random.default_rng((self.settings.seed, step // count, 0x0DE)).permutation(count)
-        return int(order[step % count])
+        return _order(self.settings.seed, step // count, count)[step % count]
+
+
+@lru_cache(maxsize=1)
+def _order(seed: int, turn: int, count: int) -> list[int]:
+    """The order of all views in one turn."""
+    order: list[int] = np.random.default_rng((seed, turn, 0x0DE)).permutation(count).tolist()
+    return order
 
 
 def _flattened(groups: Mapping[str, Group]) -> dict[str, NDArray[Any]]:

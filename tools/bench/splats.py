@@ -202,6 +202,7 @@ SPLAT_COSTS: dict[str, Cost] = {
     "tile_count": _bytes_only("splat", _n, 24, "box and depth in, count and key out"),
     "radix_count": _bytes_only("splat", _n, 4 * 4, "keys in, four passes"),
     "radix_scatter": _bytes_only("splat", _n, 4 * 16, "keys and order in and out, four passes"),
+    "radix_sort_cpu": _bytes_only("splat", _n, 5 * 16, "keys and order in and out, five times"),
     "scan_sum": _bytes_only("splat", _n, 4, "counts in"),
     "scan_place": _bytes_only("splat", _n, 8, "counts in, offsets out"),
     "tile_ranks": _bytes_only("splat", _n, 28, "order and box in, ranked counts out"),
