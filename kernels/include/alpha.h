@@ -26,6 +26,10 @@
 #ifndef ADDITIVE
 #define ADDITIVE 0
 #endif
+/* Whether splats have Hermite modes or another activation. */
+#ifndef MODAL
+#define MODAL 0
+#endif
 
 #define SMOOTH_EDGE 4.5f
 /* What sigma is multiplied with to be an exponent of two. */
@@ -53,41 +57,3 @@ static lanes falloff_rate(lanes power) {
   return 1.0f + 2.0f / (left > 1e-3f ? left : 1e-3f);
 }
 #endif
-
-/* The rows of a tile whose centres lie between two edges: the first, and one past the last. */
-static int first_row_in(float low) {
-  const float v = low - 0.5f;
-  const int whole = (int)v;
-  return v <= 0 ? 0 : v >= TILE ? TILE : whole < v ? whole + 1 : whole;
-}
-
-static int past_row_in(float high) {
-  const float v = high - 0.5f;
-  return v < 0 ? 0 : v >= TILE ? TILE : (int)v + 1;
-}
-
-/* A splat as one tile sees it: places count from the tile's corner, power = a dx^2 + b dx dy +
- * c dy^2 is that of falloff, and rows outside top .. bottom - 1 lie beyond its extents. */
-typedef struct {
-  float x, y, weight, a, b, c, extent_x;
-  int top, bottom;
-} TileSplat;
-
-static TileSplat splat_in_tile(__global const float *s, int x0, int y0) {
-  TileSplat t;
-  t.x = s[0] - x0;
-  t.y = s[1] - y0;
-  t.a = 0.5f * TO_POWER * s[2];
-  t.b = TO_POWER * s[3];
-  t.c = 0.5f * TO_POWER * s[4];
-  t.weight = s[5];
-  t.extent_x = s[6];
-  t.top = first_row_in(t.y - s[7]);
-  t.bottom = past_row_in(t.y + s[7]);
-  return t;
-}
-
-/* Whether a strip of LANES pixels, the first of which has its centre at `begin`, is within reach. */
-static int reaches_strip(TileSplat t, float begin) {
-  return begin <= t.x + t.extent_x && begin + (LANES - 1) >= t.x - t.extent_x;
-}

@@ -15,8 +15,10 @@
  * 240 in all, times exp(-9/2)). The powers are of v = STRETCH u2, since then
  * log2 exp(-|u'|^2 / 2) = -(STRETCH u1)^2 - v^2. */
 
+#include "include/screen_record.h"
+
 #ifndef SHAPE_ORDER
-#define SHAPE_ORDER 1
+#define SHAPE_ORDER 0
 #endif
 #ifndef COLOR_ORDER
 #define COLOR_ORDER 0
@@ -33,8 +35,6 @@
 #define COLOR_MODES (2 + MODES(SHAPE_ORDER))
 #define ROW (COLOR_MODES + (MODES(COLOR_ORDER) - 1) * COLORED)
 
-/* sqrt(log2(e) / 2) */
-#define STRETCH 0.8493218f
 /* Nothing of a splat of any order is seen beyond 12 standard deviations; the powers of a place
  * beyond may be too large for a float. Line integrals end where their order says. */
 #if ADDITIVE && !SMOOTH

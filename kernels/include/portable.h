@@ -73,6 +73,13 @@ typedef integer lanes_int;
 #define GATHER(p, i) ((p)[i])
 #endif
 
+/* The number of the lowest bit of a ulong that is set. */
+#if RIFT_POCL
+#define LOWEST_BIT(bits) __builtin_ctzl(bits)
+#else
+#define LOWEST_BIT(bits) (63 - (int)clz((bits) & -(bits)))
+#endif
+
 /* Asks for memory that will be read a little later; a hint alone. */
 #if LANES == 8 && RIFT_POCL
 #define PREFETCH(p) __builtin_prefetch(p)

@@ -35,6 +35,17 @@ static void transpose_halves(real8 *v) {
   v[2] = (real8)(b.s01, d.s01, b.s45, d.s45);
   v[3] = (real8)(b.s23, d.s23, b.s67, d.s67);
 }
+/* Lane n is the sum of the lanes of v[n]: 14 shuffles and 7 additions for eight sums. */
+static real8 sums_of_eight(const real8 *v) {
+  real8 a[4], b[2];
+  UNROLL for (int i = 0; i < 4; i++)
+    a[i] = (real8)(v[i].lo, v[i + 4].lo) + (real8)(v[i].hi, v[i + 4].hi);
+  UNROLL for (int i = 0; i < 2; i++)
+    b[i] = (real8)(a[i].s01, a[i + 2].s01, a[i].s45, a[i + 2].s45) +
+           (real8)(a[i].s23, a[i + 2].s23, a[i].s67, a[i + 2].s67);
+  return (real8)(b[0].s0, b[1].s0, b[0].s2, b[1].s2, b[0].s4, b[1].s4, b[0].s6, b[1].s6) +
+         (real8)(b[0].s1, b[1].s1, b[0].s3, b[1].s3, b[0].s5, b[1].s5, b[0].s7, b[1].s7);
+}
 #define SUM_OF_LANES(v) \
   ((((v).s0 + (v).s4) + ((v).s2 + (v).s6)) + (((v).s1 + (v).s5) + ((v).s3 + (v).s7)))
 #else

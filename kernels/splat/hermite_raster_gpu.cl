@@ -1,6 +1,6 @@
 /* Composite splats with Hermite modes, front to back; driver for GPUs.
  *
- * What is computed is told in hermite_raster_cpu.cl. Index space: (pixels, tile after tile, of the
+ * What is computed is told in splat_raster_cpu.cl. Index space: (pixels, tile after tile, of the
  * rows of tiles from first_tile_row on), one work-item each, as in splat_raster_gpu.cl. */
 
 #include "include/portable.h"

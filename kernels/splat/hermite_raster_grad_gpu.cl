@@ -1,6 +1,6 @@
 /* Gradient of compositing splats with Hermite modes, tile by tile; driver for GPUs.
  *
- * What is computed is told in hermite_raster_grad_cpu.cl. Index space: (tiles x GROUP): one group
+ * What is computed is told in splat_raster_grad_cpu.cl. Index space: (tiles x GROUP): one group
  * works on one tile, each item on every GROUP-th of its pixels, as in splat_raster_grad_gpu.cl. The
  * numbers of a record are summed over the items ROUND at a time, each by one item in the order of
  * the items, so that the sum is the same in every run. */

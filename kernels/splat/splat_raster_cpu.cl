@@ -1,75 +1,149 @@
-/* Composite the splats of a tile front to back; driver for CPUs (see include/alpha.h).
+/* Composite the splats of a tile front to back; driver for CPUs.
  *
  *     light: C = sum of w c + T background,  w = alpha T,  T the product of (1 - alpha) so far;
- *     ADDITIVE: C = sum of weight exp(-sigma) c, whatever the order (line integrals of X-rays).
+ *     ADDITIVE: C = sum of weight Q exp(-sigma) c, whatever the order (line integrals of X-rays).
  *
- * Index space: (tiles), of the rows of tiles from first_tile_row on. Each item owns one tile, whose
- * pixels lie in strips of LANES columns. For each splat only the strips and rows that its extents
- * touch are visited; strips are fixed, so that every load and store of a pixel's state is aligned
- * to where it was stored. A finished pixel keeps its transmittance with the sign turned, which
- * makes every later weight negative or zero and is dropped with it. Where a pixel finished is
- * noted only when a sign turned. Work stops when all pixels are finished.
+ * Index space: (tiles), of the rows of tiles from first_tile_row on; each item owns one. A batch of
+ * the tile's entries is read once, and for each block of 4 x ROWS pixels the few that touch it are
+ * listed (include/block_lists.h). The block's pixels then stay in registers while its list is gone
+ * through, which is what makes this fast: no load or store of a pixel for each splat, and vectors
+ * that do not wait for each other (include/block_splat.h says what a splat does to them).
  *
- * A pixel and a splat have `stride` channels, of which this launch does CHANNELS from `first`.
- * Written for each pixel: image (CHANNELS numbers), the final transmittance, and how
- * many of the tile's entries were looked at, where the gradient begins its way back. */
+ * A finished pixel keeps its transmittance with the sign turned, which makes every later share
+ * negative or zero and is dropped with it. A block is left when all its pixels are finished, a
+ * tile when all its blocks are; pixels outside of the image are finished from the start.
+ *
+ * A pixel and a splat have `stride` channels, of which this launch does CHANNELS from `first`; with
+ * PACKED they are in the splats' records. Written for each pixel: image (CHANNELS numbers), the
+ * final transmittance, and one past the last of the tile's entries that may have changed it, where
+ * the gradient begins its way back. */
 
 #include "include/portable.h"
 #include "include/exponential.h"
 #include "include/alpha.h"
-#include "include/tile_pixels.h"
+#include "include/screen_record.h"
+#include "include/transpose.h"
+#include "include/hermite_edge.h"
+#include "include/hermite_modes.h"
+#include "include/hermite_alpha.h"
+#include "include/pixel_blocks.h"
+#include "include/block_lists.h"
+#include "include/block_splat.h"
+
+/* Splats between two looks at whether a block is finished. */
+#define PATIENCE 8
+
+/* Pixels that nothing hides yet; the blocks that have some are returned, a bit for each. */
+static ulong clear_blocks(lanes (*state)[VECTORS][1 + CHANNELS], lanes_int (*end)[VECTORS], Window window) {
+  ulong going = 0;
+  for (int block = 0; block < BLOCKS; block++)
+    for (int v = 0; v < VECTORS; v++) {
+      end[block][v] = 0;
+      UNROLL for (int n = 0; n < CHANNELS; n++) state[block][v][1 + n] = 0;
+      for (int lane = 0; lane < 8; lane++) {
+        const int inside = pixel_of(window, block, v, lane) >= 0;
+        ((float *)&state[block][v][0])[lane] = inside ? 1 : -1;
+        going |= (ulong)inside << block;
+      }
+    }
+  return going;
+}
+
+/* Composite a list of splats onto a block; whether any pixel goes on. */
+static int draw_block(
+    lanes (*state)[1 + CHANNELS], lanes_int *end, const Batch *batch, const ushort *list, int length,
+    int block, int before, float most)
+{
+  const lanes px = block_x(block), py = block_y(block);
+  lanes t[VECTORS], color[VECTORS][CHANNELS];
+  lanes_int last[VECTORS];
+  UNROLL for (int v = 0; v < VECTORS; v++) {
+    t[v] = state[v][0];
+    last[v] = end[v];
+    UNROLL for (int n = 0; n < CHANNELS; n++) color[v][n] = state[v][1 + n];
+  }
+  int going = 1;
+  for (int i = 0; i < length && going;) {
+    const int pause = i + PATIENCE < length ? i + PATIENCE : length;
+    for (; i < pause; i++) {
+      const int k = list[i];
+      const lanes_int past = batch->order[k] + before;
+      Sight s = see_splat(batch, k, px, py);
+      UNROLL for (int v = 0; v < VECTORS; v++) {
+        const lanes power = s.level - s.place * s.place, within = place_within(s.place, power, s.peak);
+        const lanes density = density_of(falloff_of(power, s.peak), shape_at(&s, within));
+        const lanes_int counts = splat_counts(power, density, s.peak);
+#if ADDITIVE
+        const lanes w = counts ? density : 0;
+#else
+        const lanes hidden = hidden_by(density), held = hidden < most ? hidden : most;
+        const lanes share = counts ? held * t[v] : 0, rest = t[v] - share;
+#if SMOOTH
+        const lanes w = share;
+        t[v] = rest;
+#else
+        const lanes_int goes_on = rest > TRANSMITTANCE_THRESHOLD;
+        const lanes w = goes_on ? share : 0;
+        t[v] = goes_on ? rest : AS_LANES(AS_INT(t[v]) | SIGN_BIT);
+        last[v] = goes_on ? past : last[v];
+#endif
+#endif
+        UNROLL for (int n = 0; n < CHANNELS; n++)
+          color[v][n] = color[v][n] + w * color_seen(batch, &s, k, n, within);
+        s.place = s.place + s.down;
+      }
+    }
+#if !ADDITIVE && !SMOOTH
+    lanes_int sign = AS_INT(t[0]);
+    UNROLL for (int v = 1; v < VECTORS; v++) sign &= AS_INT(t[v]);
+    going = any_positive(sign);
+#endif
+  }
+  UNROLL for (int v = 0; v < VECTORS; v++) {
+    state[v][0] = t[v];
+    end[v] = last[v];
+    UNROLL for (int n = 0; n < CHANNELS; n++) state[v][1 + n] = color[v][n];
+  }
+  return going;
+}
 
 KERNEL void splat_raster_cpu(
     __global float *restrict image, __global float *restrict transmittance,
-    __global int *restrict last, __global const float *restrict screen,
+    __global int *restrict last, __global const float *restrict packed, MODES_PARAMETER
     __global const float *restrict features, __global const float *restrict background,
     __global const int2 *restrict entries, __global const int *restrict starts,
     int height, int width, int tiles_x, int first_tile_row, float cap, int stride, int first)
 {
   const int tile = (int)get_global_id(0), start = starts[tile], stop = starts[tile + 1];
-  const int x0 = tile % tiles_x * TILE, y0 = (tile / tiles_x + first_tile_row) * TILE;
-  lanes state[PIXELS][1 + CHANNELS];
-  lanes_int end[PIXELS];
-  clear_pixels(state, end, stop);
-  for (int entry = start; entry < stop; entry++) {
-    const int splat = entries[entry].x, next_splat = entries[entry + AHEAD < stop ? entry + AHEAD : entry].x;
-    PREFETCH(screen + 8 * next_splat);
-    PREFETCH(features + (long)next_splat * stride + first);
-    __global const float *feature = features + (long)splat * stride + first;
-    const TileSplat s = splat_in_tile(screen + 8 * splat, x0, y0);
-#if !ADDITIVE && !SMOOTH
-    if ((entry - start) % PATIENCE == PATIENCE - 1 && all_negative(state)) break;
-#endif
-    for (int strip = 0; strip < STRIPS; strip++) {
-      const float begin = strip * LANES + 0.5f;
-      if (!reaches_strip(s, begin)) continue;
-      const lanes dx = (s.x - begin) - LANE_NUMBERS;
-      const lanes quadratic = s.a * dx * dx, linear = s.b * dx;
-      lanes dy = s.y - (s.top + 0.5f);
-      lanes_int turned = 0;
-      for (int row = s.top; row < s.bottom; row++) {
-        lanes *here = state[strip * TILE + row];
-        const lanes raw = s.weight * falloff(quadratic + dy * (linear + s.c * dy));
-        dy = dy - 1.0f;
-#if ADDITIVE
-        const lanes w = raw;
-#elif SMOOTH
-        const lanes w = raw * here[0];
-        here[0] = here[0] - w;
-#else
-        lanes alpha = raw < cap ? raw : cap;
-        alpha = alpha < ALPHA_THRESHOLD ? 0 : alpha;
-        const lanes t = here[0], share = alpha * t, rest = t - share;
-        const lanes_int goes_on = rest > TRANSMITTANCE_THRESHOLD;
-        const lanes w = goes_on ? share : 0, after = goes_on ? rest : AS_LANES(AS_INT(t) | SIGN_BIT);
-        turned |= AS_INT(t) ^ AS_INT(after);
-        here[0] = after;
-#endif
-        UNROLL for (int n = 0; n < CHANNELS; n++) here[1 + n] = here[1 + n] + w * feature[n];
-      }
-      if (any_negative(turned)) note_finished(state, end, strip, s, stop, entry);
+  const Window window = {
+      tile % tiles_x * TILE, (tile / tiles_x + first_tile_row) * TILE, width, height};
+  const float most = cap_that_counts(cap);
+  lanes state[BLOCKS][VECTORS][1 + CHANNELS];
+  lanes_int end[BLOCKS][VECTORS];
+  Batch batch;
+  ushort list[BATCH];
+  ulong going = clear_blocks(state, end, window);
+  for (int begin = start; begin < stop && going; begin += BATCH) {
+    const int count = stop - begin < BATCH ? stop - begin : BATCH;
+    stage(&batch, entries + begin, count, window, packed, features, stride, first STAGED_MODES);
+    for (int block = 0; block < BLOCKS; block++) {
+      if (!(going >> block & 1)) continue;
+      const int length = list_block(&batch, block, list);
+      if (!draw_block(state[block], end[block], &batch, list, length, block, begin - start + 1, most))
+        going &= ~(1ul << block);
     }
   }
-  write_pixels(
-      state, end, start, x0, y0, height, width, stride, first, background, image, transmittance, last);
+  for (int block = 0; block < BLOCKS; block++)
+    for (int v = 0; v < VECTORS; v++)
+      for (int lane = 0; lane < 8; lane++) {
+        const long pixel = pixel_of(window, block, v, lane);
+        if (pixel < 0) continue;
+        const float *numbers = (const float *)state[block][v];
+        const float rest = numbers[lane] < 0 ? -numbers[lane] : numbers[lane];
+        transmittance[pixel] = rest;
+        last[pixel] = ADDITIVE || SMOOTH ? stop - start : ((const int *)&end[block][v])[lane];
+        for (int n = 0; n < CHANNELS; n++)
+          image[pixel * stride + first + n] =
+              numbers[8 * (1 + n) + lane] + (ADDITIVE ? 0 : rest * background[first + n]);
+      }
 }

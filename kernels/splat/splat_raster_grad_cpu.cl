@@ -5,112 +5,173 @@
  * q = v . background + u behind the last one, then q' = alpha (c . v) + (1 - alpha) q. So
  *
  *     T = T' / (1 - alpha),    dL/dalpha = T (c . v - q),    dL/dc = alpha T v,
- *     dL/dsigma = -alpha dL/dalpha    (zero where alpha was capped).
+ *     dL/dE = dL/dalpha dalpha/dE,  zero where E does not count or alpha is capped.
  *
  * No sum is ever taken back, so the deepest splats keep their digits. A forward sweep would need
  * what remains of C after each splat, a difference of nearly equal numbers.
  *
- * Each (splat, tile) pair owns a slot, which this kernel writes once, in a fixed order of sums; see
- * include/splat_slots.h for its record.
+ * Tiles, batches and lists of blocks are those of splat_raster_cpu.cl, the lists gone through from
+ * the back. What the pixels of a block give to a splat's sums stays in lanes: each entry of a batch
+ * has its vectors, to which all blocks add in turn, and once per entry they become numbers. Each
+ * (splat, tile) pair owns a slot (include/splat_slots.h, include/hermite_slots.h), which is written
+ * once, in a fixed order of sums; a pair that touches no pixel, or lies behind all that is seen,
+ * writes nothing: `live` says which slots hold something, and is zero before.
  *
  * Index space: (tiles), of the rows of tiles from first_tile_row on. */
 
 #include "include/portable.h"
 #include "include/exponential.h"
 #include "include/alpha.h"
-#include "include/tile_pixels.h"
-#include "include/splat_slots.h"
+#include "include/screen_record.h"
 #include "include/transpose.h"
+#include "include/hermite_edge.h"
+#include "include/hermite_modes.h"
+#include "include/hermite_alpha.h"
+#if MODAL
+#include "include/hermite_slots.h"
+#define HE_ORDER MOMENT_ORDER
+#else
+#include "include/splat_slots.h"
+#endif
+#include "include/pixel_blocks.h"
+#include "include/block_lists.h"
+#include "include/block_splat.h"
+#if MODAL
+#include "include/hermite_moments.h"
+#else
+#include "include/gaussian_moments.h"
+#endif
+
+/* Of each pixel: T on the way back, q, and v. */
+typedef lanes Pixels[VECTORS][2 + CHANNELS];
+
+/* Read a block's pixels; where the deepest of them was left is returned. */
+static int read_block(
+    Pixels state, lanes_int *end, int block, Window window, int stride, int first,
+    __global const float *background, __global const float *grad_image,
+    __global const float *grad_transmittance, __global const float *transmittance,
+    __global const int *last)
+{
+  int deepest = 0;
+  for (int v = 0; v < VECTORS; v++)
+    for (int lane = 0; lane < 8; lane++) {
+      const long at = pixel_of(window, block, v, lane), pixel = at < 0 ? 0 : at;
+      const int inside = at >= 0, until = inside ? last[pixel] : 0;
+      float q = inside ? grad_transmittance[pixel] : 0;
+      for (int n = 0; n < CHANNELS; n++) {
+        const float g = inside ? grad_image[pixel * stride + first + n] : 0;
+        ((float *)&state[v][2 + n])[lane] = g;
+        q += g * background[first + n];
+      }
+      ((float *)&state[v][0])[lane] = inside ? transmittance[pixel] : 1;
+      ((float *)&state[v][1])[lane] = q;
+      ((int *)&end[v])[lane] = until;
+      deepest = until > deepest ? until : deepest;
+    }
+  return deepest;
+}
+
+/* Go back through a block's list, and add to the sums of each of its entries. `begin` of the
+ * tile's entries lie before the batch. */
+static void undo_block(
+    Pixels state, const lanes_int *end, const Batch *batch, const ushort *list, int length, int block,
+    int begin, float most, lanes (*sums)[SUMS])
+{
+  const lanes px = block_x(block), py = block_y(block);
+  lanes t[VECTORS], q[VECTORS], view[VECTORS][CHANNELS];
+  lanes_int until[VECTORS];
+  UNROLL for (int v = 0; v < VECTORS; v++) {
+    t[v] = state[v][0];
+    q[v] = state[v][1];
+    until[v] = end[v] - begin;
+    UNROLL for (int n = 0; n < CHANNELS; n++) view[v][n] = state[v][2 + n];
+  }
+  for (int i = length - 1; i >= 0; i--) {
+    const int k = list[i];
+    const lanes_int order = batch->order[k];
+    Sight s = see_splat(batch, k, px, py);
+    BlockSums found = no_sums();
+    UNROLL for (int v = 0; v < VECTORS; v++) {
+      const lanes power = s.level - s.place * s.place, within = place_within(s.place, power, s.peak);
+      const lanes shaped = shape_at(&s, within), g = falloff_of(power, s.peak);
+      const lanes density = density_of(g, shaped);
+      lanes_int counts = splat_counts(power, density, s.peak);
+      lanes cv = 0;
+      UNROLL for (int n = 0; n < CHANNELS; n++)
+        cv = cv + color_seen(batch, &s, k, n, within) * view[v][n];
+#if ADDITIVE
+      const lanes w = counts ? density : 0;
+      const lanes h = counts ? g * cv : 0;
+#else
+      if (!SMOOTH) counts = counts & (order < until[v]);
+      const lanes hidden = hidden_by(density), held = hidden < most ? hidden : most;
+      const lanes alpha = counts ? held : 0;
+      t[v] = t[v] / (1.0f - alpha);
+      const lanes difference = cv - q[v], w = alpha * t[v];
+      q[v] = q[v] + alpha * difference;
+#if SHAPE_ORDER == 0 && ACTIVATION == CLAMP
+      const lanes h = hidden > most ? 0 : w * difference;
+#else
+      /* dE/dQ dalpha/dE, or half of it where the square of Q counts. */
+      lanes lever = counts & (hidden <= most) ? g : 0;
+      if (ACTIVATION != CLAMP) lever = lever * (1.0f - hidden);
+      if (SQUARED) lever = lever * shaped;
+      const lanes h = lever * (t[v] * difference);
+#endif
+#endif
+      add_pixels(&found, v, h, w, view[v], &s, batch, k, power, within);
+      s.place = s.place + s.down;
+    }
+    add_block(sums[k], &found, &s);
+  }
+  UNROLL for (int v = 0; v < VECTORS; v++) {
+    state[v][0] = t[v];
+    state[v][1] = q[v];
+  }
+}
 
 KERNEL void splat_raster_grad_cpu(
-    __global float *restrict slots, __global const float *restrict grad_image,
-    __global const float *restrict grad_transmittance,
+    __global float *restrict slots, __global uchar *restrict live,
+    __global const float *restrict grad_image, __global const float *restrict grad_transmittance,
     __global const float *restrict transmittance, __global const int *restrict last,
-    __global const float *restrict screen, __global const float *restrict features,
+    __global const float *restrict packed, MODES_PARAMETER __global const float *restrict features,
     __global const float *restrict background, __global const int2 *restrict entries,
     __global const int *restrict starts, int height, int width, int tiles_x, int first_tile_row,
     float cap, int stride, int first)
 {
   const int tile = (int)get_global_id(0), start = starts[tile];
-  const int x0 = tile % tiles_x * TILE, y0 = (tile / tiles_x + first_tile_row) * TILE;
-  /* Of each pixel: T on the way back, q, and v. */
-  lanes state[PIXELS][2 + CHANNELS];
-  lanes_int end[PIXELS];
-  const int deepest = read_pixels(
-      state, end, start, x0, y0, height, width, stride, first, background, grad_image,
-      grad_transmittance, transmittance, last);
-  for (int entry = deepest; entry < starts[tile + 1]; entry++)
-    for (int n = 0; n < RECORD; n++)
-      if (first == 0 || !SHARED(n)) slots[(long)entries[entry].y * RECORD_LENGTH + PLACE(n)] = 0;
-  for (int entry = deepest - 1; entry >= start; entry--) {
-    const int splat = entries[entry].x, next_splat = entries[entry - AHEAD > start ? entry - AHEAD : entry].x;
-    PREFETCH(screen + 8 * next_splat);
-    PREFETCH(features + (long)next_splat * stride + first);
-    __global float *slot = slots + (long)entries[entry].y * RECORD_LENGTH;
-    lanes sums[RECORD];
-    UNROLL for (int n = 0; n < RECORD; n++) sums[n] = 0;
-    __global const float *conic = screen + 8 * splat + 2;
-    __global const float *feature = features + (long)splat * stride + first;
-    const TileSplat s = splat_in_tile(screen + 8 * splat, x0, y0);
-    for (int strip = 0; strip < STRIPS; strip++) {
-      const float begin = strip * LANES + 0.5f;
-      if (!reaches_strip(s, begin)) continue;
-      const lanes dx = (s.x - begin) - LANE_NUMBERS;
-      const lanes quadratic = s.a * dx * dx, linear = s.b * dx;
-      lanes dy = s.y - (s.top + 0.5f);
-      /* Sums over rows of dL/dsigma times 1, dy, dy^2; dx is the same in all rows. */
-      lanes zeroth = 0, first_y = 0, second_y = 0;
-      for (int row = s.top; row < s.bottom; row++) {
-        const int p = strip * TILE + row;
-        lanes *here = state[p];
-        const lanes power = quadratic + dy * (linear + s.c * dy), raw = s.weight * falloff(power);
-        lanes cv = 0;
-        UNROLL for (int n = 0; n < CHANNELS; n++) cv = cv + feature[n] * here[2 + n];
-#if ADDITIVE
-        const lanes w = raw;
-        lanes g = -raw * cv;
-#else
-        lanes alpha = raw;
-#if !SMOOTH
-        alpha = alpha < cap ? alpha : cap;
-        alpha = alpha < ALPHA_THRESHOLD ? 0 : alpha;
-        alpha = entry < end[p] ? alpha : 0;
-#endif
-        const lanes t = here[0] / (1.0f - alpha);
-        const lanes difference = cv - here[1], w = alpha * t;
-        here[0] = t;
-        here[1] = here[1] + alpha * difference;
-        lanes g = -w * difference;
-#if !SMOOTH
-        g = raw > cap ? 0 : g;
-#endif
-#endif
-#if SMOOTH
-        sums[0] = sums[0] + g;
-        g = g * falloff_rate(power);
-#endif
-        zeroth = zeroth + g;
-        first_y = first_y + g * dy;
-        second_y = second_y + g * (dy * dy);
-        UNROLL for (int n = 0; n < CHANNELS; n++) sums[6 + n] = sums[6 + n] + w * here[2 + n];
-#if ABSGRAD
-        sums[RECORD - 2] = sums[RECORD - 2] + absolute(g * (conic[0] * dx + conic[1] * dy));
-        sums[RECORD - 1] = sums[RECORD - 1] + absolute(g * (conic[1] * dx + conic[2] * dy));
-#endif
-        dy = dy - 1.0f;
-      }
-#if !SMOOTH
-      sums[0] = sums[0] + zeroth;
-#endif
-      sums[1] = sums[1] + zeroth * dx;
-      sums[2] = sums[2] + first_y;
-      sums[3] = sums[3] + zeroth * dx * dx;
-      sums[4] = sums[4] + first_y * dx;
-      sums[5] = sums[5] + second_y;
+  const Window window = {
+      tile % tiles_x * TILE, (tile / tiles_x + first_tile_row) * TILE, width, height};
+  const float most = cap_that_counts(cap);
+  Pixels state[BLOCKS];
+  lanes_int end[BLOCKS][VECTORS];
+  lanes sums[BATCH][SUMS];
+  Batch batch;
+  ushort list[BATCH];
+  int ends[BLOCKS], deepest = 0;
+  for (int block = 0; block < BLOCKS; block++) {
+    ends[block] = read_block(
+        state[block], end[block], block, window, stride, first, background, grad_image,
+        grad_transmittance, transmittance, last);
+    deepest = ends[block] > deepest ? ends[block] : deepest;
+  }
+  for (int top = deepest; top > 0; top -= BATCH) {
+    const int begin = top > BATCH ? top - BATCH : 0, count = top - begin, places = (count + 7) / 8 * 8;
+    __global const int2 *here = entries + start + begin;
+    stage(&batch, here, count, window, packed, features, stride, first STAGED_MODES);
+    for (int k = 0; k < places; k++)
+      UNROLL for (int n = 0; n < SUMS; n++) sums[k][n] = 0;
+    for (int block = 0; block < BLOCKS; block++) {
+      if (ends[block] <= begin) continue;
+      int length = list_block(&batch, block, list);
+      while (length > 0 && batch.order[list[length - 1]] >= ends[block] - begin) length--;
+      undo_block(state[block], end[block], &batch, list, length, block, begin, most, sums);
     }
-    UNROLL for (int n = 0; n < RECORD; n++) {
-      const float sum = SUM_OF_LANES(sums[n]);
-      slot[PLACE(n)] = first > 0 && SHARED(n) ? slot[PLACE(n)] + sum : sum;
+    for (int k = 0; k < places; k++) {
+      if (!batch.touched[k]) continue;
+      const long slot = here[batch.order[k]].y;
+      write_slot(slots + slot * RECORD_LENGTH, sums[k], stride, first);
+      live[slot] = 1;
     }
   }
 }

@@ -1,4 +1,4 @@
-"""Compositing of splats with Hermite modes as it is defined: the twin of hermite_raster kernels.
+"""Compositing of splats with Hermite modes as it is defined: the twin of the raster kernels.
 
 Takes projected splats, their modes on the screen and tile lists as the kernels do, in float64, and
 works on one tile at a time with all of its pixels side by side. ``hermite_moments`` goes back.

@@ -22,8 +22,8 @@ from rift_cl.splat.raster import MOMENTS
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.tile_lists import Tiles, tile_lists_bytes
 
-# Bytes of a splat on the screen: screen, depth, box, code.
-_PROJECTED = 32 + 4 + 16 + 1
+# Bytes of a splat on the screen: screen, packed record, depth, box, code.
+_PROJECTED = 32 + 64 + 4 + 16 + 1
 # Bytes of a splat's part in the gradient by the camera and its aperture, and of what does not grow.
 _CAMERA, _SMALL = 72, 4096
 
@@ -96,7 +96,7 @@ class FrameMemory:
 
     def lists(self, entries: int, tiles: int) -> int:
         """Bytes of tile lists, with the gradient's records."""
-        records = 4 * self.record * entries if self.gradient else 0
+        records = (4 * self.record + 1) * entries if self.gradient else 0
         return tile_lists_bytes(self.splats, entries, tiles=tiles) + records
 
     def longest(self, entries: int) -> int:

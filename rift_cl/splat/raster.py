@@ -1,8 +1,7 @@
 """Splats on the screen to pixels, and the gradient back: the drivers of the raster kernels.
 
-``kernels/splat/splat_raster_cpu.cl`` says what is computed,
-``kernels/splat/splat_raster_grad_cpu.cl`` how it is differentiated;
-``kernels/splat/hermite_raster_cpu.cl`` and its gradient do both for splats with Hermite modes.
+``kernels/splat/splat_raster_cpu.cl`` says what is computed, for Gaussians and for splats with
+Hermite modes, and ``kernels/splat/splat_raster_grad_cpu.cl`` how it is differentiated.
 Features of more than 32 channels are drawn 32 at a time, without modes alone.
 """
 
@@ -24,8 +23,8 @@ from rift_cl.splat.tile_lists import TileLists, Tiles
 
 # Moments of dL/dsigma that stand before the features' gradients in a record.
 MOMENTS = 6
-# Numbers of a splat's packed record.
-RECORD_NUMBERS = 16
+# Numbers of a splat's packed record, and features that have a place in it.
+RECORD_NUMBERS, RECORD_FEATURES = 16, 5
 # The most channels that the kernels are made for.
 _CHANNELS = 32
 _TILES = (8, 16, 32)
@@ -144,13 +143,27 @@ class ScreenSplats:
 
 
 @dataclass(frozen=True, eq=False)
+class SlotRecords:
+    """What the gradient leaves in the slots of (splat, tile) pairs; device arrays.
+
+    Args:
+        numbers: (M, P), a record for each slot: see ``kernels/include/splat_slots.h``, for splats
+            with modes ``kernels/include/hermite_slots.h``.
+        live: (M,) uint8, which of them hold one; the numbers of others mean nothing.
+    """
+
+    numbers: DeviceArray
+    live: DeviceArray
+
+
+@dataclass(frozen=True, eq=False)
 class Raster:
     """A rendered image, and what its gradient needs; device arrays.
 
     Args:
         image: (height, width, D), with the background.
         transmittance: (height, width), what of the background is seen.
-        last: (height, width) int32, how many of its tile's entries were looked at.
+        last: (height, width) int32, how many of its tile's entries the gradient looks at.
     """
 
     image: DeviceArray
@@ -206,6 +219,7 @@ def rasterize(
         ShapeError: features, modes or background do not fit.
     """
     _check(splats, lists, size, settings)
+    splats = packed(device, splats)
     height, width = size
     channels = splats.features.shape[1]
     background = _background(device, background, channels)
@@ -221,9 +235,9 @@ def rasterize(
             image=raster.image,
             transmittance=raster.transmittance,
             last=raster.last,
-            **_drawn(splats, background, lists, size, settings),
-            first=None if splats.modes else first,
-            **_macros(splats, settings, count),
+            **_drawn(device, splats, background, lists, size, settings),
+            **_channels(device, splats, first, count),
+            **_macros(splats, settings),
         )
     return raster
 
@@ -238,8 +252,8 @@ def raster_grad(
     *,
     settings: SplatSettings,
     background: DeviceArray | None = None,
-) -> DeviceArray:
-    """The gradient of a loss, as a record for every (splat, tile) pair.
+) -> SlotRecords:
+    """The gradient of a loss, as a record for every (splat, tile) pair that was seen.
 
     Args:
         device: where the arrays are.
@@ -252,12 +266,12 @@ def raster_grad(
         background: as given to ``rasterize``.
 
     Returns:
-        (M, 6 + D [+ 2]) device array, slot by slot: see ``kernels/include/splat_slots.h``; for
-        splats with modes (M, P), see ``kernels/include/hermite_slots.h``.
+        (M, 6 + D [+ 2]) numbers, slot by slot; for splats with modes (M, P).
 
     Raises:
         InputError: magnitudes of gradients are asked for splats with modes.
     """
+    splats = packed(device, splats)
     height, width, channels = raster.image.shape
     as_device_array(device, grad_image, raster.image.shape, name="grad_image")
     if grad_transmittance is None:
@@ -268,26 +282,30 @@ def raster_grad(
     if splats.modes is not None:
         record = splats.modes.record_length(channels, settings)
     slots = device.empty((lists.n_entries, record))
+    live = device.zeros(lists.n_entries, np.uint8)
+    if not device.traits.is_cpu:
+        live = device.array(np.ones(lists.n_entries, np.uint8))
     nothing = device.zeros((height, width)) if channels > _CHANNELS else grad_transmittance
     for first, count in _channel_runs(channels):
         device.launch(
             _kernel(device, splats, "raster_grad"),
             _work(device, lists, settings, per_pixel=False),
             slots=slots,
+            live=live if device.traits.is_cpu else None,
             grad_image=grad_image,
             grad_transmittance=nothing if first else grad_transmittance,
             transmittance=raster.transmittance,
             last=raster.last,
-            **_drawn(splats, background, lists, (height, width), settings),
-            first=None if splats.modes else first,
-            **_macros(splats, settings, count),
+            **_drawn(device, splats, background, lists, (height, width), settings),
+            **_channels(device, splats, first, count),
+            **_macros(splats, settings),
             ABSGRAD=int(settings.absgrad),
         )
-    return slots
+    return SlotRecords(slots, live)
 
 
 def sum_slots(
-    device: Device, lists: TileLists, records: DeviceArray, *, onto: DeviceArray | None = None
+    device: Device, lists: TileLists, records: SlotRecords, *, onto: DeviceArray | None = None
 ) -> DeviceArray:
     """Sum each splat's records over its tiles: (N, 6 + D [+ 2]), or (N, P) with modes.
 
@@ -297,13 +315,14 @@ def sum_slots(
         records: what ``raster_grad`` returned for them.
         onto: sums of the rows of tiles above, which these are added to; zero if not given.
     """
-    count, record = lists.slots.size - 1, records.shape[1]
+    count, record = lists.slots.size - 1, records.numbers.shape[1]
     sums = device.empty((count, record)) if onto is None else onto
     device.launch(
         "splat_sum_slots",
         (count,),
         slots=lists.slots,
-        records=records,
+        records=records.numbers,
+        live=records.live,
         sums=sums,
         count=count,
         RECORD=record,
@@ -343,8 +362,9 @@ def _channel_runs(channels: int) -> Iterator[tuple[int, int]]:
 
 
 def _kernel(device: Device, splats: ScreenSplats, name: str) -> str:
-    basis = "splat" if splats.modes is None else "hermite"
-    return f"{basis}_{name}_{'cpu' if device.traits.is_cpu else 'gpu'}"
+    if device.traits.is_cpu:
+        return f"splat_{name}_cpu"
+    return f"{'splat' if splats.modes is None else 'hermite'}_{name}_gpu"
 
 
 def _work(
@@ -358,6 +378,7 @@ def _work(
 
 
 def _drawn(
+    device: Device,
     splats: ScreenSplats,
     background: DeviceArray,
     lists: TileLists,
@@ -365,8 +386,10 @@ def _drawn(
     settings: SplatSettings,
 ) -> dict[str, DeviceArray | float | None]:
     """The arguments that compositing and its gradient share."""
+    cpu = device.traits.is_cpu
     return {
-        "screen": splats.screen,
+        "screen": None if cpu else splats.screen,
+        "packed": splats.records if cpu else None,
         "modes": splats.modes.table if splats.modes else None,
         "features": splats.features,
         "background": background,
@@ -377,15 +400,30 @@ def _drawn(
         "tiles_x": lists.tiles.across,
         "first_tile_row": lists.tiles.first_row,
         "cap": settings.alpha_cap,
-        "stride": None if splats.modes else splats.features.shape[1],
     }
 
 
-def _macros(splats: ScreenSplats, settings: SplatSettings, channels: int) -> dict[str, int]:
+def _channels(
+    device: Device, splats: ScreenSplats, first: int, count: int
+) -> dict[str, int | None]:
+    """Which channels a launch does of those that the splats have."""
+    channels = splats.features.shape[1]
+    if device.traits.is_cpu:
+        packed = channels <= RECORD_FEATURES
+        return {"stride": channels, "first": first, "CHANNELS": count, "PACKED": int(packed)}
+    numbered = splats.modes is None
+    return {
+        "stride": channels if numbered else None,
+        "first": first if numbered else None,
+        "CHANNELS": count,
+    }
+
+
+def _macros(splats: ScreenSplats, settings: SplatSettings) -> dict[str, int]:
     macros = {
         "TILE": settings.tile,
-        "CHANNELS": channels,
         "ADDITIVE": int(settings.mode == "xray"),
         "SMOOTH": int(settings.smooth_cutoff),
+        "MODAL": int(splats.modes is not None),
     }
     return macros | (splats.modes.macros(settings) if splats.modes else {})

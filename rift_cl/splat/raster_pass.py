@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.splat.bands import FrameMemory, plan_bands
-from rift_cl.splat.raster import Raster, ScreenSplats, raster_grad, rasterize, sum_slots
+from rift_cl.splat.raster import Raster, ScreenSplats, packed, raster_grad, rasterize, sum_slots
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.tile_lists import TileLists, Tiles, count_tiles, list_tiles, tile_lists
 
@@ -80,6 +80,7 @@ def draw(
     """
     tiles, sort = Tiles.of(size, settings.tile), settings.mode == "light"
     counts = count_tiles(device, boxes, depths, tiles, sort=sort)
+    screen = packed(device, screen)
     lists, raster = None, None
     if memory.fits(counts.n_entries, tiles.count, device.budget, device.traits.allocation):
         lists = list_tiles(device, counts)

@@ -3,7 +3,7 @@
 import dataclasses
 
 import numpy as np
-from scenes import FARTHEST, lists_of, random_scene
+from scenes import FARTHEST, lists_of, numbers_of, random_scene
 
 from rift_cl.reference.hermite_moments import hermite_moments
 from rift_cl.reference.hermite_raster import (
@@ -108,8 +108,8 @@ def moments(device, given, settings, grad_image, grad_left, background=None):
         background=None if background is None else device.array(background),
     )
     owner = np.repeat(np.arange(len(given.table)), np.diff(given.scene.slots))
-    sums = np.zeros((len(given.table), slots.shape[1]))
-    np.add.at(sums, owner, device.get(slots).astype(float))
+    sums = np.zeros((len(given.table), slots.numbers.shape[1]))
+    np.add.at(sums, owner, numbers_of(device, slots))
     return sums
 
 

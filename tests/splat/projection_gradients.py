@@ -12,7 +12,7 @@ from projection_scenes import shaped, twin_of, upload
 from rift_cl.cl.arithmetic import sum_columns
 from rift_cl.splat.features import shade, shade_grad
 from rift_cl.splat.projection import project, project_grad
-from rift_cl.splat.raster import sum_slots
+from rift_cl.splat.raster import SlotRecords, sum_slots
 
 
 def tiles_of(boxes):
@@ -38,7 +38,8 @@ def random_records(counts, covars, channels, *, seed=1, absgrad=False):
 def sums_of(device, slots, records):
     """The records of each splat, summed on the device."""
     lists = SimpleNamespace(slots=device.array(slots))
-    return sum_slots(device, lists, device.array(records))
+    live = device.array(np.ones(len(records), np.uint8))
+    return sum_slots(device, lists, SlotRecords(device.array(records), live))
 
 
 def run(device, values, kind, *, channels=3, depth_channel=False, shaded=True, one_tile=False):

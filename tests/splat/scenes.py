@@ -69,3 +69,9 @@ def lists_of(screen, depths, tiles, edge):
     entries = np.stack([splat, slots[splat] + place], axis=1)[order].astype(np.int32)
     starts = np.searchsorted(tile_id[order], np.arange(tiles.count + 1)).astype(np.int32)
     return slots, entries, starts, tiles
+
+
+def numbers_of(device, records):
+    """What the raster's gradient left in each slot, in float64; zero where nothing is."""
+    live = device.get(records.live).astype(bool)
+    return np.where(live[:, None], device.get(records.numbers), np.float32(0)).astype(float)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scenes import random_scene
+from scenes import numbers_of, random_scene
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.reference.splat_raster import Rules, raster
@@ -49,8 +49,8 @@ def gradient(device, scene, settings, grad_image, grad_transmittance, background
         background=None if background is None else device.array(background),
     )
     owner = np.repeat(np.arange(len(scene.screen)), np.diff(scene.slots))
-    sums = np.zeros((len(scene.screen), slots.shape[1]))
-    np.add.at(sums, owner, device.get(slots).astype(float))
+    sums = np.zeros((len(scene.screen), slots.numbers.shape[1]))
+    np.add.at(sums, owner, numbers_of(device, slots))
     return sums
 
 

@@ -1,0 +1,51 @@
+/* The pixels of one tile as a CPU's work-item holds them: in blocks of 4 x ROWS, whose state a loop
+ * over splats can keep in registers.
+ *
+ * A vector of eight lanes is 4 x 2 pixels: splats are round, or needles at any angle, so that a
+ * block this shape wastes fewer lanes than rows of eight (78 % of them are used by a fitted scene,
+ * 64 % of 8 x 1). VECTORS of them, one below the other, are a block; more amortise what a block and
+ * a splat cost together, fewer keep many channels in registers. Launches for one image after the
+ * other have the same blocks, as what one left in a slot the next adds to. Blocks are numbered down
+ * the tile, column of blocks after column.
+ *
+ * An image has `stride` channels, of which CHANNELS from `first` on are looked at. */
+
+/* With PACKED all channels of an image are in the splats' records (screen_record.h). */
+#ifndef PACKED
+#define PACKED 0
+#endif
+#ifndef VECTORS
+#define VECTORS (PACKED && CHANNELS <= 4 ? 4 : 2)
+#endif
+#define ROWS (2 * VECTORS)
+#define ACROSS (TILE / 4)
+#define DOWN (TILE / ROWS)
+#define BLOCKS (ACROSS * DOWN)
+#define SIGN_BIT ((int)0x80000000)
+
+/* The tile's corner in the image, and the image's size. */
+typedef struct {
+  int x, y, width, height;
+} Window;
+
+/* Centres of a block's first vector, counted from the tile's corner; the next is 2 rows below. */
+static lanes block_x(int block) {
+  return block / DOWN * 4 + (lanes)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f);
+}
+
+static lanes block_y(int block) {
+  return block % DOWN * ROWS + (lanes)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f);
+}
+
+/* The pixel of a lane in the image; below zero outside. */
+static long pixel_of(Window window, int block, int vector, int lane) {
+  const int x = window.x + block / DOWN * 4 + lane % 4;
+  const int y = window.y + block % DOWN * ROWS + 2 * vector + lane / 4;
+  return x < window.width && y < window.height ? (long)y * window.width + x : -1;
+}
+
+static int any_positive(lanes_int v) {
+  const int4 four = v.lo & v.hi;
+  const int2 two = four.lo & four.hi;
+  return (two.x & two.y) >= 0;
+}
