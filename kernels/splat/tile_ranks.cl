@@ -15,6 +15,9 @@
 #define SORTED 1
 #endif
 
+/* Ranks between the splat that is asked for and the one that is read. */
+#define AHEAD 32
+
 KERNEL void tile_ranks(
     __global const int4 *restrict boxes, __global const int *restrict slots,
     __global const int *restrict order, __global const long *restrict visible,
@@ -26,6 +29,10 @@ KERNEL void tile_ranks(
   const int filled = SORTED ? (int)visible[0] : splats;
   for (long rank = first; rank < stop; rank++) {
     int count = 0;
+    if (SORTED && rank + AHEAD < filled) {
+      PREFETCH(boxes + order[rank + AHEAD]);
+      PREFETCH(slots + order[rank + AHEAD]);
+    }
     if (rank < filled) {
       const int splat = SORTED ? order[rank] : (int)rank;
       const int4 box = clipped_box(boxes[splat], tiles_x, first_tile_row, tiles_y);
