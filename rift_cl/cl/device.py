@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import threading
 from collections.abc import Callable
-from copy import copy
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -134,8 +133,7 @@ class Device:
             DeviceMemoryError: the device's memory ran out.
         """
         opened = self._open()
-        array: Any = copy(opened.plain_array(shape, dtype))
-        array.events = []
+        array: Any = opened.plain_array(shape, dtype)
         if array.nbytes:
             self._allocate(opened, array)
         made: DeviceArray = array
@@ -233,7 +231,7 @@ class _Opened(NamedTuple):
         queue: the ``pyopencl.CommandQueue``.
         pool: memory for arrays, which keeps what they leave for the next ones.
         direct: memory for arrays, from the driver.
-        plain_array: an array without memory, by shape and type; copies of it are given some.
+        plain_array: a new array without memory, by shape and type.
     """
 
     context: Any
@@ -260,12 +258,17 @@ class _Opened(NamedTuple):
         queue = cl.CommandQueue(context)
         direct = ImmediateAllocator(queue)
 
+        @lru_cache(_SHAPES)
+        def members(shape: int | tuple[int, ...], dtype: DTypeLike) -> dict[str, Any]:
+            array = Array(queue, shape, dtype, allocator=lambda size: None)
+            assert array.flags.c_contiguous  # The flags are kept with it.
+            return vars(array)
+
         # A step of a fit makes some fifty arrays, mostly of the shapes of the step before, and what
         # pyopencl looks at for each of them takes longer than to launch a kernel.
-        @lru_cache(_SHAPES)
         def plain_array(shape: int | tuple[int, ...], dtype: DTypeLike) -> Any:
-            array = Array(queue, shape, dtype, allocator=lambda size: None)
-            assert array.flags.c_contiguous  # The flags are kept with it, for the copies as well.
+            array = Array.__new__(Array)
+            array.__dict__.update(members(shape, dtype), events=[])
             return array
 
         return cls(context, queue, MemoryPool(direct), direct, plain_array)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 POCL = "Portable Computing Language"
@@ -80,7 +81,7 @@ class Traits:
             seconds=None if is_cpu else _watched_seconds(device),
         )
 
-    @property
+    @cached_property
     def usable_memory(self) -> int:
         """Bytes of device memory that we may use."""
         return min(int(self.share * self.memory), 1 << self.address_bits)

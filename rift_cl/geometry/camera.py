@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -109,10 +110,12 @@ class Camera:
         K = self.K
         return float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2])
 
-    @property
+    @cached_property
     def center(self) -> NDArray[np.float64]:
-        """Where the camera stands, (3,) in world coordinates."""
-        return np.asarray(-np.linalg.solve(self.view[:3, :3], self.view[:3, 3]), np.float64)
+        """Where the camera stands, (3,) in world coordinates; read-only."""
+        center = np.asarray(-np.linalg.solve(self.view[:3, :3], self.view[:3, 3]), np.float64)
+        center.flags.writeable = False
+        return center
 
 
 def _size(size: Sequence[int]) -> tuple[int, int]:
