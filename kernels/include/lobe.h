@@ -2,7 +2,7 @@
  *
  * FUNCTIONS counts all of them; GEOMETRY is how many numbers a splat's lobes have. A geometry with
  * a number that is not finite, or with a quaternion or an axis of no direction, has no functions.
- * Needs portable.h and small_matrix.h. */
+ * A splat's geometry comes as GEOMETRY vectors, one for each number of eight splats. Needs portable.h. */
 
 #define HG 0
 #define LG 1

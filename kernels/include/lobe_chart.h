@@ -18,58 +18,59 @@
 
 typedef struct {
   Frame frame;
-  float3 sum;         /* d + a */
-  float height, fade; /* h as it is, and what is left of the modes */
-  float2 stretch;     /* k / w */
-  float x, y, factor;
+  lanes3 sum;         /* d + a */
+  lanes height, fade; /* h as it is, and what is left of the modes */
+  lanes stretch_x, stretch_y; /* k / w */
+  lanes x, y, factor;
 } Chart;
 
-static int read_chart(Chart *c, __global const float *lobe, float3 d) {
-  if (!all_finite(lobe, GEOMETRY) || !read_frame(&c->frame, lobe)) return 0;
-  c->sum = d + c->frame.a;
-  c->height = 0.5f * dot3(c->sum, c->sum);
+static lanes_int read_chart(Chart *c, const lanes *lobe, lanes3 d) {
+  const lanes_int meant = read_frame(&c->frame, lobe) & all_finite(lobe, GEOMETRY);
+  c->sum = plus(d, c->frame.a);
+  c->height = 0.5f * dot_of(c->sum, c->sum);
   c->fade = c->height < LEAST_HEIGHT ? c->height * (1 / LEAST_HEIGHT) : 1;
-  const float k = sqrt(2 / larger1(c->height, LEAST_HEIGHT));
-  c->stretch.x = k * power_of_e(-held(lobe[4], LEAST_LOG_WIDTH, 0));
+  const lanes k = root_of(2 / larger(c->height, LEAST_HEIGHT));
+  c->stretch_x = k * power_of_e(-held(lobe[4], LEAST_LOG_WIDTH, 0));
 #if LOBES == HG
-  c->stretch.y = k * power_of_e(-held(lobe[5], LEAST_LOG_WIDTH, 0));
+  c->stretch_y = k * power_of_e(-held(lobe[5], LEAST_LOG_WIDTH, 0));
 #else
-  c->stretch.y = c->stretch.x;
+  c->stretch_y = c->stretch_x;
 #endif
-  c->x = c->stretch.x * dot3(d, c->frame.t);
-  c->y = c->stretch.y * dot3(d, c->frame.b);
+  c->x = c->stretch_x * dot_of(d, c->frame.t);
+  c->y = c->stretch_y * dot_of(d, c->frame.b);
   c->factor = INVERSE_ROOT_PI * power_of_e(-0.5f * (c->x * c->x + c->y * c->y));
-  return 1;
+  return meant;
 }
 
-/* All functions after the constant; 0 if the geometry has no meaning. */
-static int lobe_functions(__global const float *lobe, float3 d, float *value) {
+/* All functions after the constant; false where the geometry has no meaning. */
+static lanes_int lobe_functions(const lanes *lobe, lanes3 d, lanes *value) {
   Chart c;
-  if (!read_chart(&c, lobe, d)) return 0;
+  const lanes_int meant = read_chart(&c, lobe, d);
   plane_modes(c.x, c.y, c.fade * c.factor, value);
-  return 1;
+  return meant;
 }
 
 /* The same of a geometry that has a meaning, and dL/dgeometry from dL/d(functions); gives dL/dd,
  * before the direction's length is held at 1. */
-static float3 lobe_functions_grad(
-    __global const float *lobe, float3 d, const float *by_value, float *value, __global float *grad)
+static lanes3 lobe_functions_grad(
+    const lanes *lobe, lanes3 d, const lanes *by_value, lanes *value, lanes *grad)
 {
   Chart c;
   read_chart(&c, lobe, d);
   plane_modes(c.x, c.y, c.fade * c.factor, value);
-  const float3 whole = plane_slopes(c.x, c.y, c.factor, by_value);
-  const float by_x = c.fade * whole.y, by_y = c.fade * whole.z;
-  const float along_x = c.x * by_x, along_y = c.y * by_y;
-  const float by_height =
-      c.height > LEAST_HEIGHT ? -0.5f * (along_x + along_y) / c.height : whole.x * (1 / LEAST_HEIGHT);
-  const float3 g = c.stretch.x * by_x * c.frame.t + c.stretch.y * by_y * c.frame.b + by_height * c.sum;
-  store_frame_grad(&c.frame, g, d, grad);
+  const lanes3 whole = plane_slopes(c.x, c.y, c.factor, by_value);
+  const lanes by_x = c.fade * whole.y, by_y = c.fade * whole.z;
+  const lanes along_x = c.x * by_x, along_y = c.y * by_y;
+  const lanes by_height = c.height > LEAST_HEIGHT ? -0.5f * (along_x + along_y) / c.height
+                                                  : whole.x * (1 / LEAST_HEIGHT);
+  const lanes3 flat = plus(times(c.stretch_x * by_x, c.frame.t), times(c.stretch_y * by_y, c.frame.b));
+  const lanes3 g = plus(flat, times(by_height, c.sum));
+  frame_grad(&c.frame, g, d, grad);
 #if LOBES == HG
-  grad[4] = is_free(lobe[4], LEAST_LOG_WIDTH, 0) ? -along_x : 0;
-  grad[5] = is_free(lobe[5], LEAST_LOG_WIDTH, 0) ? -along_y : 0;
+  grad[4] = if_free(lobe[4], LEAST_LOG_WIDTH, 0, -along_x);
+  grad[5] = if_free(lobe[5], LEAST_LOG_WIDTH, 0, -along_y);
 #else
-  grad[4] = is_free(lobe[4], LEAST_LOG_WIDTH, 0) ? -(along_x + along_y) : 0;
+  grad[4] = if_free(lobe[4], LEAST_LOG_WIDTH, 0, -(along_x + along_y));
 #endif
   return g;
 }

@@ -9,43 +9,46 @@
 
 #define MOST_LOG_SHARPNESS 9.2103403719761836f
 
-static float sharpness(float ln) { return power_of_e(held(ln, -MOST_LOG_SHARPNESS, MOST_LOG_SHARPNESS)); }
+static lanes sharpness(lanes ln) { return power_of_e(held(ln, -MOST_LOG_SHARPNESS, MOST_LOG_SHARPNESS)); }
 
-static float sharpness_is_free(float ln) { return is_free(ln, -MOST_LOG_SHARPNESS, MOST_LOG_SHARPNESS); }
+static lanes if_sharpness_is_free(lanes ln, lanes slope) {
+  return if_free(ln, -MOST_LOG_SHARPNESS, MOST_LOG_SHARPNESS, slope);
+}
 
 #if LOBES == SG
 
 #define NUMBERS 4
 
 typedef struct {
-  float3 a, away; /* the axis, and d - a */
-  float inverse;  /* of the axis' length as given */
-  float s, parts, value;
+  lanes3 a, away; /* the axis, and d - a */
+  lanes inverse;  /* of the axis' length as given */
+  lanes s, parts, value;
 } Lobe;
 
-static int read_lobe(Lobe *l, __global const float *lobe, float3 d) {
-  const float3 axis = load3(lobe, 0);
-  const float largest = largest3(axis);
-  if (!(largest > LEAST_LENGTH)) return 0;
-  const float even = 1 / largest;
-  const float3 u = axis * even;
-  const float inverse = 1 / sqrt(dot3(u, u));
-  l->a = u * inverse;
+static lanes_int read_lobe(Lobe *l, const lanes *lobe, lanes3 d) {
+  const lanes3 axis = lanes3_of(lobe[0], lobe[1], lobe[2]);
+  const lanes largest = largest_of(axis), even = 1 / largest;
+  const lanes3 u = times(even, axis);
+  const lanes inverse = inverse_root(dot_of(u, u));
+  l->a = times(inverse, u);
   l->inverse = inverse * even;
-  l->away = d - l->a;
+  l->away = minus(d, l->a);
   l->s = sharpness(lobe[3]);
-  l->parts = 0.5f * l->s * dot3(l->away, l->away);
+  l->parts = 0.5f * l->s * dot_of(l->away, l->away);
   l->value = power_of_e(-l->parts);
-  return 1;
+  return largest > LEAST_LENGTH;
 }
 
 /* The gradient of one lobe's geometry; gives dL/dd. */
-static float3 lobe_grad(const Lobe *l, __global const float *lobe, float3 d, float by_value, __global float *grad) {
-  const float by = by_value * l->value, steep = by * l->s;
-  const float3 across = l->away - dot3(l->away, l->a) * l->a;
-  store3(grad, 0, steep * l->inverse * across);
-  grad[3] = -by * l->parts * sharpness_is_free(lobe[3]);
-  return -steep * l->away;
+static lanes3 lobe_grad(const Lobe *l, const lanes *lobe, lanes3 d, lanes by_value, lanes *grad) {
+  const lanes by = by_value * l->value, steep = by * l->s;
+  const lanes3 across = minus(l->away, times(dot_of(l->away, l->a), l->a));
+  const lanes share = steep * l->inverse;
+  grad[0] = share * across.x;
+  grad[1] = share * across.y;
+  grad[2] = share * across.z;
+  grad[3] = if_sharpness_is_free(lobe[3], -by * l->parts);
+  return times(-steep, l->away);
 }
 
 #elif LOBES == ASG
@@ -54,29 +57,31 @@ static float3 lobe_grad(const Lobe *l, __global const float *lobe, float3 d, flo
 
 typedef struct {
   Frame frame;
-  float3 place; /* d in the frame */
-  float2 l, parts;
-  float bell, value;
+  lanes3 place; /* d in the frame */
+  lanes l1, l2, part1, part2, bell, value;
 } Lobe;
 
-static int read_lobe(Lobe *l, __global const float *lobe, float3 d) {
-  if (!read_frame(&l->frame, lobe)) return 0;
-  l->place = (float3)(dot3(d, l->frame.t), dot3(d, l->frame.b), dot3(d, l->frame.a));
-  l->l = (float2)(sharpness(lobe[4]), sharpness(lobe[5]));
-  l->parts = l->l * l->place.xy * l->place.xy;
-  l->bell = power_of_e(-(l->parts.x + l->parts.y));
+static lanes_int read_lobe(Lobe *l, const lanes *lobe, lanes3 d) {
+  const lanes_int has_frame = read_frame(&l->frame, lobe);
+  l->place = lanes3_of(dot_of(d, l->frame.t), dot_of(d, l->frame.b), dot_of(d, l->frame.a));
+  l->l1 = sharpness(lobe[4]);
+  l->l2 = sharpness(lobe[5]);
+  l->part1 = l->l1 * l->place.x * l->place.x;
+  l->part2 = l->l2 * l->place.y * l->place.y;
+  l->bell = power_of_e(-(l->part1 + l->part2));
   l->value = l->place.z > 0 ? l->place.z * l->bell : 0;
-  return 1;
+  return has_frame;
 }
 
 /* The gradient of one lobe's geometry; gives dL/dd. */
-static float3 lobe_grad(const Lobe *l, __global const float *lobe, float3 d, float by_value, __global float *grad) {
-  const float by = by_value * l->value, up = l->place.z > 0 ? by_value * l->bell : 0;
-  const float2 down = -2 * by * l->l * l->place.xy;
-  const float3 g = down.x * l->frame.t + down.y * l->frame.b + up * l->frame.a;
-  store_frame_grad(&l->frame, g, d, grad);
-  grad[4] = -by * l->parts.x * sharpness_is_free(lobe[4]);
-  grad[5] = -by * l->parts.y * sharpness_is_free(lobe[5]);
+static lanes3 lobe_grad(const Lobe *l, const lanes *lobe, lanes3 d, lanes by_value, lanes *grad) {
+  const lanes by = by_value * l->value, up = l->place.z > 0 ? by_value * l->bell : 0;
+  const lanes down1 = -2 * by * l->l1 * l->place.x, down2 = -2 * by * l->l2 * l->place.y;
+  const lanes3 flat = plus(times(down1, l->frame.t), times(down2, l->frame.b));
+  const lanes3 g = plus(flat, times(up, l->frame.a));
+  frame_grad(&l->frame, g, d, grad);
+  grad[4] = if_sharpness_is_free(lobe[4], -by * l->part1);
+  grad[5] = if_sharpness_is_free(lobe[5], -by * l->part2);
   return g;
 }
 
@@ -84,28 +89,28 @@ static float3 lobe_grad(const Lobe *l, __global const float *lobe, float3 d, flo
 
 #define GEOMETRY (NUMBERS * MODES)
 
-/* All functions after the constant; 0 if the geometry has no meaning. */
-static int lobe_functions(__global const float *lobe, float3 d, float *value) {
+/* All functions after the constant; false where the geometry has no meaning. */
+static lanes_int lobe_functions(const lanes *lobe, lanes3 d, lanes *value) {
   Lobe l;
-  if (!all_finite(lobe, GEOMETRY)) return 0;
+  lanes_int meant = all_finite(lobe, GEOMETRY);
   for (int k = 0; k < MODES; k++) {
-    if (!read_lobe(&l, lobe + NUMBERS * k, d)) return 0;
+    meant &= read_lobe(&l, lobe + NUMBERS * k, d);
     value[k] = l.value;
   }
-  return 1;
+  return meant;
 }
 
 /* The same of a geometry that has a meaning, and dL/dgeometry from dL/d(functions); gives dL/dd,
  * before the direction's length is held at 1. */
-static float3 lobe_functions_grad(
-    __global const float *lobe, float3 d, const float *by_value, float *value, __global float *grad)
+static lanes3 lobe_functions_grad(
+    const lanes *lobe, lanes3 d, const lanes *by_value, lanes *value, lanes *grad)
 {
   Lobe l;
-  float3 g = 0;
+  lanes3 g = lanes3_of(0, 0, 0);
   for (int k = 0; k < MODES; k++) {
     read_lobe(&l, lobe + NUMBERS * k, d);
     value[k] = l.value;
-    g += lobe_grad(&l, lobe + NUMBERS * k, d, by_value[k], grad + NUMBERS * k);
+    g = plus(g, lobe_grad(&l, lobe + NUMBERS * k, d, by_value[k], grad + NUMBERS * k));
   }
   return g;
 }

@@ -25,16 +25,16 @@ __constant float ROOT[9] = {
 
 #if LOBES == HG
 
-static void hermite_row(float x, float *p) {
+static void hermite_row(lanes x, lanes *p) {
   p[0] = 1;
   UNROLL
   for (int n = 0; n < ORDER; n++)
-    p[n + 1] = (ROOT_TWO * x * p[n] - (n > 0 ? ROOT[n] * p[n - 1] : 0)) * (1 / ROOT[n + 1]);
+    p[n + 1] = (ROOT_TWO * x * p[n] - (n > 0 ? ROOT[n] * p[n - 1] : (lanes)0)) * (1 / ROOT[n + 1]);
 }
 
 /* All modes at (x, y), times factor. */
-static void plane_modes(float x, float y, float factor, float *value) {
-  float across[ORDER + 1], up[ORDER + 1];
+static void plane_modes(lanes x, lanes y, lanes factor, lanes *value) {
+  lanes across[ORDER + 1], up[ORDER + 1];
   hermite_row(x, across);
   hermite_row(y, up);
   UNROLL
@@ -45,23 +45,23 @@ static void plane_modes(float x, float y, float factor, float *value) {
 }
 
 /* Sum of modes times weight, and its slopes by x and y: (sum, d/dx, d/dy), times factor. */
-static float3 plane_slopes(float x, float y, float factor, const float *weight) {
-  float across[ORDER + 1], up[ORDER + 1];
+static lanes3 plane_slopes(lanes x, lanes y, lanes factor, const lanes *weight) {
+  lanes across[ORDER + 1], up[ORDER + 1];
   hermite_row(x, across);
   hermite_row(y, up);
-  float3 sum = 0;
+  lanes sum = 0, by_x = 0, by_y = 0;
   UNROLL
   for (int n = 0; n <= ORDER; n++)
     UNROLL
     for (int j = 0; j <= n; j++)
       if (MODE_AT(n) + j < MODES) {
-        const float w = weight[MODE_AT(n) + j];
+        const lanes w = weight[MODE_AT(n) + j];
         const int m = n - j;
-        sum.x += w * across[m] * up[j];
-        if (m > 0) sum.y += w * ROOT[m] * across[m - 1] * up[j];
-        if (j > 0) sum.z += w * ROOT[j] * across[m] * up[j - 1];
+        sum += w * across[m] * up[j];
+        if (m > 0) by_x += w * ROOT[m] * across[m - 1] * up[j];
+        if (j > 0) by_y += w * ROOT[j] * across[m] * up[j - 1];
       }
-  return factor * (float3)(sum.x, ROOT_TWO * sum.y - x * sum.x, ROOT_TWO * sum.z - y * sum.x);
+  return times(factor, lanes3_of(sum, ROOT_TWO * by_x - x * sum, ROOT_TWO * by_y - y * sum));
 }
 
 #elif LOBES == LG
@@ -72,7 +72,7 @@ __constant float FIRST[8] = {
     0.28867513459481292f, 0.12909944487358055f, 0.052704627669472988f, 0.019920476822239893f};
 
 /* Re and Im of (x + i y)^l. */
-static void spirals(float x, float y, float *re, float *im) {
+static void spirals(lanes x, lanes y, lanes *re, lanes *im) {
   re[0] = 1;
   im[0] = 0;
   UNROLL
@@ -83,24 +83,24 @@ static void spirals(float x, float y, float *re, float *im) {
 }
 
 /* The next of the radial polynomials after `here` and `below`. */
-static float next_radial(float q, int p, int l, float here, float below) {
-  return ((q - (2 * p + 1 + l)) * here - ROOT[p] * ROOT[p + l] * below) * (1 / (ROOT[p + 1] * ROOT[p + 1 + l]));
+static lanes next_radial(lanes q, int p, int l, lanes here, lanes below) {
+  return ((q - (float)(2 * p + 1 + l)) * here - ROOT[p] * ROOT[p + l] * below) * (1 / (ROOT[p + 1] * ROOT[p + 1 + l]));
 }
 
 /* All modes at (x, y), times factor. */
-static void plane_modes(float x, float y, float factor, float *value) {
-  const float q = x * x + y * y;
-  float re[ORDER + 1], im[ORDER + 1];
+static void plane_modes(lanes x, lanes y, lanes factor, lanes *value) {
+  const lanes q = x * x + y * y;
+  lanes re[ORDER + 1], im[ORDER + 1];
   spirals(x, y, re, im);
   UNROLL
   for (int l = 0; l <= ORDER; l++) {
-    float here = factor * FIRST[l], below = 0;
+    lanes here = factor * FIRST[l], below = 0;
     UNROLL
     for (int p = 0; 2 * p + l <= ORDER; p++) {
       const int at = MODE_AT(2 * p + l) + 2 * p;
       if (at < MODES) value[at] = re[l] * here;
       if (l > 0 && at + 1 < MODES) value[at + 1] = im[l] * here;
-      const float next = next_radial(q, p, l, here, below);
+      const lanes next = next_radial(q, p, l, here, below);
       below = here;
       here = next;
     }
@@ -108,27 +108,27 @@ static void plane_modes(float x, float y, float factor, float *value) {
 }
 
 /* Sum of modes times weight, and its slopes by x and y: (sum, d/dx, d/dy), times factor. */
-static float3 plane_slopes(float x, float y, float factor, const float *weight) {
-  const float q = x * x + y * y;
-  float re[ORDER + 1], im[ORDER + 1], total = 0, steep = 0, by_x = 0, by_y = 0;
+static lanes3 plane_slopes(lanes x, lanes y, lanes factor, const lanes *weight) {
+  const lanes q = x * x + y * y;
+  lanes re[ORDER + 1], im[ORDER + 1], total = 0, steep = 0, by_x = 0, by_y = 0;
   spirals(x, y, re, im);
   UNROLL
   for (int l = 0; l <= ORDER; l++) {
-    float here = FIRST[l], below = 0, slope = 0, slope_below = 0;
+    lanes here = FIRST[l], below = 0, slope = 0, slope_below = 0;
     UNROLL
     for (int p = 0; 2 * p + l <= ORDER; p++) {
       const int at = MODE_AT(2 * p + l) + 2 * p;
-      const float cosine = at < MODES ? weight[at] : 0;
-      const float sine = l > 0 && at + 1 < MODES ? weight[at + 1] : 0;
-      const float wave = cosine * re[l] + sine * im[l];
+      const lanes cosine = at < MODES ? weight[at] : (lanes)0;
+      const lanes sine = l > 0 && at + 1 < MODES ? weight[at + 1] : (lanes)0;
+      const lanes wave = cosine * re[l] + sine * im[l];
       total += here * wave;
       steep += slope * wave;
       if (l > 0) {
-        by_x += l * here * (cosine * re[l - 1] + sine * im[l - 1]);
-        by_y += l * here * (sine * re[l - 1] - cosine * im[l - 1]);
+        by_x += (float)l * here * (cosine * re[l - 1] + sine * im[l - 1]);
+        by_y += (float)l * here * (sine * re[l - 1] - cosine * im[l - 1]);
       }
-      const float next = next_radial(q, p, l, here, below);
-      const float next_slope =
+      const lanes next = next_radial(q, p, l, here, below);
+      const lanes next_slope =
           next_radial(q, p, l, slope, slope_below) + here * (1 / (ROOT[p + 1] * ROOT[p + 1 + l]));
       below = here;
       here = next;
@@ -136,8 +136,8 @@ static float3 plane_slopes(float x, float y, float factor, const float *weight) 
       slope = next_slope;
     }
   }
-  const float inward = 2 * steep - total;
-  return factor * (float3)(total, by_x + x * inward, by_y + y * inward);
+  const lanes inward = 2 * steep - total;
+  return times(factor, lanes3_of(total, by_x + x * inward, by_y + y * inward));
 }
 
 #endif

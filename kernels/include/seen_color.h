@@ -1,15 +1,22 @@
 /* Colours by the direction that a splat is seen in: what harmonics and lobes share.
  *
- * The direction is mean - camera, unit; (0, 0, 1) where the camera stands in the mean. Of the sum
- * of functions a colour is what is above zero, and black where it is not finite. On the way back a
- * colour that was held at zero passes nothing on. Only the direction's change across itself
- * counts, so that a gradient g by it gives dL/dmean = (g - (g . d) d) / distance. The camera stands
- * at o = -W^-1 t, so with dL/do = -dL/dmean its parts gain
+ * The direction is mean - camera, unit; (0, 0, 1) where the camera stands in the mean, or nearer
+ * than 1e-19. Of the sum of functions a colour is what is above zero, and black where it is not
+ * finite. On the way back a colour that was held at zero passes nothing on. Only the direction's
+ * change across itself counts, so that a gradient g by it gives dL/dmean = (g - (g . d) d) /
+ * distance. The camera stands at o = -W^-1 t, so with dL/do = -dL/dmean its gradient gains
  *
- *     dL/dt = W^-T dL/dmean,      dL/dW = (W^-T dL/dmean) o^T.
+ *     dL/dt = W^-T dL/dmean,      dL/dW = (W^-T dL/dmean) o^T,
  *
- * Tables of features have STRIDE numbers for each splat, of which the first three are the colour.
- * Needs small_matrix.h. */
+ * which is linear: a work-item sums dL/dmean over its splats and adds this once, to its own row of
+ * camera_parts.
+ *
+ * Coefficients are 3 FUNCTIONS numbers in a splat's row, three channels to a function. Four functions
+ * are twelve numbers, three whole fours of columns (splat_rows.h), and go through registers at once.
+ * Tables of features have STRIDE numbers for each splat, of which the first three are the colour. */
+
+#include "include/lane_vectors.h"
+#include "include/splat_rows.h"
 
 #ifndef STRIDE
 #define STRIDE 3
@@ -17,57 +24,111 @@
 #ifndef CAMERA_GRADIENT
 #define CAMERA_GRADIENT 1
 #endif
+/* Functions, and columns, that go through registers at once. */
+#define AT_ONCE 4
+#define NUMBERS_AT_ONCE 12
 
-static float3 direction_of(float3 away) {
-  const float square = dot3(away, away);
-  return square > 0 ? away / sqrt(square) : (float3)(0, 0, 1);
-}
-
-static float3 color_of(float3 sum) {
-  return not_finite3(sum) ? (float3)(0, 0, 0) : sum > 0 ? sum : (float3)(0, 0, 0);
-}
-
-static int is_black(float3 color) { return !(color.x > 0) && !(color.y > 0) && !(color.z > 0); }
-
-/* What comes in of a colour's gradient. */
-static float3 incoming_of(float3 color, __global const float *grad) {
-  return (float3)(color.x > 0 ? grad[0] : 0, color.y > 0 ? grad[1] : 0, color.z > 0 ? grad[2] : 0);
-}
-
-/* The direction on the way back, with one over the distance, and where the camera stands. */
+/* The direction that splats are seen in, and one over their distance. */
 typedef struct {
-  float3 center, direction;
-  float inverse;
+  lanes3 direction;
+  lanes inverse;
 } Sight;
 
-static Sight sight_of(float3 mean, float3 center) {
-  const float3 away = mean - center;
-  const float square = dot3(away, away);
+static Sight sight_of(lanes3 mean, float3 center) {
+  const lanes3 away = lanes3_of(mean.x - center.x, mean.y - center.y, mean.z - center.z);
+  const lanes square = dot_of(away, away);
+  const lanes_int apart = (square > LEAST_SQUARE) & (square < MOST_SQUARE);
   Sight s;
-  s.center = center;
-  s.inverse = square > 0 ? 1 / sqrt(square) : 0;
-  s.direction = square > 0 ? away * s.inverse : (float3)(0, 0, 1);
+  s.inverse = apart ? inverse_root(square) : 0;
+  s.direction = lanes3_of(
+      apart ? away.x * s.inverse : 0, apart ? away.y * s.inverse : 0, apart ? away.z * s.inverse : 1);
   return s;
 }
 
-static void add3(__global float *p, long i, float3 v) { store3(p, i, load3(p, i) + v); }
-
-/* Add the gradient g by the direction to those of splat i's mean and of the camera; x, y, z are the
- * rows of W^-T. */
-static void add_by_direction(
-    float3 g, Sight s, float3 x, float3 y, float3 z, long i, __global float *grad_means,
-    __global float *camera_parts)
+/* A half, and the sum of functions times coefficients. */
+static lanes3 sum_of_functions(
+    __global const float *coefficients, const int functions, Rows rows, const lanes *basis)
 {
-  const float3 by_mean = (g - dot3(g, s.direction) * s.direction) * s.inverse;
-  add3(grad_means, i, by_mean);
+  lanes x = 0.5f, y = 0.5f, z = 0.5f;
+  UNROLL for (int k = 0; k < functions; k += AT_ONCE) {
+    const int some = functions - k < AT_ONCE ? functions - k : AT_ONCE;
+    lanes v[NUMBERS_AT_ONCE];
+    read_columns(coefficients, 3 * functions, 3 * k, 3 * some, rows, v);
+    UNROLL for (int n = 0; n < some; n++) {
+      x += basis[k + n] * v[3 * n];
+      y += basis[k + n] * v[3 * n + 1];
+      z += basis[k + n] * v[3 * n + 2];
+    }
+  }
+  return lanes3_of(x, y, z);
+}
+
+/* The colour of a sum, where a splat is drawn. */
+static lanes3 color_of(lanes3 sum, lanes_int drawn) {
+  const lanes_int shown = drawn & !no_numbers(sum);
+  return lanes3_of(
+      shown & (sum.x > 0) ? sum.x : 0, shown & (sum.y > 0) ? sum.y : 0, shown & (sum.z > 0) ? sum.z : 0);
+}
+
+static lanes_int is_seen(lanes3 color) { return (color.x > 0) | (color.y > 0) | (color.z > 0); }
+
+/* What comes in of a colour's gradient. */
+static lanes3 incoming_of(lanes3 color, lanes3 grad) {
+  return lanes3_of(color.x > 0 ? grad.x : 0, color.y > 0 ? grad.y : 0, color.z > 0 ? grad.z : 0);
+}
+
+/* dL/d(functions), from what comes in of a colour's gradient. */
+static void functions_grad(
+    __global const float *coefficients, const int functions, Rows rows, lanes3 incoming, lanes *by_basis)
+{
+  UNROLL for (int k = 0; k < functions; k += AT_ONCE) {
+    const int some = functions - k < AT_ONCE ? functions - k : AT_ONCE;
+    lanes v[NUMBERS_AT_ONCE];
+    read_columns(coefficients, 3 * functions, 3 * k, 3 * some, rows, v);
+    UNROLL for (int n = 0; n < some; n++)
+      by_basis[k + n] = dot_of(incoming, lanes3_of(v[3 * n], v[3 * n + 1], v[3 * n + 2]));
+  }
+}
+
+/* Writes dL/d(coefficients). */
+static void write_coefficients_grad(
+    __global float *grad, const int functions, Rows rows, const lanes *basis, lanes3 incoming)
+{
+  UNROLL for (int k = 0; k < functions; k += AT_ONCE) {
+    const int some = functions - k < AT_ONCE ? functions - k : AT_ONCE;
+    lanes v[NUMBERS_AT_ONCE];
+    UNROLL for (int n = 0; n < some; n++) {
+      v[3 * n] = basis[k + n] * incoming.x;
+      v[3 * n + 1] = basis[k + n] * incoming.y;
+      v[3 * n + 2] = basis[k + n] * incoming.z;
+    }
+    write_columns(grad, 3 * functions, 3 * k, 3 * some, rows, v);
+  }
+}
+
+/* dL/dmean from the gradient g by the direction, where a splat is seen. */
+static lanes3 mean_grad(lanes3 g, Sight s, lanes_int seen) {
+  return where(seen, times(s.inverse, minus(g, times(dot_of(g, s.direction), s.direction))));
+}
+
+static void add_to_means(__global float *grad_means, Rows rows, lanes3 by_mean) {
+  write3(grad_means, 3, rows, plus(read3(grad_means, 3, rows), by_mean));
+}
+
+/* Adds what a work-item's sum of dL/dmean is worth by the camera; x, y, z are the rows of W^-T, each
+ * followed by a coordinate of o. */
+static void add_to_camera(lanes3 by_means, float4 x, float4 y, float4 z, __global float *camera_parts) {
 #if CAMERA_GRADIENT
-  __global float *part = camera_parts + 16 * i;
-  const float3 shift = (float3)(dot3(x, by_mean), dot3(y, by_mean), dot3(z, by_mean));
-  add3(part, 0, shift.x * s.center);
-  add3(part + 4, 0, shift.y * s.center);
-  add3(part + 8, 0, shift.z * s.center);
-  part[3] += shift.x;
-  part[7] += shift.y;
-  part[11] += shift.z;
+  const float3 by = (float3)(SUM_OF_LANES(by_means.x), SUM_OF_LANES(by_means.y), SUM_OF_LANES(by_means.z));
+  const float shift[3] = {
+      x.x * by.x + x.y * by.y + x.z * by.z, y.x * by.x + y.y * by.y + y.z * by.z,
+      z.x * by.x + z.y * by.y + z.z * by.z};
+  __global float *part = camera_parts + 16 * (long)get_global_id(0);
+  for (int k = 0; k < 3; k++, part += 4) {
+    part[0] += shift[k] * x.w;
+    part[1] += shift[k] * y.w;
+    part[2] += shift[k] * z.w;
+    part[3] += shift[k];
+  }
 #endif
 }

@@ -5,7 +5,7 @@
  *     Y[l^2 + l + m] = Q_lm(z) C_m(x, y),      Y[l^2 + l - m] = Q_lm(z) S_m(x, y)  for m > 0.
  *
  * Their derivatives follow from dC_m = m (C_m-1 dx - S_m-1 dy), dS_m = m (S_m-1 dx + C_m-1 dy).
- * COEFFICIENTS is (degree + 1)^2. */
+ * COEFFICIENTS is (degree + 1)^2. Each lane has a direction of its own. */
 
 #ifndef COEFFICIENTS
 #define COEFFICIENTS 16
@@ -16,8 +16,8 @@
 #define Q_AT(l, m) ((l) * ((l) + 1) / 2 + (m))
 
 /* Q_lm and dQ_lm/dz. */
-static void sh_heights(float z, float *q, float *dq) {
-  const float zz = z * z;
+static void sh_heights(lanes z, lanes *q, lanes *dq) {
+  const lanes zz = z * z;
   q[0] = 0.28209479177387814f; dq[0] = 0;
 #if DEGREE >= 1
   q[1] = 0.48860251190291992f * z; dq[1] = 0.48860251190291992f;
@@ -45,40 +45,42 @@ static void sh_heights(float z, float *q, float *dq) {
 }
 
 /* C_m and S_m. */
-static void sh_turns(float x, float y, float *c, float *s) {
+static void sh_turns(lanes x, lanes y, lanes *c, lanes *s) {
   c[0] = 1;
   s[0] = 0;
-  for (int m = 1; m <= DEGREE; m++) {
+  UNROLL for (int m = 1; m <= DEGREE; m++) {
     c[m] = x * c[m - 1] - y * s[m - 1];
     s[m] = x * s[m - 1] + y * c[m - 1];
   }
 }
 
 /* All functions in one direction, given by a unit vector. */
-static void sh_basis(float3 d, float *value) {
-  float q[Q_AT(DEGREES, 0)], dq[Q_AT(DEGREES, 0)], c[DEGREES], s[DEGREES];
+static void sh_basis(lanes3 d, lanes *value) {
+  lanes q[Q_AT(DEGREES, 0)], dq[Q_AT(DEGREES, 0)], c[DEGREES], s[DEGREES];
   sh_heights(d.z, q, dq);
   sh_turns(d.x, d.y, c, s);
-  for (int l = 0; l <= DEGREE; l++)
-    for (int m = 0; m <= l; m++) {
+  UNROLL for (int l = 0; l <= DEGREE; l++)
+    UNROLL for (int m = 0; m <= l; m++) {
       value[l * l + l + m] = q[Q_AT(l, m)] * c[m];
       if (m > 0) value[l * l + l - m] = q[Q_AT(l, m)] * s[m];
     }
 }
 
 /* dL/d(x, y, z) from dL/dY of every function, before the direction's length is held at 1. */
-static float3 sh_basis_grad(float3 d, const float *by_value) {
-  float q[Q_AT(DEGREES, 0)], dq[Q_AT(DEGREES, 0)], c[DEGREES], s[DEGREES];
+static lanes3 sh_basis_grad(lanes3 d, const lanes *by_value) {
+  lanes q[Q_AT(DEGREES, 0)], dq[Q_AT(DEGREES, 0)], c[DEGREES], s[DEGREES], gx = 0, gy = 0, gz = 0;
   sh_heights(d.z, q, dq);
   sh_turns(d.x, d.y, c, s);
-  float3 g = 0;
-  for (int l = 0; l <= DEGREE; l++)
-    for (int m = 0; m <= l; m++) {
-      const float even = by_value[l * l + l + m], odd = m > 0 ? by_value[l * l + l - m] : 0;
-      g.z += dq[Q_AT(l, m)] * (even * c[m] + odd * s[m]);
-      if (m == 0) continue;
-      g.x += m * q[Q_AT(l, m)] * (even * c[m - 1] + odd * s[m - 1]);
-      g.y += m * q[Q_AT(l, m)] * (odd * c[m - 1] - even * s[m - 1]);
+  UNROLL for (int l = 0; l <= DEGREE; l++)
+    UNROLL for (int m = 0; m <= l; m++) {
+      const lanes even = by_value[l * l + l + m], odd = m > 0 ? by_value[l * l + l - m] : even;
+      if (m == 0) {
+        gz += dq[Q_AT(l, m)] * even;
+        continue;
+      }
+      gz += dq[Q_AT(l, m)] * (even * c[m] + odd * s[m]);
+      gx += (float)m * q[Q_AT(l, m)] * (even * c[m - 1] + odd * s[m - 1]);
+      gy += (float)m * q[Q_AT(l, m)] * (odd * c[m - 1] - even * s[m - 1]);
     }
-  return g;
+  return lanes3_of(gx, gy, gz);
 }

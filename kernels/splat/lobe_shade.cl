@@ -8,10 +8,10 @@
  * numbers give no finite colour or whose lobes point nowhere (black ones pass no gradient on, so
  * that they spoil nothing else). The colour is written to the first three of STRIDE features.
  *
- * Index space: splats. Each reads 3 FUNCTIONS + GEOMETRY + 3 numbers and writes 3. */
+ * Index space: (runs of RUN splats), LANES of them at a time. Each splat has 3 FUNCTIONS + GEOMETRY + 3
+ * numbers that are read and 3 that are written. */
 
 #include "include/portable.h"
-#include "include/small_matrix.h"
 #include "include/seen_color.h"
 #include "include/lobe.h"
 
@@ -20,18 +20,18 @@ KERNEL void lobe_shade(
     __global const float *restrict lobes, __global const uchar *restrict culled,
     __global float *restrict features, float4 center, int count)
 {
-  const long i = get_global_id(0);
-  if (i >= count) return;
-  float3 color = (float3)(0, 0, 0);
-  if (!culled[i]) {
-    const float3 d = direction_of(load3(means, i) - center.xyz);
-    float basis[FUNCTIONS];
-    basis[0] = CONSTANT;
-    if (lobe_functions(lobes + i * GEOMETRY, d, basis + 1)) {
-      color = (float3)(0.5f, 0.5f, 0.5f);
-      for (int k = 0; k < FUNCTIONS; k++) color += basis[k] * load3(linear, i * FUNCTIONS + k);
-      color = color_of(color);
+  EACH_RUN(first, count) {
+    const Rows rows = rows_at(first, count);
+    const lanes_int drawn = read_bytes(culled, rows) == 0;
+    lanes3 color = lanes3_of(0, 0, 0);
+    if (any_lane(drawn)) {
+      const lanes3 d = sight_of(read3(means, 3, rows), center.xyz).direction;
+      lanes lobe[GEOMETRY], basis[FUNCTIONS];
+      read_columns(lobes, GEOMETRY, 0, GEOMETRY, rows, lobe);
+      basis[0] = CONSTANT;
+      const lanes_int meant = lobe_functions(lobe, d, basis + 1);
+      color = color_of(sum_of_functions(linear, FUNCTIONS, rows, basis), drawn & meant);
     }
+    write3(features, STRIDE, rows, color);
   }
-  store3(features + i * STRIDE, 0, color);
 }

@@ -2,15 +2,14 @@
  * camera.
  *
  * The first is B_k times what comes in; the lobes' is derived in include/lobe*.h. Those of mean and
- * camera, told in include/seen_color.h, are added to grad_means and camera_parts. inverse_x, _y, _z
- * are the rows of W^-T, each followed by a coordinate of o. A colour that was held at zero passes
- * nothing on, and so no splat that is not drawn.
+ * camera, told in include/seen_color.h, are added to grad_means and to this run's row of
+ * camera_parts. inverse_x, _y, _z are the rows of W^-T, each followed by a coordinate of o. A colour
+ * that was held at zero passes nothing on, and so no splat that is not drawn.
  *
- * Index space: splats. Each reads 3 FUNCTIONS + GEOMETRY + 9 numbers, writes 3 FUNCTIONS +
- * GEOMETRY, and reads and writes 3 of its mean and 12 of the camera's. */
+ * Index space: (runs of RUN splats), LANES of them at a time. Each splat has 3 FUNCTIONS + GEOMETRY + 9
+ * numbers that are read, 3 FUNCTIONS + GEOMETRY that are written, and 3 of its mean that are both. */
 
 #include "include/portable.h"
-#include "include/small_matrix.h"
 #include "include/seen_color.h"
 #include "include/lobe.h"
 
@@ -22,22 +21,27 @@ KERNEL void lobe_shade_grad(
     __global float *restrict grad_lobes, __global float *restrict grad_means,
     __global float *restrict camera_parts)
 {
-  const long i = get_global_id(0);
-  if (i >= count) return;
-  const float3 color = load3(features + i * STRIDE, 0);
-  if (is_black(color)) {
-    for (int k = 0; k < 3 * FUNCTIONS; k++) grad_linear[i * 3 * FUNCTIONS + k] = 0;
-    for (int k = 0; k < GEOMETRY; k++) grad_lobes[i * GEOMETRY + k] = 0;
-    return;
+  const float3 center = (float3)(inverse_x.w, inverse_y.w, inverse_z.w);
+  lanes3 by_means = lanes3_of(0, 0, 0);
+  EACH_RUN(first, count) {
+    const Rows rows = rows_at(first, count);
+    const lanes3 color = read3(features, STRIDE, rows);
+    const lanes_int seen = is_seen(color) & are_there(rows);
+    const lanes3 incoming = incoming_of(color, read3(grad_features, STRIDE, rows));
+    lanes lobe[GEOMETRY], by_lobe[GEOMETRY], basis[FUNCTIONS], by_basis[FUNCTIONS];
+    const Sight s = sight_of(read3(means, 3, rows), center);
+    read_columns(lobes, GEOMETRY, 0, GEOMETRY, rows, lobe);
+    functions_grad(linear, FUNCTIONS, rows, incoming, by_basis);
+    const lanes3 g = lobe_functions_grad(lobe, s.direction, by_basis + 1, basis + 1, by_lobe);
+    /* Geometries without a meaning, which are not seen, give no numbers. */
+    basis[0] = CONSTANT;
+    for (int k = 1; k < FUNCTIONS; k++) basis[k] = seen ? basis[k] : 0;
+    for (int k = 0; k < GEOMETRY; k++) by_lobe[k] = seen ? by_lobe[k] : 0;
+    write_coefficients_grad(grad_linear, FUNCTIONS, rows, basis, incoming);
+    write_columns(grad_lobes, GEOMETRY, 0, GEOMETRY, rows, by_lobe);
+    const lanes3 by_mean = mean_grad(g, s, seen);
+    add_to_means(grad_means, rows, by_mean);
+    by_means = plus(by_means, by_mean);
   }
-  const float3 incoming = incoming_of(color, grad_features + i * STRIDE);
-  const Sight s = sight_of(load3(means, i), (float3)(inverse_x.w, inverse_y.w, inverse_z.w));
-  float basis[FUNCTIONS], by_basis[FUNCTIONS];
-  basis[0] = CONSTANT;
-  for (int k = 0; k < FUNCTIONS; k++) by_basis[k] = dot3(incoming, load3(linear, i * FUNCTIONS + k));
-  const float3 g = lobe_functions_grad(
-      lobes + i * GEOMETRY, s.direction, by_basis + 1, basis + 1, grad_lobes + i * GEOMETRY);
-  for (int k = 0; k < FUNCTIONS; k++) store3(grad_linear, i * FUNCTIONS + k, basis[k] * incoming);
-  add_by_direction(
-      g, s, inverse_x.xyz, inverse_y.xyz, inverse_z.xyz, i, grad_means, camera_parts);
+  add_to_camera(by_means, inverse_x, inverse_y, inverse_z, camera_parts);
 }

@@ -4,10 +4,9 @@
  *
  * Splats that are not drawn are black, and so are those whose coefficients give no finite colour
  * (black ones pass no gradient on, so that they spoil nothing else). The colour is written to the
- * first three of STRIDE features. Index space: splats. */
+ * first three of STRIDE features. Index space: (runs of RUN splats), LANES of them at a time. */
 
 #include "include/portable.h"
-#include "include/small_matrix.h"
 #include "include/seen_color.h"
 #include "include/sh.h"
 
@@ -15,15 +14,15 @@ KERNEL void splat_shade(
     __global const float *restrict means, __global const float *restrict sh,
     __global const uchar *restrict culled, __global float *restrict features, float4 center, int count)
 {
-  const long i = get_global_id(0);
-  if (i >= count) return;
-  float3 color = (float3)(0, 0, 0);
-  if (!culled[i]) {
-    float basis[COEFFICIENTS];
-    sh_basis(direction_of(load3(means, i) - center.xyz), basis);
-    color = (float3)(0.5f, 0.5f, 0.5f);
-    for (int k = 0; k < COEFFICIENTS; k++) color += basis[k] * load3(sh, i * COEFFICIENTS + k);
-    color = color_of(color);
+  EACH_RUN(first, count) {
+    const Rows rows = rows_at(first, count);
+    const lanes_int drawn = read_bytes(culled, rows) == 0;
+    lanes3 color = lanes3_of(0, 0, 0);
+    if (any_lane(drawn)) {
+      lanes basis[COEFFICIENTS];
+      sh_basis(sight_of(read3(means, 3, rows), center.xyz).direction, basis);
+      color = color_of(sum_of_functions(sh, COEFFICIENTS, rows, basis), drawn);
+    }
+    write3(features, STRIDE, rows, color);
   }
-  store3(features + i * STRIDE, 0, color);
 }

@@ -1,13 +1,12 @@
 /* Gradient of splat_shade: to the coefficients, and through the direction to mean and camera.
  *
- * The latter, told in include/seen_color.h, are added to grad_means and camera_parts. inverse_x,
- * _y, _z are the rows of W^-T, each followed by a coordinate of o. A colour that was held at zero
- * passes nothing on, and so no splat that is not drawn.
+ * The latter, told in include/seen_color.h, are added to grad_means and to this run's row of
+ * camera_parts. inverse_x, _y, _z are the rows of W^-T, each followed by a coordinate of o. A colour
+ * that was held at zero passes nothing on, and so no splat that is not drawn.
  *
- * Index space: splats. */
+ * Index space: (runs of RUN splats), LANES of them at a time. */
 
 #include "include/portable.h"
-#include "include/small_matrix.h"
 #include "include/seen_color.h"
 #include "include/sh.h"
 
@@ -17,22 +16,22 @@ KERNEL void splat_shade_grad(
     float4 inverse_x, float4 inverse_y, float4 inverse_z, int count, __global float *restrict grad_sh,
     __global float *restrict grad_means, __global float *restrict camera_parts)
 {
-  const long i = get_global_id(0);
-  if (i >= count) return;
-  const float3 color = load3(features + i * STRIDE, 0);
-  if (is_black(color)) {
-    for (int k = 0; k < 3 * COEFFICIENTS; k++) grad_sh[i * 3 * COEFFICIENTS + k] = 0;
-    return;
+  const float3 center = (float3)(inverse_x.w, inverse_y.w, inverse_z.w);
+  lanes3 by_means = lanes3_of(0, 0, 0);
+  EACH_RUN(first, count) {
+    const Rows rows = rows_at(first, count);
+    const lanes3 color = read3(features, STRIDE, rows);
+    const lanes_int seen = is_seen(color) & are_there(rows);
+    const lanes3 incoming = incoming_of(color, read3(grad_features, STRIDE, rows));
+    lanes basis[COEFFICIENTS], by_basis[COEFFICIENTS];
+    const Sight s = sight_of(read3(means, 3, rows), center);
+    sh_basis(s.direction, basis);
+    write_coefficients_grad(grad_sh, COEFFICIENTS, rows, basis, incoming);
+    if (!any_lane(seen)) continue;
+    functions_grad(sh, COEFFICIENTS, rows, incoming, by_basis);
+    const lanes3 by_mean = mean_grad(sh_basis_grad(s.direction, by_basis), s, seen);
+    add_to_means(grad_means, rows, by_mean);
+    by_means = plus(by_means, by_mean);
   }
-  const float3 incoming = incoming_of(color, grad_features + i * STRIDE);
-  const Sight s = sight_of(load3(means, i), (float3)(inverse_x.w, inverse_y.w, inverse_z.w));
-  float basis[COEFFICIENTS], by_basis[COEFFICIENTS];
-  sh_basis(s.direction, basis);
-  for (int k = 0; k < COEFFICIENTS; k++) {
-    store3(grad_sh, i * COEFFICIENTS + k, basis[k] * incoming);
-    by_basis[k] = dot3(incoming, load3(sh, i * COEFFICIENTS + k));
-  }
-  const float3 g = sh_basis_grad(s.direction, by_basis);
-  add_by_direction(
-      g, s, inverse_x.xyz, inverse_y.xyz, inverse_z.xyz, i, grad_means, camera_parts);
+  add_to_camera(by_means, inverse_x, inverse_y, inverse_z, camera_parts);
 }

@@ -14,6 +14,8 @@ from typing import Any
 POCL = "Portable Computing Language"
 # Work-items of a group of a GPU, where it takes so many.
 _GROUP = 64
+# Rows of a table of splats that a work-item of a CPU goes through, eight at a time.
+_RUN = 64
 # Work-items of one launch. More than 2^31 along x are left out by some drivers without a word, and
 # groups of a GPU are numbered by 16 bits along y and z on some. A further launch costs nothing.
 _ALONG_X, _FURTHER = 1 << 31, 65535
@@ -85,6 +87,15 @@ class Traits:
     def usable_memory(self) -> int:
         """Bytes of device memory that we may use."""
         return min(int(self.share * self.memory), 1 << self.address_bits)
+
+    @property
+    def run(self) -> int:
+        """Splats that one work-item goes through: see ``kernels/include/splat_rows.h``."""
+        return _RUN if self.is_cpu else 1
+
+    def runs(self, count: int) -> int:
+        """Work-items that go through ``count`` splats."""
+        return -(-count // self.run)
 
     @property
     def macros(self) -> dict[str, int]:

@@ -192,13 +192,14 @@ def shade(
     center = np.array([*camera.center, 0], np.float32)
     device.launch(
         shading.kernel,
-        (count,),
+        (device.traits.runs(count),),
         means=means,
         **shading.parameters,
         culled=culled,
         features=features,
         center=center,
         count=count,
+        RUN=device.traits.run,
         STRIDE=features.shape[1],
         **shading.sizes,
     )
@@ -262,7 +263,7 @@ def shade_grad(
     rows = np.column_stack([inverse, camera.center]).astype(np.float32, order="C")
     device.launch(
         f"{shading.kernel}_grad",
-        (count,),
+        (device.traits.runs(count),),
         means=means,
         **shading.parameters,
         features=features,
@@ -272,6 +273,7 @@ def shade_grad(
         **found,
         grad_means=gradients.means,
         camera_parts=gradients.camera,
+        RUN=device.traits.run,
         STRIDE=features.shape[1],
         CAMERA_GRADIENT=gradients.camera is not None,
         **shading.sizes,
