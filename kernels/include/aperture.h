@@ -15,16 +15,17 @@ static Camera with_aperture(Camera c, float4 aperture) {
 }
 
 /* What the aperture adds to a splat's variance at depth z, in square pixels. */
-static float blur_variance(Camera c, float z) {
-  const float away = c.radius * (1 / z - c.inverse_focus);
+static lanes blur_variance(Camera c, lanes z) {
+  const lanes away = c.radius * (1 / z - c.inverse_focus);
   return c.fx * c.fy * (0.25f * away * away + c.diffraction * c.diffraction);
 }
 
 /* Adds to a gradient what comes in by that variance; 1/F is smooth where F is infinite. */
-static void add_blur_grad(Camera c, float z, float by_variance, CameraGradient *out) {
-  const float inverse = 1 / z, away = c.radius * (inverse - c.inverse_focus);
-  const float disc = 0.25f * away * away, airy = c.diffraction * c.diffraction;
-  const float by_share = by_variance * c.fx * c.fy, slope = 0.5f * by_share * away * c.radius;
+static void add_blur_grad(Camera c, lanes z, lanes by_variance, CameraGradient *out) {
+  const lanes inverse = 1 / z, away = c.radius * (inverse - c.inverse_focus);
+  const float airy = c.diffraction * c.diffraction;
+  const lanes disc = 0.25f * away * away;
+  const lanes by_share = by_variance * c.fx * c.fy, slope = 0.5f * by_share * away * c.radius;
   out->point.z -= slope * inverse * inverse;
   out->fx += by_variance * c.fy * (disc + airy);
   out->fy += by_variance * c.fx * (disc + airy);

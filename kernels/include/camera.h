@@ -13,7 +13,10 @@
  *
  * `volume` is det [du; dv; ray] with the unit ray along which J sees (its null direction): pixel
  * area times length along the ray, per unit of volume. Line integrals need it.
- * With DEFOCUS a camera has an aperture besides: see aperture.h. */
+ * With DEFOCUS a camera has an aperture besides: see aperture.h. The camera is the same for all lanes,
+ * points have LANES places. */
+
+#include "include/lane_vectors.h"
 
 #define PINHOLE 0
 #define ORTHO 1
@@ -40,7 +43,7 @@
 #endif
 
 typedef struct {
-  rows3 rotation;
+  float3 turn_x, turn_y, turn_z; /* rows of the rotation */
   float3 shift;
   float fx, fy, cx, cy, width, height;
 #if DEFOCUS
@@ -49,30 +52,30 @@ typedef struct {
 } Camera;
 
 typedef struct {
-  float u, v, volume;
-  float3 du, dv;
+  lanes u, v, volume;
+  lanes3 du, dv;
 } Screen;
 
 /* dL/d of a Screen's members; of the volume, by its logarithm. */
 typedef struct {
-  float u, v, log_volume;
-  float3 du, dv;
+  lanes u, v, log_volume;
+  lanes3 du, dv;
 } ScreenGradient;
 
 typedef struct {
-  float3 point;
-  float fx, fy, cx, cy;
+  lanes3 point;
+  lanes fx, fy, cx, cy;
 #if DEFOCUS
-  float radius, focus;
+  lanes radius, focus;
 #endif
 } CameraGradient;
 
 static Camera camera_of(
     float4 row_x, float4 row_y, float4 row_z, float4 intrinsics, float width, float height) {
   Camera c;
-  c.rotation.x = row_x.xyz;
-  c.rotation.y = row_y.xyz;
-  c.rotation.z = row_z.xyz;
+  c.turn_x = row_x.xyz;
+  c.turn_y = row_y.xyz;
+  c.turn_z = row_z.xyz;
   c.shift = (float3)(row_x.w, row_y.w, row_z.w);
   c.fx = intrinsics.x;
   c.fy = intrinsics.y;
@@ -83,45 +86,57 @@ static Camera camera_of(
   return c;
 }
 
+/* Into the camera's axes, and back. */
+static lanes3 turned(Camera c, lanes3 v) {
+  return lanes3_of(dot_with(c.turn_x, v), dot_with(c.turn_y, v), dot_with(c.turn_z, v));
+}
+
+static lanes3 turned_back(Camera c, lanes3 v) {
+  return lanes3_of(
+      v.x * c.turn_x.x + v.y * c.turn_y.x + v.z * c.turn_z.x,
+      v.x * c.turn_x.y + v.y * c.turn_y.y + v.z * c.turn_z.y,
+      v.x * c.turn_x.z + v.y * c.turn_y.z + v.z * c.turn_z.z);
+}
+
 #if MODEL == PINHOLE
 
 /* Offset from the principal point, kept near the image. */
-static float near_image(float offset, float center, float size) {
+static lanes near_image(lanes offset, float center, float size) {
   const float low = -MARGIN * size - center, high = (1 + MARGIN) * size - center;
-  return offset < low ? low : offset > high ? high : offset;
+  const lanes right = offset < low ? low : offset;
+  return right > high ? high : right;
 }
 
-static Screen to_screen(Camera c, float3 q) {
-  const float inverse = 1 / q.z, x = c.fx * q.x * inverse, y = c.fy * q.y * inverse;
-  const float px = near_image(x, c.cx, c.width), py = near_image(y, c.cy, c.height);
-  const float tx = px / c.fx, ty = py / c.fy;
+static Screen to_screen(Camera c, lanes3 q) {
+  const lanes inverse = 1 / q.z, x = c.fx * q.x * inverse, y = c.fy * q.y * inverse;
+  const lanes px = near_image(x, c.cx, c.width), py = near_image(y, c.cy, c.height);
+  const lanes tx = px * (1 / c.fx), ty = py * (1 / c.fy);
   Screen s;
   s.u = x + c.cx;
   s.v = y + c.cy;
-  s.du = (float3)(c.fx * inverse, 0, -px * inverse);
-  s.dv = (float3)(0, c.fy * inverse, -py * inverse);
-  s.volume = c.fx * inverse * c.fy * inverse * sqrt(1 + tx * tx + ty * ty);
+  s.du = lanes3_of(c.fx * inverse, 0, -px * inverse);
+  s.dv = lanes3_of(0, c.fy * inverse, -py * inverse);
+  s.volume = c.fx * inverse * c.fy * inverse * root_of(1 + tx * tx + ty * ty);
   return s;
 }
 
-static CameraGradient to_screen_grad(Camera c, float3 q, ScreenGradient g) {
-  const float inverse = 1 / q.z, x = q.x * inverse, y = q.y * inverse;
-  const float free_x = c.fx * x, free_y = c.fy * y;
-  const float px = near_image(free_x, c.cx, c.width), py = near_image(free_y, c.cy, c.height);
-  const float tx = px / c.fx, ty = py / c.fy;
-  const float stretch = g.log_volume / (1 + tx * tx + ty * ty);
-  float gx = -g.du.z * inverse + stretch * tx / c.fx;
-  float gy = -g.dv.z * inverse + stretch * ty / c.fy;
+static CameraGradient to_screen_grad(Camera c, lanes3 q, ScreenGradient g) {
+  const float per_fx = 1 / c.fx, per_fy = 1 / c.fy;
+  const lanes inverse = 1 / q.z, x = q.x * inverse, y = q.y * inverse;
+  const lanes free_x = c.fx * x, free_y = c.fy * y;
+  const lanes px = near_image(free_x, c.cx, c.width), py = near_image(free_y, c.cy, c.height);
+  const lanes tx = px * per_fx, ty = py * per_fy;
+  const lanes stretch = g.log_volume / (1 + tx * tx + ty * ty);
+  /* By a place that is held at a bound: the bound moves with the principal point alone. */
+  const lanes_int held_x = px != free_x, held_y = py != free_y;
+  const lanes by_px = -g.du.z * inverse + stretch * tx * per_fx;
+  const lanes by_py = -g.dv.z * inverse + stretch * ty * per_fy;
+  const lanes gx = g.u + (held_x ? 0 : by_px), gy = g.v + (held_y ? 0 : by_py);
   CameraGradient out;
-  out.cx = g.u;
-  out.cy = g.v;
-  /* A bound moves with the principal point alone. */
-  if (px != free_x) { out.cx -= gx; gx = 0; }
-  if (py != free_y) { out.cy -= gy; gy = 0; }
-  gx += g.u;
-  gy += g.v;
-  out.fx = g.du.x * inverse + gx * x + (g.log_volume - stretch * tx * tx) / c.fx;
-  out.fy = g.dv.y * inverse + gy * y + (g.log_volume - stretch * ty * ty) / c.fy;
+  out.cx = g.u - (held_x ? by_px : 0);
+  out.cy = g.v - (held_y ? by_py : 0);
+  out.fx = g.du.x * inverse + gx * x + (g.log_volume - stretch * tx * tx) * per_fx;
+  out.fy = g.dv.y * inverse + gy * y + (g.log_volume - stretch * ty * ty) * per_fy;
   out.point.x = gx * c.fx * inverse;
   out.point.y = gy * c.fy * inverse;
   out.point.z = -(out.point.x * x + out.point.y * y) - 2 * g.log_volume * inverse
@@ -131,19 +146,19 @@ static CameraGradient to_screen_grad(Camera c, float3 q, ScreenGradient g) {
 
 #elif MODEL == ORTHO
 
-static Screen to_screen(Camera c, float3 q) {
+static Screen to_screen(Camera c, lanes3 q) {
   Screen s;
   s.u = c.fx * q.x + c.cx;
   s.v = c.fy * q.y + c.cy;
-  s.du = (float3)(c.fx, 0, 0);
-  s.dv = (float3)(0, c.fy, 0);
+  s.du = lanes3_of(c.fx, 0, 0);
+  s.dv = lanes3_of(0, c.fy, 0);
   s.volume = c.fx * c.fy;
   return s;
 }
 
-static CameraGradient to_screen_grad(Camera c, float3 q, ScreenGradient g) {
+static CameraGradient to_screen_grad(Camera c, lanes3 q, ScreenGradient g) {
   CameraGradient out;
-  out.point = (float3)(g.u * c.fx, g.v * c.fy, 0);
+  out.point = lanes3_of(g.u * c.fx, g.v * c.fy, 0);
   out.fx = g.u * q.x + g.du.x + g.log_volume / c.fx;
   out.fy = g.v * q.y + g.dv.y + g.log_volume / c.fy;
   out.cx = g.u;
@@ -157,46 +172,48 @@ static CameraGradient to_screen_grad(Camera c, float3 q, ScreenGradient g) {
  * Near the axis the closed forms cancel, and series in t = w / z^2 take their place:
  * z s = sum (-t)^n / (2 n + 1). */
 typedef struct {
-  float s, s1, s2, m;
+  lanes s, s1, s2, m;
 } Bend;
 
 #define SERIES 10
 #define SERIES_BELOW 0.1f
 
-static Bend bend_of(float3 q) {
-  const float w = q.x * q.x + q.y * q.y, i = 1 / q.z, t = w * i * i;
+static Bend bend_of(lanes3 q) {
+  const lanes w = q.x * q.x + q.y * q.y, i = 1 / q.z, t = w * i * i;
+  const lanes_int close = (q.z > 0) & (t < SERIES_BELOW);
   Bend b;
   b.m = 1 / (w + q.z * q.z);
-  if (q.z > 0 && t < SERIES_BELOW) {
-    b.s = b.s1 = b.s2 = 0;
-    for (int n = SERIES; n >= 0; n--) b.s = 1.0f / (2 * n + 1) - t * b.s;
-    for (int n = SERIES; n >= 1; n--) b.s1 = 2.0f * n / (2 * n + 1) - t * b.s1;
-    for (int n = SERIES; n >= 2; n--) b.s2 = 2.0f * n * (n - 1) / (2 * n + 1) - t * b.s2;
-    b.s *= i;
-    b.s1 *= -i * i * i;
-    b.s2 *= i * i * i * i * i;
-    return b;
+  b.s = b.s1 = b.s2 = 0;
+  UNROLL for (int n = SERIES; n >= 0; n--) b.s = 1.0f / (2 * n + 1) - t * b.s;
+  UNROLL for (int n = SERIES; n >= 1; n--) b.s1 = 2.0f * n / (2 * n + 1) - t * b.s1;
+  UNROLL for (int n = SERIES; n >= 2; n--) b.s2 = 2.0f * n * (n - 1) / (2 * n + 1) - t * b.s2;
+  b.s *= i;
+  b.s1 *= -i * i * i;
+  b.s2 *= i * i * i * i * i;
+  if (any_lane(!close)) {
+    const lanes r = root_of(w), s = atan2(r, q.z) / r, s1 = (q.z * b.m - s) / w;
+    b.s = close ? b.s : s;
+    b.s1 = close ? b.s1 : s1;
+    b.s2 = close ? b.s2 : -(q.z * b.m * b.m + 1.5f * s1) / w;
   }
-  b.s = atan2(sqrt(w), q.z) / sqrt(w);
-  b.s1 = (q.z * b.m - b.s) / w;
-  b.s2 = -(q.z * b.m * b.m + 1.5f * b.s1) / w;
   return b;
 }
 
-static Screen to_screen(Camera c, float3 q) {
+static Screen to_screen(Camera c, lanes3 q) {
   const Bend b = bend_of(q);
+  const lanes cross = q.x * q.y * b.s1;
   Screen s;
   s.u = c.fx * q.x * b.s + c.cx;
   s.v = c.fy * q.y * b.s + c.cy;
-  s.du = c.fx * (float3)(b.s + q.x * q.x * b.s1, q.x * q.y * b.s1, -q.x * b.m);
-  s.dv = c.fy * (float3)(q.x * q.y * b.s1, b.s + q.y * q.y * b.s1, -q.y * b.m);
+  s.du = times(c.fx, lanes3_of(b.s + q.x * q.x * b.s1, cross, -q.x * b.m));
+  s.dv = times(c.fy, lanes3_of(cross, b.s + q.y * q.y * b.s1, -q.y * b.m));
   s.volume = 0; /* no line integrals */
   return s;
 }
 
-static CameraGradient to_screen_grad(Camera c, float3 q, ScreenGradient g) {
+static CameraGradient to_screen_grad(Camera c, lanes3 q, ScreenGradient g) {
   const Bend b = bend_of(q);
-  const float3 gu = c.fx * g.du, gv = c.fy * g.dv;
+  const lanes3 gu = times(c.fx, g.du), gv = times(c.fy, g.dv);
   CameraGradient out;
   out.cx = g.u;
   out.cy = g.v;
@@ -204,12 +221,12 @@ static CameraGradient to_screen_grad(Camera c, float3 q, ScreenGradient g) {
       - g.du.z * q.x * b.m;
   out.fy = g.v * q.y * b.s + g.dv.x * q.x * q.y * b.s1 + g.dv.y * (b.s + q.y * q.y * b.s1)
       - g.dv.z * q.y * b.m;
-  const float cross = gu.y + gv.x;
-  const float gs = g.u * c.fx * q.x + g.v * c.fy * q.y + gu.x + gv.y;
-  const float gs1 = gu.x * q.x * q.x + cross * q.x * q.y + gv.y * q.y * q.y;
-  const float gm = -gu.z * q.x - gv.z * q.y;
+  const lanes cross = gu.y + gv.x;
+  const lanes gs = g.u * c.fx * q.x + g.v * c.fy * q.y + gu.x + gv.y;
+  const lanes gs1 = gu.x * q.x * q.x + cross * q.x * q.y + gv.y * q.y * q.y;
+  const lanes gm = -gu.z * q.x - gv.z * q.y;
   /* By w, of which x and y get twice themselves. */
-  const float gw = gs * b.s1 + 2 * gs1 * b.s2 - 2 * gm * b.m * b.m;
+  const lanes gw = gs * b.s1 + 2 * gs1 * b.s2 - 2 * gm * b.m * b.m;
   out.point.x = g.u * c.fx * b.s + (2 * gu.x * q.x + cross * q.y) * b.s1 - gu.z * b.m + gw * q.x;
   out.point.y = g.v * c.fy * b.s + (2 * gv.y * q.y + cross * q.x) * b.s1 - gv.z * b.m + gw * q.y;
   out.point.z = -gs * b.m + 2 * gs1 * b.m * b.m - 2 * gm * q.z * b.m * b.m;

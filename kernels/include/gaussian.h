@@ -8,7 +8,13 @@
  *     det(V V^T) = |v0 x v1|^2     and     adj(V V^T) w = (v1 . k, -v0 . k),  k = w.x v1 - w.y v0,
  *
  * keep about as many digits as the numbers that go in. With DEFOCUS eps is eps2d plus the blur of
- * the aperture at the splat's depth. */
+ * the aperture at the splat's depth.
+ *
+ * Everything is computed in all lanes: a splat that has no meaning is told by its code, and its
+ * numbers, which may be none, are left aside by who uses them. */
+
+#include "include/lane_vectors.h"
+#include "include/splat_rows.h"
 
 #ifndef COVARIANCES
 #define COVARIANCES 0
@@ -48,78 +54,101 @@
 #endif
 
 typedef struct {
-  float3 world, point;      /* mean in the world's frame and in the camera's */
-  rows3 root;               /* F */
-  rows3 axes;               /* R, with quaternions alone */
-  float4 quat;              /* (x, y, z, w), normalised */
-  float quat_length;
-  float3 scale;
-  float root_det;           /* |det F| */
+  lanes3 world, point;      /* mean in the world's frame and in the camera's */
+  lane_rows root;           /* F */
+  lane_rows axes;           /* R, with quaternions alone */
+  lanes3 turn;              /* the quaternion, normalised: its imaginary parts, */
+  lanes real_part;          /* and its real one */
+  lanes quat_length;
+  lanes3 scale;
+  lanes root_det;           /* |det F| */
   Screen screen;
-  float3 m0, m1, v0, v1, normal;
-  float undilated, dilated; /* determinants of V V^T and of V V^T + eps I */
-  float eps, inverse;       /* inverse of the dilated one */
-  float kept, kept_eps;     /* determinant of V V^T + kept_eps I, which the factor is measured by */
-  float factor;             /* weight = opacity * factor */
+  lanes3 m0, m1, v0, v1, normal;
+  lanes undilated, dilated; /* determinants of V V^T and of V V^T + eps I */
+  lanes eps, inverse;       /* inverse of the dilated one */
+  lanes kept, kept_eps;     /* determinant of V V^T + kept_eps I, which the factor is measured by */
+  lanes factor;             /* weight = opacity * factor */
 } Gaussian;
 
-static rows3 rotation_of(float4 q) {
-  rows3 r;
-  r.x = (float3)(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y - q.w * q.z), 2 * (q.x * q.z + q.w * q.y));
-  r.y = (float3)(2 * (q.x * q.y + q.w * q.z), 1 - 2 * (q.x * q.x + q.z * q.z), 2 * (q.y * q.z - q.w * q.x));
-  r.z = (float3)(2 * (q.x * q.z - q.w * q.y), 2 * (q.y * q.z + q.w * q.x), 1 - 2 * (q.x * q.x + q.y * q.y));
-  return r;
+/* The first reason that holds is why a splat is not drawn. */
+static lanes_int or_else(lanes_int code, lanes_int holds, int reason) {
+  return (code == VISIBLE) & holds ? (lanes_int)reason : code;
 }
 
-static float larger(float a, float b) { return a > b ? a : b; }
+/* matrix * v, and transposed matrix * v. */
+static lanes3 applied(lane_rows matrix, lanes3 v) {
+  return lanes3_of(dot_of(matrix.x, v), dot_of(matrix.y, v), dot_of(matrix.z, v));
+}
+
+static lanes3 applied_transposed(lane_rows matrix, lanes3 v) {
+  return plus(plus(times(v.x, matrix.x), times(v.y, matrix.y)), times(v.z, matrix.z));
+}
+
+static lane_rows rotation_of(lanes3 q, lanes w) {
+  const lanes3 twice = plus(q, q);
+  const lanes xx = twice.x * q.x, yy = twice.y * q.y, zz = twice.z * q.z;
+  const lanes xy = twice.x * q.y, xz = twice.x * q.z, yz = twice.y * q.z;
+  const lanes3 t = times(w, twice);
+  lane_rows r;
+  r.x = lanes3_of(1 - (yy + zz), xy - t.z, xz + t.y);
+  r.y = lanes3_of(xy + t.z, 1 - (xx + zz), yz - t.x);
+  r.z = lanes3_of(xz - t.y, yz + t.x, 1 - (xx + yy));
+  return r;
+}
 
 #if COVARIANCES
 
 /* One column of Cholesky's factor below its pivot; zero where the pivot is nothing but rounding. */
-static int pivot_is_valid(float pivot, float below, float trace, float *diagonal) {
-  *diagonal = pivot > ROUNDING * trace ? sqrt(pivot) : 0;
-  return *diagonal > 0 || (pivot > -ROUNDING * trace && below < 1e-3f * trace);
+static lanes_int pivot_is_valid(lanes pivot, lanes below, lanes trace, lanes *diagonal) {
+  *diagonal = pivot > ROUNDING * trace ? root_of(pivot) : 0;
+  return (*diagonal > 0) | ((pivot > -ROUNDING * trace) & (below < 1e-3f * trace));
 }
 
-static int read_shape(Gaussian *g, SHAPES, long i) {
-  const float3 a = load3(covars, 2 * i), b = load3(covars, 2 * i + 1);
-  if (not_finite3(a) | not_finite3(b)) return DEGENERATE;
-  const float trace = a.x + b.x + b.z;
-  float l0, l1, l2;
-  if (not_finite(trace) || !(trace > 0)) return DEGENERATE;
-  if (!pivot_is_valid(a.x, larger(absolute1(a.y), absolute1(a.z)), trace, &l0)) return DEGENERATE;
-  const float l10 = l0 > 0 ? a.y / l0 : 0, l20 = l0 > 0 ? a.z / l0 : 0;
-  const float rest = b.y - l20 * l10;
-  if (!pivot_is_valid(b.x - l10 * l10, absolute1(rest), trace, &l1)) return DEGENERATE;
-  const float l21 = l1 > 0 ? rest / l1 : 0;
-  if (!pivot_is_valid(b.z - l20 * l20 - l21 * l21, 0, trace, &l2)) return DEGENERATE;
-  g->root.x = (float3)(l0, 0, 0);
-  g->root.y = (float3)(l10, l1, 0);
-  g->root.z = (float3)(l20, l21, l2);
+/* A column's number over its pivot. */
+static lanes below_pivot(lanes number, lanes diagonal) { return diagonal > 0 ? number / diagonal : 0; }
+
+static lanes_int read_shape(Gaussian *g, SHAPES, Rows rows) {
+  lanes h[6], l0, l1, l2;
+  read_columns(covars, 6, 0, 6, rows, h);
+  const lanes trace = h[0] + h[3] + h[5];
+  lanes_int meant = !(no_number(h[0]) | no_number(h[1]) | no_number(h[2]) | no_number(h[3])
+      | no_number(h[4]) | no_number(h[5]) | no_number(trace)) & (trace > 0);
+  meant &= pivot_is_valid(h[0], larger(absolute(h[1]), absolute(h[2])), trace, &l0);
+  const lanes l10 = below_pivot(h[1], l0), l20 = below_pivot(h[2], l0), rest = h[4] - l20 * l10;
+  meant &= pivot_is_valid(h[3] - l10 * l10, absolute(rest), trace, &l1);
+  const lanes l21 = below_pivot(rest, l1);
+  meant &= pivot_is_valid(h[5] - l20 * l20 - l21 * l21, 0, trace, &l2);
+  g->root.x = lanes3_of(l0, 0, 0);
+  g->root.y = lanes3_of(l10, l1, 0);
+  g->root.z = lanes3_of(l20, l21, l2);
   g->root_det = l0 * l1 * l2;
-  return VISIBLE;
+  return meant ? (lanes_int)VISIBLE : (lanes_int)DEGENERATE;
 }
 
 #else
 
-static int read_shape(Gaussian *g, SHAPES, long i) {
-  __global const float *q = quats + 4 * i;
-  const float w = q[0];
-  const float3 xyz = (float3)(q[1], q[2], q[3]), s = load3(scales, i);
-  if (not_finite(w) | not_finite3(xyz) | not_finite3(s)) return DEGENERATE;
-  const float largest = larger(larger(absolute1(w), absolute1(xyz.x)), larger(absolute1(xyz.y), absolute1(xyz.z)));
-  if (!(largest > LEAST_QUATERNION) || !(s.x > 0) || !(s.y > 0) || !(s.z > 0)) return DEGENERATE;
-  const float4 even = (float4)(xyz, w) * (1 / largest);
-  const float length = sqrt(dot3(even.xyz, even.xyz) + even.w * even.w);
-  g->quat = even * (1 / length);
-  g->quat_length = length * largest;
-  g->axes = rotation_of(g->quat);
+static lanes3 product(lanes3 a, lanes3 b) { return lanes3_of(a.x * b.x, a.y * b.y, a.z * b.z); }
+
+static lanes_int read_shape(Gaussian *g, SHAPES, Rows rows) {
+  lanes q[4];
+  read_columns(quats, 4, 0, 4, rows, q);
+  const lanes3 s = read3(scales, 3, rows);
+  const lanes largest = larger(larger(absolute(q[0]), absolute(q[1])), larger(absolute(q[2]), absolute(q[3])));
+  const lanes_int meant = !(no_number(q[0]) | no_number(q[1]) | no_number(q[2]) | no_number(q[3])
+      | no_numbers(s)) & (largest > LEAST_QUATERNION) & (s.x > 0) & (s.y > 0) & (s.z > 0);
+  const lanes even = 1 / largest, w = q[0] * even;
+  const lanes3 v = lanes3_of(q[1] * even, q[2] * even, q[3] * even);
+  const lanes square = dot_of(v, v) + w * w, inverse = inverse_root(square);
+  g->turn = times(inverse, v);
+  g->real_part = w * inverse;
+  g->quat_length = square * inverse * largest;
+  g->axes = rotation_of(g->turn, g->real_part);
   g->scale = s;
-  g->root.x = g->axes.x * s;
-  g->root.y = g->axes.y * s;
-  g->root.z = g->axes.z * s;
+  g->root.x = product(g->axes.x, s);
+  g->root.y = product(g->axes.y, s);
+  g->root.z = product(g->axes.z, s);
   g->root_det = s.x * s.y * s.z;
-  return VISIBLE;
+  return meant ? (lanes_int)VISIBLE : (lanes_int)DEGENERATE;
 }
 
 #endif
@@ -127,62 +156,72 @@ static int read_shape(Gaussian *g, SHAPES, long i) {
 /* What opacity is multiplied with: the line integral through a unit peak, with the dilated
  * screen covariance so that dilation keeps the mass; Mip-Splatting's compensation; or nothing.
  * What an aperture spreads keeps its light, whatever eps2d does. */
-static float factor_of(const Gaussian *g) {
+static lanes factor_of(const Gaussian *g) {
 #if DEFOCUS
-  return sqrt(g->kept / g->dilated) * (ANTIALIASED && g->kept_eps > 0 ? LEAST_COMPENSATION : 1);
+  const lanes share = root_of(g->kept * g->inverse);
+  return ANTIALIASED ? (g->kept_eps > 0 ? LEAST_COMPENSATION * share : share) : share;
 #elif XRAY
-  return SQRT_TWO_PI * g->root_det * g->screen.volume / sqrt(g->dilated);
+  return SQRT_TWO_PI * g->root_det * g->screen.volume * inverse_root(g->dilated);
 #elif ANTIALIASED
-  return larger(LEAST_COMPENSATION, sqrt(g->undilated / g->dilated));
+  return larger(LEAST_COMPENSATION, root_of(g->undilated * g->inverse));
 #else
   return 1;
 #endif
 }
 
 /* Determinant of V V^T + eps I. */
-static float dilated_determinant(const Gaussian *g, float eps) {
-  return g->undilated + eps * (dot3(g->v0, g->v0) + dot3(g->v1, g->v1)) + eps * eps;
+static lanes dilated_determinant(const Gaussian *g, lanes eps) {
+  return g->undilated + eps * (dot_of(g->v0, g->v0) + dot_of(g->v1, g->v1)) + eps * eps;
 }
 
-/* Project splat i; gives VISIBLE, or why not. */
-static int see_gaussian(
-    Gaussian *g, Camera camera, __global const float *restrict means, SHAPES, long i,
-    float near_plane, float far_plane, float eps)
+/* Project LANES splats; gives VISIBLE, or why not. */
+static lanes_int see_gaussian(
+    Gaussian *g, Camera camera, __global const float *restrict means, SHAPES, Rows rows,
+    float near_plane, float far_plane, float eps2d)
 {
-  g->world = load3(means, i);
-  if (not_finite3(g->world) || read_shape(g, SHAPE, i) != VISIBLE) return DEGENERATE;
-  g->point = apply3(camera.rotation, g->world) + camera.shift;
-  if (not_finite3(g->point)) return DEGENERATE;
-  if (g->point.z < near_plane || g->point.z > far_plane) return OUT_OF_DEPTH;
+  lanes eps = eps2d;
+  g->world = read3(means, 3, rows);
+  lanes_int code = or_else(read_shape(g, SHAPE, rows), no_numbers(g->world), DEGENERATE);
+  const lanes3 point = turned(camera, g->world);
+  g->point = lanes3_of(point.x + camera.shift.x, point.y + camera.shift.y, point.z + camera.shift.z);
+  code = or_else(code, no_numbers(g->point), DEGENERATE);
+  code = or_else(code, (g->point.z < near_plane) | (g->point.z > far_plane), OUT_OF_DEPTH);
   g->screen = to_screen(camera, g->point);
-  g->m0 = apply_transposed3(camera.rotation, g->screen.du);
-  g->m1 = apply_transposed3(camera.rotation, g->screen.dv);
-  g->v0 = apply_transposed3(g->root, g->m0);
-  g->v1 = apply_transposed3(g->root, g->m1);
-  g->normal = cross3(g->v0, g->v1);
-  g->undilated = dot3(g->normal, g->normal);
+  g->m0 = turned_back(camera, g->screen.du);
+  g->m1 = turned_back(camera, g->screen.dv);
+  g->v0 = applied_transposed(g->root, g->m0);
+  g->v1 = applied_transposed(g->root, g->m1);
+  g->normal = cross_of(g->v0, g->v1);
+  g->undilated = dot_of(g->normal, g->normal);
   g->kept = g->undilated;
   g->kept_eps = 0;
 #if DEFOCUS
-  const float sharp = dilated_determinant(g, eps);
-  if (!ANTIALIASED || g->undilated <= LEAST_COMPENSATION * LEAST_COMPENSATION * sharp) {
-    g->kept = sharp;
-    g->kept_eps = eps;
-  }
+  const lanes sharp = dilated_determinant(g, eps);
+#if ANTIALIASED
+  const lanes_int faded = g->undilated <= LEAST_COMPENSATION * LEAST_COMPENSATION * sharp;
+  g->kept = faded ? sharp : g->kept;
+  g->kept_eps = faded ? eps : 0;
+#else
+  g->kept = sharp;
+  g->kept_eps = eps;
+#endif
   eps += blur_variance(camera, g->point.z);
 #endif
   g->eps = eps;
   g->dilated = dilated_determinant(g, eps);
-  if (not_finite(g->screen.u) || not_finite(g->screen.v) || not_finite(g->dilated)) return DEGENERATE;
-  if (!(g->dilated > 1 / MOST_AREA) || g->dilated > MOST_AREA) return DEGENERATE;
-  if (DEFOCUS && !(g->kept > 1 / MOST_AREA)) return DEGENERATE;
+  code = or_else(code, no_number(g->screen.u) | no_number(g->screen.v) | no_number(g->dilated), DEGENERATE);
+  code = or_else(code, !(g->dilated > 1 / MOST_AREA) | (g->dilated > MOST_AREA), DEGENERATE);
+  if (DEFOCUS) code = or_else(code, !(g->kept > 1 / MOST_AREA), DEGENERATE);
   g->inverse = 1 / g->dilated;
   g->factor = factor_of(g);
-  return not_finite(g->factor) ? DEGENERATE : VISIBLE;
+  return or_else(code, no_number(g->factor), DEGENERATE);
 }
 
-/* Inverse of the dilated screen covariance, times w. */
-static float2 apply_conic(const Gaussian *g, float2 w) {
-  const float3 k = w.x * g->v1 - w.y * g->v0;
-  return ((float2)(dot3(g->v1, k), -dot3(g->v0, k)) + g->eps * w) * g->inverse;
+/* Inverse of the dilated screen covariance, times (x, y): its two numbers. */
+static lanes conic_x(const Gaussian *g, lanes x, lanes y) {
+  return (dot_of(g->v1, minus(times(x, g->v1), times(y, g->v0))) + g->eps * x) * g->inverse;
+}
+
+static lanes conic_y(const Gaussian *g, lanes x, lanes y) {
+  return (-dot_of(g->v0, minus(times(x, g->v1), times(y, g->v0))) + g->eps * y) * g->inverse;
 }

@@ -12,6 +12,7 @@
  *
  * A work-item goes through RUN rows, as a group for each eight would cost as much as its work. */
 
+#include "include/exponential.h"
 #include "include/transpose.h"
 #include "include/lane_quads.h"
 
@@ -102,6 +103,19 @@ static void write_columns(
 #endif
 }
 
+/* Whole numbers are written as the bits that they are. */
+static void write_ints(
+    __global int *table, const int stride, const int from, const int width, Rows rows, const lanes_int *column)
+{
+#if LANES == 8
+  lanes bits[4];
+  UNROLL for (int k = 0; k < width; k++) bits[k] = AS_LANES(column[k]);
+  write_columns((__global float *)table, stride, from, width, rows, bits);
+#else
+  UNROLL for (int k = 0; k < width; k++) table[rows.first * stride + from + k] = column[k];
+#endif
+}
+
 /* A table of one column. */
 static lanes read_numbers(__global const float *p, Rows rows) {
   lanes v;
@@ -134,5 +148,13 @@ static lanes_int read_bytes(__global const uchar *p, Rows rows) {
   return v;
 #else
   return p[rows.first];
+#endif
+}
+
+static void write_bytes(__global uchar *p, Rows rows, lanes_int v) {
+#if LANES == 8
+  for (int l = 0; l < rows.count; l++) p[rows.first + l] = (uchar)((const int *)&v)[l];
+#else
+  p[rows.first] = (uchar)v;
 #endif
 }

@@ -25,6 +25,9 @@
  *
  * Index space: splats. */
 
+/* One splat at a time: the modes of eight would fill more registers than there are. */
+#undef LANES
+#define LANES 1
 #include "include/portable.h"
 #include "include/small_matrix.h"
 #include "include/camera.h"
@@ -139,7 +142,7 @@ KERNEL void hermite_dilate(
   float row[6], modes[MODES], factor = 0;
   float3 columns[3];
   __global float *out = table + WIDTH * i, *sides = extents + 3 * i;
-  int drawn = read_shape(&g, SHAPE, i) == VISIBLE &&
+  int drawn = read_shape(&g, SHAPE, rows_at(i, count)) == VISIBLE &&
       dilate(&g, (float3)(per_x, per_y, per_z), (float3)(blur_x, blur_y, blur_z), row, sides, columns, &factor);
   if (drawn) {
     for (int k = 0; k < 6; k++) {

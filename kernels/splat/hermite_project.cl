@@ -6,6 +6,9 @@
  * pass by the same map as the shape, each for itself; the constants, 1 and the features, stay as
  * they are and are not in the table. Splats that are not drawn get zeros. Index space: splats. */
 
+/* One splat at a time: the modes of eight would fill more registers than there are. */
+#undef LANES
+#define LANES 1
 #include "include/portable.h"
 #include "include/small_matrix.h"
 #include "include/camera.h"
@@ -41,7 +44,7 @@ KERNEL void hermite_project(
     return;
   }
   Gaussian g;
-  see_gaussian(&g, CAMERA, means, SHAPE, i, near_plane, far_plane, eps2d);
+  see_gaussian(&g, CAMERA, means, SHAPE, rows_at(i, count), near_plane, far_plane, eps2d);
   const Whitening w = whiten(&g);
   out[0] = w.i00;
   out[1] = w.i10;

@@ -31,6 +31,9 @@
  * dT2_m/dA_ai = m_a T2' where T2' has N - 1 indices contracted and i left, and dL/dc runs through the
  * contractions backwards. Splats that are not drawn get zeros. Index space: splats. */
 
+/* One splat at a time: the modes of eight would fill more registers than there are. */
+#undef LANES
+#define LANES 1
 #include "include/portable.h"
 #include "include/small_matrix.h"
 #include "include/camera.h"
@@ -176,7 +179,7 @@ KERNEL void hermite_project_grad(
   moments += i * MOMENTS;
   screen_modes += i * TABLE_LENGTH + WHITENING;
   Gaussian g;
-  see_gaussian(&g, CAMERA, means, SHAPE, i, near_plane, far_plane, eps2d);
+  see_gaussian(&g, CAMERA, means, SHAPE, rows_at(i, count), near_plane, far_plane, eps2d);
   const Whitening w = whiten(&g);
   ScreenSums screen = {{0, 0}, 0, 0, 0, (float3)(0), (float3)(0)};
   const float by_weight = shape_grad(

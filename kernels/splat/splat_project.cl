@@ -16,12 +16,19 @@
  *
  * Splats that are not drawn get zeros and the reason in `culled`, the first of: not finite or
  * degenerate in what was given (2), out of depth (1), too large to tell (2), too faint (3),
- * clipped for its radius (5), off the screen (4). Index space: splats. */
+ * clipped for its radius (5), off the screen (4). Index space: (runs of RUN splats), LANES of them at
+ * a time; MODAL splats, whose modes would fill more registers than there are, one at a time. */
 
+#ifndef MODAL
+#define MODAL 0
+#endif
+#if MODAL
+#undef LANES
+#define LANES 1
+#endif
 #include "include/portable.h"
 #include "include/alpha_threshold.h"
 #include "include/logarithm.h"
-#include "include/small_matrix.h"
 #include "include/camera.h"
 #include "include/aperture.h"
 #include "include/gaussian.h"
@@ -34,86 +41,99 @@
 #endif
 /* Standard deviations; alpha.h stops adding line integrals there as well. */
 #define EXTENT (XRAY ? 4.0f : 3.33f)
-/* Whether splats have Hermite modes or another activation. */
-#ifndef MODAL
-#define MODAL 0
-#endif
 /* Extents are held at this, so that rounded up they fit an int with room to add. */
 #define MOST_PIXELS 1e9f
 
 /* Largest whole number not above v, and smallest not below, held between 0 and most. */
-static int whole_below(float v, int most) { return v < 0 ? 0 : v > most ? most : (int)v; }
+static lanes_int whole_below(lanes v, float most) {
+  const lanes above = v > 0 ? v : 0;
+  return TO_INT(above < most ? above : most);
+}
 
-static int whole_above(float v, int most) {
-  const int below = whole_below(v, most);
-  return below < most && below < v ? below + 1 : below;
+static lanes_int whole_above(lanes v, float most) {
+  const lanes_int below = whole_below(v, most);
+  return (TO_FLOAT(below) < most) & (TO_FLOAT(below) < v) ? below + 1 : below;
 }
 
 #if MODAL
+#include "include/small_matrix.h"
 #include "include/hermite_project.h"
 #include "include/hermite_edge.h"
 #include "include/hermite_extent.h"
 #define MODE_PARAMETERS , __global const float *restrict shape_modes, __global const float *restrict color_modes
 #define NORMS_PARAMETER , const ModeNorms *norms
 #define NORMS , &norms
-#define NORMS_AGAIN , norms
 #else
 #define MODE_PARAMETERS
 #define NORMS_PARAMETER
 #define NORMS
-#define NORMS_AGAIN
 #endif
 
-/* Extent of a splat on the screen and in tiles; gives VISIBLE, or why it is not drawn. */
-static int bound(
-    const Gaussian *g, float weight, float radius_clip, int width, int height, float *extents, int *box
-    NORMS_PARAMETER)
-{
+/* How many standard deviations a splat of a weight reaches; adds the reason if it is too faint. */
+static lanes extent_of(lanes weight, lanes_int *code NORMS_PARAMETER) {
 #if MODAL
-  if (!(weight >= LEAST_NORMAL)) return TOO_FAINT;
-  const float extent = modal_extent(norms, weight);
-  if (extent < 0) return TOO_FAINT;
-#else
-  float extent = EXTENT;
-  if (!(weight >= (XRAY ? LEAST_NORMAL : ALPHA_THRESHOLD))) return TOO_FAINT;
-  if (!XRAY && !SMOOTH) {
-    const float at_threshold = sqrt(2 * natural_log(larger(weight / ALPHA_THRESHOLD, 1)));
-    extent = at_threshold < EXTENT ? at_threshold : EXTENT;
+  if (*code != VISIBLE) return 0;
+  if (!(weight >= LEAST_NORMAL)) {
+    *code = TOO_FAINT;
+    return 0;
   }
+  const float extent = modal_extent(norms, weight);
+  if (extent < 0) *code = TOO_FAINT;
+  return extent;
+#else
+  *code = or_else(*code, !(weight >= (XRAY ? LEAST_NORMAL : ALPHA_THRESHOLD)), TOO_FAINT);
+  if (XRAY || SMOOTH) return EXTENT;
+  const lanes at_threshold = root_of(2 * natural_log(larger(weight * (1 / ALPHA_THRESHOLD), 1)));
+  return at_threshold < EXTENT ? at_threshold : EXTENT;
 #endif
-  const float reach_x = extent * sqrt(dot3(g->v0, g->v0) + g->eps);
-  const float reach_y = extent * sqrt(dot3(g->v1, g->v1) + g->eps);
-  extents[0] = reach_x < MOST_PIXELS ? reach_x : MOST_PIXELS;
-  extents[1] = reach_y < MOST_PIXELS ? reach_y : MOST_PIXELS;
-  const float rx = whole_above(extents[0], 1 << 30), ry = whole_above(extents[1], 1 << 30);
-  if (rx <= radius_clip && ry <= radius_clip) return CLIPPED;
-  const float left = g->screen.u - rx, right = g->screen.u + rx;
-  const float top = g->screen.v - ry, bottom = g->screen.v + ry;
-  if (!(right > 0 && left < width && bottom > 0 && top < height)) return OFF_SCREEN;
-  const int across = (width + TILE - 1) / TILE, down = (height + TILE - 1) / TILE;
-  box[0] = whole_below(left / TILE, across);
-  box[1] = whole_below(top / TILE, down);
-  box[2] = whole_above(right / TILE, across);
-  box[3] = whole_above(bottom / TILE, down);
-  return box[0] < box[2] && box[1] < box[3] ? VISIBLE : OFF_SCREEN;
 }
 
-/* The screen's row of a splat, its rectangles, and why it is not drawn. */
-static int project(
-    const Gaussian *g, float opacity, float radius_clip, int width, int height,
-    float *row, int *box NORMS_PARAMETER)
+/* Extent of a splat on the screen and in tiles; gives VISIBLE, or why it is not drawn. */
+static lanes_int bound(
+    const Gaussian *g, lanes_int code, lanes weight, float radius_clip, int width, int height,
+    lanes *extents, lanes_int *box NORMS_PARAMETER)
+{
+#if MODAL
+  const lanes extent = extent_of(weight, &code, norms);
+#else
+  const lanes extent = extent_of(weight, &code);
+#endif
+  const lanes reach_x = extent * root_of(dot_of(g->v0, g->v0) + g->eps);
+  const lanes reach_y = extent * root_of(dot_of(g->v1, g->v1) + g->eps);
+  extents[0] = reach_x < MOST_PIXELS ? reach_x : MOST_PIXELS;
+  extents[1] = reach_y < MOST_PIXELS ? reach_y : MOST_PIXELS;
+  const lanes rx = TO_FLOAT(whole_above(extents[0], 1 << 30)), ry = TO_FLOAT(whole_above(extents[1], 1 << 30));
+  code = or_else(code, (rx <= radius_clip) & (ry <= radius_clip), CLIPPED);
+  const lanes left = g->screen.u - rx, right = g->screen.u + rx;
+  const lanes top = g->screen.v - ry, bottom = g->screen.v + ry;
+  const lanes_int inside = (right > 0) & (left < (float)width) & (bottom > 0) & (top < (float)height);
+  const float across = (width + TILE - 1) / TILE, down = (height + TILE - 1) / TILE;
+  box[0] = whole_below(left / (float)TILE, across);
+  box[1] = whole_below(top / (float)TILE, down);
+  box[2] = whole_above(right / (float)TILE, across);
+  box[3] = whole_above(bottom / (float)TILE, down);
+  return or_else(code, !(inside & (box[0] < box[2]) & (box[1] < box[3])), OFF_SCREEN);
+}
+
+/* What a splat is on the screen: the row and the rectangle of tiles; gives VISIBLE, or why it is not drawn. */
+static lanes_int project(
+    const Gaussian *g, lanes_int code, lanes opacity, float radius_clip, int width, int height,
+    lanes *row, lanes_int *box NORMS_PARAMETER)
 {
   row[0] = g->screen.u;
   row[1] = g->screen.v;
-  row[2] = (dot3(g->v1, g->v1) + g->eps) * g->inverse;
-  row[3] = -dot3(g->v0, g->v1) * g->inverse;
-  row[4] = (dot3(g->v0, g->v0) + g->eps) * g->inverse;
+  row[2] = (dot_of(g->v1, g->v1) + g->eps) * g->inverse;
+  row[3] = -dot_of(g->v0, g->v1) * g->inverse;
+  row[4] = (dot_of(g->v0, g->v0) + g->eps) * g->inverse;
   row[5] = opacity * g->factor;
-  if (not_finite(row[2]) | not_finite(row[3]) | not_finite(row[4]) | not_finite(row[5])) return DEGENERATE;
+  code = or_else(
+      code, no_number(row[2]) | no_number(row[3]) | no_number(row[4]) | no_number(row[5]), DEGENERATE);
 #if MODAL
-  if (!modes_are_finite(norms) || !whitening_is_finite(g)) return DEGENERATE;
+  if (code == VISIBLE && (!modes_are_finite(norms) || !whitening_is_finite(g))) code = DEGENERATE;
+  return bound(g, code, row[5], radius_clip, width, height, row + 6, box, norms);
+#else
+  return bound(g, code, row[5], radius_clip, width, height, row + 6, box);
 #endif
-  return bound(g, row[5], radius_clip, width, height, row + 6, box NORMS_AGAIN);
 }
 
 KERNEL void splat_project(
@@ -122,21 +142,26 @@ KERNEL void splat_project(
     __global uchar *restrict culled, CAMERA_PARAMETERS,
     float near_plane, float far_plane, float radius_clip, float eps2d, int count MODE_PARAMETERS)
 {
-  const long i = get_global_id(0);
-  if (i >= count) return;
-  Gaussian g;
-  float row[8];
-  int box[4];
-  const float opacity = opacities[i];
-  int code = not_finite(opacity) ? DEGENERATE
-      : see_gaussian(&g, CAMERA, means, SHAPE, i, near_plane, far_plane, eps2d);
+  const Camera camera = CAMERA;
+  EACH_RUN(first, count) {
+    const Rows rows = rows_at(first, count);
+    Gaussian g;
+    lanes row[8];
+    lanes_int box[4];
+    const lanes opacity = read_numbers(opacities, rows);
+    lanes_int code = no_number(opacity) ? (lanes_int)DEGENERATE : (lanes_int)VISIBLE;
+    const lanes_int seen = see_gaussian(&g, camera, means, SHAPE, rows, near_plane, far_plane, eps2d);
+    code = code == VISIBLE ? seen : code;
 #if MODAL
-  const ModeNorms norms = norms_of(shape_modes, color_modes, i);
+    const ModeNorms norms = norms_of(shape_modes, color_modes, first);
 #endif
-  if (code == VISIBLE) code = project(&g, opacity, radius_clip, width, height, row, box NORMS);
-  const int drawn = code == VISIBLE;
-  for (int k = 0; k < 8; k++) screen[8 * i + k] = drawn ? row[k] : 0;
-  for (int k = 0; k < 4; k++) boxes[4 * i + k] = drawn ? box[k] : 0;
-  depths[i] = drawn ? g.point.z : 0;
-  culled[i] = (uchar)code;
+    code = project(&g, code, opacity, radius_clip, width, height, row, box NORMS);
+    const lanes_int drawn = code == VISIBLE;
+    UNROLL for (int k = 0; k < 8; k++) row[k] = drawn ? row[k] : 0;
+    UNROLL for (int k = 0; k < 4; k++) box[k] = drawn ? box[k] : 0;
+    write_columns(screen, 8, 0, 8, rows, row);
+    write_ints(boxes, 4, 0, 4, rows, box);
+    write_numbers(depths, rows, drawn ? g.point.z : 0);
+    write_bytes(culled, rows, code);
+  }
 }

@@ -14,13 +14,13 @@
  * With VIEW_PARTS what flows into V besides comes as view_parts[i], dL/dV's rows: the modes of
  * hermite_project_grad.cl hang on V at a fixed screen covariance as well.
  *
- * With DEPTH the last feature is the splat's depth. With CAMERA_GRADIENT each splat leaves its
- * part of dL/d(view, rows of 4), dL/d(fx, fy, cx, cy) in camera_parts, and with DEFOCUS as well of
- * dL/d(radius, focus) in aperture_parts. Nothing flows through extents and culls; splats that are
- * not drawn get zeros. Index space: splats. */
+ * With DEPTH the last feature is the splat's depth. With CAMERA_GRADIENT each run leaves its part of
+ * dL/d(view, rows of 4), dL/d(fx, fy, cx, cy) in its row of camera_parts, and with DEFOCUS as well of
+ * dL/d(radius, focus) in aperture_parts: these are summed over the run's splats in their order, lane by
+ * lane, and then over the lanes. Nothing flows through extents and culls; splats that are not drawn
+ * get zeros. Index space: (runs of RUN splats), LANES of them at a time. */
 
 #include "include/portable.h"
-#include "include/small_matrix.h"
 #include "include/camera.h"
 #include "include/aperture.h"
 #include "include/gaussian.h"
@@ -66,120 +66,145 @@
 #define VIEW_PARAMETER
 #endif
 
-static void clear(__global float *p, int length) {
-  for (int k = 0; k < length; k++) p[k] = 0;
+#define CAMERA_NUMBERS (16 + 2 * DEFOCUS)
+
+/* Numbers of a splat, where it is drawn. */
+static void write_if(
+    __global float *table, const int stride, const int from, const int width, Rows rows, lanes_int drawn,
+    lanes *column)
+{
+  UNROLL for (int k = 0; k < width; k++) column[k] = drawn ? column[k] : 0;
+  write_columns(table, stride, from, width, rows, column);
+}
+
+static void set3(lanes *column, lanes3 v) {
+  column[0] = v.x;
+  column[1] = v.y;
+  column[2] = v.z;
 }
 
 #if COVARIANCES
 
-static void clear_shape(__global float *covar, long i) { clear(covar + 6 * i, 6); }
-
 static void shape_grad(
-    const Gaussian *g, const float *s, const ViewGradient *view, __global float *covar, long i)
+    const Gaussian *g, const lanes *s, const ViewGradient *view, Rows rows, lanes_int drawn,
+    __global float *covar)
 {
-  const float2 q0 = apply_conic(g, (float2)(1, 0)), q1 = apply_conic(g, (float2)(0, 1));
-  const float2 r0 = apply_conic(g, (float2)(s[3] * q0.x + s[4] * q0.y, s[4] * q0.x + s[5] * q0.y));
-  const float2 r1 = apply_conic(g, (float2)(s[3] * q1.x + s[4] * q1.y, s[4] * q1.x + s[5] * q1.y));
-  float xx = -0.5f * r0.x, xy = -0.5f * r1.x, yy = -0.5f * r1.y;
+  const lanes q00 = conic_x(g, 1, 0), q01 = conic_y(g, 1, 0), q11 = conic_y(g, 0, 1);
+  const lanes t00 = s[3] * q00 + s[4] * q01, t01 = s[4] * q00 + s[5] * q01;
+  const lanes t10 = s[3] * q01 + s[4] * q11, t11 = s[4] * q01 + s[5] * q11;
+  lanes xx = -0.5f * conic_x(g, t00, t01), xy = -0.5f * conic_x(g, t10, t11);
+  lanes yy = -0.5f * conic_y(g, t10, t11);
 #if XRAY || ANTIALIASED || DEFOCUS
-  const float half_factor = 0.5f * view->log_factor;
-  xx -= half_factor * q0.x;
-  xy -= half_factor * q0.y;
-  yy -= half_factor * q1.y;
+  const lanes half_factor = 0.5f * view->log_factor;
+  xx -= half_factor * q00;
+  xy -= half_factor * q01;
+  yy -= half_factor * q11;
 #endif
 #if ANTIALIASED || DEFOCUS
-  const float share = view->log_factor == 0 ? 0 : half_factor / g->kept;
-  xx += share * dot3(g->v1, g->v1);
-  xy -= share * dot3(g->v0, g->v1);
-  yy += share * dot3(g->v0, g->v0);
+  const lanes share = view->log_factor == 0 ? 0 : half_factor / g->kept;
+  xx += share * dot_of(g->v1, g->v1);
+  xy -= share * dot_of(g->v0, g->v1);
+  yy += share * dot_of(g->v0, g->v0);
 #endif
 #if DEFOCUS
   xx += share * g->kept_eps;
   yy += share * g->kept_eps;
 #endif
-  const float3 left = xx * g->m0 + xy * g->m1, right = xy * g->m0 + yy * g->m1;
-  float3 rows[3];
-  rows[0] = g->m0.x * left + g->m1.x * right;
-  rows[1] = g->m0.y * left + g->m1.y * right;
-  rows[2] = g->m0.z * left + g->m1.z * right;
+  const lanes3 left = plus(times(xx, g->m0), times(xy, g->m1));
+  const lanes3 right = plus(times(xy, g->m0), times(yy, g->m1));
+  lanes3 row0 = plus(times(g->m0.x, left), times(g->m1.x, right));
+  lanes3 row1 = plus(times(g->m0.y, left), times(g->m1.y, right));
+  lanes3 row2 = plus(times(g->m0.z, left), times(g->m1.z, right));
 #if XRAY
   /* Half the inverse covariance, from the columns of F's inverse. */
-  const float3 c0 = cross3(g->root.y, g->root.z) / g->root_det;
-  const float3 c1 = cross3(g->root.z, g->root.x) / g->root_det;
-  const float3 c2 = cross3(g->root.x, g->root.y) / g->root_det;
-  rows[0] += half_factor * (float3)(dot3(c0, c0), dot3(c0, c1), dot3(c0, c2));
-  rows[1] += half_factor * (float3)(dot3(c1, c0), dot3(c1, c1), dot3(c1, c2));
-  rows[2] += half_factor * (float3)(dot3(c2, c0), dot3(c2, c1), dot3(c2, c2));
+  const lanes per = 1 / g->root_det;
+  const lanes3 c0 = times(per, cross_of(g->root.y, g->root.z));
+  const lanes3 c1 = times(per, cross_of(g->root.z, g->root.x));
+  const lanes3 c2 = times(per, cross_of(g->root.x, g->root.y));
+  row0 = plus(row0, times(half_factor, lanes3_of(dot_of(c0, c0), dot_of(c0, c1), dot_of(c0, c2))));
+  row1 = plus(row1, times(half_factor, lanes3_of(dot_of(c1, c0), dot_of(c1, c1), dot_of(c1, c2))));
+  row2 = plus(row2, times(half_factor, lanes3_of(dot_of(c2, c0), dot_of(c2, c1), dot_of(c2, c2))));
 #endif
   /* The six numbers stand for nine: off the diagonal each is two entries. */
-  store3(covar, 2 * i, (float3)(rows[0].x, 2 * rows[0].y, 2 * rows[0].z));
-  store3(covar, 2 * i + 1, (float3)(rows[1].y, 2 * rows[1].z, rows[2].z));
+  lanes out[6];
+  set3(out, lanes3_of(row0.x, 2 * row0.y, 2 * row0.z));
+  set3(out + 3, lanes3_of(row1.y, 2 * row1.z, row2.z));
+  write_if(covar, 6, 0, 6, rows, drawn, out);
 }
 
 #else
 
-static void clear_shape(__global float *quat, __global float *scale, long i) {
-  clear(quat + 4 * i, 4);
-  clear(scale + 3 * i, 3);
-}
-
 static void shape_grad(
-    const Gaussian *g, const float *s, const ViewGradient *view,
-    __global float *quat, __global float *scale, long i)
+    const Gaussian *g, const lanes *s, const ViewGradient *view, Rows rows, lanes_int drawn,
+    __global float *quat, __global float *scale)
 {
   /* dL/dF = M^T dL/dV; F = R S. */
-  rows3 f;
-  f.x = g->m0.x * view->v0 + g->m1.x * view->v1;
-  f.y = g->m0.y * view->v0 + g->m1.y * view->v1;
-  f.z = g->m0.z * view->v0 + g->m1.z * view->v1;
-  float3 by_scale = f.x * g->axes.x + f.y * g->axes.y + f.z * g->axes.z;
+  const lanes3 fx = plus(times(g->m0.x, view->v0), times(g->m1.x, view->v1));
+  const lanes3 fy = plus(times(g->m0.y, view->v0), times(g->m1.y, view->v1));
+  const lanes3 fz = plus(times(g->m0.z, view->v0), times(g->m1.z, view->v1));
+  lanes3 by_scale = plus(plus(product(fx, g->axes.x), product(fy, g->axes.y)), product(fz, g->axes.z));
 #if XRAY
-  by_scale += view->log_factor / g->scale;
+  by_scale.x += view->log_factor / g->scale.x;
+  by_scale.y += view->log_factor / g->scale.y;
+  by_scale.z += view->log_factor / g->scale.z;
 #endif
-  store3(scale, i, by_scale);
-  const float3 x = f.x * g->scale, y = f.y * g->scale, z = f.z * g->scale;
-  const float4 q = g->quat;
-  float4 d;
-  d.w = q.x * (z.y - y.z) + q.y * (x.z - z.x) + q.z * (y.x - x.y);
-  d.x = q.w * (z.y - y.z) + q.y * (x.y + y.x) + q.z * (x.z + z.x) - 2 * q.x * (y.y + z.z);
-  d.y = q.w * (x.z - z.x) + q.x * (x.y + y.x) + q.z * (y.z + z.y) - 2 * q.y * (x.x + z.z);
-  d.z = q.w * (y.x - x.y) + q.x * (x.z + z.x) + q.y * (y.z + z.y) - 2 * q.z * (x.x + y.y);
+  lanes out[4];
+  set3(out, by_scale);
+  write_if(scale, 3, 0, 3, rows, drawn, out);
+  const lanes3 x = product(fx, g->scale), y = product(fy, g->scale), z = product(fz, g->scale);
+  const lanes3 q = g->turn, across = lanes3_of(z.y - y.z, x.z - z.x, y.x - x.y);
+  const lanes xy = x.y + y.x, xz = x.z + z.x, yz = y.z + z.y, w = g->real_part;
+  const lanes dw = dot_of(q, across);
+  const lanes dx = w * across.x + q.y * xy + q.z * xz - 2 * q.x * (y.y + z.z);
+  const lanes dy = w * across.y + q.x * xy + q.z * yz - 2 * q.y * (x.x + z.z);
+  const lanes dz = w * across.z + q.x * xz + q.y * yz - 2 * q.z * (x.x + y.y);
   /* Length has no effect: what is along q goes. */
-  const float along = d.x * q.x + d.y * q.y + d.z * q.z + d.w * q.w;
-  d = (d - along * q) * (2 / g->quat_length);
-  quat[4 * i] = d.w;
-  store3(quat + 4 * i + 1, 0, d.xyz);
+  const lanes along = dx * q.x + dy * q.y + dz * q.z + dw * w, twice = 2 / g->quat_length;
+  out[0] = (dw - along * w) * twice;
+  out[1] = (dx - along * q.x) * twice;
+  out[2] = (dy - along * q.y) * twice;
+  out[3] = (dz - along * q.z) * twice;
+  write_if(quat, 4, 0, 4, rows, drawn, out);
 }
 
 #endif
 
-/* The part of a splat in the gradient of the camera. */
-static void camera_grad(
-    const Gaussian *g, const ViewGradient *view, const CameraGradient *c, __global float *part)
+/* A row of dL/d view, from that by a row of the camera's axes: (q world + du M.., q). */
+static void view_row_grad(const Gaussian *g, const ViewGradient *view, lanes q, lanes du, lanes dv, lanes *row) {
+  set3(row, plus(times(q, g->world), plus(times(du, view->m0), times(dv, view->m1))));
+  row[3] = q;
+}
+
+/* Adds the parts of LANES splats in the gradient of the camera. */
+static void add_camera_grad(
+    const Gaussian *g, const ViewGradient *view, const CameraGradient *c, lanes_int drawn, lanes *total)
 {
-  const float3 q = c->point, du = g->screen.du, dv = g->screen.dv;
-  store3(part, 0, q.x * g->world + du.x * view->m0 + dv.x * view->m1);
-  store3(part + 4, 0, q.y * g->world + du.y * view->m0 + dv.y * view->m1);
-  store3(part + 8, 0, q.z * g->world + du.z * view->m0 + dv.z * view->m1);
-  part[3] = q.x;
-  part[7] = q.y;
-  part[11] = q.z;
+  lanes part[CAMERA_NUMBERS];
+  const lanes3 q = c->point, du = g->screen.du, dv = g->screen.dv;
+  view_row_grad(g, view, q.x, du.x, dv.x, part);
+  view_row_grad(g, view, q.y, du.y, dv.y, part + 4);
+  view_row_grad(g, view, q.z, du.z, dv.z, part + 8);
   part[12] = c->fx;
   part[13] = c->fy;
   part[14] = c->cx;
   part[15] = c->cy;
+#if DEFOCUS
+  part[16] = c->radius;
+  part[17] = c->focus;
+#endif
+  UNROLL for (int k = 0; k < CAMERA_NUMBERS; k++) total[k] += drawn ? part[k] : 0;
 }
 
 /* Back from the screen to the mean and the camera. */
 static CameraGradient screen_grad(
-    const Gaussian *g, Camera camera, const ViewGradient *view, float2 uv, float depth)
+    const Gaussian *g, Camera camera, const ViewGradient *view, lanes u, lanes v, lanes depth)
 {
   ScreenGradient screen;
-  screen.u = uv.x;
-  screen.v = uv.y;
+  screen.u = u;
+  screen.v = v;
   screen.log_volume = XRAY ? view->log_factor : 0;
-  screen.du = apply3(camera.rotation, view->m0);
-  screen.dv = apply3(camera.rotation, view->m1);
+  screen.du = turned(camera, view->m0);
+  screen.dv = turned(camera, view->m1);
   CameraGradient out = to_screen_grad(camera, g->point, screen);
 #if DEFOCUS
   add_blur_grad(camera, g->point.z, view->variance, &out);
@@ -197,46 +222,47 @@ KERNEL void splat_project_grad(
     __global float *restrict grad_means2d_abs, __global float *restrict camera_parts APERTURE_GRADIENTS
     VIEW_PARAMETER)
 {
-  const long i = get_global_id(0);
-  if (i >= count) return;
-  const int drawn = culled[i] == VISIBLE;
-  float s[RECORD];
-  for (int k = 0; k < RECORD; k++) s[k] = drawn ? sums[i * RECORD + k] : 0;
-  for (int k = 0; k < CHANNELS; k++) grad_features[i * CHANNELS + k] = s[6 + k];
-  for (int k = 0; k < 2 * ABSGRAD; k++) grad_means2d_abs[2 * i + k] = s[6 + CHANNELS + k];
-  if (!drawn) {
-    clear(grad_means + 3 * i, 3);
-    clear(grad_opacities + i, 1);
-    clear(grad_means2d + 2 * i, 2);
-    clear_shape(SHAPE_GRADIENT, i);
-    if (CAMERA_GRADIENT) clear(camera_parts + 16 * i, 16);
-#if DEFOCUS && CAMERA_GRADIENT
-    clear(aperture_parts + 2 * i, 2);
-#endif
-    return;
-  }
   const Camera camera = CAMERA;
-  Gaussian g;
-  see_gaussian(&g, camera, means, SHAPE, i, near_plane, far_plane, eps2d);
+  lanes total[CAMERA_NUMBERS];
+  UNROLL for (int k = 0; k < CAMERA_NUMBERS; k++) total[k] = 0;
+  EACH_RUN(first, count) {
+    const Rows rows = rows_at(first, count);
+    const lanes_int drawn = (read_bytes(culled, rows) == VISIBLE) & are_there(rows);
+    lanes s[RECORD], out[3];
+    read_columns(sums, RECORD, 0, RECORD, rows, s);
+    UNROLL for (int k = 0; k < RECORD; k++) s[k] = drawn ? s[k] : 0;
+    write_columns(grad_features, CHANNELS, 0, CHANNELS, rows, s + 6);
+    if (ABSGRAD) write_columns(grad_means2d_abs, 2, 0, 2, rows, s + 6 + CHANNELS);
+    Gaussian g;
+    see_gaussian(&g, camera, means, SHAPE, rows, near_plane, far_plane, eps2d);
+    ViewGradient view = dilate_grad(&g, s);
 #if VIEW_PARTS
-  ViewGradient view = dilate_grad(&g, s);
-  view.v0 += load3(view_parts, 2 * i);
-  view.v1 += load3(view_parts, 2 * i + 1);
-  view.m0 = apply3(g.root, view.v0);
-  view.m1 = apply3(g.root, view.v1);
-#else
-  const ViewGradient view = dilate_grad(&g, s);
+    lanes v[6];
+    read_columns(view_parts, 6, 0, 6, rows, v);
+    view.v0 = plus(view.v0, lanes3_of(v[0], v[1], v[2]));
+    view.v1 = plus(view.v1, lanes3_of(v[3], v[4], v[5]));
+    through_root(&g, &view);
 #endif
-  const float2 first = (float2)(s[1], s[2]), uv = FIRST_MOMENTS ? apply_conic(&g, first) : first;
-  const CameraGradient point = screen_grad(&g, camera, &view, uv, DEPTH ? s[6 + CHANNELS - 1] : 0);
-  grad_opacities[i] = -s[0] / opacities[i];
-  grad_means2d[2 * i] = uv.x;
-  grad_means2d[2 * i + 1] = uv.y;
-  shape_grad(&g, s, &view, SHAPE_GRADIENT, i);
-  store3(grad_means, i, apply_transposed3(camera.rotation, point.point));
-  if (CAMERA_GRADIENT) camera_grad(&g, &view, &point, camera_parts + 16 * i);
-#if DEFOCUS && CAMERA_GRADIENT
-  aperture_parts[2 * i] = point.radius;
-  aperture_parts[2 * i + 1] = point.focus;
+    const lanes by_u = FIRST_MOMENTS ? conic_x(&g, s[1], s[2]) : s[1];
+    const lanes by_v = FIRST_MOMENTS ? conic_y(&g, s[1], s[2]) : s[2];
+    const lanes by_depth = DEPTH ? s[6 + CHANNELS - 1] : 0;
+    const CameraGradient point = screen_grad(&g, camera, &view, by_u, by_v, by_depth);
+    out[0] = by_u;
+    out[1] = by_v;
+    write_if(grad_means2d, 2, 0, 2, rows, drawn, out);
+    out[0] = -s[0] / read_numbers(opacities, rows);
+    write_if(grad_opacities, 1, 0, 1, rows, drawn, out);
+    set3(out, turned_back(camera, point.point));
+    write_if(grad_means, 3, 0, 3, rows, drawn, out);
+    shape_grad(&g, s, &view, rows, drawn, SHAPE_GRADIENT);
+    if (CAMERA_GRADIENT) add_camera_grad(&g, &view, &point, drawn, total);
+  }
+#if CAMERA_GRADIENT
+  const long run = get_global_id(0);
+  if (run * RUN >= count) return;
+  for (int k = 0; k < 16; k++) camera_parts[16 * run + k] = SUM_OF_LANES(total[k]);
+#if DEFOCUS
+  for (int k = 0; k < 2; k++) aperture_parts[2 * run + k] = SUM_OF_LANES(total[16 + k]);
+#endif
 #endif
 }

@@ -142,7 +142,7 @@ class Shade(torch.autograd.Function):
 
 def _only_features(device: Device, features: Any) -> SplatGradients:
     count = features.shape[0]
-    means, camera = device.zeros((count, 3)), device.zeros((count, 16))
+    means, camera = device.zeros((count, 3)), device.zeros((device.traits.runs(count), 16))
     no: Any = None
     return SplatGradients(means, no, no, no, no, features, no, no, camera)
 

@@ -66,8 +66,9 @@ def shade_on_host_grad(
     axpby(device, 1.0, device.array(by_mean), 1.0, gradients.means)
     if gradients.camera is not None:
         shift = by_mean @ np.linalg.inv(camera.view[:3, :3])
-        parts = np.zeros((len(shift), 4, 4))
-        parts[:, :3, :3] = shift[:, :, None] * camera.center
-        parts[:, :3, 3] = shift
-        axpby(device, 1.0, device.array(parts.reshape(-1, 16)), 1.0, gradients.camera)
+        # Of the rows that are summed in the end the first one takes it all.
+        parts = np.zeros(gradients.camera.shape)
+        total = shift.sum(axis=0)
+        parts[:1, :12] = np.column_stack([np.outer(total, camera.center), total]).ravel()
+        axpby(device, 1.0, device.array(parts), 1.0, gradients.camera)
     return device.array(by_linear), device.array(by_lobes)

@@ -87,10 +87,11 @@ class SplatGradients:
         features: (N, D) gradient by what was drawn in each channel.
         means2d: (N, 2) gradient by the position on the screen, in 1 / pixels.
         means2d_abs: (N, 2) the sum over pixels of its magnitudes; None without ``absgrad``.
-        camera: (N, 16) each splat's part in the gradient by the camera, for ``sum_columns``:
-            the upper 3 rows of the view matrix, then fx, fy, cx, cy; None if not asked for.
-        aperture: (N, 2) each splat's part in the gradient by the aperture's radius and focus;
-            None as with the camera, and for a camera without aperture.
+        camera: (runs, 16) the part of each run of splats (``Traits.runs``) in the gradient by the
+            camera, for ``sum_columns``: the upper 3 rows of the view matrix, then fx, fy, cx, cy;
+            None if not asked for.
+        aperture: (runs, 2) the same by the aperture's radius and focus; None as with the camera,
+            and for a camera without aperture.
         shape_modes: (N, K - 1) by the modes of the densities; None where there are none.
         color_modes: (N, K - 1, C) by those of the colours; None where there are none.
     """
@@ -146,7 +147,7 @@ def project(device: Device, splats: Splats, camera: Camera, settings: SplatSetti
     )
     device.launch(
         "splat_project",
-        (count,),
+        (device.traits.runs(count),),
         **_arguments(projection),
         opacities=splats.opacities,
         screen=projection.screen,
@@ -156,6 +157,7 @@ def project(device: Device, splats: Splats, camera: Camera, settings: SplatSetti
         shape_modes=splats.shape_modes,
         color_modes=splats.color_modes,
         **_mode_macros(splats, settings),
+        RUN=device.traits.run,
         TILE=settings.tile,
         SMOOTH=settings.smooth_cutoff,
     )
@@ -223,7 +225,7 @@ def project_grad(
     )
     device.launch(
         "splat_project_grad",
-        (len(splats),),
+        (device.traits.runs(len(splats)),),
         **_arguments(projection),
         opacities=splats.opacities,
         sums=sums,
@@ -238,6 +240,7 @@ def project_grad(
         camera_parts=out.camera,
         aperture_parts=out.aperture,
         view_parts=None if modes is None else modes.view_parts,
+        RUN=device.traits.run,
         CHANNELS=channels,
         ABSGRAD=settings.absgrad,
         DEPTH=depth_channel,
@@ -401,6 +404,7 @@ def _empty_gradients(
     device: Device, splats: Splats, channels: int, absgrad: bool, camera: Camera | None
 ) -> SplatGradients:
     count, given = len(splats), splats.covars is not None
+    runs = device.traits.runs(count)
     lens = camera is not None and camera.aperture is not None
     return SplatGradients(
         means=device.empty((count, 3)),
@@ -411,6 +415,6 @@ def _empty_gradients(
         features=device.empty((count, channels)),
         means2d=device.empty((count, 2)),
         means2d_abs=device.empty((count, 2)) if absgrad else None,
-        camera=None if camera is None else device.empty((count, _CAMERA)),
-        aperture=device.empty((count, 2)) if lens else None,
+        camera=None if camera is None else device.empty((runs, _CAMERA)),
+        aperture=device.empty((runs, 2)) if lens else None,
     )

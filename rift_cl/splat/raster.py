@@ -179,13 +179,14 @@ def packed(device: Device, splats: ScreenSplats) -> ScreenSplats:
     records = device.empty((count, RECORD_NUMBERS))
     device.launch(
         "splat_pack",
-        (count,),
+        (device.traits.runs(count),),
         screen=splats.screen,
         features=splats.features,
         packed=records,
         count=count,
         modes=modes.table if modes else None,
         row=modes.width if modes else None,
+        RUN=device.traits.run,
         CHANNELS=splats.features.shape[1],
         MODAL=modes is not None,
     )

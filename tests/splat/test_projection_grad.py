@@ -37,7 +37,9 @@ def test_gradients_are_autograds(device, name):
             assert errors_by_splat(found[what][drawn], wanted[drawn]).max() < 2e-4, what
             assert not found[what][~drawn].any(), what
     for what in {"camera"} | lens:
-        np.testing.assert_allclose(found[what], right[what], rtol=2e-4)
+        # Large parts of both signs may leave a small number.
+        rounding = 1e-6 * np.linalg.norm(right[what])
+        np.testing.assert_allclose(found[what], right[what], rtol=2e-4, atol=rounding)
 
 
 @pytest.mark.parametrize("coefficients", [1, 4, 9, 25])
