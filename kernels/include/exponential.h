@@ -39,3 +39,16 @@ static lanes two_to_the(lanes x) {
   value = value * f + 1.00000012f;
   return AS_LANES(AS_INT(value) + (AS_INT(shifted) << 23));
 }
+
+/* e^x, held to what a float32 holds: x = n ln 2 + r, |r| <= ln(2) / 2, and Cephes' polynomial of
+ * degree 6 (Moshier 1989), to 2e-7. What is no number has e^-87. */
+static lanes power_of_e(lanes x) {
+  x = x > -87 ? x : -87;
+  x = x < 88 ? x : 88;
+  const lanes_int n = TO_INT(1.44269504f * x + (x < 0 ? (lanes)-0.5f : (lanes)0.5f));
+  /* ln 2 in two parts, of which the first times n is exact. */
+  const lanes whole = TO_FLOAT(n), r = x - whole * 0.693359375f + whole * 2.12194440e-4f;
+  const lanes high = (1.9875691e-4f * r + 1.3981999e-3f) * r + 8.3334519e-3f;
+  const lanes low = (high * r + 4.1665796e-2f) * r + 1.6666666e-1f;
+  return ((low * r + 0.5f) * r * r + r + 1) * AS_LANES((n + 127) << 23);
+}

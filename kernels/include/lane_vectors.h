@@ -57,6 +57,8 @@ static lanes larger(lanes a, lanes b) { return a > b ? a : b; }
 
 static lanes_int no_number(lanes v) { return (AS_INT(v) & 0x7f800000) == 0x7f800000; }
 
+static lanes_int is_nan(lanes v) { return (AS_INT(v) & 0x7fffffff) > 0x7f800000; }
+
 static lanes_int no_numbers(lanes3 v) { return no_number(v.x) | no_number(v.y) | no_number(v.z); }
 
 /* Whether a condition holds in any lane. */

@@ -6,9 +6,11 @@
 #if LANES == 8
 typedef uint8 lanes_whole;
 #define WHOLE_TO_INT(v) as_int8(v)
+#define INT_TO_WHOLE(v) as_uint8(v)
 #else
 typedef uint lanes_whole;
 #define WHOLE_TO_INT(v) ((int)(v))
+#define INT_TO_WHOLE(v) ((uint)(v))
 #endif
 
 /* sin(2 pi u) for |u| <= 1/2. */

@@ -10,7 +10,7 @@
  *
  *     scale' = sqrt(scale^2 + b^2),    opacity' = opacity prod scale / scale'.
  *
- * Index space: splats. */
+ * Index space: (runs of RUN splats), LANES of them at a time. */
 
 #include "include/portable.h"
 #include "include/activation.h"
@@ -20,9 +20,10 @@ KERNEL void splat_activate(
     __global const float *restrict band, __global float *restrict scales,
     __global float *restrict opacities, int count)
 {
-  const long i = get_global_id(0);
-  if (i >= count) return;
-  const Activation a = activated(log_scales, logits, band, i);
-  for (int k = 0; k < 3; k++) scales[3 * i + k] = a.drawn[k];
-  opacities[i] = a.opacity * a.faded;
+  EACH_RUN(first, count) {
+    const Rows rows = rows_at(first, count);
+    const Activation a = activated(log_scales, read_numbers(logits, rows), band, rows);
+    write3(scales, 3, rows, a.drawn);
+    write_numbers(opacities, rows, a.opacity * a.faded);
+  }
 }

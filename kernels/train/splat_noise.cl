@@ -4,22 +4,24 @@
  *
  * with xi standard normal (3DGS as MCMC, Kheradmand et al. 2024; constants of gsplat). Numbers are
  * made from (splat, step, seed) alone by a hash (PCG4D, Jarzynski and Olano 2020) and Box and
- * Muller's transform, so that a run can be repeated and taken up again. Index space: splats. */
+ * Muller's transform, so that a run can be repeated and taken up again, whatever the number of lanes
+ * that hash at a time. Index space: (runs of RUN splats), LANES of them at a time. */
 
 #include "include/portable.h"
-#include "include/small_matrix.h"
+#include "include/lane_vectors.h"
+#include "include/splat_rows.h"
+#include "include/logarithm.h"
+#include "include/turn.h"
 
 #define STEEPNESS 100.0f
 #define FAINT 0.005f
-#define TWO_PI 6.2831853f
+#define SALT 0x9e3779b9u
 
-static uint4 scramble(uint4 v) {
-  v = v * 1664525u + 1013904223u;
-  v.x += v.y * v.w;
-  v.y += v.z * v.x;
-  v.z += v.x * v.y;
-  v.w += v.y * v.z;
-  v ^= v >> 16;
+typedef struct {
+  lanes_whole x, y, z, w;
+} whole4;
+
+static whole4 mixed(whole4 v) {
   v.x += v.y * v.w;
   v.y += v.z * v.x;
   v.z += v.x * v.y;
@@ -27,13 +29,45 @@ static uint4 scramble(uint4 v) {
   return v;
 }
 
-/* In (0, 1). */
-static float fraction(uint bits) { return ((bits >> 8) + 0.5f) * (1.0f / 16777216.0f); }
+/* PCG4D of (i, step, seed, SALT). */
+static whole4 scramble(lanes_whole i, uint step, uint seed) {
+  whole4 v;
+  v.x = i * 1664525u + 1013904223u;
+  v.y = step * 1664525u + 1013904223u;
+  v.z = seed * 1664525u + 1013904223u;
+  v.w = SALT * 1664525u + 1013904223u;
+  v = mixed(v);
+  v.x ^= v.x >> 16;
+  v.y ^= v.y >> 16;
+  v.z ^= v.z >> 16;
+  v.w ^= v.w >> 16;
+  return mixed(v);
+}
 
-static float3 normal3(uint4 bits) {
-  const float near = sqrt(-2 * log(fraction(bits.x))), far = sqrt(-2 * log(fraction(bits.z)));
-  const float turn = TWO_PI * fraction(bits.y);
-  return (float3)(near * cos(turn), near * sin(turn), far * cos(TWO_PI * fraction(bits.w)));
+/* In (0, 1), a half added to 24 bits. */
+static lanes fraction(lanes_whole bits) {
+  return (TO_FLOAT(WHOLE_TO_INT(bits >> 8)) + 0.5f) * (1.0f / 16777216.0f);
+}
+
+/* How far from the middle, of a share that lies farther. */
+static lanes radius_of(lanes share) { return root_of(-2 * natural_log(share)); }
+
+static lanes3 normal3(whole4 bits) {
+  const lanes near = radius_of(fraction(bits.x)), far = radius_of(fraction(bits.z));
+  const lanes turn = within_a_turn(fraction(bits.y)), other = within_a_turn(fraction(bits.w));
+  return lanes3_of(near * cosine_of_turn(turn), near * sine_of_turn(turn), far * cosine_of_turn(other));
+}
+
+/* 1 / (1 + e^x) */
+static lanes gate_of(lanes x) {
+  const lanes e = power_of_two(-1.44269504f * absolute(x));
+  return (x > 0 ? e : 1) / (1 + e);
+}
+
+/* Turned by the unit quaternion (w, v): x + 2 (w v x x + v x (v x x)). */
+static lanes3 rotated(lanes3 x, lanes w, lanes3 v) {
+  const lanes3 once = cross_of(v, x), more = plus(times(w, once), cross_of(v, once));
+  return plus(x, plus(more, more));
 }
 
 KERNEL void splat_noise(
@@ -41,19 +75,21 @@ KERNEL void splat_noise(
     __global const float *restrict scales, __global const float *restrict opacities,
     float amount, uint seed, uint step, int count)
 {
-  const long i = get_global_id(0);
-  if (i >= count) return;
-  const float gate = 1 / (1 + exp(STEEPNESS * (opacities[i] - FAINT)));
-  const float4 q = (float4)(quats[4 * i + 1], quats[4 * i + 2], quats[4 * i + 3], quats[4 * i]);
-  const float length = sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
-  if (!(length > 0)) return;
-  const float3 v = q.xyz / length, s = load3(scales, i);
-  const float w = q.w / length;
-  const float3 xi = normal3(scramble((uint4)((uint)i, step, seed, 0x9e3779b9u)));
-  /* Sigma xi = R S^2 R^T xi, rotations by v x (..) twice. */
-  const float3 once = cross3(v, xi), back = xi - 2 * (w * once - cross3(v, once));
-  const float3 grown = back * s * s;
-  const float3 turned = cross3(v, grown);
-  const float3 move = grown + 2 * (w * turned + cross3(v, turned));
-  store3(means, i, load3(means, i) + amount * gate * move);
+  EACH_RUN(first, count) {
+    const Rows rows = rows_at(first, count);
+    lanes q[4];
+    read_columns(quats, 4, 0, 4, rows, q);
+    const lanes3 s = read3(scales, 3, rows), mean = read3(means, 3, rows);
+    const lanes gate = gate_of(STEEPNESS * (read_numbers(opacities, rows) - FAINT));
+    const lanes square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    const lanes inverse = inverse_root(square), w = q[0] * inverse;
+    const lanes3 v = lanes3_of(q[1] * inverse, q[2] * inverse, q[3] * inverse);
+    const lanes_int i = (int)first + TO_INT(LANE_NUMBERS);
+    const lanes3 xi = normal3(scramble(INT_TO_WHOLE(i), step, seed));
+    /* Sigma xi = R S^2 R^T xi. */
+    const lanes3 back = rotated(xi, -w, v);
+    const lanes3 grown = lanes3_of(back.x * s.x * s.x, back.y * s.y * s.y, back.z * s.z * s.z);
+    const lanes3 move = times(amount * gate, rotated(grown, w, v));
+    write3(means, 3, rows, plus(mean, where((square > LEAST_SQUARE) & (square < MOST_SQUARE), move)));
+  }
 }

@@ -153,13 +153,14 @@ class Parameters:
         count, found = len(self), gradients.splats
         self.device.launch(
             "splat_activate_grad",
-            (count,),
+            (self.device.traits.runs(count),),
             **self._before(),
             by_scales=found.scales,
             by_opacities=found.opacities,
             each_scale=scale_penalty / (3 * count),
             each_opacity=opacity_penalty / count,
             count=count,
+            RUN=self.device.traits.run,
             **self._kind(),
         )
         by = (found.means, found.quats, found.scales, found.opacities, gradients.sh)
@@ -181,11 +182,12 @@ class Parameters:
         drawn, count = self.drawn, len(self)
         self.device.launch(
             "splat_activate",
-            (count,),
+            (self.device.traits.runs(count),),
             **self._before(),
             scales=drawn.scales,
             opacities=drawn.opacities,
             count=count,
+            RUN=self.device.traits.run,
             **self._kind(),
         )
 
@@ -226,7 +228,7 @@ class Parameters:
         drawn, count = self.drawn, len(self)
         self.device.launch(
             "splat_noise",
-            (count,),
+            (self.device.traits.runs(count),),
             means=drawn.means,
             quats=drawn.quats,
             scales=drawn.scales,
@@ -235,6 +237,7 @@ class Parameters:
             seed=seed & 0xFFFFFFFF,
             step=self.step,
             count=count,
+            RUN=self.device.traits.run,
         )
 
     def add_degree(self) -> None:

@@ -166,3 +166,21 @@ def test_extreme_values_stay_drawable(device):
     assert np.isfinite(device.get(drawn.scales)).all() and (device.get(drawn.scales) > 0).all()
     opacities = device.get(drawn.opacities)
     assert ((opacities >= 0) & (opacities <= 1)).all()
+
+
+@pytest.mark.parametrize("count", [1, 7, 65])
+def test_numbers_that_are_none_are_their_own_splats_alone(device, count):
+    """Activated, updated and moved: what is no number stays so, and spoils no other splat."""
+    raw = raw_values(count)
+    bad = {name: value.copy() for name, value in raw.items()}
+    bad["log_scales"][-1, 1] = bad["logits"][-1] = np.nan
+    found = []
+    for values in (raw, bad):
+        parameters = Parameters.of(device, values)
+        parameters.update(gradients(device, count)[1], RATES, **FREE)
+        parameters.shake(0.1, 9)
+        drawn = parameters.drawn
+        found.append([device.get(a) for a in (drawn.scales, drawn.opacities, drawn.means)])
+    for right, spoilt in zip(*found, strict=True):
+        assert right[:-1].tobytes() == spoilt[:-1].tobytes() and np.isfinite(right).all()
+    assert np.isnan(found[1][0][-1, 1]) and np.isnan(found[1][1][-1])
