@@ -7,7 +7,8 @@ Data are exact line integrals, averaged over the bins as a detector does. Means 
 of the ball's radius, over its density, which is 1 at best: in the plane of the source's orbit, for
 magnifications and for bins of so many voxels; and over the whole ball, for half-angles of the cone
 that the ball fills, beside the iterative result. A ball of few bins is off by the ripple that the
-bins' band limit leaves of its edge, whatever the rays. The head shows what a detector's roll costs.
+bins' band limit leaves of its edge, whatever the rays. Helices are those of Katsevich's method. The
+head shows what a detector's roll costs.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ MAGNIFICATIONS = (1.2, 1.5, 3.0, 6.0, 15.0)
 PITCHES = (0.5, 0.75, 1.0, 1.3, 2.0)
 HALF_ANGLES = (2.0, 5.0, 10.0, 15.0)
 ROLLS = (0.5, 2.0)
+# Rises of a helix in a turn, in edges of the volume, and the cone's half-angle.
+RISES, HELIX_ANGLE = (0.25, 0.5, 1.0), 10.0
 # Radius of the ball, as a share of the volume's edge, and what of it is looked at.
 BALL, INNER = 0.35, 0.8
 
@@ -48,6 +51,11 @@ def main() -> None:
     for degrees in HALF_ANGLES:
         fdk, cgls = whole_ball(given, degrees)
         print(f"whole ball, half-angle {degrees:g} degrees: {fdk:.4f}, CGLS {cgls:.4f}", flush=True)
+    for rise in RISES:
+        for curved in (False, True):
+            name, mean = "curved" if curved else "flat", helical(given, rise, curved=curved)
+            line = f"whole ball, half-angle {HELIX_ANGLE:g} degrees, helix, {name}"
+            print(f"{line}, rise of {rise:g} edges in a turn: {mean:.4f}", flush=True)
     for degrees in ROLLS:
         upright, known, ignored = rolled(given, degrees)
         line = f"head, roll of {degrees:g} degrees: {known:.2f} dB, {ignored:.2f} dB if ignored"
@@ -70,6 +78,16 @@ def whole_ball(given: argparse.Namespace, degrees: float) -> tuple[float, float]
     grid, scan = volume(given), circle(given, distance=BALL / np.sin(np.deg2rad(degrees)))
     A, data = rift.Projector(grid, scan), averaged(ball(given), grid, scan, 4)
     return level(rift.fbp(A, data)), level(rift.cgls(A, data, given.steps))
+
+
+def helical(given: argparse.Namespace, rise: float, *, curved: bool) -> float:
+    """The mean in the ball from a helix, for a rise in a turn in edges of the volume."""
+    distance = BALL / np.sin(np.deg2rad(HELIX_ANGLE))
+    grid, scan = volume(given), circle(given, distance=distance, curved=curved)
+    views = round(given.views * (1 + 1.7 * rise) / rise)
+    angles = 2 * np.pi * (np.arange(views) - (views - 1) / 2) / given.views
+    scan = replace(scan, angles=angles, heights=rise * given.size * angles / (2 * np.pi))
+    return level(rift.fbp(rift.Projector(grid, scan), averaged(ball(given), grid, scan, 3)))
 
 
 def volume(given: argparse.Namespace) -> rift.Grid:

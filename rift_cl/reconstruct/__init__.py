@@ -12,6 +12,7 @@ from rift_cl.reconstruct.direct.filtered_backprojection import (
     backproject,
     fbp,
 )
+from rift_cl.reconstruct.direct.katsevich import Katsevich
 from rift_cl.reconstruct.direct.offset_axis import widened
 from rift_cl.reconstruct.direct.padding import extended
 from rift_cl.reconstruct.preprocess import remove_rings
@@ -39,6 +40,7 @@ __all__ = [
     "FewLevels",
     "FilteredBackprojection",
     "Fista",
+    "Katsevich",
     "MeasuredRays",
     "OrderedSubsets",
     "Pdhg",

@@ -71,6 +71,23 @@ def test_a_ball_has_its_density(ball: Path, tmp_path: Path) -> None:
     assert np.corrcoef(part.ravel(), whole.ravel())[0, 1] > 0.99
 
 
+def test_a_helix_has_its_density(tmp_path: Path) -> None:
+    turns = np.arange(3 * VIEWS) / VIEWS - 1.5
+    angles, heights = 2 * np.pi * turns, 8.0 * turns
+    cone = Cone(angles, ROWS, BINS, PITCH, R, S, heights=heights)
+    lengths = {"source_to_axis": R, "source_to_detector": S, "pitch": PITCH}
+    views = project([Ellipsoid.ball(6.0, 0.02)], Grid((2, 2, 2)), cone)
+    scan = {"projections": views, "angles": angles, "heights": heights, **lengths}
+    np.savez(tmp_path / "helix.npz", **scan)
+    command = ("reconstruct", tmp_path / "helix.npz", "--unit", "mm", "--quiet")
+    assert run(*command, "--out", tmp_path / "a", "--format", "h5") == 0
+    volume = read_volume(tmp_path / "a" / "volume.h5")
+    z, y, x = np.indices(volume.shape) - (np.array(volume.shape)[:, None, None, None] - 1) / 2
+    assert volume[z**2 + y**2 + x**2 < 16].mean() == pytest.approx(0.02, rel=0.02)
+    metrics = json.loads((tmp_path / "a" / "metrics.json").read_text())
+    assert "Katsevich" in " ".join(metrics["assumed"])
+
+
 def test_axis_and_sense_are_found(ball: Path, tmp_path: Path) -> None:
     """A file that is wrong about both: the middle for the axis, the other sense of rotation."""
     found = rift.reconstruct_scan(ball, tmp_path / "a", reversed=True)

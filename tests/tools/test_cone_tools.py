@@ -24,6 +24,7 @@ def test_levels_are_true_in_the_middle_and_fall_off_with_the_cone(tool, monkeypa
     for name, few in {"MAGNIFICATIONS": (3.0,), "PITCHES": (0.75,), "ROLLS": (2.0,)}.items():
         monkeypatch.setattr(levels, name, few)
     monkeypatch.setattr(levels, "HALF_ANGLES", (2.0, 15.0))
+    monkeypatch.setattr(levels, "RISES", (1.0,))
     arguments = ["--size", "32", "--views", "40", "--steps", "15"]
     monkeypatch.setattr("sys.argv", ["check_fdk.py", *arguments])
     levels.main()
@@ -35,6 +36,8 @@ def test_levels_are_true_in_the_middle_and_fall_off_with_the_cone(tool, monkeypa
     assert float(narrow) == pytest.approx(1, abs=1e-3)
     assert 0.97 < float(wide) < 0.99
     assert float(solved) == pytest.approx(1, abs=0.01)
+    helices = [float(value) for value in re.findall(r"helix.*: ([\d.]+)", said)]
+    assert helices == pytest.approx([1] * 2, abs=1e-3)
     known, ignored, upright = numbers(said)
     assert min(known, ignored) > upright - 2
 

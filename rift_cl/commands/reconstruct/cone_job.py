@@ -32,7 +32,8 @@ from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.io.volumes import VOLUME_NAMES, VolumeWriter, open_volume, suggested_window
 from rift_cl.operators import Projector
 from rift_cl.progress import Report
-from rift_cl.reconstruct import FDK, backproject, poisson_weights
+from rift_cl.reconstruct import FDK, Katsevich, backproject, poisson_weights
+from rift_cl.reconstruct.direct.katsevich import cone_inversion
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_png, image_grid
 
@@ -72,7 +73,7 @@ class ConeReconstruction:
         self.source = ConeInput(settings, file, self.device)
         self.inversion = ConeInversion(self.source.window)
         # Made now, so that a scan that the method does not take is told before any work.
-        self.projector, self._fdk = self._operators()
+        self.projector, self._formula = self._operators()
         self._check_slabs()
         out = settings.out
         alone = out.is_dir() and {p.name for p in out.iterdir()} <= {PREVIEW_PICTURE, "config.json"}
@@ -106,7 +107,7 @@ class ConeReconstruction:
         """The settings with all that was decided."""
         return decided_cone_settings(self.source, self._values)
 
-    def _operators(self) -> tuple[Projector, FDK | None]:
+    def _operators(self) -> tuple[Projector, FDK | Katsevich | None]:
         """The projector of the voxels that are solved for, and the formula where it is one."""
         settings = self.settings
         options: dict[str, Any] = {"device": self.device}
@@ -115,14 +116,14 @@ class ConeReconstruction:
         A = Projector(self.source.solved, self.source.geometry, **options)
         if settings.method != "fbp":
             return A, None
-        return A, FDK(A, settings.view_filter(), compensate=settings.compensate)
+        return A, cone_inversion(A, settings.view_filter(), settings.compensate)
 
     def _check_slabs(self) -> None:
         """Refuse slabs that find no room, or of which no window of values can be chosen."""
         settings, left = self.settings, self.source.slab_budget
-        if self._fdk is None or left is None:
+        if self._formula is None or left is None:
             return
-        self._fdk.check_slabs(left)
+        self._formula.check_slabs(left)
         if settings.dtype != "float32" and settings.window is None and not settings.preview:
             raise InputError(
                 f"--dtype {settings.dtype} wants --window LOW HIGH here: volume and projections do "
@@ -134,11 +135,9 @@ class ConeReconstruction:
         """Find the axis, and make the operators again for it."""
         self.source.locate()
         self.inversion.window = self.source.window
-        self.projector, self._fdk = self._operators()
-        if self._fdk is not None:
-            self.source.notes.append(
-                f"Method of Feldkamp, Davis and Kress (FDK): {self._fdk.sentence}."
-            )
+        self.projector, self._formula = self._operators()
+        if self._formula is not None:
+            self.source.notes.append(f"{self._formula.method}: {self._formula.sentence}.")
         if self.source.slab_budget is not None:
             self.source.notes.append(
                 "The volume is made in slabs of slices, since it does not fit the memory budget "
@@ -188,10 +187,10 @@ class ConeReconstruction:
     def _solve(self, projections: Floats, total: int) -> Generator[Report, None, Iterable[Floats]]:
         """The volume in slabs, or in one, after a report for every step."""
         left = self.source.slab_budget
-        if self._fdk is not None:
+        if self._formula is not None:
             if left is not None:
-                return self._fdk.slabs(projections, left)
-            return [np.asarray(self._fdk(projections))]
+                return self._formula.slabs(projections, left)
+            return [np.asarray(self._formula(projections))]
         if self.settings.method == "backproject":
             return [np.asarray(backproject(self.projector, projections))]
         options: dict[str, Any] = {}
@@ -208,7 +207,7 @@ class ConeReconstruction:
 
     def _preview(self) -> list[Floats]:
         """The middle slice alone, which a formula makes without the others."""
-        if self._fdk is None:
+        if self._formula is None:
             raise InputError(
                 "--preview of a cone-beam scan is for --method fbp: steps need the whole volume"
             )
@@ -217,8 +216,8 @@ class ConeReconstruction:
         settings = dataclasses.replace(self.settings, rows=(middle, middle + 1))
         grid = VolumeWindow.of(settings, self.source.geometry).grid
         A = Projector(grid, self.source.geometry, device=self.device)
-        fdk = FDK(A, settings.view_filter(), compensate=settings.compensate)
-        return [np.asarray(fdk(self.source.read().projections))[0]]
+        formula = cone_inversion(A, settings.view_filter(), settings.compensate)
+        return [np.asarray(formula(self.source.read().projections))[0]]
 
     def _finish(self, slabs: Iterable[Floats]) -> None:
         """Write the volume, its pictures and the report."""

@@ -93,7 +93,6 @@ class FanSlicesProjector(SlabProjector):
 
     def _part(self, z: slice, views: slice) -> FanSlicesProjector:
         part = cast(FanSlicesProjector, super()._part(z, views))
-        part.depth_power = self.depth_power
         # Slices are counted from the part's first, as its rows are.
         part._column = Samples(part.grid.slices, 0.0, 1.0)
         return part

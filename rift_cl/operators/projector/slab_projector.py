@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,6 +57,9 @@ class SlabProjector(VolumeInParts):
             shadows.
         device: the device to use; the default device if not given.
         dtype: ``float32``, or ``float64`` where the device has it.
+        depth_power: of the inverse of the depth that a sample is weighted by. 2 is that of line
+            integrals; 1 has another factor ``depth / source_to_axis``, as the filtered
+            backprojection of helices wants it. On an arc the depth is the way from the source.
 
     The domain is ``grid.shape``; the range is (views, rows, bins).
 
@@ -76,6 +79,8 @@ class SlabProjector(VolumeInParts):
         footprint: str = "strip",
         device: Device | None = None,
         dtype: DTypeLike = np.float32,
+        *,
+        depth_power: int = 2,
     ) -> None:
         if not isinstance(grid, Grid) or len(grid.shape) != 3:
             raise InputError(
@@ -87,11 +92,15 @@ class SlabProjector(VolumeInParts):
         shape = scan.views, scan.rows, scan.bins
         super().__init__(grid.shape, shape, device or default_device(), dtype)
         self.grid, self.scan, self.footprint = grid, scan, footprint
-        self._tables = [slab_table(grid, scan, footprint, along_x=way) for way in (True, False)]
+        self.depth_power = depth_power
+        self._tables = [
+            slab_table(grid, scan, footprint, depth_power, along_x=way) for way in (True, False)
+        ]
         self._precision = {"DOUBLE": int(self.dtype == np.float64)}
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return SlabProjector, (self.grid, self.scan, self.footprint, self.device, self.dtype)
+        settled = partial(SlabProjector, depth_power=self.depth_power)
+        return settled, (self.grid, self.scan, self.footprint, self.device, self.dtype)
 
     def _facts(self) -> list[str]:
         scan = self.scan
@@ -192,7 +201,7 @@ class SlabProjector(VolumeInParts):
     def _part(self, z: slice, views: slice) -> SlabProjector:
         part = self._bare_part(z, views)
         slices, column = z.stop - z.start, self._column
-        part._precision = self._precision
+        part._precision, part.depth_power = self._precision, self.depth_power
         part._tables = [self._lower(table.of_views(views), slices) for table in self._tables]
         part._column = replace(column, count=slices, first=column.first + z.start)
         return part

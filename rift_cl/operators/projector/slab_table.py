@@ -129,13 +129,17 @@ class SlabTable:
         )
 
 
-def slab_table(grid: Grid, scan: Cone | Upright, footprint: str, *, along_x: bool) -> SlabTable:
+def slab_table(
+    grid: Grid, scan: Cone | Upright, footprint: str, depth_power: int = 2, *, along_x: bool
+) -> SlabTable:
     """The table of the views whose slabs have lines along x, or of those with lines along y.
 
     Args:
         grid: the volume.
         scan: the scan.
         footprint: ``strip``, ``linear`` or ``point``.
+        depth_power: of the inverse of the depth that a sample is weighted by; 2 is that of line
+            integrals, 1 of a ``Cone`` has another factor ``depth / source_to_axis``.
         along_x: which of the two.
 
     Raises:
@@ -159,17 +163,22 @@ def slab_table(grid: Grid, scan: Cone | Upright, footprint: str, *, along_x: boo
     slopes = np.abs(walk.slopes)
     firsts, rows = walk.row_ranges(pitch, slopes, row_taps)
     padding = (0, 0), (pad, columns - pad - scan.bins)
-    steps = np.pad(pitch * slopes, padding, mode="edge")
+    slopes = np.pad(slopes, padding, mode="edge")
+    steps, gains, amplitudes = pitch * slopes, (pitch * slopes) ** 2, walk.amplitudes(pitch)
+    if depth_power != 2:
+        gains *= slopes ** (depth_power - 2.0)
+        reaches = walk.reaches(walk.slabs.places) / scan.source_to_axis
+        amplitudes *= reaches ** (2.0 - depth_power)
     return SlabTable(
         views=views.astype(np.int32),
         lines=walk.lines,
         slabs=walk.slabs,
         column_forms=walk.column_forms(scan.center[1] + pad),
         row_forms=walk.row_forms(pitch, firsts),
-        amplitudes=walk.amplitudes(pitch),
+        amplitudes=amplitudes,
         firsts=firsts.astype(np.int32),
         steps=steps,
-        gains=steps**2,
+        gains=gains,
         rows=rows,
         columns=columns,
         pad=pad,

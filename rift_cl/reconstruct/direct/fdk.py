@@ -62,6 +62,8 @@ class FDK(LinearOperator):
         InputError: the scan is not circular, or does not see enough; the sentence says what does.
     """
 
+    method = "Method of Feldkamp, Davis and Kress (FDK)"
+
     def __init__(
         self, A: Projector, filter: FilterLike = "ram-lak", *, compensate: str | None = None
     ) -> None:
@@ -136,18 +138,7 @@ class FDK(LinearOperator):
         filtered = np.empty(self._weighting.range, self.dtype)
         for chunk in self._weighting._chunks(budget):
             self._weighting._apply_chunk(y, filtered, chunk, add=False)
-        back, slab, place = self._A.T, np.empty(0, self.dtype), None
-        for chunk in back._chunks(budget):
-            if chunk.outside != place:
-                if place is not None:
-                    yield slab
-                place = chunk.outside
-                first, stop, _ = (place[0] if place else slice(None)).indices(self.range[0])
-                slab = np.empty((stop - first, *self.range[1:]), self.dtype)
-                add = False
-            back._apply_chunk(filtered, slab, chunk._replace(outside=()), add=add)
-            add = True
-        yield slab
+        yield from backprojected_slabs(self._A.T, filtered, budget)
 
     def check_slabs(self, budget: int) -> None:
         """Refuse a budget in which ``slabs`` would find no room.
@@ -169,6 +160,30 @@ class FDK(LinearOperator):
         """Bytes of the largest array among these."""
         filtered = self.dtype.itemsize * math.prod(self._weighting.range)
         return max(filtered, self._weighting.largest_scratch, self._A.largest_scratch)
+
+
+def backprojected_slabs(
+    back: LinearOperator, filtered: NDArray[Any], budget: int
+) -> Iterator[NDArray[Any]]:
+    """A backprojection in slabs of slices, from the first on, with the bits of the whole.
+
+    Args:
+        back: the adjoint of a projector.
+        filtered: what it is applied to, on the host.
+        budget: bytes of the device to work in.
+    """
+    slab, place, add = np.empty(0, back.dtype), None, False
+    for chunk in back._chunks(budget):
+        if chunk.outside != place:
+            if place is not None:
+                yield slab
+            place = chunk.outside
+            first, stop, _ = (place[0] if place else slice(None)).indices(back.range[0])
+            slab = np.empty((stop - first, *back.range[1:]), back.dtype)
+            add = False
+        back._apply_chunk(filtered, slab, chunk._replace(outside=()), add=add)
+        add = True
+    yield slab
 
 
 class _Weighting(LinearOperator):
@@ -307,6 +322,11 @@ def as_beam(scan: Scan | None) -> Fan | Cone:
         ) from None
 
 
+def rises(scan: Fan | Cone) -> bool:
+    """Whether the source leaves the plane of one orbit."""
+    return isinstance(scan, Cone) and bool(np.ptp(scan.heights) > _LEVEL * scan.source_to_axis)
+
+
 def amplitude(grid: Grid, scan: Fan | Cone) -> float:
     """k, which makes the adjoint's weights those of the inversion, and about 1 at the axis."""
     if isinstance(scan, Fan):
@@ -320,16 +340,16 @@ def _circle(A: Projector) -> tuple[Fan | Cone, Rectification | None]:
     Raises:
         InputError: the source leaves a circle; the sentence names the methods that take it.
     """
-    if isinstance(A.scan, Vectors):
-        try:
-            return Cone.of_vectors(A.scan), None
-        except InputError:
+    try:
+        beam = as_beam(A.scan)
+    except InputError:
+        if isinstance(A.scan, Vectors):
             return _untilted(A, A.scan)
-    beam = as_beam(A.scan)
-    if isinstance(beam, Cone) and np.ptp(beam.heights) > _LEVEL * beam.source_to_axis:
+        raise
+    if isinstance(beam, Cone) and rises(beam):
         raise InputError(
-            f"scan: heights range over {np.ptp(beam.heights):.3g}, a helix or steps, and filtered "
-            f"backprojection wants a circle; {ITERATE}"
+            f"scan: heights range over {np.ptp(beam.heights):.3g}, a helix or steps, and FDK wants "
+            f"a circle; Katsevich takes an even helix, {ITERATE}"
         )
     return beam, None
 

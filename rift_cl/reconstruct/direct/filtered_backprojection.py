@@ -28,6 +28,7 @@ from rift_cl.operators.linear import Chunk, LinearOperator
 from rift_cl.operators.projector.parallel_projector import ParallelProjector
 from rift_cl.operators.projector.projector import Projector
 from rift_cl.reconstruct.direct.fdk import FDK, amplitude, as_beam
+from rift_cl.reconstruct.direct.katsevich import Katsevich, cone_inversion
 from rift_cl.reconstruct.direct.view_weights import view_gains
 
 Floats = NDArray[np.float64]
@@ -130,7 +131,7 @@ def fbp(
     Args:
         A: the projector that describes grid and scan. A cone's source goes round a full turn or
             half a turn and the fan; the rotation axis may be near one side of the detector in a
-            full turn (see ``FDK``).
+            full turn (see ``FDK``). Or it goes along an even helix (see ``Katsevich``).
         y: sinogram (angles, bins) or projections (angles, rows, bins); line integrals in the
             image's unit times the grid's unit of length.
         filter: a name (``ram-lak``, ``shepp-logan``, ``cosine``, ``hamming``, ``hann``,
@@ -156,14 +157,14 @@ def filtered_backprojection(
     compensate: str | None = None,
     *,
     diameter: float | None = None,
-) -> FilteredBackprojection | FDK:
+) -> FilteredBackprojection | FDK | Katsevich:
     """The operator that ``fbp`` applies, chosen by the scan of ``A``; arguments are those of it."""
     if isinstance(A, ParallelProjector):
         return FilteredBackprojection(A, filter, compensate=compensate, diameter=diameter)
     _check_projector(A)
     if diameter is not None:
         raise InputError("diameter is given, and only filters of parallel beams depend on it")
-    return FDK(A, filter, compensate=compensate)
+    return cone_inversion(A, filter, compensate)
 
 
 def backproject(A: ParallelProjector | Projector, y: Any, *, out: Any = None) -> Any:
