@@ -1,7 +1,6 @@
 /* What splat_activate and its gradient have in common: splats' scales and opacities, before and after
  * the limit of their band, LANES at a time. */
 
-#include "include/lane_vectors.h"
 #include "include/splat_rows.h"
 
 #ifndef DENSITY

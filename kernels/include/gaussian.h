@@ -13,7 +13,6 @@
  * Everything is computed in all lanes: a splat that has no meaning is told by its code, and its
  * numbers, which may be none, are left aside by who uses them. */
 
-#include "include/lane_vectors.h"
 #include "include/splat_rows.h"
 
 #ifndef COVARIANCES

@@ -12,7 +12,7 @@
  *
  * A work-item goes through RUN rows, as a group for each eight would cost as much as its work. */
 
-#include "include/exponential.h"
+#include "include/lane_vectors.h"
 #include "include/transpose.h"
 #include "include/lane_quads.h"
 

@@ -6,7 +6,6 @@
 
 #include "include/portable.h"
 #include "include/logarithm.h"
-#include "include/lane_vectors.h"
 #include "include/splat_rows.h"
 #include "include/screen_record.h"
 

@@ -35,6 +35,9 @@ from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 from rift_cl.splat.tile_lists import TileLists
 
+# Pixels that one work-item of a CPU goes through.
+_PIXEL_RUN = 1024
+
 DepthKind = Literal["accumulated", "expected"]
 
 
@@ -285,15 +288,19 @@ class Renderer:
         if frame.raster_pass.background is None:
             return None
         height, width, channels = frame.image.shape
-        seen = self.device.empty((height * width, channels))
+        pixels = height * width
+        run = _PIXEL_RUN if self.device.traits.is_cpu else 1
+        runs = -(-pixels // run)
+        seen = self.device.empty((runs, channels))
         self.device.launch(
             "background_grad",
-            (height * width,),
+            (runs,),
             grad_image=grad_image,
             transmittance=frame.transmittance,
             parts=seen,
-            pixels=height * width,
-            channels=channels,
+            pixels=pixels,
+            CHANNELS=channels,
+            RUN=run,
         )
         total, color = sum_columns(self.device, seen), frame.channels.color
         if color == channels:

@@ -174,3 +174,20 @@ def test_splats_without_colour_are_refused(device):
     del values["sh"]
     with pytest.raises(InputError, match=r"neither|no spherical"):
         draw(device, "light", values)
+
+
+@pytest.mark.parametrize("channels", [1, 4, 7])
+def test_background_gradient_takes_any_channels_and_odd_sizes(device, channels):
+    values = random_splats(40) | {"sh": None}
+    values["colors"] = np.random.default_rng(1).random((40, channels)).astype(np.float32)
+    random = np.random.default_rng(2)
+    background = device.array(random.random(channels))
+    renderer = Renderer(device=device)
+    for size in ((1, 1), (3, 7), (37, 61)):
+        camera, splats = camera_of("pinhole", size=size), Splats.upload(device, **values)
+        frame = renderer.forward(splats, camera, background=background)
+        grad_image = random.normal(size=(*size, channels)).astype(np.float32)
+        found = renderer.backward(frame, device.array(grad_image))
+        left = device.get(frame.transmittance)[..., None].astype(float)
+        expected = (left * grad_image).sum((0, 1))
+        np.testing.assert_allclose(device.get(found.background), expected, rtol=1e-4, atol=1e-4)

@@ -220,7 +220,7 @@ SPLAT_COSTS: dict[str, Cost] = {
     "expected_depth": _bytes_only("pixel", _pixels, 12, "depth and transmittance in, depth out"),
     "expected_depth_grad": _bytes_only("pixel", _pixels, 48, "images in and out"),
     "splat_shade_grad": _bytes_only("splat", _n, 12 + 192 + 24 + 192, "harmonics in and out"),
-    "sum_columns": _bytes_only("splat", _n, 64, "the camera's parts in"),
-    "background_grad": _bytes_only("pixel", _pixels, 28, "image in, parts out"),
+    "sum_columns": _bytes_only("splat", _n, 1, "a row of the camera for 64 splats"),
+    "background_grad": _bytes_only("pixel", _pixels, 16, "gradient and transmittance in"),
     **TRAINING_COSTS,
 }
