@@ -3,9 +3,14 @@
  *     table[chunk][tile] = entries that the chunks before have in this tile
  *     counts[tile]       = entries of the tile;  counts[tiles] = 0
  *
- * Index space: runs of `run` tiles; a run is done chunk after chunk, which reads whole rows. */
+ * Index space: runs of `run` tiles; a run is done chunk after chunk, which reads whole rows.
+ * Where one run is all there is (WHOLE 1), counts become the sums of those before. */
 
 #include "include/portable.h"
+
+#ifndef WHOLE
+#define WHOLE 0
+#endif
 
 KERNEL void tile_offsets(
     __global int *restrict table, __global int *restrict counts, int chunks, int tiles, int run)
@@ -22,5 +27,11 @@ KERNEL void tile_offsets(
       counts[tile] += count;
     }
   }
-  if (first == 0) counts[tiles] = 0;
+  int sum = 0;
+  for (int tile = first; WHOLE && tile < stop; tile++) {
+    const int count = counts[tile];
+    counts[tile] = sum;
+    sum += count;
+  }
+  if (first == 0) counts[tiles] = sum;
 }

@@ -6,13 +6,17 @@
  * The gather is the one random access to the splats; what follows reads `ranks` in order.
  *
  * Index space: runs of `run` ranks, the last of which closes the list. SORTED 0: the splats are
- * taken in index order, and neither `order` nor `visible` is read. */
+ * taken in index order, and neither `order` nor `visible` is read. Where one run is all there is
+ * (WHOLE 1), counts become the sums of those before. */
 
 #include "include/portable.h"
 #include "include/tile_box.h"
 
 #ifndef SORTED
 #define SORTED 1
+#endif
+#ifndef WHOLE
+#define WHOLE 0
 #endif
 
 /* Ranks between the splat that is asked for and the one that is read. */
@@ -27,6 +31,7 @@ KERNEL void tile_ranks(
   const long first = (long)get_global_id(0) * run;
   const long stop = first + run < splats ? first + run : splats;
   const int filled = SORTED ? (int)visible[0] : splats;
+  int sum = 0;
   for (long rank = first; rank < stop; rank++) {
     int count = 0;
     if (SORTED && rank + AHEAD < filled) {
@@ -39,7 +44,8 @@ KERNEL void tile_ranks(
       count = slots[splat + 1] - slots[splat];
       ranks[rank] = (int4)(box.y * tiles_x + box.x, box.z - box.x, slots[splat], splat);
     }
-    counts[rank] = count;
+    counts[rank] = WHOLE ? sum : count;
+    sum += count;
   }
-  if (first == 0) counts[splats] = 0;
+  if (first == 0) counts[splats] = WHOLE ? sum : 0;
 }

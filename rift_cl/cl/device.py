@@ -258,17 +258,19 @@ class _Opened(NamedTuple):
         queue = cl.CommandQueue(context)
         direct = ImmediateAllocator(queue)
 
-        @lru_cache(_SHAPES)
-        def members(shape: int | tuple[int, ...], dtype: DTypeLike) -> dict[str, Any]:
+        def looked_at(shape: int | tuple[int, ...], dtype: DTypeLike) -> dict[str, Any]:
             array = Array(queue, shape, dtype, allocator=lambda size: None)
             assert array.flags.c_contiguous  # The flags are kept with it.
-            return vars(array)
+            members: dict[str, Any] = vars(array)
+            return members
 
         # A step of a fit makes some fifty arrays, mostly of the shapes of the step before, and what
         # pyopencl looks at for each of them takes longer than to launch a kernel.
+        known: Callable[..., dict[str, Any]] = lru_cache(_SHAPES)(looked_at)
+
         def plain_array(shape: int | tuple[int, ...], dtype: DTypeLike) -> Any:
             array = Array.__new__(Array)
-            array.__dict__.update(members(shape, dtype), events=[])
+            array.__dict__.update(known(shape, dtype), events=[])
             return array
 
         return cls(context, queue, MemoryPool(direct), direct, plain_array)

@@ -6,7 +6,8 @@ than sorting all M pairs by (tile, depth), and since every step counts chunk by 
 the order of the chunks, the lists are the same whatever the device and the number of work-items.
 
 Prefix sums go up and down a pyramid of sums; ``kernels/vector/scan_sum.cl`` and ``scan_place.cl``
-are one step each way. Integers are exact, so the result does not depend on how a list was cut.
+are one step each way. What one work-item counts alone (WHOLE), it sums up on the way. Integers are
+exact, so the result does not depend on how a list was cut.
 
 Only M, the number of entries, comes to the host on the way: it is needed to allocate them. All that
 goes by splats is enqueued before it is waited for, so that the device works on meanwhile.
@@ -213,14 +214,26 @@ def count_tiles(
     levels = scan_levels(device, _longest_scan(device, splats))
     run = run_length(device, splats, gpu=1)
     by_splat = {"boxes": boxes, "splats": splats, "run": run, **_rectangle(tiles)}
-    runs = (pieces(splats, run),)
-    device.launch("tile_count", runs, **by_splat, depths=depths, counts=slots, keys=keys)
-    total = fetch(device, exclusive_scan(device, slots, splats + 1, levels), 1)
+    runs = pieces(splats, run)
+    total = device.empty(1, np.int64) if runs == 1 else None
+    device.launch(
+        "tile_count",
+        (runs,),
+        **by_splat,
+        depths=depths,
+        counts=slots,
+        keys=keys,
+        total=total,
+        WHOLE=runs == 1,
+    )
+    if total is None:
+        total = exclusive_scan(device, slots, splats + 1, levels)
+    sent = fetch(device, total, 1)
     order, visible = _depth_order(device, keys, slots, levels) if sort else (None, None)
     ranks, offsets = device.empty((splats, 4), np.int32), device.empty(splats + 1, np.int32)
     device.launch(
         "tile_ranks",
-        runs,
+        (runs,),
         **by_splat,
         slots=slots,
         order=order,
@@ -228,9 +241,11 @@ def count_tiles(
         ranks=ranks,
         counts=offsets,
         SORTED=sort,
+        WHOLE=runs == 1,
     )
-    exclusive_scan(device, offsets, splats + 1, levels)
-    return TileCounts(slots, ranks, offsets, tiles, total)
+    if runs > 1:
+        exclusive_scan(device, offsets, splats + 1, levels)
+    return TileCounts(slots, ranks, offsets, tiles, sent)
 
 
 def list_tiles(device: Device, counts: TileCounts) -> TileLists:
@@ -376,10 +391,11 @@ def _sort_by_tile(device: Device, counts: TileCounts) -> tuple[DeviceArray, Devi
     many = {"splats": len(counts.ranks), "pairs": pairs, "tiles_x": across}
     run = run_length(device, tiles, gpu=1)
     device.launch("tile_histogram", (chunks,), **walk, **sizes, **many)
-    device.launch(
-        "tile_offsets", (pieces(tiles, run),), table=table, counts=starts, **sizes, run=run
-    )
-    exclusive_scan(device, starts, tiles + 1, scan_levels(device, tiles + 1))
+    runs = pieces(tiles, run)
+    by_tile = {"table": table, "counts": starts, **sizes, "run": run}
+    device.launch("tile_offsets", (runs,), **by_tile, WHOLE=runs == 1)
+    if runs > 1:
+        exclusive_scan(device, starts, tiles + 1, scan_levels(device, tiles + 1))
     device.launch(
         "tile_scatter", (chunks,), **walk, starts=starts, entries=entries, **sizes, **many
     )

@@ -28,6 +28,7 @@ _VARIANTS = [
     ("splat_project_grad", {"VIEW_PARTS": 1}),
     ("hermite_project", {"MODAL": 1, "DEFOCUS": 1}),
     ("scan_sum", {"WIDE": 1}),
+    ("tile_count", {"WHOLE": 1}),
     ("scan_place", {"WIDE": 1}),
 ]
 
