@@ -1,6 +1,6 @@
 /* Upright views to those of tilted detectors (include/upright.h):
  *
- *     data[view][i][k] = sum over r, c of keys(v - r) keys(u - c) upright[view][r][c].
+ *     data[view][i][k] = sum over r, c of cubic(v - r) cubic(u - c) upright[view][r][c].
  *
  * With SLOPE 1 it is the derivative by u, with SLOPE 2 that by v. Pixels whose four rows and columns
  * are not all there are zero. `first` is the first view of the
@@ -14,8 +14,8 @@
 #ifndef SLOPE
 #define SLOPE 0
 #endif
-#define BY_COLUMN(d) (SLOPE == 1 ? keys_slope(d) : keys(d))
-#define BY_ROW(d) (SLOPE == 2 ? keys_slope(d) : keys(d))
+#define BY_COLUMN(d) (SLOPE == 1 ? keys_slope(d) : cubic(d))
+#define BY_ROW(d) (SLOPE == 2 ? keys_slope(d) : cubic(d))
 
 KERNEL void upright_read(
     __global real *restrict data, __global const real *restrict upright,

@@ -1,6 +1,6 @@
 /* Views of tilted detectors to upright ones: the transpose of upright_read, by gathering.
  *
- *     upright[view][r][c] = sum over i, k of keys(v - r) keys(u - c) data[view][i][k]
+ *     upright[view][r][c] = sum over i, k of cubic(v - r) cubic(u - c) data[view][i][k]
  *
  * over the pixels that see a place within two rows and columns of (r, c). They lie within the
  * rectangle about the four corners of that square, taken the way back; where the way back has no
@@ -61,7 +61,7 @@ KERNEL void upright_spread(
       const lanes_int inside = k < bins && depth > 0 && u >= 1.0f &&
           u < (real)(upright_bins - 2) && v >= 1.0f && v < (real)(upright_rows - 2);
       const lanes_int there = k < bins ? k : bins - 1;
-      const lanes weight = keys(u - column) * keys(v - (real)r);
+      const lanes weight = cubic(u - column) * cubic(v - (real)r);
       sum = sum + (inside ? weight : 0) * GATHER(pixels + (long)i * bins, there);
     }
   __global real *out = upright + ((long)view * upright_rows + r) * upright_bins + c0;

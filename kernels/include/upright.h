@@ -6,7 +6,12 @@
  *     u = (h0 + h1 k + h2 i) / (h6 + h7 k + h8 i),   v = (h3 + h4 k + h5 i) / (the same),
  *
  * k, i, u and v counted from the middles of both detectors. A pixel's value is the upright view's,
- * interpolated by Keys' cubic (IEEE Trans. ASSP 29, 1153, 1981) along both axes. */
+ * interpolated by Keys' cubic (IEEE Trans. ASSP 29, 1153, 1981) along both axes, or with SPLINE 1 the
+ * sum of cubic B-splines, of which the upright view has the factors (spline_coefficients.cl). */
+
+#ifndef SPLINE
+#define SPLINE 0
+#endif
 
 /* Numbers of a view: the forms, then those of the way back from (v, u) to (i, k). */
 #define VIEW_FORMS 18
@@ -19,6 +24,16 @@ static lanes keys(lanes d) {
   const lanes zero = 0;
   return a < 1.0f ? near : (a < 2.0f ? far : zero);
 }
+
+static lanes spline(lanes d) {
+  const lanes a = absolute(d), rest = 2.0f - a;
+  const lanes near = (4.0f + a * a * (3.0f * a - 6.0f)) * (real)(1.0 / 6.0);
+  const lanes far = rest * rest * rest * (real)(1.0 / 6.0);
+  const lanes zero = 0;
+  return a < 1.0f ? near : (a < 2.0f ? far : zero);
+}
+
+static lanes cubic(lanes d) { return SPLINE ? spline(d) : keys(d); }
 
 /* The derivative of keys. */
 static lanes keys_slope(lanes d) {

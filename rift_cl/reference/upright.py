@@ -1,8 +1,8 @@
 """What the pixels of tilted detectors read of upright ones, as a matrix.
 
 A pixel's ray is followed to the plane of the upright detector behind the same source, and the view
-there is interpolated by Keys' cubic along rows and columns (R. G. Keys, IEEE Trans. ASSP 29, 1153,
-1981).
+there is interpolated along rows and columns: by Keys' cubic (R. G. Keys, IEEE Trans. ASSP 29, 1153,
+1981), or by the cubic spline through its samples.
 """
 
 from __future__ import annotations
@@ -15,20 +15,26 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-def reading_matrix(places: Floats, rows: int, bins: int) -> Any:
+def reading_matrix(places: Floats, rows: int, bins: int, *, spline: bool = False) -> Any:
     """The matrix from an upright view to the pixels that see these places.
 
     Args:
         places: (row, column) of each pixel's ray on the upright detector, (pixels, 2).
         rows: of the upright detector.
         bins: of each of its rows.
+        spline: interpolate by the cubic spline in the place of Keys' cubic.
 
     Returns:
         (pixels, rows * bins) float64; pixels that are not wholly inside read nothing.
     """
     size = np.array([rows, bins])
     inside = np.asarray(((places >= 1) & (places < size - 2)).all(axis=1))
-    by_row, by_column = (keys(places[:, axis, None] - np.arange(size[axis])) for axis in (0, 1))
+    by_row, by_column = (
+        (cubic_b_spline if spline else keys)(places[:, axis, None] - np.arange(size[axis]))
+        for axis in (0, 1)
+    )
+    if spline:
+        by_row, by_column = by_row @ spline_factors(rows), by_column @ spline_factors(bins)
     weights = by_row[:, :, None] * by_column[:, None, :] * inside[:, None, None]
     return weights.reshape(len(places), -1)
 
@@ -40,6 +46,22 @@ def keys(distance: Floats) -> Floats:
     far = 2 + d * (-4 + d * (2.5 - 0.5 * d))
     weights: Floats = np.where(d < 1, near, np.where(d < 2, far, 0))
     return weights
+
+
+def cubic_b_spline(distance: Floats) -> Floats:
+    """The cubic B-spline about 0."""
+    d = np.abs(distance)
+    near, far = (4 + d**2 * (3 * d - 6)) / 6, np.maximum(0, 2 - d) ** 3 / 6
+    weights: Floats = np.where(d < 1, near, far)
+    return weights
+
+
+def spline_factors(count: int) -> Floats:
+    """The matrix from samples, zero beyond their ends, to the factors of the B-splines there."""
+    places = np.arange(count)
+    away = np.abs(places[:, None] - places)
+    factors: Floats = np.sqrt(3) * (np.sqrt(3) - 2.0) ** away
+    return factors
 
 
 def places_on_plane(

@@ -64,7 +64,7 @@ def rays(scan, view):
     return (pixels + scan.middle[view] - scan.source[view]).reshape(-1, 3)
 
 
-def matrices(scan, found, along_z):
+def matrices(scan, found, along_z, spline):
     """Matrices from each upright view to the pixels of its tilted one, by plane and ray alone."""
     axes = [0, 2, 1] if along_z else [0, 1, 2]
     upright = found.upright
@@ -75,19 +75,22 @@ def matrices(scan, found, along_z):
         ahead = np.array([-sine, cosine, 0.0]) * upright.source_to_detector
         foot = ahead - upright.center[1] * along - upright.center[0] * up
         places = places_on_plane(rays(scan, view)[:, axes], foot, along, up, ahead)
-        yield reading_matrix(places, upright.rows, upright.bins)
+        yield reading_matrix(places, upright.rows, upright.bins, spline=spline)
 
 
-def reading(device, scan, found):
+def reading(device, scan, found, *, spline=False):
     tilted, upright = (scan.rows, scan.bins), (found.upright.rows, found.upright.bins)
-    return Rectification(device, tilted, upright, found.views, found.forms, np.dtype(np.float32))
+    dtype = np.dtype(np.float32)
+    return Rectification(device, tilted, upright, found.views, found.forms, dtype, spline=spline)
 
 
-def test_reading_and_its_transpose_equal_the_matrices(device, case):
+@pytest.mark.each
+@pytest.mark.parametrize("spline", [False, True])
+def test_reading_and_its_transpose_equal_the_matrices(device, case, spline):
     scan, along_z = case
     found = rectified(GRID, scan, along_z=along_z)
     assert len(found.views) == scan.views
-    read = reading(device, scan, found)
+    read = reading(device, scan, found, spline=spline)
     random = np.random.default_rng(1)
     upright = random.standard_normal((scan.views, found.upright.rows, found.upright.bins))
     data = random.standard_normal((scan.views, scan.rows, scan.bins))
@@ -95,7 +98,7 @@ def test_reading_and_its_transpose_equal_the_matrices(device, case):
     read.read(device.array(upright, np.float32), out, 0, scan.views)
     back = device.empty(upright.shape)
     read.spread(device.array(data, np.float32), back, 0, scan.views)
-    wanted = list(matrices(scan, found, along_z))
+    wanted = list(matrices(scan, found, along_z, spline))
     for n, matrix in enumerate(wanted):
         assert matrix.any()
         np.testing.assert_allclose(out.get()[n].ravel(), matrix @ upright[n].ravel(), atol=3e-4)
@@ -121,6 +124,24 @@ def test_smooth_views_are_read_as_they_are(device):
         u, v = way @ [cosine, sine, 0.0], way[:, 2]
         wanted = np.exp(-(u**2 + v**2) / (2 * 6.0**2))
         np.testing.assert_allclose(out.get()[n].ravel(), wanted, atol=2e-3)
+
+
+@pytest.mark.parametrize(("spline", "kept"), [(True, 7 / 8), (False, 11 / 16)])
+def test_a_wave_of_three_samples_keeps_most_of_its_height_between_them(device, spline, kept):
+    rows, bins, count = 36, 44, 3
+    steps = np.arange(bins) * 2 * np.pi / 3 + np.array([[[0.0]], [[0.4]], [[1.1]]])
+    samples = np.broadcast_to(np.cos(steps), (count, rows, bins)).astype(np.float32)
+    aside = np.tile(np.eye(3)[[1, 2, 0]].reshape(9), 2)
+    aside[[0, 9]] = 0.5, -0.5
+    forms, views = np.tile(aside, (count, 1)), np.arange(count, dtype=np.int32)
+    read = Rectification(
+        device, (rows, bins), (rows, bins), views, forms, np.dtype(np.float32), spline=spline
+    )
+    out = device.empty(samples.shape)
+    read.read(device.array(samples), out, 0, count)
+    inner = np.s_[:, 14:-14, 14:-14]
+    wanted = np.broadcast_to(kept * np.cos(steps + np.pi / 3), samples.shape)
+    np.testing.assert_allclose(out.get()[inner], wanted[inner], atol=2e-6)
 
 
 def test_views_are_told_by_where_they_look():

@@ -18,7 +18,9 @@ import numpy as np
 import rift_cl as rift
 from bench.costs import Cost
 from bench.operations import Task
+from rift_cl.operators.projector.rectification import Rectification
 from rift_cl.reconstruct.direct.ray_factors import RayFactors
+from rift_cl.reconstruct.direct.upright_views import upright_cone
 
 _FAR, _MAGNIFICATION, _TILT = 3.0, 1.5, 0.02
 
@@ -145,6 +147,13 @@ CONE_COSTS: dict[str, Cost] = {
     ),
     "upright_read": _UPRIGHT,
     "upright_spread": _UPRIGHT,
+    "spline_coefficients": Cost(
+        "pixel",
+        56,
+        lambda c: c.pixels,
+        lambda c: 8 * c.pixels,
+        "56 flop per pixel: 13 multiply-adds to either side; bytes: both sides",
+    ),
     "fan_backproject": _RAY,
     "fan_project": _RAY,
     "fan_records": Cost(
@@ -169,6 +178,13 @@ _PLANES: dict[str, Cost] = {
 }
 
 
+def upright_reading(device: rift.Device, case: ConeCase) -> Rectification:
+    """What filtered backprojection reads of tilted detectors."""
+    _, forms = upright_cone(case.scan)
+    shape, views = (case.n, case.n), np.arange(case.views, dtype=np.int32)
+    return Rectification(device, shape, shape, views, forms, np.dtype(np.float32), spline=True)
+
+
 def cone_tasks(device: rift.Device, n: int, views: int) -> Iterator[Task]:
     """Both halves of every kind, and the weights of rays of filtered backprojection.
 
@@ -188,6 +204,10 @@ def cone_tasks(device: rift.Device, n: int, views: int) -> Iterator[Task]:
         y = device.array(random.random(A.range, np.float32))
         yield Task(f"{case.kind}, forward", case, partial(A, x), {**CONE_COSTS, **_PLANES})
         yield Task(f"{case.kind}, backward", case, partial(A.T, y), {**CONE_COSTS, **_PLANES})
+        if case.kind == "vectors":
+            reading, out = upright_reading(device, case), device.empty(A.range)
+            run = partial(reading.read, y, out, 0, case.views)
+            yield Task("vectors, read as upright views", case, run, CONE_COSTS)
         if case.kind == "cone":
             ones = np.ones((1, case.n))
             weights, out = RayFactors(device, np.float32, ones, ones), device.empty(A.range)

@@ -13,7 +13,11 @@ from rift_cl.cl.device import Device
 
 
 class Rectification:
-    """The map from upright views to those of tilted detectors, by Keys' cubic.
+    """The map from upright views to those of tilted detectors.
+
+    Keys' cubic reads sixteen samples. The cubic spline through all of them keeps waves of three
+    samples at 7/8 of their height where that keeps 11/16, for a pass along rows and columns before.
+    Projectors want shares of few samples, filtered backprojection wants sharp views.
 
     Args:
         device: where it runs.
@@ -22,6 +26,7 @@ class Rectification:
         views: (n,) int32, which views of the tilted data they are.
         forms: (n, 18), as ``kernels/include/upright.h`` reads them.
         dtype: of all arrays.
+        spline: interpolate by the cubic spline in the place of Keys' cubic.
     """
 
     def __init__(
@@ -32,10 +37,12 @@ class Rectification:
         views: NDArray[np.int32],
         forms: NDArray[np.float64],
         dtype: np.dtype[Any],
+        *,
+        spline: bool = False,
     ) -> None:
         self._device, (self._rows, self._bins), self._upright = device, tilted, upright
         self._host, self._dtype = (views, forms), dtype
-        self._double = int(dtype == np.float64)
+        self._double, self._spline = int(dtype == np.float64), spline
 
     @cached_property
     def _forms(self) -> DeviceArray:
@@ -62,6 +69,7 @@ class Rectification:
             (views[chosen] - run.start).astype(np.int32),
             forms[chosen],
             self._dtype,
+            spline=self._spline,
         )
 
     def read(
@@ -77,6 +85,8 @@ class Rectification:
             slope: 1 for derivatives by the upright views' column, 2 for those by their row.
         """
         work = self._bins, self._rows, count
+        if self._spline:
+            upright = self._filtered(self._filtered(upright, down=0), down=1)
         self._launch("upright_read", upright, data, first, work, SLOPE=slope)
 
     def spread(self, data: DeviceArray, upright: DeviceArray, first: int, count: int) -> None:
@@ -84,6 +94,29 @@ class Rectification:
         rows, bins = self._upright
         work = bins, rows, count
         self._launch("upright_spread", upright, data, first, work)
+        if self._spline:
+            down = self._filtered(upright, down=1)
+            self._filter(down, upright, down=0)
+
+    def _filtered(self, samples: DeviceArray, *, down: int) -> DeviceArray:
+        factors = self._device.empty(samples.shape, self._dtype)
+        self._filter(samples, factors, down=down)
+        return factors
+
+    def _filter(self, samples: DeviceArray, factors: DeviceArray, *, down: int) -> None:
+        """Write the B-splines' factors of upright views along an axis; its own transpose."""
+        count, rows, columns = samples.shape
+        lanes = self._device.traits.macros["LANES"]
+        self._device.launch(
+            "spline_coefficients",
+            (-(-columns // lanes), rows, count),
+            factors=factors,
+            samples=samples,
+            rows=rows,
+            columns=columns,
+            DOWN=down,
+            DOUBLE=self._double,
+        )
 
     def _launch(
         self,
@@ -107,6 +140,7 @@ class Rectification:
             bins=self._bins,
             upright_rows=self._upright[0],
             upright_bins=self._upright[1],
+            SPLINE=int(self._spline),
             DOUBLE=self._double,
             **macros,
         )

@@ -236,9 +236,9 @@ class _Weighting(LinearOperator):
 
     @property
     def scratch(self) -> int:
-        """Weighted and filtered projections, upright ones, and what the filter needs."""
+        """Weighted and filtered projections, upright ones twice, and what the filter needs."""
         upright, rays = (math.prod(shape) for shape in (self.domain, self.range))
-        numbers = 2 * rays + (upright if self._reading is not None else 0)
+        numbers = 2 * rays + (2 * upright if self._reading is not None else 0)
         return self.dtype.itemsize * numbers + self._filter.scratch
 
     @property
@@ -362,7 +362,7 @@ def _untilted(A: Projector, scan: Vectors) -> tuple[Cone, Rectification]:
             f"filtered backprojection wants a circular scan; {failure}; {ITERATE}"
         ) from None
     shape, views = (scan.rows, scan.bins), np.arange(scan.views, dtype=np.int32)
-    return cone, Rectification(A.device, shape, shape, views, forms, A.dtype)
+    return cone, Rectification(A.device, shape, shape, views, forms, A.dtype, spline=True)
 
 
 def _backprojector(A: Projector, scan: Fan | Cone) -> Projector:
