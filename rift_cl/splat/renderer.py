@@ -224,10 +224,10 @@ class Renderer:
             grad_image, grad_transmittance = _expected_depth_grad(
                 device, frame.raster, grad_image, grad_transmittance
             )
-        sums = draw_grad(device, frame.raster_pass, grad_image, grad_transmittance)
+        # The sums have no name here: they are the largest array but one, and wanted no longer then.
         gradients = project_grad(
             frame.projection,
-            sums,
+            draw_grad(device, frame.raster_pass, grad_image, grad_transmittance),
             with_camera=with_camera,
             depth_channel=frame.depth is not None,
         )

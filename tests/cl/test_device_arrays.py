@@ -8,7 +8,7 @@ import pytest
 import rift_cl as rift
 from rift_cl.cl import Device
 from rift_cl.cl.arithmetic import axpby
-from rift_cl.cl.host_arrays import as_device_array, is_device_array
+from rift_cl.cl.host_arrays import as_device_array, fetch, is_device_array
 from rift_cl.errors import DeviceError, DTypeError, ShapeError
 
 SHAPE = (4, 6)
@@ -131,3 +131,20 @@ def test_what_is_sent_past_the_queue_is_a_copy_made_at_once(device):
     axpby(device, 1.0, device.array(np.ones((10, 100), np.float32)), 2.0, sent)
     np.testing.assert_array_equal(device.get(sent), 2 * np.arange(1000).reshape(10, 100) + 1)
     assert device.send(np.empty((0, 3), np.float32)).shape == (0, 3)
+
+
+def test_arrays_of_one_shape_share_nothing(device):
+    one, other = device.array(np.zeros(SHAPE)), device.array(np.ones(SHAPE))
+    assert one.base_data != other.base_data and one.events is not other.events
+    assert device.get(one).sum() == 0 and device.get(other).sum() == 24
+    assert device.empty(5).shape == (5,) and device.empty((0, 4)).base_data is None
+    with pytest.raises(ValueError, match="negative"):
+        device.empty(-1)
+
+
+def test_fetched_numbers_are_those_of_the_moment_of_the_call(device):
+    numbers = device.array(np.arange(6.0))
+    found = fetch(device, numbers, 4)
+    axpby(device, 1.0, numbers, 1.0, numbers)
+    assert found().tolist() == found().tolist() == [0, 1, 2, 3]
+    assert device.get(numbers).tolist() == [0, 2, 4, 6, 8, 10]
