@@ -38,20 +38,9 @@
 /* Line integrals end at 4 standard deviations, wherever tiles lie: 3.4e-4 of a mass lies beyond. */
 #define ADDED_EDGE 8.0f
 
-/* exp(-sigma) or its smooth stand-in, of power = TO_POWER sigma. */
-static lanes falloff(lanes power) {
 #if SMOOTH
-  const lanes rest = 1.0f - power * (TO_SIGMA / SMOOTH_EDGE), left = rest > 0 ? rest : 0;
-  return power_of_two(power) * left * left;
-#elif ADDITIVE
-  return power >= TO_POWER * ADDED_EDGE ? power_of_two(power) : 0;
-#else
-  return power_of_two(power);
-#endif
-}
-
-#if SMOOTH
-/* -d falloff / d sigma, as a multiple of falloff; it is 1 for an exponential. */
+/* -d / d sigma of the smooth stand-in for exp(-sigma), as a multiple of it, of power = TO_POWER sigma; it
+ * is 1 for an exponential. */
 static lanes falloff_rate(lanes power) {
   const lanes left = SMOOTH_EDGE - TO_SIGMA * power;
   return 1.0f + 2.0f / (left > 1e-3f ? left : 1e-3f);

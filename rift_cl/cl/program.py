@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 _SMALL_GRID = 65534
 # Items of a group that know of each other: the kernel's driver in Python counts in groups as well.
 _COOPERATES = "get_local_id"
+# Such a kernel works in smaller groups as well where its launches say of how many items they would
+# like them: it then returns from groups that are one too many.
+_GROUP = "GROUP"
 # Ways in which PoCL compiles a kernel apart: for a large grid, and for a part of a grid.
 _Way = tuple[bool, bool]
 
@@ -199,12 +202,17 @@ class Programs:
     def _kernel(self, key: Key) -> _Kernel:
         kernel = self._own.kernels.get(key)
         if kernel is None:
-            group = self._device.traits.macros["GROUP"]
-            kernel = self._own.kernels[key] = self._built(key, group)
+            asked = dict(key[1]).get(_GROUP, self._device.traits.macros[_GROUP])
+            kernel = self._own.kernels[key] = self._built(key, int(asked))
         return kernel
 
     def _built(self, key: Key, group: int) -> _Kernel:
-        """A kernel in groups of ``group``, or of half as many items where these are too many."""
+        """A kernel in groups of ``group``, or of half as many items where these are too many.
+
+        Raises:
+            DeviceError: its groups are too large, or take too much local memory, in a kernel that
+                is not made for smaller ones.
+        """
         import pyopencl as cl
 
         name, macros = key
@@ -217,30 +225,29 @@ class Programs:
                 [each.dtype.type if each.lanes == 1 else None for each in found]
             )
             needs = kernel_needs(handle, self._device._handle)
-        self._check_local(name, needs)
-        if needs.group >= group:
+        fault = self._fault(needs, group)
+        if fault is None:
             return _Kernel(key, handle, found, group, self._started.setdefault(key, set()))
-        if group == 1 or _COOPERATES in kernel_source(name):
-            raise DeviceError(
-                f"{feature_of(name)}: works in groups of {group} work-items, and "
-                f"{self._device.name} runs it in groups of at most {needs.group}: use another "
-                "device (--device)"
-            )
-        smaller = {**dict(macros), "GROUP": str(group // 2)}
+        fixed = _COOPERATES in kernel_source(name) and _GROUP not in dict(macros)
+        if group == 1 or fixed:
+            raise DeviceError(f"{feature_of(name)}: {fault}: use another device (--device)")
+        smaller = {**dict(macros), _GROUP: str(group // 2)}
         return self._built((name, tuple(sorted(smaller.items()))), group // 2)
 
-    def _check_local(self, name: str, needs: KernelNeeds) -> None:
-        """Refuse a kernel that needs more local memory than there is.
-
-        Raises:
-            DeviceError: it does.
-        """
-        there = self._device.traits.local_memory
+    def _fault(self, needs: KernelNeeds, group: int) -> str | None:
+        """Why a kernel does not run on this device in groups of so many items; None if it does."""
+        there, device = self._device.traits.local_memory, self._device.name
         if needs.local_memory > there:
-            raise DeviceError(
-                f"{feature_of(name)}: needs {format_bytes(needs.local_memory)} of local memory, "
-                f"{self._device.name} has {format_bytes(there)}: use another device (--device)"
+            return (
+                f"needs {format_bytes(needs.local_memory)} of local memory, "
+                f"{device} has {format_bytes(there)}"
             )
+        if needs.group < group:
+            return (
+                f"works in groups of {group} work-items, and {device} runs it in groups of at most "
+                f"{needs.group}"
+            )
+        return None
 
 
 def _magnitudes(values: Iterable[Any]) -> tuple[int, ...]:

@@ -2,7 +2,8 @@
 
 ``kernels/splat/splat_raster_cpu.cl`` says what is computed, for Gaussians and for splats with
 Hermite modes, and ``kernels/splat/splat_raster_grad_cpu.cl`` how it is differentiated.
-Features of more than 32 channels are drawn 32 at a time, without modes alone.
+How a GPU's group shares a tile stands in ``kernels/include/group_tile.h``. Features of more than 32
+channels are drawn 32 at a time, on a GPU 8 at a time; without modes alone.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.host_arrays import as_device_array
+from rift_cl.cl.traits import smaller_group
 from rift_cl.errors import InputError, SettingError, ShapeError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.splat.orders import ModeOrders, check_order
@@ -27,6 +29,8 @@ MOMENTS = 6
 RECORD_NUMBERS, RECORD_FEATURES = 16, 5
 # The most channels that the kernels are made for.
 _CHANNELS = 32
+# Those of one launch for Gaussians on a GPU, where registers are few; and its largest group.
+_GROUP_CHANNELS, _GROUP = 8, 256
 _TILES = (8, 16, 32)
 _ACTIVATIONS: dict[Activation, int] = {"clamp": 0, "exp": 1, "square": 2}
 
@@ -229,16 +233,16 @@ def rasterize(
         device.empty((height, width)),
         device.empty((height, width), np.int32),
     )
-    for first, count in _channel_runs(channels):
+    for first, count in _channel_runs(device, splats):
         device.launch(
-            _kernel(device, splats, "raster"),
-            _work(device, lists, settings, per_pixel=True),
+            _kernel(device, "raster"),
+            _work(device, lists, settings),
             image=raster.image,
             transmittance=raster.transmittance,
             last=raster.last,
             **_drawn(device, splats, background, lists, size, settings),
-            **_channels(device, splats, first, count),
-            **_macros(splats, settings),
+            **_channels(splats, first, count),
+            **_macros(device, splats, settings, count),
         )
     return raster
 
@@ -284,22 +288,20 @@ def raster_grad(
         record = splats.modes.record_length(channels, settings)
     slots = device.empty((lists.n_entries, record))
     live = device.zeros(lists.n_entries, np.uint8)
-    if not device.traits.is_cpu:
-        live = device.array(np.ones(lists.n_entries, np.uint8))
-    nothing = device.zeros((height, width)) if channels > _CHANNELS else grad_transmittance
-    for first, count in _channel_runs(channels):
+    nothing = device.zeros((height, width)) if channels > _GROUP_CHANNELS else grad_transmittance
+    for first, count in _channel_runs(device, splats):
         device.launch(
-            _kernel(device, splats, "raster_grad"),
-            _work(device, lists, settings, per_pixel=False),
+            _kernel(device, "raster_grad"),
+            _work(device, lists, settings, group=_group(device, settings, count)),
             slots=slots,
-            live=live if device.traits.is_cpu else None,
+            live=live,
             grad_image=grad_image,
             grad_transmittance=nothing if first else grad_transmittance,
             transmittance=raster.transmittance,
             last=raster.last,
             **_drawn(device, splats, background, lists, (height, width), settings),
-            **_channels(device, splats, first, count),
-            **_macros(splats, settings),
+            **_channels(splats, first, count),
+            **_macros(device, splats, settings, count),
             ABSGRAD=int(settings.absgrad),
         )
     return SlotRecords(slots, live)
@@ -357,25 +359,34 @@ def _background(device: Device, background: DeviceArray | None, channels: int) -
     return as_device_array(device, background, (channels,), name="background")
 
 
-def _channel_runs(channels: int) -> Iterator[tuple[int, int]]:
-    for first in range(0, channels, _CHANNELS):
-        yield first, min(_CHANNELS, channels - first)
+def _channel_runs(device: Device, splats: ScreenSplats) -> Iterator[tuple[int, int]]:
+    """The first channel and the number of channels of each launch."""
+    channels = splats.features.shape[1]
+    few = not device.traits.is_cpu and splats.modes is None
+    most = _GROUP_CHANNELS if few else _CHANNELS
+    for first in range(0, channels, most):
+        yield first, min(most, channels - first)
 
 
-def _kernel(device: Device, splats: ScreenSplats, name: str) -> str:
-    if device.traits.is_cpu:
-        return f"splat_{name}_cpu"
-    return f"{'splat' if splats.modes is None else 'hermite'}_{name}_gpu"
+def _kernel(device: Device, name: str) -> str:
+    return f"splat_{name}_{'cpu' if device.traits.is_cpu else 'gpu'}"
 
 
 def _work(
-    device: Device, lists: TileLists, settings: SplatSettings, *, per_pixel: bool
+    device: Device, lists: TileLists, settings: SplatSettings, group: int | None = None
 ) -> tuple[int]:
     """Work-items: a CPU takes one for a tile; a GPU one for a pixel, or a group for a tile."""
-    tiles = lists.tiles.count
-    if device.traits.is_cpu:
-        return (tiles,)
-    return (tiles * (settings.tile**2 if per_pixel else device.traits.macros["GROUP"]),)
+    of_tile = 1 if device.traits.is_cpu else group or settings.tile**2
+    return (lists.tiles.count * of_tile,)
+
+
+def _group(device: Device, settings: SplatSettings, channels: int) -> int:
+    """Work-items of a GPU's group: one for each pixel of a tile, or of a part of one.
+
+    More channels than one launch of Gaussians has take local memory for as many more pixels.
+    """
+    room = _GROUP * _GROUP_CHANNELS // max(channels, _GROUP_CHANNELS)
+    return smaller_group(min(room, settings.tile**2, device.traits.group))
 
 
 def _drawn(
@@ -387,10 +398,8 @@ def _drawn(
     settings: SplatSettings,
 ) -> dict[str, DeviceArray | float | None]:
     """The arguments that compositing and its gradient share."""
-    cpu = device.traits.is_cpu
     return {
-        "screen": None if cpu else splats.screen,
-        "packed": splats.records if cpu else None,
+        "packed": splats.records,
         "modes": splats.modes.table if splats.modes else None,
         "features": splats.features,
         "background": background,
@@ -400,31 +409,27 @@ def _drawn(
         "width": size[1],
         "tiles_x": lists.tiles.across,
         "first_tile_row": lists.tiles.first_row,
+        "tiles": None if device.traits.is_cpu else lists.tiles.count,
         "cap": settings.alpha_cap,
     }
 
 
-def _channels(
-    device: Device, splats: ScreenSplats, first: int, count: int
-) -> dict[str, int | None]:
+def _channels(splats: ScreenSplats, first: int, count: int) -> dict[str, int]:
     """Which channels a launch does of those that the splats have."""
     channels = splats.features.shape[1]
-    if device.traits.is_cpu:
-        packed = channels <= RECORD_FEATURES
-        return {"stride": channels, "first": first, "CHANNELS": count, "PACKED": int(packed)}
-    numbered = splats.modes is None
-    return {
-        "stride": channels if numbered else None,
-        "first": first if numbered else None,
-        "CHANNELS": count,
-    }
+    inside = int(channels <= RECORD_FEATURES)
+    return {"stride": channels, "first": first, "CHANNELS": count, "PACKED": inside}
 
 
-def _macros(splats: ScreenSplats, settings: SplatSettings) -> dict[str, int]:
+def _macros(
+    device: Device, splats: ScreenSplats, settings: SplatSettings, channels: int
+) -> dict[str, int]:
     macros = {
         "TILE": settings.tile,
         "ADDITIVE": int(settings.mode == "xray"),
         "SMOOTH": int(settings.smooth_cutoff),
         "MODAL": int(splats.modes is not None),
     }
+    if not device.traits.is_cpu:
+        macros["GROUP"] = _group(device, settings, channels)
     return macros | (splats.modes.macros(settings) if splats.modes else {})

@@ -145,9 +145,9 @@ MODE_COSTS: dict[str, Cost] = {
         "parameters, modes, table and moments in, gradients and sums out",
     ),
     "splat_raster_cpu": _raster(_FORWARD, False),
-    "hermite_raster_gpu": _raster(_FORWARD, False),
+    "splat_raster_gpu": _raster(_FORWARD, False),
     "splat_raster_grad_cpu": _raster(_BACKWARD, True),
-    "hermite_raster_grad_gpu": _raster(_BACKWARD, True),
+    "splat_raster_grad_gpu": _raster(_BACKWARD, True),
     "lobe_shade": _per_splat(3 + _LOBE + 3, "position, coefficients and lobes in, colour out"),
     "lobe_shade_grad": _per_splat(6 + 2 * _LOBE + 6, "the same and gradients, in and out"),
     "hermite_dilate": _per_splat(
