@@ -1,4 +1,4 @@
-"""Does a driver compute the same numbers as PoCL? 16 families of kernels, a table, an exit status.
+"""Does a driver compute the same numbers as PoCL? Families of kernels, a table, an exit status.
 
     python tools/compare_drivers.py --device intel            # beside PoCL in the same environment
     python tools/compare_drivers.py --device pocl --as-gpu    # one lane, groups of 64

@@ -17,7 +17,7 @@ def test_a_family_differs_as_its_worst_array(tool):
 def test_families_after_one_that_failed_still_run(tool):
     run_families = tool("portability.family_runs").run_families
     options = {"device": None, "as_gpu": False, "tiny": True, "limit": 250}
-    absent, sums = run_families(["absent", "reductions"], **options)
+    absent, sums = run_families(["absent", "sums"], **options)
     assert absent.arrays is None and "absent" in absent.fault
     assert sums.arrays.keys() == {"sums"} and not sums.fault
 
@@ -25,7 +25,7 @@ def test_families_after_one_that_failed_still_run(tool):
 def test_a_driver_is_compared_with_what_was_saved(tool, tmp_path, capsys):
     compare = tool("compare_drivers")
     kept = tmp_path / "kept.npz"
-    options = {"only": ("reductions",), "tiny": True}
+    options = {"only": ("sums",), "tiny": True}
     assert compare.main(compare.Options(save=kept, **options)) == 0
     assert compare.main(compare.Options(against=str(kept), **options)) == 0
     assert "=" in capsys.readouterr().out

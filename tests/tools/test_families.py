@@ -6,13 +6,12 @@ With ``--record-kernels`` it shows ``tools/compile_gate.py`` most kernels with m
 import pytest
 
 import rift_cl as rift
+from rift_cl.commands.devices.families import FAMILIES
 
 # Their many kernels are compiled by the tests of the packages too.
-_SLOW = ("fast", "splats", "hermite")
-_FAMILIES = (
-    *("fbp", "adjoint", "footprints", "stack", "double", "solvers", "sorting", "lobes", "voxels"),
-    *("loss", "spectrum", "sampling", "reductions", *_SLOW),
-)
+_SLOW = ("fast", "splats", "Hermite splats", "cameras", "orders")
+_OWN = ("adjoint", "footprints", "stack", "double", "solvers", "sorting", "lobes", "strips")
+_FAMILIES = (*FAMILIES, *_OWN, "odd_sizes", "fast", "cameras", "orders")
 
 
 def test_all_are_here(tool):

@@ -1,32 +1,37 @@
-"""Fixed problems of every family of kernels: 16 functions from a device to named arrays.
+"""Fixed problems of every family of kernels: functions from a device to named arrays.
 
-They are small, their input is the same on every device, and between them they launch nearly every
-kernel. `families.py` runs them and compares what two drivers give.
+Those that `rift devices` tries a driver on, and others that are larger or take settings that these
+do not. Their input is the same on every device, and between them they launch nearly every kernel.
+`family_runs.py` runs them, and `differences.py` compares what two drivers give.
 """
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 import rift_cl as rift
-from rift_cl import coverage
 from rift_cl.basis import angular_basis
-from rift_cl.cl.reductions import dot, norm, total
+from rift_cl.commands.devices import families
 from rift_cl.operators.fourier.spectrum import SpectralFilter
-from rift_cl.sampling import Observations, Target
-from rift_cl.sampling.coverage.device import coverage_grad
-from rift_cl.splat import SplatGradients, shade, shade_grad, voxelise
+from rift_cl.splat import SplatGradients, shade, shade_grad
 from rift_cl.splat.orders import count_of
 from rift_cl.splat.tile_lists import Tiles, tile_lists
 from rift_cl.train import ImageLoss
 
 Arrays = dict[str, np.ndarray]
 Problem = Callable[[rift.Device, bool], Arrays]
-FAMILIES: dict[str, Problem] = {}
+
+
+def _of_one_size(family: Callable[[rift.Device], Arrays]) -> Problem:
+    return lambda device, tiny: family(device)
+
+
+FAMILIES: dict[str, Problem] = {
+    name: _of_one_size(family) for name, family in families.FAMILIES.items()
+}
 _FOCAL = {"pinhole": 60.0, "ortho": 16.0, "fisheye": 50.0}
 
 
@@ -53,19 +58,6 @@ def _products(A: Any, x: np.ndarray) -> np.ndarray:
     y = _noise(A.range, x.dtype, seed=2)
     sides = (np.vdot(A(x).astype(float), y), np.vdot(x.astype(float), A.T(y)))
     return np.array(sides)
-
-
-@_family
-def fbp(device: rift.Device, tiny: bool) -> Arrays:
-    """Projection, backprojection and filtered backprojection of the head phantom."""
-    grid, A = _projector(device, tiny)
-    y = A(rift.phantom.shepp_logan(grid))
-    return {
-        "projections": y,
-        "adjoint": A.T(y),
-        "fbp": rift.fbp(A, y, filter="shepp-logan"),
-        "backproject": rift.backproject(A, y),
-    }
 
 
 @_family
@@ -152,9 +144,9 @@ def sorting(device: rift.Device, tiny: bool) -> Arrays:
 
 
 @_family
-def splats(device: rift.Device, tiny: bool) -> Arrays:
+def cameras(device: rift.Device, tiny: bool) -> Arrays:
     """Images of Gaussian splats and every gradient, by camera and by setting."""
-    scene = _splats(40 if tiny else 800, coefficients=4, wide=0.8)
+    scene = _scene(40 if tiny else 800, coefficients=4, wide=0.8)
     given = rift.Splats.upload(device, **scene)
     found = {}
     for model in ("ortho", "fisheye"):
@@ -172,7 +164,7 @@ def splats(device: rift.Device, tiny: bool) -> Arrays:
 
 
 @_family
-def hermite(device: rift.Device, tiny: bool) -> Arrays:
+def orders(device: rift.Device, tiny: bool) -> Arrays:
     """Splats with Hermite modes of shape and colour, their squares and X-rays of them."""
     found = {}
     for shape, color in ((1, 1), (2, 0), (3, 1)):
@@ -196,26 +188,21 @@ def lobes(device: rift.Device, tiny: bool) -> Arrays:
         table = shade(device, means, linear, camera, culled, **options)
         incoming = device.array(_noise(table.shape, seed=3))
         by_means = device.array(np.zeros(means.shape, np.float32))
-        parts = device.array(np.zeros((len(means), 16), np.float32))
+        parts = device.array(np.zeros((device.traits.runs(len(means)), 16), np.float32))
         into = SplatGradients(by_means, None, None, None, None, incoming, None, None, parts)
         by_lobes = device.empty(shapes.shape)
         options |= {"features": table, "gradients": into, "grad_lobes": by_lobes}
         by_linear = shade_grad(device, means, linear, camera, **options)
         arrays = {"colors": table, "by linear": by_linear, "by lobes": by_lobes}
-        arrays |= {"by means": by_means, "by camera": parts}
         found |= {f"{kind} {name}": device.get(array) for name, array in arrays.items()}
+        found[f"{kind} by means"] = device.get(by_means)
+        # A row for each run of splats, which are longer on some devices.
+        found[f"{kind} by camera"] = device.get(parts).sum(axis=0, dtype=float)
     return found
 
 
 @_family
-def voxels(device: rift.Device, tiny: bool) -> Arrays:
-    """Densities with Hermite modes of order 2 summed at voxels."""
-    given = rift.Splats.upload(device, **_modal(30, 2, 0))
-    return {"volume": device.get(voxelise(device, given, rift.Grid((20, 24, 28), spacing=0.1)))}
-
-
-@_family
-def loss(device: rift.Device, tiny: bool) -> Arrays:
+def strips(device: rift.Device, tiny: bool) -> Arrays:
     """L1 and SSIM with their gradient, images of one and of several strips."""
     found = {}
     for size in ((11, 11), (12, 86)) if tiny else ((11, 11), (12, 86), (13, 200), (97, 143)):
@@ -231,7 +218,7 @@ def loss(device: rift.Device, tiny: bool) -> Arrays:
 
 
 @_family
-def spectrum(device: rift.Device, tiny: bool) -> Arrays:
+def odd_sizes(device: rift.Device, tiny: bool) -> Arrays:
     """A filter by fast Fourier transforms of odd sizes."""
     found = {}
     for size in ((13, 17),) if tiny else ((96, 81), (130, 47)):
@@ -240,28 +227,7 @@ def spectrum(device: rift.Device, tiny: bool) -> Arrays:
     return found
 
 
-@_family
-def sampling(device: rift.Device, tiny: bool) -> Arrays:
-    """Coverage of the Fourier domain by views, and its gradient."""
-    random, shape = np.random.default_rng(0), (23, 2)
-    direction = random.normal(size=(*shape, 3))
-    direction /= np.linalg.norm(direction, axis=2, keepdims=True)
-    optics = [random.uniform(*ends, shape) for ends in ((0.5, 1.5), (0, 0.2), (2, 8), (0, 1.5))]
-    views = Observations(direction, *optics)
-    target = Target((0, 0, 0), 3.0, points=[[0.1, 0, 0], [-0.5, 0.2, 0.4]])
-    density = coverage(views, target, device=device)
-    gradient = coverage_grad(views, target, random.normal(size=density.shape), device=device)
-    return {"coverage": density} | dict(_arrays(device, gradient, "by "))
-
-
-@_family
-def reductions(device: rift.Device, tiny: bool) -> Arrays:
-    """Sums over vectors longer than a group."""
-    x = device.array(_noise((1003 if tiny else 1000003,)))
-    return {"sums": np.array([dot(device, x, x), total(device, x), norm(device, x)])}
-
-
-def _splats(count: int, *, coefficients: int, wide: float, least: float = 0.005) -> Arrays:
+def _scene(count: int, *, coefficients: int, wide: float, least: float = 0.005) -> Arrays:
     random = np.random.default_rng(0)
     values = {
         "means": random.uniform(-wide, wide, (count, 3)),
@@ -274,7 +240,7 @@ def _splats(count: int, *, coefficients: int, wide: float, least: float = 0.005)
 
 
 def _modal(count: int, shape: int, color: int) -> Arrays:
-    values = _splats(count, coefficients=4, wide=1.0, least=0.05)
+    values = _scene(count, coefficients=4, wide=1.0, least=0.05)
     values["shape_modes"] = 0.3 * _noise((count, count_of(shape) - 1), seed=50)
     if color:
         values["color_modes"] = 0.3 * _noise((count, count_of(color) - 1, 3), seed=51)
@@ -322,17 +288,4 @@ def _drawn(
         f"{prefix}image": device.get(frame.image),
         f"{prefix}transmittance": device.get(frame.transmittance),
     }
-    return found | dict(_arrays(device, gradients, f"{prefix}by "))
-
-
-def _arrays(device: rift.Device, record: Any, prefix: str) -> Iterator[tuple[str, np.ndarray]]:
-    """The arrays in a dataclass or a named tuple and in those that it holds."""
-    names = getattr(record, "_fields", None) or [f.name for f in dataclasses.fields(record)]
-    for name in names:
-        value = getattr(record, name)
-        if isinstance(value, np.ndarray):
-            yield prefix + name, value
-        elif hasattr(value, "_fields") or dataclasses.is_dataclass(value):
-            yield from _arrays(device, value, f"{prefix}{name} ")
-        elif value is not None:
-            yield prefix + name, device.get(value)
+    return found | dict(families.arrays_of(f"{prefix}by ", device, gradients))

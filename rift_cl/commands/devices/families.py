@@ -1,8 +1,9 @@
 """Small problems, one for each family of kernels, whose results are known.
 
-A driver is tried on them when it is first met. The results in ``families.npz`` are those of PoCL,
-which the tests hold to float64 twins; ``tools/make_family_results.py`` makes them. Inputs come from
-whole numbers, so that they are the same bits with every NumPy.
+A driver is tried on them when it is first met, and ``tools/compare_drivers.py`` runs them beside
+larger ones. The results in ``families.npz`` are those of PoCL, which the tests hold to float64
+twins; ``tools/make_family_results.py`` makes them. Inputs come from whole numbers, so that they are
+the same bits with every NumPy.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.host_arrays import is_device_array
 from rift_cl.cl.reductions import dot, norm, total
-from rift_cl.geometry import Camera, Grid, Parallel
+from rift_cl.geometry import Camera, Cone, Fan, Grid, Parallel
 from rift_cl.operators import Projector
 from rift_cl.operators.fourier.spectrum import SpectralFilter
 from rift_cl.reconstruct import backproject, fbp
@@ -35,11 +36,23 @@ STORED = Path(__file__).with_name("families.npz")
 
 
 def tomography(device: Device) -> Results:
-    """Projection, its adjoint, and filtered backprojection."""
-    grid = Grid((32, 32), spacing=0.1)
-    A = Projector(grid, Parallel(np.arange(24) * np.pi / 24, bins=48, pitch=0.1), device=device)
-    y = np.asarray(A(_numbers(1, 32, 32)))
-    return {"projection": y, "backprojection": backproject(A, y), "fbp": fbp(A, y)}
+    """Projection, its adjoint, and filtered backprojection, of parallel beams."""
+    scan = Parallel(np.arange(24) * np.pi / 24, bins=48, pitch=0.1)
+    return _tomography(Projector(Grid((32, 32), spacing=0.1), scan, device=device))
+
+
+def fan(device: Device) -> Results:
+    """The same of a fan."""
+    angles = np.arange(24) * np.pi / 12
+    scan = Fan(angles, bins=40, pitch=0.15, source_to_axis=5.0, source_to_detector=8.0)
+    return _tomography(Projector(Grid((24, 24), spacing=0.1), scan, device=device))
+
+
+def cone(device: Device) -> Results:
+    """The same of a cone, by the method of Feldkamp, Davis and Kress."""
+    angles = np.arange(12) * np.pi / 6
+    scan = Cone(angles, 20, 28, 0.15, source_to_axis=5.0, source_to_detector=8.0)
+    return _tomography(Projector(Grid((16, 16, 16), spacing=0.1), scan, device=device))
 
 
 def splats(device: Device) -> Results:
@@ -93,6 +106,8 @@ def sums(device: Device) -> Results:
 
 FAMILIES: dict[str, Callable[[Device], Results]] = {
     "tomography": tomography,
+    "fan": fan,
+    "cone": cone,
     "splats": splats,
     "Hermite splats": hermite_splats,
     "voxels": voxels,
@@ -139,6 +154,11 @@ def _numbers(seed: int, *shape: int) -> NDArray[np.float32]:
     return ((x >> np.uint64(8)) / 2.0**24).astype(np.float32).reshape(shape)
 
 
+def _tomography(A: Projector) -> Results:
+    y = np.asarray(A(_numbers(1, *A.domain)))
+    return {"projection": y, "backprojection": backproject(A, y), "fbp": fbp(A, y)}
+
+
 def _modes() -> NDArray[np.float32]:
     return 0.4 * (_numbers(6, 30, 9) - 0.5)
 
@@ -161,14 +181,14 @@ def _drawn(device: Device, values: dict[str, NDArray[np.float32]]) -> Results:
     frame = renderer.forward(Splats.upload(device, **values), camera)
     seed = device.array(_numbers(9, *frame.image.shape) - 0.5)
     found = {"image": device.get(frame.image), "transmittance": device.get(frame.transmittance)}
-    return found | dict(_arrays("", device, renderer.backward(frame, seed)))
+    return found | dict(arrays_of("", device, renderer.backward(frame, seed)))
 
 
-def _arrays(before: str, device: Device, record: Any) -> Iterator[tuple[str, NDArray[Any]]]:
-    """The device arrays of a record and of the records in it, by their names."""
+def arrays_of(before: str, device: Device, record: Any) -> Iterator[tuple[str, NDArray[Any]]]:
+    """The device arrays of a record and of the records in it, by their names after a prefix."""
     for field in dataclasses.fields(record):
         value = getattr(record, field.name)
         if is_device_array(value):
             yield f"{before}{field.name}", device.get(value)
         elif dataclasses.is_dataclass(value):
-            yield from _arrays(f"{before}{field.name}.", device, value)
+            yield from arrays_of(f"{before}{field.name}.", device, value)
