@@ -71,7 +71,7 @@ typedef struct {
 
 /* The first reason that holds is why a splat is not drawn. */
 static lanes_int or_else(lanes_int code, lanes_int holds, int reason) {
-  return (code == VISIBLE) & holds ? (lanes_int)reason : code;
+  return ((code == VISIBLE) & holds) ? (lanes_int)reason : code;
 }
 
 /* matrix * v, and transposed matrix * v. */

@@ -64,4 +64,4 @@ static lanes held(lanes x, float low, float high) {
   return above < high ? above : high;
 }
 
-static lanes if_free(lanes x, float low, float high, lanes slope) { return (x > low) & (x < high) ? slope : 0; }
+static lanes if_free(lanes x, float low, float high, lanes slope) { return ((x > low) & (x < high)) ? slope : 0; }

@@ -66,7 +66,8 @@ static lanes3 sum_of_functions(
 static lanes3 color_of(lanes3 sum, lanes_int drawn) {
   const lanes_int shown = drawn & !no_numbers(sum);
   return lanes3_of(
-      shown & (sum.x > 0) ? sum.x : 0, shown & (sum.y > 0) ? sum.y : 0, shown & (sum.z > 0) ? sum.z : 0);
+      (shown & (sum.x > 0)) ? sum.x : 0, (shown & (sum.y > 0)) ? sum.y : 0,
+      (shown & (sum.z > 0)) ? sum.z : 0);
 }
 
 static lanes_int is_seen(lanes3 color) { return (color.x > 0) | (color.y > 0) | (color.z > 0); }

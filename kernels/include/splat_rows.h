@@ -118,7 +118,7 @@ static void write_ints(
 
 /* A table of one column. */
 static lanes read_numbers(__global const float *p, Rows rows) {
-  lanes v;
+  lanes v = 0;
   read_columns(p, 1, 0, 1, rows, &v);
   return v;
 }
@@ -143,7 +143,7 @@ static void write3(__global float *table, const int stride, Rows rows, lanes3 v)
 /* A table of one byte to a row, as whole numbers. */
 static lanes_int read_bytes(__global const uchar *p, Rows rows) {
 #if LANES == 8
-  lanes_int v;
+  lanes_int v = 0;
   for (int l = 0; l < LANES; l++) ((int *)&v)[l] = p[rows.first + (l < rows.count ? l : rows.count - 1)];
   return v;
 #else

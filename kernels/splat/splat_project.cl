@@ -52,7 +52,7 @@ static lanes_int whole_below(lanes v, float most) {
 
 static lanes_int whole_above(lanes v, float most) {
   const lanes_int below = whole_below(v, most);
-  return (TO_FLOAT(below) < most) & (TO_FLOAT(below) < v) ? below + 1 : below;
+  return ((TO_FLOAT(below) < most) & (TO_FLOAT(below) < v)) ? below + 1 : below;
 }
 
 #if MODAL
