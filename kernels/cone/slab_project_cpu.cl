@@ -10,6 +10,11 @@
  * into lanes. No atomics, one order of summation. Views are grouped since each of them reads the
  * same slab, which is then in the cache.
  *
+ * What holds it (Zen 4, PoCL, 128^3 voxels): half of the time goes into the blend of lines, half into
+ * that of rows, where each number is loaded and transposed besides its multiply-adds, and each z asks
+ * whether a row is done. Tried, and slower: lines without the third column where its share is zero,
+ * and rows of 16 columns at a time.
+ *
  * The volume is that of slab_backproject_cpu; its z behind the last are zeros. */
 
 #include "include/portable.h"
