@@ -18,6 +18,10 @@
 #ifndef BATCH
 #define BATCH (STAGED_NUMBERS < 16 ? 256 : STAGED_NUMBERS < 64 ? 64 : STAGED_NUMBERS < 256 ? 32 : 8)
 #endif
+/* With PACKED all channels of an image are in the splats' records (screen_record.h). */
+#ifndef PACKED
+#define PACKED 0
+#endif
 #define PACKED_FEATURES (PACKED ? CHANNELS : 0)
 /* Rounds between asking for a splat's record and reading it: splats lie anywhere in memory. */
 #define ROUNDS_AHEAD 3

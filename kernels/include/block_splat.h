@@ -13,6 +13,9 @@
  * SMOOTH, for tests, knows no thresholds; a Gaussian, which ends at 3.33 standard deviations, then
  * fades to zero at SMOOTH_EDGE with a continuous slope, and modes reach farther. */
 
+/* Whether the exponent says at once if a splat counts; what is not counted may be any number. */
+#define JUDGED_BY_POWER (SHAPE_ORDER == 0 && !SMOOTH && !ADDITIVE)
+/* A Gaussian that fades, see above. */
 #define FADES (SMOOTH && !MODAL)
 /* log2 of LEAST_DENSITY. */
 #define LEAST_SEEN (ACTIVATION == CLAMP ? -7.99435344f : -7.99152702f)
@@ -53,7 +56,9 @@ static Sight see_splat(const Batch *batch, int k, lanes px, lanes py) {
 
 /* exp(-sigma) times the weight, of power = peak + TO_POWER sigma. */
 static lanes falloff_of(lanes power, float peak) {
-#if FADES
+#if JUDGED_BY_POWER
+  return two_to_about(power);
+#elif FADES
   const lanes rest = 1.0f - (power - peak) * (TO_SIGMA / SMOOTH_EDGE), left = rest > 0 ? rest : 0;
   return two_to_the(power) * left * left;
 #else
@@ -88,7 +93,7 @@ static lanes_int splat_counts(lanes power, lanes density, float peak) {
   return power == power;
 #elif ADDITIVE
   return power >= peak + LEAST_POWER;
-#elif SHAPE_ORDER == 0 && !SMOOTH
+#elif JUDGED_BY_POWER
   return power >= LEAST_SEEN;
 #else
   return density >= LEAST_DENSITY;

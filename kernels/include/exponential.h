@@ -27,8 +27,8 @@ static lanes power_of_two(lanes x) {
 }
 
 /* 2^x for x < 127 as 2^f 2^i with i the nearest whole number, which adding 1.5 * 2^23 leaves in the
- * lowest bits, and f in [-1/2, 1/2]: relative error 7.5e-8 before rounding, fewer steps than
- * power_of_two. Where x is no number it is next to nothing as well. */
+ * lowest bits, and f in [-1/2, 1/2]; fewer steps than power_of_two. Below -126, or where x is no
+ * number, it is next to nothing. Relative error 7.5e-8 before rounding. */
 static lanes two_to_the(lanes x) {
   x = x > -126.0f ? x : -126.0f;
   const lanes shifted = x + 12582912.0f, f = x - (shifted - 12582912.0f);
@@ -37,6 +37,16 @@ static lanes two_to_the(lanes x) {
   value = value * f + 0.2402212024f;
   value = value * f + 0.693146944f;
   value = value * f + 1.00000012f;
+  return AS_LANES(AS_INT(value) + (AS_INT(shifted) << 23));
+}
+
+/* The same with a relative error of 2.6e-6, for -126 <= x < 127; elsewhere any number, or none. */
+static lanes two_to_about(lanes x) {
+  const lanes shifted = x + 12582912.0f, f = x - (shifted - 12582912.0f);
+  lanes value = 0.00957010956f * f + 0.0559178988f;
+  value = value * f + 0.24024745f;
+  value = value * f + 0.69312181f;
+  value = value * f + 0.999999261f;
   return AS_LANES(AS_INT(value) + (AS_INT(shifted) << 23));
 }
 

@@ -3,19 +3,15 @@
  *
  * A vector of eight lanes is 4 x 2 pixels: splats are round, or needles at any angle, so that a
  * block this shape wastes fewer lanes than rows of eight (78 % of them are used by a fitted scene,
- * 64 % of 8 x 1). VECTORS of them, one below the other, are a block; more amortise what a block and
- * a splat cost together, fewer keep many channels in registers. Launches for one image after the
- * other have the same blocks, as what one left in a slot the next adds to. Blocks are numbered down
- * the tile, column of blocks after column.
+ * 64 % of 8 x 1). VECTORS of them, one below the other, are a block, which amortises what a block
+ * and a splat cost together. It is the same for any number of channels, so that a channel has the
+ * same bits alone and among others, and what one launch left in a slot the next can add to. Blocks
+ * are numbered down the tile, column of blocks after column.
  *
  * An image has `stride` channels, of which CHANNELS from `first` on are looked at. */
 
-/* With PACKED all channels of an image are in the splats' records (screen_record.h). */
-#ifndef PACKED
-#define PACKED 0
-#endif
 #ifndef VECTORS
-#define VECTORS (PACKED && CHANNELS <= 4 ? 4 : 2)
+#define VECTORS 4
 #endif
 #define ROWS (2 * VECTORS)
 #define ACROSS (TILE / 4)
@@ -37,11 +33,18 @@ static lanes block_y(int block) {
   return block % DOWN * ROWS + (lanes)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f);
 }
 
-/* The pixel of a lane in the image; below zero outside. */
-static long pixel_of(Window window, int block, int vector, int lane) {
-  const int x = window.x + block / DOWN * 4 + lane % 4;
-  const int y = window.y + block % DOWN * ROWS + 2 * vector + lane / 4;
-  return x < window.width && y < window.height ? (long)y * window.width + x : -1;
+/* A block's pixels that the image has: `across` of each of `down` rows, from pixel `first` on. Lane
+ * row % 2 * 4 + column of vector row / 2 holds one. */
+typedef struct {
+  long first;
+  int across, down;
+} Rows;
+
+static Rows rows_of(Window window, int block) {
+  const int x = window.x + block / DOWN * 4, y = window.y + block % DOWN * ROWS;
+  const int right = window.width - x, below = window.height - y;
+  const Rows rows = {(long)y * window.width + x, right < 4 ? right : 4, below < ROWS ? below : ROWS};
+  return rows;
 }
 
 static int any_positive(lanes_int v) {

@@ -36,17 +36,41 @@
 /* Pixels that nothing hides yet; the blocks that have some are returned, a bit for each. */
 static ulong clear_blocks(lanes (*state)[VECTORS][1 + CHANNELS], lanes_int (*end)[VECTORS], Window window) {
   ulong going = 0;
-  for (int block = 0; block < BLOCKS; block++)
-    for (int v = 0; v < VECTORS; v++) {
+  for (int block = 0; block < BLOCKS; block++) {
+    const lanes x = window.x + block_x(block);
+    lanes y = window.y + block_y(block);
+    UNROLL for (int v = 0; v < VECTORS; v++) {
+      const lanes t = (x < window.width) & (y < window.height) ? (lanes)1.0f : (lanes)-1.0f;
+      going |= (ulong)any_positive(AS_INT(t)) << block;
+      state[block][v][0] = t;
       end[block][v] = 0;
       UNROLL for (int n = 0; n < CHANNELS; n++) state[block][v][1 + n] = 0;
-      for (int lane = 0; lane < 8; lane++) {
-        const int inside = pixel_of(window, block, v, lane) >= 0;
-        ((float *)&state[block][v][0])[lane] = inside ? 1 : -1;
-        going |= (ulong)inside << block;
-      }
+      y = y + 2.0f;
     }
+  }
   return going;
+}
+
+/* Write a block's pixels, row by row; `looked` entries of the tile there are. */
+static void write_block(
+    lanes (*state)[1 + CHANNELS], const lanes_int *end, int block, Window window, int stride, int first,
+    int looked, __global const float *background, __global float *image, __global float *transmittance,
+    __global int *last)
+{
+  const Rows rows = rows_of(window, block);
+  for (int row = 0; row < rows.down; row++) {
+    const long pixel = rows.first + (long)row * window.width;
+    const float *numbers = (const float *)state[row / 2] + row % 2 * 4;
+    const int *ends = (const int *)&end[row / 2] + row % 2 * 4;
+    __global float *out = image + pixel * stride + first;
+    for (int k = 0; k < rows.across; k++) {
+      const float rest = numbers[k] < 0 ? -numbers[k] : numbers[k];
+      transmittance[pixel + k] = rest;
+      last[pixel + k] = ADDITIVE || SMOOTH ? looked : ends[k];
+      UNROLL for (int n = 0; n < CHANNELS; n++)
+        out[k * stride + n] = numbers[8 * (1 + n) + k] + (ADDITIVE ? 0 : rest * background[first + n]);
+    }
+  }
 }
 
 /* Composite a list of splats onto a block; whether any pixel goes on. */
@@ -134,16 +158,7 @@ KERNEL void splat_raster_cpu(
     }
   }
   for (int block = 0; block < BLOCKS; block++)
-    for (int v = 0; v < VECTORS; v++)
-      for (int lane = 0; lane < 8; lane++) {
-        const long pixel = pixel_of(window, block, v, lane);
-        if (pixel < 0) continue;
-        const float *numbers = (const float *)state[block][v];
-        const float rest = numbers[lane] < 0 ? -numbers[lane] : numbers[lane];
-        transmittance[pixel] = rest;
-        last[pixel] = ADDITIVE || SMOOTH ? stop - start : ((const int *)&end[block][v])[lane];
-        for (int n = 0; n < CHANNELS; n++)
-          image[pixel * stride + first + n] =
-              numbers[8 * (1 + n) + lane] + (ADDITIVE ? 0 : rest * background[first + n]);
-      }
+    write_block(
+        state[block], end[block], block, window, stride, first, stop - start, background, image,
+        transmittance, last);
 }

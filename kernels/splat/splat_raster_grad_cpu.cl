@@ -52,22 +52,30 @@ static int read_block(
     __global const float *grad_transmittance, __global const float *transmittance,
     __global const int *last)
 {
+  UNROLL for (int v = 0; v < VECTORS; v++) {
+    state[v][0] = 1;
+    UNROLL for (int n = 0; n <= CHANNELS; n++) state[v][1 + n] = 0;
+    end[v] = 0;
+  }
+  const Rows rows = rows_of(window, block);
   int deepest = 0;
-  for (int v = 0; v < VECTORS; v++)
-    for (int lane = 0; lane < 8; lane++) {
-      const long at = pixel_of(window, block, v, lane), pixel = at < 0 ? 0 : at;
-      const int inside = at >= 0, until = inside ? last[pixel] : 0;
-      float q = inside ? grad_transmittance[pixel] : 0;
-      for (int n = 0; n < CHANNELS; n++) {
-        const float g = inside ? grad_image[pixel * stride + first + n] : 0;
-        ((float *)&state[v][2 + n])[lane] = g;
+  for (int row = 0; row < rows.down; row++) {
+    const long pixel = rows.first + (long)row * window.width;
+    float *numbers = (float *)state[row / 2] + row % 2 * 4;
+    int *ends = (int *)&end[row / 2] + row % 2 * 4;
+    for (int k = 0; k < rows.across; k++) {
+      float q = grad_transmittance[pixel + k];
+      UNROLL for (int n = 0; n < CHANNELS; n++) {
+        const float g = grad_image[(pixel + k) * stride + first + n];
+        numbers[8 * (2 + n) + k] = g;
         q += g * background[first + n];
       }
-      ((float *)&state[v][0])[lane] = inside ? transmittance[pixel] : 1;
-      ((float *)&state[v][1])[lane] = q;
-      ((int *)&end[v])[lane] = until;
-      deepest = until > deepest ? until : deepest;
+      numbers[k] = transmittance[pixel + k];
+      numbers[8 + k] = q;
+      ends[k] = last[pixel + k];
+      deepest = ends[k] > deepest ? ends[k] : deepest;
     }
+  }
   return deepest;
 }
 

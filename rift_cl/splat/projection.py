@@ -137,6 +137,7 @@ def project(device: Device, splats: Splats, camera: Camera, settings: SplatSetti
         DeviceMemoryError: the device has too little memory.
     """
     _check(device, splats, camera, settings)
+    settings = settings.for_image(camera.size, cpu=device.traits.is_cpu)
     count = len(splats)
     projection = Projection(
         *(device, splats, camera, settings),
@@ -158,7 +159,7 @@ def project(device: Device, splats: Splats, camera: Camera, settings: SplatSetti
         color_modes=splats.color_modes,
         **_mode_macros(splats, settings),
         RUN=device.traits.run,
-        TILE=settings.tile,
+        TILE=settings.edge,
         SMOOTH=settings.smooth_cutoff,
     )
     if not is_modal(splats, settings):

@@ -223,6 +223,7 @@ def rasterize(
             have more than 32 channels.
         ShapeError: features, modes or background do not fit.
     """
+    settings = settings.for_image(size, cpu=device.traits.is_cpu)
     _check(splats, lists, size, settings)
     splats = packed(device, splats)
     height, width = size
@@ -278,6 +279,7 @@ def raster_grad(
     """
     splats = packed(device, splats)
     height, width, channels = raster.image.shape
+    settings = settings.for_image((height, width), cpu=device.traits.is_cpu)
     as_device_array(device, grad_image, raster.image.shape, name="grad_image")
     if grad_transmittance is None:
         grad_transmittance = device.zeros((height, width))
@@ -339,7 +341,7 @@ def _check(
 ) -> None:
     if settings.tile not in _TILES:
         raise InputError(f"tile is {settings.tile}, wanted one of {_TILES}")
-    whole, listed = Tiles.of(size, settings.tile), lists.tiles
+    whole, listed = Tiles.of(size, settings.edge), lists.tiles
     if listed.across != whole.across or listed.first_row + listed.rows > whole.rows:
         raise ShapeError(
             f"lists have tiles {listed.across} x {listed.first_row + listed.rows}, an image of "
@@ -376,7 +378,7 @@ def _work(
     device: Device, lists: TileLists, settings: SplatSettings, group: int | None = None
 ) -> tuple[int]:
     """Work-items: a CPU takes one for a tile; a GPU one for a pixel, or a group for a tile."""
-    of_tile = 1 if device.traits.is_cpu else group or settings.tile**2
+    of_tile = 1 if device.traits.is_cpu else group or settings.edge**2
     return (lists.tiles.count * of_tile,)
 
 
@@ -386,7 +388,7 @@ def _group(device: Device, settings: SplatSettings, channels: int) -> int:
     More channels than one launch of Gaussians has take local memory for as many more pixels.
     """
     room = _GROUP * _GROUP_CHANNELS // max(channels, _GROUP_CHANNELS)
-    return smaller_group(min(room, settings.tile**2, device.traits.group))
+    return smaller_group(min(room, settings.edge**2, device.traits.group))
 
 
 def _drawn(
@@ -425,7 +427,7 @@ def _macros(
     device: Device, splats: ScreenSplats, settings: SplatSettings, channels: int
 ) -> dict[str, int]:
     macros = {
-        "TILE": settings.tile,
+        "TILE": settings.edge,
         "ADDITIVE": int(settings.mode == "xray"),
         "SMOOTH": int(settings.smooth_cutoff),
         "MODAL": int(splats.modes is not None),

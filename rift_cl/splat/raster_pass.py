@@ -29,7 +29,7 @@ class RasterPass:
         boxes: (N, 4) int32, their tiles; see ``Projection``.
         depths: (N,) along the camera's axis.
         size: (height, width) in pixels.
-        settings: how it was drawn.
+        settings: how it was drawn, its tiles' edge chosen.
         background: (D,) or None.
         memory: what it takes.
         lists: the tile lists; None where they did not fit and the image was drawn in bands.
@@ -49,7 +49,7 @@ class RasterPass:
     @property
     def tiles(self) -> Tiles:
         """All tiles of the image."""
-        return Tiles.of(self.size, self.settings.tile)
+        return Tiles.of(self.size, self.settings.edge)
 
 
 def draw(
@@ -78,7 +78,8 @@ def draw(
     Raises:
         ResourceLimitError: not even one row of tiles fits the budget.
     """
-    tiles, sort = Tiles.of(size, settings.tile), settings.mode == "light"
+    settings = settings.for_image(size, cpu=device.traits.is_cpu)
+    tiles, sort = Tiles.of(size, settings.edge), settings.mode == "light"
     counts = count_tiles(device, boxes, depths, tiles, sort=sort)
     screen = packed(device, screen)
     lists, raster = None, None

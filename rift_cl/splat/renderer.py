@@ -176,7 +176,8 @@ class Renderer:
             ShapeError: the background or the lobes do not fit.
             ResourceLimitError: not even one row of tiles fits the memory budget.
         """
-        device, settings = self.device, self.settings
+        device = self.device
+        settings = self.settings.for_image(camera.size, cpu=device.traits.is_cpu)
         check_modal(splats, settings)
         channels = self._channels(splats, depth)
         behind = self._behind(background, channels)

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from typing import Literal, get_args
 
 from rift_cl.basis.angular import ANGULAR_BASES
 from rift_cl.errors import SettingError
 from rift_cl.geometry.numbers import one_number
-from rift_cl.option_marks import NoOption, Short
+from rift_cl.option_marks import Auto, NoOption, Short
 
 SplatMode = Literal["light", "xray"]
 Activation = Literal["clamp", "exp", "square"]
+# Edges of tiles where none is given: large ones share what is read of a splat among more pixels,
+# but a small image cut into few of them keeps few cores busy.
+LARGE_TILE, SMALL_TILE, _ENOUGH = 32, 16, 64
 # Devices count in float32.
 _LARGEST = 3.4028234e38
 
@@ -33,8 +37,9 @@ class SplatSettings:
     eps2d: Short[float] = 0.3
     """Variance added to every splat on the screen, in square pixels. 0.3 blurs small images; 0.05
     to 0.1 suits cameras at one distance."""
-    tile: int = 16
-    """Edge of a tile in pixels."""
+    tile: Auto[int] = None
+    """Edge of a tile in pixels: 8, 16 or 32. If not given, 32 on a CPU where an image has 64 such
+    tiles or more, else 16."""
     alpha_cap: float = 0.99
     """Largest alpha of one splat, above 0 and below 1."""
     antialiased: bool = False
@@ -71,7 +76,7 @@ class SplatSettings:
         for name in ("near", "far", "radius_clip", "eps2d"):
             if abs(one_number(getattr(self, name))) > _LARGEST:
                 raise SettingError(self, name, f"is {getattr(self, name)!r}, too large for float32")
-        edge = one_number(self.tile)
+        edge = one_number(SMALL_TILE if self.tile is None else self.tile)
         if not (edge >= 1 and edge.is_integer()):
             raise SettingError(self, "tile", f"is {self.tile!r}, wanted a whole number >= 1")
         if not 0 < one_number(self.alpha_cap) < 1:
@@ -97,3 +102,26 @@ class SplatSettings:
                 f"{self.activation} has no meaning in xray mode, which adds densities as they are: "
                 "leave it at clamp",
             )
+
+    def for_image(self, size: tuple[int, int], *, cpu: bool) -> SplatSettings:
+        """These settings with the tile's edge chosen, for an image on a kind of device.
+
+        Args:
+            size: (height, width) in pixels.
+            cpu: whether a CPU draws it.
+        """
+        if self.tile is not None:
+            return self
+        tiles = -(-size[0] // LARGE_TILE) * -(-size[1] // LARGE_TILE)
+        return _with_tile(self, LARGE_TILE if cpu and tiles >= _ENOUGH else SMALL_TILE)
+
+    @property
+    def edge(self) -> int:
+        """Edge of a tile in pixels, which ``for_image`` has chosen."""
+        assert self.tile is not None
+        return self.tile
+
+
+@cache
+def _with_tile(settings: SplatSettings, edge: int) -> SplatSettings:
+    return replace(settings, tile=edge)

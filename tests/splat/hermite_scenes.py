@@ -74,7 +74,7 @@ def whitening(screen):
 
 def rules_of(settings):
     smooth, additive = settings.smooth_cutoff, settings.mode == "xray"
-    rules = Rules(settings.tile, settings.alpha_cap, additive, smooth)
+    rules = Rules(settings.tile or 16, settings.alpha_cap, additive, smooth)
     return HermiteRules(rules, settings.activation)
 
 

@@ -22,7 +22,7 @@ def close_calls(twin, kind):
     edges = np.concatenate([twin.means - twin.radii, twin.means + twin.radii], axis=1)
     on_border = np.abs(edges - np.concatenate([size, 0 * size])).min(axis=1) < 1e-3
     faint = np.abs(twin.weights * 255 - 1) < 1e-4
-    return whole(twin.extents) | whole(edges / kind.settings.tile) | on_border | faint
+    return whole(twin.extents) | whole(edges / (kind.settings.tile or 16)) | on_border | faint
 
 
 @pytest.mark.parametrize("name", KINDS)

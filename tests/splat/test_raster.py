@@ -21,7 +21,9 @@ KINDS = {
 
 
 def rules_of(settings):
-    return Rules(settings.tile, settings.alpha_cap, settings.mode == "xray", settings.smooth_cutoff)
+    return Rules(
+        settings.tile or 16, settings.alpha_cap, settings.mode == "xray", settings.smooth_cutoff
+    )
 
 
 def twin(scene, settings, background=None, screen=None, features=None):
@@ -65,7 +67,7 @@ def chain(sums, screen):
 @pytest.mark.parametrize("kind", KINDS)
 def test_image_equals_its_twin(device, kind, channels):
     settings = KINDS[kind]
-    scene = random_scene(250, SIZE, channels=channels, tile=settings.tile)
+    scene = random_scene(250, SIZE, channels=channels, tile=settings.tile or 16)
     background = np.linspace(0.1, 0.9, channels).astype(np.float32)
     _, _, result = draw(device, scene, settings, background)
     image, transmittance = twin(scene, settings, background)
@@ -129,7 +131,7 @@ def test_gradient_equals_autograd(device, kind):
     from twin_raster import raster_torch
 
     settings = KINDS[kind]
-    scene = random_scene(200, SIZE, channels=4, tile=settings.tile)
+    scene = random_scene(200, SIZE, channels=4, tile=settings.tile or 16)
     random = np.random.default_rng(5)
     grad_image = random.normal(size=(*SIZE, 4)).astype(np.float32)
     grad_left = random.normal(size=SIZE).astype(np.float32) * (settings.mode == "light")

@@ -79,7 +79,7 @@ def oracle(way, values, frame, device, grad_image):
         frame.lists.tiles,
         SIZE,
     )
-    rules = Rules(settings.tile, settings.alpha_cap, settings.mode == "xray", smooth=True)
+    rules = Rules(settings.tile or 16, settings.alpha_cap, settings.mode == "xray", smooth=True)
     image, _ = raster_torch(lists, screen, colors, rules, BACKGROUND)
     (image * torch.tensor(grad_image)).sum().backward()
     gradients = {name: leaf.grad.numpy() for name, leaf in leaves.items()}

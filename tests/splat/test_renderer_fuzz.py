@@ -184,7 +184,7 @@ def test_hostile_splats_spoil_nothing_but_their_own_gradient(device, name, scene
 def test_hostile_colours_stay_in_the_tiles_of_their_splats(device, name, scene):
     frame, _, drawn = checked(device, WAYS[name], scene)
     clean = np.ones(scene.size, bool)
-    boxes = WAYS[name].settings.tile * frame["boxes"][drawn & scene.odd_in("sh", "colors")]
+    boxes = (WAYS[name].settings.tile or 16) * frame["boxes"][drawn & scene.odd_in("sh", "colors")]
     for x0, y0, x1, y1 in boxes:
         clean[y0:y1, x0:x1] = False
     assert np.isfinite(frame["image"][clean]).all()

@@ -96,7 +96,7 @@ class Placed(LinearOperator):
         dtype = np.float64 if device.traits.fp64 else np.float32
         super().__init__((count, modes.count, channels), pictures, device, dtype)
         self.renderer, self.modes = renderer, modes
-        self._mosaic = Mosaic(cameras, renderer.settings.tile)
+        self._mosaic = Mosaic(cameras, renderer.settings.edge)
         self._camera, self._views = self._mosaic.camera, len(cameras)
         self._count, self._channels = count, channels
         self._scales = np.exp(geometry.log_scales)
@@ -104,7 +104,7 @@ class Placed(LinearOperator):
         projected = project(self.device, self._splats, self._camera, renderer.settings)
         boxes = self.device.array(self._mosaic.cut_boxes(self.device.get(projected.boxes)))
         self._projected = replace(projected, boxes=boxes)
-        tiles = Tiles.of(self._camera.size, renderer.settings.tile)
+        tiles = Tiles.of(self._camera.size, renderer.settings.edge)
         self._lists = tile_lists(self.device, boxes, projected.depths, tiles, sort=False)
         self._whitening, self._to_screen = self._mode_maps()
         self._raster: Raster | None = None

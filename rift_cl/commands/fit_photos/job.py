@@ -32,6 +32,7 @@ from rift_cl.io.scenes.splat_scene import SplatScene
 from rift_cl.progress import Report
 from rift_cl.splat.bands import FrameMemory
 from rift_cl.splat.orders import ModeOrders
+from rift_cl.splat.settings import SMALL_TILE
 from rift_cl.train.loss.homogenisation import noise_of
 from rift_cl.train.strategy import DefaultSettings
 from rift_cl.train.trainer import Trainer
@@ -105,7 +106,8 @@ class Fit(FitRun[FitPhotosSettings]):
         first = round(len(trainer.parameters) * most / count)
         ahead = trainer.strategy.forecast(0, first)
         seconds = reading * len(self.training_views) + probe.steps(ahead)
-        lists = min(probe.lists(frame, settings.rendering.tile), self.device.budget)
+        edge = settings.rendering.tile or SMALL_TILE
+        lists = min(probe.lists(frame, edge), self.device.budget)
         return {
             "device memory": f"{self._need(frame) / 2**20:.0f} MiB, and about "
             f"{lists / 2**20:.0f} MiB of tile lists",
