@@ -9,7 +9,7 @@ that it is seen in. Both evaluate the same weights (``kernels/include/fan_footpr
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Fan, Grid
 from rift_cl.operators.projector.fan_rays import FanRays, fan_rays
-from rift_cl.operators.projector.footprint import FOOTPRINTS, check_footprint
+from rift_cl.operators.projector.footprint import FOOTPRINTS, check_depth_power, check_footprint
 from rift_cl.operators.projector.projector import Projector
 
 # Records of a run of views together: on a CPU they should stay in its caches.
@@ -58,6 +58,7 @@ class FanProjector(Projector):
     """
 
     scan: Fan
+    _settled = ("depth_power",)
 
     def __init__(
         self,
@@ -73,10 +74,8 @@ class FanProjector(Projector):
             raise InputError(f"wanted a Grid and a Fan, got {grid!r:.60} and {scan!r:.60}")
         if len(grid.shape) != 2:
             raise InputError(f"grid has shape {grid.shape}, wanted that of one slice, (ny, nx)")
-        if depth_power not in (1, 2):
-            raise InputError(f"depth_power is {depth_power!r}, wanted 1 or 2")
         super().__init__(grid.shape, (scan.views, scan.bins), device or default_device(), dtype)
-        self.grid, self.scan, self.depth_power = grid, scan, int(depth_power)
+        self.grid, self.scan, self.depth_power = grid, scan, check_depth_power(depth_power)
         self.footprint = check_footprint(footprint)
         self._rays = fan_rays(grid, scan, footprint, self.depth_power)
         self._precision = {"DOUBLE": int(self.dtype == np.float64)}
@@ -85,10 +84,6 @@ class FanProjector(Projector):
             "POWER": self.depth_power,
             **self._precision,
         }
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        make = partial(FanProjector, depth_power=self.depth_power)
-        return make, (self.grid, self.scan, self.footprint, self.device, self.dtype)
 
     def _facts(self) -> list[str]:
         scan = self.scan

@@ -6,7 +6,7 @@ Slices fill the lanes as the z of a cone's volume do; a table's rows are the sli
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
@@ -16,6 +16,7 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Fan, Grid
+from rift_cl.operators.projector.footprint import check_depth_power, check_footprint
 from rift_cl.operators.projector.slab_projector import SlabProjector
 from rift_cl.operators.projector.slab_table import Samples, SlabTable, fan_table
 
@@ -58,15 +59,12 @@ class FanSlicesProjector(SlabProjector):
     ) -> None:
         if not isinstance(grid, Grid):
             raise InputError(f"grid is {grid!r:.60}, wanted a Grid such as Grid((8, 256, 256))")
-        if footprint not in _FOOTPRINTS:
-            raise InputError(f"footprint is {footprint!r}, wanted 'strip' or 'linear'")
-        if depth_power not in (1, 2):
-            raise InputError(f"depth_power is {depth_power!r}, wanted 1 or 2")
         shape = scan.views, grid.slices, scan.bins
         # Not that of a SlabProjector, which sees rows.
         super(SlabProjector, self).__init__(grid.shape, shape, device or default_device(), dtype)
-        self.grid, self.scan, self.footprint = grid, scan, footprint
-        self.depth_power = depth_power
+        self.grid, self.scan = grid, scan
+        self.footprint = check_footprint(footprint, _FOOTPRINTS)
+        self.depth_power = check_depth_power(depth_power)
         self._tables = [
             fan_table(grid, self._beam, footprint, depth_power, along_x=way)
             for way in (True, False)
@@ -105,10 +103,6 @@ class FanSlicesProjector(SlabProjector):
 
     def _seen(self, z: slice, views: slice) -> tuple[slice, ...]:
         return views, z
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        make = partial(FanSlicesProjector, depth_power=self.depth_power)
-        return make, (self.grid, self.scan, self.footprint, self.device, self.dtype)
 
     def _facts(self) -> list[str]:
         return [

@@ -44,16 +44,31 @@ class FootprintRecords:
         return replace(self, support=self.support[chosen], records=self.records[chosen])
 
 
-def check_footprint(name: str) -> str:
+def check_footprint(name: str, known: tuple[str, ...] = FOOTPRINTS) -> str:
     """The name itself.
 
+    Args:
+        name: of a footprint.
+        known: those that the projector has.
+
     Raises:
-        InputError: there is no such footprint.
+        InputError: it is none of them.
     """
-    if name not in FOOTPRINTS:
-        wanted = ", ".join(repr(known) for known in FOOTPRINTS[:-1]) + f" or {FOOTPRINTS[-1]!r}"
+    if name not in known:
+        wanted = ", ".join(map(repr, known[:-1])) + f" or {known[-1]!r}"
         raise InputError(f"footprint is {name!r}, wanted {wanted}")
     return name
+
+
+def check_depth_power(power: int) -> int:
+    """The power of the inverse depth that shares are weighted by, as a plain number.
+
+    Raises:
+        InputError: it is neither 1 nor 2.
+    """
+    if power not in (1, 2):
+        raise InputError(f"depth_power is {power!r}, wanted 1 or 2")
+    return int(power)
 
 
 def footprint_records(name: str, step: Floats, cross_step: Floats, mass: float) -> FootprintRecords:

@@ -101,9 +101,6 @@ class PhaseProjector(ParallelProjector, Projector):
         by_rows, by_columns = self._tables
         return _Walk(self.device, by_rows, self.dtype), _Walk(self.device, by_columns, self.dtype)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return PhaseProjector, (self.grid, self.scan, self.footprint, self.device, self.dtype)
-
     def _facts(self) -> list[str]:
         return [*super()._facts(), f"footprint {self.footprint}"]
 

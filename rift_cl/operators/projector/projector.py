@@ -6,6 +6,7 @@ get a path of their own system from ``pathlib.Path``. ``isinstance(A, Projector)
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any, overload
 
 from numpy.typing import DTypeLike
@@ -46,6 +47,8 @@ class Projector(LinearOperator):
 
     grid: Grid
     footprint: str
+    # What else a projector of this kind is made from, by name.
+    _settled: tuple[str, ...] = ()
 
     @overload
     def __new__(
@@ -61,6 +64,11 @@ class Projector(LinearOperator):
     def __new__(cls, grid: Grid, scan: Any, *given: Any, **named: Any) -> Projector:
         """Make the subclass that the scan asks for, whose ``__init__`` reads the arguments."""
         return object.__new__(_kind(grid, scan) if cls is Projector else cls)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        settled = {name: getattr(self, name) for name in self._settled}
+        given = self.grid, self.scan, self.footprint, self.device, self.dtype
+        return partial(type(self), **settled), given
 
     # Not abstract, since for a type checker a call of Projector may make one of these.
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Grid
+from rift_cl.operators.projector.footprint import check_depth_power, check_footprint
 from rift_cl.operators.projector.slab_stretch import SlabStretch
 from rift_cl.operators.projector.slab_table import Samples, SlabTable, slab_table
 from rift_cl.operators.projector.volume_in_parts import VolumeInParts
@@ -71,6 +72,7 @@ class SlabProjector(VolumeInParts):
     """
 
     scan: Cone
+    _settled = ("depth_power",)
 
     def __init__(
         self,
@@ -87,20 +89,15 @@ class SlabProjector(VolumeInParts):
                 f"grid is {grid!r:.60}, wanted a volume such as Grid((256, 256, 256)): a cone "
                 "looks at one"
             )
-        if footprint not in _FOOTPRINTS:
-            raise InputError(f"footprint is {footprint!r}, wanted 'strip', 'linear' or 'point'")
         shape = scan.views, scan.rows, scan.bins
         super().__init__(grid.shape, shape, device or default_device(), dtype)
-        self.grid, self.scan, self.footprint = grid, scan, footprint
-        self.depth_power = depth_power
+        self.grid, self.scan = grid, scan
+        self.footprint = check_footprint(footprint, _FOOTPRINTS)
+        self.depth_power = check_depth_power(depth_power)
         self._tables = [
             slab_table(grid, scan, footprint, depth_power, along_x=way) for way in (True, False)
         ]
         self._precision = {"DOUBLE": int(self.dtype == np.float64)}
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        settled = partial(SlabProjector, depth_power=self.depth_power)
-        return settled, (self.grid, self.scan, self.footprint, self.device, self.dtype)
 
     def _facts(self) -> list[str]:
         scan = self.scan

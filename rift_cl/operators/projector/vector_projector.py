@@ -80,9 +80,6 @@ class VectorProjector(VolumeInParts):
             if (along_z == way).any()
         ]
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return VectorProjector, (self.grid, self.scan, self.footprint, self.device, self.dtype)
-
     def _facts(self) -> list[str]:
         scan = self.scan
         return [
