@@ -1,12 +1,13 @@
-"""A scan's geometry from its data: centre, sense, roll and distance of the detector."""
+"""A scan's geometry from its data: centre, sense, orbit, roll, tilts and detector distance."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from fan_scenes import FULL, KINDS, body, cone, fan, noisy, projections, sinogram
+from fan_scenes import AXIS, DETECTOR, FULL, KINDS, body, cone, fan, noisy, projections, sinogram
 
 import rift_cl as rift
+from rift_cl.errors import ShapeError
 from rift_cl.phantom import project
 from rift_cl.reconstruct.calibration import rolled
 
@@ -55,3 +56,35 @@ def test_a_rolled_detector_shows_the_axis_along_a_slope():
     across = place - scan.vectors().source
     along = np.stack([np.cos(scan.angles), np.sin(scan.angles)], axis=1)
     assert np.abs((across[:, :2] * along).sum(axis=1)).max() < 1e-9
+
+
+# Bins of the centre, rows of the orbit, and degrees of the roll that a scan is taken to have less.
+FAULTS = [(0.0, 1.0, 0.0), (0.4, -1.5, 0.6), (0.0, 0.0, 0.0)]
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_planes_tell_the_row_of_the_orbit(fault):
+    center, row, roll = fault
+    taken = rift.Cone(FULL[::4], 40, 80, 2.0, AXIS, DETECTOR, (19.5, 41.6))
+    true = replace(taken, center=(19.5 + row, 41.6 + center))
+    vectors = rolled(true, np.deg2rad(roll))
+    y = project(body(height=18.0), rift.Grid((4, 4, 4)), vectors, dtype=np.float64)
+    found = rift.calibrate(noisy(y, 0.01, 0), taken, orbit=True)
+    assert found.row[0] == pytest.approx(19.5 + row, abs=0.4)
+    assert abs(found.row[0] - 19.5 - row) < found.row[1] < 2
+    assert abs(np.rad2deg(found.roll[0]) - roll) < np.rad2deg(found.roll[1])
+    assert "row of the source's orbit" in found.in_words()
+    assert isinstance(found.scan, rift.Vectors if roll else rift.Cone)
+
+
+def test_an_object_beyond_the_sides_tells_no_planes():
+    taken = rift.Cone(FULL[::4], 40, 32, 2.0, AXIS, DETECTOR, (19.5, 15.5))
+    y = noisy(project(body(), rift.Grid((4, 4, 4)), taken, dtype=np.float64), 0.01, 0)
+    found = rift.calibrate(y, taken, orbit=True)
+    assert found.row is None and found.scan.center[0] == 19.5
+
+
+def test_errors_name_the_function_that_was_called():
+    scan = cone()
+    with pytest.raises(ShapeError, match="calibrate"):
+        rift.calibrate(np.zeros((2, 3, 4), np.float32), scan)

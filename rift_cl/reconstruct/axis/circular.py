@@ -34,7 +34,11 @@ _READINGS, _SETTLED = 6, 0.01
 
 
 def axis_of_scan(
-    projections: Views, scan: Scan, span: tuple[float, float] | None = None
+    projections: Views,
+    scan: Scan,
+    span: tuple[float, float] | None = None,
+    *,
+    wants: str = "find_center",
 ) -> AxisEstimate:
     """Find the axis of a fan or of a circular cone, and the sense of its rotation.
 
@@ -42,13 +46,14 @@ def axis_of_scan(
         projections: line integrals, (view, bin) or (view, row, bin); rows of a fan are slices.
         scan: the geometry; its centre (bin) is a first guess, and the angles' sign is checked.
         span: where to search, in bins; as for ``find_center`` if not given.
+        wants: the function that errors name.
 
     Raises:
         InputError: as for ``find_center``.
         ShapeError: the projections do not fit the scan.
         NonFiniteError: a sample is not finite.
     """
-    fan = _fan_of(scan)
+    fan = _fan_of(scan, wants)
     shape = np.shape(projections)
     if isinstance(scan, Cone):
         wanted: tuple[int, ...] = (scan.views, scan.rows, scan.bins)
@@ -56,7 +61,7 @@ def axis_of_scan(
         wanted = (scan.views, shape[1], fan.bins)
     else:
         wanted = (scan.views, fan.bins)
-    y = as_host_array(projections, wanted, name="projections", wants="find_center")
+    y = as_host_array(projections, wanted, name="projections", wants=wants)
     stack = y if y.ndim == 3 else y[:, None]
     if isinstance(scan, Cone):
         groups, middle = orbit_rows(scan), scan.center[0]
@@ -154,17 +159,17 @@ def _on_detector(read: AxisEstimate, bins: Floats, middle: float) -> AxisEstimat
     )
 
 
-def _fan_of(scan: Scan) -> Fan:
+def _fan_of(scan: Scan, wants: str) -> Fan:
     if isinstance(scan, Fan):
         return scan
     if not isinstance(scan, Cone):
         raise InputError(
-            f"find_center: scan is a {type(scan).__name__}, wanted a Fan or a Cone "
+            f"{wants}: scan is a {type(scan).__name__}, wanted a Fan or a Cone "
             "(rift.Cone.of_vectors makes one of circular vectors)"
         )
     if not scan.circular:
         raise InputError(
-            "find_center: heights differ; opposite rays meet only where the source goes round in "
+            f"{wants}: heights differ; opposite rays meet only where the source goes round in "
             "one plane: find the axis of a circular scan"
         )
     return scan.fan()

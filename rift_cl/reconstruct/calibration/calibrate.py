@@ -13,11 +13,17 @@ from rift_cl.cl.host_arrays import as_host_array
 from rift_cl.geometry import Cone, Fan, Vectors
 from rift_cl.reconstruct.axis import AxisEstimate, axis_of_scan
 from rift_cl.reconstruct.calibration.opposite_fit import fit_opposite_rays
+from rift_cl.reconstruct.calibration.orbit_row import orbit_row
+from rift_cl.reconstruct.direct.padding import is_truncated
 
 # Half a 95 % interval in standard errors, as for the axis.
 _HALF_INTERVAL = 2.3
 # The widest half intervals that are still an answer: radians, and a share of the distance.
 _WIDEST_ROLL, _WIDEST_DISTANCE = np.deg2rad(1.0), 0.1
+# A value and half its 95 % interval; None where the data do not tell.
+Told = tuple[float, float] | None
+# Fewest rows of a detector on which the orbit's row is looked for.
+_FEWEST_ROWS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +31,9 @@ class Calibration:
     """What the data say of a scan's geometry.
 
     Args:
-        scan: the scan with what was found put right: sense and centre; a roll that is surely there
-            makes a flat ``Cone`` a ``Vectors``; the distance only where that was asked for.
+        scan: the scan with what was found put right: sense and centre; the orbit's row where it is
+            surely another; a roll that is surely there makes a flat ``Cone`` a ``Vectors``; the
+            distance only where that was asked for.
         axis: bin of the axis, its interval, and the sense of rotation.
         roll: of the detector in its plane, in radians, and half its 95 % interval; positive where
             the axis is seen at greater bins in greater rows; None where the data do not tell.
@@ -34,30 +41,37 @@ class Calibration:
             where the data do not tell.
         disagreement: root mean square difference of opposite rays as a share of the contrast, at
             the axis that was found and after the fit of roll and distance.
+        row: of the source's orbit, and half its 95 % interval; None where the data do not tell, or
+            were not asked (``orbit``).
+        asked: whether the row was looked for.
     """
 
     scan: Fan | Cone | Vectors
     axis: AxisEstimate
-    roll: tuple[float, float] | None
-    distance: tuple[float, float] | None
+    roll: Told
+    distance: Told
     disagreement: tuple[float, float]
+    row: Told = None
+    asked: bool = False
 
     def in_words(self) -> str:
         """What was found, a line for each quantity, and what cannot be told."""
         lines = [f"rotation axis {self.axis.in_words()}"]
-        if self.roll is None:
-            lines.append("roll of the detector: the data do not tell")
-        else:
-            roll, half = np.rad2deg(self.roll)
-            lines.append(f"roll of the detector: {roll:.3f} degrees (+- {half:.3f})")
+        lines.append(f"roll of the detector: {_degrees(self.roll)}")
         if self.distance is None:
             lines.append("source to detector: the data do not tell")
         else:
             share, half = self.distance
             lines.append(f"source to detector: {share:.4f} times what is given (+- {half:.4f})")
+        if self.asked:
+            told = "the data do not tell"
+            if self.row is not None:
+                told = f"{self.row[0]:.2f} (+- {self.row[1]:.2f})"
+            lines.append(f"row of the source's orbit: {told}")
+        left = "" if self.asked else ", the orbit's row (orbit=True looks for it)"
         lines.append(
-            "source to axis, the orbit's row and tilts of the detector out of its plane are taken "
-            "as given: opposite rays do not tell them"
+            f"source to axis{left} and tilts of the detector out of its plane are taken as given: "
+            "the data hardly tell them"
         )
         return "\n".join(lines)
 
@@ -67,6 +81,7 @@ class Calibration:
             "axis": self.axis.record(),
             "roll": None if self.roll is None else list(self.roll),
             "distance": None if self.distance is None else list(self.distance),
+            "row": None if self.row is None else list(self.row),
             "in_words": self.in_words(),
         }
 
@@ -76,6 +91,7 @@ def calibrate(
     scan: Fan | Cone,
     *,
     distance: bool = False,
+    orbit: bool = False,
     device: Device | None = None,
 ) -> Calibration:
     """Find centre, sense of rotation, roll and detector distance of a scan from its data.
@@ -84,7 +100,9 @@ def calibrate(
     the sense of rotation (as ``find_center`` does), the detector's roll in its plane, and the
     distance of the detector in bins, which is the scale of the fan angle. They do not tell the
     distance of the axis, since everything twice as large makes the same pictures, nor the orbit's
-    row or tilts out of the detector's plane.
+    row or tilts out of the detector's plane. The row is told, with ``orbit``, by planes through two
+    places of the source, of which both views must measure the same integral: of a flat ``Cone``
+    whose object leaves the detector at neither side.
 
     Args:
         projections: line integrals, (view, bin) or (view, row, bin).
@@ -92,6 +110,8 @@ def calibrate(
             (``center[0]``) is right, or a ``Fan``.
         distance: whether the returned scan has the distance of the detector that the data tell.
             The distance of the axis stays, so that lengths change with the magnification.
+        orbit: whether the row of the orbit is looked for as well, within an eighth of the rows of
+            the given one, which takes some seconds.
         device: accepted as by every method; the fit runs on the host.
 
     Returns:
@@ -103,7 +123,7 @@ def calibrate(
         ShapeError: the projections do not fit the scan.
         NonFiniteError: a sample is not finite.
     """
-    axis = axis_of_scan(projections, scan)
+    axis = axis_of_scan(projections, scan, wants="calibrate")
     sign = -1.0 if axis.sense is not None and axis.sense.sign < 0 else 1.0
     right: Fan | Cone
     if isinstance(scan, Fan):
@@ -120,10 +140,15 @@ def calibrate(
     share = _told(fit.distance, fit.errors[2], _WIDEST_DISTANCE)
     if distance and share is not None:
         right = replace(right, source_to_detector=right.source_to_detector * share[0])
+    row = None
+    if orbit and isinstance(right, Cone) and _tells_planes(stack, right):
+        row = orbit_row(stack, right, 0.0 if roll is None else roll[0])
+        if row is not None and abs(row[0] - right.center[0]) > row[1]:
+            right = replace(right, center=(row[0], right.center[1]))
     corrected: Fan | Cone | Vectors = right
     if isinstance(right, Cone) and not right.curved and roll is not None and abs(roll[0]) > roll[1]:
         corrected = rolled(right, roll[0])
-    return Calibration(corrected, axis, roll, share, fit.disagreement)
+    return Calibration(corrected, axis, roll, share, fit.disagreement, row, orbit)
 
 
 def rolled(scan: Cone, angle: float) -> Vectors:
@@ -144,11 +169,23 @@ def rolled(scan: Cone, angle: float) -> Vectors:
     return Vectors(upright.source, middle, across, down, scan.rows, scan.bins)
 
 
+def _tells_planes(stack: NDArray[np.float32], scan: Cone) -> bool:
+    """Whether views may be compared on planes: flat detectors that no side of the object leaves."""
+    return not scan.curved and scan.rows >= _FEWEST_ROWS and not is_truncated(stack)
+
+
+def _degrees(told: Told) -> str:
+    if told is None:
+        return "the data do not tell"
+    value, half = np.rad2deg(told)
+    return f"{value:.3f} degrees (+- {half:.3f})"
+
+
 def _one_row(fan: Fan) -> Cone:
     lengths = fan.pitch, fan.source_to_axis, fan.source_to_detector
     return Cone(fan.angles, 1, fan.bins, *lengths, (0.0, fan.center), curved=fan.curved)
 
 
-def _told(value: float, error: float, widest: float) -> tuple[float, float] | None:
+def _told(value: float, error: float, widest: float) -> Told:
     half = _HALF_INTERVAL * float(error)
     return (value, half) if half <= widest else None
