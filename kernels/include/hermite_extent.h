@@ -28,33 +28,35 @@
 
 /* 2-norms of each order of the shape, index 0 unused; what all colours' modes are together. */
 typedef struct {
-  float shape[SHAPE_ORDER + 1];
-  float color_square;
+  lanes shape[SHAPE_ORDER + 1];
+  lanes color_square;
 } ModeNorms;
 
-static float square_of(__global const float *modes, int count) {
-  float sum = 0;
-  for (int k = 0; k < count; k++) sum += modes[k] * modes[k];
+static lanes square_of(__global const float *modes, const int width, int from, int count, Rows rows) {
+  lanes sum = 0;
+  for (int k = from; k < from + count; k++) {
+    const lanes mode = read_one(modes, width, k, rows);
+    sum += mode * mode;
+  }
   return sum;
 }
 
 static ModeNorms norms_of(
-    __global const float *restrict shape_modes, __global const float *restrict color_modes, long i)
+    __global const float *restrict shape_modes, __global const float *restrict color_modes, Rows rows)
 {
-  ModeNorms norms;
-  __global const float *shape = shape_modes + i * SHAPE_MODES;
-  for (int n = 1; n <= SHAPE_ORDER; n++)
-    norms.shape[n] = sqrt(square_of(shape + MODES3(n - 1) - 1, MODES2(n)));
   const int colors = COLOR_MODES * COLOR_CHANNELS;
-  norms.color_square = square_of(color_modes + i * colors, colors);
+  ModeNorms norms;
+  for (int n = 1; n <= SHAPE_ORDER; n++)
+    norms.shape[n] = root_of(square_of(shape_modes, SHAPE_MODES, MODES3(n - 1) - 1, MODES2(n), rows));
+  norms.color_square = square_of(color_modes, colors, 0, colors, rows);
   return norms;
 }
 
 /* Whether a splat's modes are numbers, whose squares are as well. */
-static int modes_are_finite(const ModeNorms *norms) {
-  for (int n = 1; n <= SHAPE_ORDER; n++)
-    if (not_finite(norms->shape[n])) return 0;
-  return !not_finite(norms->color_square);
+static lanes_int modes_are_finite(const ModeNorms *norms) {
+  lanes_int bad = no_number(norms->color_square);
+  for (int n = 1; n <= SHAPE_ORDER; n++) bad |= no_number(norms->shape[n]);
+  return !bad;
 }
 
 /* sqrt(n), 1 / sqrt(n), and He~_2k(0)^2 = C(2k, k) / 4^k. */
@@ -65,36 +67,38 @@ __constant float INVERSE_ROOT_OF[] = {
 __constant float MIDDLE_SQUARE[] = {1, 0.5f, 0.375f, 0.3125f, 0.2734375f};
 
 /* P(r), with K_n the sum over even k of He~_{n-k}(r)^2 He~_k(0)^2. */
-static float polynomial_bound(const ModeNorms *norms, float r) {
-  float squares[SHAPE_ORDER + 1], before = 0, here = 1, sum = 1;
+static lanes polynomial_bound(const ModeNorms *norms, lanes r) {
+  lanes squares[SHAPE_ORDER + 1], before = 0, here = 1, sum = 1;
   squares[0] = 1;
   UNROLL for (int n = 1; n <= SHAPE_ORDER; n++) {
-    const float next = (r * here - ROOT_OF[n - 1] * before) * INVERSE_ROOT_OF[n];
-    float kernel_sum = 0;
+    const lanes next = (r * here - ROOT_OF[n - 1] * before) * INVERSE_ROOT_OF[n];
+    lanes kernel_sum = 0;
     before = here;
     here = next;
     squares[n] = next * next;
     UNROLL for (int k = 0; k <= n; k += 2) kernel_sum += squares[n - k] * MIDDLE_SQUARE[k / 2];
-    sum += norms->shape[n] * sqrt(kernel_sum);
+    sum += norms->shape[n] * root_of(kernel_sum);
   }
   return SQUARE ? sum * sum : sum;
 }
 
-/* Where a splat ends, in standard deviations; below zero where it is too faint to be drawn. */
-static float modal_extent(const ModeNorms *norms, float weight) {
+/* Where splats end, in standard deviations; below zero where they are too faint to be drawn. A lane
+ * that is done stays as it is, so that it does not depend on the others. */
+static lanes modal_extent(const ModeNorms *norms, lanes weight) {
   if (SMOOTH) return MOST_RADIUS;
   if (XRAY) return HERMITE_EDGE(MOST_ORDER);
-  float r = MOST_RADIUS;
-  for (int step = 0; step < EXTENT_STEPS; step++) {
-    const float steady = larger(r, STEADY_RADIUS);
-    const float over = weight / ALPHA_THRESHOLD * polynomial_bound(norms, steady);
+  lanes r = MOST_RADIUS;
+  lanes_int going = !is_nan(weight), faint = 0, wide = 0;
+  for (int step = 0; step < EXTENT_STEPS && any_lane(going); step++) {
+    const lanes over = weight / ALPHA_THRESHOLD * polynomial_bound(norms, larger(r, STEADY_RADIUS));
     /* Not a number or too large for one: as wide as any. */
-    if (not_finite(over)) return MOST_RADIUS;
-    if (!(over >= 1)) return -1;
-    const float next = sqrt(2 * natural_log(over));
-    const float fallen = r - next;
-    r = next < r ? next : r;
-    if (SHAPE_ORDER == 0 || fallen < CLOSE) break;
+    wide |= going & no_number(over);
+    faint |= going & !(over >= 1) & !wide;
+    const lanes next = root_of(2 * natural_log(larger(over, 1))), fallen = r - next;
+    r = (going & (next < r)) ? next : r;
+    if (SHAPE_ORDER == 0) break;
+    going &= !wide & !faint & (fallen >= CLOSE);
   }
-  return r;
+  r = wide ? MOST_RADIUS : r;
+  return faint ? -1 : r;
 }

@@ -49,26 +49,26 @@ __constant float FACTORIAL_ROOT[] = {
 
 /* L^-1 and the rows of A. */
 typedef struct {
-  float i00, i10, i11;
-  float3 a0, a1;
+  lanes i00, i10, i11;
+  lanes3 a0, a1;
 } Whitening;
 
 /* No difference of nearly equal numbers: |v0|^2 v1 - (v0 . v1) v0 = (v0 x v1) x v0. */
 static Whitening whiten(const Gaussian *g) {
   Whitening w;
-  const float l00 = sqrt(dot3(g->v0, g->v0) + g->eps), root = sqrt(g->dilated);
+  const lanes l00 = root_of(dot_of(g->v0, g->v0) + g->eps), per_root = 1 / root_of(g->dilated);
   w.i00 = 1 / l00;
-  w.i11 = l00 / root;
-  w.a0 = g->v0 * w.i00;
-  w.i10 = -dot3(w.a0, g->v1) / root;
-  w.a1 = cross3(g->normal / root, w.a0) + (g->eps * w.i00 / root) * g->v1;
+  w.i11 = l00 * per_root;
+  w.a0 = times(w.i00, g->v0);
+  w.i10 = -dot_of(w.a0, g->v1) * per_root;
+  w.a1 = plus(cross_of(times(per_root, g->normal), w.a0), times(g->eps * w.i00 * per_root, g->v1));
   return w;
 }
 
 /* A thinner or wider splat than floats can whiten is none. */
-static int whitening_is_finite(const Gaussian *g) {
+static lanes_int whitening_is_finite(const Gaussian *g) {
   const Whitening w = whiten(g);
-  return !(not_finite(w.i00) | not_finite(w.i10) | not_finite(w.i11) | not_finite3(w.a0) | not_finite3(w.a1));
+  return !(no_number(w.i00) | no_number(w.i10) | no_number(w.i11) | no_numbers(w.a0) | no_numbers(w.a1));
 }
 
 /* sqrt(n1! n2! n3!) with r = n2 + n3, z = n3. */
@@ -79,24 +79,40 @@ static float factor_in_space(int order, int r, int z) {
 /* sqrt(m1! m2!) with m2 = j. */
 static float factor_on_screen(int order, int j) { return FACTORIAL_ROOT[order - j] * FACTORIAL_ROOT[j]; }
 
-static void load_order(float *tensor, __global const float *modes, int order, int stride) {
+/* Polynomials in a table: each is in every `stride`-th column from `first` on, of rows of `width`. */
+typedef struct {
+  int width, first, stride;
+} Columns;
+
+static Columns columns_of(int width, int first, int stride) {
+  Columns c;
+  c.width = width;
+  c.first = first;
+  c.stride = stride;
+  return c;
+}
+
+static void load_order(
+    lanes *tensor, __global const float *modes, const Columns at, Rows rows, int order)
+{
   int p = 0;
   for (int r = 0; r <= order; r++)
-    for (int z = 0; z <= r; z++, p++) tensor[p] = modes[(long)p * stride] * factor_in_space(order, r, z);
+    for (int z = 0; z <= r; z++, p++)
+      tensor[p] = read_one(modes, at.width, at.first + p * at.stride, rows) * factor_in_space(order, r, z);
 }
 
 /* Contract the first of a row's indices with a; the row is of this degree afterwards. */
-static void contract(const float *row, float3 a, int degree, float *out) {
+static void contract(const lanes *row, lanes3 a, int degree, lanes *out) {
   int p = 0;
   for (int r = 0; r <= degree; r++)
     for (int z = 0; z <= r; z++, p++) out[p] = a.x * row[p] + a.y * row[p + r + 1] + a.z * row[p + r + 2];
 }
 
 /* Contract so many indices of the tensor of an order. */
-static void contract_order(float *tensor, const Whitening *w, int order, int steps) {
-  float *newest = tensor;
+static void contract_order(lanes *tensor, const Whitening *w, int order, int steps) {
+  lanes *newest = tensor;
   for (int k = 1; k <= steps; k++) {
-    float *row = tensor, *next = newest + MODES2(order - k + 1);
+    lanes *row = tensor, *next = newest + MODES2(order - k + 1);
     contract(newest, w->a1, order - k, next);
     for (int j = 0; j < k; j++) {
       contract(row, w->a0, order - k, row);

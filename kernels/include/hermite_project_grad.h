@@ -3,18 +3,18 @@
 
 /* P, the lower part of R, and G. */
 typedef struct {
-  float first[2];
-  float xx, yx, yy;
-  float3 a0, a1;
+  lanes first[2];
+  lanes xx, yx, yy;
+  lanes3 a0, a1;
 } ScreenSums;
 
 /* The transpose of contract: a row of `degree` gains an index. */
-static void expand(float *row, float3 a, int degree) {
+static void expand(lanes *row, lanes3 a, int degree) {
   for (int p = MODES2(degree); p < MODES2(degree + 1); p++) row[p] = 0;
   int p = MODES2(degree) - 1;
   for (int r = degree; r >= 0; r--)
     for (int z = r; z >= 0; z--, p--) {
-      const float v = row[p];
+      const lanes v = row[p];
       row[p] = a.x * v;
       row[p + r + 1] += a.y * v;
       row[p + r + 2] += a.z * v;
@@ -22,7 +22,7 @@ static void expand(float *row, float3 a, int degree) {
 }
 
 /* The same of another row, added to one that has the index already. */
-static void expand_onto(const float *row, float3 a, int degree, float *out) {
+static void expand_onto(const lanes *row, lanes3 a, int degree, lanes *out) {
   int p = 0;
   for (int r = 0; r <= degree; r++)
     for (int z = 0; z <= r; z++, p++) {
@@ -33,44 +33,50 @@ static void expand_onto(const float *row, float3 a, int degree, float *out) {
 }
 
 /* The transpose of contract_order, of all its steps. */
-static void expand_order(float *tensor, const Whitening *w, int order) {
-  float *newest = tensor;
+static void expand_order(lanes *tensor, const Whitening *w, int order) {
+  lanes *newest = tensor;
   for (int j = 0; j < order; j++) newest += MODES2(order - j);
   for (int k = order; k >= 1; k--) {
-    float *row = tensor;
+    lanes *row = tensor;
     for (int j = 0; j < k; j++) {
       expand(row, w->a0, order - k);
       row += MODES2(order - j);
     }
-    float *last = newest - MODES2(order - k + 1);
+    lanes *last = newest - MODES2(order - k + 1);
     expand_onto(newest, w->a1, order - k, last);
     newest = last;
   }
 }
 
-/* One order of one polynomial: adds to G, and gives dL/dc from `by_screen`, dL/dc2. */
+/* One order of one polynomial: adds to G, and gives dL/dc from `by_screen`, dL/dc2, where a splat is
+ * drawn. */
 static void order_grad(
-    const Whitening *w, ScreenSums *sums, __global const float *modes, int order, int stride,
-    const float *by_screen, float scale, __global float *out)
+    const Whitening *w, ScreenSums *sums, __global const float *modes, const Columns at, Rows rows,
+    lanes_int drawn, int order, const lanes *by_screen, float scale, __global float *out)
 {
-  float tensor[TENSOR_LENGTH];
-  load_order(tensor, modes, order, stride);
+  lanes tensor[TENSOR_LENGTH];
+  load_order(tensor, modes, at, rows, order);
   contract_order(tensor, w, order, order - 1);
-  const float *row = tensor;
+  const lanes *row = tensor;
   for (int j = 0; j < order; j++) {
     /* Row j has j indices 2 of order - 1: it is m - e_1 of m = j, and m - e_2 of m = j + 1. */
-    const float3 rest = (float3)(row[0], row[1], row[2]);
-    sums->a0 += (order - j) * scale * by_screen[j] / factor_on_screen(order, j) * rest;
-    sums->a1 += (j + 1) * scale * by_screen[j + 1] / factor_on_screen(order, j + 1) * rest;
+    const lanes3 rest = lanes3_of(row[0], row[1], row[2]);
+    const float along0 = (order - j) * scale / factor_on_screen(order, j);
+    const float along1 = (j + 1) * scale / factor_on_screen(order, j + 1);
+    sums->a0 = plus(sums->a0, times(along0 * by_screen[j], rest));
+    sums->a1 = plus(sums->a1, times(along1 * by_screen[j + 1], rest));
     row += MODES2(order - j);
   }
-  float *place = tensor;
+  lanes *place = tensor;
   for (int j = 0; j <= order; j++) {
-    place[0] = scale * by_screen[j] / factor_on_screen(order, j);
+    place[0] = scale / factor_on_screen(order, j) * by_screen[j];
     place += MODES2(order - j);
   }
   expand_order(tensor, w, order);
   int p = 0;
   for (int r = 0; r <= order; r++)
-    for (int z = 0; z <= r; z++, p++) out[(long)p * stride] = tensor[p] * factor_in_space(order, r, z);
+    for (int z = 0; z <= r; z++, p++) {
+      const lanes by = tensor[p] * factor_in_space(order, r, z);
+      write_one(out, at.width, at.first + p * at.stride, rows, drawn ? by : 0);
+    }
 }

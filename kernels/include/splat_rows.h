@@ -103,6 +103,28 @@ static void write_columns(
 #endif
 }
 
+/* A single column, which costs a read or a write for each lane: for rows too long to be held. */
+static lanes read_one(__global const float *table, const int stride, int column, Rows rows) {
+  __global const float *p = table + rows.first * stride + column;
+#if LANES == 8
+  lanes v = 0;
+  UNROLL for (int l = 0; l < LANES; l++) ((float *)&v)[l] = p[(l < rows.count ? l : rows.count - 1) * stride];
+  return v;
+#else
+  return p[0];
+#endif
+}
+
+static void write_one(__global float *table, const int stride, int column, Rows rows, lanes v) {
+  __global float *p = table + rows.first * stride + column;
+#if LANES == 8
+  UNROLL for (int l = 0; l < LANES; l++)
+    if (l < rows.count) p[l * stride] = ((const float *)&v)[l];
+#else
+  p[0] = v;
+#endif
+}
+
 /* Whole numbers are written as the bits that they are. */
 static void write_ints(
     __global int *table, const int stride, const int from, const int width, Rows rows, const lanes_int *column)

@@ -4,28 +4,28 @@
  *
  * where i00, i10, i11 are the rows of L^-1 (include/hermite_project.h derives it and c2). Channels
  * pass by the same map as the shape, each for itself; the constants, 1 and the features, stay as
- * they are and are not in the table. Splats that are not drawn get zeros. Index space: splats. */
+ * they are and are not in the table. Splats that are not drawn get zeros.
+ *
+ * Index space: (runs of RUN splats), LANES of them at a time. */
 
-/* One splat at a time: the modes of eight would fill more registers than there are. */
-#undef LANES
-#define LANES 1
 #include "include/portable.h"
-#include "include/small_matrix.h"
 #include "include/camera.h"
 #include "include/aperture.h"
 #include "include/gaussian.h"
 #include "include/hermite_project.h"
 
-/* One order of one polynomial, from entries `stride` apart to entries as far apart. */
+/* One order of one polynomial, from its columns to those of the table. */
 static void project_order(
-    const Whitening *w, __global const float *modes, int order, int stride, __global float *out)
+    const Whitening *w, __global const float *modes, const Columns at, Rows rows, lanes_int drawn, int order,
+    __global float *table, const Columns to)
 {
-  float tensor[TENSOR_LENGTH];
-  load_order(tensor, modes, order, stride);
+  lanes tensor[TENSOR_LENGTH];
+  load_order(tensor, modes, at, rows, order);
   contract_order(tensor, w, order, order);
-  const float *row = tensor;
+  const lanes *row = tensor;
   for (int j = 0; j <= order; j++) {
-    out[j * stride] = row[0] / factor_on_screen(order, j);
+    const lanes mode = row[0] * (1 / factor_on_screen(order, j));
+    write_one(table, to.width, to.first + j * to.stride, rows, drawn ? mode : 0);
     row += MODES2(order - j);
   }
 }
@@ -36,28 +36,28 @@ KERNEL void hermite_project(
     __global float *restrict screen_modes, CAMERA_PARAMETERS,
     float near_plane, float far_plane, float eps2d, int count)
 {
-  const long i = get_global_id(0);
-  if (i >= count) return;
-  __global float *out = screen_modes + i * TABLE_LENGTH;
-  if (culled[i] != VISIBLE) {
-    for (int k = 0; k < TABLE_LENGTH; k++) out[k] = 0;
-    return;
+  const Camera camera = CAMERA;
+  EACH_RUN(first, count) {
+    const Rows rows = rows_at(first, count);
+    const lanes_int drawn = read_bytes(culled, rows) == VISIBLE;
+    Gaussian g;
+    see_gaussian(&g, camera, means, SHAPE, rows, near_plane, far_plane, eps2d);
+    const Whitening w = whiten(&g);
+    write_one(screen_modes, TABLE_LENGTH, 0, rows, drawn ? w.i00 : 0);
+    write_one(screen_modes, TABLE_LENGTH, 1, rows, drawn ? w.i10 : 0);
+    write_one(screen_modes, TABLE_LENGTH, 2, rows, drawn ? w.i11 : 0);
+    for (int order = 1; order <= SHAPE_ORDER; order++) {
+      const Columns at = columns_of(SHAPE_MODES, MODES3(order - 1) - 1, 1);
+      const Columns to = columns_of(TABLE_LENGTH, WHITENING + MODES2(order - 1) - 1, 1);
+      project_order(&w, shape_modes, at, rows, drawn, order, screen_modes, to);
+    }
+    for (int order = 1; order <= COLOR_ORDER; order++)
+      for (int c = 0; c < COLOR_CHANNELS; c++) {
+        const int from = (MODES3(order - 1) - 1) * COLOR_CHANNELS + c;
+        const int onto = WHITENING + SCREEN_SHAPE_MODES + (MODES2(order - 1) - 1) * COLOR_CHANNELS + c;
+        const Columns at = columns_of(COLOR_MODES * COLOR_CHANNELS, from, COLOR_CHANNELS);
+        const Columns to = columns_of(TABLE_LENGTH, onto, COLOR_CHANNELS);
+        project_order(&w, color_modes, at, rows, drawn, order, screen_modes, to);
+      }
   }
-  Gaussian g;
-  see_gaussian(&g, CAMERA, means, SHAPE, rows_at(i, count), near_plane, far_plane, eps2d);
-  const Whitening w = whiten(&g);
-  out[0] = w.i00;
-  out[1] = w.i10;
-  out[2] = w.i11;
-  out += WHITENING;
-  __global const float *shape = shape_modes + i * SHAPE_MODES;
-  for (int order = 1; order <= SHAPE_ORDER; order++)
-    project_order(&w, shape + MODES3(order - 1) - 1, order, 1, out + MODES2(order - 1) - 1);
-  out += SCREEN_SHAPE_MODES;
-  __global const float *color = color_modes + i * COLOR_MODES * COLOR_CHANNELS;
-  for (int order = 1; order <= COLOR_ORDER; order++)
-    for (int c = 0; c < COLOR_CHANNELS; c++)
-      project_order(
-          &w, color + (MODES3(order - 1) - 1) * COLOR_CHANNELS + c, order, COLOR_CHANNELS,
-          out + (MODES2(order - 1) - 1) * COLOR_CHANNELS + c);
 }

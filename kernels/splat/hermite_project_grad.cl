@@ -29,13 +29,11 @@
  *
  * Through one order, c2 = Gamma(A) c, with c2_m sqrt(m!) = T2 contracted N times (hermite_project.h):
  * dT2_m/dA_ai = m_a T2' where T2' has N - 1 indices contracted and i left, and dL/dc runs through the
- * contractions backwards. Splats that are not drawn get zeros. Index space: splats. */
+ * contractions backwards. Splats that are not drawn get zeros.
+ *
+ * Index space: (runs of RUN splats), LANES of them at a time. */
 
-/* One splat at a time: the modes of eight would fill more registers than there are. */
-#undef LANES
-#define LANES 1
 #include "include/portable.h"
-#include "include/small_matrix.h"
 #include "include/camera.h"
 #include "include/aperture.h"
 #include "include/gaussian.h"
@@ -57,17 +55,17 @@ __constant float ROOTS[] = {
     0, 1, 1.41421356f, 1.73205081f, 2, 2.23606798f, 2.44948974f, 2.64575131f, 2.82842712f, 3, 3.16227766f};
 
 /* The moment of u_b He~_m, m = (order - j, j). */
-static float moment_times(const float *moments, int order, int j, int b) {
+static lanes moment_times(const lanes *moments, int order, int j, int b) {
   const int m = b ? j : order - j;
-  float sum = ROOTS[m + 1] * moments[PLACE2(order + 1, j + b)];
+  lanes sum = ROOTS[m + 1] * moments[PLACE2(order + 1, j + b)];
   if (m > 0) sum += ROOTS[m] * moments[PLACE2(order - 1, j - b)];
   return sum;
 }
 
 /* What comes of a term `factor` He~_m in dL/du_a, m = (order - j, j). */
-static void add_slope(ScreenSums *sums, const float *moments, int order, int j, int a, float factor) {
+static void add_slope(ScreenSums *sums, const lanes *moments, int order, int j, int a, lanes factor) {
   sums->first[a] += factor * moments[PLACE2(order, j)];
-  const float by_x = factor * moment_times(moments, order, j, 0);
+  const lanes by_x = factor * moment_times(moments, order, j, 0);
   if (a == 0) {
     sums->xx += by_x;
   } else {
@@ -76,12 +74,19 @@ static void add_slope(ScreenSums *sums, const float *moments, int order, int j, 
   }
 }
 
+/* A splat's modes on the screen, from its row of the table. */
+static lanes screen_mode(__global const float *screen_modes, int place, Rows rows) {
+  return read_one(screen_modes, TABLE_LENGTH, WHITENING + place, rows);
+}
+
 /* The shape's part of P and R; gives weight dL/dweight. */
-static float shape_slopes(ScreenSums *sums, const float *moments, __global const float *modes) {
-  float by_weight = 0;
+static lanes shape_slopes(
+    ScreenSums *sums, const lanes *moments, __global const float *screen_modes, Rows rows)
+{
+  lanes by_weight = 0;
   for (int order = 0; order <= SHAPE_ORDER; order++)
     for (int j = 0; j <= order; j++) {
-      const float s = order == 0 ? 1 : modes[PLACE2(order, j) - 1];
+      const lanes s = order == 0 ? (lanes)1 : screen_mode(screen_modes, PLACE2(order, j) - 1, rows);
       by_weight += s * moments[PLACE2(order, j)];
       for (int a = 0; a < 2; a++) {
         const int m = a ? j : order - j;
@@ -93,68 +98,82 @@ static float shape_slopes(ScreenSums *sums, const float *moments, __global const
 }
 
 /* A channel's part of P and R. */
-static void color_slopes(ScreenSums *sums, const float *moments, __global const float *modes, int channel) {
+static void color_slopes(
+    ScreenSums *sums, const lanes *moments, __global const float *screen_modes, int channel, Rows rows)
+{
   for (int order = 1; order <= COLOR_ORDER; order++)
     for (int j = 0; j <= order; j++) {
-      const float t = modes[(PLACE2(order, j) - 1) * COLOR_CHANNELS + channel];
+      const int place = SCREEN_SHAPE_MODES + (PLACE2(order, j) - 1) * COLOR_CHANNELS + channel;
+      const lanes t = screen_mode(screen_modes, place, rows);
       if (order > j) add_slope(sums, moments, order - 1, j, 0, t * ROOTS[order - j]);
       if (j > 0) add_slope(sums, moments, order - 1, j - 1, 1, t * ROOTS[j]);
     }
 }
 
 /* The shape's part of everything; gives weight dL/dweight. */
-static float shape_grad(
-    const Whitening *w, ScreenSums *sums, __global const float *moments,
-    __global const float *modes, __global const float *screen_modes, __global float *out)
+static lanes shape_grad(
+    const Whitening *w, ScreenSums *sums, __global const float *moments, __global const float *modes,
+    __global const float *screen_modes, Rows rows, lanes_int drawn, __global float *out)
 {
-  float h[SHAPE_MOMENTS];
-  for (int m = 0; m < SHAPE_MOMENTS; m++) h[m] = moments[m];
+  lanes h[SHAPE_MOMENTS];
+  read_columns(moments, MOMENTS, 0, SHAPE_MOMENTS, rows, h);
   for (int order = 1; order <= SHAPE_ORDER; order++) {
-    const int first = MODES3(order - 1) - 1;
-    order_grad(w, sums, modes + first, order, 1, h + MODES2(order - 1), SQUARE ? 2 : 1, out + first);
+    const Columns at = columns_of(SHAPE_MODES, MODES3(order - 1) - 1, 1);
+    order_grad(w, sums, modes, at, rows, drawn, order, h + MODES2(order - 1), SQUARE ? 2 : 1, out);
   }
-  return shape_slopes(sums, h, screen_modes);
+  return shape_slopes(sums, h, screen_modes, rows);
 }
 
 /* A channel's part of everything. */
 static void color_grad(
     const Whitening *w, ScreenSums *sums, __global const float *moments, int channel,
-    __global const float *modes, __global const float *screen_modes, __global float *out)
+    __global const float *modes, __global const float *screen_modes, Rows rows, lanes_int drawn,
+    __global float *out)
 {
-  float v[MODES2(COLOR_ORDER)];
-  v[0] = moments[channel];
+  lanes v[MODES2(COLOR_ORDER)];
+  v[0] = read_one(moments, MOMENTS, SHAPE_MOMENTS + channel, rows);
   for (int m = 1; m < MODES2(COLOR_ORDER); m++)
-    v[m] = moments[CHANNELS + (m - 1) * COLOR_CHANNELS + channel];
+    v[m] = read_one(
+        moments, MOMENTS, SHAPE_MOMENTS + CHANNELS + (m - 1) * COLOR_CHANNELS + channel, rows);
   for (int order = 1; order <= COLOR_ORDER; order++) {
     const int first = (MODES3(order - 1) - 1) * COLOR_CHANNELS + channel;
-    order_grad(w, sums, modes + first, order, COLOR_CHANNELS, v + MODES2(order - 1), 1, out + first);
+    const Columns at = columns_of(COLOR_MODES * COLOR_CHANNELS, first, COLOR_CHANNELS);
+    order_grad(w, sums, modes, at, rows, drawn, order, v + MODES2(order - 1), 1, out);
   }
-  color_slopes(sums, v, screen_modes, channel);
+  color_slopes(sums, v, screen_modes, channel, rows);
 }
 
 /* From P, R and G to the sums of splat_project_grad and the view's part. */
 static void leave_sums(
-    const Gaussian *g, const Whitening *w, const ScreenSums *sums, float by_weight,
-    __global float *out, __global float *view_part)
+    const Gaussian *g, const Whitening *w, const ScreenSums *sums, lanes by_weight, Rows rows,
+    lanes_int drawn, __global float *out, __global float *view_parts)
 {
-  const float xx = sums->xx + dot3(sums->a0, w->a0);
-  const float yx = sums->yx + dot3(sums->a1, w->a0);
-  const float yy = sums->yy + dot3(sums->a1, w->a1);
+  const lanes xx = sums->xx + dot_of(sums->a0, w->a0);
+  const lanes yx = sums->yx + dot_of(sums->a1, w->a0);
+  const lanes yy = sums->yy + dot_of(sums->a1, w->a1);
   /* L from what it is made of: its inverse would be a quotient of quotients. */
-  const float l00 = 1 / w->i00, l11 = 1 / w->i11, l10 = dot3(g->v0, g->v1) * w->i00;
-  const float left = l10 * xx + l11 * yx;
-  out[0] = -by_weight;
-  out[1] = -(w->i00 * sums->first[0] + w->i10 * sums->first[1]);
-  out[2] = -w->i11 * sums->first[1];
-  out[3] = l00 * l00 * xx;
-  out[4] = l00 * left;
-  out[5] = l10 * left + l11 * (l10 * yx + l11 * yy);
-  store3(view_part, 0, w->i00 * sums->a0 + w->i10 * sums->a1);
-  store3(view_part, 1, w->i11 * sums->a1);
-}
-
-static void clear(__global float *p, int length) {
-  for (int k = 0; k < length; k++) p[k] = 0;
+  const lanes l00 = 1 / w->i00, l11 = 1 / w->i11, l10 = dot_of(g->v0, g->v1) * w->i00;
+  const lanes left = l10 * xx + l11 * yx;
+  const lanes3 part0 = plus(times(w->i00, sums->a0), times(w->i10, sums->a1)), part1 = times(w->i11, sums->a1);
+  lanes moments[6], view[6];
+  moments[0] = -by_weight;
+  moments[1] = -(w->i00 * sums->first[0] + w->i10 * sums->first[1]);
+  moments[2] = -w->i11 * sums->first[1];
+  moments[3] = l00 * l00 * xx;
+  moments[4] = l00 * left;
+  moments[5] = l10 * left + l11 * (l10 * yx + l11 * yy);
+  view[0] = part0.x;
+  view[1] = part0.y;
+  view[2] = part0.z;
+  view[3] = part1.x;
+  view[4] = part1.y;
+  view[5] = part1.z;
+  UNROLL for (int k = 0; k < 6; k++) {
+    moments[k] = drawn ? moments[k] : 0;
+    view[k] = drawn ? view[k] : 0;
+  }
+  write_columns(out, 6 + CHANNELS, 0, 6, rows, moments);
+  write_columns(view_parts, 6, 0, 6, rows, view);
 }
 
 KERNEL void hermite_project_grad(
@@ -165,30 +184,24 @@ KERNEL void hermite_project_grad(
     __global float *restrict sums, __global float *restrict view_parts,
     __global float *restrict grad_shape_modes, __global float *restrict grad_color_modes)
 {
-  const long i = get_global_id(0);
-  if (i >= count) return;
-  const long shape = i * SHAPE_MODES, color = i * COLOR_MODES * COLOR_CHANNELS;
-  sums += i * (6 + CHANNELS);
-  if (culled[i] != VISIBLE) {
-    clear(sums, 6 + CHANNELS);
-    clear(view_parts + 6 * i, 6);
-    clear(grad_shape_modes + shape, SHAPE_MODES);
-    clear(grad_color_modes + color, COLOR_MODES * COLOR_CHANNELS);
-    return;
+  const Camera camera = CAMERA;
+  EACH_RUN(first, count) {
+    const Rows rows = rows_at(first, count);
+    const lanes_int drawn = read_bytes(culled, rows) == VISIBLE;
+    Gaussian g;
+    see_gaussian(&g, camera, means, SHAPE, rows, near_plane, far_plane, eps2d);
+    const Whitening w = whiten(&g);
+    ScreenSums screen;
+    screen.first[0] = screen.first[1] = screen.xx = screen.yx = screen.yy = 0;
+    screen.a0 = screen.a1 = lanes3_of(0, 0, 0);
+    const lanes by_weight = shape_grad(
+        &w, &screen, moments, shape_modes, screen_modes, rows, drawn, grad_shape_modes);
+    for (int c = 0; COLOR_ORDER > 0 && c < COLOR_CHANNELS; c++)
+      color_grad(&w, &screen, moments, c, color_modes, screen_modes, rows, drawn, grad_color_modes);
+    leave_sums(&g, &w, &screen, by_weight, rows, drawn, sums, view_parts);
+    for (int c = 0; c < CHANNELS; c++) {
+      const lanes by_feature = read_one(moments, MOMENTS, SHAPE_MOMENTS + c, rows);
+      write_one(sums, 6 + CHANNELS, 6 + c, rows, drawn ? by_feature : 0);
+    }
   }
-  moments += i * MOMENTS;
-  screen_modes += i * TABLE_LENGTH + WHITENING;
-  Gaussian g;
-  see_gaussian(&g, CAMERA, means, SHAPE, rows_at(i, count), near_plane, far_plane, eps2d);
-  const Whitening w = whiten(&g);
-  ScreenSums screen = {{0, 0}, 0, 0, 0, (float3)(0), (float3)(0)};
-  const float by_weight = shape_grad(
-      &w, &screen, moments, shape_modes + shape, screen_modes, grad_shape_modes + shape);
-  moments += SHAPE_MOMENTS;
-  for (int c = 0; COLOR_ORDER > 0 && c < COLOR_CHANNELS; c++)
-    color_grad(
-        &w, &screen, moments, c, color_modes + color, screen_modes + SCREEN_SHAPE_MODES,
-        grad_color_modes + color);
-  leave_sums(&g, &w, &screen, by_weight, sums, view_parts + 6 * i);
-  for (int c = 0; c < CHANNELS; c++) sums[6 + c] = moments[c];
 }

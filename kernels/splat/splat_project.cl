@@ -17,15 +17,8 @@
  * Splats that are not drawn get zeros and the reason in `culled`, the first of: not finite or
  * degenerate in what was given (2), out of depth (1), too large to tell (2), too faint (3),
  * clipped for its radius (5), off the screen (4). Index space: (runs of RUN splats), LANES of them at
- * a time; MODAL splats, whose modes would fill more registers than there are, one at a time. */
+ * a time. */
 
-#ifndef MODAL
-#define MODAL 0
-#endif
-#if MODAL
-#undef LANES
-#define LANES 1
-#endif
 #include "include/portable.h"
 #include "include/alpha_threshold.h"
 #include "include/logarithm.h"
@@ -38,6 +31,10 @@
 #endif
 #ifndef SMOOTH
 #define SMOOTH 0
+#endif
+/* Whether splats have Hermite modes or another activation. */
+#ifndef MODAL
+#define MODAL 0
 #endif
 /* Standard deviations; alpha.h stops adding line integrals there as well. */
 #define EXTENT (XRAY ? 4.0f : 3.33f)
@@ -56,7 +53,6 @@ static lanes_int whole_above(lanes v, float most) {
 }
 
 #if MODAL
-#include "include/small_matrix.h"
 #include "include/hermite_project.h"
 #include "include/hermite_edge.h"
 #include "include/hermite_extent.h"
@@ -72,14 +68,10 @@ static lanes_int whole_above(lanes v, float most) {
 /* How many standard deviations a splat of a weight reaches; adds the reason if it is too faint. */
 static lanes extent_of(lanes weight, lanes_int *code NORMS_PARAMETER) {
 #if MODAL
-  if (*code != VISIBLE) return 0;
-  if (!(weight >= LEAST_NORMAL)) {
-    *code = TOO_FAINT;
-    return 0;
-  }
-  const float extent = modal_extent(norms, weight);
-  if (extent < 0) *code = TOO_FAINT;
-  return extent;
+  *code = or_else(*code, !(weight >= LEAST_NORMAL), TOO_FAINT);
+  const lanes extent = modal_extent(norms, weight);
+  *code = or_else(*code, extent < 0, TOO_FAINT);
+  return extent > 0 ? extent : 0;
 #else
   *code = or_else(*code, !(weight >= (XRAY ? LEAST_NORMAL : ALPHA_THRESHOLD)), TOO_FAINT);
   if (XRAY || SMOOTH) return EXTENT;
@@ -129,7 +121,7 @@ static lanes_int project(
   code = or_else(
       code, no_number(row[2]) | no_number(row[3]) | no_number(row[4]) | no_number(row[5]), DEGENERATE);
 #if MODAL
-  if (code == VISIBLE && (!modes_are_finite(norms) || !whitening_is_finite(g))) code = DEGENERATE;
+  code = or_else(code, !modes_are_finite(norms) | !whitening_is_finite(g), DEGENERATE);
   return bound(g, code, row[5], radius_clip, width, height, row + 6, box, norms);
 #else
   return bound(g, code, row[5], radius_clip, width, height, row + 6, box);
@@ -153,7 +145,7 @@ KERNEL void splat_project(
     const lanes_int seen = see_gaussian(&g, camera, means, SHAPE, rows, near_plane, far_plane, eps2d);
     code = code == VISIBLE ? seen : code;
 #if MODAL
-    const ModeNorms norms = norms_of(shape_modes, color_modes, first);
+    const ModeNorms norms = norms_of(shape_modes, color_modes, rows);
 #endif
     code = project(&g, code, opacity, radius_clip, width, height, row, box NORMS);
     const lanes_int drawn = code == VISIBLE;

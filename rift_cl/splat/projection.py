@@ -178,11 +178,12 @@ def project_modes(projection: Projection) -> ScreenModes:
     table = device.empty((len(splats), table_width(splats)))
     device.launch(
         "hermite_project",
-        (len(splats),),
+        (device.traits.runs(len(splats)),),
         **_arguments(projection),
         shape_modes=splats.shape_modes,
         color_modes=splats.color_modes,
         screen_modes=table,
+        RUN=device.traits.run,
         **macros,
     )
     return ScreenModes(table, splats.shape_order, splats.color_order, macros["COLOR_CHANNELS"])
@@ -278,7 +279,7 @@ def project_modes_grad(projection: Projection, moments: DeviceArray) -> ModeGrad
     )
     device.launch(
         "hermite_project_grad",
-        (count,),
+        (device.traits.runs(count),),
         **_arguments(projection),
         shape_modes=splats.shape_modes,
         color_modes=splats.color_modes,
@@ -289,6 +290,7 @@ def project_modes_grad(projection: Projection, moments: DeviceArray) -> ModeGrad
         grad_shape_modes=out.shape_modes,
         grad_color_modes=out.color_modes,
         **_mode_macros(splats, projection.settings),
+        RUN=device.traits.run,
         CHANNELS=channels,
     )
     return out
