@@ -16,11 +16,9 @@ typedef struct {
   lanes h[VECTORS], color[CHANNELS], plain, magnitude_x, magnitude_y;
 } BlockSums;
 
-static BlockSums no_sums(void) {
-  BlockSums b;
-  UNROLL for (int n = 0; n < CHANNELS; n++) b.color[n] = 0;
-  b.plain = b.magnitude_x = b.magnitude_y = 0;
-  return b;
+static void clear_sums(BlockSums *b) {
+  UNROLL for (int n = 0; n < CHANNELS; n++) b->color[n] = 0;
+  b->plain = b->magnitude_x = b->magnitude_y = 0;
 }
 
 /* Add the pixels of one vector, of which h = weight dL/dweight and w are known. */

@@ -13,12 +13,10 @@ typedef struct {
   lanes shape[SHAPE_POWERS], color[CHANNELS][COLOR_ORDER + 1];
 } BlockSums;
 
-static BlockSums no_sums(void) {
-  BlockSums b;
-  UNROLL for (int k = 0; k < SHAPE_POWERS; k++) b.shape[k] = 0;
+static void clear_sums(BlockSums *b) {
+  UNROLL for (int k = 0; k < SHAPE_POWERS; k++) b->shape[k] = 0;
   UNROLL for (int n = 0; n < CHANNELS; n++)
-    UNROLL for (int k = 0; k <= COLOR_ORDER; k++) b.color[n][k] = 0;
-  return b;
+    UNROLL for (int k = 0; k <= COLOR_ORDER; k++) b->color[n][k] = 0;
 }
 
 /* Add the pixels of one vector, of which h = dL/dE weight g, with SQUARED times Q, and w are known. */

@@ -40,7 +40,8 @@ static ulong clear_blocks(lanes (*state)[VECTORS][1 + CHANNELS], lanes_int (*end
     const lanes x = window.x + block_x(block);
     lanes y = window.y + block_y(block);
     UNROLL for (int v = 0; v < VECTORS; v++) {
-      const lanes t = (x < window.width) & (y < window.height) ? (lanes)1.0f : (lanes)-1.0f;
+      const lanes_int inside = (x < window.width) & (y < window.height);
+      const lanes t = inside ? (lanes)1.0f : (lanes)-1.0f;
       going |= (ulong)any_positive(AS_INT(t)) << block;
       state[block][v][0] = t;
       end[block][v] = 0;

@@ -98,7 +98,8 @@ static void undo_block(
     const int k = list[i];
     const lanes_int order = batch->order[k];
     Sight s = see_splat(batch, k, px, py);
-    BlockSums found = no_sums();
+    BlockSums found;
+    clear_sums(&found);
     UNROLL for (int v = 0; v < VECTORS; v++) {
       const lanes power = s.level - s.place * s.place, within = place_within(s.place, power, s.peak);
       const lanes shaped = shape_at(&s, within), g = falloff_of(power, s.peak);
@@ -121,7 +122,7 @@ static void undo_block(
       const lanes h = hidden > most ? 0 : w * difference;
 #else
       /* dE/dQ dalpha/dE, or half of it where the square of Q counts. */
-      lanes lever = counts & (hidden <= most) ? g : 0;
+      lanes lever = (counts & (hidden <= most)) ? g : 0;
       if (ACTIVATION != CLAMP) lever = lever * (1.0f - hidden);
       if (SQUARED) lever = lever * shaped;
       const lanes h = lever * (t[v] * difference);

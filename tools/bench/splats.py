@@ -1,9 +1,9 @@
 """Splats: the scenes that are drawn, the operations on them, and what each kernel has to do.
 
 The scene is a cube of small Gaussians with spherical harmonics of degree 3 (seed 0), as in the
-comparison of rasterizers that the design quotes. Compositing is counted in lanes: pixels that a
-splat's strips and rows touch in a tile before the tile is finished. Lane use is the share of them
-in which the splat counted.
+comparison of rasterizers that the design quotes. Compositing is counted in lanes: pixels of the
+blocks (4 x 8, those of the CPU's kernels) that a splat's ellipse touches before the block is
+finished. Lane use is the share of them in which the splat counted.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from rift_cl.splat.raster import MOMENTS
 
 # Operations per lane, forward and backward: the count that the design's prototype used.
 _FORWARD, _BACKWARD = 32, 62
-_STRIP = 8
+# Pixels of a block.
+_ROWS, _COLUMNS = 8, 4
 
 
 @dataclass(frozen=True)
@@ -138,9 +139,9 @@ class SplatCase:
 
 
 def _count_lanes(device: rift.Device, frame: Frame) -> tuple[int, int]:
-    lists, tile = frame.lists, 16
+    lists, tile = frame.lists, frame.raster_pass.settings.edge
     starts, splat = device.get(lists.starts), device.get(lists.entries)[:, 0]
-    last, height, width = device.get(frame.raster.last), *frame.camera.size
+    last, (height, width) = device.get(frame.raster.last), frame.camera.size
     screen = device.get(frame.projection.screen)
     evaluated = used = 0
     for number in range(len(starts) - 1):
@@ -148,15 +149,33 @@ def _count_lanes(device: rift.Device, frame: Frame) -> tuple[int, int]:
         ends = last[y0 : min(y0 + tile, height), x0 : min(x0 + tile, width)]
         drawn = np.arange(ends.max())
         listed = screen[splat[starts[number] + drawn]]
-        mean, extent = listed[:, :2] - (x0 + 0.5, y0 + 0.5), listed[:, 6:]
-        top = np.maximum(np.ceil(mean[:, 1] - extent[:, 1]), 0)
-        bottom = np.minimum(np.floor(mean[:, 1] + extent[:, 1]) + 1, tile)
-        begin = _STRIP * np.arange(tile // _STRIP)[:, None]
-        low, high = mean[:, 0] - extent[:, 0], mean[:, 0] + extent[:, 0]
-        strips = ((begin <= high) & (begin + _STRIP - 1 >= low)).sum(axis=0)
-        evaluated += int((_STRIP * strips * np.maximum(bottom - top, 0)).sum())
+        whole = np.zeros((tile, tile), ends.dtype)
+        whole[: ends.shape[0], : ends.shape[1]] = ends
+        deepest = whole.reshape(tile // _ROWS, _ROWS, tile // _COLUMNS, _COLUMNS).max(axis=(1, 3))
+        met = _touch(listed.astype(float), (y0, x0), tile) & (drawn[:, None, None] < deepest)
+        evaluated += _ROWS * _COLUMNS * int(met.sum())
         used += _count_used(listed, drawn, ends, (y0, x0))
     return evaluated, used
+
+
+def _touch(screen: Any, corner: tuple[int, int], tile: int) -> Any:
+    """Whether splats touch the blocks of a tile, (splats, rows of blocks, columns of blocks).
+
+    The bounds are those of ``kernels/include/screen_record.h``.
+    """
+    mean_x, mean_y, a, b, c, _, across, down = (column[:, None] for column in screen.T)
+    begin = _COLUMNS * np.arange(tile // _COLUMNS) + 0.5 + corner[1] - mean_x
+    low, high = np.maximum(begin, -across), np.minimum(begin + _COLUMNS - 1, across)
+    summit, reach = -b / a * down, down * np.sqrt(np.maximum(1 - b * b / (a * c), 0))
+
+    def edge(sign: int) -> Any:
+        u = np.minimum(np.maximum(sign * summit, low), high)
+        half = reach * np.sqrt(np.maximum(1 - (u / across) ** 2, 0))
+        return (mean_y - corner[0] - b / c * u + sign * half)[:, None]
+
+    rows = (_ROWS * np.arange(tile // _ROWS) + 0.5)[:, None]
+    within = (edge(-1) <= rows + _ROWS - 1) & (edge(1) >= rows)
+    return within & (low <= high)[:, None]
 
 
 def _count_used(screen: Any, drawn: Any, ends: Any, corner: tuple[int, int]) -> int:
