@@ -11,9 +11,9 @@ reconstruction using native cone-beam geometries, Phys. Med. Biol. 48, 3787, 200
    the source at equal steps: rows are read there, convolved, and read back;
 3. the window, whose edge takes its share of a pixel.
 
-Derivatives are taken halfway between views and between bins, the convolution comes back to bins.
-All steps are alike in every view. They are done on the host: each is a sparse matrix, or a
-convolution.
+Derivatives are taken halfway between views and between bins. The convolution comes back to bins,
+and makes up for what differences of bins lose of a derivative: windows are those of the ramp. All
+steps are alike in every view. They are done on the host: each is a sparse matrix, or a convolution.
 """
 
 from __future__ import annotations
@@ -36,6 +36,8 @@ _EVEN, _ROW = 0.05, 0.1
 _WIDEST = np.pi / 4
 # Curves on the detector for each of its rows.
 _CURVES = 2
+# Rows that are read at a place, from the one below it.
+_TAPS = (-1, 0, 1, 2)
 # Views that are filtered at the same time.
 _VIEWS = 16
 
@@ -256,18 +258,22 @@ def _scaled(factors: Floats, matrix: Any) -> Any:
 
 
 def _reader(places: Floats, rows: int) -> Any:
-    """The matrix that reads columns of so many rows at places, (n, columns), linearly."""
+    """The matrix that reads columns of so many rows at places, (n, columns), by Keys' cubic."""
     from scipy import sparse
 
     count, columns = places.shape
     places = np.clip(places, 0, rows - 1)
-    low = np.minimum(places.astype(int), rows - 2)
-    share = places - low
-    column = np.arange(columns)
-    target = np.arange(count * columns)
-    from_low = (low * columns + column).ravel()
-    values = np.concatenate([(1 - share).ravel(), share.ravel()])
-    at = np.concatenate([target, target]), np.concatenate([from_low, from_low + columns])
+    low = np.minimum(places.astype(int), max(rows - 2, 0))
+    t = places - low
+    shares = (
+        (2 * t**2 - t - t**3) / 2,
+        (3 * t**3 - 5 * t**2 + 2) / 2,
+        (4 * t**2 + t - 3 * t**3) / 2,
+        (t**3 - t**2) / 2,
+    )
+    read = [np.clip(low + step, 0, rows - 1) * columns + np.arange(columns) for step in _TAPS]
+    at = np.tile(np.arange(count * columns), len(_TAPS)), np.concatenate(read, axis=None)
+    values = np.concatenate(shares, axis=None)
     return sparse.csr_array((values, at), shape=(count * columns, rows * columns))
 
 
@@ -283,8 +289,11 @@ def _hilbert(bins: int, angle: float, filter: Filter) -> tuple[Floats, int]:
     n = np.fft.fftfreq(length, 1 / length) - 0.5
     kernel = 1 / (np.pi * n) if not angle else angle / (np.pi * np.sin(np.clip(n * angle, -3, 3)))
     kernel[np.abs(n) > bins] = 0
-    u = 2 * np.fft.rfftfreq(length) / filter.cutoff
-    window = np.where(u <= 1, WINDOWS[filter.window](np.minimum(u, 1)), 0.0)
+    u = 2 * np.fft.rfftfreq(length)
+    below = np.minimum(u / filter.cutoff, 1)
+    window = np.where(u <= filter.cutoff, WINDOWS[filter.window](below), 0.0)
+    # The difference of neighbouring bins falls behind the derivative by a sinc.
+    window /= np.sinc(u / 2)
     return np.fft.irfft(np.fft.rfft(kernel) * window, length), length
 
 
