@@ -42,6 +42,7 @@ _CASES = {
     "order 0": f"MODAL=1 PACKED=1 {_MODES}0",
     "order 2": f"MODAL=1 PACKED=1 {_MODES}2",
     "order 4": f"MODAL=1 PACKED=1 {_MODES}4",
+    "order 8": f"MODAL=1 PACKED=1 {_MODES}8",
 }
 _OLDER_CASES = {**_CASES, "32 channels": "CHANNELS=32"}
 # A few registers more are no fault: they are given out in blocks of 8 at least.

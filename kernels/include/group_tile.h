@@ -6,10 +6,10 @@
  * column, the odd ones the row), so that any 2^n pixels from a multiple of 2^n on are a square or two
  * squares side by side, whatever the group; within a block pixels are numbered row by row.
  *
- * Why blocks: splats fitted to photographs are needles, and of the pixels of a tile in whose list
- * one stands, it touches a third. The item that fetches an entry into local memory therefore says
- * with one bit for each block whether the splat's ellipse reaches it; a block then takes the entries
- * with its bit alone. The test is exact but for a margin, and once per entry and block.
+ * Why blocks: splats fitted to photographs are needles, which touch few of the pixels of a tile in
+ * whose list they stand. The item that fetches an entry into local memory therefore says with one bit
+ * for each block whether the splat's ellipse reaches it; a block then takes the entries with its bit
+ * alone. The test is exact but for a margin, and is made once per entry and block.
  *
  * With include/screen_record.h, of a splat at (x, y) and a strip of columns between centres left and
  * right of the mean, u in [low, high] is the strip cut to [-ex, ex]. The ellipse's upper edge

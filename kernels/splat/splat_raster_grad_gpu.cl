@@ -5,22 +5,23 @@
  *
  * What each pixel gives to an entry, RECORD numbers, must be summed over the pixels. Sums over the
  * items of a sub-group take five steps for each number, which costs more than all else (45 exchanges
- * for three channels). But the numbers are moments of two: w = alpha T and g = dL/dsigma. So CHUNK
- * entries at a time, those that any block of the part sees:
+ * for three channels). But the numbers are moments of two: w = alpha T and g = dL/dsigma (for splats
+ * with modes h, see include/hermite_slots.h). So CHUNK entries at a time, those that any block sees:
  *
  *     1. every item, for its pixel, leaves g and w of each entry in local memory;
- *     2. every item, for one entry, one block and SHARE of the block's pixels, reads g and w back and
- *        forms the moments of its pixels in registers;
- *     3. its moments go to the same local memory, and one item for each number of an entry adds what
- *        the blocks that the entry reaches have of it, in their order.
+ *     2. every item, for one entry, one block and one row of the block, reads the g and w of the row
+ *        and forms its moments in registers; along a row of a Gaussian dy is the same;
+ *     3. the moments go to local memory, and one item for each number of an entry adds what the rows
+ *        of the blocks that the entry reaches have of it, in their order.
  *
- * A pair of entry and pixel so costs four accesses of local memory, whatever the record, and is
- * evaluated once; nothing needs sub-groups, and the order of all sums is the same in every run. Rows
- * of local memory are one number longer than a block, so that items which read rows side by side
- * find them in different banks.
+ * A pair of entry and pixel is so evaluated once, and costs two numbers written and read, however
+ * long the record. Nothing needs sub-groups or atomics, any size of a group will do, and the order of
+ * all sums is the same in every run. Rows of local memory are one number longer than a block, so that
+ * items which read rows side by side find them in different banks.
  *
- * ROUND numbers of a record are summed at a time; only splats with modes have more. Entries that no
- * block sees before its pixels were finished leave nothing: live stays 0.
+ * Records of splats with modes may be longer than registers can hold; they are summed in passes.
+ * Entries that no block sees before its pixels were finished leave nothing: their `live` stays 0.
+ * Where a tile has several parts, a slot is cleared first, and every part adds to it.
  *
  * Index space: (tiles x GROUP), of the rows of tiles from first_tile_row on. */
 
@@ -49,8 +50,9 @@
 /* A row of local memory: one number of an entry and a block for each pixel; and how many rows. */
 #define PITCH (BLOCK + 1)
 #define ROWS (CHUNK * BLOCKS)
-/* Numbers of a record for which the same memory has room; and those that an item sums in one pass
- * over its pixels, which it keeps beside the pixels' where there are more. */
+/* Numbers that an item sums in one pass over its pixels, as registers hold them; numbers that items
+ * then lay down for all to add, for which the memory of the pixels' numbers has room; and passes. */
+#define MOST_SUMMED 32
 #define ROUND (2 * SHARE)
 #define SUMMED (RECORD <= MOST_SUMMED ? RECORD : ROUND)
 #define ADDED (SUMMED < ROUND ? SUMMED : ROUND)
@@ -61,15 +63,6 @@
 #else
 #define UNROLL_IF_FEW
 #endif
-#ifndef MOST_SUMMED
-#define MOST_SUMMED 32
-#endif
-#if PASSES > 1
-#define ROLL UNROLL
-#else
-#define ROLL ROLLED
-#endif
-
 #if MODAL
 /* A launch does all channels. */
 #define RECORD_LENGTH RECORD
@@ -127,7 +120,8 @@ static void sum_row(
   const float first_dx = splat[SPLAT_X] - x, dy = splat[SPLAT_Y] - y;
   float zeroth = 0, first_x = 0;
   UNROLL for (int n = 0; n < RECORD; n++) sums[n] = 0;
-  UNROLL for (int i = 0; i < SHARE; i++) {
+  /* Two at a time: the whole row at once takes more registers than it saves time. */
+  _Pragma("unroll 2") for (int i = 0; i < SHARE; i++) {
     const float dx = first_dx - i, w = w_of[i];
     float g = g_of[i];
 #if SMOOTH || ABSGRAD
@@ -172,6 +166,12 @@ KERNEL void splat_raster_grad_gpu(
   __local int slot_of[BATCH];
   __local uint seen_words[WORDS];
   __local float shares[2 * ROWS * PITCH], views[CHANNELS * BLOCKS * PITCH];
+#if PASSES > 1
+  /* A further pass wants the pixels' numbers again. */
+  __local float totals[ROUND * (GROUP + 1)];
+#else
+  __local float *totals = shares;
+#endif
   __local int block_ends[BLOCKS], seen_count[1];
   const int me = (int)get_local_id(0), tile = GROUP_NUMBER(0);
   if (tile >= tiles) return;
@@ -185,6 +185,7 @@ KERNEL void splat_raster_grad_gpu(
   for (int n = me; n < (stop - start) * RECORD; n += GROUP)
     if (first == 0 || !SHARED(n % RECORD))
       slots[(long)entries[start + n / RECORD].y * RECORD_LENGTH + PLACE(n % RECORD)] = 0;
+  barrier(CLK_GLOBAL_MEM_FENCE);
 #endif
   for (int part = 0; part < PARTS; part++) {
     const int corner = part * GROUP, column = COLUMN_OF(me), row = ROW_OF(me);
@@ -282,24 +283,12 @@ KERNEL void splat_raster_grad_gpu(
         __local const float *view_of = views + of_block * PITCH + from;
         float splat[4 * QUADS];
         read_splat(splat, staged, k);
-#if PASSES > 1
-        float g_kept[SHARE], w_kept[SHARE];
-        UNROLL for (int i = 0; i < SHARE; i++) {
-          g_kept[i] = g_of[i];
-          w_kept[i] = w_of[i];
-        }
-#define G_OF(i) g_kept[i]
-#define W_OF(i) w_kept[i]
-#else
-#define G_OF(i) g_of[i]
-#define W_OF(i) w_of[i]
-#endif
         UNROLL_IF_FEW for (int pass = 0; pass < RECORD; pass += SUMMED) {
           float sums[SUMMED];
 #if MODAL
           UNROLL for (int n = 0; n < SUMMED; n++) sums[n] = 0;
-          ROLL for (int i = 0; i < SHARE; i++)
-            add_pixel(sums, pass, splat, x + i, y, G_OF(i), W_OF(i), view_of + i);
+          ROLLED for (int i = 0; i < SHARE; i++)
+            add_pixel(sums, pass, splat, x + i, y, g_of[i], w_of[i], view_of + i);
 #else
           sum_row(sums, splat, x, y, g_of, w_of, view_of);
 #endif
@@ -307,7 +296,7 @@ KERNEL void splat_raster_grad_gpu(
             /* What was read last from where the sums go is read. */
             barrier(CLK_LOCAL_MEM_FENCE);
             UNROLL for (int n = 0; n < ROUND && round + n < SUMMED; n++)
-              shares[n * (GROUP + 1) + me] = sums[round + n];
+              totals[n * (GROUP + 1) + me] = sums[round + n];
             barrier(CLK_LOCAL_MEM_FENCE);
             for (int n = me; n < ADDED * CHUNK; n += GROUP) {
               const int e = n / ADDED, in_round = n % ADDED, number_of = pass + round + in_round;
@@ -316,7 +305,7 @@ KERNEL void splat_raster_grad_gpu(
               float sum = 0;
               for (uint blocks = reached[added]; blocks; blocks &= blocks - 1) {
                 const int items = in_round * (GROUP + 1) + (e * BLOCKS + lowest_bit(blocks)) * SHARES;
-                UNROLL for (int i = 0; i < SHARES; i++) sum += shares[items + i];
+                UNROLL for (int i = 0; i < SHARES; i++) sum += totals[items + i];
               }
               __global float *slot = slots + (long)slot_of[added] * RECORD_LENGTH + PLACE(number_of);
               *slot = PARTS > 1 || (first > 0 && SHARED(number_of)) ? *slot + sum : sum;
