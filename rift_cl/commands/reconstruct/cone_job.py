@@ -27,13 +27,17 @@ from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.volume import volume_path
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import InputError
+from rift_cl.geometry import Cone
 from rift_cl.io.output import atomic_path
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.io.volumes import VOLUME_NAMES, VolumeWriter, open_volume, suggested_window
 from rift_cl.operators import Projector
 from rift_cl.progress import Report
-from rift_cl.reconstruct import FDK, Katsevich, backproject, poisson_weights
+from rift_cl.reconstruct import FDK, Attenuation, Katsevich, backproject, poisson_weights
 from rift_cl.reconstruct.direct.katsevich import cone_inversion
+from rift_cl.reconstruct.direct.offset_axis import is_full_turn, sees_further
+from rift_cl.reconstruct.direct.padding import is_truncated
+from rift_cl.reconstruct.direct.redundancy import ITERATE
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_png, image_grid
 
@@ -174,7 +178,7 @@ class ConeReconstruction:
                 yield Report(total, total, "steps")
                 return
             self._check_place()
-            integrals = self.source.read()
+            integrals = self._read()
             self.metrics = {"dead_pixels": integrals.dead, "starved_samples": integrals.starved}
             yield Report(1, total, "steps")
             slabs = yield from self._solve(integrals.projections, total)
@@ -183,6 +187,36 @@ class ConeReconstruction:
             self.folder.discard()
             raise
         yield Report(total, total, "steps")
+
+    def _read(self) -> Attenuation:
+        """Line integrals of all rows, whose sides a formula can take.
+
+        Raises:
+            InputError: no view shows what the shorter side of the detector does not.
+        """
+        integrals, scan = self.source.read(), self.source.geometry
+        if (
+            not isinstance(self._formula, FDK)
+            or not isinstance(scan, Cone)
+            or not is_truncated(integrals.projections)
+        ):
+            return integrals
+        bin, turn = scan.center[1], is_full_turn(scan.angles)
+        further = sees_further(bin, scan.bins)
+        if further and not turn:
+            raise InputError(
+                f"{self.source.file.path}: the object reaches beyond a side of the detector, whose "
+                f"axis is at bin {bin:.1f} of {scan.bins}, and the views do not go all round, so "
+                f"that no view shows what is missing there; {ITERATE} (--method)"
+            )
+        if not further:
+            note = (
+                "The object reaches beyond a side of the detector in most views: values near the "
+                "border of the field of view are too large (cgls, sirt and tv explain the rays)."
+            )
+            self.source.notes.append(note)
+            self.announce(note)
+        return integrals
 
     def _solve(self, projections: Floats, total: int) -> Generator[Report, None, Iterable[Floats]]:
         """The volume in slabs, or in one, after a report for every step."""
@@ -217,7 +251,7 @@ class ConeReconstruction:
         grid = VolumeWindow.of(settings, self.source.geometry).grid
         A = Projector(grid, self.source.geometry, device=self.device)
         formula = cone_inversion(A, settings.view_filter(), settings.compensate)
-        return [np.asarray(formula(self.source.read().projections))[0]]
+        return [np.asarray(formula(self._read().projections))[0]]
 
     def _finish(self, slabs: Iterable[Floats]) -> None:
         """Write the volume, its pictures and the report."""
