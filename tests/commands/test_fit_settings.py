@@ -42,6 +42,7 @@ OTHERS = {
     "test": (Path("one"), Path("two")),
     "out": Path("other"),
     "rendering.far": 5.0,
+    "rendering.tile": 8,
     "homogenise": 0.75,
 }
 
