@@ -40,7 +40,7 @@ _QUICK_SIZES = ("256x384",)
 _GROUPS_AT, _QUICK_GROUPS_AT = "512x768", "128x192"
 # Splats, and pixels along a side.
 _SPLATS = ((10_000, 256), (10_000, 512), (100_000, 256), (100_000, 512))
-_QUICK_SPLATS = ((10_000, 256),)
+_QUICK_SPLATS = ((10_000, 256), (30_000, 256))
 # Updates from which peers run once (they need minutes), and up to which a stack is measured.
 _ONCE_UPDATES = 2e9
 _STACK_UPDATES = 1e10
