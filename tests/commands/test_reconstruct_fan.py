@@ -126,3 +126,14 @@ def test_data_without_contrast_leave_the_axis_to_the_file(tmp_path: Path) -> Non
     save(tmp_path / "fan.npz", y, scan.angles, center=(0.0, 75.0))
     _, said = reconstructed(tmp_path / "fan.npz", tmp_path / "out")
     assert "The axis was taken to be that of the file, bin 75.00" in said
+
+
+def test_lengths_in_two_units_are_doubted(tmp_path: Path) -> None:
+    scan = fan(SPANS["turn"], 75.0)
+    save(tmp_path / "fan.npz", sinogram(KINDS["parts"], scan), scan.angles)
+    _, said = reconstructed(tmp_path / "fan.npz", tmp_path / "out", "--size", 8)
+    assert "in one unit of length" not in said
+    with np.load(tmp_path / "fan.npz") as file:
+        np.savez(tmp_path / "two.npz", **{**file, "pitch": 1e-3})
+    _, said = reconstructed(tmp_path / "two.npz", tmp_path / "two", "--size", 8)
+    assert "in one unit of length" in said

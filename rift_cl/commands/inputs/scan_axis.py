@@ -16,6 +16,9 @@ from rift_cl.reconstruct.axis import AxisEstimate, axis_of_rows, searched_rows
 from rift_cl.reconstruct.axis.circular import axis_of_fan, axis_of_scan, orbit_rows
 from rift_cl.reconstruct.axis.search import GIVE_IT
 
+# A fan that opens by less than this many degrees is no scanner's.
+_NARROW = 0.25
+
 
 def find_axis(
     scan: ScanFile, device: Device | None = None, *, span: tuple[float, float] | None = None
@@ -92,15 +95,32 @@ def settled_axis(scan: ScanFile, center: float, device: Device | None = None) ->
             f"The axis was taken to be that of {told}, bin {center:.2f} (--center), since the data "
             f"do not tell it: {reason}."
         )
-        return SettledAxis(center, False, None, {"center": center, "by": told}, (note,))
-    notes = [f"The rotation axis was found {found.in_words()}; {told} has bin {center:.2f}."]
+        notes = (note, *_narrow(scan))
+        return SettledAxis(center, False, None, {"center": center, "by": told}, notes)
+    words = f"The rotation axis was found {found.in_words()}; {told} has bin {center:.2f}."
+    notes = (words, *_narrow(scan))
     turned = found.sense is not None and found.sense.sign < 0
     if turned:
-        notes.append(
+        reason = (
             "The angles were therefore taken with the other sign; --reversed does so without "
             "asking the data, and --center leaves them as they are."
         )
-    return SettledAxis(found.center, turned, found, found.record(), tuple(notes))
+        notes = (*notes, reason)
+    return SettledAxis(found.center, turned, found, found.record(), notes)
+
+
+def _narrow(scan: ScanFile) -> tuple[str, ...]:
+    """A doubt about lengths that make a fan as narrow as no scanner's."""
+    beam = scan.geometry if scan.cone is None else scan.cone
+    if not isinstance(beam, Fan | Cone):
+        return ()
+    opening = float(np.rad2deg(np.ptp(beam.fan_angles())))
+    if opening >= _NARROW:
+        return ()
+    return (
+        f"The fan opens by {opening:.2g} degrees, hardly more than parallel rays: are distances "
+        "and pitch in one unit of length (--geometry, --pitch)?",
+    )
 
 
 def _of_cone(
