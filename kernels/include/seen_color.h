@@ -44,6 +44,16 @@ static Sight sight_of(lanes3 mean, float3 center) {
   return s;
 }
 
+/* Asks for the coefficients of the splats after the next LANES: a row of harmonics is three lines of
+ * memory, and eight rows are more than the hardware looks ahead for by itself. */
+#define NUMBERS_OF_LINE 16
+static void ask_ahead(__global const float *coefficients, const int functions, Rows rows) {
+#if LANES == 8 && RIFT_POCL
+  __global const float *p = coefficients + (rows.first + 2 * LANES) * 3 * functions;
+  for (int k = 0; k < LANES * 3 * functions; k += NUMBERS_OF_LINE) PREFETCH(p + k);
+#endif
+}
+
 /* A half, and the sum of functions times coefficients. */
 static lanes3 sum_of_functions(
     __global const float *coefficients, const int functions, Rows rows, const lanes *basis)

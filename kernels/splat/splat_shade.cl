@@ -18,6 +18,7 @@ KERNEL void splat_shade(
     const Rows rows = rows_at(first, count);
     const lanes_int drawn = read_bytes(culled, rows) == 0;
     lanes3 color = lanes3_of(0, 0, 0);
+    ask_ahead(sh, COEFFICIENTS, rows);
     if (any_lane(drawn)) {
       lanes basis[COEFFICIENTS];
       sh_basis(sight_of(read3(means, 3, rows), center.xyz).direction, basis);

@@ -21,6 +21,7 @@ KERNEL void splat_shade_grad(
   EACH_RUN(first, count) {
     const Rows rows = rows_at(first, count);
     const lanes3 color = read3(features, STRIDE, rows);
+    ask_ahead(sh, COEFFICIENTS, rows);
     const lanes_int seen = is_seen(color) & are_there(rows);
     const lanes3 incoming = incoming_of(color, read3(grad_features, STRIDE, rows));
     lanes basis[COEFFICIENTS], by_basis[COEFFICIENTS];
