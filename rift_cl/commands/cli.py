@@ -6,7 +6,6 @@ imports its own settings to parse or to help, and its job only to run; ``rift --
 
 from __future__ import annotations
 
-import dataclasses
 import shutil
 import sys
 import textwrap
@@ -140,14 +139,17 @@ def _command(
 
 
 def _earlier(name: str, arguments: Sequence[str]) -> Any:
-    """The settings of the run that ``--config`` names, which options override; else None."""
-    if not any(argument.startswith("--config") for argument in arguments):
+    """The settings that options override, of a run (``--config``) or a preset; None if neither."""
+    if not any(argument.startswith(("--config", "--preset")) for argument in arguments):
         return None
-    from rift_cl.commands.run_folder.saved_settings import named_config, saved_settings
+    from rift_cl.commands.run_folder.saved_settings import (
+        begun_settings,
+        named_config,
+        named_preset,
+    )
 
-    path, settings = named_config(arguments), COMMANDS[name].settings_class()
-    takes = any(field.name == "config" for field in dataclasses.fields(settings))
-    return saved_settings(path, name, settings) if path is not None and takes else None
+    given = named_config(arguments), named_preset(arguments)
+    return begun_settings(*given, name, COMMANDS[name].settings_class())
 
 
 def _devices(settings: Any, output: Output) -> None:

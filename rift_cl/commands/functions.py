@@ -28,7 +28,7 @@ from rift_cl.commands.results import (
     Result,
     Scored,
 )
-from rift_cl.commands.run_folder.saved_settings import parsed_settings, saved_settings
+from rift_cl.commands.run_folder.saved_settings import begun_settings, parsed_settings
 from rift_cl.errors import InputError
 from rift_cl.progress import Report
 
@@ -294,8 +294,9 @@ def _settings(given: dict[str, Any], job: str, settings: type[S]) -> S:
         if given.get(name):
             raise InputError(f"{name} is for 'rift {job}' on a command line alone: leave it out")
     plain = {name: _plain(value) for name, value in given.items()}
-    config = plain.pop("config", None)
-    earlier = None if config is None else saved_settings(Path(config), job, settings)
+    config, preset = plain.pop("config", None), plain.get("preset")
+    path = None if config is None else Path(config)
+    earlier = begun_settings(path, preset, job, settings)
     return parsed_settings(plain, job, settings, earlier=earlier)
 
 

@@ -97,8 +97,9 @@ class CoefficientSchedule:
             parameters.activate()
         if settings.angular.kind == "sh":
             degree = int(np.sqrt(parameters.raw["sh"].shape[1])) - 1
-            if step and step % settings.sh_every == 0 and degree < settings.sh_degree:
-                parameters.add_degree()
+            for joins in settings.degree_joins[degree:]:
+                if step >= joins:
+                    parameters.add_degree()
         elif "lobes" not in parameters.raw:
             self._add_lobes(parameters)
         self._add_orders(parameters)

@@ -93,8 +93,9 @@ class TrainSettings:
     """Random seed; the same seed gives the same splats, bit by bit."""
     sh_degree: Short[int] = 3
     """Highest degree of the spherical harmonics of colours, 0 to 4."""
-    sh_every: Short[int] = 500
-    """Steps after which the next degree of harmonics is added."""
+    sh_every: Short[float] = 1 / 6
+    """Fraction of the run between one degree of the harmonics and the next; 0 = all from the first
+    step on."""
     loss: Short[str] = "l1"
     """Pixel loss: absolute (l1) or squared (l2) differences, or the name of a registered one
     (rift_cl.train.register_loss)."""
@@ -132,10 +133,10 @@ class TrainSettings:
 
     def __post_init__(self) -> None:
         """Check every number's range."""
-        for name, least in (("steps", 1), ("splats", 1), ("sh_every", 1), ("seed", 0)):
+        for name, least in (("steps", 1), ("splats", 1), ("seed", 0)):
             check_whole(self, name, least)
         check_whole(self, "sh_degree", 0, 4)
-        for name in ("ssim_weight", "cooldown"):
+        for name in ("ssim_weight", "cooldown", "sh_every"):
             check_number(self, name, most=1)
         if self.noise is not None:
             check_number(self, "noise")
@@ -165,6 +166,12 @@ class TrainSettings:
         shape, color = basis.orders
         modes = count_of(shape) - 1 + 3 * (count_of(color) - 1)
         return 11 + modes + (self.angular.numbers or colors)
+
+    @property
+    def degree_joins(self) -> tuple[int, ...]:
+        """Steps after which degrees 1, 2 .. of the harmonics join; none where colours are lobes."""
+        highest = self.sh_degree if self.angular.kind == "sh" else 0
+        return tuple(round(self.sh_every * self.steps * degree) for degree in range(1, highest + 1))
 
     @property
     def needs_noise(self) -> bool:

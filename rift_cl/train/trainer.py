@@ -211,21 +211,16 @@ class Trainer:
 
     def _work(self, step: int, splats: int, steps: int = 1) -> float:
         """Cost of steps, in units of one step with all splats of one color each."""
-        degree = min(step // self.settings.sh_every, self._last_degree)
+        degree = sum(step >= joins for joins in self.settings.degree_joins)
         harmonics = _FIRST_DEGREE + _NEXT_DEGREE * (degree - 1) if degree else 0.0
         one = _PIXELS + splats / self.settings.splats * (1 + harmonics)
         large = _LARGE * _SHRINK**step * (1 - _SHRINK**steps) / (1 - _SHRINK)
         return one * (steps + large)
 
-    @property
-    def _last_degree(self) -> int:
-        """Of the harmonics, once all have joined."""
-        return self.settings.sh_degree if self.settings.angular.kind == "sh" else 0
-
     def _work_left(self) -> float:
         """The cost of all steps to come."""
         step, left = self.parameters.step, 0.0
-        joins = [self.settings.sh_every * degree for degree in range(1, self._last_degree + 1)]
+        joins = self.settings.degree_joins
         for steps, count in self.strategy.forecast(step, len(self.parameters)):
             end = step + steps
             for until in [*(at for at in joins if step < at < end), end]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from rift_cl.commands.cli import COMMANDS, main
+from rift_cl.commands.fit_photos.presets import PRESETS
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.run_folder.saved_settings import options_of, record_of, saved_settings
@@ -44,6 +45,7 @@ OTHERS = {
     "rendering.far": 5.0,
     "rendering.tile": 8,
     "homogenise": 0.75,
+    "preset": "0.1",
 }
 
 
@@ -105,6 +107,29 @@ def test_settings_by_name_are_those_of_the_command_line(monkeypatch):
     whole = FitPhotosSettings.of(Path("x"), Path("y"), strategy=DefaultSettings(every=7))
     by_name = {"strategy": "default", "strategy.every": 7}
     assert whole == FitPhotosSettings.of(Path("x"), Path("y"), **by_name)
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_options_override_a_preset_on_the_command_line_and_in_python(monkeypatch, name):
+    words = ("--preset", name, "--learning-rates.means", 1e-3)
+    found = meant(monkeypatch, "fit photos", "x", "--out", "y", *words)
+    options = {"preset": name, "learning_rates.means": 1e-3}
+    assert found == FitPhotosSettings.of(Path("x"), Path("y"), **options)
+    wanted = {**PRESETS[name], **options}
+    assert wanted.items() <= {option.name: option.value for option in options_of(found)}.items()
+
+
+def test_a_preset_that_contradicts_an_option_is_refused():
+    settings = FitPhotosSettings.of(Path("x"), Path("y"), preset="fast", sh_degree=2)
+    with pytest.raises(InputError, match="--sh-degree"):
+        settings.check()
+
+
+def test_a_preset_and_a_run_to_repeat_are_refused_together(tmp_path, capsys):
+    config = tmp_path / "config.json"
+    config.write_text("{}", encoding="utf-8")
+    assert main(["fit", "photos", "x", "--preset", "fast", "--config", str(config)]) == 3
+    assert "--preset" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("job", CLASSES)

@@ -58,7 +58,7 @@ def test_the_numbers_of_splats_are_forecast_to_the_last(device):
 
 @pytest.mark.parametrize("degree", [0, 2])
 def test_reports_say_how_much_work_is_done_and_left(device, degree):
-    _, reports, counts = trained(device, sh_degree=degree, sh_every=50)
+    _, reports, counts = trained(device, sh_degree=degree, sh_every=50 / 120)
     work = np.cumsum(
         [cost(step, count / 80, min(step // 50, degree)) for step, count in enumerate(counts)]
     )

@@ -25,7 +25,7 @@ SETTINGS = TrainSettings(
     steps=120,
     splats=150,
     sh_degree=1,
-    sh_every=40,
+    sh_every=1 / 3,
     seed=3,
     strategy=McmcSettings(first=40, every=20),
 )

@@ -7,7 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
 
-from rift_cl.commands.run_folder.saved_settings import options_of, parsed_settings
+from rift_cl.commands.run_folder.saved_settings import (
+    begun_settings,
+    options_of,
+    parsed_settings,
+)
 from rift_cl.errors import InputError
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.settings import TrainSettings
@@ -17,7 +21,7 @@ F = TypeVar("F", bound="FitSettings")
 # result.
 _FREE = (
     *("out", "resume", "overwrite", "dry_run", "checkpoint_every", "view", "device", "config"),
-    *("memory", "format"),
+    *("memory", "format", "preset"),
 )
 
 
@@ -78,7 +82,9 @@ class FitSettings:
         Raises:
             InputError: there is no such option, or a value is none that it takes.
         """
-        return parsed_settings({"capture": capture, "out": out, **options}, cls.job, cls)
+        begun = begun_settings(None, options.get("preset"), cls.job, cls)
+        given = {"capture": capture, "out": out, **options}
+        return parsed_settings(given, cls.job, cls, earlier=begun)
 
     def check(self) -> None:
         """Check what neither the trainer nor the rasterizer does.

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from tyro.conf import Positional
 
 from rift_cl.commands.fit.settings import FitOutput, FitSettings, SplitOptions
+from rift_cl.commands.fit_photos.presets import PRESETS
 from rift_cl.commands.options import RepeatableRun
 from rift_cl.errors import InputError
 from rift_cl.option_marks import Auto, Short
@@ -63,6 +65,10 @@ class PhotosTraining:
 
     group: ClassVar[str] = ""
 
+    preset: Auto[Literal["fast", "harmonics", "0.1"]] = None
+    """Settings to begin with, which other options override: eight spherical Gaussians and fast
+    rates (fast), the same rates with harmonics, which every viewer shows (harmonics), or those of
+    version 0.1. Default: 0.1."""
     training: Short[TrainSettings] = field(default_factory=_training)
     """The optimization."""
     rendering: Short[SplatSettings] = field(default_factory=_rendering)
@@ -80,6 +86,7 @@ class FitPhotosSettings(RepeatableRun, FitOutput, PhotosTraining, PhotosInput, F
     """
 
     job: ClassVar[str] = "fit photos"
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
 
     def check(self) -> None:
         """Check what neither the trainer nor the rasterizer does; see ``FitSettings``."""

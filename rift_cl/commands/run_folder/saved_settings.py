@@ -134,6 +134,56 @@ def saved_settings(path: Path, job: str, settings: type[S]) -> S:
     return _read_tree(settings, None, repeated, f"--config {path}: 'rift {job}'", open_ended=True)
 
 
+def named_preset(arguments: Sequence[str]) -> str | None:
+    """The name that ``--preset`` gives on a command line, if it does."""
+    return _given(arguments, "--preset")
+
+
+def begun_settings(
+    config: Path | None, preset: str | None, job: str, settings: type[S]
+) -> S | None:
+    """The settings that a command begins with, and its options override.
+
+    Args:
+        config: file of an earlier run that is repeated, or None.
+        preset: name of a preset of the command's, or None.
+        job: the command.
+        settings: its settings.
+
+    Returns:
+        None if the defaults are meant.
+
+    Raises:
+        InputError: both are given, or the file cannot be used.
+    """
+    takes = {field.name for field in dataclasses.fields(settings)}  # type: ignore[arg-type]
+    if config is not None and preset is not None and {"config", "preset"} <= takes:
+        raise InputError(
+            "--config repeats a run with all of its values and --preset begins with others: give "
+            "one of the two"
+        )
+    if config is not None:
+        return saved_settings(config, job, settings) if "config" in takes else None
+    return None if preset is None else _preset_settings(preset, job, settings)
+
+
+def _preset_settings(name: str, job: str, settings: type[S]) -> S | None:
+    """The defaults of a command with a preset's values in their place.
+
+    Args:
+        name: of the preset.
+        job: the command.
+        settings: its settings, whose class may have ``presets``: values by the names of options.
+
+    Returns:
+        None if the command has no preset of that name, which its parser then says.
+    """
+    values = getattr(settings, "presets", {}).get(name)
+    if values is None:
+        return None
+    return parsed_settings({**values, "preset": name}, job, settings, open_ended=True)
+
+
 def parsed_settings(
     values: dict[str, Any],
     job: str,
@@ -141,6 +191,7 @@ def parsed_settings(
     *,
     earlier: S | None = None,
     where: str = "",
+    open_ended: bool = False,
 ) -> S:
     """Settings by the names of their options, as ``options_of`` gives them.
 
@@ -151,6 +202,7 @@ def parsed_settings(
         settings: its settings.
         earlier: those to begin with, in place of the defaults.
         where: what a sentence about a mistake begins with.
+        open_ended: whether what has to be given may be missing, for a parser to ask for.
 
     Raises:
         InputError: there is no such setting, or a value is none that it takes.
@@ -171,7 +223,7 @@ def parsed_settings(
             if not isinstance(part, dict):
                 raise InputError(f"{said}: {name} is given, and all of {step} as well")
         part[last] = value
-    return _read_tree(settings, earlier, tree, said)
+    return _read_tree(settings, earlier, tree, said, open_ended=open_ended)
 
 
 def read_settings(settings: type[S], record: Any, where: str) -> S:

@@ -53,7 +53,7 @@ class XrayTrainSettings(TrainSettings):
     """Settings of a fit to X-ray projections."""
 
     sh_degree: NoOption[int] = 0
-    sh_every: NoOption[int] = 500
+    sh_every: NoOption[float] = 1 / 6
     loss: Short[str] = "l2"
     ssim_weight: Short[float] = 0.0
     refine_poses: NoOption[bool] = False
