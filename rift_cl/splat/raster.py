@@ -9,7 +9,7 @@ channels are drawn 32 at a time, on a GPU 8 at a time; without modes alone.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -136,14 +136,16 @@ class ScreenSplats:
         screen: (N, 8): mean x, mean y, conic a, b, c, weight, extent x, extent y.
         features: (N, D), the channels that are drawn.
         modes: the polynomials of splats that have some; None for Gaussians.
-        records: (N, 16), what tiles want of them in one line each, see
-            ``kernels/include/screen_record.h``; None until ``packed`` makes them.
+
+    ``records``, (N, 16), hold what tiles want of them in one line each, see
+    ``kernels/include/screen_record.h``; they are None until ``packed`` makes them, and in a copy
+    with other arrays, which they would not be of.
     """
 
     screen: DeviceArray
     features: DeviceArray
     modes: ScreenModes | None = None
-    records: DeviceArray | None = None
+    records: DeviceArray | None = field(default=None, init=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +196,9 @@ def packed(device: Device, splats: ScreenSplats) -> ScreenSplats:
         CHANNELS=splats.features.shape[1],
         MODAL=modes is not None,
     )
-    return replace(splats, records=records)
+    found = replace(splats)
+    object.__setattr__(found, "records", records)
+    return found
 
 
 def rasterize(

@@ -40,6 +40,8 @@ _SHAPE_NUMBERS = 12
 _MARGIN = 1e-4
 # What float32 counts exactly.
 _MOST_SAMPLES = 1 << 24
+# Bytes of a splat in a layer's lists (its row, box and depth), and of what does not grow.
+_LISTED, _SMALL = 24, 4096
 _LARGEST = float(np.finfo(np.float32).max)
 
 Floats = NDArray[np.float64]
@@ -95,7 +97,7 @@ class _LayerMemory(FrameMemory):
 
     @property
     def fixed(self) -> int:
-        return self.shared + super().fixed
+        return self.shared + _LISTED * self.splats + _SMALL
 
 
 @dataclass(frozen=True, eq=False)

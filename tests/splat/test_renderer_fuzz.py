@@ -130,6 +130,8 @@ def run(device, chosen, scene, values):
     arrays |= {"features": frame.raster_pass.screen.features}
     arrays |= {"coming": coming[0], "by camera": found.camera, "by background": found.background}
     gradients = vars(found.splats) | {"colors": found.colors, "sh": found.sh}
+    # These have a row for a run of splats.
+    del gradients["camera"], gradients["aperture"]
     hosts = [
         {name: device.get(array) for name, array in some.items() if array is not None}
         for some in (arrays, gradients)
