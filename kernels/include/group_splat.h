@@ -28,14 +28,6 @@
 /* log2(1/255) */
 #define FAINTEST -7.99435344f
 
-/* 2^x for x < 128. A GPU has one instruction for it, right to some 2e-7; whether a driver keeps that
- * is seen where its results are compared with known ones. On PoCL it is a slow call. */
-#if RIFT_POCL
-#define TWO_TO(x) two_to_the(x)
-#else
-#define TWO_TO(x) native_exp2(x)
-#endif
-
 /* A splat at a pixel: its peak times the exponential, and that as it counts, with its polynomial. */
 typedef struct {
   float distance;               /* (sigma log2 e) */
@@ -62,7 +54,7 @@ static Seen see(const float *splat, float x, float y AND_MODES_ARGUMENT) {
   const float far = splat[SPLAT_FAR] * dx, near = splat[SPLAT_LEAN] * dx + splat[SPLAT_RISE] * dy;
   s.distance = far * far + near * near;
   const float power = splat[SPLAT_PEAK] - s.distance;
-  s.exponential = TWO_TO(power);
+  s.exponential = two_to_the(power);
 #if MODAL
   __global const float *mode = MODES_OF(splat, modes);
   const int within = -s.distance >= LEAST_POWER;

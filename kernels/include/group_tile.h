@@ -56,10 +56,10 @@ static float larger_of(float a, float b) { return a > b ? a : b; }
 static float smaller_of(float a, float b) { return a < b ? a : b; }
 
 /* How far an ellipse's edge lies from its axis at column u, as a share of what it does at u = 0; a
- * little more, whatever a driver's quick root is worth. */
+ * little more, against rounding. */
 static float half_height(float u, float per_extent) {
   const float share = u * per_extent, rest = 1 - share * share;
-  return 1.001f * native_sqrt(larger_of(rest, 1e-6f));
+  return 1.001f * sqrt(larger_of(rest, 1e-6f));
 }
 
 /* A bit for each block of a part that a splat's ellipse reaches; (x, y) counts from the part's corner.

