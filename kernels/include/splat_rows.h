@@ -30,6 +30,10 @@
 #define STORE_QUAD(p, v) vstore4(v, 0, p)
 #endif
 
+/* Whether this work-item has a run: a group may be longer than what is left, and what the items without
+ * one would add to, be it zero, is another's memory. */
+#define HAS_RUN(count) ((long)get_global_id(0) * RUN < (count))
+
 /* The first of LANES rows, how many there are of them, and whether another follows. */
 typedef struct {
   long first;

@@ -34,7 +34,7 @@ KERNEL void background_grad(
     __global float *restrict parts, int pixels)
 {
   const long run = get_global_id(0);
-  if (run * RUN >= pixels) return;
+  if (!HAS_RUN(pixels)) return;
   __global float *part = parts + run * CHANNELS;
   for (int n = 0; n + 4 <= CHANNELS; n += 4) sum_channels(grad_image, transmittance, pixels, n, 4, part);
   if (CHANNELS % 4) sum_channels(grad_image, transmittance, pixels, CHANNELS / 4 * 4, CHANNELS % 4, part);

@@ -259,7 +259,7 @@ KERNEL void splat_project_grad(
   }
 #if CAMERA_GRADIENT
   const long run = get_global_id(0);
-  if (run * RUN >= count) return;
+  if (!HAS_RUN(count)) return;
   for (int k = 0; k < 16; k++) camera_parts[16 * run + k] = SUM_OF_LANES(total[k]);
 #if DEFOCUS
   for (int k = 0; k < 2; k++) aperture_parts[2 * run + k] = SUM_OF_LANES(total[16 + k]);

@@ -34,5 +34,5 @@ KERNEL void splat_shade_grad(
     add_to_means(grad_means, rows, by_mean);
     by_means = plus(by_means, by_mean);
   }
-  add_to_camera(by_means, inverse_x, inverse_y, inverse_z, camera_parts);
+  if (HAS_RUN(count)) add_to_camera(by_means, inverse_x, inverse_y, inverse_z, camera_parts);
 }

@@ -67,3 +67,24 @@ def test_so_have_splats_with_lobes(device, kind, count):
         found = seen_grad(device, few, incoming[:some])
         for name in ("linear", "lobes", "means"):
             assert same(found[name], whole[name][:some]), (name, some)
+
+
+def test_work_items_without_a_splat_write_nothing(device):
+    rows = {f"inverse_{axis}": np.full(4, np.inf, np.float32) for axis in "xyz"}
+    parts = device.zeros((64, 16))
+    device.launch(
+        "splat_shade_grad",
+        (1,),
+        **{name: device.array(np.ones((1, 3))) for name in ("means", "features", "grad_features")},
+        **{name: device.array(np.ones((1, 1, 3))) for name in ("sh", "grad_sh")},
+        **rows,
+        count=1,
+        grad_means=device.zeros((1, 3)),
+        camera_parts=parts,
+        RUN=device.traits.run,
+        STRIDE=3,
+        COEFFICIENTS=1,
+        CAMERA_GRADIENT=True,
+    )
+    assert np.isnan(device.get(parts)[0]).any()
+    assert not device.get(parts)[1:].any()
