@@ -12,7 +12,6 @@ itk-rtk``.
 
 from __future__ import annotations
 
-import math
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -23,6 +22,7 @@ import numpy as np
 import tyro
 
 import rift_cl as rift
+from bench.ball_psnr import ball_psnr
 from bench.command import say
 from bench.cones import ConeCase
 from bench.limits import LimitMeter
@@ -31,7 +31,7 @@ from bench.table import Table, show
 from rift_cl import phantom
 
 _HEAD = ("operation", "who", "seconds", "CPU seconds", "Gup/s", "share of multiply-adds", "PSNR")
-_STEPS, _RADIUS, _FLOP = 10, 0.48, 4
+_STEPS, _FLOP = 10, 4
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def _rows(
             times.append((time.perf_counter() - wall, time.process_time() - processor))
         seconds, processor = (min(column) for column in zip(*times, strict=True))
         share = _FLOP * updates / seconds / limit
-        quality = f"{_psnr(np.asarray(result), truth):.2f}" if scored else ""
+        quality = f"{ball_psnr(np.asarray(result), truth):.2f}" if scored else ""
         rate = f"{updates / seconds / 1e9:.2f}"
         yield (name, who, f"{seconds:.3f}", f"{processor:.3f}", rate, f"{share:.0%}", quality)
 
@@ -109,14 +109,6 @@ def _operations(
     yield "RTK", "filtered backprojection", lambda: peer.filtered(seen), once, True
     yield "RTK", "forward", lambda: peer.projected(truth), once, False
     yield "RTK", "backward", lambda: peer.backprojected(seen), once, False
-
-
-def _psnr(volume: Any, truth: Any) -> float:
-    n = len(truth)
-    places = np.arange(n) - (n - 1) / 2
-    radius = sum(np.meshgrid(*[places**2] * 3, indexing="ij", sparse=True))
-    error = (volume - truth)[radius < (_RADIUS * n) ** 2].astype(np.float64)
-    return -10 * math.log10(float(np.mean(error**2)))
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 import rift_cl as rift
+from bench.ball_psnr import ball_psnr
 
 MAGNIFICATIONS = (1.2, 1.5, 3.0, 6.0, 15.0)
 PITCHES = (0.5, 0.75, 1.0, 1.3, 2.0)
@@ -157,18 +158,9 @@ def rolled(given: argparse.Namespace, degrees: float) -> tuple[float, float, flo
     straight, data = (rift.phantom.project(head, grid, each) for each in (scan, turned))
 
     def quality(scan: rift.Cone | rift.Vectors, data: np.ndarray) -> float:
-        return psnr(rift.fbp(rift.Projector(grid, scan), data), truth)
+        return ball_psnr(rift.fbp(rift.Projector(grid, scan), data), truth)
 
     return quality(scan, straight), quality(turned, data), quality(scan, data)
-
-
-def psnr(volume: np.ndarray, truth: np.ndarray) -> float:
-    """Within the ball of 0.48 of the edge, against the largest value, in dB."""
-    half = (len(truth) - 1) / 2
-    places = np.mgrid[tuple(slice(n) for n in truth.shape)] - half
-    inside = (places**2).sum(axis=0) <= (0.48 * len(truth)) ** 2
-    mean = np.mean((volume - truth)[inside] ** 2)
-    return float(10 * np.log10(truth.max() ** 2 / mean))
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from functools import partial
 import numpy as np
 
 import rift_cl as rift
+from bench.ball_psnr import ball_psnr
 
 
 def main() -> None:
@@ -37,10 +38,10 @@ def main() -> None:
         ):
             data = rift.phantom.project(parts, grid, scan)
             known = solve(rift.Projector(grid, scan), data)
-            line = f"{degrees:g} degrees, {method}: {psnr(known, truth):.2f} dB"
+            line = f"{degrees:g} degrees, {method}: {ball_psnr(known, truth):.2f} dB"
             if degrees:
                 ignored = solve(rift.Projector(grid, plain), data)
-                line += f", {psnr(ignored, truth):.2f} dB if they are ignored"
+                line += f", {ball_psnr(ignored, truth):.2f} dB if they are ignored"
             print(line, flush=True)
 
 
@@ -63,15 +64,6 @@ def tilted(scan: rift.Vectors, degrees: float, *, sources: bool = True) -> rift.
     shifts = degrees / 2 * random.standard_normal((2, scan.views, 3))
     source, middle = scan.source + sources * shifts[0], scan.middle + shifts[1]
     return rift.Vectors(source, middle, across, down, scan.rows, scan.bins)
-
-
-def psnr(volume: np.ndarray, truth: np.ndarray) -> float:
-    """Within the ball of 0.48 of the edge, against the largest value, in dB."""
-    half = (len(truth) - 1) / 2
-    places = np.mgrid[tuple(slice(n) for n in truth.shape)] - half
-    inside = (places**2).sum(axis=0) <= (0.48 * len(truth)) ** 2
-    mean = np.mean((volume - truth)[inside] ** 2)
-    return float(10 * np.log10(truth.max() ** 2 / mean))
 
 
 if __name__ == "__main__":

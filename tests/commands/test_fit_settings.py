@@ -45,7 +45,7 @@ OTHERS = {
     "rendering.far": 5.0,
     "rendering.tile": 8,
     "homogenise": 0.75,
-    "preset": "0.1",
+    "preset": "harmonics",
 }
 
 

@@ -8,9 +8,11 @@ magnification, the pitch and the detector's shape.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
+from averaged_rays import averaged_on
 
 import rift_cl as rift
 from rift_cl import Cone, Grid, Projector, backproject, fbp, phantom
@@ -27,6 +29,7 @@ BALL = phantom.Ellipsoid.ball(0.35 * N, 1.7)
 AWAY = np.arange(N) - (N - 1) / 2
 RADIUS = np.sqrt(AWAY[:, None, None] ** 2 + AWAY[:, None] ** 2 + AWAY**2)
 FULL = np.arange(90) * 2 * np.pi / 90
+averaged = partial(averaged_on, GRID)
 
 
 def circle(angles=FULL, magnification=1.5, distance=3.0, share=1.0, **changes):
@@ -36,15 +39,6 @@ def circle(angles=FULL, magnification=1.5, distance=3.0, share=1.0, **changes):
     width = 2.04 * to_detector * np.tan(np.arcsin(0.5 / distance))
     bins = round(N / share)
     return Cone(angles, bins, bins, width / bins, to_axis, to_detector, **changes)
-
-
-def averaged(parts, scan, factor=4):
-    """Line integrals averaged over bins, as a detector measures them."""
-    pitch = tuple(length / factor for length in scan.pitch)
-    center = tuple((place + 0.5) * factor - 0.5 for place in scan.center)
-    counts = {"rows": scan.rows * factor, "bins": scan.bins * factor}
-    fine = phantom.project(parts, GRID, replace(scan, pitch=pitch, center=center, **counts))
-    return fine.reshape(scan.views, scan.rows, factor, scan.bins, factor).mean((2, 4))
 
 
 def level(volume, within):

@@ -7,9 +7,11 @@ the bins, are the data.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
+from averaged_rays import averaged_on
 
 import rift_cl as rift
 from rift_cl import Cone, Grid, Projector, fbp, phantom
@@ -23,6 +25,7 @@ GRID = Grid((N, N, N))
 BALL = phantom.Ellipsoid.ball(0.35 * N, 1.7)
 AWAY = np.arange(N) - (N - 1) / 2
 RADIUS = np.sqrt(AWAY[:, None, None] ** 2 + AWAY[:, None] ** 2 + AWAY**2)
+averaged = partial(averaged_on, GRID)
 
 
 def helix(rise=24.0, distance=3.0, magnification=1.5, share=1.0, per_turn=72, **changes):
@@ -36,15 +39,6 @@ def helix(rise=24.0, distance=3.0, magnification=1.5, share=1.0, per_turn=72, **
     heights = rise * angles / (2 * np.pi)
     lengths = to_axis, to_detector
     return Cone(angles, bins, bins, pitch, *lengths, heights=heights, **changes)
-
-
-def averaged(parts, scan, factor=4):
-    """Line integrals averaged over bins, as a detector measures them."""
-    pitch = tuple(length / factor for length in scan.pitch)
-    center = tuple((place + 0.5) * factor - 0.5 for place in scan.center)
-    counts = {"rows": scan.rows * factor, "bins": scan.bins * factor}
-    fine = phantom.project(parts, GRID, replace(scan, pitch=pitch, center=center, **counts))
-    return fine.reshape(scan.views, scan.rows, factor, scan.bins, factor).mean((2, 4))
 
 
 def level(device, scan):

@@ -35,7 +35,7 @@ from rift_cl.train.strategy.mcmc import relocate
 _STAGES = {
     "project and shade": ("splat_project", "splat_shade"),
     "tile lists": ("tile_", "radix_", "scan_"),
-    "raster": ("splat_raster_cpu", "splat_raster_gpu"),
+    "raster": ("splat_pack", "splat_raster_cpu", "splat_raster_gpu"),
     "exposure": ("expose", "expose_grad"),
     "loss": ("ssim_map", "loss_grad", "sum_columns"),
     "homogenisation": ("fft_", "keep_norm", "axpby"),

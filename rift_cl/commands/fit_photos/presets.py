@@ -21,5 +21,4 @@ _RATES = {
 PRESETS: Mapping[str, Mapping[str, Any]] = {
     "fast": {**_RATES, "angular": "sg", "modes": 8, "angular.first": 0.05},
     "harmonics": {**_RATES, "sh_every": 1 / 14, "learning_rates.sh_rest": 1.0},
-    "0.1": {},
 }

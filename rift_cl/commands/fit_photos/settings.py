@@ -65,10 +65,10 @@ class PhotosTraining:
 
     group: ClassVar[str] = ""
 
-    preset: Auto[Literal["fast", "harmonics", "0.1"]] = None
-    """Settings to begin with, which other options override: eight spherical Gaussians and fast
-    rates (fast), the same rates with harmonics, which every viewer shows (harmonics), or those of
-    version 0.1. Default: 0.1."""
+    preset: Auto[Literal["fast", "harmonics"]] = None
+    """Named set of values in place of the defaults, for short fits; other options override them.
+    Higher learning rates and no random walk, with eight spherical Gaussians for colours (fast) or
+    with spherical harmonics, which every viewer shows (harmonics). Default: none."""
     training: Short[TrainSettings] = field(default_factory=_training)
     """The optimization."""
     rendering: Short[SplatSettings] = field(default_factory=_rendering)

@@ -113,7 +113,7 @@ class HelixFilter:
         average = sparse.diags_array([0.5, 0.5], offsets=[0, 1], shape=(bins - 1, bins))
         between = sparse.diags_array([-1.0, 1.0], offsets=[0, 1], shape=(bins - 1, bins))
         along_z = _slopes(rows)
-        eye = sparse.eye_array(rows)
+        eye = sparse.diags_array(np.ones(rows))
         mean, across = sparse.kron(eye, average), sparse.kron(eye, between)
         down = sparse.kron(along_z, average)
         v: Floats = (np.arange(rows, dtype=np.float64) - scan.center[0])[:, None] * scan.pitch[0]
