@@ -2,7 +2,7 @@
 
     python tools/bench_gpu.py --device radeon --out radeon
 
-It compares 16 families of kernels with PoCL (``tools/compare_drivers.py``), runs the tests that use
+It compares 22 families of kernels with PoCL (``tools/compare_drivers.py``), runs the tests that use
 a device, and measures the kernels beside other packages as far as those are installed
 (``tools/bench_kernels.py --peers``). OUT.json holds every figure, OUT.md the tables, both with the
 device's name; a part that fails is told there and does not stop the others. Ends with status 1 if
