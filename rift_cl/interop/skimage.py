@@ -38,8 +38,8 @@ from rift_cl.geometry import Grid, Parallel
 from rift_cl.geometry.numbers import real_numbers
 from rift_cl.interop.spline_backprojection import backproject_spline
 from rift_cl.operators.filters.ramp_filters import Ramp, ViewFilter
-from rift_cl.operators.projector.parallel_projector import ParallelProjector
-from rift_cl.operators.projector.phase_projector import PhaseProjector
+from rift_cl.operators.projector.parallel.parallel_projector import ParallelProjector
+from rift_cl.operators.projector.parallel.phase_projector import PhaseProjector
 
 __all__ = ["iradon", "radon"]
 

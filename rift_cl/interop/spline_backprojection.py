@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.operators.projector.parallel_projector import ParallelProjector
+from rift_cl.operators.projector.parallel.parallel_projector import ParallelProjector
 
 
 def backproject_spline(

@@ -14,12 +14,12 @@ from rift_cl.operators.filters.ramp_filters import (
     register_filter,
 )
 from rift_cl.operators.linear import LinearOperator
-from rift_cl.operators.projector.fast_projector import FastProjector
+from rift_cl.operators.projector.cone.geometry_gradient import GeometryGradient, geometry_gradient
 from rift_cl.operators.projector.footprint import FOOTPRINTS
-from rift_cl.operators.projector.geometry_gradient import GeometryGradient, geometry_gradient
-from rift_cl.operators.projector.parallel_projector import ParallelProjector
+from rift_cl.operators.projector.parallel.fast_projector import FastProjector
+from rift_cl.operators.projector.parallel.parallel_projector import ParallelProjector
+from rift_cl.operators.projector.parallel.projector_choice import cheapest_projector
 from rift_cl.operators.projector.projector import Projector
-from rift_cl.operators.projector.projector_choice import cheapest_projector
 
 __all__ = [
     "COMPENSATIONS",

@@ -14,7 +14,7 @@ import pytest
 
 from rift_cl import Cone, Grid, Parallel, Projector, dot_test, open_device, phantom
 from rift_cl.errors import InputError, ResourceLimitError
-from rift_cl.operators.projector import slab_projector
+from rift_cl.operators.projector.cone import slab_projector
 from rift_cl.reference.cone import ConeProjector
 
 ROUNDING = 6e-6

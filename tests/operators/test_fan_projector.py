@@ -13,7 +13,7 @@ import pytest
 
 from rift_cl import Fan, Grid, Parallel, Projector, dot_test
 from rift_cl.errors import InputError, RiftError
-from rift_cl.operators.projector.fan_projector import FanProjector
+from rift_cl.operators.projector.fan.fan_projector import FanProjector
 from rift_cl.operators.projector.footprint import FOOTPRINTS
 from rift_cl.reference import fan
 

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 import rift_cl as rift
 from rift_cl import Grid, Parallel, Projector, dot_test, phantom
 from rift_cl.operators import Ramp, ViewFilter
-from rift_cl.operators.projector.fast_projector import FastProjector
+from rift_cl.operators.projector.parallel.fast_projector import FastProjector
 from rift_cl.phantom import shepp_logan, shepp_logan_sinogram
 from rift_cl.reconstruct.direct.filtered_backprojection import FilteredBackprojection
 from rift_cl.reference import radon

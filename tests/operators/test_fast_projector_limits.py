@@ -9,7 +9,7 @@ import rift_cl as rift
 from rift_cl import Grid, Parallel
 from rift_cl.errors import InputError, ResourceLimitError
 from rift_cl.operators import LinearOperator
-from rift_cl.operators.projector.fast_projector import FastProjector
+from rift_cl.operators.projector.parallel.fast_projector import FastProjector
 
 
 @pytest.mark.full

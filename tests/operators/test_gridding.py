@@ -7,7 +7,7 @@ import pytest
 
 from rift_cl import Grid, Parallel
 from rift_cl.operators.fourier.gridding import choose, kaiser_bessel, spectrum
-from rift_cl.operators.projector.ray_geometry import fixed_steps, rays, tile_visits
+from rift_cl.operators.projector.parallel.ray_geometry import fixed_steps, rays, tile_visits
 
 
 def test_the_kernel_has_the_spectrum_that_is_divided_out():

@@ -9,7 +9,7 @@ from rift_cl import Cone, FastProjector, Grid, Parallel, fbp
 from rift_cl.errors import InputError
 from rift_cl.metrics import psnr
 from rift_cl.operators import cheapest_projector
-from rift_cl.operators.projector.phase_projector import PhaseProjector
+from rift_cl.operators.projector.parallel.phase_projector import PhaseProjector
 from rift_cl.phantom import shepp_logan, shepp_logan_sinogram
 
 pytestmark = pytest.mark.dealt

@@ -15,8 +15,8 @@ import pytest
 import rift_cl as rift
 from rift_cl.errors import ResourceLimitError
 from rift_cl.operators import LinearOperator, ViewFilter
-from rift_cl.operators.projector import phase_projector as projector
-from rift_cl.operators.projector.phase_projector import PhaseProjector
+from rift_cl.operators.projector.parallel import phase_projector as projector
+from rift_cl.operators.projector.parallel.phase_projector import PhaseProjector
 from rift_cl.reconstruct import FilteredBackprojection
 
 

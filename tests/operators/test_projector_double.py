@@ -15,7 +15,7 @@ import rift_cl as rift
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.errors import DeviceError, DTypeError, NonFiniteError, ResourceLimitError
 from rift_cl.operators.projector.footprint import FOOTPRINTS
-from rift_cl.operators.projector.phase_projector import PhaseProjector
+from rift_cl.operators.projector.parallel.phase_projector import PhaseProjector
 
 pytestmark = pytest.mark.dealt
 

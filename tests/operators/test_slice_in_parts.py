@@ -9,7 +9,7 @@ from limited_devices import assert_same, limited, normal
 import rift_cl as rift
 from rift_cl.errors import ResourceLimitError
 from rift_cl.operators import ViewFilter, cheapest_projector
-from rift_cl.operators.projector.phase_projector import PhaseProjector
+from rift_cl.operators.projector.parallel.phase_projector import PhaseProjector
 
 # Larger than a run of 64 rows, off the middle, and looked at along both axes.
 GRID = rift.Grid((256, 150), 0.7, (3.0, -5.0))

@@ -7,8 +7,8 @@ import pytest
 
 from rift_cl import Cone, Grid, Vectors
 from rift_cl.errors import InputError
-from rift_cl.operators.projector.rectification import Rectification
-from rift_cl.operators.projector.upright import looking_along_z, rectified
+from rift_cl.operators.projector.cone.rectification import Rectification
+from rift_cl.operators.projector.cone.upright import looking_along_z, rectified
 from rift_cl.reference.upright import places_on_plane, reading_matrix
 
 GRID = Grid((20, 24, 22), center=(1.0, -2.0, 0.5))

@@ -14,7 +14,7 @@ import pytest
 
 from rift_cl import Cone, Grid, Projector, Vectors, dot_test, phantom
 from rift_cl.errors import InputError
-from rift_cl.operators.projector.vector_projector import VectorProjector
+from rift_cl.operators.projector.cone.vector_projector import VectorProjector
 
 TURN = np.linspace(0, 2 * np.pi, 7, endpoint=False) + 0.1
 

@@ -18,7 +18,7 @@ import pytest
 import rift_cl as rift
 from rift_cl.cl.host_arrays import is_device_array
 from rift_cl.operators.projector.footprint import FOOTPRINTS
-from rift_cl.operators.projector.phase_table import PHASES, phase_table
+from rift_cl.operators.projector.parallel.phase_table import PHASES, phase_table
 
 # Compulsory bytes over the bytes of the arrays that were handed over. Not all of an array need be
 # touched (tables are as wide as the widest view's), and what changes in place is moved twice.

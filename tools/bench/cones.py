@@ -18,7 +18,7 @@ import numpy as np
 import rift_cl as rift
 from bench.costs import Cost
 from bench.operations import Task
-from rift_cl.operators.projector.rectification import Rectification
+from rift_cl.operators.projector.cone.rectification import Rectification
 from rift_cl.reconstruct.direct.ray_factors import RayFactors
 from rift_cl.reconstruct.direct.upright_views import upright_cone
 

@@ -14,7 +14,7 @@ from bench.operations import Task
 from bench.row_filters import ROW_COSTS
 from rift_cl.operators import FOOTPRINTS
 from rift_cl.operators.projector.footprint import footprint_records
-from rift_cl.operators.projector.phase_table import PHASES
+from rift_cl.operators.projector.parallel.phase_table import PHASES
 
 
 def pixels(case: Case) -> float:

@@ -27,8 +27,8 @@ from rift_cl.operators import (
     Projector,
     cheapest_projector,
 )
-from rift_cl.operators.projector.fan_slices_projector import FanSlicesProjector
-from rift_cl.operators.projector.phase_projector import PhaseProjector
+from rift_cl.operators.projector.fan.fan_slices_projector import FanSlicesProjector
+from rift_cl.operators.projector.parallel.phase_projector import PhaseProjector
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp, poisson_weights
 from rift_cl.reconstruct.solvers.direction_weights import DirectionWeights

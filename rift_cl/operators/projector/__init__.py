@@ -1,1 +1,1 @@
-"""The X-ray transform and its exact adjoint, by phase tables or by the Fourier slice theorem."""
+"""The X-ray transform and its exact adjoint, of parallel, fan and cone beams: a room for each."""

@@ -17,7 +17,7 @@ from rift_cl.geometry import Cone, Fan, Grid, Parallel, Vectors
 from rift_cl.operators.linear import LinearOperator
 
 if TYPE_CHECKING:
-    from rift_cl.operators.projector.phase_projector import PhaseProjector
+    from rift_cl.operators.projector.parallel.phase_projector import PhaseProjector
 
 
 class Projector(LinearOperator):
@@ -80,21 +80,21 @@ class Projector(LinearOperator):
 
 def _kind(grid: Grid, scan: Any) -> type[Projector]:
     if isinstance(scan, Fan) and isinstance(grid, Grid) and len(grid.shape) == 2:
-        from rift_cl.operators.projector.fan_projector import FanProjector
+        from rift_cl.operators.projector.fan.fan_projector import FanProjector
 
         return FanProjector
     if isinstance(scan, Fan):
-        from rift_cl.operators.projector.fan_slices_projector import FanSlicesProjector
+        from rift_cl.operators.projector.fan.fan_slices_projector import FanSlicesProjector
 
         return FanSlicesProjector
     if isinstance(scan, Cone):
-        from rift_cl.operators.projector.slab_projector import SlabProjector
+        from rift_cl.operators.projector.cone.slab_projector import SlabProjector
 
         return SlabProjector
     if isinstance(scan, Vectors):
-        from rift_cl.operators.projector.vector_projector import VectorProjector
+        from rift_cl.operators.projector.cone.vector_projector import VectorProjector
 
         return VectorProjector
-    from rift_cl.operators.projector.phase_projector import PhaseProjector
+    from rift_cl.operators.projector.parallel.phase_projector import PhaseProjector
 
     return PhaseProjector

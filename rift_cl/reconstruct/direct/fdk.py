@@ -36,8 +36,8 @@ from rift_cl.errors import InputError, ResourceLimitError
 from rift_cl.geometry import Cone, Fan, Grid, Scan, Vectors, at_axis
 from rift_cl.operators.filters.ramp_filters import Filter, FilterLike, ViewFilter, as_filter
 from rift_cl.operators.linear import Chunk, LinearOperator
+from rift_cl.operators.projector.cone.rectification import Rectification
 from rift_cl.operators.projector.projector import Projector
-from rift_cl.operators.projector.rectification import Rectification
 from rift_cl.reconstruct.direct.padding import wider
 from rift_cl.reconstruct.direct.ray_factors import RayFactors
 from rift_cl.reconstruct.direct.redundancy import ITERATE, redundancy

@@ -25,7 +25,7 @@ from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.filters.compensation import Compensation
 from rift_cl.operators.filters.ramp_filters import FilterLike, Gains, ViewFilter, as_filter
 from rift_cl.operators.linear import Chunk, LinearOperator
-from rift_cl.operators.projector.parallel_projector import ParallelProjector
+from rift_cl.operators.projector.parallel.parallel_projector import ParallelProjector
 from rift_cl.operators.projector.projector import Projector
 from rift_cl.reconstruct.direct.fdk import FDK, amplitude, as_beam
 from rift_cl.reconstruct.direct.katsevich import Katsevich, cone_inversion

@@ -26,8 +26,8 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Cone
 from rift_cl.operators.filters.ramp_filters import FilterLike, as_filter
 from rift_cl.operators.linear import LinearOperator
+from rift_cl.operators.projector.cone.slab_projector import SlabProjector
 from rift_cl.operators.projector.projector import Projector
-from rift_cl.operators.projector.slab_projector import SlabProjector
 from rift_cl.reconstruct.direct.fdk import FDK, amplitude, as_beam, backprojected_slabs, rises
 from rift_cl.reconstruct.direct.helix_filter import Helix, HelixFilter, complete_depth
 from rift_cl.reconstruct.direct.redundancy import ITERATE

@@ -11,7 +11,7 @@ from rift_cl.cl.elementwise import copy
 from rift_cl.cl.host_arrays import download
 from rift_cl.geometry import Parallel, at_axis
 from rift_cl.operators.linear import LinearOperator
-from rift_cl.operators.projector.fast_projector import FastProjector
+from rift_cl.operators.projector.parallel.fast_projector import FastProjector
 from rift_cl.operators.projector.projector import Projector
 from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays
 

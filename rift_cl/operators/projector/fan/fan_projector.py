@@ -20,7 +20,7 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Fan, Grid
-from rift_cl.operators.projector.fan_rays import FanRays, fan_rays
+from rift_cl.operators.projector.fan.fan_rays import FanRays, fan_rays
 from rift_cl.operators.projector.footprint import FOOTPRINTS, check_depth_power, check_footprint
 from rift_cl.operators.projector.projector import Projector
 

@@ -16,9 +16,9 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Fan, Grid
+from rift_cl.operators.projector.cone.slab_projector import SlabProjector
+from rift_cl.operators.projector.cone.slab_table import Samples, SlabTable, fan_table
 from rift_cl.operators.projector.footprint import check_depth_power, check_footprint
-from rift_cl.operators.projector.slab_projector import SlabProjector
-from rift_cl.operators.projector.slab_table import Samples, SlabTable, fan_table
 
 _FOOTPRINTS = ("strip", "linear")
 # Rows next to which a detector is far away: slices have no height on it.

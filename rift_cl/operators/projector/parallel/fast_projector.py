@@ -26,8 +26,8 @@ from rift_cl.operators.fourier.block_transform import BLOCK, BlockTransform
 from rift_cl.operators.fourier.column_transform import ColumnTransform
 from rift_cl.operators.fourier.gridding import LOG2_ROWS, Gridding, choose
 from rift_cl.operators.fourier.padded_spectrum import PaddedSpectrum, in_steps
-from rift_cl.operators.projector.parallel_projector import ParallelProjector
-from rift_cl.operators.projector.ray_geometry import (
+from rift_cl.operators.projector.parallel.parallel_projector import ParallelProjector
+from rift_cl.operators.projector.parallel.ray_geometry import (
     IMAGE,
     Rays,
     fixed_steps,

@@ -26,8 +26,8 @@ from rift_cl.errors import ResourceLimitError
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.operators.linear import Chunk
 from rift_cl.operators.projector.footprint import check_footprint
-from rift_cl.operators.projector.parallel_projector import ParallelProjector
-from rift_cl.operators.projector.phase_table import LOG2_PHASES, PhaseTable, phase_table
+from rift_cl.operators.projector.parallel.parallel_projector import ParallelProjector
+from rift_cl.operators.projector.parallel.phase_table import LOG2_PHASES, PhaseTable, phase_table
 from rift_cl.operators.projector.projector import Projector
 
 # Tables of a run of views together: on a CPU they should stay in its caches.

@@ -21,9 +21,8 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Grid
+from rift_cl.operators.projector.cone.slab_table import Samples, SlabTable, ray_lengths, slab_table
 from rift_cl.operators.projector.footprint import check_depth_power, check_footprint
-from rift_cl.operators.projector.slab_stretch import SlabStretch
-from rift_cl.operators.projector.slab_table import Samples, SlabTable, slab_table
 from rift_cl.operators.projector.volume_in_parts import VolumeInParts
 
 _FOOTPRINTS = ("strip", "linear", "point")
@@ -281,7 +280,7 @@ class _Walk:
         self._arc = int(projector._beam.curved)
         self._precision = projector._precision
         self.table = table
-        self.stage = SlabStretch(self._device, projector._beam, table, self._dtype)
+        self.stage = _Stretch(self._device, projector._beam, table, self._dtype)
         self._column_forms = self._device.array(table.column_forms, self._dtype)
         self._row_forms = self._device.array(table.row_forms, self._dtype)
         self._amplitudes = self._device.array(table.amplitudes, self._dtype)
@@ -420,6 +419,65 @@ class _Walk:
             **self._precision,
         )
         return places, shares
+
+
+class _Stretch:
+    """Fills the tables of runs of views, column by column, and collects them.
+
+    It stands between the data and the slabs, and is all that knows how a detector is placed.
+
+    Args:
+        device: where it runs.
+        scan: the scan.
+        table: of the views that are walked alike.
+        dtype: of data and tables.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        scan: Cone,
+        table: SlabTable,
+        dtype: np.dtype[Any],
+    ) -> None:
+        self._device, self._table = device, table
+        self._run = 1 << 30 if device.traits.is_cpu else 1
+        self._shape = scan.rows, scan.bins
+        self._arguments = {
+            "lengths": device.array(ray_lengths(scan), dtype),
+            "views": device.array(table.views),
+            "firsts": device.array(table.firsts),
+            "steps": device.array(table.steps, dtype),
+            "gains": device.array(table.gains, dtype),
+            "detector_rows": scan.rows,
+            "bins": scan.bins,
+            "rows": table.rows,
+            "columns": table.columns,
+            "pad": table.pad,
+            "center": scan.center[0],
+            "DOUBLE": int(dtype == np.float64),
+            "WIDE": int(table.wide),
+            "RUN": self._run,
+        }
+
+    def fill(self, data: DeviceArray, tables: DeviceArray, first: int, count: int) -> None:
+        """Write the tables of ``count`` views from ``first`` on from all data."""
+        items = self._items(self._table.columns)
+        work = (items, self._table.rows, count)
+        self._device.launch(
+            "slab_stretch", work, data=data, table=tables, first=first, **self._arguments
+        )
+
+    def collect(self, tables: DeviceArray, data: DeviceArray, first: int, count: int) -> None:
+        """Write these views of the data from their tables."""
+        rows, bins = self._shape
+        work = (self._items(bins), rows, count)
+        self._device.launch(
+            "slab_stretch_adjoint", work, data=data, table=tables, first=first, **self._arguments
+        )
+
+    def _items(self, length: int) -> int:
+        return -(-length // self._run)
 
 
 def _padded(lines: int, device: Device) -> int:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.cl.host_arrays import as_host_array
 from rift_cl.errors import InputError
-from rift_cl.operators.projector.vector_projector import VectorProjector
+from rift_cl.operators.projector.cone.vector_projector import VectorProjector
 
 Floats = NDArray[np.float64]
 

@@ -23,9 +23,9 @@ from rift_cl.cl.discovery import default_device
 from rift_cl.cl.host_arrays import download
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Grid, Vectors
-from rift_cl.operators.projector.rectification import Rectification
-from rift_cl.operators.projector.slab_projector import SlabProjector
-from rift_cl.operators.projector.upright import (
+from rift_cl.operators.projector.cone.rectification import Rectification
+from rift_cl.operators.projector.cone.slab_projector import SlabProjector
+from rift_cl.operators.projector.cone.upright import (
     Rectified,
     looking_along_z,
     pixel_slopes,

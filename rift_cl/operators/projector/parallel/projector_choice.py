@@ -18,10 +18,10 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
-from rift_cl.operators.projector.fast_projector import FastProjector
-from rift_cl.operators.projector.parallel_projector import ParallelProjector
-from rift_cl.operators.projector.phase_projector import PhaseProjector
-from rift_cl.operators.projector.ray_geometry import IMAGE, too_fine
+from rift_cl.operators.projector.parallel.fast_projector import FastProjector
+from rift_cl.operators.projector.parallel.parallel_projector import ParallelProjector
+from rift_cl.operators.projector.parallel.phase_projector import PhaseProjector
+from rift_cl.operators.projector.parallel.ray_geometry import IMAGE, too_fine
 
 # What FastProjector may differ by in norm. A uniform disc then comes back as flat as from
 # Projector; with 1e-2 it is twice as rough at 360 views, though the phantom loses 0.01 dB alone.

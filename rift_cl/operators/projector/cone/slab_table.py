@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Grid
-from rift_cl.operators.projector.upright import Upright
+from rift_cl.operators.projector.cone.upright import Upright
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int32]

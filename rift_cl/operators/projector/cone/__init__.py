@@ -1,0 +1,1 @@
+"""Cones, and any places of source and detector: by slab tables."""

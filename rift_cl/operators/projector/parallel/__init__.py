@@ -1,0 +1,1 @@
+"""Parallel beams: by phase tables, or by the Fourier slice theorem."""
