@@ -1,4 +1,4 @@
-/* Slab tables to a volume (see include/slab_table.h): the inner loops of backprojection.
+/* Slab tables to a volume (see include/cone/slab_table.h): the inner loops of backprojection.
  *
  *     volume[slab][line][z] = before + sum over views of amplitude[view][slab] *
  *         sum over columns c and rows r of f(line, c) g(z, r) table[view][r][c],
@@ -24,7 +24,7 @@
  * what is written there means nothing. */
 
 #include "include/portable.h"
-#include "include/slab_table.h"
+#include "include/cone/slab_table.h"
 #include "include/transpose.h"
 
 #ifndef LINES

@@ -1,4 +1,4 @@
-/* Slab tables to a volume (see include/slab_table.h), for devices that want many small items.
+/* Slab tables to a volume (see include/cone/slab_table.h), for devices that want many small items.
  *
  *     volume[slab][line][z] = before + sum over views of amplitude[view][slab] *
  *         sum over columns c and rows r of f(line, c) g(z, r) table[view][r][c],
@@ -9,7 +9,7 @@
  * columns, and read neighbouring rows of the table, which are contiguous here. */
 
 #include "include/portable.h"
-#include "include/slab_table.h"
+#include "include/cone/slab_table.h"
 
 KERNEL void slab_backproject_gpu(
     __global const real *restrict table, __global real *restrict volume,

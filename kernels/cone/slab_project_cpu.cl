@@ -18,7 +18,7 @@
  * The volume is that of slab_backproject_cpu; its z behind the last are zeros. */
 
 #include "include/portable.h"
-#include "include/slab_table.h"
+#include "include/cone/slab_table.h"
 #include "include/transpose.h"
 
 #ifndef DEPTH

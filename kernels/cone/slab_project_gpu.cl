@@ -9,7 +9,7 @@
  * group are neighbours in rows: they take the same lines, and z beside each other. */
 
 #include "include/portable.h"
-#include "include/slab_table.h"
+#include "include/cone/slab_table.h"
 
 /* What one of a sample's entries receives, of which `shares` has the second one's; those of the
  * entries behind it are `samples` apart. */

@@ -1,4 +1,4 @@
-/* Projections to slab tables (see include/slab_table.h).
+/* Projections to slab tables (see include/cone/slab_table.h).
  *
  *     table[view][r][pad + u] = gain * sum over rows i of
  *         weight(step (r + first) + center - i) length[i][u] data[view][i][u],
@@ -11,7 +11,7 @@
  * row of the stretched view stands first in its table. */
 
 #include "include/portable.h"
-#include "include/slab_table.h"
+#include "include/cone/slab_table.h"
 
 #ifndef RUN
 #define RUN LANES

@@ -7,7 +7,7 @@
  * its bins, the table's rows that reach them: no two write the same bin. */
 
 #include "include/portable.h"
-#include "include/slab_table.h"
+#include "include/cone/slab_table.h"
 
 #ifndef RUN
 #define RUN LANES

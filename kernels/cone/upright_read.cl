@@ -1,4 +1,4 @@
-/* Upright views to those of tilted detectors (include/upright.h):
+/* Upright views to those of tilted detectors (include/cone/upright.h):
  *
  *     data[view][i][k] = sum over r, c of cubic(v - r) cubic(u - c) upright[view][r][c].
  *
@@ -9,7 +9,7 @@
 
 #include "include/portable.h"
 #include "include/lane_quads.h"
-#include "include/upright.h"
+#include "include/cone/upright.h"
 
 #ifndef SLOPE
 #define SLOPE 0

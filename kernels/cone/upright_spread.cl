@@ -9,7 +9,7 @@
 
 #include "include/portable.h"
 #include "include/lane_quads.h"
-#include "include/upright.h"
+#include "include/cone/upright.h"
 
 static lanes smaller(lanes a, lanes b) { return a < b ? a : b; }
 static lanes greater(lanes a, lanes b) { return a > b ? a : b; }

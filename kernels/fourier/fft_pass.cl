@@ -18,7 +18,7 @@
  * Index space: (runs of RUN columns, butterflies, fields). */
 
 #include "include/portable.h"
-#include "include/butterfly.h"
+#include "include/fourier/butterfly.h"
 
 #ifndef RADIX
 #define RADIX 4

@@ -1,16 +1,17 @@
 /* Columns of the grid are transformed back and folded to pairs of image rows, for CPUs.
  *
  * What a GPU does by fft_pass and spectrum_fold_gpu, BLOCK frequencies at a time in the caches of a core
- * (see include/row_pairs.h). The grid comes in blocks (cell_at), and is overwritten; pairs leave in
- * blocks of BLOCK as well, each with its real parts and then its imaginary ones, (edge, BLOCK).
+ * (see include/fourier/row_pairs.h). The grid comes in blocks (cell_at), and is overwritten; pairs
+ * leave in blocks of BLOCK as well, each with its real parts and then its imaginary ones, (edge,
+ * BLOCK).
  *
  * Index space: items, each of which takes every so many-th block. */
 
 #include "include/portable.h"
 #include "include/transpose.h"
-#include "include/fft_block.h"
-#include "include/fourier_rays.h"
-#include "include/row_pairs.h"
+#include "include/fourier/fft_block.h"
+#include "include/fourier/fourier_rays.h"
+#include "include/fourier/row_pairs.h"
 
 KERNEL void pairs_of_spectrum_cpu(
     __global float *grid, __global float *fields, int height, int middle, int edge, int pairs,

@@ -1,15 +1,16 @@
 /* Views become rays of the image's spectrum, BLOCK pairs of views at a time, for CPUs.
  *
  * What a GPU does by rays_pack_gpu, fft_pass and rays_weigh_gpu, all in the caches of a core (see
- * include/view_columns.h). Index space: items, each of which takes every so many-th block. */
+ * include/fourier/view_columns.h). Index space: items, each of which takes every so many-th
+ * block. */
 
 #include "include/portable.h"
 #include "include/transpose.h"
 #include "include/turn.h"
-#include "include/ray_response.h"
-#include "include/fourier_rays.h"
-#include "include/view_columns.h"
-#include "include/fft_block.h"
+#include "include/fourier/ray_response.h"
+#include "include/fourier/fourier_rays.h"
+#include "include/fourier/view_columns.h"
+#include "include/fourier/fft_block.h"
 
 KERNEL void rays_of_views_cpu(
     __global const float *restrict views, __global float *restrict rays,

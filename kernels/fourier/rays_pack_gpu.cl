@@ -1,4 +1,5 @@
-/* Views become the complex columns of a Fourier transform, for GPUs (see include/view_columns.h).
+/* Views become the complex columns of a Fourier transform, for GPUs (see
+ * include/fourier/view_columns.h).
  *
  * Index space: (blocks of LANES columns, blocks of LANES rows, parts). Length and columns are
  * multiples of LANES. */
@@ -6,9 +7,9 @@
 #include "include/portable.h"
 #include "include/transpose.h"
 #include "include/turn.h"
-#include "include/ray_response.h"
-#include "include/fourier_rays.h"
-#include "include/view_columns.h"
+#include "include/fourier/ray_response.h"
+#include "include/fourier/fourier_rays.h"
+#include "include/fourier/view_columns.h"
 
 KERNEL void rays_pack_gpu(
     __global const float *restrict views, __global float *restrict fields,

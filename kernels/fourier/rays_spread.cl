@@ -1,4 +1,5 @@
-/* Rays to the regular grid of frequencies: backprojection's inner loop (see include/fourier_rays.h).
+/* Rays to the regular grid of frequencies: backprojection's inner loop (see
+ * include/fourier/fourier_rays.h).
  *
  *     grid[y][x] = sum over samples of phi(x - px) phi(y - py) ray[l],      p = l * step,
  *
@@ -12,12 +13,12 @@
  * overhangs the tile. */
 
 #include "include/portable.h"
-#include "include/fourier_rays.h"
+#include "include/fourier/fourier_rays.h"
 
 #ifndef TILE
 #define TILE (LANES == 8 ? 32 : 4)
 #endif
-#include "include/ray_span.h"
+#include "include/fourier/ray_span.h"
 
 #if LANES == 8
 #define OVERHANG TABLE_PITCH

@@ -9,7 +9,7 @@
 
 #include "include/portable.h"
 #include "include/transpose.h"
-#include "include/fourier_rays.h"
+#include "include/fourier/fourier_rays.h"
 
 #ifndef TILE
 #define TILE 32
@@ -17,7 +17,7 @@
 #ifndef SLICES
 #define SLICES 4
 #endif
-#include "include/ray_span.h"
+#include "include/fourier/ray_span.h"
 
 #define OVERHANG (WIDTH - 1)
 #define ACROSS (TILE + 2 * OVERHANG)

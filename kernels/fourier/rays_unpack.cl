@@ -6,7 +6,7 @@
 
 #include "include/portable.h"
 #include "include/transpose.h"
-#include "include/fourier_rays.h"
+#include "include/fourier/fourier_rays.h"
 
 #ifndef RUN
 #define RUN (LANES == 8 ? 256 : 1)

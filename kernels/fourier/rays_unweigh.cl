@@ -11,8 +11,8 @@
 #include "include/portable.h"
 #include "include/transpose.h"
 #include "include/turn.h"
-#include "include/ray_response.h"
-#include "include/fourier_rays.h"
+#include "include/fourier/ray_response.h"
+#include "include/fourier/fourier_rays.h"
 
 #ifndef RUN
 #define RUN (LANES == 8 ? 256 : 1)

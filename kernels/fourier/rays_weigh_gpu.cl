@@ -1,13 +1,14 @@
-/* Transforms of pairs of views become rays of the spectrum, for GPUs (see include/view_columns.h).
+/* Transforms of pairs of views become rays of the spectrum, for GPUs (see
+ * include/fourier/view_columns.h).
  *
  * Index space: (blocks of LANES columns, blocks of LANES samples, parts). */
 
 #include "include/portable.h"
 #include "include/transpose.h"
 #include "include/turn.h"
-#include "include/ray_response.h"
-#include "include/fourier_rays.h"
-#include "include/view_columns.h"
+#include "include/fourier/ray_response.h"
+#include "include/fourier/fourier_rays.h"
+#include "include/fourier/view_columns.h"
 
 KERNEL void rays_weigh_gpu(
     __global const float *restrict fields, __global float *restrict rays,

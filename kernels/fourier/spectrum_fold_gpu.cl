@@ -1,11 +1,11 @@
-/* Between the two halves of the inverse transform, for GPUs (see include/row_pairs.h).
+/* Between the two halves of the inverse transform, for GPUs (see include/fourier/row_pairs.h).
  *
  * Index space: (blocks of LANES pairs, blocks of LANES frequencies 0 .. edge / 2). */
 
 #include "include/portable.h"
 #include "include/transpose.h"
-#include "include/fourier_rays.h"
-#include "include/row_pairs.h"
+#include "include/fourier/fourier_rays.h"
+#include "include/fourier/row_pairs.h"
 
 KERNEL void spectrum_fold_gpu(
     __global const float *restrict grid, __global float *restrict fields,

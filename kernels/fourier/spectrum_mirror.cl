@@ -6,7 +6,7 @@
  * space: (rows, columns to fill). */
 
 #include "include/portable.h"
-#include "include/fourier_rays.h"
+#include "include/fourier/fourier_rays.h"
 
 KERNEL void spectrum_mirror(__global float *grid, int rows, int columns, int edge)
 {

@@ -9,7 +9,7 @@
 
 #include "include/portable.h"
 #include "include/transpose.h"
-#include "include/fourier_rays.h"
+#include "include/fourier/fourier_rays.h"
 
 KERNEL void spectrum_unfold(
     __global const float *restrict fields, __global float *restrict grid,

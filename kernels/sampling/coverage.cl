@@ -2,13 +2,13 @@
  *
  *     L(k) = sum over views of w MTF(|k_perp|)^2 rho(n . k)^2,      k_perp = k - (n . k) n,
  *
- * in the units of include/coverage.h, where a view that is far from a block of frequencies is
- * skipped. `count` is a whole number of LANES. Views are summed in their order.
+ * in the units of include/sampling/coverage.h, where a view that is far from a block of frequencies
+ * is skipped. `count` is a whole number of LANES. Views are summed in their order.
  *
  * Index space: (blocks of LANES frequencies, points). */
 
 #include "include/portable.h"
-#include "include/coverage.h"
+#include "include/sampling/coverage.h"
 
 KERNEL void coverage(
     __global const float *restrict frequencies, __global const float *restrict boxes,

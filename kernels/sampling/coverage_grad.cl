@@ -10,7 +10,7 @@
 
 #include "include/portable.h"
 #include "include/transpose.h"
-#include "include/coverage.h"
+#include "include/sampling/coverage.h"
 
 #ifndef RUN
 #define RUN 1024

@@ -1,12 +1,13 @@
 /* A run's part in the gradient of the background: the sum over its pixels of transmittance times dL/dC.
  *
- * Four channels of LANES pixels are read at a time (include/splat_rows.h, whose rows are pixels here);
- * each lane keeps its own sum to the end of the run. sum_columns adds the runs in a fixed order.
+ * Four channels of LANES pixels are read at a time (include/splat/splat_rows.h, whose rows are
+ * pixels here); each lane keeps its own sum to the end of the run. sum_columns adds the runs in a
+ * fixed order.
  *
  * Index space: (runs of RUN pixels). */
 
 #include "include/portable.h"
-#include "include/splat_rows.h"
+#include "include/splat/splat_rows.h"
 
 #ifndef CHANNELS
 #define CHANNELS 3

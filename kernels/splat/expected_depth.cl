@@ -5,7 +5,7 @@
  * Index space: (pixels). */
 
 #include "include/portable.h"
-#include "include/expected_depth.h"
+#include "include/splat/expected_depth.h"
 
 KERNEL void expected_depth(
     __global float *restrict image, __global const float *restrict transmittance,

@@ -5,7 +5,7 @@
  * Other channels pass through. Index space: (pixels). */
 
 #include "include/portable.h"
-#include "include/expected_depth.h"
+#include "include/splat/expected_depth.h"
 
 KERNEL void expected_depth_grad(
     __global const float *restrict image, __global const float *restrict transmittance,

@@ -7,8 +7,9 @@
  *
  *     opacity det F / det U (1 + sum of b_m He_m(u)) exp(-|u|^2 / 2),
  *
- * whose coefficients b are those of include/hermite_space.h. U is upper triangular: along a row of
- * voxels then u_0 alone changes, so that the polynomial is one of a single variable there.
+ * whose coefficients b are those of include/projection/hermite_space.h. U is upper triangular:
+ * along a row of voxels then u_0 alone changes, so that the polynomial is one of a single variable
+ * there.
  *
  * U comes from the rows of the 3 x 6 matrix [F, sqrt(D)] = U Q by Gram and Schmidt, z first, twice
  * over since once is not enough for needles; A is the first half of Q. Neither that nor
@@ -30,11 +31,11 @@
 #define LANES 1
 #include "include/portable.h"
 #include "include/small_matrix.h"
-#include "include/camera.h"
-#include "include/aperture.h"
-#include "include/gaussian.h"
-#include "include/hermite_space.h"
-#include "include/hermite_edge.h"
+#include "include/projection/camera.h"
+#include "include/projection/aperture.h"
+#include "include/projection/gaussian.h"
+#include "include/projection/hermite_space.h"
+#include "include/raster/hermite_edge.h"
 
 #define REACH HERMITE_EDGE(ORDER)
 #define SHAPE_NUMBERS 12

@@ -2,17 +2,17 @@
  *
  *     screen_modes[i] = (i00, i10, i11, shape's c2_m, channels' c2_mc mode after mode),
  *
- * where i00, i10, i11 are the rows of L^-1 (include/hermite_project.h derives it and c2). Channels
- * pass by the same map as the shape, each for itself; the constants, 1 and the features, stay as
- * they are and are not in the table. Splats that are not drawn get zeros.
+ * where i00, i10, i11 are the rows of L^-1 (include/projection/hermite_project.h derives it and
+ * c2). Channels pass by the same map as the shape, each for itself; the constants, 1 and the
+ * features, stay as they are and are not in the table. Splats that are not drawn get zeros.
  *
  * Index space: (runs of RUN splats), LANES of them at a time. */
 
 #include "include/portable.h"
-#include "include/camera.h"
-#include "include/aperture.h"
-#include "include/gaussian.h"
-#include "include/hermite_project.h"
+#include "include/projection/camera.h"
+#include "include/projection/aperture.h"
+#include "include/projection/gaussian.h"
+#include "include/projection/hermite_project.h"
 
 /* One order of one polynomial, from its columns to those of the table. */
 static void project_order(

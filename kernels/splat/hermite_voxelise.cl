@@ -21,8 +21,8 @@
 
 #include "include/portable.h"
 #include "include/exponential.h"
-#include "include/hermite_space.h"
-#include "include/hermite_edge.h"
+#include "include/projection/hermite_space.h"
+#include "include/raster/hermite_edge.h"
 
 #define REACH HERMITE_EDGE(ORDER)
 #define SHAPE_NUMBERS 12

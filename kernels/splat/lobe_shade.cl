@@ -12,8 +12,8 @@
  * numbers that are read and 3 that are written. */
 
 #include "include/portable.h"
-#include "include/seen_color.h"
-#include "include/lobe.h"
+#include "include/shading/seen_color.h"
+#include "include/shading/lobe.h"
 
 KERNEL void lobe_shade(
     __global const float *restrict means, __global const float *restrict linear,

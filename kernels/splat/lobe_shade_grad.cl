@@ -2,7 +2,7 @@
  * camera.
  *
  * The first is B_k times what comes in; the lobes' is derived in include/lobe*.h. Those of mean and
- * camera, told in include/seen_color.h, are added to grad_means and to this run's row of
+ * camera, told in include/shading/seen_color.h, are added to grad_means and to this run's row of
  * camera_parts. inverse_x, _y, _z are the rows of W^-T, each followed by a coordinate of o. A colour
  * that was held at zero passes nothing on, and so no splat that is not drawn.
  *
@@ -10,8 +10,8 @@
  * numbers that are read, 3 FUNCTIONS + GEOMETRY that are written, and 3 of its mean that are both. */
 
 #include "include/portable.h"
-#include "include/seen_color.h"
-#include "include/lobe.h"
+#include "include/shading/seen_color.h"
+#include "include/shading/lobe.h"
 
 KERNEL void lobe_shade_grad(
     __global const float *restrict means, __global const float *restrict linear,

@@ -13,7 +13,7 @@
  * Index space: (runs of RUN splats), LANES of them at a time. */
 
 #include "include/portable.h"
-#include "include/activation.h"
+#include "include/splat/activation.h"
 
 KERNEL void splat_activate(
     __global const float *restrict log_scales, __global const float *restrict logits,

@@ -15,7 +15,7 @@
  * splats), LANES of them at a time. */
 
 #include "include/portable.h"
-#include "include/activation.h"
+#include "include/splat/activation.h"
 
 /* dL/dlog_scale of one of the three. */
 static lanes log_scale_grad(lanes trained, lanes drawn, lanes by_scale, float each_scale, lanes fading, lanes band) {

@@ -1,4 +1,4 @@
-/* Pack what tiles want of each splat into one line of memory: include/screen_record.h.
+/* Pack what tiles want of each splat into one line of memory: include/raster/screen_record.h.
  *
  * MODAL splats give their whitening, the first three of the ROW numbers that each has in `modes`;
  * Gaussians have it from their conic. Splats that are not drawn get a record that is never read.
@@ -6,8 +6,8 @@
 
 #include "include/portable.h"
 #include "include/logarithm.h"
-#include "include/splat_rows.h"
-#include "include/screen_record.h"
+#include "include/splat/splat_rows.h"
+#include "include/raster/screen_record.h"
 
 #ifndef MODAL
 #define MODAL 0

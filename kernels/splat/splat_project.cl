@@ -20,11 +20,11 @@
  * a time. */
 
 #include "include/portable.h"
-#include "include/alpha_threshold.h"
+#include "include/raster/alpha_threshold.h"
 #include "include/logarithm.h"
-#include "include/camera.h"
-#include "include/aperture.h"
-#include "include/gaussian.h"
+#include "include/projection/camera.h"
+#include "include/projection/aperture.h"
+#include "include/projection/gaussian.h"
 
 #ifndef TILE
 #define TILE 16
@@ -53,9 +53,9 @@ static lanes_int whole_above(lanes v, float most) {
 }
 
 #if MODAL
-#include "include/hermite_project.h"
-#include "include/hermite_edge.h"
-#include "include/hermite_extent.h"
+#include "include/projection/hermite_project.h"
+#include "include/raster/hermite_edge.h"
+#include "include/projection/hermite_extent.h"
 #define MODE_PARAMETERS , __global const float *restrict shape_modes, __global const float *restrict color_modes
 #define NORMS_PARAMETER , const ModeNorms *norms
 #define NORMS , &norms

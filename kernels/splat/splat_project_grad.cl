@@ -21,10 +21,10 @@
  * get zeros. Index space: (runs of RUN splats), LANES of them at a time. */
 
 #include "include/portable.h"
-#include "include/camera.h"
-#include "include/aperture.h"
-#include "include/gaussian.h"
-#include "include/gaussian_grad.h"
+#include "include/projection/camera.h"
+#include "include/projection/aperture.h"
+#include "include/projection/gaussian.h"
+#include "include/projection/gaussian_grad.h"
 
 #ifndef CHANNELS
 #define CHANNELS 3

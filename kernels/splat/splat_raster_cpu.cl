@@ -5,9 +5,10 @@
  *
  * Index space: (tiles), of the rows of tiles from first_tile_row on; each item owns one. A batch of
  * the tile's entries is read once, and for each block of 4 x ROWS pixels the few that touch it are
- * listed (include/block_lists.h). The block's pixels then stay in registers while its list is gone
- * through, which is what makes this fast: no load or store of a pixel for each splat, and vectors
- * that do not wait for each other (include/block_splat.h says what a splat does to them).
+ * listed (include/raster/block_lists.h). The block's pixels then stay in registers while its list
+ * is gone through, which is what makes this fast: no load or store of a pixel for each splat, and
+ * vectors that do not wait for each other (include/raster/block_splat.h says what a splat does to
+ * them).
  *
  * A finished pixel keeps its transmittance with the sign turned, which makes every later share
  * negative or zero and is dropped with it. A block is left when all its pixels are finished, a
@@ -20,15 +21,15 @@
 
 #include "include/portable.h"
 #include "include/exponential.h"
-#include "include/alpha.h"
-#include "include/screen_record.h"
+#include "include/raster/alpha.h"
+#include "include/raster/screen_record.h"
 #include "include/transpose.h"
-#include "include/hermite_edge.h"
-#include "include/hermite_modes.h"
-#include "include/hermite_alpha.h"
-#include "include/pixel_blocks.h"
-#include "include/block_lists.h"
-#include "include/block_splat.h"
+#include "include/raster/hermite_edge.h"
+#include "include/raster/hermite_modes.h"
+#include "include/raster/hermite_alpha.h"
+#include "include/raster/pixel_blocks.h"
+#include "include/raster/block_lists.h"
+#include "include/raster/block_splat.h"
 
 /* Splats between two looks at whether a block is finished. */
 #define PATIENCE 8

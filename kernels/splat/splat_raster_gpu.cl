@@ -1,12 +1,13 @@
 /* Composite the splats of a tile front to back; driver for GPUs.
  *
  * What is computed is told in splat_raster_cpu.cl. A group draws a part of a tile, an item one pixel
- * (include/group_tile.h). The tile's list comes in batches of BATCH entries: every item fetches some
- * into local memory, so that the three loads which wait for each other, entry, record and features,
- * are waited for once a batch and not once an entry, and says which blocks each of them reaches.
- * Eight bytes of such bits at a time become words of 32 entries for each block, and an item walks the
- * words of its block alone. An item whose pixel is finished leaves the walk; a sub-group goes on when
- * its last item left, and the group ends before the batch that no pixel waits for.
+ * (include/raster/group_tile.h). The tile's list comes in batches of BATCH entries: every item
+ * fetches some into local memory, so that the three loads which wait for each other, entry, record
+ * and features, are waited for once a batch and not once an entry, and says which blocks each of
+ * them reaches. Eight bytes of such bits at a time become words of 32 entries for each block, and
+ * an item walks the words of its block alone. An item whose pixel is finished leaves the walk; a
+ * sub-group goes on when its last item left, and the group ends before the batch that no pixel
+ * waits for.
  *
  * Written for each pixel: the image's CHANNELS numbers from `first` on of `stride`, the final
  * transmittance, and one past the last entry of the tile's that it saw.
@@ -16,17 +17,17 @@
 
 #include "include/portable.h"
 #include "include/exponential.h"
-#include "include/alpha.h"
-#include "include/hermite_edge.h"
-#include "include/hermite_modes.h"
-#include "include/hermite_alpha.h"
-#include "include/group_tile.h"
+#include "include/raster/alpha.h"
+#include "include/raster/hermite_edge.h"
+#include "include/raster/hermite_modes.h"
+#include "include/raster/hermite_alpha.h"
+#include "include/raster/group_tile.h"
 #if MODAL
 #define MODE_PARAMETERS , __global const float *restrict modes
 #else
 #define MODE_PARAMETERS
 #endif
-#include "include/group_splat.h"
+#include "include/raster/group_splat.h"
 
 KERNEL void splat_raster_gpu(
     __global float *restrict image, __global float *restrict transmittance, __global int *restrict last,

@@ -13,33 +13,33 @@
  * Tiles, batches and lists of blocks are those of splat_raster_cpu.cl, the lists gone through from
  * the back. What the pixels of a block give to a splat's sums stays in lanes: each entry of a batch
  * has its vectors, to which all blocks add in turn, and once per entry they become numbers. Each
- * (splat, tile) pair owns a slot (include/splat_slots.h, include/hermite_slots.h), which is written
- * once, in a fixed order of sums; a pair that touches no pixel, or lies behind all that is seen,
- * writes nothing: `live` says which slots hold something, and is zero before.
+ * (splat, tile) pair owns a slot (include/raster/splat_slots.h, include/raster/hermite_slots.h),
+ * which is written once, in a fixed order of sums; a pair that touches no pixel, or lies behind all
+ * that is seen, writes nothing: `live` says which slots hold something, and is zero before.
  *
  * Index space: (tiles), of the rows of tiles from first_tile_row on. */
 
 #include "include/portable.h"
 #include "include/exponential.h"
-#include "include/alpha.h"
-#include "include/screen_record.h"
+#include "include/raster/alpha.h"
+#include "include/raster/screen_record.h"
 #include "include/transpose.h"
-#include "include/hermite_edge.h"
-#include "include/hermite_modes.h"
-#include "include/hermite_alpha.h"
+#include "include/raster/hermite_edge.h"
+#include "include/raster/hermite_modes.h"
+#include "include/raster/hermite_alpha.h"
 #if MODAL
-#include "include/hermite_slots.h"
+#include "include/raster/hermite_slots.h"
 #define HE_ORDER MOMENT_ORDER
 #else
-#include "include/splat_slots.h"
+#include "include/raster/splat_slots.h"
 #endif
-#include "include/pixel_blocks.h"
-#include "include/block_lists.h"
-#include "include/block_splat.h"
+#include "include/raster/pixel_blocks.h"
+#include "include/raster/block_lists.h"
+#include "include/raster/block_splat.h"
 #if MODAL
-#include "include/hermite_moments.h"
+#include "include/raster/hermite_moments.h"
 #else
-#include "include/gaussian_moments.h"
+#include "include/raster/gaussian_moments.h"
 #endif
 
 /* Of each pixel: T on the way back, q, and v. */

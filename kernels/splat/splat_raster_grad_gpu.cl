@@ -1,12 +1,14 @@
 /* Gradient of compositing, tile by tile; driver for GPUs.
  *
- * What is computed is told in splat_raster_grad_cpu.cl, blocks and batches in include/group_tile.h. A
- * group works on a tile, part after part, an item on one pixel of a part.
+ * What is computed is told in splat_raster_grad_cpu.cl, blocks and batches in
+ * include/raster/group_tile.h. A group works on a tile, part after part, an item on one pixel of a
+ * part.
  *
  * What each pixel gives to an entry, RECORD numbers, must be summed over the pixels. Sums over the
  * items of a sub-group take five steps for each number, which costs more than all else (45 exchanges
  * for three channels). But the numbers are moments of two: w = alpha T and g = dL/dsigma (for splats
- * with modes h, see include/hermite_slots.h). So CHUNK entries at a time, those that any block sees:
+ * with modes h, see include/raster/hermite_slots.h). So CHUNK entries at a time, those that any
+ * block sees:
  *
  *     1. every item, for its pixel, leaves g and w of each entry in local memory;
  *     2. every item, for one entry, one block and one row of the block, reads the g and w of the row
@@ -27,21 +29,21 @@
 
 #include "include/portable.h"
 #include "include/exponential.h"
-#include "include/alpha.h"
-#include "include/hermite_edge.h"
-#include "include/hermite_modes.h"
-#include "include/hermite_alpha.h"
+#include "include/raster/alpha.h"
+#include "include/raster/hermite_edge.h"
+#include "include/raster/hermite_modes.h"
+#include "include/raster/hermite_alpha.h"
 /* Fewer at a time than compositing has: most of local memory is for the sums. */
 #define BATCH (QUADS <= 3 ? 128 : 64)
-#include "include/group_tile.h"
+#include "include/raster/group_tile.h"
 #if MODAL
-#include "include/hermite_slots.h"
+#include "include/raster/hermite_slots.h"
 #define MODE_PARAMETERS , __global const float *restrict modes
 #else
-#include "include/splat_slots.h"
+#include "include/raster/splat_slots.h"
 #define MODE_PARAMETERS
 #endif
-#include "include/group_splat.h"
+#include "include/raster/group_splat.h"
 
 /* An item sums a row of a block: so many pixels, so many rows of a block, and entries at a time. */
 #define SHARE BLOCK_WIDTH
@@ -83,7 +85,7 @@ static float by_density(const Seen *s, float hidden, float alpha, float t, float
 
 #if MODAL
 
-/* Add one pixel to the numbers from `pass` on of the moments of include/hermite_slots.h. */
+/* Add one pixel to the numbers from `pass` on of the moments of include/raster/hermite_slots.h. */
 static void add_pixel(
     float *sums, int pass, const float *splat, float x, float y, float h, float w, __local const float *view)
 {
@@ -112,7 +114,8 @@ static void add_pixel(
 #else
 
 /* Sum a row of pixels, the first of which has its centre at (x, y): the record of
- * include/splat_slots.h. Along a row dy is the same, so that moments in dy follow from sums. */
+ * include/raster/splat_slots.h. Along a row dy is the same, so that moments in dy follow from
+ * sums. */
 static void sum_row(
     float *sums, const float *splat, float x, float y, __local const float *g_of, __local const float *w_of,
     __local const float *view)

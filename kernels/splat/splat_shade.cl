@@ -7,8 +7,8 @@
  * first three of STRIDE features. Index space: (runs of RUN splats), LANES of them at a time. */
 
 #include "include/portable.h"
-#include "include/seen_color.h"
-#include "include/sh.h"
+#include "include/shading/seen_color.h"
+#include "include/shading/sh.h"
 
 KERNEL void splat_shade(
     __global const float *restrict means, __global const float *restrict sh,

@@ -1,14 +1,14 @@
 /* Gradient of splat_shade: to the coefficients, and through the direction to mean and camera.
  *
- * The latter, told in include/seen_color.h, are added to grad_means and to this run's row of
- * camera_parts. inverse_x, _y, _z are the rows of W^-T, each followed by a coordinate of o. A colour
- * that was held at zero passes nothing on, and so no splat that is not drawn.
+ * The latter, told in include/shading/seen_color.h, are added to grad_means and to this run's row
+ * of camera_parts. inverse_x, _y, _z are the rows of W^-T, each followed by a coordinate of o. A
+ * colour that was held at zero passes nothing on, and so no splat that is not drawn.
  *
  * Index space: (runs of RUN splats), LANES of them at a time. */
 
 #include "include/portable.h"
-#include "include/seen_color.h"
-#include "include/sh.h"
+#include "include/shading/seen_color.h"
+#include "include/shading/sh.h"
 
 KERNEL void splat_shade_grad(
     __global const float *restrict means, __global const float *restrict sh,

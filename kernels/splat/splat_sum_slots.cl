@@ -1,4 +1,4 @@
-/* Sum the records that a splat left in the tiles it touches (include/splat_slots.h).
+/* Sum the records that a splat left in the tiles it touches (include/raster/splat_slots.h).
  *
  *     sums[i][k] = sum over the splat's slots that are live, in their order, of records[slot][k]
  *

@@ -11,7 +11,7 @@
  * of those before, and total[0] the sum of all. */
 
 #include "include/portable.h"
-#include "include/tile_box.h"
+#include "include/splat/tile_box.h"
 
 #ifndef WHOLE
 #define WHOLE 0

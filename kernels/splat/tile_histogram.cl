@@ -2,10 +2,10 @@
  *
  *     table[chunk][tile] = (splat, tile) pairs of the chunk
  *
- * Index space: chunks of the walk of include/tile_walk.h. */
+ * Index space: chunks of the walk of include/splat/tile_walk.h. */
 
 #include "include/portable.h"
-#include "include/tile_walk.h"
+#include "include/splat/tile_walk.h"
 
 KERNEL void tile_histogram(
     __global const int4 *restrict ranks, __global const int *restrict offsets,

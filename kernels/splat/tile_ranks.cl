@@ -10,7 +10,7 @@
  * (WHOLE 1), counts become the sums of those before. */
 
 #include "include/portable.h"
-#include "include/tile_box.h"
+#include "include/splat/tile_box.h"
 
 #ifndef SORTED
 #define SORTED 1

@@ -6,10 +6,10 @@
  * has, and a splat's own are side by side. `table` holds how many entries of the tile come from
  * the chunks before.
  *
- * Index space: chunks of the walk of include/tile_walk.h. */
+ * Index space: chunks of the walk of include/splat/tile_walk.h. */
 
 #include "include/portable.h"
-#include "include/tile_walk.h"
+#include "include/splat/tile_walk.h"
 
 KERNEL void tile_scatter(
     __global const int4 *restrict ranks, __global const int *restrict offsets,

@@ -11,7 +11,7 @@
  * Index space: runs of columns. */
 
 #include "include/portable.h"
-#include "include/sort_key.h"
+#include "include/tomo/sort_key.h"
 
 #ifndef DIGIT_BITS
 #define DIGIT_BITS (LANES == 8 ? 11 : 4)

@@ -2,10 +2,10 @@
  *
  *     image[y][x] = before + sum over views of weight(b) * sum over bins of share(ray, b, i) * value
  *
- * with the weights and shares of include/fan_footprint.h; before = image[y][x] if `add` is set,
- * else 0. The first bin in reach is found from the place on the detector at which the pixel's near
- * end is seen, a ratio of linear forms (its arc tangent, where the detector is an arc); shares do
- * not depend on that.
+ * with the weights and shares of include/tomo/fan_footprint.h; before = image[y][x] if `add` is
+ * set, else 0. The first bin in reach is found from the place on the detector at which the pixel's
+ * near end is seen, a ratio of linear forms (its arc tangent, where the detector is an arc); shares
+ * do not depend on that.
  *
  * Of strips the sum runs over edges: bins before the first have no share, and with y the values
  * and G the part of the pixel before an edge,
@@ -15,7 +15,7 @@
  * Index space: (runs of LANES pixels of a row, runs of ROWS rows). */
 
 #include "include/portable.h"
-#include "include/fan_footprint.h"
+#include "include/tomo/fan_footprint.h"
 #include "include/lane_quads.h"
 
 #ifndef ROWS

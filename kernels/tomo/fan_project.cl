@@ -3,14 +3,14 @@
  *     out[view][bin] = factor[bin] * sum over slabs b of weight(b) *
  *                      sum over pixels i of share(ray, b, i) * plane[b][i]
  *
- * with the weights and shares of include/fan_footprint.h.
+ * with the weights and shares of include/tomo/fan_footprint.h.
  *
  * Index space: (runs of LANES bins, views). Each item owns its bins. The plane has `margin` zeros
  * before and after every slab, more than a bin reaches in lines, so that no pixel needs a bounds
  * test; pixels before the first of these are left out. */
 
 #include "include/portable.h"
-#include "include/fan_footprint.h"
+#include "include/tomo/fan_footprint.h"
 #include "include/lane_quads.h"
 
 /* Slabs whose first pixels are found together. */

@@ -9,7 +9,7 @@
  * `first` is the first view of this run. Index space: (runs of RUN rays, views of the run). */
 
 #include "include/portable.h"
-#include "include/fan_footprint.h"
+#include "include/tomo/fan_footprint.h"
 
 #if DOUBLE
 typedef double4 ray_record;

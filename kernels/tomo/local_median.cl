@@ -7,7 +7,7 @@
  * Index space: (runs of RUN bins, rows, views). */
 
 #include "include/portable.h"
-#include "include/neighbours.h"
+#include "include/tomo/neighbours.h"
 
 #ifndef VIEWS_AWAY
 #define VIEWS_AWAY 0

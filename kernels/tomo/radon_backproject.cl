@@ -1,4 +1,4 @@
-/* Phase tables to image rows (see include/phase_table.h): the inner loop of backprojection.
+/* Phase tables to image rows (see include/tomo/phase_table.h): the inner loop of backprojection.
  *
  *     plane[slice][i][j] = before + sum over views of (1-w) F[r][m+j] + w F[r+1][m+j],
  *
@@ -12,7 +12,7 @@
  * Columns of the plane are padded to whole segments, rows are not. */
 
 #include "include/portable.h"
-#include "include/phase_table.h"
+#include "include/tomo/phase_table.h"
 
 #ifndef ROWS
 #define ROWS (LANES == 8 ? 64 : 1)

@@ -14,7 +14,7 @@
  * row needs no bounds test. */
 
 #include "include/portable.h"
-#include "include/phase_table.h"
+#include "include/tomo/phase_table.h"
 #include "include/transpose.h"
 
 /* Neighbouring items of a GPU take neighbouring segments, so that their loads are one. A CPU takes

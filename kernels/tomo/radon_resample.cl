@@ -1,4 +1,4 @@
-/* Sinogram to phase tables (see include/phase_table.h).
+/* Sinogram to phase tables (see include/tomo/phase_table.h).
  *
  *     table[slice][view][r][k] = scale * sum over bins b of footprint(tau - b) y[view][slice][b],
  *     tau = origin + step * (k + r / PHASES).
@@ -13,8 +13,8 @@
  * slices, of which the table takes those from slice0. */
 
 #include "include/portable.h"
-#include "include/phase_table.h"
-#include "include/footprint.h"
+#include "include/tomo/phase_table.h"
+#include "include/tomo/footprint.h"
 #include "include/transpose.h"
 
 KERNEL void radon_resample(

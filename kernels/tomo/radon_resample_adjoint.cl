@@ -8,8 +8,8 @@
  * taken LANES at a time. No two items write the same bin: no atomics, and one order of summation. */
 
 #include "include/portable.h"
-#include "include/phase_table.h"
-#include "include/footprint.h"
+#include "include/tomo/phase_table.h"
+#include "include/tomo/footprint.h"
 #include "include/transpose.h"
 
 /* Bins that one item takes, one after the other. */

@@ -1,4 +1,5 @@
-/* Sinogram to phase tables with the strip footprint (see include/phase_table.h, include/shadow.h).
+/* Sinogram to phase tables with the strip footprint (see include/tomo/phase_table.h,
+ * include/tomo/shadow.h).
  *
  * A view is a staircase whose steps are the edges between bins, zero outside the detector. A pixel
  * reads its mean over the pixel's shadow: the bin below the shadow, and of each step that the
@@ -14,8 +15,8 @@
  * slices); a CPU takes the phases of a column as lanes and transposes at the end. */
 
 #include "include/portable.h"
-#include "include/phase_table.h"
-#include "include/shadow.h"
+#include "include/tomo/phase_table.h"
+#include "include/tomo/shadow.h"
 #include "include/transpose.h"
 
 KERNEL void radon_resample_edges(

@@ -17,8 +17,8 @@
  * atomics, and one order of summation, whatever BINS is. */
 
 #include "include/portable.h"
-#include "include/phase_table.h"
-#include "include/shadow.h"
+#include "include/tomo/phase_table.h"
+#include "include/tomo/shadow.h"
 #include "include/transpose.h"
 
 /* Bins that one item takes, one after the other. */

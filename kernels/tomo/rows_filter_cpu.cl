@@ -1,12 +1,13 @@
 /* Convolve rows of a detector by their transforms, BLOCK rows at a time, for CPUs.
  *
  * What a GPU does by rows_pack_gpu, fft_pass, rows_weigh_gpu, fft_pass and rows_unpack_gpu, all in the caches of a
- * core (see include/row_columns.h). Index space: items, each of which takes every so many-th block. */
+ * core (see include/tomo/row_columns.h). Index space: items, each of which takes every so many-th
+ * block. */
 
 #include "include/portable.h"
 #include "include/transpose.h"
-#include "include/row_columns.h"
-#include "include/fft_block.h"
+#include "include/tomo/row_columns.h"
+#include "include/fourier/fft_block.h"
 
 KERNEL void rows_filter_cpu(
     __global const real *restrict rows, __global real *restrict out, __global const real *restrict gains,

@@ -1,11 +1,12 @@
-/* Rows of a detector become the columns of a Fourier transform, for GPUs (see include/row_columns.h).
+/* Rows of a detector become the columns of a Fourier transform, for GPUs (see
+ * include/tomo/row_columns.h).
  *
  * `planes` holds the real parts, (length, columns), then the imaginary ones. Rows begin at `first`;
  * what stands past the last repeats it and is never read. Index space: (bins of 2 length, columns). */
 
 #include "include/portable.h"
 #include "include/transpose.h"
-#include "include/row_columns.h"
+#include "include/tomo/row_columns.h"
 
 KERNEL void rows_pack_gpu(
     __global const real *restrict rows, __global real *restrict planes,

@@ -4,7 +4,7 @@
 
 #include "include/portable.h"
 #include "include/transpose.h"
-#include "include/row_columns.h"
+#include "include/tomo/row_columns.h"
 
 KERNEL void rows_unpack_gpu(
     __global const real *restrict planes, __global real *restrict rows, __global const real *restrict gains,

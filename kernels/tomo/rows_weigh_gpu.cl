@@ -1,10 +1,10 @@
-/* Multiply the spectra of real rows by responses, for GPUs (see include/row_columns.h).
+/* Multiply the spectra of real rows by responses, for GPUs (see include/tomo/row_columns.h).
  *
  * Each filter serves `rows_per_filter` rows. Index space: (blocks of LANES columns, length / 2 + 1). */
 
 #include "include/portable.h"
 #include "include/transpose.h"
-#include "include/row_columns.h"
+#include "include/tomo/row_columns.h"
 
 KERNEL void rows_weigh_gpu(
     __global real *restrict planes, __global const real *restrict sums,

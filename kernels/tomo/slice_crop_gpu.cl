@@ -4,8 +4,8 @@
 
 #include "include/portable.h"
 #include "include/transpose.h"
-#include "include/fourier_rays.h"
-#include "include/row_pairs.h"
+#include "include/fourier/fourier_rays.h"
+#include "include/fourier/row_pairs.h"
 
 KERNEL void slice_crop_gpu(
     __global const float *restrict fields, __global float *restrict image,

@@ -1,15 +1,16 @@
 /* Pairs of rows are transformed back and cropped to a slice of the image, for CPUs.
  *
  * What a GPU does by fft_pass and slice_crop_gpu, BLOCK pairs at a time in the caches of a core (see
- * include/row_pairs.h). Pairs come as pairs_of_spectrum_cpu leaves them, and are overwritten.
+ * include/fourier/row_pairs.h). Pairs come as pairs_of_spectrum_cpu leaves them, and are
+ * overwritten.
  *
  * Index space: items, each of which takes every so many-th block. */
 
 #include "include/portable.h"
 #include "include/transpose.h"
-#include "include/fft_block.h"
-#include "include/fourier_rays.h"
-#include "include/row_pairs.h"
+#include "include/fourier/fft_block.h"
+#include "include/fourier/fourier_rays.h"
+#include "include/fourier/row_pairs.h"
 
 KERNEL void slice_of_pairs_cpu(
     __global float *fields, __global float *restrict image, __global const float *restrict down,

@@ -5,7 +5,7 @@
 
 #include "include/portable.h"
 #include "include/transpose.h"
-#include "include/fourier_rays.h"
+#include "include/fourier/fourier_rays.h"
 
 KERNEL void slice_place(
     __global const float *restrict image, __global float *restrict fields,

@@ -9,7 +9,7 @@
  * Index space: (runs of RUN samples along x, y, z). */
 
 #include "include/portable.h"
-#include "include/differences.h"
+#include "include/tomo/differences.h"
 
 #ifndef RUN
 #define RUN (LANES == 8 ? 4096 : 1)

@@ -12,7 +12,7 @@
  * Index space: (runs of RUN bins, rows, views). */
 
 #include "include/portable.h"
-#include "include/neighbours.h"
+#include "include/tomo/neighbours.h"
 
 #pragma OPENCL FP_CONTRACT OFF
 

@@ -16,7 +16,7 @@
 
 #include "include/portable.h"
 #include "include/transpose.h"
-#include "include/ssim_tile.h"
+#include "include/train/ssim_tile.h"
 
 #ifndef SSIM
 #define SSIM 1

@@ -13,7 +13,7 @@
  * Index space: (runs of LANES splats). */
 
 #include "include/portable.h"
-#include "include/optical_transfer.h"
+#include "include/sampling/optical_transfer.h"
 
 #define SHARE 0.4472136f
 #define MARGIN 0.15f

@@ -8,7 +8,7 @@
  * that hash at a time. Index space: (runs of RUN splats), LANES of them at a time. */
 
 #include "include/portable.h"
-#include "include/splat_rows.h"
+#include "include/splat/splat_rows.h"
 #include "include/logarithm.h"
 #include "include/turn.h"
 

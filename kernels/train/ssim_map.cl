@@ -1,6 +1,6 @@
 /* SSIM at every pixel, and what its gradient is blurred from.
  *
- * With E the blur (include/ssim_tile.h) and, for images x and y, d = x - y and p = x + y,
+ * With E the blur (include/train/ssim_tile.h) and, for images x and y, d = x - y and p = x + y,
  *
  *     D = E(d),  P = E(p),  Vd = E(d d) - D^2,  Vp = E(p p) - P^2,
  *     M = (P^2 + D^2) / 2 + C1,   V = (Vp + Vd) / 2 + C2,   a = D^2 / M,   b = Vd / V,
@@ -25,7 +25,7 @@
 
 #include "include/portable.h"
 #include "include/transpose.h"
-#include "include/ssim_tile.h"
+#include "include/train/ssim_tile.h"
 
 #define C1 1e-4f
 #define C2 9e-4f

@@ -4,11 +4,11 @@
  *
  * The prefix sum of the table tells radix_scatter where each chunk's keys of each digit begin.
  *
- * Index space: chunks. See include/radix.h for FIRST and the counters. */
+ * Index space: chunks. See include/vector/radix.h for FIRST and the counters. */
 
 #include "include/portable.h"
-#include "include/chunk.h"
-#include "include/radix.h"
+#include "include/vector/chunk.h"
+#include "include/vector/radix.h"
 
 KERNEL void radix_count(
     __global const uint *restrict keys, __global const int *restrict slots,

@@ -3,12 +3,12 @@
  * `table` is the prefix sum of what radix_count counted. Chunks keep their order and so do the
  * keys within one, so that equal digits stay in the order of the list.
  *
- * Index space: chunks. See include/radix.h for FIRST and the counters; in the first pass a splat
- * is its own place in the list, and `order` is not read. */
+ * Index space: chunks. See include/vector/radix.h for FIRST and the counters; in the first pass a
+ * splat is its own place in the list, and `order` is not read. */
 
 #include "include/portable.h"
-#include "include/chunk.h"
-#include "include/radix.h"
+#include "include/vector/chunk.h"
+#include "include/vector/radix.h"
 
 KERNEL void radix_scatter(
     __global const uint *restrict keys, __global const int *restrict order,

@@ -90,7 +90,7 @@ class Traits:
 
     @property
     def run(self) -> int:
-        """Splats that one work-item goes through: see ``kernels/include/splat_rows.h``."""
+        """Splats that one work-item goes through: see ``kernels/include/splat/splat_rows.h``."""
         return _RUN if self.is_cpu else 1
 
     def runs(self, count: int) -> int:

@@ -7,7 +7,7 @@ of incoherent light (Goodman, Introduction to Fourier Optics, chapter 6): a roun
 pixels, taken as equal in all directions, and defocus, which for small frequencies is the transform
 of the blur disc; with Stokseth's factor (J. Opt. Soc. Am. 59, 1314, 1969) it stays within 0.02 of a
 real pupil's up to the cut-off, where the bare disc is up to 0.25 too low. The coverage kernels use
-the same formula (``kernels/include/coverage.h``).
+the same formula (``kernels/include/sampling/coverage.h``).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What the gradient of compositing keeps of every splat with Hermite modes, by definition.
 
 These moments say all that the pixels have to say: the gradients of a splat's modes, weight, place
-and shape are linear in them. ``kernels/include/hermite_slots.h`` has the record.
+and shape are linear in them. ``kernels/include/raster/hermite_slots.h`` has the record.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ MARGIN = 1e-6
 
 
 def screen_records(screen: Floats, features: Floats, whitening: Floats | None = None) -> Floats:
-    """The records (N, 16) of ``kernels/include/screen_record.h``.
+    """The records (N, 16) of ``kernels/include/raster/screen_record.h``.
 
     Args:
         screen: (N, 8): mean, conic a, b, c, weight, half sides of the ellipse's box.

@@ -47,7 +47,7 @@ def raster(
     """The image (height, width, D) and what of the background is seen (height, width).
 
     Args:
-        screen: (N, 8), see ``kernels/include/alpha.h``.
+        screen: (N, 8), see ``kernels/include/raster/alpha.h``.
         features: (N, D).
         entries: (M, 2), of which the first is the splat.
         starts: (tiles + 1,), where each tile's entries begin.

@@ -26,7 +26,7 @@ from rift_cl.splat.host_shading import shade_on_host, shade_on_host_grad
 from rift_cl.splat.projection import Projection, SplatGradients
 from rift_cl.splat.splats import Splats
 
-# The numbers that kernels/include/lobe.h knows the kinds of lobes by.
+# The numbers that kernels/include/shading/lobe.h knows the kinds of lobes by.
 _LOBES = {"hg": 0, "lg": 1, "sg": 2, "asg": 3}
 
 

@@ -71,8 +71,8 @@ class ModeOrders:
     def record_length(self, channels: int) -> int:
         """Floats of one gradient record, for an image of a number of channels.
 
-        ``kernels/include/hermite_slots.h`` says what they are; a gradient by the place has moments
-        of two orders more than the polynomial.
+        ``kernels/include/raster/hermite_slots.h`` says what they are; a gradient by the place has
+        moments of two orders more than the polynomial.
         """
         return n_coeff(self.shape + 2, 2) + channels + self._color_numbers
 

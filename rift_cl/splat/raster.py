@@ -2,8 +2,8 @@
 
 ``kernels/splat/splat_raster_cpu.cl`` says what is computed, for Gaussians and for splats with
 Hermite modes, and ``kernels/splat/splat_raster_grad_cpu.cl`` how it is differentiated.
-How a GPU's group shares a tile stands in ``kernels/include/group_tile.h``. Features of more than 32
-channels are drawn 32 at a time, on a GPU 8 at a time; without modes alone.
+How a GPU's group shares a tile stands in ``kernels/include/raster/group_tile.h``. Features of more
+than 32 channels are drawn 32 at a time, on a GPU 8 at a time; without modes alone.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class ScreenModes:
         return self._orders.row_length
 
     def record_length(self, features: int, settings: SplatSettings) -> int:
-        """Numbers that the gradient has for each splat: ``kernels/include/hermite_slots.h``.
+        """Numbers that the gradient has for each splat: ``kernels/include/raster/hermite_slots.h``.
 
         Args:
             features: channels that are drawn.
@@ -138,8 +138,8 @@ class ScreenSplats:
         modes: the polynomials of splats that have some; None for Gaussians.
 
     ``records``, (N, 16), hold what tiles want of them in one line each, see
-    ``kernels/include/screen_record.h``; they are None until ``packed`` makes them, and in a copy
-    with other arrays, which they would not be of.
+    ``kernels/include/raster/screen_record.h``; they are None until ``packed`` makes them, and in a
+    copy with other arrays, which they would not be of.
     """
 
     screen: DeviceArray
@@ -153,8 +153,8 @@ class SlotRecords:
     """What the gradient leaves in the slots of (splat, tile) pairs; device arrays.
 
     Args:
-        numbers: (M, P), a record for each slot: see ``kernels/include/splat_slots.h``, for splats
-            with modes ``kernels/include/hermite_slots.h``.
+        numbers: (M, P), a record for each slot: see ``kernels/include/raster/splat_slots.h``, for
+            splats with modes ``kernels/include/raster/hermite_slots.h``.
         live: (M,) uint8, which of them hold one; the numbers of others mean nothing.
     """
 

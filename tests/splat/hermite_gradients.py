@@ -1,8 +1,8 @@
 """From the moments that the raster leaves to the gradients of splats on the screen: plain algebra.
 
 u_a He~_m and d/du_a (He~_m g) are made of neighbouring modes; see
-``kernels/include/hermite_slots.h``. What is written here for tests alone, projection does on the
-device.
+``kernels/include/raster/hermite_slots.h``. What is written here for tests alone, projection does on
+the device.
 """
 
 import numpy as np

@@ -124,7 +124,7 @@ def test_the_order_of_splats_changes_no_integral(device):
 
 def test_integrals_end_where_their_order_falls_below_the_gaussians_end():
     """The kernels' table and the twin's are one, and say what they are said to."""
-    header = Path(__file__).parents[2] / "kernels" / "include" / "hermite_edge.h"
+    header = Path(__file__).parents[2] / "kernels" / "include" / "raster" / "hermite_edge.h"
     listed = re.findall(r"(\d\.\d+)f", header.read_text().split("#define")[1])
     assert tuple(map(float, listed)) == EDGES
     for order, edge in enumerate(EDGES):

@@ -44,7 +44,7 @@ def _view_entries(case: Case) -> Any:
     """Entries of each view's table of a slice, (views,).
 
     A view is walked along the axis that moves further over the detector, so a row starts
-    ``slope <= 1`` columns after the one before (``kernels/include/phase_table.h``).
+    ``slope <= 1`` columns after the one before (``kernels/include/tomo/phase_table.h``).
     """
     cosine, sine = np.abs(np.cos(case.angles)), np.abs(np.sin(case.angles))
     slope = np.minimum(cosine, sine) / np.maximum(cosine, sine)

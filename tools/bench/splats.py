@@ -161,7 +161,7 @@ def _count_lanes(device: rift.Device, frame: Frame) -> tuple[int, int]:
 def _touch(screen: Any, corner: tuple[int, int], tile: int) -> Any:
     """Whether splats touch the blocks of a tile, (splats, rows of blocks, columns of blocks).
 
-    The bounds are those of ``kernels/include/screen_record.h``.
+    The bounds are those of ``kernels/include/raster/screen_record.h``.
     """
     mean_x, mean_y, a, b, c, _, across, down = (column[:, None] for column in screen.T)
     begin = _COLUMNS * np.arange(tile // _COLUMNS) + 0.5 + corner[1] - mean_x

@@ -10,8 +10,8 @@ are autograd's. What makes it fast:
 - pixels come before splats, because torch multiplies cumulatively fast along the last axis alone;
 - thresholds are ``threshold`` and not ``where``, which is many times slower.
 
-Conventions are those of ``kernels/include/alpha.h``: the same thresholds, extents and tiles, so
-that equal work is compared. Numbers that are not finite are not looked for.
+Conventions are those of ``kernels/include/raster/alpha.h``: the same thresholds, extents and tiles,
+so that equal work is compared. Numbers that are not finite are not looked for.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """How many passes a Fourier transform takes, and the operations in them.
 
-A pass of radix 9, 8, 4, 3 or 2 (kernels/include/butterfly.h) adds up the samples of a butterfly
-and turns all results but the first: 8 complex additions and 3 complex products for 4 samples, and
-so on. Nine samples are six transforms of three with four products between them; eight are two
-transforms of four, two turns of an eighth and eight additions. A complex addition is 2 flop, a
-complex product 6.
+A pass of radix 9, 8, 4, 3 or 2 (kernels/include/fourier/butterfly.h) adds up the samples of a
+butterfly and turns all results but the first: 8 complex additions and 3 complex products for 4
+samples, and so on. Nine samples are six transforms of three with four products between them; eight
+are two transforms of four, two turns of an eighth and eight additions. A complex addition is 2
+flop, a complex product 6.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Fourier transforms that a CPU makes inside of other kernels, a few columns at a time.
 
 A core of a CPU waits for memory in a transform that goes over whole planes pass by pass. Here a
-kernel fills a block of columns, transforms it (kernels/include/fft_block.h), makes something of it
-and empties it, all in its caches. GPUs take ``ColumnTransform``.
+kernel fills a block of columns, transforms it (kernels/include/fourier/fft_block.h), makes
+something of it and empties it, all in its caches. GPUs take ``ColumnTransform``.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from rift_cl.operators.fourier.block_transform import BLOCK, BlockTransform
 from rift_cl.operators.fourier.column_transform import ColumnTransform
 from rift_cl.operators.fourier.gridding import Gridding
 
-# Cells before zero frequency and behind the last one, as kernels/include/fourier_rays.h has them.
+# Cells before zero frequency and behind the last one: kernels/include/fourier/fourier_rays.h.
 _MARGIN = 8
 _STEP = 8
 
@@ -86,7 +86,7 @@ class PaddedSpectrum:
         return max(2 * self.entries + folded, 2 * folded + self.entries)
 
     def empty_grid(self) -> DeviceArray:
-        """A grid for ``crop``, whose cells are where kernels/include/fourier_rays.h puts them."""
+        """A grid for ``crop``: cells are where kernels/include/fourier/fourier_rays.h puts them."""
         if self.device.traits.is_cpu:
             return self.device.empty((self.width // BLOCK, 2, self._edges[0], BLOCK))
         return self.device.empty((2, self._edges[0], self.across))

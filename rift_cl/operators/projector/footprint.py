@@ -1,9 +1,9 @@
 """What a pixel leaves on the detector: three models of it, as the numbers that kernels read.
 
 A model is its half-width on the detector and a record for each view; whatever else the projector
-does is the same for all of them. ``kernels/include/footprint.h`` has the profiles that weight a bin
-by its distance. Strips are otherwise summed over the edges between bins, which takes less
-(``kernels/include/shadow.h``), as long as no shadow covers many of them.
+does is the same for all of them. ``kernels/include/tomo/footprint.h`` has the profiles that weight
+a bin by its distance. Strips are otherwise summed over the edges between bins, which takes less
+(``kernels/include/tomo/shadow.h``), as long as no shadow covers many of them.
 """
 
 from __future__ import annotations

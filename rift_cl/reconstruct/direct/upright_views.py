@@ -27,8 +27,8 @@ def upright_cone(scan: Vectors) -> tuple[Cone, Floats]:
         scan: places of source and detector; the source goes round the axis on a circle.
 
     Returns:
-        The cone, and (views, 18) forms as ``kernels/include/upright.h`` reads them: from the rows
-        and columns of the cone's detectors to those of the scan's, and back.
+        The cone, and (views, 18) forms as ``kernels/include/cone/upright.h`` reads them: from the
+        rows and columns of the cone's detectors to those of the scan's, and back.
 
     Raises:
         InputError: a source stands beside the circle; the sentence names the first such view.

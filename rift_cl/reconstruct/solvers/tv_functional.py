@@ -5,7 +5,7 @@
 D the forward differences divided by the grid's spacing. This is the integral of the gradient's
 length, in the image's unit times length^(axes - 1): for an image, jump times length of the edge,
 whatever the grid's spacing. It is isotropic, or weighs D x by direction (``direction_weights``).
-``kernels/include/differences.h`` says what happens at the borders.
+``kernels/include/tomo/differences.h`` says what happens at the borders.
 
 Its proximal map has no closed form; it is found on the dual, where every sample holds a vector
 ``u`` of length at most the weight (Chambolle, J. Math. Imaging Vis. 20, 2004), by the accelerated

@@ -65,7 +65,7 @@ class CoverageWork:
         wanted: number of frequencies that were asked for.
         k: (3, frequencies).
         boxes: (blocks, 6) middle and half edges of the box that a block's frequencies lie in.
-        rows: (P, V, 8) the views; see ``kernels/include/coverage.h``.
+        rows: (P, V, 8) the views; see ``kernels/include/sampling/coverage.h``.
         diameter: of the target.
     """
 

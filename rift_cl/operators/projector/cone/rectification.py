@@ -24,7 +24,7 @@ class Rectification:
         tilted: (rows, bins) of the detectors that read.
         upright: (rows, bins) of those that are read.
         views: (n,) int32, which views of the tilted data they are.
-        forms: (n, 18), as ``kernels/include/upright.h`` reads them.
+        forms: (n, 18), as ``kernels/include/cone/upright.h`` reads them.
         dtype: of all arrays.
         spline: interpolate by the cubic spline in the place of Keys' cubic.
     """

@@ -1,7 +1,7 @@
 """Line integrals along the rays of a cone, and their exact adjoint, by slab tables.
 
 Forward: volume -> slabs (y, x, z) -> slab tables -> detector. Adjoint: the same steps transposed,
-in reverse, with the same numbers. ``kernels/include/slab_table.h`` derives the method;
+in reverse, with the same numbers. ``kernels/include/cone/slab_table.h`` derives the method;
 ``rift_cl/reference/cone.py`` has the matrix.
 """
 

@@ -1,6 +1,6 @@
 """The numbers behind the slab projector: where the volume's slabs lie in the tables of the views.
 
-``kernels/include/slab_table.h`` derives the method. Here its per-view records are computed, in
+``kernels/include/cone/slab_table.h`` derives the method. Here its per-view records are computed, in
 float64. Views are walked in slabs across y, whose lines follow each other along x, or in slabs
 across x; both see lines along z.
 """

@@ -84,7 +84,7 @@ class Rectified:
         views: which of the scan, (n,) int32.
         upright: their upright detectors.
         grid: the grid in their coordinates.
-        forms: as ``kernels/include/upright.h`` reads them, (n, 18).
+        forms: as ``kernels/include/cone/upright.h`` reads them, (n, 18).
         along_z: whether they look along z.
     """
 

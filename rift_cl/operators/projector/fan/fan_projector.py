@@ -2,7 +2,7 @@
 
 Forward: image -> padded planes (by rows, by columns) -> bins, each of which gathers the pixels that
 its rays cross. Adjoint: views -> records of their rays -> pixels, each of which gathers the bins
-that it is seen in. Both evaluate the same weights (``kernels/include/fan_footprint.h``);
+that it is seen in. Both evaluate the same weights (``kernels/include/tomo/fan_footprint.h``);
 ``rift_cl/reference/fan.py`` has them as a matrix.
 """
 

@@ -1,7 +1,7 @@
 """The numbers behind the projector of a fan: where every ray of every view crosses the grid.
 
-``kernels/include/fan_footprint.h`` says how they are used. A view looks along y, so that rows are
-its slabs, where the ray through the grid's middle passes more rows than columns, and along x
+``kernels/include/tomo/fan_footprint.h`` says how they are used. A view looks along y, so that rows
+are its slabs, where the ray through the grid's middle passes more rows than columns, and along x
 otherwise. Everything is computed in float64 and counted in lines and slabs of the grid.
 """
 

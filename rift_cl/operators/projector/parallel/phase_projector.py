@@ -1,8 +1,8 @@
 """The X-ray transform of a parallel scan and its exact adjoint, by phase tables.
 
 Forward: image -> padded planes (by rows, by columns) -> phase tables -> bins. Adjoint: the same
-steps transposed, in reverse, with the same numbers. ``kernels/include/phase_table.h`` derives the
-method; ``rift_cl/reference/radon.py`` has the matrix that it approximates.
+steps transposed, in reverse, with the same numbers. ``kernels/include/tomo/phase_table.h`` derives
+the method; ``rift_cl/reference/radon.py`` has the matrix that it approximates.
 
 A slice on the host that is too large for the device is taken in parts, a band of rows of the image
 and a run of views each. Bands are independent of each other in a backprojection and views in a

@@ -1,7 +1,7 @@
 """The numbers behind the phase-table projector: which row starts where in which view's table.
 
-``kernels/include/phase_table.h`` derives the method. Here its per-view records are computed, in
-float64, and turned into 32.32 fixed point. Views are walked along x when a step in x moves
+``kernels/include/tomo/phase_table.h`` derives the method. Here its per-view records are computed,
+in float64, and turned into 32.32 fixed point. Views are walked along x when a step in x moves
 further over the detector than a step in y, along y otherwise; either way the image is seen as
 ``rows`` of ``width`` columns.
 """

@@ -1,6 +1,6 @@
 /* What a splat with modes does to a pixel; the same lines for compositing and its gradient.
  *
- * With g = exp(-|u'|^2 / 2) and the polynomial Q of include/hermite_modes.h:
+ * With g = exp(-|u'|^2 / 2) and the polynomial Q of include/raster/hermite_modes.h:
  *
  *     CLAMP:  E = weight Q g,      alpha = min(cap, max(E, 0));
  *     EXP:    E = weight Q g,      alpha = min(cap, 1 - exp(-max(E, 0))), E an optical depth;

@@ -15,7 +15,7 @@
  * 240 in all, times exp(-9/2)). The powers are of v = STRETCH u2, since then
  * log2 exp(-|u'|^2 / 2) = -(STRETCH u1)^2 - v^2. */
 
-#include "include/screen_record.h"
+#include "include/raster/screen_record.h"
 
 #ifndef SHAPE_ORDER
 #define SHAPE_ORDER 0

@@ -5,8 +5,8 @@
  *     V_00c = sum of w v_c for each of CHANNELS channels, with v = dL/dC and w as in the image;
  *     V_ijc = sum of w v_c He~_i(u1) He~_j(u2),   1 <= i + j <= COLOR_ORDER, c < COLORED,
  *
- * in this order, modes graded as in include/hermite_modes.h. All that a splat is gets its gradient
- * from these numbers, since d/du_a (He~_m g) = -sqrt(m_a + 1) He~_{m + e_a} g and
+ * in this order, modes graded as in include/raster/hermite_modes.h. All that a splat is gets its
+ * gradient from these numbers, since d/du_a (He~_m g) = -sqrt(m_a + 1) He~_{m + e_a} g and
  * u_a He~_m = sqrt(m_a + 1) He~_{m + e_a} + sqrt(m_a) He~_{m - e_a}:
  *
  *     dL/ds_m = H_m,   weight dL/dweight = sum of s_m H_m (s_00 = 1),   dL/dt_mc = V_mc,

@@ -12,7 +12,7 @@
  * screen[splat] = (mean_x, mean_y, a, b, c, weight, extent_x, extent_y): a splat counts nowhere
  * farther from its mean than its extents. */
 
-#include "include/alpha_threshold.h"
+#include "include/raster/alpha_threshold.h"
 
 #ifndef TILE
 #define TILE 16

@@ -13,7 +13,7 @@
  * Everything is computed in all lanes: a splat that has no meaning is told by its code, and its
  * numbers, which may be none, are left aside by who uses them. */
 
-#include "include/splat_rows.h"
+#include "include/splat/splat_rows.h"
 
 #ifndef COVARIANCES
 #define COVARIANCES 0

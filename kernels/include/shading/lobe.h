@@ -19,10 +19,10 @@
 /* The harmonic of degree 0. */
 #define CONSTANT 0.28209479177387814f
 
-#include "include/lobe_frame.h"
+#include "include/shading/lobe_frame.h"
 #if LOBES == HG || LOBES == LG
-#include "include/lobe_modes.h"
-#include "include/lobe_chart.h"
+#include "include/shading/lobe_modes.h"
+#include "include/shading/lobe_chart.h"
 #else
-#include "include/lobe_gaussians.h"
+#include "include/shading/lobe_gaussians.h"
 #endif

@@ -3,11 +3,12 @@
  *
  * A splat lies in local memory as QUADS vectors of four numbers, of which all items of a sub-group
  * read the same: its place from the part's corner and its whitening (x, y, far, lean | rise, peak, ..)
- * of include/screen_record.h, then its features, which fill the second vector and further ones. A
- * splat with modes has its own number before its features: its modes, too many for local memory,
- * are read where they lie.
+ * of include/raster/screen_record.h, then its features, which fill the second vector and further
+ * ones. A splat with modes has its own number before its features: its modes, too many for local
+ * memory, are read where they lie.
  *
- * Thresholds and smooth cut-offs are those of include/alpha.h and include/hermite_alpha.h. */
+ * Thresholds and smooth cut-offs are those of include/raster/alpha.h and
+ * include/raster/hermite_alpha.h. */
 
 /* Whether the features are those in the records. */
 #ifndef PACKED

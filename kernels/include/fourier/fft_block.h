@@ -4,7 +4,7 @@
  * the data are, transforms it and empties it, and nothing in between goes to memory. Rows of a block
  * stand side by side, real and imaginary parts apart. Passes are those of fft_pass.cl. */
 
-#include "include/butterfly.h"
+#include "include/fourier/butterfly.h"
 
 #ifndef BLOCK
 #define BLOCK (2 * LANES)

@@ -9,7 +9,7 @@
  * that no rounding fills. */
 
 #include "include/exponential.h"
-#include "include/optical_transfer.h"
+#include "include/sampling/optical_transfer.h"
 
 #define ROW 8
 #define REACH 1.625f

@@ -11,10 +11,10 @@
  * for each block whether the splat's ellipse reaches it; a block then takes the entries with its bit
  * alone. The test is exact but for a margin, and is made once per entry and block.
  *
- * With include/screen_record.h, of a splat at (x, y) and a strip of columns between centres left and
- * right of the mean, u in [low, high] is the strip cut to [-ex, ex]. The ellipse's upper edge
- * falls to both sides of u = -summit and its lower edge to both sides of u = summit, so the highest
- * and the lowest row within the strip are those edges at -summit and summit, held within
+ * With include/raster/screen_record.h, of a splat at (x, y) and a strip of columns between centres
+ * left and right of the mean, u in [low, high] is the strip cut to [-ex, ex]. The ellipse's upper
+ * edge falls to both sides of u = -summit and its lower edge to both sides of u = summit, so the
+ * highest and the lowest row within the strip are those edges at -summit and summit, held within
  * [low, high]. A block of the strip is touched if its rows of centres overlap what lies between. */
 
 #ifndef TILE

@@ -1,7 +1,7 @@
 /* What splat_activate and its gradient have in common: splats' scales and opacities, before and after
  * the limit of their band, LANES at a time. */
 
-#include "include/splat_rows.h"
+#include "include/splat/splat_rows.h"
 
 #ifndef DENSITY
 #define DENSITY 0

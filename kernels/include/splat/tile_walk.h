@@ -8,7 +8,7 @@
  *
  * Each chunk counts its pairs tile by tile in a row of `table` (chunks, tiles) of its own. */
 
-#include "include/chunk.h"
+#include "include/vector/chunk.h"
 
 /* The last rank whose pairs begin at `pair` or before; ranks without pairs are passed over. */
 static int rank_of(int pair, __global const int *offsets, int splats) {

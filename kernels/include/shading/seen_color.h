@@ -15,7 +15,7 @@
  * are twelve numbers, three whole fours of columns (splat_rows.h), and go through registers at once.
  * Tables of features have STRIDE numbers for each splat, of which the first three are the colour. */
 
-#include "include/splat_rows.h"
+#include "include/splat/splat_rows.h"
 
 #ifndef STRIDE
 #define STRIDE 3

@@ -12,9 +12,9 @@
  * gives a radius beyond which nothing is drawn; few are enough. If 255 weight P <= 1 the splat is
  * too faint everywhere.
  *
- * Sums of line integrals, which no display rounds, end where include/hermite_edge.h says, and
- * SMOOTH cut-offs at MOST_RADIUS. A colour's polynomial widens nothing where it is blended, as it
- * multiplies an alpha that ended. */
+ * Sums of line integrals, which no display rounds, end where include/raster/hermite_edge.h says,
+ * and SMOOTH cut-offs at MOST_RADIUS. A colour's polynomial widens nothing where it is blended, as
+ * it multiplies an alpha that ended. */
 
 #ifndef SQUARE
 #define SQUARE 0
