@@ -29,7 +29,7 @@ import numpy as np
 import tyro
 
 from stress.damage import damaged
-from stress.scans import KINDS
+from stress.valid_scans import KINDS
 
 _BUDGET = 1 << 28
 _FAILURES = ("crash", "hang", "unnamed error")

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 import tyro
 
-from stress.held import BINS, CENTER, REFUSED, RIGHT, Case, cases, slices
+from stress.known_object import BINS, CENTER, REFUSED, RIGHT, Case, cases, slices
 
 # Right slices have at least this PSNR in dB (peak: the true densities' greatest), and a mean inside
 # that is off by no more than this share.

@@ -1,1 +1,1 @@
-"""The parts of ``tools/stress_readers.py``; scripts, which the package never imports."""
+"""The parts of ``tools/stress_readers.py`` and ``tools/stress_scans.py``."""
