@@ -2,7 +2,7 @@
 
     python tools/try_driver.py pocl                  # PoCL of the system's distribution
     python tools/try_driver.py rusticl --as-gpu      # Mesa on llvmpipe: no doubles, 32 KiB local
-    python tools/try_driver.py oclgrind --as-gpu --only reductions fbp
+    python tools/try_driver.py oclgrind --as-gpu --only sums tomography
     python tools/try_driver.py clspv                 # compiles for Vulkan (Android), runs nothing
 
 The first three unpack Debian packages into a folder, without root and beside the system, and

@@ -1,5 +1,8 @@
 """Families of problems on two drivers: what counts as equal, and a process that dies costs one."""
 
+import shlex
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -32,3 +35,10 @@ def test_a_driver_is_compared_with_what_was_saved(tool, tmp_path, capsys):
     with np.load(kept) as file:
         np.savez(kept, **{name: file[name] * 1.01 for name in file.files})
     assert compare.main(compare.Options(against=str(kept), **options)) == 1
+
+
+def test_the_continuous_check_names_families_that_are_there(tool):
+    lines = (Path(__file__).parents[2] / ".ci" / "run").read_text().splitlines()
+    (named,) = (shlex.split(line) for line in lines if line.strip().startswith("--only "))
+    families = tool("portability.problems").FAMILIES
+    assert len(named) > 5 and families.keys() >= set(named[1:])
