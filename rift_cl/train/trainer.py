@@ -36,6 +36,7 @@ from rift_cl.train.per_view.poses import Poses
 from rift_cl.train.schedules import CoefficientSchedule, LearningRateSchedule
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import scene_extent
+from rift_cl.train.state_schema import check_state
 from rift_cl.train.strategy import TrainingRun
 
 # Steps between two reports; the loss comes to the host for each.
@@ -259,8 +260,9 @@ class Trainer:
         """Go on from a state of a run with the same settings and views.
 
         Raises:
-            CheckpointError: it is of another run.
+            CheckpointError: it is of another run, or no state at all; nothing was changed then.
         """
+        check_state(state, views=len(self.pictures.cameras))
         groups = _grouped(state)
         try:
             self.parameters = Parameters.of(
