@@ -11,7 +11,6 @@ import sys
 import textwrap
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from functools import partial
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -25,7 +24,6 @@ from rift_cl.commands.runner import (
     command,
     exit_status,
     gentle_interrupt,
-    parsed,
     ran,
     run_job,
     told,
@@ -73,12 +71,9 @@ def _run(arguments: Sequence[str]) -> int:
         return 0
     name, rest = _named(list(arguments))
     if name in COMMANDS:
-        earlier = _earlier(name, rest)
-        # Without an earlier run only one form of a switch is of use: that which its default is not.
-        config = (tyro.conf.FlagCreatePairsOff,) if earlier is None else ()
-        entry = _command(name, earlier, rest)
-        parse = partial(tyro.cli, entry, prog=f"rift {name}", args=rest, config=config)
-        return parsed(parse, COMMANDS[name].settings_class())()
+        entry = _command(name, _earlier(name, rest), rest)
+        run: Callable[[], int] = tyro.cli(entry, prog=f"rift {name}", args=rest)
+        return run()
     if first == "fit":
         print(_FIT_HELP)
         return 0 if rest else _USAGE
@@ -130,12 +125,13 @@ def _command(
 ) -> Callable[..., Callable[[], int]]:
     """A command for tyro; of all the commands' modules, only its own settings are imported."""
     run, settings = COMMANDS[name].run, COMMANDS[name].settings_class()
-    if not name.startswith("fit "):
-        return command(run, settings, earlier)
-    from rift_cl.commands.run_folder.saved_settings import chosen, kinds
+    first = earlier
+    if name.startswith("fit "):
+        from rift_cl.commands.run_folder.saved_settings import chosen
 
-    first = chosen(settings, earlier, arguments)
-    return command(run, settings, first, kinds(settings, first))
+        first = chosen(settings, earlier, arguments)
+    # Without an earlier run only one form of a switch is of use: that which its default is not.
+    return command(run, settings, first, twins=earlier is not None)
 
 
 def _earlier(name: str, arguments: Sequence[str]) -> Any:

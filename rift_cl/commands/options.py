@@ -1,21 +1,32 @@
 """Options that several commands share, and how a command's options fall into groups.
 
-A command's settings are one flat frozen dataclass: what Python passes, what ``config.json`` holds
-and what the command line shows. It inherits its fields from a few classes that each name a
-``group``, under whose title the help lists them.
+A command's settings are a frozen dataclass: what Python passes, what ``config.json`` holds and what
+the command line shows. It inherits its fields from a few classes that each name a ``group``, under
+whose title the help lists them; a field, or a part of the tree, that is marked with a ``Group`` of
+``rift_cl.option_marks`` is listed under that instead.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, is_dataclass, replace
+import dataclasses
+from collections.abc import Iterator, Mapping
+from dataclasses import Field, dataclass, fields, is_dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, TypeVar, get_type_hints
 
-from rift_cl.option_marks import Auto
+import tyro
+
+from rift_cl.option_marks import Auto, Group
 
 if TYPE_CHECKING:
     from rift_cl.cl.device import Device
+
+# What something has to be given for has no default.
+MISSING = (dataclasses.MISSING, tyro.MISSING)
+# The name of the choice where a part of the settings is one of several kinds.
+KIND = "name"
+# The group of what no mark puts into one.
+_UNSAID = Group("", "")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,6 +92,97 @@ def absolute_paths(settings: S) -> S:
     return replace(settings, **changed)  # type: ignore[type-var]
 
 
+class ShownOption(NamedTuple):
+    """An option as a command's help lists it.
+
+    Args:
+        name: its name, such as ``steps`` or ``learning_rates.means``.
+        path: where its value is in the tree of settings.
+        kind: its type, with the marks on it.
+        default: its value where nothing is given; one of ``MISSING`` where something has to be.
+        group: where the help lists it.
+        help: what the help says of it.
+    """
+
+    name: str
+    path: tuple[str, ...]
+    kind: Any
+    default: Any
+    group: Group
+    help: str
+
+
+def shown_options(settings: type, default: Any = None) -> Iterator[ShownOption]:
+    """The options of a command, in the order of the fields.
+
+    Args:
+        settings: the class of its settings.
+        default: settings to begin with; the class's own where it is None.
+    """
+    groups = {
+        field.name: Group(getattr(base, "group", ""), _first_paragraph(base))
+        for base in option_groups(settings)
+        for field in fields(base)
+    }
+    for option in _options_in(settings, default):
+        said = option.group is not _UNSAID
+        yield option if said else option._replace(group=groups[option.path[0]])
+
+
+def _first_paragraph(described: type) -> str:
+    return " ".join((described.__doc__ or "").split("\n\n")[0].split())
+
+
+def _options_in(
+    settings: Any,
+    usual: Any,
+    group: Group = _UNSAID,
+    path: tuple[str, ...] = (),
+    prefix: str = "",
+) -> Iterator[ShownOption]:
+    """The options of a part of a tree of settings, whose group its marks say, or do not."""
+    kinds, helps = get_type_hints(settings, include_extras=True), _helps(settings)
+    for field in fields(settings):
+        name, marks = option_name(field.name, kinds[field.name], prefix)
+        if tyro.conf.Fixed in marks:
+            continue
+        default, place = default_of(field, usual), (*path, field.name)
+        own = next((mark for mark in marks if isinstance(mark, Group)), group)
+        registry = field.metadata.get("registry")
+        if registry is not None:
+            usually = registry.name_of(type(default))
+            hidden = {*field.metadata.get("without", ())} - {usually}
+            choice: Any = Literal[tuple(kind for kind in registry if kind not in hidden)]
+            text = field.metadata["help"]
+            yield ShownOption(name, (*place, KIND), choice, usually, group, text)
+        if is_dataclass(default):
+            yield from _options_in(type(default), default, own, place, name)
+        else:
+            kind = kinds[field.name]
+            yield ShownOption(name, place, kind, default, own, helps.get(field.name, ""))
+
+
+def assembled(
+    settings: type[S],
+    default: Any,
+    given: Mapping[tuple[str, ...], Any],
+    path: tuple[str, ...] = (),
+) -> S:
+    """Settings of values by their places in the tree; what is not given is as usual.
+
+    Raises:
+        SettingError: a value is out of its range.
+    """
+    values = {}
+    for field in fields(settings):  # type: ignore[arg-type]
+        usual, place = default_of(field, default), (*path, field.name)
+        if is_dataclass(usual):
+            values[field.name] = assembled(type(usual), usual, given, place)
+        else:
+            values[field.name] = given.get(place, usual)
+    return settings(**values)
+
+
 def option_groups(settings: type) -> list[type]:
     """The classes that a command's settings consist of, in the order of the fields.
 
@@ -97,22 +199,32 @@ def option_groups(settings: type) -> list[type]:
     return found[::-1] or [settings]
 
 
-def join_help_lines(settings: Any) -> None:
-    """Have tyro wrap the docstring of each option as one paragraph.
+def option_name(name: str, kind: Any, prefix: str) -> tuple[str, tuple[Any, ...]]:
+    """The name of the option of a field, and all marks of its type."""
+    marks = getattr(kind, "__metadata__", ())
+    for mark in marks:
+        if getattr(mark, "name", None):
+            name = mark.name.replace("-", "_")
+        if getattr(mark, "prefix_name", None) is False:
+            prefix = ""
+    return (f"{prefix}.{name}" if prefix else name), marks
 
-    It keeps the line breaks of docstrings that are indented, but takes a field's help from the
-    metadata as it stands. Classes of fields that are dataclasses themselves are gone through, too.
-    """
+
+def default_of(field: Field[Any], usual: Any) -> Any:
+    """A field's value in the settings to begin with, otherwise its own default."""
+    if usual is not None:
+        return getattr(usual, field.name)
+    if field.default_factory is not dataclasses.MISSING:
+        return field.default_factory()
+    return field.default
+
+
+def _helps(settings: type) -> dict[str, str]:
+    """The docstring of each field, as one paragraph."""
     import docstring_parser
 
-    described: dict[str, str] = {}
+    helps: dict[str, str] = {}
     for base in reversed(settings.__mro__[:-1]):
         for entry in docstring_parser.parse_from_object(base).params:
-            described[entry.arg_name] = " ".join((entry.description or "").split())
-    kinds = get_type_hints(settings)
-    for field in fields(settings):
-        if described.get(field.name) and "help" not in field.metadata:
-            field.metadata = MappingProxyType({**field.metadata, "help": described[field.name]})
-        for kind in getattr(kinds[field.name], "__args__", (kinds[field.name],)):
-            if isinstance(kind, type) and is_dataclass(kind):
-                join_help_lines(kind)
+            helps[entry.arg_name] = " ".join((entry.description or "").split())
+    return helps

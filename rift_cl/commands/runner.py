@@ -6,32 +6,33 @@ or a value that cannot be used), 4 device, 5 output, 130 interrupted.
 
 from __future__ import annotations
 
-import contextlib
-import io
 import os
 import signal
 import sys
 import threading
 import traceback
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, make_dataclass
 from inspect import Parameter, Signature
 from types import FrameType
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, NamedTuple
 
 import tyro
 
 from rift_cl.commands.console_table import print_table
-from rift_cl.commands.options import join_help_lines, option_groups
+from rift_cl.commands.options import MISSING, ShownOption, assembled, shown_options
 from rift_cl.commands.progress_bar import print_line, show_progress
-from rift_cl.errors import InputError, RiftError, SettingError
+from rift_cl.errors import RiftError, SettingError
+from rift_cl.option_marks import EXPERT, Group
 from rift_cl.progress import Report
 
 _INPUT, _OUTPUT, _INTERRUPTED = 3, 5, 130
-# Groups of values, and one of further groups, whose options have names of their own.
-_OMITTED, _UNNAMED = tyro.conf.OmitArgPrefixes, tyro.conf.arg(name="")
+# Options have names of their own, whichever group they are in.
+_OMITTED: Any = tyro.conf.OmitArgPrefixes
+# Options in no group, which the help lists under tyro's own title.
+_TITLELESS = "settings"
 
 
 @dataclass(frozen=True)
@@ -70,91 +71,95 @@ def told(run: Callable[[], int]) -> int:
         return _say(f"rift: {error}", error.exit_status)
 
 
-def parsed(parse: Callable[[], Callable[[], int]], settings: type) -> Callable[[], int]:
-    """What a command line means; what its settings refuse is raised by the name of the option.
-
-    Raises:
-        RiftError: a value is out of its range.
-        SystemExit: help was shown, or an option is unknown; that was said.
-    """
-    said = io.StringIO()
-    try:
-        with contextlib.redirect_stderr(said):
-            return parse()
-    except SystemExit as end:
-        error: BaseException | None = end
-        while error is not None and not isinstance(error, RiftError):
-            error = error.__context__
-        if isinstance(error, SettingError):
-            raise InputError(_sentence(error, settings)) from None
-        if error is not None:
-            raise error from None
-        print(said.getvalue(), end="", file=sys.stderr)
-        raise
-
-
 def command(
-    run: Callable[[Any, Output], None],
-    settings: type,
-    default: Any = None,
-    kinds: Iterable[tuple[str, Sequence[str], str, str]] = (),
+    run: Callable[[Any, Output], None], settings: type, default: Any = None, *, twins: bool = False
 ) -> Callable[..., Callable[[], int]]:
     """A command for tyro: it takes groups of options and gives back what is to be run.
 
     Args:
         run: what to do with the settings.
-        settings: their class; the help lists its options by ``option_groups``.
+        settings: their class.
         default: settings to begin with, where nothing else is given; the class's own if None.
-        kinds: options that were heeded already, in ``default``: their name, choices, what was
-            chosen, and help.
+        twins: give every switch a form that turns it on and one that turns it off, and not only
+            the one that its default is not.
     """
-    groups = {
-        group.group if hasattr(group, "group") else "": group for group in option_groups(settings)
+    groups: dict[Group, list[_Entry]] = {}
+    # Sorting keeps the order of the fields within what is for experts and what is not.
+    for option in sorted(shown_options(settings, default), key=lambda one: one.group == EXPERT):
+        groups.setdefault(option.group, []).append(_Entry.of(option, twins=twins))
+    marks = (_OMITTED,) if twins else (_OMITTED, tyro.conf.FlagCreatePairsOff)
+    parameters: dict[str, type] = {
+        group.title or _TITLELESS: _class_of(group, entries) for group, entries in groups.items()
     }
-    for group in (*groups.values(), Output):
-        join_help_lines(group)
-    parameters = [
-        Parameter(
-            title or "settings",
-            Parameter.KEYWORD_ONLY,
-            annotation=Annotated[group, _OMITTED if title else _UNNAMED],
-            default=Parameter.empty if default is None else _part(default, group),
-        )
-        for title, group in groups.items()
-    ]
-    talk = Parameter(
-        "messages", Parameter.KEYWORD_ONLY, annotation=Annotated[Output, _OMITTED], default=Output()
+    parameters["messages"] = Output
+
+    def prepared(**parts: Any) -> Callable[[], int]:
+        given = {
+            entry.option.path: entry.value(parts[group.title or _TITLELESS])
+            for group, entries in groups.items()
+            for entry in entries
+        }
+
+        def made() -> Any:
+            return assembled(settings, default, given)
+
+        return lambda: _guarded(run, settings, made, parts["messages"])
+
+    kinds = {
+        name: Annotated[(kind, tyro.conf.arg(name="" if name == _TITLELESS else name), *marks)]
+        for name, kind in parameters.items()
+    }
+    prepared.__signature__ = Signature(  # type: ignore[attr-defined]
+        [Parameter(name, Parameter.KEYWORD_ONLY, annotation=kind) for name, kind in kinds.items()]
     )
-
-    heeded = [
-        Parameter(
-            name,
-            Parameter.KEYWORD_ONLY,
-            annotation=Annotated[Literal[tuple(choices)], tyro.conf.arg(help=text)],
-            default=usual,
-        )
-        for name, choices, usual, text in kinds
-    ]
-    names = [parameter.name for parameter in parameters]
-
-    def prepared(*, messages: Output, **parts: Any) -> Callable[[], int]:
-        values = {name: value for part in names for name, value in _values(parts[part]).items()}
-        return lambda: _guarded(run, settings(**values), messages)
-
-    every = (*parameters, *heeded, talk)
-    prepared.__signature__ = Signature(every)  # type: ignore[attr-defined]
-    prepared.__annotations__ = {entry.name: entry.annotation for entry in every}
+    prepared.__annotations__ = kinds
     prepared.__doc__ = settings.__doc__
     return prepared
 
 
-def _part(settings: Any, group: type) -> Any:
-    """The options of one group, with the values of some settings."""
-    return group(**{field.name: getattr(settings, field.name) for field in fields(group)})
+class _Entry(NamedTuple):
+    """An option as tyro is told of it.
+
+    Args:
+        option: the option.
+        field: its name in a class of options.
+        kind: its type there.
+        default: its value where nothing is given.
+        negated: whether it is a switch that turns off what is on.
+    """
+
+    option: ShownOption
+    field: str
+    kind: Any
+    default: Any
+    negated: bool
+
+    @classmethod
+    def of(cls, option: ShownOption, *, twins: bool) -> _Entry:
+        above, dot, last = option.name.replace("_", "-").rpartition(".")
+        negated = option.default is True and not twins
+        name = above + dot + ("no-" if negated else "") + last
+        hint = "(default: True)" if negated else None
+        mark = tyro.conf.arg(name=name, help=option.help, help_behavior_hint=hint)
+        kind: Any = Annotated[option.kind, mark]
+        default = False if negated else option.default
+        return cls(option, "__".join(option.path), kind, default, negated)
+
+    def value(self, part: Any) -> Any:
+        """What was given for it, or its default."""
+        found = getattr(part, self.field)
+        return not found if self.negated else found
 
 
-def _values(part: Any) -> dict[str, Any]:
-    return {field.name: getattr(part, field.name) for field in fields(part)}
+def _class_of(group: Group, entries: Iterable[_Entry]) -> type:
+    """A class with the options of a group."""
+    members: list[Any] = [
+        (entry.field, entry.kind)
+        if any(entry.default is missing for missing in MISSING)
+        else (entry.field, entry.kind, field(default=entry.default))
+        for entry in entries
+    ]
+    return make_dataclass("Options", members, kw_only=True, namespace={"__doc__": group.about})
 
 
 def watch(reports: Iterable[Report], output: Output) -> None:
@@ -182,16 +187,18 @@ def run_job(job: Any, output: Output) -> None:
     watch(job.run(), output)
 
 
-def _guarded(run: Callable[[Any, Output], None], settings: Any, output: Output) -> int:
-    """Run a command; an error becomes one sentence and an exit status."""
+def _guarded(
+    run: Callable[[Any, Output], None], settings: type, made: Callable[[], Any], output: Output
+) -> int:
+    """Make the settings and run a command; an error becomes one sentence and an exit status."""
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
-            run(settings, output)
+            run(made(), output)
     except RiftError as error:
         if output.debug:
             traceback.print_exc()
-        return _say(f"rift: {_sentence(error, type(settings))}", error.exit_status)
+        return _say(f"rift: {_sentence(error, settings)}", error.exit_status)
     except MemoryError as error:
         return _say(f"rift: there is too little memory for this ({error}): ask for less", _INPUT)
     return 0

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 from rift_cl.basis.angular import ANGULAR_BASES
 from rift_cl.errors import SettingError
 from rift_cl.geometry.numbers import one_number
-from rift_cl.option_marks import Auto, NoOption, Short
+from rift_cl.option_marks import AutoExpert, Expert, NoOption, Short
 
 SplatMode = Literal["light", "xray"]
 Activation = Literal["clamp", "exp", "square"]
@@ -28,19 +28,19 @@ class SplatSettings:
         InputError: a number is out of its range, or a choice is unknown.
     """
 
-    near: float = 0.01
+    near: Expert[float] = 0.01
     """Depth below which splats are left out, in scene units; above 0 for a pinhole."""
-    far: float = 1e10
+    far: Expert[float] = 1e10
     """Depth above which splats are left out, in scene units."""
-    radius_clip: float = 0.0
+    radius_clip: Expert[float] = 0.0
     """Radius up to which splats are left out, in pixels."""
     eps2d: Short[float] = 0.3
     """Variance added to every splat on the screen, in square pixels. 0.3 blurs small images; 0.05
     to 0.1 suits cameras at one distance."""
-    tile: Auto[int] = None
+    tile: AutoExpert[int] = None
     """Edge of a tile in pixels: 8, 16 or 32. If not given, 32 on a CPU where an image has 64 such
     tiles or more, else 16."""
-    alpha_cap: float = 0.99
+    alpha_cap: Expert[float] = 0.99
     """Largest alpha of one splat, above 0 and below 1."""
     antialiased: bool = False
     """Dim splats as eps2d widens them (Mip-Splatting)."""

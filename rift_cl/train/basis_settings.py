@@ -15,7 +15,7 @@ from tyro.conf import arg
 
 from rift_cl.basis.angular import ANGULAR_BASES, angular_basis
 from rift_cl.errors import SettingError
-from rift_cl.option_marks import Short, ShortAuto
+from rift_cl.option_marks import Expert, Short, ShortAuto
 from rift_cl.splat.orders import HIGHEST
 from rift_cl.splat.settings import Activation
 from rift_cl.train.ranges import check_choice, check_number, check_whole
@@ -46,13 +46,13 @@ class BasisSettings:
     activation: Short[Activation] = "clamp"
     """How a splat's density E becomes its alpha: max(E, 0) (clamp), 1 - exp(-max(E, 0)) (exp), or
     1 - exp(-E) with the polynomial squared, so that E is never negative (square)."""
-    first: float = 0.1
+    first: Expert[float] = 0.1
     """Fraction of the run after which order 1 is added, with coefficients of zero."""
-    every: float = 0.1
+    every: Expert[float] = 0.1
     """Fraction of the run between one order and the next."""
     # Modes of orders 1 and 2 of a shape do nearly what a shift and another covariance do, and
     # polynomials of colours have no bound: without it they wander where nothing holds them.
-    ridge: float = 1e-3
+    ridge: Expert[float] = 1e-3
     """Weight in the loss of the modes' squares, a mean over splats."""
 
     def __post_init__(self) -> None:
@@ -114,7 +114,7 @@ class AngularSettings:
     (rift_cl.basis.register_angular_basis)."""
     modes: Short[int] = 8
     """Number of lobe modes or spherical Gaussians besides the constant, 1 to 35; not for sh."""
-    first: float = 0.15
+    first: Expert[float] = 0.15
     """Fraction of the run after which they are added, with coefficients of zero; not for sh."""
 
     def __post_init__(self) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Literal, TypeVar, get_args
 
 from rift_cl.errors import SettingError
-from rift_cl.option_marks import NoOption, Short, ShortAuto
+from rift_cl.option_marks import Expert, NoOption, Short, ShortAuto, ShortExpert, ShortSplats
 from rift_cl.splat.orders import count_of
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
@@ -87,13 +87,13 @@ class TrainSettings:
 
     steps: Short[int] = 3000
     """Number of optimization steps (one training image each)."""
-    splats: Short[int] = 20_000
+    splats: ShortSplats[int] = 20_000
     """Largest number of splats."""
     seed: Short[int] = 0
     """Random seed; the same seed gives the same splats, bit by bit."""
-    sh_degree: Short[int] = 3
+    sh_degree: ShortSplats[int] = 3
     """Highest degree of the spherical harmonics of colours, 0 to 4."""
-    sh_every: Short[float] = 1 / 6
+    sh_every: ShortExpert[float] = 1 / 6
     """Fraction of the run between one degree of the harmonics and the next; 0 = all from the first
     step on."""
     loss: Short[str] = "l1"
@@ -101,32 +101,32 @@ class TrainSettings:
     (rift_cl.train.register_loss)."""
     ssim_weight: Short[float] = 0.2
     """Fraction of 1 - SSIM in the loss; the rest is the pixel loss."""
-    noise: ShortAuto[float] = None
+    noise: Expert[ShortAuto[float]] = None
     """Standard deviation of the noise in the training images, in units of the image. Default:
     estimated from a few images where it matters, else none."""
     band_limit: ShortAuto[BandLimit] = None
     """Keep splats no finer than the cameras resolve: half a pixel of the finest camera (pixels,
     Mip-Splatting), or what all views determine above noise (coverage). Default: no limit."""
-    cooldown: Short[float] = 0.12
+    cooldown: ShortExpert[float] = 0.12
     """Fraction of the run, at its end, without random walks and penalties and with falling
     learning rates."""
     refine_poses: Short[bool] = False
     """Optimize the camera poses."""
     refine_exposures: Short[bool] = False
     """Fit a gain and an offset of each image's colours."""
-    basis: Short[BasisSettings] = field(default_factory=BasisSettings)
+    basis: ShortSplats[BasisSettings] = field(default_factory=BasisSettings)
     """Hermite modes of the splats' shapes and colours, and how densities become opacities."""
-    angular: Short[AngularSettings] = field(default_factory=AngularSettings)
+    angular: ShortSplats[AngularSettings] = field(default_factory=AngularSettings)
     """Functions of the viewing direction that colours are made of; other kinds than sh take the
     place of all harmonics but the constant one."""
-    strategy: Short[StrategySettings] = field(
+    strategy: ShortExpert[StrategySettings] = field(
         default_factory=McmcSettings,
         metadata={"registry": STRATEGIES, "without": ("xray",), "help": _STRATEGY_HELP},
     )
     """How splats are added, moved and removed."""
     homogenisation: Short[Homogenisation] = field(default_factory=Homogenisation)
     """Weight of spatial frequencies in the gradient of the pixel loss."""
-    learning_rates: Short[LearningRates] = field(default_factory=LearningRates)
+    learning_rates: ShortExpert[LearningRates] = field(default_factory=LearningRates)
     """Adam's learning rates at the first step (0 = not trained)."""
     solve: NoOption[SolveSettings] = field(default_factory=SolveSettings)
     """Periodic least-squares solve for densities and shape modes (X-rays only)."""

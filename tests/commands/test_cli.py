@@ -5,9 +5,11 @@ import re
 from dataclasses import fields
 
 import pytest
+import tyro
 
 from rift_cl.commands.cli import COMMANDS, main
-from rift_cl.commands.options import option_groups
+from rift_cl.commands.options import option_groups, shown_options
+from rift_cl.commands.runner import command
 
 # What the command line and one class of settings need: far below what any job loads.
 MOST_MODULES = 24
@@ -97,7 +99,28 @@ def test_help_stands_in_groups_without_negative_twins(capsys):
     with pytest.raises(SystemExit):
         main(["reconstruct", "--help"])
     shown = capsys.readouterr().out
-    titles = ("input", "method", "geometry", "correction", "output", "run", "messages")
+    titles = ("input", "method", "geometry", "correction", "output", "run", "expert", "messages")
     places = [shown.index(f" {title} options ") for title in titles]
     assert places == sorted(places)
     assert "--no-" not in shown and "(default: None)" not in shown
+
+
+@pytest.mark.parametrize("job", ["fit photos", "fit xray"])
+def test_what_few_fits_need_is_listed_for_experts(job):
+    groups = {}
+    for option in shown_options(COMMANDS[job].settings_class()):
+        groups.setdefault(option.group.title, set()).add(option.name)
+    assert groups.keys() == {"input", "training", "splats", "output", "run", "expert"}
+    assert "steps" in groups["training"] and {"order", "eps2d"} <= groups["splats"]
+    expert = ("learning_rates.", "strategy.", "solve.", "homogenisation.", "basis.")
+    dotted = {name for names in groups.values() for name in names if name.startswith(expert)}
+    assert len(dotted) > 15 and dotted <= groups["expert"]
+
+
+def test_a_switch_that_is_on_is_turned_off_by_its_negative():
+    found, settings = [], COMMANDS["fit photos"].settings_class()
+    for twins, word in ((False, "no-noise-aware"), (True, "no-noise-aware"), (True, "noise-aware")):
+        entry = command(lambda made, _: found.append(made), settings, twins=twins)
+        assert not tyro.cli(entry, args=["capture", f"--homogenisation.{word}"])()
+    aware = [made.training.homogenisation.noise_aware for made in found]
+    assert aware == [False, False, True]

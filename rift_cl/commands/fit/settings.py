@@ -13,6 +13,7 @@ from rift_cl.commands.run_folder.saved_settings import (
     parsed_settings,
 )
 from rift_cl.errors import InputError
+from rift_cl.option_marks import Expert
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.settings import TrainSettings
 
@@ -45,7 +46,7 @@ class FitOutput:
 
     out: Path = Path("rift-fit")
     """Folder for scene.ply, report.html, config.json, metrics.json and checkpoints."""
-    checkpoint_every: int = 1000
+    checkpoint_every: Expert[int] = 1000
     """Steps between two checkpoints, of which the last two are kept (0 = none)."""
     resume: bool = False
     """Resume from the last checkpoint in --out, to the same bits. With more --steps than before, a

@@ -13,7 +13,7 @@ from rift_cl.commands.fit.settings import FitOutput, FitSettings, SplitOptions
 from rift_cl.commands.fit_photos.presets import PRESETS
 from rift_cl.commands.options import RepeatableRun
 from rift_cl.errors import InputError
-from rift_cl.option_marks import Auto, Short
+from rift_cl.option_marks import Auto, AutoExpert, Expert, Short, ShortSplats
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.basis_settings import BasisSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
@@ -37,10 +37,10 @@ class PhotosInput(SplitOptions):
     1.6 megapixels, or 0.7 on a CPU."""
     light: Literal["display", "linear"] = "display"
     """Light in which photographs are fitted and scored: as displays show it, or linear."""
-    pinhole: bool = False
+    pinhole: Expert[bool] = False
     """Treat every lens as a pinhole, sharp at every depth, whatever the capture says of its opening
     ('aperture_radius' and 'focus_distance' of a transforms.json)."""
-    first_splats: Auto[float] = None
+    first_splats: AutoExpert[float] = None
     """Fraction of --splats that a fit without sparse points starts with. Default: 1, or 0.2 with
     --strategy default."""
     frames: int = 100
@@ -61,9 +61,9 @@ def _rendering() -> SplatSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class PhotosTraining:
-    """The optimization and the rasterizer; each part of them has a group of its own."""
+    """The optimization."""
 
-    group: ClassVar[str] = ""
+    group: ClassVar[str] = "training"
 
     preset: Auto[Literal["fast", "harmonics"]] = None
     """Named set of values in place of the defaults, for short fits; other options override them.
@@ -71,7 +71,7 @@ class PhotosTraining:
     with spherical harmonics, which every viewer shows (harmonics). Default: none."""
     training: Short[TrainSettings] = field(default_factory=_training)
     """The optimization."""
-    rendering: Short[SplatSettings] = field(default_factory=_rendering)
+    rendering: ShortSplats[SplatSettings] = field(default_factory=_rendering)
     """The rasterizer."""
 
 
@@ -79,8 +79,7 @@ class PhotosTraining:
 class FitPhotosSettings(RepeatableRun, FitOutput, PhotosTraining, PhotosInput, FitSettings):
     """Fit splats to photographs.
 
-    '--strategy default --help' lists the options of that strategy. Options with a dot in their name
-    (--learning-rates.means) are for experts: few fits need another value.
+    '--strategy default --help' lists the options of that strategy.
 
     Example: rift fit photos capture/transforms.json --out fit --steps 3000 --splats 20000
     """

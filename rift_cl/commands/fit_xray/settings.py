@@ -11,7 +11,7 @@ from tyro.conf import Positional
 from rift_cl.commands.fit.settings import FitOutput, FitSettings, SplitOptions
 from rift_cl.commands.options import RepeatableRun
 from rift_cl.io.scans.literals import AngleUnit, Kind
-from rift_cl.option_marks import Auto, Short
+from rift_cl.option_marks import Auto, AutoExpert, Expert, Short, ShortSplats
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.xray.settings import XrayBasisSettings, XrayTrainSettings
@@ -34,20 +34,20 @@ class XrayInput(SplitOptions):
     file's layout."""
     darks: Auto[str] = None
     """Name of the frames without the beam. Default: that of the file's layout."""
-    image_key: Auto[str] = None
+    image_key: AutoExpert[str] = None
     """Name of the array that says what each frame is, as in NXtomo. Default: that of the file's
     layout."""
     kind: Auto[Kind] = None
     """What the values are: counts, transmission or attenuation. Default: read from the file."""
-    axes: Auto[str] = None
+    axes: AutoExpert[str] = None
     """Which axis of the projections is which, such as angle,row,bin. Default: read from the
     file."""
-    angle_unit: Auto[AngleUnit] = None
+    angle_unit: AutoExpert[AngleUnit] = None
     """Unit of the angles. Default: read from the file."""
     geometry: Auto[Path] = None
     """File with the positions of source and detector for cone beams; see rift reconstruct. Default:
     that of the scan, otherwise parallel rays."""
-    reversed: bool = False
+    reversed: Expert[bool] = False
     """Negate the angles, for an object that turned in the other sense than assumed."""
     center: Auto[float] = None
     """Detector bin of the rotation axis. Default: found automatically; of cone beams that of their
@@ -84,22 +84,19 @@ def _rendering() -> SplatSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class XrayTraining:
-    """The optimization and the rasterizer; each part of them has a group of its own."""
+    """The optimization."""
 
-    group: ClassVar[str] = ""
+    group: ClassVar[str] = "training"
 
     training: Short[TrainSettings] = field(default_factory=_training)
     """The optimization."""
-    rendering: Short[SplatSettings] = field(default_factory=_rendering)
+    rendering: ShortSplats[SplatSettings] = field(default_factory=_rendering)
     """The rasterizer."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FitXraySettings(RepeatableRun, XrayOutput, XrayTraining, XrayInput, FitSettings):
     """Fit Gaussian densities to the projections of a parallel-beam or cone-beam X-ray scan.
-
-    Options with a dot in their name (--learning-rates.means) are for experts: few fits need another
-    value.
 
     Example: rift fit xray scan.h5 --out fit --steps 3000 --splats 20000
     """

@@ -14,7 +14,7 @@ from tyro.conf import Positional
 
 from rift_cl.errors import InputError
 from rift_cl.io.scans.literals import AngleUnit, Kind
-from rift_cl.option_marks import Auto
+from rift_cl.option_marks import Auto, AutoExpert, Expert
 
 if TYPE_CHECKING:
     from rift_cl.io.scans.scan_file import ScanFile
@@ -29,22 +29,22 @@ class ScanArrays:
     theta: Auto[str] = None
     """Angles: their name in the file, a file of them (.txt, .csv, .npy), or a range in degrees that
     is divided evenly, such as 0:180 (its end excluded). Default: those of the file."""
-    image_key: Auto[str] = None
+    image_key: AutoExpert[str] = None
     """Name of the array that tells what each frame is: 0 projection, 1 flat, 2 dark, 3 invalid.
     Default: that of an NXtomo file."""
-    axes: Auto[str] = None
+    axes: AutoExpert[str] = None
     """Order of the axes of the projections: angle,row,bin, or row,angle,bin for sinograms;
     angle,bin or bin,angle for a single sinogram. Default: inferred from the number of angles."""
-    angle_unit: Auto[AngleUnit] = None
+    angle_unit: AutoExpert[AngleUnit] = None
     """Unit of the angles. Default: that of the file, checked against their range."""
     geometry: Auto[Path] = None
     """File with the positions of source and detector for fan and cone beams: Nikon .xtekct, SkyScan
     .log, RTK .xml, ASTRA vectors (.geom, .npy, .txt; 12 numbers per view), or .yaml or .json as in
     docs/tomography.md. Default: that of the scan, otherwise parallel rays."""
-    reversed: bool = False
+    reversed: Expert[bool] = False
     """Negate the angles, for an object that turned in the other sense than assumed; a wrong sense
     doubles edges in fan and cone beams."""
-    repeat: Auto[int] = None
+    repeat: AutoExpert[int] = None
     """For a sample that is symmetric about the axis: number of views over a full turn that its one
     TIFF image is taken for. Default: every image is one view."""
 
@@ -69,7 +69,7 @@ class ScanInput(ScanArrays):
     attenuation (line integrals). Default: inferred from flat fields, names, units and values."""
     memory: Auto[str] = None
     """Maximum memory to use, such as 512M or 4G. Default: a share of what is free."""
-    background: Auto[int] = None
+    background: AutoExpert[int] = None
     """For line integrals that are not zero in air: number of bins at each end of the detector whose
     mean is subtracted from every view. Default: what the file's layout says, usually 0."""
 

@@ -223,6 +223,11 @@ def _named(choice: CameraChoice, made: CameraType) -> CameraType:
 def _constraints(
     settings: PlanSettings, choices: tuple[CameraChoice, ...], have: ViewSet | None
 ) -> Constraints:
+    """The options as constraints, with degrees as radians: the one place where they become them.
+
+    ``Constraints`` cannot be the settings themselves: ``up`` comes from the capture, ranges and
+    costs from the camera files, regions from texts.
+    """
     budget = None
     if settings.budget is not None:
         budget = Budget(settings.budget, {choice.kind.name: choice.cost for choice in choices})

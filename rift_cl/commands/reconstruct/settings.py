@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from rift_cl.commands.inputs.scan_input import ScanInput
 from rift_cl.commands.options import RepeatableRun
 from rift_cl.errors import InputError
-from rift_cl.option_marks import Auto
+from rift_cl.option_marks import Auto, AutoExpert, Expert
 
 if TYPE_CHECKING:
     from rift_cl.operators import Filter
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 SOLVERS = ("sirt", "cgls", "tv")
 ITERATIVE = (*SOLVERS, "levels")
 Switch = Literal["auto", "on", "off"]
+Compensation = Literal["uniform", "voronoi", "capped-voronoi", "pipe-menon", "exact"]
 # Options that apply to some methods only; with another one they are refused.
 _ONLY = {
     "filter": ("fbp",),
@@ -62,22 +63,22 @@ class MethodOptions:
     the name of a registered one. Default: ram-lak."""
     cutoff: Auto[float] = None
     """fbp: cut-off of the filter, as a fraction of the Nyquist frequency. Default: 1."""
-    exponent: Auto[float] = None
+    exponent: AutoExpert[float] = None
     """fbp: exponent p of the high-pass filter |f|^p. Default: 1, the ramp."""
-    compensate: Auto[Literal["uniform", "voronoi", "capped-voronoi", "pipe-menon", "exact"]] = None
+    compensate: AutoExpert[Compensation] = None
     """fbp: density compensation for irregular angles. Default: voronoi if the angles cover 180
     degrees without a gap, otherwise uniform."""
-    footprint: Auto[Literal["strip", "joseph", "linear"]] = None
+    footprint: AutoExpert[Literal["strip", "joseph", "linear"]] = None
     """Project in real space: a pixel is spread over the bins by shared area (strip), or by linear
     interpolation between pixels (joseph) or between bins (linear). Default: see --error."""
-    error: Auto[float] = None
+    error: AutoExpert[float] = None
     """Project through the Fourier transform with this relative error, such as 1e-3. Default, if
     --footprint is not given either: the cheaper of the Fourier transform with 1e-3 (slices of more
     than about 150 samples on a CPU; costs fbp less than 0.05 dB) and --footprint strip."""
     steps: Auto[int] = None
     """sirt, cgls, tv, levels: maximum number of iterations per slice. Default: sirt 100 (divided by
     --subsets, at least 5), cgls 30 (4 with --precondition), tv 200, levels 1200."""
-    subsets: Auto[int] = None
+    subsets: AutoExpert[int] = None
     """sirt: number of ordered subsets of the views; the image is updated after each, which saves
     iterations by about that factor. Default: 1."""
     noise: Auto[float] = None
@@ -87,10 +88,10 @@ class MethodOptions:
     """tv, levels: weight of the total variation; larger is smoother. tv needs it."""
     nonnegative: bool = False
     """sirt, tv: constrain the slice to be non-negative."""
-    weights: Auto[Literal["counts"]] = None
+    weights: AutoExpert[Literal["counts"]] = None
     """sirt, cgls, tv: weight each ray by its photon count (penalized weighted least squares), which
     reduces streaks behind metal. Default: all rays count alike."""
-    precondition: Auto[Literal["ramp", "capped-voronoi"]] = None
+    precondition: AutoExpert[Literal["ramp", "capped-voronoi"]] = None
     """sirt, cgls, tv: filter that preconditions the residual, which saves iterations. Default:
     none."""
 
@@ -108,10 +109,10 @@ class GeometryOptions:
     """Tilt of the rotation axis in the detector plane in degrees, positive where its bin grows with
     the row. Default: the tilt found with the axis if it moves the axis by a quarter of a bin or
     more, otherwise 0."""
-    centers: Auto[Path] = None
+    centers: AutoExpert[Path] = None
     """File with the bin of the rotation axis in every detector row (.txt, .csv or .npy), for an
     axis that drifts; replaces --center and --tilt."""
-    half_acquisition: Literal["weighted", "stitched"] = "weighted"
+    half_acquisition: Expert[Literal["weighted", "stitched"]] = "weighted"
     """For full turns with the axis off the middle of the detector: weight opposite views, or stitch
     them into wider views over 180 degrees."""
     rows: Auto[tuple[int, int]] = None
@@ -127,7 +128,7 @@ class GeometryOptions:
     roi: Auto[tuple[int, int, int, int]] = None
     """Part of the slice: first column and the one after the last, first line and the one after the
     last. Default: all of it."""
-    pad: Switch = "auto"
+    pad: Expert[Switch] = "auto"
     """Extend the projections of an object that is wider than the detector; auto does where they do
     not end at zero."""
 
@@ -185,7 +186,7 @@ class VolumeOutput:
     OME-Zarr store, one HDF5 file, or one MRC file."""
     dtype: Literal["float32", "uint16", "uint8"] = "float32"
     """Sample type of the volume; integers cover --window."""
-    window: Auto[tuple[float, float]] = None
+    window: AutoExpert[tuple[float, float]] = None
     """For integer samples: attenuation of the smallest and the largest integer. Default: the range
     of a few slices, with a margin."""
     preview: bool = False

@@ -19,14 +19,13 @@ from typing import get_type_hints as type_hints
 import tyro
 
 from rift_cl import __version__
+from rift_cl.commands.options import KIND, MISSING, default_of, option_name
 from rift_cl.errors import InputError, SettingError
 
 S = TypeVar("S")
 # Options that say how a command runs, not what comes out: they are not repeated.
 _NOT_REPEATED = ("config", "dry_run", "overwrite", "preview", "resume", "view")
 _MOST_BYTES = 1 << 24
-_KIND = "name"
-_MISSING = (dataclasses.MISSING, tyro.MISSING)
 
 
 class Option(NamedTuple):
@@ -69,8 +68,8 @@ def options_of(settings: Any, usual: Any = None, prefix: str = "") -> Iterator[O
     """
     hints = type_hints(type(settings), include_extras=True)
     for field in dataclasses.fields(settings):
-        value, default = getattr(settings, field.name), _default(field, usual)
-        name, marks = _named(field.name, hints[field.name], prefix)
+        value, default = getattr(settings, field.name), default_of(field, usual)
+        name, marks = option_name(field.name, hints[field.name], prefix)
         if "registry" in field.metadata:
             registry = field.metadata["registry"]
             yield Option(name, registry.name_of(type(value)), registry.name_of(type(default)))
@@ -89,7 +88,7 @@ def record_of(settings: Any) -> dict[str, Any]:
         value = getattr(settings, field.name)
         if dataclasses.is_dataclass(value):
             registry = field.metadata.get("registry")
-            kind = {} if registry is None else {_KIND: registry.name_of(type(value))}
+            kind = {} if registry is None else {KIND: registry.name_of(type(value))}
             record[field.name] = kind | record_of(value)
         else:
             record[field.name] = _plain(value)
@@ -254,12 +253,12 @@ def option_of(error: SettingError, settings: Any, prefix: str = "") -> str | Non
     hints = type_hints(settings, include_extras=True)
     here = error.settings in {kind.__name__ for kind in settings.__mro__}
     for field in dataclasses.fields(settings):
-        name, marks = _named(field.name, hints[field.name], prefix)
+        name, marks = option_name(field.name, hints[field.name], prefix)
         if tyro.conf.Fixed in marks:
             continue
         if here and field.name == error.name:
             return name
-        registry, default = field.metadata.get("registry", {}), _default(field, None)
+        registry, default = field.metadata.get("registry", {}), default_of(field, None)
         parts = [registry[kind] for kind in registry] or [type(default)]
         for part in filter(dataclasses.is_dataclass, parts):
             found = option_of(error, part, name)
@@ -286,43 +285,25 @@ def _of_kinds(settings: type[S], default: S | None, kind_of: Callable[[str], Any
     """Settings whose parts are of certain kinds, by the names of the options that say so."""
     tree: dict[str, Any] = {}
     for name, path in _places(settings, default):
-        kind = kind_of(name) if path[-1] == _KIND else None
+        kind = kind_of(name) if path[-1] == KIND else None
         if kind is None:
             continue
         part = tree
         for step in path[:-1]:
             part = part.setdefault(step, {})
-        part[_KIND] = kind
+        part[KIND] = kind
     return _read(settings, default, tree, "", open_ended=True) if tree else default
-
-
-def kinds(settings: type, default: Any) -> Iterator[tuple[str, list[str], str, str]]:
-    """Parts of a command's settings of which there are several kinds.
-
-    Yields:
-        The name of the option, the kinds, the one that is taken where none is named, and its help.
-    """
-    hints = type_hints(settings, include_extras=True)
-    for field in dataclasses.fields(settings):
-        usual = _default(field, default)
-        registry = field.metadata.get("registry")
-        if registry is not None:
-            name, _ = _named(field.name, hints[field.name], "")
-            names = [kind for kind in registry if kind not in field.metadata.get("without", ())]
-            yield name, names, registry.name_of(type(usual)), field.metadata["help"]
-        elif dataclasses.is_dataclass(usual):
-            yield from kinds(type(usual), usual)
 
 
 def _places(settings: Any, usual: Any, prefix: str = "") -> Iterator[tuple[str, tuple[str, ...]]]:
     """Where in a tree each option is, and each part of it."""
     hints = type_hints(settings, include_extras=True)
     for field in dataclasses.fields(settings):
-        default = _default(field, usual)
-        option, marks = _named(field.name, hints[field.name], prefix)
+        default = default_of(field, usual)
+        option, marks = option_name(field.name, hints[field.name], prefix)
         if dataclasses.is_dataclass(default):
             if "registry" in field.metadata:
-                yield option, (field.name, _KIND)
+                yield option, (field.name, KIND)
             else:
                 yield option, (field.name,)
             if tyro.conf.Fixed not in marks:
@@ -356,13 +337,13 @@ def _read(settings: Any, usual: Any, values: Any, where: str, *, open_ended: boo
         if name not in known:
             raise _unknown(name, known, where)
     for name, field in known.items():
-        default = _default(field, usual)
+        default = default_of(field, usual)
         if name in values and not dataclasses.is_dataclass(default):
             found[name] = _value(hints[name], values[name], f"{where}: {name}")
         elif name in values:
             part, given = _kind_of(field, default, values[name])
             found[name] = _read(type(part), part, given, where, open_ended=open_ended)
-        elif default not in _MISSING:
+        elif default not in MISSING:
             found[name] = default
         elif open_ended:
             found[name] = tyro.MISSING
@@ -374,10 +355,10 @@ def _read(settings: Any, usual: Any, values: Any, where: str, *, open_ended: boo
 def _kind_of(field: dataclasses.Field[Any], default: Any, given: Any) -> tuple[Any, Any]:
     """The defaults of a part of the tree, of the kind that is given, and the values given."""
     registry = field.metadata.get("registry")
-    if registry is None or not isinstance(given, dict) or _KIND not in given:
+    if registry is None or not isinstance(given, dict) or KIND not in given:
         return default, given
-    values = {name: value for name, value in given.items() if name != _KIND}
-    kind = given[_KIND]
+    values = {name: value for name, value in given.items() if name != KIND}
+    kind = given[KIND]
     if dataclasses.is_dataclass(kind):
         return kind, kind
     return (default if registry[kind] is type(default) else registry[kind]()), values
@@ -425,25 +406,6 @@ _PLAIN: dict[Any, tuple[str, Callable[[Any], bool]]] = {
     str: ("a text", lambda value: isinstance(value, str)),
     Path: ("a path", lambda value: isinstance(value, (str, Path))),
 }
-
-
-def _named(name: str, hint: Any, prefix: str) -> tuple[str, tuple[Any, ...]]:
-    """The name of the option of a field, and all marks of its type."""
-    marks = getattr(hint, "__metadata__", ())
-    for mark in marks:
-        if getattr(mark, "name", None):
-            name = mark.name.replace("-", "_")
-        if getattr(mark, "prefix_name", None) is False:
-            prefix = ""
-    return (f"{prefix}.{name}" if prefix else name), marks
-
-
-def _default(field: dataclasses.Field[Any], usual: Any) -> Any:
-    if usual is not None:
-        return getattr(usual, field.name)
-    if field.default_factory is not dataclasses.MISSING:
-        return field.default_factory()
-    return field.default
 
 
 def _unknown(name: str, known: Any, where: str) -> InputError:

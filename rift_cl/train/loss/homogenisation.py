@@ -32,6 +32,7 @@ from tyro.conf import arg
 
 from rift_cl.errors import SettingError
 from rift_cl.geometry.numbers import one_number
+from rift_cl.option_marks import Expert
 
 Floats = NDArray[np.float64]
 WeightKind = Literal["ramp", "coverage"]
@@ -62,9 +63,9 @@ class Homogenisation:
     weight: Annotated[WeightKind, arg(name="homogenise-by", prefix_name=False)] = "ramp"
     """What that exponent is of: the frequency (ramp), which suits evenly spaced views, or one over
     the coverage of the frequency by all views (coverage)."""
-    noise_aware: bool = True
+    noise_aware: Expert[bool] = True
     """Lower the exponent as the residual comes down to the noise of the images."""
-    along_rows: bool = False
+    along_rows: Expert[bool] = False
     """Weight frequencies along the rows of an image alone, as for the projections of an orbit."""
 
     def __post_init__(self) -> None:

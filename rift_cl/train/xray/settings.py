@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from rift_cl.option_marks import NoOption, Short
+from rift_cl.option_marks import Expert, NoOption, Short, ShortExpert, ShortSplats
 from rift_cl.splat.settings import Activation
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
@@ -45,7 +45,7 @@ class XrayBasisSettings(BasisSettings):
     color_order: NoOption[int | None] = 0
     activation: NoOption[Activation] = "clamp"
     # In a loss of squares that is far smaller than that of photographs.
-    ridge: float = 1e-5
+    ridge: Expert[float] = 1e-5
 
 
 @dataclass(frozen=True)
@@ -58,14 +58,14 @@ class XrayTrainSettings(TrainSettings):
     ssim_weight: Short[float] = 0.0
     refine_poses: NoOption[bool] = False
     refine_exposures: NoOption[bool] = False
-    basis: Short[BasisSettings] = field(default_factory=XrayBasisSettings)
+    basis: ShortSplats[BasisSettings] = field(default_factory=XrayBasisSettings)
     angular: NoOption[AngularSettings] = field(default_factory=AngularSettings)
-    strategy: Short[StrategySettings] = field(default_factory=XraySettings)
+    strategy: ShortExpert[StrategySettings] = field(default_factory=XraySettings)
     # Orbits are dense along the detector's rows, and along nothing else.
     homogenisation: Short[Homogenisation] = field(
         default_factory=lambda: Homogenisation(along_rows=True)
     )
-    learning_rates: Short[LearningRates] = field(default_factory=XrayLearningRates)
+    learning_rates: ShortExpert[LearningRates] = field(default_factory=XrayLearningRates)
     solve: Short[SolveSettings] = field(default_factory=SolveSettings)
 
     def decided(self: X, views: int) -> X:

@@ -8,6 +8,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from rift_cl.errors import SettingError
+from rift_cl.option_marks import Expert
 from rift_cl.train.ranges import check_number, check_whole
 
 
@@ -26,12 +27,12 @@ class SolveSettings:
     """Steps between two least-squares solves for all densities and their modes, such as 100, with
     one before the first step and one after the last. Between them only positions and shapes are
     optimized (0 = none)."""
-    views: int = 64
+    views: Expert[int] = 64
     """Most projections in a solve; of more, some are drawn by chance."""
-    iterations: int = 2
+    iterations: Expert[int] = 2
     """Conjugate gradient iterations of a solve."""
     # Below 1e-6 float32 does not hold the answer.
-    ridge: float = 1e-3
+    ridge: Expert[float] = 1e-3
     """Weight of the squared coefficients, as a fraction of the mean squared norm of what one of
     them shows."""
 
