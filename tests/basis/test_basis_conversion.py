@@ -118,7 +118,7 @@ def test_there_and_back_is_where_it_began(order: int, bound: float, kind) -> Non
     [
         (Hermite(3), Hermite(2), "any set to total order 3 in 2D"),
         (Hermite(3, 3), Hermite(3, 2), "any set to total order 3 in 3D"),
-        (Laguerre(3, truncation="row"), Hermite(5), "total order 6 in 2D, or its own row set"),
+        (Laguerre(3, truncation="row"), Hermite(5), "total order 6 in 2D"),
         (Hermite(2, truncation="row"), Laguerre(2, truncation="row"), "total order 4 in 2D"),
         (Hermite(3, truncation="row"), Hermite(2, truncation="row"), "own row set to order 3"),
         (Laguerre(3, truncation="row"), Laguerre(2, truncation="row"), "own row set to order 3"),
@@ -153,10 +153,8 @@ def test_what_is_refused_could_not_have_been_held(source, to) -> None:
 
 
 def test_a_form_cannot_change_above_order_12() -> None:
-    with pytest.raises(
-        InputError, match="total order 13 cannot change its form from 'der' to 'std'"
-    ):
+    with pytest.raises(InputError, match=r"order 13.*'der'.*'std'"):
         Hermite(13).convert(np.ones(105), Hermite(13, form="std"))
-    with pytest.raises(InputError, match="ill-conditioned above order 12"):
+    with pytest.raises(InputError, match="order 12"):
         Laguerre(7, truncation="row", form="std").project(np.ones(64), [[1.0, 0.0]])
     Hermite(64).convert(np.ones(Hermite(64).n_coeff), Laguerre(64))

@@ -39,7 +39,7 @@ def test_a_screen_of_other_units_sees_the_same_line_integrals() -> None:
 
 def test_impossible_footprints_are_refused() -> None:
     for root, P in ((np.eye(3), np.eye(3)), (np.eye(2), np.eye(2)), (np.ones(3), np.eye(3)[:2])):
-        with pytest.raises(ShapeError, match="root and P have shapes"):
+        with pytest.raises(ShapeError, match="root and P"):
             footprint(root, P)
     with pytest.raises(InputError, match="no area"):
         footprint(np.zeros((3, 3)), np.eye(3)[:2])

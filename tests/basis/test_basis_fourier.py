@@ -77,5 +77,5 @@ def test_a_derivative_mode_has_no_integral_but_the_first() -> None:
 def test_frequencies_that_do_not_fit_are_refused() -> None:
     with pytest.raises(InputError, match="k has shape"):
         Hermite(2).fourier(np.ones(6), [1.0])
-    with pytest.raises(InputError, match="k holds NaN or infinity"):
+    with pytest.raises(InputError, match="k holds NaN"):
         Laguerre(2).fourier(np.ones(6), [1.0, math.inf])

@@ -211,7 +211,7 @@ def test_impossible_matrices_are_refused(A: object, kind: type[Exception]) -> No
 def test_shapes_that_do_not_fit_are_refused() -> None:
     A = np.ones((2, 3))
     for wrong in (np.ones(9), np.ones(0), 1.0, np.ones((10, 3))):
-        with pytest.raises(ShapeError, match=r"coeff has shape .*, wanted \(\.\.\., 10\)"):
+        with pytest.raises(ShapeError, match=r"coeff has shape .*, 10"):
             project(wrong, A, 2)
     with pytest.raises(ShapeError, match="leading axes"):
         project(np.ones((4, 10)), np.ones((3, 2, 3)), 2)

@@ -66,13 +66,13 @@ def test_laguerre_is_hermite_turned_to_a_diagonal() -> None:
 
 
 def test_what_cannot_be_turned_is_refused() -> None:
-    with pytest.raises(BasisSpanError, match=r"closed would be the total order 4"):
+    with pytest.raises(BasisSpanError, match=r"order 4"):
         Hermite(2, 2, "row").rotate(np.ones(9), 0.1)
     with pytest.raises(InputError, match="a line cannot be turned"):
         Hermite(2, 1).rotate(np.ones(3), 0.1)
     with pytest.raises(InputError, match="wanted one angle"):
         Laguerre(2).rotate(np.ones(6), [0.1, 0.2])
-    with pytest.raises(InputError, match=r"orthogonal matrix of shape \(3, 3\)"):
+    with pytest.raises(InputError, match=r"\(3, 3\)"):
         Hermite(2, 3).rotate(np.ones(10), 0.1)
     with pytest.raises(InputError, match="no orthogonal matrix"):
         Hermite(2, 3).rotate(np.ones(10), np.ones((3, 3)))

@@ -89,19 +89,17 @@ def test_index_sets_cannot_be_changed_from_outside() -> None:
 
 @pytest.mark.parametrize("order", [-1, 65, 1.5, "2", True, None, math.nan])
 def test_impossible_orders_are_refused(order: object) -> None:
-    with pytest.raises(InputError, match=r"order is .*, wanted a whole number from 0 to 64"):
+    with pytest.raises(InputError, match=r"order is .*0 to 64"):
         n_coeff(order, 2)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("dim", [0, 4, 2.0, "3"])
 def test_impossible_dimensions_are_refused(dim: object) -> None:
-    with pytest.raises(InputError, match=r"dim is .*, wanted a whole number from 1 to 3"):
+    with pytest.raises(InputError, match=r"dim is .*1 to 3"):
         graded(2, dim)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("count", [0, 2, 5, -3, 11])
 def test_counts_that_fit_no_order_are_refused(count: int) -> None:
-    with pytest.raises(
-        InputError, match=f"{count} coefficients fit no order in 3D, wanted one of 1, 4"
-    ):
+    with pytest.raises(InputError, match=f"{count} coefficients.*3D"):
         order_of(count, 3)

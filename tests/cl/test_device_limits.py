@@ -197,7 +197,7 @@ def test_work_whose_least_part_is_beyond_the_largest_buffer_is_told(device):
     scan = rift.Parallel(np.linspace(0, 3, 50), 40)
     gains = np.arange(50.0)
     F = ViewFilter(scan, rift.Ramp(), rows=9, gains=gains, device=limited(device, allocation=1000))
-    with pytest.raises(ResourceLimitError, match=r"one view with its gain.*1\.41 KiB"):
+    with pytest.raises(ResourceLimitError, match=r"one view.*1\.41 KiB"):
         F(normal(50, 9, 40))
 
 
@@ -272,7 +272,7 @@ def test_filtered_views_beyond_the_groups_that_a_gpu_numbers(device):
 
 def test_local_memory_beyond_the_devices_is_told(device):
     small = limited(device, local_memory=4096)
-    with pytest.raises(DeviceError, match=r"ssim_map\): needs .* KiB of local memory.*4 KiB"):
+    with pytest.raises(DeviceError, match=r"ssim_map\):.*KiB.*memory.*4 KiB"):
         loss(small)
 
 
@@ -303,7 +303,7 @@ def test_a_kernel_that_runs_in_smaller_groups_alone(device, most, monkeypatch):
     assert_same(filtering(small), wanted)
     groups = {kernel.group for kernel in small._programs._own.kernels.values()}
     assert groups == {32 if most == 32 else 16}
-    with pytest.raises(DeviceError, match=f"ssim_map.* groups of at most {most}"):
+    with pytest.raises(DeviceError, match=f"ssim_map.* at most {most}"):
         loss(limited(gpu))
 
 

@@ -80,7 +80,7 @@ def test_device_that_goes_away_at_a_launch(device, monkeypatch, where, turn):
 
     with monkeypatch.context() as patch:
         patch.setattr(cl, "enqueue_nd_range_kernel", lose)
-        with pytest.raises(DeviceLostError, match="start again from the last saved result"):
+        with pytest.raises(DeviceLostError, match="last saved result"):
             A(x)
     np.testing.assert_array_equal(A(x), before)
 
@@ -155,5 +155,5 @@ def test_smaller_budgets_give_the_same_bits(device, part):
 def test_problem_that_no_cut_can_make_fit(device):
     small = Device(device._handle, device.selector, traits=device.traits, memory=1000)
     A = rift.Projector(rift.Grid((40, 40)), rift.Parallel([0.0], 60), device=small)
-    with pytest.raises(ResourceLimitError, match="the memory budget is 1e\\+03 B"):
+    with pytest.raises(ResourceLimitError, match="budget is 1e\\+03 B"):
         A(np.ones((40, 40), np.float32))

@@ -113,7 +113,7 @@ def test_wrong_numbers_are_found_and_refused_by_name(tested, monkeypatch, fault)
     assert "wrong" in findings(tested)[1].lower()
     tested = _fresh()
     x = tested.array(np.ones(5))
-    with pytest.raises(DeviceError, match=r"dot_product\): refused.*sums"):
+    with pytest.raises(DeviceError, match=r"dot_product.*sums"):
         total(tested, x)
     assert np.array_equal(tested.get(tested.array(np.ones(5))), np.ones(5))
 

@@ -92,7 +92,7 @@ def test_an_odd_edge_loses_its_last_row(av, tmp_path):
 
 def test_a_film_that_fails_leaves_nothing(av, tmp_path):
     chosen("mp4")
-    with pytest.raises(OutputError, match=r"libsvtav1 writes no film of 2 x 2.*--film apng"):
+    with pytest.raises(OutputError, match=r"libsvtav1.*2 x 2.*--film"):
         written(tmp_path / "film", "mp4", frames(size=(2, 2)))
     with pytest.raises(KeyError), film_writer(tmp_path / "film", "webm", SIZE, 24) as add:
         add(frames(1)[0])
@@ -116,12 +116,12 @@ def test_the_kind_of_a_film_by_what_there_is(monkeypatch):
     assert chosen_film("apng", alike) == "apng"
     with pytest.raises(InputError, match="edges of 4 pixels"):
         chosen_film("webm", [(2, 8)] * 2)
-    with pytest.raises(InputError, match="all of one size"):
+    with pytest.raises(InputError, match="one size"):
         chosen_film("webm", apart)
     monkeypatch.setitem(sys.modules, "av", None)
     monkeypatch.setattr("rift_cl.io.images.film_file.find_spec", lambda _: None)
     assert chosen_film("auto", alike) == "apng"
-    with pytest.raises(InputError, match=r"pip install av .*--film apng"):
+    with pytest.raises(InputError, match=r"pip install av .*--film"):
         chosen_film("mp4", alike)
 
 

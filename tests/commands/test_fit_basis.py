@@ -34,7 +34,7 @@ def settings(capture, out, **more):
 def broken_off(given, after):
     """Run a fit until a step, as Ctrl-C would break it off; what is said then."""
     job = Fit(given)
-    with pytest.raises(StoppedError, match="to go on: rift fit") as caught:
+    with pytest.raises(StoppedError, match="rift fit") as caught:
         for report in job.run():
             if report.done >= after:
                 job.stop()

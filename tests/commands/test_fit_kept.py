@@ -24,7 +24,7 @@ def test_the_size_that_was_decided_is_that_of_what_goes_on(capture, tmp_path, mo
     list(other.run())
     assert digest(cut) == digest(whole)
     assert Fit(settings(capture, asked, steps=75, resume=True)).downscale == 1
-    with pytest.raises(CheckpointError, match="had downscale 1, now it is 2"):
+    with pytest.raises(CheckpointError, match=r"downscale 1.*2"):
         Fit(settings(capture, asked, steps=75, resume=True, downscale=2))
 
 

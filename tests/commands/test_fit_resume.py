@@ -54,7 +54,7 @@ def newest(folder):
 def broken_off(given, after):
     """Run a fit until a step, as Ctrl-C would break it off."""
     job = Fit(given)
-    with pytest.raises(StoppedError, match="to go on: rift fit photos") as caught:
+    with pytest.raises(StoppedError, match="rift fit photos") as caught:
         for report in job.run():
             if report.done >= after:
                 job.stop()

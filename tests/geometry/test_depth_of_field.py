@@ -117,7 +117,7 @@ def test_lengths_are_positive(bad: float) -> None:
 
 
 def test_a_target_does_not_reach_to_the_lens_and_levels_lie_between_nothing_and_all() -> None:
-    with pytest.raises(InputError, match="reaches to the lens"):
+    with pytest.raises(InputError, match="the lens"):
         finite_depth_optimum(600, 270, GREEN)
     with pytest.raises(InputError, match="level"):
         worst_depth_cutoff(4, 270, 60, GREEN, level=1.0)

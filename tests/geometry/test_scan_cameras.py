@@ -68,5 +68,5 @@ def test_what_no_camera_sees_is_refused():
         scan_cameras(rift.Fan([0.3], 12, 0.4, 50, 80, curved=True))
     vectors = CONE.vectors()
     values = vectors.source, vectors.middle, vectors.across + 0.1 * vectors.down, vectors.down
-    with pytest.raises(InputError, match="view 0 are not perpendicular"):
+    with pytest.raises(InputError, match=r"view 0.*perpendicular"):
         scan_cameras(rift.Vectors(*values, 9, 12))

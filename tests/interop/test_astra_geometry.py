@@ -207,5 +207,5 @@ def test_what_has_no_counterpart_is_named(case):
 def test_rays_that_leave_their_slice_are_refused(column):
     proj_geom, vol_geom = to_astra(rift.Grid((3, 8, 8)), rift.Parallel(ANGLES, 9, center=3))
     proj_geom["Vectors"][:, column] += 0.1
-    with pytest.raises(InputError, match="its rays lie in them"):
+    with pytest.raises(InputError, match="rays lie"):
         from_astra(proj_geom, vol_geom)

@@ -44,7 +44,7 @@ def test_gsplats_name_for_no_rolling_shutter_passes(device):
     [
         ({"means": lambda t: t[:, :2]}, ShapeError, r"means has shape \(70, 2\)"),
         ({"means": lambda t: t[0, 0]}, ShapeError, "means has shape"),
-        ({"quats": lambda t: t[:-1]}, ShapeError, r"quats has shape \(69, 4\), wanted \(70, 4\)"),
+        ({"quats": lambda t: t[:-1]}, ShapeError, r"quats has shape \(69, 4\)"),
         ({"scales": lambda t: t.double()}, DTypeError, "scales"),
         ({"opacities": lambda t: t[:, None]}, ShapeError, "opacities"),
         ({"viewmats": lambda t: t[0]}, ShapeError, "viewmats has shape"),

@@ -52,7 +52,7 @@ def test_options_that_do_not_fit_are_named(device):
         )
     with pytest.raises(InputError, match="nothing is drawn"):
         render({n: tensors[n] for n in NAMES}, views, Ks, device=device)
-    with pytest.raises(InputError, match="either quats and scales"):
+    with pytest.raises(InputError, match="quats and scales"):
         render(tensors | {"covars": torch.zeros(60, 6)}, views, Ks, device=device)
     with pytest.raises(ShapeError, match="backgrounds"):
         render(tensors, views, Ks, backgrounds=torch.zeros(2, 4), device=device)

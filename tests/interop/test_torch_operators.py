@@ -51,7 +51,7 @@ def test_an_operator_takes_a_tensor_as_it_takes_an_array(device):
     assert A(x).requires_grad
     rift.fbp(A, y.requires_grad_()).sum().backward()
     assert y.grad.shape == y.shape
-    with pytest.raises(RiftError, match="out is given and x a torch tensor"):
+    with pytest.raises(RiftError, match="out is given"):
         A(x, out=np.empty((5, 9), np.float32))
     with pytest.raises(ShapeError, match="y has shape"):
         rift.fbp(A, y[0])
@@ -172,10 +172,10 @@ def test_what_is_no_argument_is_named(device, case):
 
 
 def test_what_is_no_operator_is_named():
-    with pytest.raises(RiftError, match=r"A is a Tensor, wanted a linear operator first, then x"):
+    with pytest.raises(RiftError, match=r"A is a Tensor"):
         apply(white(6, 7), white(6, 7))
 
 
 def test_an_operator_in_float64_asks_for_double(exact):
-    with pytest.raises(DTypeError, match=r"wanted a dense torch.float64: call .*\.double"):
+    with pytest.raises(DTypeError, match=r"dense torch.float64.*\.double"):
         apply(exact, white(3, 4))

@@ -50,7 +50,7 @@ def test_a_lens_lies_beside_the_file_whatever_path_leads_there(tmp_path: Path) -
         ({"cost": -1}, "'cost' is -1"),
         ({"ranges": {"f_number": "ab"}}, "wanted two numbers"),
         ({"lens": "triplet.json"}, "comes with a 'lens'"),
-        ({**dict.fromkeys(CAMERA), **BEHIND, "lens": "none.json"}, "'none.json', which is not in"),
+        ({**dict.fromkeys(CAMERA), **BEHIND, "lens": "none.json"}, r"'none.json'"),
         ({**dict.fromkeys(CAMERA), **BEHIND, "lens": "../x.json"}, "outside the folder"),
     ],
 )
@@ -66,5 +66,5 @@ def test_what_a_camera_may_not_be_is_said_with_its_place_once(
 
 def test_fields_beside_the_list_are_not_passed_over(tmp_path: Path) -> None:
     path = save(tmp_path, {"cameras": [CAMERA], "ranges": {"f_number": [4, 22]}})
-    with pytest.raises(RiftError, match="'ranges' stands beside 'cameras'"):
+    with pytest.raises(RiftError, match=r"'ranges'.*'cameras'"):
         read_cameras(path)

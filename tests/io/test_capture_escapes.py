@@ -61,7 +61,7 @@ def test_frames_that_lead_outside(capture: Path, field: str, name: str) -> None:
 
 @pytest.mark.parametrize("name", ["../secret.ply", "link/secret.ply"])
 def test_points_that_lie_outside(capture: Path, name: str) -> None:
-    with pytest.raises(PathEscapeError, match=r"'ply_file_path': .*outside the folder"):
+    with pytest.raises(PathEscapeError, match=r"'ply_file_path'"):
         open_capture(made.transforms(capture, ply_file_path=name))
 
 

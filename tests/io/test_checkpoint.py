@@ -86,7 +86,7 @@ def test_changed_values_are_noticed_even_if_the_archive_is_sound(tmp_path):
     with zipfile.ZipFile(path, "w") as archive:
         for name, content in members.items():
             archive.writestr(name, content)
-    with pytest.raises(CheckpointError, match="'step' is not what was written"):
+    with pytest.raises(CheckpointError, match="'step'"):
         load_checkpoint(path)
 
 

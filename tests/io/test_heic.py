@@ -52,7 +52,7 @@ def test_damage_and_size_are_named(photograph: Path) -> None:
         read_image(photograph, budget=1000)
     other = photograph.with_suffix(".jpg")
     other.write_bytes(HEIC)
-    with pytest.raises(FileFormatError, match=r"is heic, the name says \.jpg"):
+    with pytest.raises(FileFormatError, match=r"heic.*\.jpg"):
         read_image(other)
     for end in (100, 500, 700):
         photograph.write_bytes(HEIC[:end])

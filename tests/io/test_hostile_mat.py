@@ -59,7 +59,7 @@ def test_the_pieces_of_these_tests_make_a_file_that_others_read(tmp_path: Path) 
 def test_a_shape_that_is_not_stored(tmp_path: Path, pack: type, shape: tuple[int, ...]) -> None:
     element = matrix("p", DOUBLE, shape, tag(9, bytes(48)))
     before = grown()
-    with pytest.raises(FileFormatError, match=r"claims the shape .* and stores 48 bytes"):
+    with pytest.raises(FileFormatError, match=r"48 bytes"):
         open_scan(write(tmp_path / "a.mat", pack(element)), dataset="p", theta="180")
     assert grown() - before < 50 << 20
 
@@ -80,7 +80,7 @@ def test_a_bomb_is_unpacked_neither_when_it_is_listed_nor_when_it_is_read(tmp_pa
     path = write(tmp_path / "a.mat", bomb(1 << 27))
     assert path.stat().st_size < 1 << 20
     before, begin = grown(), time.perf_counter()
-    with pytest.raises(ResourceLimitError, match="the memory budget is 16 MiB"):
+    with pytest.raises(ResourceLimitError, match="budget is 16 MiB"):
         open_scan(path, dataset="p", theta="180", budget=1 << 24, **SINOGRAM)
     assert grown() - before < 50 << 20 and time.perf_counter() - begin < 0.5
 
@@ -109,7 +109,7 @@ def nested(depth: int) -> bytes:
 def test_structures_in_structures(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match=r"'s\.a\.a\.a' \(1, 1\)"):
         open_scan(write(tmp_path / "a.mat", nested(3)))
-    with pytest.raises(FileFormatError, match="no array of real numbers"):
+    with pytest.raises(FileFormatError, match="real numbers"):
         open_scan(write(tmp_path / "a.mat", nested(5000)))
 
 
@@ -149,7 +149,7 @@ def test_more_arrays_than_a_file_has(tmp_path: Path, monkeypatch: pytest.MonkeyP
     ],
 )
 def test_elements_out_of_place(tmp_path: Path, element: bytes) -> None:
-    with pytest.raises(FileFormatError, match=r"a\.mat: the MAT file cannot be read"):
+    with pytest.raises(FileFormatError, match=r"a\.mat:.*MAT"):
         open_scan(write(tmp_path / "a.mat", element))
 
 
@@ -176,7 +176,7 @@ def test_files_cut_short(tmp_path: Path, version: str) -> None:
 
 def test_names_that_lie(tmp_path: Path) -> None:
     (tmp_path / "a.mat").write_bytes(struct.pack("<5i", 0, 2, 2, 0, 2) + bytes(40))
-    with pytest.raises(FileFormatError, match="says MAT or HDF5, the content is of no known kind"):
+    with pytest.raises(FileFormatError, match="MAT or HDF5"):
         open_scan(tmp_path / "a.mat")
 
 

@@ -41,9 +41,9 @@ def test_terabytes_in_a_kilobyte_of_hdf5(tmp_path: Path, layout: dict[str, objec
     path = hdf5_claim(tmp_path / "a.h5", (1000, 30_000, 300_000), 1000, **layout)
     before = grown()
     scan = open_scan(path, budget=1 << 30)
-    with pytest.raises(ResourceLimitError, match="the memory budget is 1 GiB"):
+    with pytest.raises(ResourceLimitError, match="budget is 1 GiB"):
         scan.read(0, 30_000)
-    with pytest.raises(ResourceLimitError, match=r"rows 0 to 1 of the scan claims 1\.12 GiB"):
+    with pytest.raises(ResourceLimitError, match=r"rows 0 to 1.*1\.12 GiB"):
         scan.read(0, 1)
     with pytest.raises(ResourceLimitError, match=r"32\.7 TiB"):
         open_scan(path).read(0, 30_000)
@@ -100,7 +100,7 @@ def test_npz_whose_directory_lies_about_its_size(tmp_path: Path) -> None:
     claimed = len(header((6, 1000, 1000))) + 24_000_000
     content[entry + 24 : entry + 28] = struct.pack("<I", claimed)
     path.write_bytes(content)
-    with pytest.raises(FileFormatError, match="not what the archive stores"):
+    with pytest.raises(FileFormatError, match="the archive"):
         open_scan(path).read(0, 1)
 
 

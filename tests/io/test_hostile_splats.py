@@ -82,7 +82,7 @@ def test_a_file_that_really_is_terabytes(tmp_path: Path, name: str) -> None:
 def test_the_budget_decides(tmp_path: Path, kind: str) -> None:
     path = valid(tmp_path, kind, 1000)
     assert len(rift.SplatScene.load(path, budget=1 << 20)) == 1000
-    with pytest.raises(ResourceLimitError, match=f"{kind}: the scene claims"):
+    with pytest.raises(ResourceLimitError, match=f"{kind}: .*claims"):
         rift.SplatScene.load(path, budget=50_000)
 
 

@@ -120,5 +120,5 @@ def test_a_strip_counts_whole(tmp_path: Path) -> None:
     path = made.write_pages(
         tmp_path / "a.tif", np.zeros((1, 4000, 500), "u2"), compression="zlib", rowsperstrip=4000
     )
-    with pytest.raises(ResourceLimitError, match=r"a part of a frame claims 7\.63 MiB"):
+    with pytest.raises(ResourceLimitError, match=r"part of a frame.*7\.63 MiB"):
         open_scan(path, budget=1 << 20, axes="angle,bin", theta="180")

@@ -117,7 +117,7 @@ def test_depth_beside_colours_is_not_divided_by_alpha(tmp_path: Path) -> None:
 @pytest.mark.parametrize("format", ["bmp", "targa", "jpeg", "tiff"])
 def test_other_formats_under_the_name_of_png(tmp_path: Path, format: str) -> None:
     path = store(tmp_path / "a", np.zeros((4, 4, 3), np.uint8), format, ".png")
-    with pytest.raises(FileFormatError, match=r"the name says \.png"):
+    with pytest.raises(FileFormatError, match=r"name says \.png"):
         read_image(path)
 
 
@@ -125,7 +125,7 @@ def test_png_under_another_name(tmp_path: Path) -> None:
     write_png(tmp_path / "a.png", np.zeros((2, 2)))
     for name in ("a.exr", "a.bmp", "a"):
         (tmp_path / name).write_bytes((tmp_path / "a.png").read_bytes())
-        with pytest.raises(FileFormatError, match="the content is png"):
+        with pytest.raises(FileFormatError, match="content is png"):
             read_image(tmp_path / name)
     with pytest.raises(InputError, match="no such file"):
         read_image(tmp_path / "b.png")
@@ -173,7 +173,7 @@ def test_tiles_of_float64_are_refused_before_they_are_read_wrong(tmp_path: Path)
     tifffile.imwrite(path, image)
     np.testing.assert_allclose(read_image(path), image, atol=1e-7)
     tifffile.imwrite(path, image, tile=(16, 16))
-    with pytest.raises(FileFormatError, match="float64 in tiles; save it in strips"):
+    with pytest.raises(FileFormatError, match="float64 in tiles"):
         read_image(path)
 
 

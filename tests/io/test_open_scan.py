@@ -39,12 +39,12 @@ def test_radians_and_other_units(tmp_path: Path) -> None:
     made.data_exchange(path)
     with h5py.File(path, "a") as file:
         file["exchange/theta"].attrs["units"] = "Radians"
-    with pytest.raises(InputError, match="span 150 in 6 views, which is doubtful for radians"):
+    with pytest.raises(InputError, match=r"150 in 6 views.*radians"):
         open_scan(path)
     np.testing.assert_array_equal(open_scan(path, angle_unit="radians").angles, made.DEGREES)
     with h5py.File(path, "a") as file:
         file["exchange/theta"].attrs["units"] = "gon"
-    with pytest.raises(FileFormatError, match="'gon', wanted degrees or radians"):
+    with pytest.raises(FileFormatError, match="'gon'"):
         open_scan(path)
     with h5py.File(path, "a") as file:
         del file["exchange/theta"].attrs["units"]
@@ -59,7 +59,7 @@ def test_data_exchange_without_angles_takes_named_ones(tmp_path: Path) -> None:
         del file["exchange/data_white"]
     with pytest.raises(FileFormatError, match=r"--theta.*/elsewhere/angle|/elsewhere.*--theta"):
         open_scan(path)
-    with pytest.raises(InputError, match=r"holds counts, and there are no flats.*--flats"):
+    with pytest.raises(InputError, match=r"counts.*--flats"):
         open_scan(path, theta="elsewhere/angle")
     scan = open_scan(path, theta="elsewhere/angle", kind="attenuation")
     np.testing.assert_allclose(scan.angles, np.deg2rad(made.DEGREES))
@@ -113,7 +113,7 @@ def test_nxtomo_key_count(tmp_path: Path) -> None:
     with h5py.File(path, "a") as file:
         del file[key]
         file[key] = np.zeros(5)
-    with pytest.raises(ShapeError, match="5 image keys for 8 frames"):
+    with pytest.raises(ShapeError, match="5 image keys for 8"):
         open_scan(path)
 
 

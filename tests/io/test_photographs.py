@@ -206,11 +206,11 @@ def test_what_is_missing_is_said_before_anything_is_written(
     (tmp_path / "two").mkdir()
     for name in NAMES[:2]:
         (folder / name).rename(tmp_path / "two" / name)
-    with pytest.raises(InputError, match=r"holds 2 photographs, .* from 3 on"):
+    with pytest.raises(InputError, match=r"2 photographs.*3"):
         check_photographs(tmp_path / "two")
     made.photographs(folder, NAMES)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"not installed; pip install pycolmap"):
+    with pytest.raises(InputError, match=r"pip install pycolmap"):
         run(pose_photographs(folder, tmp_path / "fit" / "poses"))
     with pytest.raises(InputError, match="no such file"):
         run(pose_photographs(tmp_path / "gone", tmp_path / "fit" / "poses"))
@@ -219,7 +219,7 @@ def test_what_is_missing_is_said_before_anything_is_written(
 
 def test_bare_photographs_are_no_capture_yet(folder: Path, tmp_path: Path) -> None:
     assert holds_bare_photographs(folder)
-    with pytest.raises(InputError, match=r"no capture; .*4 bare photographs .*'rift fit'"):
+    with pytest.raises(InputError, match=r"4 bare photographs.*'rift fit'"):
         open_capture(folder)
     with pytest.raises(InputError, match="no COLMAP model"):
         open_capture(folder, images=folder)

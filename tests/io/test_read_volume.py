@@ -36,7 +36,7 @@ def test_volumes_that_cannot_be_read(tmp_path: Path) -> None:
         read_volume(tmp_path / "text")
     save(tmp_path / "v", "tiff")
     (tmp_path / "v" / "slice_00002.tif").unlink()
-    with pytest.raises(FileFormatError, match="slice 2 of 4 is missing"):
+    with pytest.raises(FileFormatError, match="slice 2 of 4"):
         read_volume(tmp_path / "v")
     (tmp_path / "v" / "slice_00002.tif").write_bytes(b"II*\0")
     with pytest.raises(FileFormatError, match="slice_00002"):

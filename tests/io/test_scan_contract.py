@@ -115,7 +115,7 @@ def test_a_name_settles_a_doubt_and_is_not_believed_against_the_values(tmp_path:
     path = hdf5(tmp_path / "a.h5", transmission=inner, theta=DEGREES)
     assert open_scan(path, dataset="transmission").kind == "transmission"
     path = hdf5(tmp_path / "b.h5", transmission=lines(3.0), theta=DEGREES)
-    with pytest.raises(InputError, match=r"states transmission, and its values .* attenuation"):
+    with pytest.raises(InputError, match=r"transmission.*attenuation"):
         open_scan(path, dataset="transmission")
     assert open_scan(path, dataset="transmission", kind="attenuation").kind == "attenuation"
 
@@ -211,7 +211,7 @@ def test_the_number_of_angles_tells_the_axes(
     [((9, 9, 5), 9), ((9, 5, 9), 9), ((9, 9), 9), ((5, 4, 9), 9), ((4, 5), None)],
 )
 def test_axes_that_fit_in_two_ways(shape: tuple[int, ...], count: int | None) -> None:
-    with pytest.raises(ShapeError, match=r"can be read as .* or as .*--axes"):
+    with pytest.raises(ShapeError, match=r"--axes"):
         axes_of(Path("a"), "p", shape, count=count, asked=None)
 
 
@@ -235,14 +235,14 @@ def test_units_of_angles() -> None:
         (100 * steps, {"usual": "radians"}),
         (1800 * steps, {}),
     ]:
-        with pytest.raises(InputError, match=r"is doubtful for .*--angle-unit"):
+        with pytest.raises(InputError, match=r"--angle-unit"):
             unit(values, **options)
 
 
 def test_views_that_tell_nothing() -> None:
     with pytest.raises(InputError, match="holds one view"):
         unit(np.zeros(1))
-    with pytest.raises(InputError, match=r"all 5 angles of 't' are 3 degrees"):
+    with pytest.raises(InputError, match=r"angles of 't'.*3 degrees"):
         unit(np.full(5, 3.0))
 
 
@@ -263,7 +263,7 @@ def test_pages_of_sinograms_are_read_row_by_row(tmp_path: Path) -> None:
 def test_a_single_page_is_a_sinogram_where_the_angles_say_so(tmp_path: Path) -> None:
     page = made.frames(1)[0]
     tifffile.imwrite(tmp_path / "a.tif", page)
-    with pytest.raises(ShapeError, match=r"as .angle, bin. or as .bin, angle."):
+    with pytest.raises(ShapeError, match=r"angle, bin.*bin, angle"):
         open_scan(tmp_path / "a.tif", kind="attenuation")
     for axes, count in (("(angle, bin)", made.ROWS), ("(bin, angle)", made.BINS)):
         np.savetxt(tmp_path / "angles.txt", np.arange(count) * 7.0)
@@ -278,7 +278,7 @@ def test_a_single_page_is_a_sinogram_where_the_angles_say_so(tmp_path: Path) -> 
 
 def test_files_named_as_sinograms_are_not_taken_for_projections(tmp_path: Path) -> None:
     made.write_series(tmp_path / "a", "sino_{:04}.tif", made.frames())
-    with pytest.raises(InputError, match=r"named as a sinogram.*--axes"):
+    with pytest.raises(InputError, match=r"sinogram.*--axes"):
         open_scan(tmp_path / "a", kind="attenuation")
     scan = open_scan(tmp_path / "a", kind="attenuation", axes="row,angle,bin", theta="180")
     np.testing.assert_array_equal(
@@ -316,7 +316,7 @@ def test_tilt_series(tmp_path: Path, dtype: str) -> None:
 
 def test_tilts_beside_the_file(tmp_path: Path) -> None:
     path = mrc(tmp_path / "a.st", made.frames(11))
-    with pytest.raises(FileFormatError, match=r"no tilt angles, and no a\.tlt or a\.rawtlt"):
+    with pytest.raises(FileFormatError, match=r"a\.tlt.*a\.rawtlt"):
         open_scan(path, kind="attenuation")
     np.savetxt(tmp_path / "a.rawtlt", TILTS)
     scan = open_scan(path, kind="counts")
@@ -326,7 +326,7 @@ def test_tilts_beside_the_file(tmp_path: Path) -> None:
     scan = open_scan(path, kind="attenuation")
     np.testing.assert_allclose(np.rad2deg(scan.angles), TILTS + 0.5)
     assert "a.tlt" in scan.notes[1]
-    with pytest.raises(InputError, match=r"--kind counts.*--kind attenuation"):
+    with pytest.raises(InputError, match=r"--kind counts.*--kind"):
         open_scan(path)
     (tmp_path / "a.tlt").unlink()
     (tmp_path / "in").mkdir()

@@ -22,7 +22,7 @@ from rift_cl.io import open_scan
 @pytest.mark.parametrize("rows", [(0, 0), (-1, 2), (2, 5), (3, 2)])
 def test_rows_that_are_not_there(tmp_path: Path, rows: tuple[int, int]) -> None:
     made.data_exchange(tmp_path / "a.h5")
-    with pytest.raises(InputError, match="the scan has rows 0 to 4"):
+    with pytest.raises(InputError, match="rows 0 to 4"):
         open_scan(tmp_path / "a.h5").read(*rows)
 
 
@@ -98,7 +98,7 @@ def test_files_that_hold_no_scan_list_what_they_hold(tmp_path: Path) -> None:
             file[f"g/d{index:02}"] = np.zeros((2, index + 1))
     with pytest.raises(FileFormatError, match=r"'/g/d00' \(2, 1\).*'/g/d07' \(2, 8\), \.\.\.:"):
         open_scan(tmp_path / "a.h5")
-    with pytest.raises(FileFormatError, match=r"no dataset 'g/x'; it holds '/g/d00'"):
+    with pytest.raises(FileFormatError, match=r"'g/x'.*'/g/d00'"):
         open_scan(tmp_path / "a.h5", dataset="g/x")
     with pytest.raises(FileFormatError, match="--theta"):
         open_scan(tmp_path / "a.h5", dataset="g/d01")
@@ -109,15 +109,15 @@ def test_files_that_hold_no_scan_list_what_they_hold(tmp_path: Path) -> None:
 
 def test_names_that_lie(tmp_path: Path) -> None:
     (tmp_path / "text.h5").write_text("not a scan")
-    with pytest.raises(FileFormatError, match="says HDF5, the content is of no known kind"):
+    with pytest.raises(FileFormatError, match="says HDF5"):
         open_scan(tmp_path / "text.h5")
     made.data_exchange(tmp_path / "really_hdf5.npz")
-    with pytest.raises(FileFormatError, match="the name says NPZ, the content is HDF5"):
+    with pytest.raises(FileFormatError, match=r"NPZ.*HDF5"):
         open_scan(tmp_path / "really_hdf5.npz")
     made.data_exchange(tmp_path / "a.dat")
     with pytest.raises(InputError, match=r"not from '\.dat'"):
         open_scan(tmp_path / "a.dat")
-    with pytest.raises(InputError, match=r"gone\.h5: there is no such file"):
+    with pytest.raises(InputError, match=r"gone\.h5"):
         open_scan(tmp_path / "gone.h5")
     (tmp_path / "folder.h5").mkdir()
     with pytest.raises(InputError, match="is not a file"):

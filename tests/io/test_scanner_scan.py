@@ -220,7 +220,7 @@ def test_astra_vectors(tmp_path: Path, suffix: str) -> None:
     wrong = vectors_of(cone)
     wrong[3, 7] = np.nan
     np.savetxt(tmp_path / "wrong.txt", wrong)
-    with pytest.raises(RiftError, match="view 3 are not finite"):
+    with pytest.raises(RiftError, match="view 3"):
         open_scan(tmp_path / "images", geometry=tmp_path / "wrong.txt", **options)
     np.savetxt(tmp_path / "few.txt", vectors_of(cone)[:5])
     with pytest.raises(ShapeError, match=r"5 .*12|12 .* 5"):
@@ -250,7 +250,7 @@ def test_rtk(tmp_path: Path) -> None:
     cone = cone_of(open_scan(tmp_path / "geometry.yaml", kind="counts", flats="mean"))
     np.testing.assert_allclose(np.rad2deg(cone.angles), 30.0 * np.arange(12), atol=1e-9)
     assert cone.magnification == pytest.approx(4)
-    with pytest.raises(InputError, match=r"how large a pixel is"):
+    with pytest.raises(InputError, match=r"how large a pixel"):
         open_scan(tmp_path / "images", geometry=tmp_path / "rtk.xml", kind="counts")
 
 

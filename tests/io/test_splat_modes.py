@@ -92,7 +92,7 @@ def test_plain_scenes_say_nothing_of_it(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_splat_files_refuse_what_they_cannot_hold_by_name(tmp_path: Path, kind) -> None:
-    with pytest.raises(InputError, match=r"a \.splat file holds no .*order|activation|angular"):
+    with pytest.raises(InputError, match=r"\.splat file.*order|activation|angular"):
         scene(kind).save(tmp_path / "a.splat")
     assert list(tmp_path.iterdir()) == []
 
@@ -124,26 +124,26 @@ def test_x_ray_splats_have_shapes_alone(tmp_path: Path) -> None:
     assert found.mode == "xray"
     assert_same(found, wanted)
     for more in ({"color_modes": np.zeros((7, 3, 3))}, {"activation": "exp"}):
-        with pytest.raises(InputError, match="X-rays have neither colours"):
+        with pytest.raises(InputError, match=r"X-rays.*colours"):
             XrayScene(**given, **more)
 
 
 @pytest.mark.parametrize(
     ("changes", "kind", "words"),
     [
-        ({"shape_modes": np.zeros((7, 4))}, ShapeError, "shape_modes: 5 modes belong to no order"),
+        ({"shape_modes": np.zeros((7, 4))}, ShapeError, "shape_modes: 5 modes"),
         ({"shape_modes": np.zeros((6, 3))}, ShapeError, "shape_modes has shape .* wants"),
-        ({"shape_modes": np.zeros(7)}, ShapeError, r"shape_modes has shape \(7,\), wanted"),
+        ({"shape_modes": np.zeros(7)}, ShapeError, r"shape_modes has shape \(7,\)"),
         ({"color_modes": np.zeros((7, 3))}, ShapeError, "color_modes has shape"),
         ({"color_modes": np.zeros((7, 3, 4))}, ShapeError, r"wants \(7, 3, 3\)"),
         ({"shape_modes": np.full((7, 3), np.nan)}, NonFiniteError, "shape_modes holds NaN"),
-        ({"activation": "gate"}, InputError, "activation is 'gate', wanted clamp or exp or square"),
-        ({"angular": "fourier"}, InputError, "angular is 'fourier', wanted sh or hg"),
+        ({"activation": "gate"}, InputError, "activation is 'gate'"),
+        ({"angular": "fourier"}, InputError, "angular is 'fourier'"),
         ({"angular": "lg"}, ShapeError, "angular is 'lg' without lobes"),
         ({"lobes": np.zeros((7, 5))}, ShapeError, "angular is 'sh' with lobes"),
         ({"angular": "lg", "lobes": np.zeros((7, 6))}, ShapeError, r"lobes .* wants \(7, 5\)"),
         ({"angular": "lg", "lobes": np.zeros((7, 5)), "sh": np.zeros((7, 37, 3))}, InputError,
-         "37, wanted a whole number from 1 to 36"),
+         "37"),
     ],
 )  # fmt: skip
 def test_arrays_that_make_no_scene(changes, kind, words) -> None:
@@ -169,11 +169,11 @@ def saved(folder: Path, kind=KINDS[8]) -> Path:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("shape order 1", "shape order 2", r"has 3 properties shape_0\.\., but its comment"),
+        ("shape order 1", "shape order 2", r"has 3 properties shape_0\.\."),
         ("shape order 1", "shape order 9", "has no meaning"),
         ("shape order 1", "shape order 99999999999", "has no meaning"),
         ("shape order 1, ", "", r"has 3 properties shape_0"),
-        ("angular asg", "angular lg", r"has 12 properties lobe_0\.\., but .* has 5"),
+        ("angular asg", "angular lg", r"has 12 properties lobe_0\.\."),
         ("angular asg", "angular xx", "has no meaning"),
         ("angular asg", "angular asg, angular asg", "has no meaning"),
         ("rift-cl basis", "rift_cl basis", "no comment 'rift-cl basis:' that says"),
@@ -181,7 +181,7 @@ def saved(folder: Path, kind=KINDS[8]) -> Path:
         ("property float shape_2", "property float shapes2", r"has 2 properties shape_0"),
         ("property float shape_2", "property float shape_7", "lacks shape_2"),
         ("property float lobe_11", "property float lobes11", "has 11 properties lobe_0"),
-        ("property float angular_0\n", "property float f_rest_0\n", "which has 6; the file is"),
+        ("property float angular_0\n", "property float f_rest_0\n", "which has 6"),
         ("property float f_dc_2", "property float f_dc_3", "lacks f_dc_2"),
         ("vertex 7", "vertex 9", "claims 9 records"),
     ],

@@ -78,7 +78,7 @@ def test_what_no_file_can_hold_does_not_come_back(device, changes, words) -> Non
     [
         ({"means": np.zeros((7, 2))}, ShapeError, r"means has shape \(7, 2\)"),
         ({"means": 1.0}, ShapeError, r"means has shape \(\)"),
-        ({"quats": np.zeros((6, 4))}, ShapeError, r"quats has shape .* wants \(7, 4\)"),
+        ({"quats": np.zeros((6, 4))}, ShapeError, r"quats has shape"),
         ({"log_scales": np.zeros(7)}, ShapeError, "log_scales has shape"),
         ({"logit_opacities": np.zeros((7, 1))}, ShapeError, "logit_opacities has shape"),
         ({"sh": np.zeros((7, 5, 3))}, ShapeError, "K = 1, 4, 9, 16 or 25"),

@@ -28,13 +28,13 @@ def series(tmp_path: Path) -> Path:
 
 
 def test_a_folder_without_tiff(tmp_path: Path) -> None:
-    with pytest.raises(FileFormatError, match=r"holds no TIFF files.*no folder with some"):
+    with pytest.raises(FileFormatError, match=r"TIFF files"):
         open_scan(tmp_path)
     for name in ("one", "two"):
         made.write_series(tmp_path / name, "p{}.tif", made.frames())
-    with pytest.raises(FileFormatError, match=r"several folders with some .'one', 'two'."):
+    with pytest.raises(FileFormatError, match=r"'one', 'two'"):
         open_scan(tmp_path)
-    with pytest.raises(InputError, match="no such file or folder"):
+    with pytest.raises(InputError, match="no such file"):
         open_scan(tmp_path / "three")
 
 
@@ -64,13 +64,13 @@ def test_pages_that_differ(tmp_path: Path) -> None:
 
 def test_pages_in_one_of_several_files(series: Path) -> None:
     made.write_pages(series / "p_0003.tif", made.frames())
-    with pytest.raises(FileFormatError, match=r"p_0003.tif: holds 6 pages and is one of 6 files"):
+    with pytest.raises(FileFormatError, match=r"p_0003.tif: .*6 pages.*6 files"):
         open_scan(series)
 
 
 def test_flats_of_another_size(series: Path) -> None:
     made.write_series(series, "flat{}.tif", made.frames()[:2, :-1])
-    with pytest.raises(ShapeError, match=r"flat1.tif: the flats have 19 x 24 rows and bins"):
+    with pytest.raises(ShapeError, match=r"flat1.tif: .*19 x 24"):
         open_scan(series)
 
 
@@ -98,29 +98,29 @@ def test_float64_in_other_packing(tmp_path: Path, packed: str) -> None:
     output = OpenImageIO.ImageOutput.create("tiff")
     assert output.open(str(tmp_path / "a.tif"), spec) and output.write_image(np.ones((4, 5, 1)))
     output.close()
-    with pytest.raises(FileFormatError, match="float64 samples are packed by method"):
+    with pytest.raises(FileFormatError, match=r"float64.*packed"):
         open_scan(tmp_path / "a.tif", axes="angle,bin", theta="180").read(0, 1)
 
 
 def test_names_that_leave_it_open(series: Path) -> None:
     (series / "p_0002.tif").rename(series / "other_0002.tif")
-    with pytest.raises(FileFormatError, match=r"several series of files .'other_#', 'p_#'."):
+    with pytest.raises(FileFormatError, match=r"'other_#', 'p_#'"):
         open_scan(series)
     (series / "other_0002.tif").rename(series / "flat_dark.tif")
-    with pytest.raises(FileFormatError, match=r"flat_dark\.tif: the name says flat and dark"):
+    with pytest.raises(FileFormatError, match=r"flat_dark\.tif"):
         open_scan(series)
 
 
 def test_a_folder_of_flats(tmp_path: Path) -> None:
     made.write_series(tmp_path, "flat{}.tif", made.frames())
-    with pytest.raises(FileFormatError, match="holds flats or darks alone"):
+    with pytest.raises(FileFormatError, match="flats or darks"):
         open_scan(tmp_path)
 
 
 def test_two_folders_of_flats(series: Path) -> None:
     for name in ("flats", "white_before"):
         made.write_series(series / name, "f{}.tif", made.frames())
-    with pytest.raises(FileFormatError, match="'flats' and 'white_before' may both hold"):
+    with pytest.raises(FileFormatError, match=r"'flats'.*'white_before'"):
         open_scan(series)
     assert open_scan(series, flats="flats").kind == "counts"
 
@@ -133,7 +133,7 @@ def test_a_missing_number_needs_angles(series: Path) -> None:
 
 
 def test_a_dataset_has_no_meaning(series: Path) -> None:
-    with pytest.raises(InputError, match="TIFF holds no named arrays"):
+    with pytest.raises(InputError, match="named arrays"):
         open_scan(series, dataset="x")
 
 
@@ -170,13 +170,13 @@ def test_angles_that_cannot_be_used(
 def test_two_lists_of_angles(series: Path) -> None:
     for name in ("angles.txt", "theta.csv"):
         (series / name).write_text("0\n1\n2\n3\n4\n5\n")
-    with pytest.raises(FileFormatError, match=r"'angles.txt' and 'theta.csv' may both hold"):
+    with pytest.raises(FileFormatError, match=r"'angles.txt'.*'theta.csv'"):
         open_scan(series)
 
 
 def test_a_file_that_cannot_be_read(series: Path) -> None:
     (series / "p_0003.tif").write_bytes(b"nothing of the kind")
-    with pytest.raises(FileFormatError, match=r"p_0003\.tif: the content is of no known format"):
+    with pytest.raises(FileFormatError, match=r"p_0003\.tif"):
         open_scan(series)
     (series / "p_0003.tif").unlink()
     (series / "p_0003.tif").mkdir()
@@ -190,12 +190,12 @@ def test_files_that_changed_since(series: Path) -> None:
     with pytest.raises(ShapeError, match=r"p_0004\.tif"):
         scan.read(0, 1)
     (series / "p_0004.tif").unlink()
-    with pytest.raises(InputError, match=r"p_0004\.tif: there is no such file"):
+    with pytest.raises(InputError, match=r"p_0004\.tif"):
         scan.read(0, 1)
 
 
 def test_an_imagej_stack_that_hides_its_images(tmp_path: Path) -> None:
     text = "ImageJ=1.53\nimages=900\nslices=900\n"
     tifffile.imwrite(tmp_path / "a.tif", made.frames()[0], description=text, metadata=None)
-    with pytest.raises(FileFormatError, match="keeps 900 images in this one page"):
+    with pytest.raises(FileFormatError, match="keeps 900"):
         open_scan(tmp_path / "a.tif")

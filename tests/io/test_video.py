@@ -104,7 +104,7 @@ def test_frames_are_turned_as_the_file_says(
 
 def test_files_without_frames_are_refused_in_a_sentence(video: Path, tmp_path: Path) -> None:
     sound = store_video(tmp_path / "sound.mp4", [], audio_only=True)
-    with pytest.raises(InputError, match=r"sound\.mp4: the video holds no pictures"):
+    with pytest.raises(InputError, match=r"sound\.mp4: .*no pictures"):
         check_video(sound)
     for name, content in (
         ("empty.mp4", b""),

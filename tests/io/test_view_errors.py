@@ -34,7 +34,7 @@ def test_budget(tmp_path: Path) -> None:
     ):
         numbers = 7 + (3 if view.mask else 0) + (8 if view.lens else 0)
         need = 4 * numbers * size[0] * size[1]
-        with pytest.raises(ResourceLimitError, match=r"a\.png: the view.* claims"):
+        with pytest.raises(ResourceLimitError, match=r"a\.png: .*claims"):
             read_view(view, budget=need - 1)
         read_view(view, downscale=2, budget=need)
         tracemalloc.start()
@@ -73,10 +73,10 @@ def test_pictures_that_do_not_fit(tmp_path: Path) -> None:
         read_view(wrong)
     with pytest.raises(ShapeError, match=r"m\.png: is 79 x 60 .* says 80 x 60"):
         read_view(View("x", camera, tmp_path / "a.png", tmp_path / "m.png", None))
-    with pytest.raises(InputError, match=r"gone\.png: there is no such file"):
+    with pytest.raises(InputError, match=r"gone\.png"):
         read_view(View("x", camera, tmp_path / "gone.png", None, None))
     path = store(tmp_path / "five.exr", np.zeros((HEIGHT, WIDTH, 5), np.float32), "float")
-    with pytest.raises(FileFormatError, match=r"five\.exr: has 5 channels"):
+    with pytest.raises(FileFormatError, match=r"five\.exr:.*5 channels"):
         read_view(View("x", camera, path, None, None))
 
 
@@ -90,10 +90,10 @@ def test_pictures_that_are_damaged(tmp_path: Path) -> None:
         read_view(view)
     pixels = np.ones((HEIGHT, WIDTH, 3), np.float32)
     pixels[3, 4, 1] = np.nan
-    with pytest.raises(NonFiniteError, match=r"b\.exr: the image holds NaN"):
+    with pytest.raises(NonFiniteError, match=r"b\.exr: .*image.*NaN"):
         read_view(view_of(store(tmp_path / "b.exr", pixels, "float")))
     write_png(path, np.zeros((HEIGHT, WIDTH, 3)))
-    with pytest.raises(NonFiniteError, match=r"b\.exr: the mask holds NaN"):
+    with pytest.raises(NonFiniteError, match=r"b\.exr: .*mask.*NaN"):
         read_view(view_of(path, tmp_path / "b.exr"))
 
 
@@ -105,5 +105,5 @@ def test_a_mask_of_zeros_and_ones_is_no_black_one(tmp_path: Path) -> None:
     assert not read_view(view)[..., 3].any()
     mask[2:] = 1
     write_png(tmp_path / "m.png", mask)
-    with pytest.raises(FileFormatError, match=r"m\.png: the mask has no code above 1"):
+    with pytest.raises(FileFormatError, match=r"m\.png: .*mask"):
         read_view(view)

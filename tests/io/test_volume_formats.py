@@ -189,7 +189,7 @@ def test_mrc_of_no_length(tmp_path: Path) -> None:
     write(tmp_path / "v.mrc", "mrc", unit="bin")
     with mrcfile.open(tmp_path / "v.mrc") as file:
         assert [float(file.header.cella[axis]) for axis in "xyz"] == [0, 0, 0]
-    with pytest.raises(InputError, match="no unsigned 8-bit samples; choose uint16"):
+    with pytest.raises(InputError, match=r"8-bit.*uint16"):
         write(tmp_path / "w.mrc", "mrc", dtype="uint8", window=(0, 1))
 
 
@@ -246,7 +246,7 @@ def test_integers_come_back_as_values(tmp_path: Path, format: str, dtype: str) -
 def test_values_that_no_integer_stands_for(tmp_path: Path, format: str) -> None:
     volume = VOLUME.copy()
     volume[3, 2, 1] = np.nan
-    with pytest.raises(NonFiniteError, match="in slice 3 1 values are NaN"):
+    with pytest.raises(NonFiniteError, match=r"slice 3 .*NaN"):
         write(tmp_path / "v", format, volume, dtype="uint16", window=(0, 1))
     assert list(tmp_path.iterdir()) == []
 
@@ -348,10 +348,10 @@ def test_a_chunk_that_is_missing(tmp_path: Path) -> None:
     chunk = tmp_path / "v" / "0" / "1" / "0" / "0"
     whole = chunk.read_bytes()
     chunk.write_bytes(whole[:-9])
-    with pytest.raises(FileFormatError, match="v: the volume cannot be read"):
+    with pytest.raises(FileFormatError, match="v: "):
         read_volume(tmp_path / "v")
     chunk.unlink()
-    with pytest.raises(FileFormatError, match="the chunk 0/1/0/0 is missing"):
+    with pytest.raises(FileFormatError, match="0/1/0/0"):
         read_volume(tmp_path / "v")
     if hasattr(os, "mkfifo"):
         os.mkfifo(chunk)
@@ -416,7 +416,7 @@ def test_stacks_of_imagej_s_own(tmp_path: Path, order: str, dtype: str) -> None:
 
 def test_a_picture_is_no_volume(tmp_path: Path) -> None:
     tifffile.imwrite(tmp_path / "p.tif", VOLUME[0], compression="zlib")
-    with pytest.raises(FileFormatError, match="are not plain ones"):
+    with pytest.raises(FileFormatError, match="plain"):
         read_volume(tmp_path / "p.tif")
     tifffile.imwrite(tmp_path / "q.tif", np.zeros((4, 5, 3), np.uint8), photometric="rgb")
     with pytest.raises(ShapeError, match="wanted one channel"):

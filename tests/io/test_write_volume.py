@@ -65,7 +65,7 @@ def test_an_exception_discards(tmp_path: Path, format: str, kind: type[BaseExcep
 @FORMATS
 def test_missing_slices(tmp_path: Path, format: str) -> None:
     with (
-        pytest.raises(OutputError, match="2 of 5 slices were never written, the first is 1"),
+        pytest.raises(OutputError, match="2 of 5 slices"),
         open_volume(tmp_path / "v", SHAPE, format=format, spacing=1) as writer,
     ):
         writer.write(0, VOLUME[:1])

@@ -206,7 +206,7 @@ def test_runs_of_any_length_give_the_same_bits(device, monkeypatch):
 def test_memory_is_counted_before_it_is_taken():
     device = open_device(memory=10_000)
     A = Projector(Grid((9, 10, 11)), covering(11), device=device)
-    with pytest.raises(ResourceLimitError, match=r"part of a volume .* needs"):
+    with pytest.raises(ResourceLimitError, match=r"part of a volume"):
         A(np.zeros(A.domain))
 
 

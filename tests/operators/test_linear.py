@@ -145,7 +145,7 @@ def test_types_without_a_meaning_are_refused(A, dtype):
 def test_masked_and_double_device_arrays_are_refused(A, device):
     with pytest.raises(DTypeError, match="masked"):
         A(np.ma.masked_less(X, 0))
-    with pytest.raises(DTypeError, match="x has type float64 on the device"):
+    with pytest.raises(DTypeError, match="x has type float64"):
         A(device.empty(GRID.shape, np.float64))
 
 
@@ -165,21 +165,19 @@ def test_empty_scans_are_refused_by_name():
 
 
 def test_an_unknown_footprint_is_refused(device):
-    with pytest.raises(
-        InputError, match="footprint is 'round', wanted 'strip', 'joseph' or 'linear'"
-    ):
+    with pytest.raises(InputError, match="footprint is 'round'"):
         rift.Projector(GRID, SCAN, "round", device=device)
 
 
 def test_arguments_that_are_no_geometry_are_told_by_name(device):
     for make in (rift.Projector, rift.FastProjector):
-        with pytest.raises(InputError, match=r"grid is None, wanted a Grid"):
+        with pytest.raises(InputError, match=r"grid is None"):
             make(None, None, device=device)
-        with pytest.raises(InputError, match=r"grid is \(12, 15\), wanted a Grid"):
+        with pytest.raises(InputError, match=r"grid is \(12, 15\)"):
             make((12, 15), SCAN, device=device)
-        with pytest.raises(InputError, match=r"scan is array\(.*, wanted a Parallel"):
+        with pytest.raises(InputError, match=r"scan is array"):
             make(GRID, np.arange(3.0), device=device)
-        with pytest.raises(InputError, match=r"scan is a FanBeam.*rebin_fan first"):
+        with pytest.raises(InputError, match=r"scan is a FanBeam.*rebin_fan"):
             make(GRID, rift.FanBeam(100, 150, 1, 10), device=device)
 
 

@@ -81,7 +81,7 @@ def test_more_views_than_one_run_of_tables(device, monkeypatch):
 
 def test_a_budget_too_small_for_one_slice_is_refused():
     A, x, _ = volume(rift.open_device(memory=10_000))
-    with pytest.raises(ResourceLimitError, match=r"part of a slice .* needs .* is 9.77 KiB"):
+    with pytest.raises(ResourceLimitError, match=r"part of a slice .*9\.77 KiB"):
         A(x)
 
 

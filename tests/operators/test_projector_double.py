@@ -77,9 +77,9 @@ def test_what_goes_in_and_comes_out_is_float64(A, device):
     assert np.array_equal((A.T @ A)(X), A.T(A(X)))
     out = np.empty(A.range)
     assert A(X, out=out) is out
-    with pytest.raises(DTypeError, match=r"out must be .* native float64"):
+    with pytest.raises(DTypeError, match=r"out must be .*float64"):
         A(X, out=np.empty(A.range, np.float32))
-    with pytest.raises(DTypeError, match="x has type float32 on the device, wanted float64"):
+    with pytest.raises(DTypeError, match="x has type float32"):
         A(device.array(X))
 
 
@@ -98,23 +98,23 @@ def test_the_algebra_keeps_its_digits(A):
 
 def test_types_are_not_mixed(A, single):
     for combine in (lambda: A + single, lambda: single - A, lambda: A.T @ single):
-        with pytest.raises(DTypeError, match=r"operators in float.. and float.. cannot"):
+        with pytest.raises(DTypeError, match=r"float.. and float.."):
             combine()
 
 
 @pytest.mark.parametrize("dtype", ["float16", "int32", "complex64", ">f8", "double precision", 7])
 def test_other_types_are_refused(device, dtype):
-    with pytest.raises(DTypeError, match="wanted 'float32' or 'float64'"):
+    with pytest.raises(DTypeError, match=r"'float32'.*'float64'"):
         rift.Projector(GRID, SCAN, device=device, dtype=dtype)
 
 
 def test_a_device_without_doubles_says_so_at_once(device):
     traits = dataclasses.replace(device.traits, fp64=False)
     plain = rift.Device(device._handle, device.selector, traits=traits)
-    with pytest.raises(DeviceError, match=r"cannot compute in float64 .*use float32"):
+    with pytest.raises(DeviceError, match=r"float64 .*float32"):
         rift.Projector(GRID, SCAN, device=plain, dtype="float64")
     x = plain.empty(3, np.float64)
-    with pytest.raises(DeviceError, match="cannot compute in float64"):
+    with pytest.raises(DeviceError, match="float64"):
         axpby(plain, 1.0, x, 1.0, x)
     assert rift.Projector(GRID, SCAN, device=plain)(X).dtype == np.float32
 

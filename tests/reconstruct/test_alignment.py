@@ -150,7 +150,7 @@ def test_rows_are_the_same_bits_in_every_slab(
 
 def test_what_cannot_be_straightened() -> None:
     stack = np.zeros((2, 3, 20), np.float32)
-    with pytest.raises(ShapeError, match="one for each of 3"):
+    with pytest.raises(ShapeError, match="each of 3"):
         straightened(stack, [1.0, 2.0], 3.0)
     with pytest.raises(ShapeError, match="angle, row, bin"):
         straightened(stack[0], [1.0, 2.0, 3.0], 3.0)

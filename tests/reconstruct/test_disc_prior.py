@@ -84,13 +84,13 @@ def test_what_is_no_disc_is_refused():
     t, angle = scan.coordinates()[None, :], scan.angles[:, None]
     reach = np.abs(60 * np.cos(angle)) + np.abs(25 * np.sin(angle))
     long = 0.02 * 60 * np.clip(1 - np.abs(t) / reach, 0, None) ** 0.5
-    with pytest.raises(InputError, match="not those of a disc"):
+    with pytest.raises(InputError, match="a disc"):
         find_disc(long, scan)
     wide = 0.02 * Disc(0, 0, 300.0).chords(scan)
     with pytest.raises(InputError, match="wider than the detector"):
         find_disc(wide, scan)
     for nothing in (np.zeros(wide.shape), -wide):
-        with pytest.raises(InputError, match="no positive line integrals"):
+        with pytest.raises(InputError, match="positive line integrals"):
             find_disc(nothing, scan)
     with pytest.raises(InputError, match="NaN or infinity"):
         find_disc(np.full(wide.shape, np.nan), scan)
@@ -98,14 +98,14 @@ def test_what_is_no_disc_is_refused():
         find_disc(wide[:-1], scan)
     with pytest.raises(ShapeError, match="seen has shape"):
         find_disc(wide, scan, seen=np.ones(3, bool))
-    with pytest.raises(InputError, match="no positive line integrals"):
+    with pytest.raises(InputError, match="positive line integrals"):
         find_disc(wide, scan, seen=np.zeros(wide.shape, bool))
 
 
 @pytest.mark.parametrize("angles", [[0.3], [0.3, 0.3], [0.3, 0.3, 0.3 + np.pi], [0.3, 0.31]])
 def test_views_of_one_direction_do_not_place_a_disc(angles):
     scan = Parallel(angles, 200)
-    with pytest.raises(InputError, match=r"edges with air beside|differ too little"):
+    with pytest.raises(InputError, match=r"edges|differ too little"):
         find_disc(0.02 * Disc(4.0, 3.0, 60.0).chords(scan), scan)
 
 
@@ -113,7 +113,7 @@ def test_a_rim_that_is_not_solid_is_refused():
     disc, scan = Disc(0.0, 0.0, 80.0), scan_of(180)
     exact = disc.chords(scan)
     speckled = 0.02 * exact * RANDOM.uniform(0, 1, exact.shape)
-    with pytest.raises(InputError, match="rim of the disc is not solid"):
+    with pytest.raises(InputError, match="rim of the disc"):
         material_lengths(speckled, scan, disc)
     with pytest.raises(InputError, match="rim is 0"):
         material_lengths(exact, scan, disc, rim=0)

@@ -202,7 +202,7 @@ def test_data_that_cannot_be_used_are_refused(device, method):
 
 def test_unknown_names_are_refused(device):
     A = Projector(*SMALL, device=device)
-    with pytest.raises(InputError, match=r"filter is 'nope', wanted .*shepp-logan"):
+    with pytest.raises(InputError, match=r"filter is 'nope'"):
         fbp(A, np.zeros(A.range), "nope")
-    with pytest.raises(InputError, match=r"compensate is 'nope', wanted .*'voronoi'"):
+    with pytest.raises(InputError, match=r"compensate is 'nope'"):
         fbp(A, np.zeros(A.range), compensate="nope")

@@ -142,7 +142,7 @@ def test_a_helix_is_refused_with_the_methods_that_take_it(device):
 
 
 def test_a_short_span_is_refused_with_the_methods_that_take_it(device):
-    with pytest.raises(InputError, match=r"half a turn and the fan.*cgls"):
+    with pytest.raises(InputError, match=r"half a turn.*cgls"):
         FDK(Projector(GRID, circle(FULL[:40]), device=device))
 
 

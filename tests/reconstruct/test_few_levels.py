@@ -264,7 +264,7 @@ def test_what_cannot_be_used_is_refused(device, given, kind, message):
     ("bounds", "message"),
     [
         ((1, 0), "bounds cross"),
-        ((0, np.inf), "NaN or infinity"),
+        ((0, np.inf), "NaN"),
         ((0, np.ones(7)), "wanted as two"),
         (3, "wanted as two"),
         ((0, "x"), "wanted as two"),
@@ -274,7 +274,7 @@ def test_bounds_that_cannot_be_are_refused(device, bounds, message):
     A, _, _, y = problem(device)
     with pytest.raises(InputError, match=message):
         Pdhg(A, y, 0.1, bounds=bounds)
-    with pytest.raises(InputError, match="make 0 the lower bound"):
+    with pytest.raises(InputError, match="lower bound"):
         Pdhg(A, y, 0.1, bounds=(0, 1), nonnegative=True)
 
 

@@ -176,13 +176,13 @@ def test_projectors_of_every_kind(device, kind, dtype):
 @pytest.mark.parametrize("subsets", [0, -2, 19, 2.5, "many", None, np.nan])
 def test_subsets_that_cannot_be_are_refused(device, subsets):
     A, _, _, y = problem(device)
-    with pytest.raises(InputError, match="wanted a whole number from 1 to the 18 views"):
+    with pytest.raises(InputError, match="1 to the 18 views"):
         OrderedSubsets(A, y, subsets)
 
 
 def test_what_does_not_go_with_subsets_is_refused(device):
     A, _, _, y = problem(device)
-    with pytest.raises(InputError, match="choose one of them"):
+    with pytest.raises(InputError, match="one of them"):
         sirt(A, y, subsets=3, precondition="ramp")
     with pytest.raises(InputError, match="relaxation is 2"):
         sirt(A, y, subsets=3, relaxation=2)

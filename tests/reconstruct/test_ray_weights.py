@@ -255,7 +255,7 @@ def test_weights_of_odd_data():
         (-np.ones((18, 33)), InputError, "weights hold -1"),
         (np.zeros((18, 33)), InputError, "0 everywhere"),
         (np.full((18, 33), 1e-60), InputError, "0 everywhere"),
-        (np.full((18, 33), np.nan), NonFiniteError, "NaN or infinity"),
+        (np.full((18, 33), np.nan), NonFiniteError, "NaN"),
         (np.full((18, 33), 1e60), NonFiniteError, "beyond float32"),
         ("many", RiftError, "weights"),
     ],

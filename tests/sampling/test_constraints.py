@@ -50,7 +50,7 @@ def test_what_makes_no_sense_is_refused_by_name(make, words):
 @pytest.mark.parametrize(
     ("limits", "types", "words"),
     [
-        (Constraints(distance=(5, 6)), (LENS,), "distance ends at 6, but camera 'lens' has 100%"),
+        (Constraints(distance=(5, 6)), (LENS,), "distance ends at 6"),
         (Constraints(), (LENS, LENS), "a name of its own"),
         (Constraints(ranges={"zoom": Ranges()}), (LENS,), "no camera's name"),
         (Constraints(), ("lens",), "wanted a CameraType"),

@@ -153,9 +153,9 @@ def test_bad_frequencies_are_refused(observations, target, k, wanted):
 def test_bad_views_and_gradients_are_refused(observations, target):
     with pytest.raises(ShapeError, match="cameras is empty"):
         coverage([], target)
-    with pytest.raises(ShapeError, match="2 points, the target has 1"):
+    with pytest.raises(ShapeError, match=r"2 points.*1"):
         coverage(observations, Target((0, 0, 0), 1.0))
-    with pytest.raises(InputError, match="weights are for cameras"):
+    with pytest.raises(InputError, match="weights"):
         coverage(observations, target, weights=[1.0])
     with pytest.raises(InputError, match="too large for float32"):
         coverage(ring_of_cameras(1), Target((0, 0, 0), 1.0), weights=[1e39])

@@ -102,11 +102,11 @@ def test_what_makes_no_sense_is_refused():
         DepthMap(camera, np.ones(3))
     with pytest.raises(InputError, match="zero or less"):
         DepthMap(camera, np.zeros((2, 2)))
-    with pytest.raises(InputError, match="no map of depth"):
+    with pytest.raises(InputError, match="map of depth"):
         FreeSpace([])
     near = FreeSpace([DepthMap(c, np.full((2, 2), 0.1)) for c in arc()])
-    with pytest.raises(InputError, match="no place from which the target is seen"):
+    with pytest.raises(InputError, match="no place"):
         out_of_sight(near, ORIGIN, 0.5, 4.0, 4.0)
-    with pytest.raises(InputError, match="no surface that could hide"):
+    with pytest.raises(InputError, match="no surface"):
         KeepOut(out_of_sight(walled("depth"), ORIGIN, 0.5, 4.0, 4.0), hides=True)
     assert depth_of_points(camera, np.array([[9.0, 9, 9]])) is None

@@ -128,7 +128,7 @@ def test_a_path_goes_round_keep_outs_or_says_that_none_does():
     found = plan(TARGET, 9, Constraints(path=Spline(6), keepouts=(ball,)))
     assert permitted(found.objective.design, found.view_table)
     wall = KeepOut(Cone((0, 0, 0), (1, 0, 0), 1.5))
-    with pytest.raises(InputError, match=r"no path Ring with 9 views .* keepouts\[0\] cuts"):
+    with pytest.raises(InputError, match=r"Ring.*keepouts\[0\]"):
         plan(TARGET, 9, Constraints(path=Ring(), elevation=(-0.5, 0.5), keepouts=(wall,)))
 
 

@@ -198,7 +198,7 @@ def test_further_views_go_where_the_first_left_most_unknown():
 
 def test_a_prior_too_steep_for_its_frequencies_is_warned_of():
     steep = Target(CENTER, 60.0, snr=30.0, prior=PowerLaw(4.7), frequencies=half_ball(12 / 60, 800))
-    with pytest.warns(UserWarning, match="about 5 of its 800 frequencies"):
+    with pytest.warns(UserWarning, match="5 of its 800 frequencies"):
         plan(steep, 2)
     lower = replace(steep, frequencies=half_ball(4 / 60, 800))
     assert keeps(plan(lower, 2))

@@ -29,7 +29,7 @@ from rift_cl.sampling.planning.planner import next_views, plan
         ({"constraints": Constraints(budget=Budget(0.5))}, "0.5 pays for no view: the cheapest"),
         (
             {"constraints": Constraints(budget=Budget(5, {"other": 1}))},
-            "per_view names .'other'., but not 'pinhole'",
+            r"per_view names .'other'.",
         ),
         ({"constraints": Constraints(distance=31), "cameras": (LONG,)}, "distance ends at 31"),
     ],
@@ -40,5 +40,5 @@ def test_what_cannot_be_planned_says_why(change, words):
 
 
 def test_views_follow_on_others_only():
-    with pytest.raises(InputError, match="no view was taken"):
+    with pytest.raises(InputError, match="no view"):
         next_views([], TARGET, 4)

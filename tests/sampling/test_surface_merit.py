@@ -143,11 +143,11 @@ def test_gradients_are_those_of_finite_differences(kind, seen_from):
 
 def test_what_a_surface_has_not_is_refused():
     target = Target((0, 0, 0), 1.0, POINTS, NORMALS, "surface")
-    with pytest.raises(InputError, match="surface has no exact"):
+    with pytest.raises(InputError, match=r"surface.*exact"):
         merit(cameras(2), target, "exact")
     with pytest.raises(InputError, match="degree is 33"):
         patch(degree=33)
-    with pytest.raises(InputError, match="kind is 'best', wanted wiener"):
+    with pytest.raises(InputError, match="kind is 'best'"):
         surface_criterion(looking([[0, 0, 1]]), patch(), "best")
     with pytest.raises(InputError, match="no normals"):
         surface_criterion(looking([[0, 0, 1]]), Target((0, 0, 0), 1.0))

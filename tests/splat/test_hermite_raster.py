@@ -216,17 +216,17 @@ def test_what_does_not_fit_is_told(device):
             settings=SplatSettings(),
         )
 
-    with pytest.raises(InputError, match="shape_order is 9, wanted a whole number from 0 to 8"):
+    with pytest.raises(InputError, match="shape_order is 9"):
         ScreenModes(table, 9)
     with pytest.raises(InputError, match="color_order is -1"):
         ScreenModes(table, 1, -1, 3)
     with pytest.raises(InputError, match=r"channels is 1\.5"):
         ScreenModes(table, 1, 1, 1.5)
-    with pytest.raises(ShapeError, match=r"table has shape \(5, 11\), wanted \(splats, 14\)"):
+    with pytest.raises(ShapeError, match=r"table has shape \(5, 11\)"):
         ScreenModes(table, 2, 1, 3)
     with pytest.raises(InputError, match="features have 33 channels"):
         drawn(device.zeros((5, 33)), splats.modes)
-    with pytest.raises(ShapeError, match="more than the 2 features"):
+    with pytest.raises(ShapeError, match="2 features"):
         drawn(device.zeros((5, 2)), splats.modes)
-    with pytest.raises(ShapeError, match="table has 4 rows, wanted 5"):
+    with pytest.raises(ShapeError, match="table has 4 rows"):
         drawn(splats.features, ScreenModes(table[:4], 1, 1, 3))

@@ -180,29 +180,29 @@ def test_counts_that_do_not_fit_are_refused(device):
     def shaded(sh=arrays[1], **lobes):
         return shade(device, arrays[0], sh, CAMERA, culled, **lobes)
 
-    with pytest.raises(ShapeError, match=r"lobes has shape \(5, 6\), wanted \(5, 5\) for 8 func"):
+    with pytest.raises(ShapeError, match=r"lobes has shape \(5, 6\)"):
         shaded(lobes=lobes, angular="lg")
-    with pytest.raises(ShapeError, match=r"wanted \(5, 28\) for 8 functions of 'sg'"):
+    with pytest.raises(ShapeError, match=r"\(5, 28\).*8 functions.*'sg'"):
         shaded(lobes=lobes, angular="sg")
-    with pytest.raises(InputError, match="have no lobes: give lobes, or draw them with angular='s"):
+    with pytest.raises(InputError, match="have no lobes"):
         shaded(angular="hg")
-    with pytest.raises(InputError, match="these splats have lobes, which angular='sh' would leave"):
+    with pytest.raises(InputError, match=r"lobes.*angular='sh'"):
         shaded(lobes=lobes)
-    with pytest.raises(InputError, match="'zernike', wanted one of sh, hg, lg, sg, asg"):
+    with pytest.raises(InputError, match="'zernike'"):
         shaded(lobes=lobes, angular="zernike")
     with pytest.raises(InputError, match="no spherical harmonics"):
         shaded(None, lobes=lobes, angular="hg")
     many = device.zeros((5, 37, 3))
-    with pytest.raises(InputError, match="modes is 37, wanted a whole number from 1 to 36"):
+    with pytest.raises(InputError, match="modes is 37"):
         shaded(many, lobes=lobes, angular="hg")
-    with pytest.raises(InputError, match="functions is 1, wanted a whole number from 2 to 36"):
+    with pytest.raises(InputError, match="functions is 1"):
         shaded(device.zeros((5, 1, 3)), lobes=lobes, angular="sg")
 
 
 def test_gradient_by_lobes_that_does_not_fit_is_refused(device):
     given = random_lobes("hg", 8, 5)
     features = seen(device, given)
-    with pytest.raises(ShapeError, match=r"grad_lobes has shape \(5, 5\), wanted \(5, 6\)"):
+    with pytest.raises(ShapeError, match=r"grad_lobes has shape \(5, 5\)"):
         shade_grad(
             device,
             *(device.array(given.means), device.array(given.linear), CAMERA),

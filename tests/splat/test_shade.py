@@ -115,7 +115,7 @@ def test_shading_needs_harmonics_and_three_channels(device):
     splats = upload(device, values, Kind())
     colors = shade(device, splats.means, splats.sh, Kind().camera, projected.culled)
     gradients = grad_of_ones(device, splats, projected, channels=2)
-    with pytest.raises(ShapeError, match=r"shape \(5, 2\), wanted that of features, \(5, 3\)"):
+    with pytest.raises(ShapeError, match=r"\(5, 2\),.*\(5, 3\)"):
         shade_grad(
             device, splats.means, splats.sh, Kind().camera, features=colors, gradients=gradients
         )

@@ -206,7 +206,7 @@ def test_what_lies_before_the_near_plane_is_culled(device):
 
 
 def test_xray_mode_refuses_a_lens(device):
-    with pytest.raises(InputError, match="xray mode wants a camera without aperture"):
+    with pytest.raises(InputError, match=r"xray.*aperture"):
         projected_on(device, plain(), changed(mode="xray"), camera_of("pinhole", aperture=LENS))
 
 

@@ -104,18 +104,18 @@ def test_covariances_draw_what_quaternions_and_scales_do(device):
     "dilation", [-1, (1, 2), (0, 0, -1e-9), np.nan, np.inf, "wide", None, 1e38]
 )
 def test_dilations_that_are_none_are_refused(device, dilation):
-    with pytest.raises(InputError, match=r"voxelise: dilation is .*, wanted"):
+    with pytest.raises(InputError, match=r"voxelise: dilation"):
         drawn(device, random_splats(3), GRID, dilation)
 
 
 def test_what_is_no_volume_and_no_splats_is_refused(device):
     splats = Splats.upload(device, **random_splats(3))
     for grid in (rift.Grid((4, 5)), (4, 5, 6), None):
-        with pytest.raises(ShapeError, match=r"voxelise: grid is .*, wanted a Grid"):
+        with pytest.raises(ShapeError, match=r"voxelise: grid"):
             voxelise(device, splats, grid)
-    with pytest.raises(InputError, match="at most 16777216 samples along an axis"):
+    with pytest.raises(InputError, match="16777216 samples"):
         voxelise(device, splats, rift.Grid((1, 1, (1 << 24) + 1)))
     with pytest.raises(DTypeError, match="on the host"):
         voxelise(device, Splats(**random_splats(3)), GRID)
-    with pytest.raises(InputError, match="belong to no order"):
+    with pytest.raises(InputError, match="no order"):
         Splats.upload(device, **random_splats(3), shape_modes=np.zeros((3, 5)))

@@ -203,7 +203,7 @@ def test_settings_are_checked():
     for weight in (-0.1, 1.5, float("nan"), "much", None):
         with pytest.raises(InputError, match="ssim_weight is"):
             ImageLoss(ssim_weight=weight)
-    with pytest.raises(InputError, match="'huber', wanted one of l1, l2"):
+    with pytest.raises(InputError, match="'huber'"):
         ImageLoss(kind="huber")
     with pytest.raises(dataclasses.FrozenInstanceError):
         ImageLoss().kind = "l2"
@@ -243,5 +243,5 @@ def test_arrays_that_are_no_images_of_the_device_are_named(device):
             ImageLoss()(device, *arrays, weights=thin)
     with pytest.raises(ShapeError, match="weights has shape"):
         ImageLoss()(device, good, good, weights=device.zeros((20, 16)))
-    with pytest.raises(DTypeError, match="weights is a ndarray on the host"):
+    with pytest.raises(DTypeError, match="weights is a ndarray"):
         ImageLoss()(device, good, good, weights=np.ones(size[:2], np.float32))

@@ -173,22 +173,22 @@ def test_only_absgrad_asks_for_another_drawing(ball):
 def test_statistics_of_other_splats_are_found_at_the_next_step(ball):
     parameters, strategy = begun(ball, DEFAULT)
     strategy.restore({"statistics": np.zeros((59, 3))})
-    with pytest.raises(InputError, match="60 splats, statistics are of 59"):
+    with pytest.raises(InputError, match=r"60 splats.*59"):
         run(ball, parameters, strategy, 1)
 
 
 def test_densities_are_not_densified(ball):
     raw = start_splats(random_points(ball.cameras, 60, 1), None, seed=1)
     densities = Parameters.of(ball.device, raw, density=True)
-    with pytest.raises(InputError, match="for splats with opacities"):
+    with pytest.raises(InputError, match="opacities"):
         with_strategy(ball, DEFAULT, densities)
 
 
 @pytest.mark.parametrize(
     ("settings", "state", "words"),
     [
-        (MCMC, {"statistics": np.zeros((60, 3))}, "holds statistics, wanted nothing"),
-        (DEFAULT, {}, "holds nothing, wanted statistics"),
+        (MCMC, {"statistics": np.zeros((60, 3))}, "holds statistics"),
+        (DEFAULT, {}, "holds nothing"),
         (DEFAULT, {"statistics": np.zeros((60, 2))}, "shape"),
         (DEFAULT, {"statistics": np.full((60, 3), np.nan)}, "not finite"),
     ],
