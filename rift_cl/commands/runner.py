@@ -1,7 +1,7 @@
 """How a command is run: its errors become sentences and exit statuses, its progress goes to stderr.
 
 Exit statuses: 0 ok, 2 usage (an unknown option, or no number where one is wanted), 3 input (a file
-or a value that cannot be used), 4 device, 5 output, 130 interrupted.
+or a value that cannot be used), 4 device, 5 output, 130 interrupted, 143 ended by SIGTERM.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import threading
 import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, make_dataclass
 from inspect import Parameter, Signature
 from types import FrameType
@@ -28,7 +28,7 @@ from rift_cl.errors import RiftError, SettingError
 from rift_cl.option_marks import EXPERT, Group
 from rift_cl.progress import Report
 
-_INPUT, _OUTPUT, _INTERRUPTED = 3, 5, 130
+_INPUT, _OUTPUT, _INTERRUPTED, _TERMINATED = 3, 5, 130, 143
 # Options have names of their own, whichever group they are in.
 _OMITTED: Any = tyro.conf.OmitArgPrefixes
 # Options in no group, which the help lists under tyro's own title.
@@ -45,14 +45,20 @@ class Output:
     """Show the traceback of an error."""
 
 
+class Terminated(KeyboardInterrupt):
+    """SIGTERM: a batch system's Ctrl-C, which it sends before it kills."""
+
+
 def exit_status(run: Callable[[], int]) -> int:
     """Run a command line; what ends it from outside becomes a sentence and an exit status."""
     try:
-        status = run()
+        with _heard((signal.SIGTERM,), _terminate):
+            status = run()
         if sys.stdout is not None:
             sys.stdout.flush()
-    except KeyboardInterrupt:
-        return _say("rift: interrupted; no file is half-written", _INTERRUPTED)
+    except KeyboardInterrupt as end:
+        ended = _TERMINATED if isinstance(end, Terminated) else _INTERRUPTED
+        return _say("rift: interrupted; no file is half-written", ended)
     except BrokenPipeError:
         # Whoever read the output has seen enough; the interpreter must not try to flush the rest.
         sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115 - kept open until the end
@@ -226,19 +232,33 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 
 @contextmanager
 def gentle_interrupt(stop: Callable[[], None]) -> Iterator[None]:
-    """Call ``stop`` at the first Ctrl-C; the second breaks off at once, as usual."""
+    """Call ``stop`` at the first Ctrl-C or SIGTERM; the second breaks off at once, as usual."""
+    with ExitStack() as usual:
+
+        def heard(number: int, frame: FrameType | None) -> None:
+            usual.close()
+            stop()
+            print_line("rift: stopping after this step; Ctrl-C again stops at once")
+
+        usual.enter_context(_heard((signal.SIGINT, signal.SIGTERM), heard))
+        yield
+
+
+@contextmanager
+def _heard(
+    signals: Iterable[signal.Signals], heard: Callable[[int, FrameType | None], None]
+) -> Iterator[None]:
+    """Have signals call a function, in the main thread, whose they are; elsewhere do nothing."""
     if threading.current_thread() is not threading.main_thread():
-        yield  # Signals are the main thread's.
+        yield
         return
-    usual = signal.getsignal(signal.SIGINT)
-
-    def heard(number: int, frame: FrameType | None) -> None:
-        signal.signal(signal.SIGINT, usual)
-        stop()
-        print_line("rift: stopping after this step; Ctrl-C again stops at once")
-
-    signal.signal(signal.SIGINT, heard)
+    usual = {number: signal.signal(number, heard) for number in signals}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, usual)
+        for number, handler in usual.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    raise Terminated

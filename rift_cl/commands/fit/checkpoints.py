@@ -8,6 +8,7 @@ when.
 
 from __future__ import annotations
 
+import time
 import warnings
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,30 @@ from rift_cl.train.trainer import Trainer
 Losses = list[tuple[int, float]]
 # Stages of a fit: the step that each ended with, and the steps of the fit whose schedules it had.
 History = list[tuple[int, int]]
+
+
+class CheckpointSchedule:
+    """When a fit keeps a checkpoint: by steps, by the clock, and when it ends.
+
+    When it was kept changes no bit of the fit.
+
+    Args:
+        every: steps between two; 0 keeps none at all.
+        minutes: after which there is one before those steps are over; 0 goes by steps alone.
+        step: that the fit begins with.
+    """
+
+    def __init__(self, every: int, minutes: float, step: int) -> None:
+        self._every, self._seconds = every, 60 * minutes if minutes else float("inf")
+        self._step, self._time = step, time.monotonic()
+
+    def due(self, step: int, *, ended: bool) -> bool:
+        """Whether there is to be one after a step, which is then taken for kept."""
+        late = time.monotonic() >= self._time + self._seconds
+        due = bool(self._every) and (ended or late or step >= self._step + self._every)
+        if due:
+            self._step, self._time = step, time.monotonic()
+        return due
 
 
 class FitCheckpoints:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, Generic, TypeVar
 
 from rift_cl.cl.discovery import open_device
-from rift_cl.commands.fit.checkpoints import FitCheckpoints
+from rift_cl.commands.fit.checkpoints import CheckpointSchedule, FitCheckpoints
 from rift_cl.commands.fit.settings import FitSettings
 from rift_cl.commands.fit_photos.scores import ViewScore
 from rift_cl.commands.run_folder.run_folder import RunFolder
@@ -68,13 +68,13 @@ class FitRun(Generic[S]):
 
     def _trained(self, trainer: Trainer, pictures: Any) -> Iterator[Report]:
         """Train, with a checkpoint now and then, at the end, and when broken off."""
-        every, kept = self.settings.checkpoint_every, trainer.parameters.step
+        every, minutes = self.settings.checkpoint_every, self.settings.checkpoint_minutes
+        schedule = CheckpointSchedule(every, minutes, trainer.parameters.step)
         for report in self._reports(trainer, pictures):
             if report.done % REPORT_EVERY == 0 or report.done == report.total:
                 self.losses.append((report.done, report.values["loss"]))
             ended = self._stopping or report.done == report.total
-            if every and (ended or report.done >= kept + every):
-                kept = report.done
+            if schedule.due(report.done, ended=ended):
                 self.checkpoints.save(trainer, self.losses)
             yield report
             self._heed(report.done)

@@ -21,8 +21,8 @@ F = TypeVar("F", bound="FitSettings")
 # Settings that may differ between a run and the one that resumes it: they change no bit of the
 # result.
 _FREE = (
-    *("out", "resume", "overwrite", "dry_run", "checkpoint_every", "view", "device", "config"),
-    *("memory", "format", "preset"),
+    *("out", "resume", "overwrite", "dry_run", "view", "device", "config"),
+    *("checkpoint_every", "checkpoint_minutes", "memory", "format", "preset"),
 )
 
 
@@ -48,6 +48,8 @@ class FitOutput:
     """Folder for scene.ply, report.html, config.json, metrics.json and checkpoints."""
     checkpoint_every: Expert[int] = 1000
     """Steps between two checkpoints, of which the last two are kept (0 = none)."""
+    checkpoint_minutes: float = 10.0
+    """Minutes after which there is a checkpoint before those steps are over (0 = not by time)."""
     resume: bool = False
     """Resume from the last checkpoint in --out, to the same bits. With more --steps than before, a
     fit is trained on with the learning rates, densification and cooldown of a fit of that many
@@ -70,6 +72,7 @@ class FitSettings:
         hold_out: int
         views: int
         checkpoint_every: int
+        checkpoint_minutes: float
         resume: bool
         view: bool
         device: str | None
@@ -93,7 +96,7 @@ class FitSettings:
         Raises:
             InputError: a setting is out of its range, or has no meaning beside the others.
         """
-        for name in ("hold_out", "views", "checkpoint_every"):
+        for name in ("hold_out", "views", "checkpoint_every", "checkpoint_minutes"):
             self._check_least(name, 0)
         how = self.training.homogenisation
         if how.weight == "coverage" and how.exponent == 0:

@@ -1,0 +1,66 @@
+"""What a batch system sends is heeded as Ctrl-C is, and nobody's handlers stay changed."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import pytest
+
+from rift_cl.commands.fit import checkpoints
+from rift_cl.commands.fit.checkpoints import CheckpointSchedule
+from rift_cl.commands.runner import exit_status, gentle_interrupt
+
+
+@pytest.fixture(autouse=True)
+def handlers():
+    """The handlers are those of before, whatever was heard."""
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    yield
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
+
+
+def test_a_command_that_is_terminated_ends_with_a_sentence(capsys):
+    def run():
+        os.kill(os.getpid(), signal.SIGTERM)
+        raise AssertionError("went on")
+
+    assert exit_status(run) == 143
+    assert "interrupted" in capsys.readouterr().err
+
+
+def test_an_interrupted_command_has_a_status_of_its_own():
+    def run():
+        raise KeyboardInterrupt
+
+    assert exit_status(run) == 130
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_fit_is_asked_to_stop_first_and_made_to_the_second_time(number, capsys):
+    asked = []
+
+    def run():
+        with gentle_interrupt(lambda: asked.append(number)):
+            os.kill(os.getpid(), number)
+            assert asked == [number]
+            os.kill(os.getpid(), number)
+        raise AssertionError("went on")
+
+    assert exit_status(run) in (130, 143)
+    assert asked == [number] and "stopping after this step" in capsys.readouterr().err
+
+
+def test_checkpoints_are_due_by_steps_by_minutes_and_at_the_end(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(checkpoints.time, "monotonic", lambda: now[0])
+    schedule = CheckpointSchedule(1000, 10.0, 50)
+    assert not schedule.due(1049, ended=False) and schedule.due(1050, ended=False)
+    now[0] += 599
+    assert not schedule.due(1060, ended=False)
+    now[0] += 1
+    assert schedule.due(1061, ended=False) and not schedule.due(1062, ended=False)
+    assert schedule.due(1063, ended=True)
+    now[0] += 1e6
+    assert not CheckpointSchedule(1000, 0.0, 0).due(1, ended=False)
+    assert not CheckpointSchedule(0, 10.0, 0).due(5000, ended=True)
