@@ -48,7 +48,7 @@ class FitOutput:
     """Folder for scene.ply, report.html, config.json, metrics.json and checkpoints."""
     checkpoint_every: Expert[int] = 1000
     """Steps between two checkpoints, of which the last two are kept (0 = none)."""
-    checkpoint_minutes: float = 10.0
+    checkpoint_minutes: Expert[float] = 10.0
     """Minutes after which there is a checkpoint before those steps are over (0 = not by time)."""
     resume: bool = False
     """Resume from the last checkpoint in --out, to the same bits. With more --steps than before, a
