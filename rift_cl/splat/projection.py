@@ -157,7 +157,7 @@ def project(device: Device, splats: Splats, camera: Camera, settings: SplatSetti
         radius_clip=settings.radius_clip,
         shape_modes=splats.shape_modes,
         color_modes=splats.color_modes,
-        **_mode_macros(splats, settings),
+        **_extent_macros(splats, settings),
         RUN=device.traits.run,
         TILE=settings.edge,
         SMOOTH=settings.smooth_cutoff,
@@ -174,7 +174,7 @@ def project_modes(projection: Projection) -> ScreenModes:
         DeviceMemoryError: the device has too little memory.
     """
     device, splats = projection.device, projection.splats
-    macros = _mode_macros(splats, projection.settings)
+    macros = _mode_macros(splats)
     table = device.empty((len(splats), table_width(splats)))
     device.launch(
         "hermite_project",
@@ -289,7 +289,7 @@ def project_modes_grad(projection: Projection, moments: DeviceArray) -> ModeGrad
         view_parts=out.view_parts,
         grad_shape_modes=out.shape_modes,
         grad_color_modes=out.color_modes,
-        **_mode_macros(splats, projection.settings),
+        **_mode_macros(splats),
         RUN=device.traits.run,
         CHANNELS=channels,
     )
@@ -327,18 +327,21 @@ def is_modal(splats: Modal, settings: SplatSettings) -> bool:
     return modes or settings.activation != "clamp"
 
 
-def _mode_macros(splats: Splats, settings: SplatSettings) -> dict[str, int]:
-    """What ``hermite_project.h`` and ``hermite_extent.h`` are told; nothing for plain splats."""
-    if not is_modal(splats, settings):
-        return {}
+def _mode_macros(splats: Splats) -> dict[str, int]:
+    """What ``hermite_project.h`` is told of the modes."""
     orders = ModeOrders.of(splats)
     return {
-        "MODAL": 1,
         "SHAPE_ORDER": orders.shape,
         "COLOR_ORDER": orders.color,
         "COLOR_CHANNELS": orders.channels,
-        "SQUARE": settings.activation == "square",
     }
+
+
+def _extent_macros(splats: Splats, settings: SplatSettings) -> dict[str, int]:
+    """What ``hermite_extent.h`` is told of the modes; nothing for plain splats."""
+    if not is_modal(splats, settings):
+        return {}
+    return {"MODAL": 1, "SQUARE": settings.activation == "square"} | _mode_macros(splats)
 
 
 def _check(device: Device, splats: Splats, camera: Camera, settings: SplatSettings) -> None:

@@ -1,6 +1,7 @@
 """The compile gate: what is in order passes, and each of its faults is found."""
 
 import json
+import re
 
 import pytest
 import touched
@@ -53,6 +54,17 @@ def test_every_kernel_has_variants_for_its_kinds_of_device(tool):
     for kernel, wanted in kinds.items():
         assert {variant.kind for variant in found if variant.kernel == kernel} == wanted
     assert len(set(found)) == len(found)
+
+
+def test_kernels_are_built_with_macros_that_they_read(tool):
+    """One that a kernel does not read has it compiled again for each of its values."""
+    source = tool("portability.offline").kernel_source
+    words = {}
+    for variant in tool("portability.variants").variants():
+        if variant.kernel not in words:
+            words[variant.kernel] = set(re.findall(r"\w+", source(variant.kernel)))
+        names = {macro.partition("=")[0] for macro in variant.macros}
+        assert names <= words[variant.kernel], variant
 
 
 def test_a_record_grows_and_forgets_kernels_that_are_gone(tmp_path, monkeypatch):

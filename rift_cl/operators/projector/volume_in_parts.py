@@ -11,8 +11,12 @@ from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from rift_cl.cl.budget import cut_evenly, largest_pair, plan_chunks
+from rift_cl.cl.device import Device
+from rift_cl.cl.discovery import default_device
+from rift_cl.errors import InputError
 from rift_cl.geometry import Grid
 from rift_cl.operators.linear import Chunk, LinearOperator
 from rift_cl.operators.projector.projector import Projector
@@ -30,6 +34,33 @@ class VolumeInParts(Projector):
     scan: Any
     # Whether only the fewest views have scratch memory at a time.
     _sparing = False
+
+    def __init__(
+        self,
+        grid: Grid,
+        scan: Any,
+        device: Device | None,
+        dtype: DTypeLike,
+        *,
+        rows: int | None = None,
+    ) -> None:
+        """Check the grid.
+
+        Args:
+            grid: of the volume.
+            scan: where source and detector are.
+            device: the default device if not given.
+            dtype: of its arrays.
+            rows: of the data; as many as there are slices if not given.
+        """
+        if not isinstance(grid, Grid) or len(grid.shape) != 3:
+            raise InputError(
+                f"grid is {grid!r:.60}, wanted that of a volume, such as Grid((256, 256, 256)): "
+                f"the rays of a {type(scan).__name__} run through one"
+            )
+        shape = scan.views, grid.slices if rows is None else rows, scan.bins
+        super().__init__(grid.shape, shape, device or default_device(), dtype)
+        self.grid, self.scan = grid, scan
 
     def _need(self, slices: int, views: int, *, sparing: bool) -> tuple[int, int]:
         """Bytes that so many slices and views take with all their records, and the largest array.

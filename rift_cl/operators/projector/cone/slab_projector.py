@@ -8,7 +8,7 @@ in reverse, with the same numbers. ``kernels/include/cone/slab_table.h`` derives
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -18,8 +18,6 @@ from numpy.typing import DTypeLike
 
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
-from rift_cl.cl.discovery import default_device
-from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Grid
 from rift_cl.operators.projector.cone.slab_table import Samples, SlabTable, ray_lengths, slab_table
 from rift_cl.operators.projector.footprint import check_depth_power, check_footprint
@@ -83,18 +81,22 @@ class SlabProjector(VolumeInParts):
         *,
         depth_power: int = 2,
     ) -> None:
-        if not isinstance(grid, Grid) or len(grid.shape) != 3:
-            raise InputError(
-                f"grid is {grid!r:.60}, wanted a volume such as Grid((256, 256, 256)): a cone "
-                "looks at one"
-            )
-        shape = scan.views, scan.rows, scan.bins
-        super().__init__(grid.shape, shape, device or default_device(), dtype)
-        self.grid, self.scan = grid, scan
-        self.footprint = check_footprint(footprint, _FOOTPRINTS)
+        super().__init__(grid, scan, device, dtype, rows=scan.rows)
+        self._settle(footprint, _FOOTPRINTS, depth_power, slab_table)
+
+    def _settle(
+        self,
+        footprint: str,
+        footprints: tuple[str, ...],
+        depth_power: int,
+        table: Callable[..., SlabTable],
+    ) -> None:
+        """Check how shadows are shared and weighted, and make the tables of both walks."""
+        self.footprint = check_footprint(footprint, footprints)
         self.depth_power = check_depth_power(depth_power)
         self._tables = [
-            slab_table(grid, scan, footprint, depth_power, along_x=way) for way in (True, False)
+            table(self.grid, self._beam, footprint, depth_power, along_x=way)
+            for way in (True, False)
         ]
         self._precision = {"DOUBLE": int(self.dtype == np.float64)}
 

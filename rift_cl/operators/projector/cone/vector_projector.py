@@ -19,9 +19,7 @@ from numpy.typing import DTypeLike, NDArray
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
-from rift_cl.cl.discovery import default_device
 from rift_cl.cl.host_arrays import download
-from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Grid, Vectors
 from rift_cl.operators.projector.cone.rectification import Rectification
 from rift_cl.operators.projector.cone.slab_projector import SlabProjector
@@ -65,14 +63,8 @@ class VectorProjector(VolumeInParts):
         device: Device | None = None,
         dtype: DTypeLike = np.float32,
     ) -> None:
-        if not isinstance(grid, Grid) or len(grid.shape) != 3:
-            raise InputError(
-                f"grid is {grid!r:.60}, wanted a volume such as Grid((256, 256, 256)): the rays of "
-                "Vectors run through one"
-            )
-        shape = scan.views, scan.rows, scan.bins
-        super().__init__(grid.shape, shape, device or default_device(), dtype)
-        self.grid, self.scan, self.footprint = grid, scan, footprint
+        super().__init__(grid, scan, device, dtype, rows=scan.rows)
+        self.footprint = footprint
         along_z = looking_along_z(scan)
         self._parts = [
             _Part(self, rectified(grid, scan, along_z=way))

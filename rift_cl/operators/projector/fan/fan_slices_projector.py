@@ -13,12 +13,9 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from rift_cl.cl.device import Device
-from rift_cl.cl.discovery import default_device
-from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Fan, Grid
 from rift_cl.operators.projector.cone.slab_projector import SlabProjector
 from rift_cl.operators.projector.cone.slab_table import Samples, SlabTable, fan_table
-from rift_cl.operators.projector.footprint import check_depth_power, check_footprint
 
 _FOOTPRINTS = ("strip", "linear")
 # Rows next to which a detector is far away: slices have no height on it.
@@ -57,19 +54,9 @@ class FanSlicesProjector(SlabProjector):
         *,
         depth_power: int = 1,
     ) -> None:
-        if not isinstance(grid, Grid):
-            raise InputError(f"grid is {grid!r:.60}, wanted a Grid such as Grid((8, 256, 256))")
-        shape = scan.views, grid.slices, scan.bins
         # Not that of a SlabProjector, which sees rows.
-        super(SlabProjector, self).__init__(grid.shape, shape, device or default_device(), dtype)
-        self.grid, self.scan = grid, scan
-        self.footprint = check_footprint(footprint, _FOOTPRINTS)
-        self.depth_power = check_depth_power(depth_power)
-        self._tables = [
-            fan_table(grid, self._beam, footprint, depth_power, along_x=way)
-            for way in (True, False)
-        ]
-        self._precision = {"DOUBLE": int(self.dtype == np.float64)}
+        super(SlabProjector, self).__init__(grid, scan, device, dtype)
+        self._settle(footprint, _FOOTPRINTS, depth_power, fan_table)
 
     @cached_property
     def _beam(self) -> Cone:

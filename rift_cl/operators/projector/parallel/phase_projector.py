@@ -85,7 +85,6 @@ class PhaseProjector(ParallelProjector, Projector):
         self._table_bytes = _TABLE_BYTES["cpu" if self.device.traits.is_cpu else "gpu"]
         self._precision = {"DOUBLE": int(self.dtype == np.float64)}
         self._macros = {"BLOCKS": blocks, "LOG2_PHASES": LOG2_PHASES, **self._precision}
-        self._resampling = {"STRIP": int(footprint == "strip"), **self._macros}
 
     @cached_property
     def _tables(self) -> tuple[PhaseTable, PhaseTable]:
@@ -229,7 +228,8 @@ class PhaseProjector(ParallelProjector, Projector):
             "slices": slab.total,
             "bins": self.scan.bins,
             "columns": walk.table.columns,
-            **self._resampling,
+            **self._macros,
+            **({} if walk.by_edges else {"STRIP": int(self.footprint == "strip")}),
         }
 
     def _row_run(self, slices: int, table: PhaseTable) -> int:
@@ -374,8 +374,8 @@ class _Walk:
     def __init__(self, device: Device, table: PhaseTable, dtype: np.dtype[Any]) -> None:
         self.table = table
         self.count = len(table.views)
-        by_edges = table.footprints.by_edges
-        self.resample = "radon_resample_edges" if by_edges else "radon_resample"
+        self.by_edges = table.footprints.by_edges
+        self.resample = "radon_resample_edges" if self.by_edges else "radon_resample"
         self.views = device.array(table.views)
         self.geometry = device.array(table.geometry)
         self.footprints = device.array(table.footprints.records, dtype)
