@@ -3,12 +3,13 @@
  *     place(a) = origin + (n0 + n1 a + n2 b) / (d0 + d1 a + d2 b),
  *
  * with ARC 1 origin + radius * atan of the fraction; a = a0 + da (sample0 + i) is the coordinate of
- * sample i, b that of its slab. The edges of the sample, a -+ da/2, end its shadow. STRIP 1 shares it among the entries that
- * the shadow overlaps; otherwise a hat as wide as the shadow, or two entries at least, is shared in
- * proportion to its heights; with POINT 1 it is two entries wide in any case. `places` is the first
- * entry of TAPS, `shares` what the others receive of 1 (see include/cone/slab_table.h): those of a
- * slab's samples in their second entries, then in their third ones, and so on. A sample that is
- * seen off the table is put on its edge, where entries are zero.
+ * sample i, b that of its slab. The edges of the sample, a -+ da/2, end its shadow. STRIP 1 shares
+ * it among the entries that the shadow overlaps; otherwise a hat as wide as the shadow, or two
+ * entries at least, is shared in proportion to its heights; with POINT 1 it is two entries wide in
+ * any case. `places` is the first entry of TAPS, `shares` what the others receive of 1 (see
+ * include/cone/slab_table.h): those of a slab's samples in their second entries, then in their
+ * third ones, and so on. A sample that is seen off the table is put on its edge, where entries are
+ * zero.
  *
  * forms[view] = n0 n1 n2 d0 d1 d2 origin radius.
  *

@@ -3,8 +3,8 @@
  *     table[view][r][pad + u] = gain * sum over rows i of
  *         weight(step (r + first) + center - i) length[i][u] data[view][i][u],
  *
- * step and gain being those of the column; where no column stands, entries are zero. `length` is that of a ray in units
- * of its reach across the detector.
+ * step and gain being those of the column; where no column stands, entries are zero. `length` is
+ * that of a ray in units of its reach across the detector.
  *
  * Index space: (runs of columns, rows of the table, views of this run). A CPU takes all columns of a
  * row, LANES at a time, a GPU one. `views` tells which view of the data each is, `firsts` which
@@ -29,7 +29,8 @@ KERNEL void slab_stretch(
     __global const real *restrict data, __global const real *restrict lengths,
     __global real *restrict table, __global const int *restrict views,
     __global const int *restrict firsts, __global const real *restrict steps,
-    __global const real *restrict gains, int first, int detector_rows, int bins, int rows, int columns, int pad, real center)
+    __global const real *restrict gains, int first, int detector_rows, int bins, int rows,
+    int columns, int pad, real center)
 {
   const int r = (int)get_global_id(1), view = (int)get_global_id(2);
   const int c0 = (int)get_global_id(0) * RUN;

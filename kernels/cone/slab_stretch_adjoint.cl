@@ -17,7 +17,8 @@ KERNEL void slab_stretch_adjoint(
     __global real *restrict data, __global const real *restrict lengths,
     __global const real *restrict table, __global const int *restrict views,
     __global const int *restrict firsts, __global const real *restrict steps,
-    __global const real *restrict gains, int first, int detector_rows, int bins, int rows, int columns, int pad, real center)
+    __global const real *restrict gains, int first, int detector_rows, int bins, int rows,
+    int columns, int pad, real center)
 {
   const int i = (int)get_global_id(1), view = (int)get_global_id(2);
   const int u0 = (int)get_global_id(0) * RUN;

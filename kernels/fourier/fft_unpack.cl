@@ -1,7 +1,8 @@
 /* The fields of a Fourier transform become the channels of an image again: fft_pack.cl backwards.
  *
  * Values are multiplied by `scale`, one over the number of samples of a plane, and by the mask if
- * MASKED; channels behind the last are zero. `squares` gets the sum of the squares of each row. Index space: rows of the image. */
+ * MASKED; channels behind the last are zero. `squares` gets the sum of the squares of each row.
+ * Index space: rows of the image. */
 
 #include "include/portable.h"
 

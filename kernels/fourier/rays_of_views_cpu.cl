@@ -17,7 +17,8 @@ KERNEL void rays_of_views_cpu(
     __global const int *restrict order, __global const int *restrict starts,
     __global const uint *restrict offsets, __global const float *restrict shadows,
     __global const float *restrict signs, __global const float *restrict bin_response,
-    __global const int *restrict ends, int count, int slice, int slices, int bins, int window, int samples, int columns,
+    __global const int *restrict ends, int count, int slice, int slices, int bins, int window,
+    int samples, int columns,
     __global float *scratch, __global const float *restrict turns, int length, int blocks, int items)
 {
   const int item = (int)get_global_id(0);

@@ -24,7 +24,8 @@ KERNEL void rays_unpack(
   __global const float *in = fields + (long)part * length * columns + c;
   for (int r = begin; r < end; r += LANES) {
     lanes block[LANES];
-    UNROLL for (int k = 0; k < LANES; k++) block[k] = r + k < window ? LOAD(in + (long)(r + k) * columns) : (lanes)0;
+    UNROLL for (int k = 0; k < LANES; k++)
+      block[k] = r + k < window ? LOAD(in + (long)(r + k) * columns) : (lanes)0;
     TRANSPOSE(block)
     UNROLL for (int k = 0; k < LANES; k++) {
       const int ray = part * columns + c + k;

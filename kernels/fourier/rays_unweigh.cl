@@ -32,7 +32,8 @@ static void load_samples(
 KERNEL void rays_unweigh(
     __global const float *restrict rays, __global float *restrict fields,
     __global const uint *restrict turns, __global const float *restrict shadows,
-    __global const float *restrict signs, __global const float *restrict bins, int count, int samples, int length, int columns)
+    __global const float *restrict signs, __global const float *restrict bins, int count,
+    int samples, int length, int columns)
 {
   const int c = (int)get_global_id(0) * LANES;
   if (c >= columns) return;

@@ -17,7 +17,8 @@ typedef uint lanes_whole;
 static lanes sine_of_turn(lanes u) {
   const lanes v = u > 0.25f ? 0.5f - u : (u < -0.25f ? -0.5f - u : u);
   const lanes s = v * v;
-  return v * (6.28318531f + s * (-41.3417019f + s * (81.6052094f + s * (-76.703666f + s * (41.9999608f + s * -14.336856f)))));
+  return v * (6.28318531f + s * (-41.3417019f + s * (81.6052094f + s * (-76.703666f +
+      s * (41.9999608f + s * -14.336856f)))));
 }
 
 /* cos(2 pi u) for |u| <= 1/2. */

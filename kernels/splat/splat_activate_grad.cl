@@ -18,7 +18,8 @@
 #include "include/splat/activation.h"
 
 /* dL/dlog_scale of one of the three. */
-static lanes log_scale_grad(lanes trained, lanes drawn, lanes by_scale, float each_scale, lanes fading, lanes band) {
+static lanes log_scale_grad(lanes trained, lanes drawn, lanes by_scale, float each_scale,
+    lanes fading, lanes band) {
   const lanes by = trained * (trained / drawn * by_scale + each_scale);
 #if BAND
   const lanes b = band / drawn;
@@ -40,7 +41,8 @@ KERNEL void splat_activate_grad(
     const lanes b = BAND ? read_numbers(band, rows) : 0, fading = a.opacity * a.faded * by_opacity;
     const lanes3 by = read3(by_scales, 3, rows), s = a.trained, d = a.drawn;
     write3(by_scales, 3, rows, lanes3_of(
-        log_scale_grad(s.x, d.x, by.x, each_scale, fading, b), log_scale_grad(s.y, d.y, by.y, each_scale, fading, b),
+        log_scale_grad(s.x, d.x, by.x, each_scale, fading, b),
+        log_scale_grad(s.y, d.y, by.y, each_scale, fading, b),
         log_scale_grad(s.z, d.z, by.z, each_scale, fading, b)));
 #if AMPLITUDE
     const lanes hidden = sigmoid(logit);

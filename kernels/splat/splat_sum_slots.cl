@@ -2,9 +2,10 @@
  *
  *     sums[i][k] = sum over the splat's slots that are live, in their order, of records[slot][k]
  *
- * What is not live holds nothing, not even zeros, and is not read. A splat's slots are contiguous and in the order of its tiles, row by row. With CONTINUED the
- * sums go on from what is there: bands of an image, one after the other, add up to the same bits
- * as the whole. Index space: splats. */
+ * What is not live holds nothing, not even zeros, and is not read. A splat's slots are contiguous
+ * and in the order of its tiles, row by row. With CONTINUED the sums go on from what is there:
+ * bands of an image, one after the other, add up to the same bits as the whole. Index space:
+ * splats. */
 
 #include "include/portable.h"
 

@@ -4,10 +4,10 @@
  *
  *     d > least[row]   and   d > 2 limit sqrt(max(median, floor[row])) + limit^2
  *
- * with the pixel's own limit[row][bin], and, if ALONE, where no pixel near it in the view before and the one behind is half as far from
- * the median: what several views see belongs to the object. Near are a row on either side, and
- * BINS_BESIDE bins, by as many as the object may move between views. `levels` holds least and floor
- * of each row.
+ * with the pixel's own limit[row][bin], and, if ALONE, where no pixel near it in the view before
+ * and the one behind is half as far from the median: what several views see belongs to the object.
+ * Near are a row on either side, and BINS_BESIDE bins, by as many as the object may move between
+ * views. `levels` holds least and floor of each row.
  *
  * Index space: (runs of RUN bins, rows, views). */
 

@@ -63,7 +63,8 @@ static void map_modes(float *modes, float3 column0, float3 column1, float3 colum
       for (int b = degree; b >= 0; b--) {
         const int c = degree - b, size = (c + 1) * (c + 2) / 2;
         const float *power = powers + modes_below(c);
-        const float factor = given[(b + c) * (b + c + 1) / 2 + c] * inverse_root[a] * inverse_root[b] * inverse_root[c];
+        const float factor = given[(b + c) * (b + c + 1) / 2 + c] *
+            inverse_root[a] * inverse_root[b] * inverse_root[c];
         if (c > 0) times_form(part, c - 1, column1);
         for (int k = 0; k < size; k++) part[k] = (c > 0 ? part[k] : 0) + factor * power[k];
       }

@@ -84,7 +84,8 @@ static void spirals(lanes x, lanes y, lanes *re, lanes *im) {
 
 /* The next of the radial polynomials after `here` and `below`. */
 static lanes next_radial(lanes q, int p, int l, lanes here, lanes below) {
-  return ((q - (float)(2 * p + 1 + l)) * here - ROOT[p] * ROOT[p + l] * below) * (1 / (ROOT[p + 1] * ROOT[p + 1 + l]));
+  return ((q - (float)(2 * p + 1 + l)) * here - ROOT[p] * ROOT[p + l] * below) *
+      (1 / (ROOT[p + 1] * ROOT[p + 1 + l]));
 }
 
 /* All modes at (x, y), times factor. */
