@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 
 from rift_cl.commands.options import RepeatableRun
 from rift_cl.errors import InputError
-from rift_cl.option_marks import Auto, Several
+from rift_cl.option_marks import Auto, AutoExpert, Expert, Several
 
 _MOST_VIEWS = 10_000
 
@@ -35,14 +35,14 @@ class PlanTarget:
     pilot: Auto[Path] = None
     """A first reconstruction (a volume of 'rift reconstruct') as the prior of the target's power
     spectrum. Default: a power law 1/k^2."""
-    pilot_spacing: Auto[float] = None
+    pilot_spacing: AutoExpert[float] = None
     """Sample spacing of --pilot in millimetres. Default: such that the target fills the volume."""
-    prior_trust: float = 1.0
+    prior_trust: Expert[float] = 1.0
     """Fraction of the spectrum of --pilot that is trusted, 0 to 1; the rest is taken to be
     isotropic. 0.8 costs little where the pilot is right, and saves much where it is wrong."""
-    prior_blur: float = 0.0
+    prior_blur: Expert[float] = 0.0
     """Angular uncertainty of the spectrum of --pilot in degrees; it is blurred by as much."""
-    snr: float = 1000.0
+    snr: Expert[float] = 1000.0
     """Signal-to-noise ratio of one view at one cycle per diameter."""
     band: Auto[float] = None
     """Highest frequency of interest, in cycles per millimetre. Default: 16 per diameter."""
@@ -67,7 +67,7 @@ class PlanCameras:
     distance: Auto[tuple[float, float]] = None
     """Nearest and farthest distance from the target's centre in millimetres. Default: as near as
     the target fits into the picture."""
-    cover: float = 1.0
+    cover: Expert[float] = 1.0
     """Fraction of the target's outline that must lie in each picture, above 0, up to 1."""
     path: Literal["free", "ring", "tilted-rings", "spline"] = "free"
     """Shape of the camera path: free positions, one ring, several tilted rings, or a smooth
