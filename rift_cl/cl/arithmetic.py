@@ -1,4 +1,4 @@
-"""Arithmetic on whole device arrays, where no kernel of its own has a reason to exist.
+"""Arithmetic on whole arrays, where no kernel of its own has a reason to exist.
 
 pyopencl's own operators would build kernels that ``rift_cl.cl`` knows nothing of.
 """
@@ -9,17 +9,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rift_cl.cl.passing_parts import CPU_RUN, pass_parts
+
 if TYPE_CHECKING:
-    from rift_cl.cl.array import DeviceArray
+    from rift_cl.cl.array import AnyArray, DeviceArray
     from rift_cl.cl.device import Device
 
-# Samples that one work-item of a CPU goes through; rows that one run of a column sum has.
-_CPU_RUN, _SUM_RUN = 4096, 64
+# Rows that one run of a column sum has.
+_SUM_RUN = 64
 
 
-def axpby(device: Device, a: float, x: DeviceArray, b: float, y: DeviceArray) -> None:
-    """Y = a x + b y on device arrays of the same shape and type, float32 or float64."""
-    run = _CPU_RUN if device.traits.is_cpu else 1
+def axpby(device: Device, a: float, x: AnyArray, b: float, y: AnyArray) -> None:
+    """Y = a x + b y on arrays of the same shape and type, float32 or float64.
+
+    Both are on the device, or both on the host: then parts of them pass through the device.
+    """
+    if isinstance(x, np.ndarray) and isinstance(y, np.ndarray):
+        pass_parts(device, lambda x, y: axpby(device, a, x, b, y), x, y)
+        return
+    run = CPU_RUN if device.traits.is_cpu else 1
     macros = {"RUN": run, "DOUBLE": int(y.dtype == np.float64)}
     device.launch("axpby", (-(-y.size // run),), x=x, y=y, a=a, b=b, size=y.size, **macros)
 

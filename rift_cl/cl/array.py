@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import DTypeLike
+from numpy.typing import DTypeLike, NDArray
 
 
 class DeviceArray(Protocol):
@@ -59,3 +59,7 @@ class DeviceArray(Protocol):
 
     def view(self, dtype: DTypeLike) -> DeviceArray:
         """The same bits taken for numbers of another type."""
+
+
+# An array that the device holds, or one on the host, parts of which pass through it.
+AnyArray = DeviceArray | NDArray[Any]

@@ -61,6 +61,12 @@ def _free_host_memory(moment: int) -> int | None:
         return None
 
 
+def host_budget() -> int:
+    """Bytes of host memory that may be taken: 60 % of what is free, all where that is not told."""
+    free = free_host_memory()
+    return _MOST if free is None else int(_HOST_SHARE * free)
+
+
 def memory_budget(traits: Traits, limit: int | None = None) -> int:
     """Bytes that a device may use.
 
@@ -69,9 +75,8 @@ def memory_budget(traits: Traits, limit: int | None = None) -> int:
     ``RIFT_MEMORY``.
     """
     amounts = [traits.usable_memory]
-    free = free_host_memory() if traits.is_cpu or traits.unified else None
-    if free is not None:
-        amounts.append(int(_HOST_SHARE * free))
+    if traits.is_cpu or traits.unified:
+        amounts.append(host_budget())
     if limit is None and os.environ.get("RIFT_MEMORY"):
         limit = parse_bytes(os.environ["RIFT_MEMORY"])
     if limit is not None:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from rift_cl.cl.array import DeviceArray
+from rift_cl.cl.array import AnyArray, DeviceArray
 from rift_cl.cl.budget import check_array, memory_budget
 from rift_cl.cl.build.driver_record import OTHER_KIND, driver_identity, read_record
 from rift_cl.cl.failures import driver_errors, named_error, named_errors
@@ -193,9 +193,9 @@ class Device:
         """As ``array``, for float32 in C order, without waiting for what was enqueued before."""
         return send(self, host)
 
-    def get(self, array: DeviceArray) -> NDArray[Any]:
-        """Copy a device array to the host."""
-        return download(self, array)
+    def get(self, array: AnyArray) -> NDArray[Any]:
+        """A copy on the host of an array, which may be there already."""
+        return array.copy() if isinstance(array, np.ndarray) else download(self, array)
 
     def launch(self, kernel: str, work: tuple[int, ...], /, **given: Any) -> None:
         """Enqueue a kernel over ``work`` items, as in ``launch("axpby", (n,), x=x, .., RUN=1)``.

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import threading
+import warnings
 from functools import cache
 from typing import Any
 
@@ -85,6 +86,8 @@ def open_device(selector: str | None = None, memory: int | None = None) -> Devic
         known = ", ".join(f"{d.selector} {d.name} ({d.platform})" for d in found)
         raise NoDeviceError(f"no OpenCL device fits {selector!r}; there is: {known}")
     chosen = fitting[0]
+    if selector:
+        _tell_namesakes(fitting, selector)
     if memory is None:
         return chosen
     return Device(chosen._handle, chosen.selector, memory=memory)
@@ -105,6 +108,19 @@ def default_device() -> Device:
 
 def _fitting(found: tuple[Device, ...], selector: str) -> list[Device]:
     return [device for number, device in enumerate(found) if _fits(device, number, selector)]
+
+
+def _tell_namesakes(fitting: list[Device], selector: str) -> None:
+    """Warn where a name fits two drivers of that name, of which the first is taken."""
+    first, *others = fitting
+    alike = [d for d in others if (d.name, d.platform) == (first.name, first.platform)]
+    if alike:
+        known = ", ".join(f"{d.selector} (driver {d.driver})" for d in (first, *alike))
+        warnings.warn(
+            f"{selector!r} fits {len(alike) + 1} devices named {first.name} ({first.platform}): "
+            f"{known}; the first is taken, '{alike[0].selector}' selects the next",
+            stacklevel=3,
+        )
 
 
 def _fits(device: Device, number: int, selector: str) -> bool:

@@ -1,6 +1,7 @@
-"""What solvers do to whole device arrays besides adding them: copy, weigh, clip, pull.
+"""What solvers do to whole arrays besides adding them: copy, weigh, clip, pull.
 
 Sums and multiples are in ``rift_cl.cl.arithmetic``, inner products in ``rift_cl.cl.reductions``.
+Copies, weights and clips at zero are of arrays on the host as well, all of them there.
 """
 
 from __future__ import annotations
@@ -10,17 +11,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rift_cl.cl.failures import named_errors
+from rift_cl.cl.passing_parts import CPU_RUN, pass_parts
 
 if TYPE_CHECKING:
-    from rift_cl.cl.array import DeviceArray
+    from rift_cl.cl.array import AnyArray, DeviceArray
     from rift_cl.cl.device import Device
 
-# Samples that one work-item of a CPU goes through.
-_CPU_RUN = 4096
 
-
-def copy(device: Device, x: DeviceArray, y: DeviceArray) -> None:
+def copy(device: Device, x: AnyArray, y: AnyArray) -> None:
     """Y = x, whatever y held before."""
+    if isinstance(x, np.ndarray) and isinstance(y, np.ndarray):
+        np.copyto(y, x)
+        return
+    assert not isinstance(x, np.ndarray) and not isinstance(y, np.ndarray)
     _copy_bytes(device, x, 0, y, 0, x.nbytes)
 
 
@@ -51,13 +54,19 @@ def _copy_bytes(
             )
 
 
-def multiply(device: Device, w: DeviceArray, y: DeviceArray) -> None:
+def multiply(device: Device, w: AnyArray, y: AnyArray) -> None:
     """Y = w y, sample by sample."""
+    if isinstance(w, np.ndarray) and isinstance(y, np.ndarray):
+        pass_parts(device, lambda w, y: multiply(device, w, y), w, y)
+        return
     _launch(device, "multiply", y, w=w)
 
 
-def clip_negative(device: Device, y: DeviceArray) -> None:
+def clip_negative(device: Device, y: AnyArray) -> None:
     """Y = max(y, 0), sample by sample."""
+    if isinstance(y, np.ndarray):
+        pass_parts(device, lambda y: clip_negative(device, y), y)
+        return
     _launch(device, "clip_negative", y)
 
 
@@ -73,7 +82,7 @@ def pull_to_levels(
     _launch(device, "level_pull", y, levels=levels, count=levels.size, strength=strength, x=x)
 
 
-def _launch(device: Device, kernel: str, y: DeviceArray, **given: DeviceArray | float) -> None:
-    run = _CPU_RUN if device.traits.is_cpu else 1
+def _launch(device: Device, kernel: str, y: AnyArray, **given: AnyArray | float) -> None:
+    run = CPU_RUN if device.traits.is_cpu else 1
     macros = {"RUN": run, "DOUBLE": int(y.dtype == np.float64)}
     device.launch(kernel, (-(-y.size // run),), y=y, size=y.size, **given, **macros)

@@ -1,21 +1,25 @@
-"""Inner products of device arrays, the scalars that solvers steer by.
+"""Inner products of arrays, the scalars that solvers steer by.
 
 A kernel leaves a fixed number of partial sums, each with what rounding took from it; the host adds
 those in float64. The order depends on the size and the device alone, so that equal arrays give
-equal bits, and devices without float64 lose nothing to the length of the sum.
+equal bits, and devices without float64 lose nothing to the length of the sum. Of arrays that stay
+on the host some of these partial sums are made at a time, of the same samples.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rift_cl.cl.host_arrays import download
+from rift_cl.cl.host_arrays import download, share
+from rift_cl.cl.passing_parts import most_samples
 
 if TYPE_CHECKING:
-    from rift_cl.cl.array import DeviceArray
+    from rift_cl.cl.array import AnyArray, DeviceArray
     from rift_cl.cl.device import Device
 
 # Partial sums: enough to keep a device busy, few enough for the host. A CPU gets runs that are
@@ -24,8 +28,8 @@ _CPU_SUMS, _GPU_SUMS = 256, 16384
 _SHORTEST_RUN = 4096
 
 
-def dot(device: Device, x: DeviceArray, y: DeviceArray) -> float:
-    """The inner product of two device arrays of the same shape and type.
+def dot(device: Device, x: AnyArray, y: AnyArray) -> float:
+    """The inner product of two arrays of the same shape and type, both on the device or the host.
 
     A NaN or an infinity in either shows in the result.
     """
@@ -37,17 +41,34 @@ def total(device: Device, x: DeviceArray) -> float:
     return _reduce(device, x, x, product=False)
 
 
-def norm(device: Device, x: DeviceArray) -> float:
-    """The Euclidean norm of a device array."""
+def norm(device: Device, x: AnyArray) -> float:
+    """The Euclidean norm of an array on the device or the host."""
     return math.sqrt(dot(device, x, x))
 
 
-def _reduce(device: Device, x: DeviceArray, y: DeviceArray, *, product: bool) -> float:
+def _reduce(device: Device, x: AnyArray, y: AnyArray, *, product: bool) -> float:
     if x.size == 0:
         return 0.0
-    cpu = device.traits.is_cpu
     length = -(-max(_SHORTEST_RUN, -(-x.size // _CPU_SUMS)) // 8) * 8
-    count = -(-x.size // length) if cpu else min(x.size, _GPU_SUMS)
+    count = -(-x.size // length) if device.traits.is_cpu else min(x.size, _GPU_SUMS)
+    if isinstance(x, np.ndarray) and isinstance(y, np.ndarray):
+        found = [
+            _sums(device, share(device, a), share(device, b), length, stop - first, product=product)
+            for first, stop, a, b in _items(device, x, y, length, count)
+        ]
+        sums = np.concatenate(found, axis=1)
+    else:
+        assert not isinstance(x, np.ndarray) and not isinstance(y, np.ndarray)
+        sums = _sums(device, x, y, length, count, product=product)
+    # Infinities of both signs make the NaN that they should, without a warning.
+    with np.errstate(invalid="ignore"):
+        return float(sums.sum(dtype=np.float64))
+
+
+def _sums(
+    device: Device, x: DeviceArray, y: DeviceArray, length: int, count: int, *, product: bool
+) -> NDArray[Any]:
+    """(2, count): what each work-item adds up, and what rounding took from it."""
     sums = device.empty((2, count), x.dtype)
     device.launch(
         "dot_product",
@@ -61,6 +82,30 @@ def _reduce(device: Device, x: DeviceArray, y: DeviceArray, *, product: bool) ->
         PRODUCT=int(product),
         DOUBLE=int(x.dtype == np.float64),
     )
-    # Infinities of both signs make the NaN that they should, without a warning.
-    with np.errstate(invalid="ignore"):
-        return float(download(device, sums).sum(dtype=np.float64))
+    return download(device, sums)
+
+
+def _items(
+    device: Device, x: NDArray[Any], y: NDArray[Any], length: int, count: int
+) -> Iterator[tuple[int, int, NDArray[Any], NDArray[Any]]]:
+    """Runs of work-items, from first to stop, with the samples that are theirs.
+
+    The samples of an item are a run of ``length`` on a CPU, and every ``count``-th on a GPU.
+    """
+    cpu, flat = device.traits.is_cpu, (x.reshape(-1), y.reshape(-1))
+    each = length if cpu else -(-x.size // count)
+    most = max(most_samples(device, x.itemsize) // each, 1)
+    for first in range(0, count, most):
+        stop = min(first + most, count)
+        if cpu:
+            a, b = (array[first * length : stop * length] for array in flat)
+        else:
+            a, b = (_columns(array, count, first, stop) for array in flat)
+        yield first, stop, a, b
+
+
+def _columns(array: NDArray[Any], count: int, first: int, stop: int) -> NDArray[Any]:
+    """Columns of an array in rows of ``count``, of which the last may be shorter."""
+    whole = array.size // count * count
+    columns = array[:whole].reshape(-1, count)[:, first:stop].reshape(-1)
+    return np.concatenate([columns, array[whole:][first:stop]])

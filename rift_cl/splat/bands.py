@@ -109,12 +109,21 @@ class FrameMemory:
         return within and self.fixed + self.lists(entries, tiles) <= budget
 
 
-def check_fixed(memory: FrameMemory, budget: int) -> None:
+def check_fixed(memory: FrameMemory, budget: int, largest: int) -> None:
     """Raise an error if a frame does not fit the memory in any number of bands.
 
+    Args:
+        memory: what it takes.
+        budget: bytes there are.
+        largest: bytes of the largest array that the device takes.
+
     Raises:
-        ResourceLimitError: what is taken however the image is cut does not fit the budget.
+        ResourceLimitError: what is taken however the image is cut does not fit the budget, or the
+            image is larger than the device takes in one piece.
     """
+    image = 4 * memory.pixels * memory.channels
+    what = f"an image of {memory.pixels} pixels with {memory.channels} channels"
+    check_array(image, largest, what=what, instead="draw a smaller image, or fewer channels")
     if memory.fixed > budget:
         raise ResourceLimitError(
             f"{memory.splats} splats and an image of {memory.pixels} pixels with "

@@ -182,7 +182,7 @@ class Renderer:
         channels = self._channels(splats, depth)
         behind = self._behind(background, channels)
         memory = FrameMemory.of(splats, camera.size, channels.total, settings)
-        check_fixed(memory, device.budget)
+        check_fixed(memory, device.budget, device.traits.allocation)
         projection = project(device, splats, camera, settings)
         features = gather_features(projection, channels)
         raster_pass = draw(

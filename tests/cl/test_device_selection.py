@@ -118,11 +118,20 @@ def test_an_accelerator_comes_last_and_is_no_gpu(pocl, monkeypatch):
     assert rift.open_device() is other
 
 
-def test_drivers_of_one_name_differ_by_their_version(pocl):
-    class Newer(Accelerator):
-        driver_version = "99"
+class Newer(Accelerator):
+    """The same device by a newer driver of the same name."""
 
-    assert rift.Device(Newer(pocl._handle), "9:0").identity != pocl.identity
+    driver_version = "99"
+
+
+def test_drivers_of_one_name_differ_by_their_version_and_are_told(pocl, monkeypatch):
+    newer = rift.Device(Newer(pocl._handle), "9:0")
+    assert newer.identity != pocl.identity
+    monkeypatch.setattr("rift_cl.cl.discovery._found", lambda: (pocl, newer))
+    with pytest.warns(UserWarning, match=rf"2 devices .*{pocl.selector}.*9:0 \(driver 99\).*'9:0'"):
+        assert rift.open_device(pocl.name) is pocl
+    assert rift.open_device("9:0") is newer
+    assert rift.open_device() is pocl
 
 
 def test_device_travels_as_its_selector(monkeypatch):

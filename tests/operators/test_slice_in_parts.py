@@ -96,3 +96,16 @@ def test_a_slice_too_large_for_the_spectrum_is_left_to_the_projector_that_takes_
         with pytest.warns(UserWarning, match="Projector is used"):
             A = cheapest_projector(grid, scan, device=small)
         assert type(A) is PhaseProjector
+
+
+@pytest.mark.once
+def test_a_slice_too_large_for_the_fourier_projector_is_refused_with_what_takes_it(device):
+    scan, words = (
+        rift.Parallel(np.linspace(0, 3, 40), 64),
+        "FastProjector cannot .*rift.Projector can",
+    )
+    for small in (limited(device, 200_000), limited(device, allocation=30_000)):
+        A = rift.FastProjector(rift.Grid((64, 64)), scan, device=small)
+        for apply in (A, A.T):
+            with pytest.raises(ResourceLimitError, match=words):
+                apply(normal(*apply.domain))

@@ -77,7 +77,7 @@ def test_a_budget_that_a_run_exceeds_is_told_before(device, method, monkeypatch)
     A, _, _, y = problem(device)
     monkeypatch.setattr(Device, "budget", A.scratch + 4 * y.nbytes)
     with pytest.raises(ResourceLimitError, match="one solver needs"):
-        method(A, y)
+        method(A, device.array(y))
 
 
 def test_lengths_so_small_that_squares_vanish_are_told(device):

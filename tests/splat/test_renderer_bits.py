@@ -210,7 +210,10 @@ def test_what_fits_no_bands_is_refused_in_one_sentence():
         "^100 splats and an image of 15360 pixels with 3 channels need .* budget is 1 KiB: raise"
     )
     with pytest.raises(ResourceLimitError, match=words):
-        check_fixed(memory, 1024)
+        check_fixed(memory, 1024, 1 << 40)
+    words = "^an image of 15360 pixels with 3 channels takes 180 KiB, .* takes is 100 KiB.*smaller"
+    with pytest.raises(ResourceLimitError, match=words):
+        check_fixed(memory, 1 << 40, 100 << 10)
 
 
 @pytest.mark.parametrize(

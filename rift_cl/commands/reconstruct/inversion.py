@@ -40,8 +40,9 @@ from rift_cl.reconstruct.solvers.solver import Solver
 
 Floats = NDArray[np.float32]
 AnyProjector = ParallelProjector | Projector
-# Projectors of which a formula takes arrays of a slice in parts where it must.
+# Projectors that take arrays of a slice in parts where they must, and solvers that do.
 _IN_PARTS = PhaseProjector, FanSlicesProjector
+_STEPS_IN_PARTS = "cgls", "sirt"
 # Images and sinograms, float32, that a slice needs on host and device at a time: a formula's are
 # counts, line integrals, two temporaries and the filtered ones; a method's are its state as well.
 # The next slab is read and the last one written at the same time: an image and two sinograms more.
@@ -131,9 +132,9 @@ class Inversion:
         return cut
 
     def _fitting(self, count: int, A: AnyProjector) -> list[slice]:
-        """Chunks of so many slices; a formula takes arrays of a slice in parts where it must."""
+        """Chunks of so many slices; arrays of a slice are taken in parts where that can be."""
         array = 4 * max(int(np.prod(A.grid.shape[-2:])), A.range[0] * A.range[-1])
-        if not self.settings.iterative and isinstance(A, _IN_PARTS):
+        if self._takes_parts and isinstance(A, _IN_PARTS):
             array = 0
         return plan_chunks(
             count,
@@ -144,6 +145,14 @@ class Inversion:
             array=array,
             largest=self.device.traits.allocation,
         )
+
+    @property
+    def _takes_parts(self) -> bool:
+        """Whether the method takes arrays larger than the device does in one piece."""
+        method, weighted = self.settings.method, self.settings.weights is not None
+        if method in _STEPS_IN_PARTS:
+            return not weighted and self.source.seen is None
+        return not self.settings.iterative
 
     def slices(self, first: int, projections: Floats) -> Generator[Report, None, Floats]:
         """Reconstruct a slab; a report after every step of every slice.

@@ -4,7 +4,9 @@
 
 F the weight of the residual, or the identity. Rays with weights of their own make A and y
 ``W^(1/2) A`` and ``W^(1/2) y`` beforehand (see ``weighted_rays``). Everything is on the device;
-what comes back to the host are scalars.
+what comes back to the host are scalars. Arrays that the device does not hold stay on the host
+instead, where the method allows it: A takes its parts from there, and so does the arithmetic, to
+the same bits.
 """
 
 from __future__ import annotations
@@ -13,13 +15,15 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rift_cl.cl.arithmetic import axpby
-from rift_cl.cl.budget import plan_chunks
+from rift_cl.cl.array import AnyArray
+from rift_cl.cl.budget import host_budget, plan_chunks
 from rift_cl.cl.elementwise import copy
-from rift_cl.cl.host_arrays import as_device_array, as_host_array, is_device_array
+from rift_cl.cl.host_arrays import as_device_array, as_host_array, download, is_device_array
 from rift_cl.cl.reductions import dot, norm
-from rift_cl.errors import InputError, NonFiniteError
+from rift_cl.errors import InputError, NonFiniteError, ResourceLimitError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.reconstruct.solvers.residual_weight import Precondition, residual_weight
@@ -28,6 +32,7 @@ from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays, masked_data
 # Rounds of the search for the largest eigenvalue, what is added to its answer, which comes from
 # below, and the share of it that is rounding.
 _ROUNDS, _MARGIN, _ROUNDING = 12, 1.05, 1e-6
+_INSTEAD = "cgls and sirt, without weights, take data on the host in parts, and so does fbp"
 
 
 class DataTerm:
@@ -40,6 +45,8 @@ class DataTerm:
         noise: standard deviation of the noise of a sample of y, if known.
         arrays: of the shape of x and of the shape of y that the method keeps on the device.
         weights: of the samples of y, their relative inverse variances; None: all alike.
+        in_parts: whether the method's arrays may be on the host. Rays with weights are not then,
+            nor are data that the caller has on the device.
 
     Raises:
         InputError: A is no operator, or y, ``precondition``, ``noise`` or ``weights`` cannot be
@@ -55,6 +62,8 @@ class DataTerm:
         noise: float | None,
         arrays: tuple[int, int] = (1, 2),
         weights: Any = None,
+        *,
+        in_parts: bool = False,
     ) -> None:
         if not isinstance(A, LinearOperator):
             raise InputError(
@@ -63,28 +72,45 @@ class DataTerm:
         if noise is not None and not one_number(noise) >= 0:
             raise InputError(f"noise is {noise!r}, wanted a standard deviation, 0 or more")
         self.A, self.device, self.dtype = A, A.device, A.dtype
-        images, sinograms = (math.prod(shape) for shape in (A.domain, A.range))
-        each = self.dtype.itemsize * (arrays[0] * images + arrays[1] * sinograms)
-        plan_chunks(
-            1,
-            each,
-            A.scratch,
-            self.device.budget,
-            what="solver",
-            array=self.dtype.itemsize * max(images, sinograms),
-            largest=self.device.traits.allocation,
-            instead="a solver cannot take a slice in parts, rift.fbp can",
-        )
+        in_parts = in_parts and weights is None and not is_device_array(y)
+        self.on_host = self._stays(arrays, in_parts)
+        """Whether the arrays are on the host, since the device does not hold them."""
         self.samples = max(math.prod(A.range), 1)
         """Samples of y that count."""
         self.y = self.data()
         if weights is None:
-            copy(self.device, self.on_device(y, A.range, name="y"), self.y)
+            copy(self.device, self.taken(y, A.range, name="y"), self.y)
         else:
             self._weigh_rays(y, weights)
         self.weight = residual_weight(self.A, self.y, precondition, noise)
         self.unit_gain = self.weight is None or isinstance(precondition, str)
         """Whether F keeps the size of white noise; not known of an operator of the caller's."""
+
+    def _stays(self, arrays: tuple[int, int], in_parts: bool) -> bool:
+        """Whether the method's arrays stay on the host.
+
+        Raises:
+            ResourceLimitError: the device does not hold them, and the host cannot.
+        """
+        A = self.A
+        images, sinograms = (math.prod(shape) for shape in (A.domain, A.range))
+        each = self.dtype.itemsize * (arrays[0] * images + arrays[1] * sinograms)
+        try:
+            plan_chunks(
+                1,
+                each,
+                A.scratch,
+                self.device.budget,
+                what="solver",
+                array=self.dtype.itemsize * max(images, sinograms),
+                largest=self.device.traits.allocation,
+                instead=_INSTEAD,
+            )
+        except ResourceLimitError:
+            if not in_parts or each > host_budget():
+                raise
+            return True
+        return False
 
     def _weigh_rays(self, y: Any, weights: Any) -> None:
         """Make A and y those of the weighted problem."""
@@ -92,19 +118,19 @@ class DataTerm:
         if weighted.measured == 0:
             raise InputError("weights are 0 everywhere: at least one sample must count")
         given = y if is_device_array(y) else masked_data(y, weighted.weights)
-        copy(self.device, self.on_device(given, self.A.range, name="y"), self.y)
+        copy(self.device, self.taken(given, self.A.range, name="y"), self.y)
         weighted.weigh(self.y)
         self.A, self.samples = weighted, weighted.measured
 
-    def on_device(self, x: Any, shape: tuple[int, ...], *, name: str) -> Any:
-        """An array that a caller gave, checked, on the device.
+    def taken(self, x: Any, shape: tuple[int, ...], *, name: str) -> Any:
+        """An array that a caller gave, checked, where the method's arrays are.
 
         Raises:
             InputError: its shape or type is wrong, or it holds NaN or infinity.
         """
         if not is_device_array(x):
             host = as_host_array(x, shape, name=name, wants="the operator", dtype=self.dtype)
-            return self.device.array(host, self.dtype)
+            return host if self.on_host else self.device.array(host, self.dtype)
         x = as_device_array(self.device, x, shape, name=name, dtype=self.dtype)
         if not math.isfinite(norm(self.device, x)):
             raise NonFiniteError(
@@ -114,19 +140,30 @@ class DataTerm:
         return x
 
     def image(self) -> Any:
-        """A new device array of the shape of x, its contents not set."""
-        return self.device.empty(self.A.domain, self.dtype)
+        """A new array of the shape of x, its contents not set."""
+        return self.empty(self.A.domain)
 
     def data(self) -> Any:
-        """A new device array of the shape of y, its contents not set."""
-        return self.device.empty(self.A.range, self.dtype)
+        """A new array of the shape of y, its contents not set."""
+        return self.empty(self.A.range)
+
+    def empty(self, shape: tuple[int, ...]) -> Any:
+        """A new array where the method's arrays are, its contents not set."""
+        make = np.empty if self.on_host else self.device.empty
+        return make(shape, self.dtype)
+
+    def array(self, host: NDArray[Any]) -> AnyArray:
+        """A copy of a host array where the method's arrays are."""
+        return host.astype(self.dtype) if self.on_host else self.device.array(host, self.dtype)
 
     def start(self, start: Any) -> Any:
-        """The image to begin from, a new device array: zero if None was given."""
+        """The image to begin from, a new array: zero if None was given."""
         if start is None:
-            return self.device.zeros(self.A.domain, self.dtype)
+            return self.array(np.zeros(self.A.domain, self.dtype))
+        if self.on_host and is_device_array(start):
+            start = download(self.device, start)
         image = self.image()
-        copy(self.device, self.on_device(start, self.A.domain, name="start"), image)
+        copy(self.device, self.taken(start, self.A.domain, name="start"), image)
         return image
 
     def residual(self, x: Any, out: Any) -> None:
@@ -172,8 +209,8 @@ class DataTerm:
         with an image that a seed fixes, so that the answer is the same every time.
         """
         device, random = self.device, np.random.default_rng(0)
-        image = device.array(1 + random.random(self.A.domain), self.dtype)
-        before, product = device.zeros(self.A.domain, self.dtype), self.image()
+        image = self.array(1 + random.random(self.A.domain))
+        before, product = self.array(np.zeros(self.A.domain)), self.image()
         seen, weighted = self.data(), self.data()
         diagonal: list[float] = []
         beside = [norm(device, image)]

@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import clip_negative, copy, multiply
-from rift_cl.cl.host_arrays import download
 from rift_cl.cl.reductions import dot
 from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.geometry.numbers import one_number
@@ -95,7 +94,7 @@ class OrderedSubsets(Solver):
     ) -> None:
         if not 0 < one_number(relaxation) < 2:
             raise InputError(f"relaxation is {relaxation!r}, wanted a number between 0 and 2")
-        data = DataTerm(A, y, None, noise, self.arrays, weights)
+        data = DataTerm(A, y, None, noise, self.arrays, weights, in_parts=True)
         super().__init__(data, noise)
         count, most = one_number(subsets), A.range[0]
         if not (1 <= count <= most and count.is_integer()):
@@ -103,7 +102,7 @@ class OrderedSubsets(Solver):
                 f"subsets is {subsets!r}, wanted a whole number from 1 to the {most} views"
             )
         self._nonnegative, self._length = bool(nonnegative), float(relaxation)
-        whole = download(data.device, data.y)
+        whole = data.device.get(data.y)
         chosen = view_subsets(data.A, int(count))
         self._subsets = [self._subset(views, whole, weights is None) for views in chosen]
         self._pixels = self._inverse_columns(weights is None)
@@ -118,18 +117,17 @@ class OrderedSubsets(Solver):
     def _subset(self, views: Views, whole: NDArray[Any], unweighted: bool) -> _Subset:
         data = self.data
         part = restricted(data.A, views)
-        y = data.device.array(whole[views], data.dtype)
-        rays = inverse_sums(part) if unweighted else None
-        return _Subset(views, part, y, rays, data.device.empty(part.range, data.dtype))
+        rays = inverse_sums(part, data) if unweighted else None
+        return _Subset(views, part, data.array(whole[views]), rays, data.empty(part.range))
 
     def _inverse_columns(self, unweighted: bool) -> Any:
         """One over the largest of the subsets' sums of columns; 0 where nothing is seen."""
         least = np.zeros(self.data.A.domain)
         for part in self._subsets:
-            sums = inverse_sums(part.A.T if unweighted else part.A.T @ part.A)
-            found = download(self.data.device, sums)
+            sums = part.A.T if unweighted else part.A.T @ part.A
+            found = self.data.device.get(inverse_sums(sums, self.data))
             least = np.where((found > 0) & ((least == 0) | (found < least)), found, least)
-        return self.data.device.array(least, self.data.dtype)
+        return self.data.array(least)
 
     def _advance(self) -> None:
         now, data, device = self._now, self.data, self.data.device
@@ -160,8 +158,8 @@ class OrderedSubsets(Solver):
         whole = np.empty(self.data.A.range, self.data.dtype)
         for part in self._subsets:
             self._look(part, image)
-            whole[part.views] = download(self.data.device, part.residual)
-        copy(self.data.device, self.data.device.array(whole, self.data.dtype), out)
+            whole[part.views] = self.data.device.get(part.residual)
+        copy(self.data.device, self.data.array(whole), out)
 
     def state(self) -> dict[str, NDArray[Any]]:
         """The solver's state as host arrays; computing it projects all views once."""

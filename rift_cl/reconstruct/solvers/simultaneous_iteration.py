@@ -28,7 +28,6 @@ import numpy as np
 
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import clip_negative, copy, multiply
-from rift_cl.cl.host_arrays import download
 from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.linear import LinearOperator
@@ -81,14 +80,14 @@ class Sirt(Solver):
     ) -> None:
         if not 0 < one_number(relaxation) < 2:
             raise InputError(f"relaxation is {relaxation!r}, wanted a number between 0 and 2")
-        data = DataTerm(A, y, precondition, noise, self.arrays, weights)
+        data = DataTerm(A, y, precondition, noise, self.arrays, weights, in_parts=True)
         super().__init__(data, noise)
         self._nonnegative = nonnegative
         self._rays, self._pixels, self._length = None, None, float(relaxation)
         if data.weight is None and weights is None:
-            self._rays, self._pixels = inverse_sums(A), inverse_sums(A.T)
+            self._rays, self._pixels = inverse_sums(A, data), inverse_sums(A.T, data)
         elif data.weight is None:
-            self._pixels = inverse_sums(data.A.T @ data.A)
+            self._pixels = inverse_sums(data.A.T @ data.A, data)
         else:
             largest = data.norm_squared()
             self._length = relaxation / largest if largest > 0 else 0.0
@@ -134,8 +133,8 @@ class Sirt(Solver):
         now.step += 1
 
 
-def inverse_sums(A: LinearOperator) -> Any:
-    """One over the sums of an operator's rows, as a device array; 0 where they are next to 0.
+def inverse_sums(A: LinearOperator, data: DataTerm) -> Any:
+    """One over the sums of an operator's rows, where the data are; 0 where they are next to 0.
 
     Where sums ring below zero, none counts for less than that: a ray that grazes the image would
     get a weight that only ringing has made large.
@@ -143,8 +142,7 @@ def inverse_sums(A: LinearOperator) -> Any:
     Raises:
         InputError: a sum is negative, and not by ringing.
     """
-    sums = A(A.device.array(np.ones(A.domain), A.dtype))
-    host = download(A.device, sums).astype(np.float64)
+    host = A.device.get(A(data.array(np.ones(A.domain)))).astype(np.float64)
     largest = host.max(initial=0.0)
     below = -host.min(initial=0.0)
     if below > _RINGING * largest:
@@ -152,9 +150,7 @@ def inverse_sums(A: LinearOperator) -> Any:
             "A has rows or columns with a negative sum, and SIRT wants weights >= 0: use cgls"
         )
     counts = host > _LEAST * largest
-    return A.device.array(
-        np.where(counts, 1 / np.where(counts, np.maximum(host, below), 1), 0), A.dtype
-    )
+    return data.array(np.where(counts, 1 / np.where(counts, np.maximum(host, below), 1), 0))
 
 
 def sirt(

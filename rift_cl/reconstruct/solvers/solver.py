@@ -1,6 +1,6 @@
 """What all iterative methods have in common: steps, when to stop, and a state to go on from.
 
-A method is a class with a record of its state, arrays on the device and numbers; each step is a
+A method is a class with a record of its state, arrays and numbers; each step is a
 function of that record alone, so that a run that was broken off and restored gives the same bits
 as one that was not.
 
@@ -70,12 +70,15 @@ class Solver(ABC):
 
     @property
     def image(self) -> Any:
-        """The image so far, a device array that the next step may change."""
+        """The image so far, which the next step may change.
+
+        A device array; of what the device does not hold, one on the host (``DataTerm.on_host``).
+        """
         return self._now.image
 
     @property
     def residual(self) -> Any:
-        """``A image - y`` so far, a device array that the next step may change."""
+        """``A image - y`` so far, where the image is; the next step may change it."""
         return self._now.residual
 
     @property
@@ -110,7 +113,7 @@ class Solver(ABC):
         """All that the next step depends on, as host arrays."""
         device = self.data.device
         return {
-            name: device.get(value) if is_device_array(value) else np.asarray(value)
+            name: device.get(value) if _is_array(value) else np.asarray(value)
             for name, value in self._entries()
         }
 
@@ -136,9 +139,8 @@ class Solver(ABC):
             raise CheckpointError(f"state holds {found[low[0]]} for {low[0]}: it is damaged")
         self._demand_own(found)
         for name, value in entries.items():
-            if is_device_array(value):
-                fresh = self.data.device.array(found[name], self.data.dtype)
-                copy(self.data.device, fresh, value)
+            if _is_array(value):
+                copy(self.data.device, self.data.array(found[name]), value)
             else:
                 setattr(self._now, name, type(value)(found[name]))
         self._exhausted = False
@@ -150,8 +152,8 @@ class Solver(ABC):
             CheckpointError: it is not.
         """
         data, residual = self.data, self.data.data()
-        self._measured(data.device.array(found["image"], data.dtype), residual)
-        given = data.device.array(found["residual"], data.dtype)
+        self._measured(data.array(found["image"]), residual)
+        given = data.array(found["residual"])
         axpby(data.device, -1.0, residual, 1.0, given)
         size = data.rms(residual) + data.rms(data.y)
         if data.rms(given) > _SAME_RESIDUAL * size:
@@ -194,7 +196,12 @@ def solve(solver: Solver, steps: int, *, like: Any, out: Any = None) -> Any:
     for _ in solver.run(steps):
         pass
     if here:
-        return download(data.device, solver.image, out)
+        if not data.on_host:
+            return download(data.device, solver.image, out)
+        if out is None:
+            return solver.image
+        np.copyto(out, solver.image)
+        return out
     if out is None:
         return solver.image
     copy(data.device, solver.image, out)
@@ -213,6 +220,11 @@ def check_steps(steps: Any, *, name: str = "steps") -> int:
     return int(number)
 
 
+def _is_array(value: Any) -> bool:
+    """Whether something of a state is an array, on the device or on the host."""
+    return isinstance(value, np.ndarray) or is_device_array(value)
+
+
 def _form(value: Any) -> tuple[tuple[int, ...], str]:
-    array = value if is_device_array(value) else np.asarray(value)
+    array = value if _is_array(value) else np.asarray(value)
     return tuple(array.shape), str(array.dtype)

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from rift_cl.cl.array import DeviceArray
+from rift_cl.cl.budget import check_array
 from rift_cl.cl.device import Device
 from rift_cl.errors import InputError
 from rift_cl.geometry import Grid, Parallel
@@ -183,6 +184,9 @@ class FastProjector(ParallelProjector):
 
     @cached_property
     def _tables(self) -> RayTables:
+        # Before any of them is made; how much memory there is tells ``chunks``.
+        largest, what = self.device.traits.allocation, "an array of one slice"
+        check_array(4 * self._largest, largest, what=what, instead=self._instead)
         return RayTables(self.device, self._rays, self.gridding, self._columns, self._samples)
 
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
@@ -387,15 +391,22 @@ class FastProjector(ParallelProjector):
     @property
     def fits(self) -> bool:
         """Whether a slice fits the device now, told before any table is made."""
-        found, edges = self._rays, self.gridding.edges
-        image, views = math.prod(self.grid.shape[-2:]), len(self.scan.angles) * self.scan.bins
-        fields = 2 * max(found.length * self._columns, edges[1] * self._spectrum.pairs)
-        largest = max(image, views, fields, self._ray_entries, self._spectrum.entries)
-        blocks = (
-            BlockTransform(self.device, found.length).nbytes if self.device.traits.is_cpu else 0
-        )
-        need = self._working + 4 * (image + views) + self._spectrum.nbytes + blocks
-        return need <= self.device.budget and 4 * largest <= self.device.traits.allocation
+        cpu = self.device.traits.is_cpu
+        blocks = BlockTransform(self.device, self.period).nbytes if cpu else 0
+        need = self._working + 4 * sum(self._slice) + self._spectrum.nbytes + blocks
+        return need <= self.device.budget and 4 * self._largest <= self.device.traits.allocation
+
+    @property
+    def _slice(self) -> tuple[int, int]:
+        """Numbers of a slice, and of its views."""
+        return math.prod(self.grid.shape[-2:]), len(self.scan.angles) * self.scan.bins
+
+    @property
+    def _largest(self) -> int:
+        """Numbers of the largest array that a slice takes."""
+        edge = self.gridding.edges[1]
+        fields = 2 * max(self.period * self._columns, edge * self._spectrum.pairs)
+        return max(*self._slice, fields, self._ray_entries, self._spectrum.entries)
 
     @property
     def _ray_entries(self) -> int:
