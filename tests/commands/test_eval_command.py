@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -59,6 +61,13 @@ def test_a_fit_is_scored_as_it_scored_itself(capture, fitted, tmp_path, capsys):
     assert [view["name"] for view in found["views"][capture.name]] == ["0.png", "4.png"]
     page = (out / "report.html").read_text()
     assert "degrees away" in page and page.count('class="pair"') == 2
+    own = metrics_of(fitted)["errors"]["held out"]
+    for kind, rows in found["errors"][capture.name].items():
+        assert rows and len(rows) == len(own[kind]), kind
+        for row, mine in zip(rows, own[kind], strict=True):
+            assert row.pop("region", None) == mine.pop("region", None)
+            assert row == pytest.approx(mine, rel=1e-3), kind
+    assert "silhouette" in page and "cycles per pixel" in page
 
 
 def test_without_training_views_there_are_no_baselines(capture, fitted, tmp_path, capsys):
@@ -87,6 +96,24 @@ def test_a_dry_run_says_what_would_be_scored(capture, fitted, tmp_path, capsys):
     assert evaluate(fitted / "scene.ply", tmp_path / "scores", capture, "--dry-run") == 0
     printed = capsys.readouterr().out
     assert "8 views" in printed and "no baselines" in printed
+    assert not (tmp_path / "scores").exists()
+
+
+def test_flip_is_scored_when_asked_for(capture, fitted, tmp_path, monkeypatch):
+    module = SimpleNamespace(evaluate=lambda *pair, **more: (None, 0.25, {}))
+    monkeypatch.setitem(sys.modules, "flip_evaluator", module)
+    assert evaluate(fitted, tmp_path / "scores", "--flip") == 0
+    scores = metrics_of(tmp_path / "scores")["scores"]["held out"]
+    assert scores["fit_flip"] == scores["nearest_flip"] == 0.25
+    assert "FLIP" in (tmp_path / "scores" / "report.html").read_text()
+
+
+def test_scores_that_cannot_be_had_are_named(fitted, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "flip_evaluator", None)
+    assert evaluate(fitted, tmp_path / "scores", "--flip") == 3
+    assert "flip-evaluator" in capsys.readouterr().err
+    assert evaluate(fitted, tmp_path / "scores", "--lpips", tmp_path / "none.pth") == 3
+    assert "LPIPS" in capsys.readouterr().err.upper()
     assert not (tmp_path / "scores").exists()
 
 

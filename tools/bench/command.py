@@ -9,7 +9,7 @@ from pathlib import Path
 
 import rift_cl as rift
 from bench.costs import CoverageError
-from bench.history import Record, keep
+from bench.history import Record, keep, kept
 from bench.table import Table, show
 from rift_cl.io import write_text
 
@@ -28,6 +28,7 @@ def report(
     page: Callable[[Record], str],
     tables: Callable[[Record], Iterable[Table]],
     keep_in: Path | None = None,
+    kept: Callable[[Record], Record] = kept,
 ) -> int:
     """Write every record as it grows, print the tables of the last one; the exit status.
 
@@ -39,6 +40,7 @@ def report(
         page: of a record.
         tables: of a record.
         keep_in: folder for the last record by date, if it is to be kept.
+        kept: what is kept of it.
     """
     record: Record = {}
     try:
@@ -50,6 +52,6 @@ def report(
         say(f"{name}: {error}")
         return error.exit_status if isinstance(error, rift.RiftError) else 1
     if keep_in is not None:
-        say(f"kept as {keep(record, keep_in)}")
+        say(f"kept as {keep(record, keep_in, kept)}")
     show(tables(record))
     return 0

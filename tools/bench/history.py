@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -47,8 +47,14 @@ def kept(record: Record) -> Record:
     }
 
 
-def keep(record: Record, folder: Path = FOLDER) -> Path:
-    """Write a record's result as DATE-DEVICE.json, in place of an earlier one; return its path."""
+def keep(record: Record, folder: Path = FOLDER, kept: Callable[[Record], Record] = kept) -> Path:
+    """Write a record's result as DATE-DEVICE.json, in place of an earlier one; return its path.
+
+    Args:
+        record: of a benchmark.
+        folder: where results of this benchmark are kept.
+        kept: what is kept of a record.
+    """
     device = re.sub(r"[^a-z0-9]+", "-", record["device"]["name"].lower()).strip("-")
     path = folder / f"{record['date'][:10]}-{device}.json"
     write_text(path, json.dumps(kept(record), indent=1) + "\n")

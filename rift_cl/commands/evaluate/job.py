@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +12,20 @@ from rift_cl.commands.cameras.fit_cameras import FitCameras, open_fit_cameras
 from rift_cl.commands.evaluate.report import eval_page
 from rift_cl.commands.evaluate.settings import EvalSettings
 from rift_cl.commands.fit_photos.pictures import CapturePictures
-from rift_cl.commands.fit_photos.scores import ViewScore, score_record, score_views
+from rift_cl.commands.fit_photos.scores import (
+    Score,
+    ViewScore,
+    error_record,
+    score_record,
+    score_views,
+)
 from rift_cl.commands.fit_photos.view_split import open_seen, split_views
 from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import InputError
 from rift_cl.io.captures.capture import View, camera_at, capture_name, holds_bare_photographs
+from rift_cl.metrics import flip
+from rift_cl.metrics.perceptual import flip_evaluator
 from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
 
@@ -45,6 +54,7 @@ class Evaluation:
         elif len(self.groups) < len(settings.captures):
             raise InputError("two captures have the same name: rename one folder")
         self.training_views = self._training_views()
+        self.more = self._more()
         for view in [*self.training_views, *(v for views in self.groups.values() for v in views)]:
             camera_at(view, self.downscale)
         self.device = settings.open_device()
@@ -57,6 +67,20 @@ class Evaluation:
         """The settings with the values that were decided."""
         eps2d = self.scene.rendering.eps2d
         return replace(absolute_paths(self.settings), eps2d=eps2d, downscale=self.downscale)
+
+    def _more(self) -> dict[str, Score]:
+        """The scores that were asked for besides PSNR and SSIM.
+
+        Raises:
+            InputError: the package that one needs is missing, or its weights are.
+        """
+        more: dict[str, Score] = {}
+        if self.settings.flip:
+            flip_evaluator()
+            more["flip"] = flip
+        if self.settings.lpips is not None:
+            more["lpips"] = _lpips(self.settings.lpips)
+        return more
 
     def _scored(self, path: Path) -> tuple[View, ...]:
         """The views of a capture that are scored.
@@ -142,6 +166,7 @@ class Evaluation:
             "trained on": trained,
             "downscale": str(self.downscale),
             "eps2d": f"{self.scene.rendering.eps2d:g}",
+            "scores": ", ".join(["PSNR", "SSIM", *(name.upper() for name in self.more)]),
             "device": self.device.name,
         }
 
@@ -154,7 +179,7 @@ class Evaluation:
         for name, views in self.groups.items():
             test = self._pictures(views, training)
             self.scores[name] = []
-            for score in score_views(renderer, splats, test, training):
+            for score in score_views(renderer, splats, test, training, self.more):
                 self.scores[name].append(score)
                 yield Report(len(self.scores[name]), len(views), f"views of {name}")
         self.metrics = {
@@ -162,6 +187,7 @@ class Evaluation:
             "eps2d": self.scene.rendering.eps2d,
             "downscale": self.downscale,
             **score_record(self.scores),
+            **error_record(self.scores),
         }
         page = eval_page(self.scene.name, self.scores, self.metrics)
         self.folder.finish(self.decided, self.metrics, page, self.device, asked=self.settings)
@@ -176,3 +202,16 @@ class Evaluation:
         if self.settings.background is not None:
             pictures.behind = self.scene.background
         return pictures
+
+
+def _lpips(weights: Path) -> Score:
+    """LPIPS with weights from a file.
+
+    Raises:
+        InputError: torch is missing, or the weights cannot be read.
+    """
+    if find_spec("torch") is None:
+        raise InputError("--lpips needs torch, which is not installed: pip install torch")
+    from rift_cl.interop.lpips import Lpips
+
+    return Lpips(weights)

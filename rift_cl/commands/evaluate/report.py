@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from itertools import compress
 from typing import Any
 
-from rift_cl.commands.fit_photos.report import COLUMNS, SCORING, score_rows, show_views
+from rift_cl.commands.fit_photos.error_places_report import show_error_places
+from rift_cl.commands.fit_photos.report import COLUMNS, SCORES, SCORING, score_rows, show_views
 from rift_cl.commands.fit_photos.scores import ViewScore
 from rift_cl.report.html_page import Page
 
@@ -26,11 +27,11 @@ def eval_page(
     page.table(*score_table(metrics), caption=SCORING)
     for group, scores in groups.items():
         trained = any("nearest_psnr" in score.values for score in scores)
-        front = any("fit_psnr_foreground" in score.values for score in scores)
-        columns = ["picture", "PSNR", *(["PSNR foreground"] if front else []), "SSIM"]
-        columns += _TRAINED if trained else []
-        rows = [_row(score, front, trained) for score in scores]
+        kinds = [kind for kind in SCORES if any(f"fit_{kind}" in s.values for s in scores)]
+        columns = ["picture", *(SCORES[kind] for kind in kinds), *(_TRAINED if trained else ())]
+        rows = [_row(score, kinds, trained) for score in scores]
         page.table(columns, rows, caption=group)
+    show_error_places(page, metrics["errors"])
     return page
 
 
@@ -45,10 +46,9 @@ def _unknown(cell: Any) -> bool:
     return isinstance(cell, float) and math.isnan(cell)
 
 
-def _row(score: ViewScore, front: bool, trained: bool) -> tuple[Any, ...]:
+def _row(score: ViewScore, kinds: Sequence[str], trained: bool) -> tuple[Any, ...]:
     values = score.values
-    middle = (values.get("fit_psnr_foreground"),) if front else ()
-    cells = (score.name, values["fit_psnr"], *middle, values["fit_ssim"])
+    cells = (score.name, *(values.get(f"fit_{kind}") for kind in kinds))
     if not trained:
         return cells
     return (*cells, score.angle, values.get("nearest_psnr"), values.get("blend_psnr"))

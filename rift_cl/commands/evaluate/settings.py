@@ -32,6 +32,12 @@ class EvalInput(SceneInput):
     'rift fit' does (0 = score all)."""
     downscale: Auto[int] = None
     """Whole factor by which photographs are downscaled. Default: that of the fit, or 1."""
+    flip: bool = False
+    """Score FLIP too, the difference that a person sees who flips between two pictures (0 is
+    best). Needs flip-evaluator (pip install flip-evaluator)."""
+    lpips: Auto[Path] = None
+    """Score LPIPS too (0 is best), with the network's weights from this file: torch.save of the
+    state_dict() of lpips.LPIPS, net 'alex' or 'vgg'. Needs torch. Default: no LPIPS."""
 
 
 @dataclass(frozen=True, kw_only=True)

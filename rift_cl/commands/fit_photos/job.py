@@ -16,7 +16,7 @@ from rift_cl.commands.fit_photos.bare_input import BareInput
 from rift_cl.commands.fit_photos.photograph_size import fitting_downscale, size_words
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.report import fit_page, history_notes, ramp_notes
-from rift_cl.commands.fit_photos.scores import score_record, score_views
+from rift_cl.commands.fit_photos.scores import error_record, score_record, score_views
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.fit_photos.start import first_splats
 from rift_cl.commands.fit_photos.view_split import open_seen, split_views
@@ -199,6 +199,7 @@ class Fit(FitRun[FitPhotosSettings]):
             "background": pictures.behind.tolist(),
             **settings.basis_facts(),
             **score_record(self.scores),
+            **error_record(self.scores),
         }
         ramp = ramp_notes(settings, len(self.training_views))
         notes = [*self._notes(), *ramp, *history_notes(self._history)]

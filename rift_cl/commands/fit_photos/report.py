@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rift_cl.commands.fit_photos.error_places_report import show_error_places
 from rift_cl.commands.fit_photos.scores import ViewScore
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.pictures.evenly_spaced import evenly
@@ -25,15 +26,21 @@ SCORING = (
     "'blend' are the nearest training picture and the mean of the two nearest: what no fit scores."
 )
 COLUMNS = ("pictures", "score", "fit", "nearest", "blend")
+# Kinds of scores and what tables call them.
+SCORES = {
+    "psnr": "PSNR",
+    "psnr_foreground": "PSNR foreground",
+    "ssim": "SSIM",
+    "flip": "FLIP (0 is best)",
+    "lpips": "LPIPS (0 is best)",
+}
 
 
 def score_rows(metrics: Mapping[str, Any]) -> list[tuple[Any, ...]]:
     """The table of mean scores: a row for each group of pictures and kind of score."""
     rows = []
     for group, values in metrics["scores"].items():
-        for kind, label in (
-            ("psnr", "PSNR"), ("psnr_foreground", "PSNR foreground"), ("ssim", "SSIM")
-        ):  # fmt: skip
+        for kind, label in SCORES.items():
             if f"fit_{kind}" in values:
                 cells = (values.get(f"{name}_{kind}", float("nan")) for name in COLUMNS[2:])
                 rows.append((group, label, *cells))
@@ -108,6 +115,7 @@ def show_fit(
         columns = ("picture", "degrees away", "PSNR", "SSIM", "blend PSNR")
         caption = f"{group}: degrees away from the nearest picture that was trained on."
         page.table(columns, rows, caption=caption)
+    show_error_places(page, metrics["errors"])
     page.section("Training")
     steps, values = zip(*losses, strict=True)
     draw = partial(curves, {"loss": (steps, values)}, xlabel="step", ylabel="loss")

@@ -8,14 +8,20 @@ differs from the background by more than two codes, or what alpha says.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import functools
+import math
+import operator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.commands.fit_photos.error_places import ErrorPlaces, by_distance, by_elevation
 from rift_cl.commands.fit_photos.pictures import CapturePictures
+from rift_cl.commands.inputs.scene_bounds import common_up
+from rift_cl.commands.pictures.views_table import angles_of
 from rift_cl.geometry import Camera
 from rift_cl.metrics import psnr, ssim
 from rift_cl.splat.renderer import Renderer
@@ -24,6 +30,8 @@ from rift_cl.train.start.points import focus_of
 
 Floats = NDArray[np.float32]
 Masks = tuple[NDArray[np.bool_] | None, NDArray[np.bool_] | None]
+# A score of a picture (height, width, 3) in display light beside the truth.
+Score = Callable[[Floats, Floats], float]
 
 
 @dataclass(frozen=True)
@@ -36,6 +44,9 @@ class ViewScore:
         values: PSNR in dB and SSIM by name, of the whole picture and of its foreground.
         truth: (height, width, 3) what it should be.
         image: (height, width, 3) what was drawn.
+        elevation: of the camera above the focus, in degrees; NaN where it is not known.
+        distance: to the nearest training camera over that to the focus; NaN where it is not known.
+        places: where the picture errs; None of X-rays.
     """
 
     name: str
@@ -43,32 +54,49 @@ class ViewScore:
     values: dict[str, float]
     truth: Floats
     image: Floats
+    elevation: float = math.nan
+    distance: float = math.nan
+    places: ErrorPlaces | None = None
 
 
 def score_views(
-    renderer: Renderer, splats: Splats, test: CapturePictures, training: CapturePictures | None
+    renderer: Renderer,
+    splats: Splats,
+    test: CapturePictures,
+    training: CapturePictures | None,
+    more: Mapping[str, Score] | None = None,
 ) -> Iterator[ViewScore]:
     """Render and score every picture of ``test``.
 
-    ``training`` are the ones that were trained on; without them there are no angles and no
-    baselines.
+    ``training`` are the ones that were trained on; without them there are no angles, no distances
+    and no baselines. ``more`` are scores by name besides PSNR and SSIM.
     """
-    behind, focus = test.behind, focus_of((training or test).cameras)
+    cameras = (training or test).cameras
+    behind, focus, up = test.behind, focus_of(cameras), common_up(cameras)
     for number, camera in enumerate(test.cameras):
         frame = renderer.forward(splats, camera, background=renderer.device.array(behind))
         image = test.shown(renderer.device.get(frame.image))
         truth = test.shown(test.over(number, behind))
         masks = test.counted(number), test.foreground(number)
-        values, angle = scores_of(image, truth, masks, "fit"), float("nan")
+        values, angle, distance = scores_of(image, truth, masks, "fit", more), math.nan, math.nan
         if training is not None:
             angles = _angles(training.cameras, camera, focus)
-            angle = float(angles.min())
+            angle, distance = float(angles.min()), _distance(training.cameras, camera, focus)
             for name, blend in _baselines(training, angles, truth.shape, behind).items():
-                values |= scores_of(blend, truth, masks, name)
-        yield ViewScore(test.views[number].name, angle, values, truth, image)
+                values |= scores_of(blend, truth, masks, name, more)
+        elevation = math.nan if up is None else angles_of(camera, focus, up)[1]
+        places = ErrorPlaces.of(image, truth, *masks)
+        name = test.views[number].name
+        yield ViewScore(name, angle, values, truth, image, elevation, distance, places)
 
 
-def scores_of(image: Floats, truth: Floats, masks: Masks, name: str) -> dict[str, float]:
+def scores_of(
+    image: Floats,
+    truth: Floats,
+    masks: Masks,
+    name: str,
+    more: Mapping[str, Score] | None = None,
+) -> dict[str, float]:
     """PSNR and SSIM of the whole picture and of the foreground, where there is one.
 
     Args:
@@ -77,6 +105,7 @@ def scores_of(image: Floats, truth: Floats, masks: Masks, name: str) -> dict[str
         masks: the pixels that count at all, and the foreground; None where it is all of them, or
             where nobody can tell.
         name: goes before the scores' names.
+        more: further scores of the whole picture.
     """
     counted, foreground = masks
     if counted is not None:
@@ -88,6 +117,8 @@ def scores_of(image: Floats, truth: Floats, masks: Masks, name: str) -> dict[str
     }
     if foreground is not None and foreground.any() and not foreground.all():
         values[f"{name}_psnr_foreground"] = psnr(image, truth, mask=_of_samples(foreground, truth))
+    for kind, score in (more or {}).items():
+        values[f"{name}_{kind}"] = score(image, truth)
     return values
 
 
@@ -114,12 +145,34 @@ def score_record(groups: Mapping[str, Sequence[ViewScore]]) -> dict[str, Any]:
     }
 
 
+def error_record(groups: Mapping[str, Sequence[ViewScore]]) -> dict[str, Any]:
+    """Where the pictures of each group err: by region, band, elevation and distance; JSON."""
+    return {"errors": {name: _places_record(scores) for name, scores in groups.items()}}
+
+
+def _places_record(scores: Sequence[ViewScore]) -> dict[str, Any]:
+    total = functools.reduce(operator.add, (s.places for s in scores if s.places is not None))
+    return {
+        "regions": total.region_record(),
+        "bands": total.band_record(),
+        "by_elevation": by_elevation((s.elevation, s.values["fit_psnr"]) for s in scores),
+        "by_distance": by_distance((s.distance, s.values["fit_psnr"]) for s in scores),
+    }
+
+
 def _angles(cameras: Sequence[Camera], camera: Camera, focus: NDArray[np.float64]) -> Floats:
     """Degrees between a camera and others, measured at their focus."""
     ways = np.array([other.center for other in cameras]) - focus
     way = camera.center - focus
     across = np.linalg.norm(np.cross(ways, way), axis=1)
     return np.asarray(np.degrees(np.arctan2(across, ways @ way)), np.float32)
+
+
+def _distance(cameras: Sequence[Camera], camera: Camera, focus: NDArray[np.float64]) -> float:
+    """From a camera to the nearest of others, over that to their focus."""
+    nearest = min(float(np.linalg.norm(other.center - camera.center)) for other in cameras)
+    away = float(np.linalg.norm(camera.center - focus))
+    return nearest / away if away > 0 else math.nan
 
 
 def _baselines(

@@ -151,7 +151,7 @@ def disc(grid: Grid, *, radius: float | None = None) -> _Mask:
 def _checked(
     image: ArrayLike, truth: ArrayLike, mask: ArrayLike | None
 ) -> tuple[_Reals, _Reals, _Mask]:
-    found, wanted = _finite("image", image), _finite("truth", truth)
+    found, wanted = finite_values("image", image), finite_values("truth", truth)
     if found.shape != wanted.shape:
         raise ShapeError(f"image has shape {found.shape} and truth {wanted.shape}; make them equal")
     counts = np.ones(found.shape, dtype=np.bool_) if mask is None else np.asarray(mask)
@@ -164,7 +164,13 @@ def _checked(
     return found, wanted, counts
 
 
-def _finite(name: str, array: ArrayLike) -> _Reals:
+def finite_values(name: str, array: ArrayLike) -> _Reals:
+    """An array of real numbers in double precision.
+
+    Raises:
+        DTypeError: it is not real.
+        NonFiniteError: it holds NaN or infinity.
+    """
     given: NDArray[Any] = np.asarray(array)
     if given.dtype.kind not in "biuf":
         raise DTypeError(f"{name} has type {given.dtype}, wanted real numbers")

@@ -1,0 +1,72 @@
+"""FLIP: the difference that a person sees who flips between two pictures.
+
+The computation is NVIDIA's own (package ``flip-evaluator``, BSD-3-Clause), so that figures agree
+with those that others print.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rift_cl.errors import InputError, ShapeError
+from rift_cl.metrics.scores import finite_values
+
+# 0.7 m before a monitor of 3840 pixels and 0.7 m across, as the paper has it.
+PIXELS_PER_DEGREE = 67.0
+
+
+def flip(
+    image: ArrayLike, truth: ArrayLike, *, pixels_per_degree: float = PIXELS_PER_DEGREE
+) -> float:
+    """Mean of the FLIP error map (Andersson et al., Proc. ACM CGIT 3(2), 2020).
+
+    Args:
+        image: what is scored, (height, width, 3) in display light (sRGB) from 0 to 1; values
+            beyond are clipped.
+        truth: what it should be, of the same shape.
+        pixels_per_degree: of the observer's field of view; a larger number is a person who is
+            further away and sees less.
+
+    Returns:
+        From 0, for equal pictures, to 1; about 0.97 for black in place of white.
+
+    Raises:
+        ShapeError: the shapes differ, or an array is no colour picture.
+        DTypeError: an array is not real.
+        NonFiniteError: an array holds NaN or infinity.
+        InputError: ``pixels_per_degree`` is not a positive number, or the package
+            ``flip-evaluator`` is not installed.
+    """
+    found, wanted = finite_values("image", image), finite_values("truth", truth)
+    if found.shape != wanted.shape or found.shape[2:] != (3,) or not found.size:
+        raise ShapeError(
+            f"flip: image has shape {found.shape} and truth {wanted.shape}, wanted (height, width, "
+            "3) twice"
+        )
+    if not (math.isfinite(pixels_per_degree) and pixels_per_degree > 0):
+        raise InputError(
+            f"flip: pixels_per_degree is {pixels_per_degree!r}, wanted a positive number"
+        )
+    evaluate = flip_evaluator().evaluate
+    pair = [np.ascontiguousarray(np.clip(a, 0, 1), np.float32) for a in (wanted, found)]
+    *_, mean, _ = evaluate(*pair, "LDR", applyMagma=False, parameters={"ppd": pixels_per_degree})
+    return float(mean)
+
+
+def flip_evaluator() -> Any:
+    """The package that computes FLIP.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    try:
+        import flip_evaluator
+    except ImportError as error:
+        raise InputError(
+            "FLIP is computed by flip-evaluator, which is not installed: pip install flip-evaluator"
+        ) from error
+    return flip_evaluator
