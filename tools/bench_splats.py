@@ -7,8 +7,11 @@ Both versions work in one process and take turns, with the same splats and camer
 processor time of all threads divided by the number of cores, the least of the rounds: what else
 the machine does hardly enters. ``raster`` and ``raster gradient`` are the kernels that composite,
 alone. A used lane is a pixel in which a listed splat counts, whatever a version evaluates besides.
+Memory is the most that the device has from its driver while a scene is drawn and differentiated
+three times: splats and pictures, what is kept for later arrays, and what is lost between them.
 ``--scenes`` understands what ``bench/splat_scenes.py`` says, ``--training`` what
-``bench/training_case.py`` says.
+``bench/training_case.py`` says, ``--photographs`` what ``bench/photographs.py`` says: it tells
+steps whose photographs are kept from steps whose photographs are read from the disk meanwhile.
 """
 
 from __future__ import annotations
@@ -28,8 +31,10 @@ import numpy as np
 import tyro
 
 import rift_cl as rift
+from bench import photographs
 from bench.checkout import Checkout
 from bench.command import say
+from bench.photographs import PhotographsCase
 from bench.splat_scenes import DrawnScene
 from bench.surroundings import surroundings
 from bench.table import NONE, Table, show
@@ -47,6 +52,8 @@ _GROWTH = (
 )
 # Steps in a turn of training, and those before anything counts.
 _STEPS, _WARM = 8, 8
+# Frames while memory is looked at.
+_FRAMES = 3
 _RASTER = ("raster", "raster gradient")
 
 
@@ -57,6 +64,7 @@ class Options:
     Args:
         scenes: what is drawn, any number.
         training: what is trained on, any number; none to leave training out.
+        photographs: captures that are fitted, any number, such as 1000:480x360:128M.
         growth: draw cubes of 10,000 to 2 million splats and the fitted scene up to 4K instead.
         against: checkout of another version.
         rounds: how often each version has its turn.
@@ -67,6 +75,7 @@ class Options:
 
     scenes: tuple[str, ...] = _SCENES
     training: tuple[str, ...] = _TRAINING
+    photographs: tuple[str, ...] = ()
     growth: bool = False
     against: Path | None = None
     rounds: int = 5
@@ -133,12 +142,37 @@ class Drawing:
         timed(_RASTER[1], lambda: self._raster_grad(*drawn, again, self._grad, **given))
         return frame
 
+    def memory(self) -> int:
+        """Most bytes that the device has from its driver: ask before anything else is done."""
+        device, most = self.version.device, 0
+        device.release()
+        make = device.empty
+
+        def counted(*given: Any) -> Any:
+            nonlocal most
+            array = make(*given)
+            most = max(most, _taken(device))
+            return array
+
+        device.empty = counted
+        try:
+            for _ in range(_FRAMES):
+                self._renderer.backward(self._draw(), self._grad)
+        finally:
+            del device.empty
+        return most
+
     def image(self, frame: Any) -> Any:
         """The picture on the host."""
         return self.version.device.get(frame.image)
 
     def _draw(self) -> Any:
         return self._renderer.forward(self._splats, self._camera, background=self._behind)
+
+
+def _taken(device: Any) -> int:
+    """Bytes that a device has from its driver; older versions had nothing but a pool."""
+    return int(device.taken if hasattr(device, "taken") else device._open().pool.managed_bytes)
 
 
 def _on_screen(frame: Any) -> Any:
@@ -151,11 +185,12 @@ def _on_screen(frame: Any) -> Any:
 
 def draw(scene: DrawnScene, versions: list[Version], options: Options) -> dict[str, Any]:
     """The record of a scene: times of all versions, and how far their pictures are apart."""
-    drawings = []
+    drawings, memory = [], {}
     for version in versions:
         version.seconds = {}
         with version.turn():
             drawings.append(Drawing(version, scene))
+            memory[version.name] = drawings[-1].memory()
     frames: list[Any] = []
     for turn in range(options.rounds + 1):
         if turn == 1:
@@ -171,6 +206,7 @@ def draw(scene: DrawnScene, versions: list[Version], options: Options) -> dict[s
         "splats": len(scene.parameters["means"]),
         "apart": float(np.linalg.norm(images[0] - images[-1]) / np.linalg.norm(images[-1])),
         "cpu_s": {version.name: version.seconds for version in versions},
+        "memory": memory,
     }
     lists = frames[0].lists
     if lists is not None:
@@ -212,19 +248,26 @@ def measure_all(options: Options) -> Iterator[dict[str, Any]]:
             theirs = package.open_device(device.selector)
         versions.append(Version("the other", other.active, theirs))
     head = {**surroundings(device), "steps": _STEPS}
-    drawn, trained = list[dict[str, Any]](), list[dict[str, Any]]()
+    drawn, trained, read = (list[dict[str, Any]]() for _ in range(3))
+    record = {**head, "scenes": drawn, "training": trained, "photographs": read}
     for text in _GROWTH if options.growth else options.scenes:
         say(text)
         drawn.append(draw(DrawnScene.parse(text), versions, options))
-        yield {**head, "scenes": drawn, "training": trained}
+        yield record
     for text in () if options.growth else options.training:
         say(f"training, {text}")
         trained.append(train(text, versions, options))
-        yield {**head, "scenes": drawn, "training": trained}
+        yield record
+    for text in options.photographs:
+        say(f"photographs, {text}")
+        read.append(
+            photographs.measure(PhotographsCase.parse(text), device.selector, options.rounds)
+        )
+        yield record
 
 
 def tables(record: dict[str, Any]) -> Iterator[Table]:
-    """A table of the scenes, and one of training."""
+    """A table of the scenes, one of their memory, and one of training."""
     columns = ("scene", "operation", "ms", "other", "times", "ns per used lane", "other")
     notes = (
         "Processor time of all threads over the number of cores, least of the rounds.",
@@ -232,25 +275,31 @@ def tables(record: dict[str, Any]) -> Iterator[Table]:
     )
     rows = [row for scene in record["scenes"] for row in _rows(scene, 1)]
     yield Table(record["device"]["name"], columns, rows, notes, texts=2)
+    rows = [
+        (scene["name"], *_beside([bytes_ / 1e6 for bytes_ in scene["memory"].values()], 0))
+        for scene in record["scenes"]
+    ]
+    yield Table("Memory", ("scene", "MB", "other", "times"), rows, texts=1)
     if record["training"]:
         steps = [row[:5] for case in record["training"] for row in _rows(case, record["steps"])]
         yield Table("Training", columns[:5], steps, texts=2)
+    if record["photographs"]:
+        yield photographs.table(record["photographs"])
 
 
 def _rows(case: dict[str, Any], parts: int) -> Iterator[tuple[str, ...]]:
     ours, *others = ({k: min(v) / parts for k, v in s.items()} for s in case["cpu_s"].values())
     for what, took in ours.items():
-        other = others[0].get(what) if others else None
+        both = [1e3 * seconds for seconds in (took, *(o[what] for o in others if what in o))]
         lanes = case.get("used_lanes") if what in _RASTER else None
-        yield (
-            case["name"],
-            what,
-            f"{took * 1e3:.2f}",
-            f"{other * 1e3:.2f}" if other else NONE,
-            f"{other / took:.2f}" if other else NONE,
-            f"{took / lanes * 1e9:.3f}" if lanes else NONE,
-            f"{other / lanes * 1e9:.3f}" if lanes and other else NONE,
-        )
+        each = _beside([ms / lanes * 1e6 for ms in both], 3)[:2] if lanes else (NONE, NONE)
+        yield (case["name"], what, *_beside(both, 2), *each)
+
+
+def _beside(both: list[float], digits: int) -> tuple[str, str, str]:
+    """Our number, the other's, and how many times ours that is; dashes where there is no other."""
+    ours, *others = (f"{number:.{digits}f}" for number in both)
+    return ours, *((others[0], f"{both[1] / both[0]:.2f}") if others else (NONE, NONE))
 
 
 def main() -> int:

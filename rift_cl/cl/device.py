@@ -19,6 +19,7 @@ from rift_cl.cl.array import AnyArray, DeviceArray
 from rift_cl.cl.budget import check_array, memory_budget
 from rift_cl.cl.build.driver_record import OTHER_KIND, driver_identity, read_record
 from rift_cl.cl.failures import driver_errors, named_error, named_errors
+from rift_cl.cl.heap import Heap
 from rift_cl.cl.host_arrays import as_plain, as_real_array, download, send, upload
 from rift_cl.cl.process import claim_process
 from rift_cl.cl.program import Programs
@@ -117,7 +118,7 @@ class Device:
         with self._opening:
             if self._opened is None:
                 with named_errors("opening it", self.name):
-                    self._opened = _Opened.of(self._handle)
+                    self._opened = _Opened.of(self._handle, self.traits)
             return self._opened
 
     @property
@@ -145,8 +146,8 @@ class Device:
         self.check_array(wanted, shape)
         # Blocks that are kept for the next array count as well, until the room is needed.
         room = self.budget if wanted >= _LARGE else self._limit or self.traits.usable_memory
-        if opened.pool.managed_bytes + wanted > room:
-            opened.pool.free_held()
+        if opened.managed_bytes + wanted > room:
+            opened.free_held()
         array.allocator = opened.allocator(wanted, self.traits.allocation)
         try:
             array.base_data = array.allocator(wanted)
@@ -213,7 +214,12 @@ class Device:
 
     def release(self) -> None:
         """Give memory that no array uses any more back to the driver."""
-        self._open().pool.free_held()
+        self._open().free_held()
+
+    @property
+    def taken(self) -> int:
+        """Bytes that it has from the driver for arrays, kept ones included."""
+        return self._open().managed_bytes
 
 
 def _traits_of(handle: Any) -> Traits:
@@ -230,6 +236,8 @@ class _Opened(NamedTuple):
         context: the ``pyopencl.Context``.
         queue: the ``pyopencl.CommandQueue``.
         pool: memory for arrays, which keeps what they leave for the next ones.
+        heap: that for large arrays, where the device computes in the host's memory; otherwise None,
+            as GPUs may ask for more of parts of buffers than is known here.
         direct: memory for arrays, from the driver.
         plain_array: a new array without memory, by shape and type.
     """
@@ -237,19 +245,33 @@ class _Opened(NamedTuple):
     context: Any
     queue: Any
     pool: Any
+    heap: Heap | None
     direct: Any
     plain_array: Callable[..., Any]
+
+    @property
+    def managed_bytes(self) -> int:
+        """Bytes that there are for arrays, in use and kept."""
+        return int(self.pool.managed_bytes) + (self.heap.managed_bytes if self.heap else 0)
+
+    def free_held(self) -> None:
+        """Give back what is kept."""
+        self.pool.free_held()
+        if self.heap is not None:
+            self.heap.free_held()
 
     def allocator(self, size: int, largest: int) -> Any:
         """What makes a buffer of ``size`` bytes: the pool, unless its own would be too large.
 
         Buffers of the pool are up to a sixteenth larger than what is asked for.
         """
+        if self.heap is not None and size >= _LARGE and self.heap.fits(size, largest):
+            return self.heap
         fits = size <= largest // 2 or self.pool.alloc_size(self.pool.bin_number(size)) <= largest
         return self.pool if fits else self.direct
 
     @classmethod
-    def of(cls, handle: Any) -> _Opened:
+    def of(cls, handle: Any, traits: Traits) -> _Opened:
         import pyopencl as cl
         from pyopencl.array import Array
         from pyopencl.tools import ImmediateAllocator, MemoryPool
@@ -273,4 +295,5 @@ class _Opened(NamedTuple):
             array.__dict__.update(known(shape, dtype), events=[])
             return array
 
-        return cls(context, queue, MemoryPool(direct), direct, plain_array)
+        heap = Heap(direct) if traits.is_cpu else None
+        return cls(context, queue, MemoryPool(direct), heap, direct, plain_array)

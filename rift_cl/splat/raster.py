@@ -138,8 +138,8 @@ class ScreenSplats:
         modes: the polynomials of splats that have some; None for Gaussians.
 
     ``records``, (N, 16), hold what tiles want of them in one line each, see
-    ``kernels/include/raster/screen_record.h``; they are None until ``packed`` makes them, and in a
-    copy with other arrays, which they would not be of.
+    ``kernels/include/raster/screen_record.h``; they are None until ``packed`` makes them and after
+    ``unpack``, and in a copy with other arrays, which they would not be of.
     """
 
     screen: DeviceArray
@@ -199,6 +199,11 @@ def packed(device: Device, splats: ScreenSplats) -> ScreenSplats:
     found = replace(splats)
     object.__setattr__(found, "records", records)
     return found
+
+
+def unpack(splats: ScreenSplats) -> None:
+    """Give up the packed records, the largest array of the screen; ``packed`` makes them again."""
+    object.__setattr__(splats, "records", None)
 
 
 def rasterize(

@@ -117,10 +117,11 @@ def draw_grad(
         ResourceLimitError: not even one row of tiles fits the budget.
     """
     sums: DeviceArray | None = None
+    screen = packed(device, done.screen)
     for lists in _lists_again(device, done):
         records = raster_grad(
             device,
-            *(done.screen, lists, done.raster, grad_image, grad_transmittance),
+            *(screen, lists, done.raster, grad_image, grad_transmittance),
             settings=done.settings,
             background=done.background,
         )

@@ -29,7 +29,7 @@ from rift_cl.splat.projection import (
     project,
     project_grad,
 )
-from rift_cl.splat.raster import Raster, ScreenSplats
+from rift_cl.splat.raster import Raster, ScreenSplats, unpack
 from rift_cl.splat.raster_pass import RasterPass, draw, draw_grad
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
@@ -225,13 +225,16 @@ class Renderer:
             grad_image, grad_transmittance = _expected_depth_grad(
                 device, frame.raster, grad_image, grad_transmittance
             )
-        # The sums have no name here: they are the largest array but one, and wanted no longer then.
+        sums = draw_grad(device, frame.raster_pass, grad_image, grad_transmittance)
+        # Before the gradients are there; a second gradient of the frame packs again.
+        unpack(frame.raster_pass.screen)
         gradients = project_grad(
             frame.projection,
-            draw_grad(device, frame.raster_pass, grad_image, grad_transmittance),
+            sums,
             with_camera=with_camera,
             depth_channel=frame.depth is not None,
         )
+        del sums
         sh, lobes = self._shade_grad(frame, gradients)
         return FrameGradients(
             splats=gradients,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
 from view_files import linear, store, view_of
@@ -9,6 +11,7 @@ from view_files import linear, store, view_of
 import rift_cl as rift
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.scores import scores_of
+from rift_cl.errors import FileFormatError
 
 GREY = 128
 
@@ -46,6 +49,47 @@ def test_what_does_not_fit_into_memory_is_the_same_when_decoded_again(tmp_path, 
     streamed = pictures([view])
     assert kept.image(0).tobytes() == streamed.image(0).tobytes()
     assert kept._kept and not streamed._kept
+
+
+def test_what_is_not_kept_is_read_while_the_step_before_works(tmp_path, monkeypatch):
+    """By another thread, once for each step, and what a step sees is the same."""
+    views = [opened(tmp_path, codes(seed=seed), name=f"{seed}.png") for seed in range(4)]
+    order, mains = [2, 0, 3, 1, 1, 2, 0], []
+    read = CapturePictures._read
+
+    def noted(self, number):
+        mains.append((number, threading.current_thread() is threading.main_thread()))
+        return read(self, number)
+
+    kept = pictures(views)
+    monkeypatch.setattr("rift_cl.commands.fit_photos.pictures._SHARE", 0.0)
+    streamed = pictures(views)
+    streamed.announce(order.__getitem__)
+    monkeypatch.setattr(CapturePictures, "_read", noted)
+    for step, number in enumerate(order[:-1]):
+        streamed.begin(step)
+        assert streamed.image(number).tobytes() == kept.image(number).tobytes()
+    streamed.image(order[-1])
+    assert mains == [(2, True), *((number, False) for number in (0, 3, 1, 2, 0))]
+
+
+def test_a_photograph_that_cannot_be_read_is_told_at_its_step(tmp_path, monkeypatch):
+    views = [opened(tmp_path, codes(seed=seed), name=f"{seed}.png") for seed in range(2)]
+    monkeypatch.setattr("rift_cl.commands.fit_photos.pictures._SHARE", 0.0)
+    seen = pictures(views)
+    seen.announce([0, 1, 0].__getitem__)
+    views[1].image.write_bytes(b"no picture")
+    seen.begin(0)
+    with pytest.raises(FileFormatError):
+        seen.begin(1)
+
+
+def test_photographs_are_kept_within_the_memory_of_a_device_that_shares_the_hosts(tmp_path):
+    views = [opened(tmp_path, codes(seed=seed), name=f"{seed}.png") for seed in range(4)]
+    device = rift.default_device()
+    small = rift.Device(device._handle, device.selector, traits=device.traits, memory=6000)
+    seen = CapturePictures(small, views)
+    assert [seen.keep(number) for number in range(4)] == [True, False, False, False]
 
 
 def test_a_common_border_is_the_background(tmp_path):

@@ -88,6 +88,7 @@ def test_two_versions_take_turns(tool, tmp_path, capsys, monkeypatch):
     bench = tool("bench_splats")
     out = tmp_path / "splats.json"
     arguments = ["--scenes", SCENE, "--training", "60:24x16", "--rounds", "1"]
+    arguments += ["--photographs", "3:24x16:64M"]
     monkeypatch.setattr(
         sys, "argv", ["bench_splats", *arguments, "--against", str(ROOT), "--json", str(out)]
     )
@@ -96,7 +97,18 @@ def test_two_versions_take_turns(tool, tmp_path, capsys, monkeypatch):
     (scene,), (training,) = record["scenes"], record["training"]
     assert scene["apart"] == 0
     assert scene["used_lanes"] > 0
+    assert min(scene["memory"].values()) > 4 * 40 * (14 + 48)
     both = {"this version", "the other"}
     assert set(scene["cpu_s"]) == set(training["cpu_s"]) == both
     assert set(scene["cpu_s"]["the other"]) >= {"draw", "raster", "raster gradient"}
-    assert "ns per used lane" in capsys.readouterr().out
+    (capture,) = record["photographs"]
+    assert set(capture["ways"]) == {"kept", "streamed"}
+    assert all(way["kept"] == 3 for way in capture["ways"].values())
+    printed = capsys.readouterr().out
+    assert all(words in printed for words in ("ns per used lane", "Memory", "Photographs"))
+
+
+@pytest.mark.parametrize("text", ["10:480x360", "0:48x36:64M", "5:8x8:64M", "5:48x36:none", ""])
+def test_photographs_that_are_none_are_refused(tool, text):
+    with pytest.raises(InputError, match="wanted"):
+        tool("bench.photographs").PhotographsCase.parse(text)

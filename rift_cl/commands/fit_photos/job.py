@@ -272,7 +272,9 @@ class Fit(FitRun[FitPhotosSettings]):
             few = evenly(count, _NOISE_VIEWS)
             noise = noise_of([pictures.image(number)[..., :3] for number in few])
             training = dataclasses.replace(training, noise=noise)
-        return Trainer(pictures, first, training, settings.rendering)
+        trainer = Trainer(pictures, first, training, settings.rendering)
+        pictures.announce(trainer.view_at)
+        return trainer
 
     def _pictures(
         self, views: tuple[View, ...], like: CapturePictures | None = None

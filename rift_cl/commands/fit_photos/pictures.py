@@ -1,7 +1,8 @@
 """The photographs of a fit: decoded once, sent to the device one at a time, over their background.
 
 Photographs are kept on the host, in display light as codes of 8 or 16 bits, and are decoded again
-whenever they do not fit the budget; what a step sees is the same either way. Those that have alpha
+whenever they do not fit the budget, the next step's in another thread while a step works; what a
+step sees is the same either way. Those that have alpha
 of their own show what was cut out: they are laid over a background that is drawn by chance for each
 step, so that transparent places must become transparent. Where a mask is black, or the photograph
 did not reach once its lens was undone, nothing is known: such pixels do not count.
@@ -9,7 +10,8 @@ did not reach once its lens was undone, nothing is known: such pixels do not cou
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Literal
 
 import numpy as np
@@ -23,8 +25,9 @@ from rift_cl.io.captures.capture import View, camera_at, read_view
 from rift_cl.io.images.display_light import to_display
 from rift_cl.io.images.picture_header import read_picture_header
 
-# Share of the free host memory that photographs may take.
-_SHARE = 0.4
+# Share of the free host memory that photographs may take, and of the memory budget of a device that
+# computes in the host's memory.
+_SHARE, _OF_BUDGET = 0.4, 2 / 3
 # What differs by more from the background, or has more alpha, is in front of it.
 _FOREGROUND = 2 / 255
 # A pixel counts in a score if so much of it is known.
@@ -72,6 +75,11 @@ class CapturePictures:
         # A step asks for one picture several times.
         self._last: tuple[int, Floats] | None = None
         self._room = int(_SHARE * (free_host_memory() or 1 << 30))
+        if device.traits.is_cpu or device.traits.unified:
+            self._room = min(self._room, int(_OF_BUDGET * device.budget))
+        self._view_at: Callable[[int], int] | None = None
+        self._coming: dict[int, Future[Kept]] = {}
+        self._reader: ThreadPoolExecutor | None = None
         found = self._common_border() if like is None else like.behind
         self.behind: Floats = np.zeros(3, np.float32) if found is None else found
         self.backed: bool = found is not None if like is None else like.backed
@@ -91,13 +99,35 @@ class CapturePictures:
     def _decoded(self, number: int) -> Floats:
         kept = self._kept.get(number)
         if kept is None:
-            image = read_view(self.views[number], downscale=self._downscale, light=self.light)
-            kept = _codes_of(image) if self.light == "display" else image
+            coming = self._coming.pop(number, None)
+            kept = self._read(number) if coming is None else coming.result()
             if kept.nbytes <= self._room:
                 self._room -= kept.nbytes
                 self._kept[number] = kept
         most = 1 if kept.dtype.kind == "f" else np.iinfo(kept.dtype).max
         return np.asarray(kept, np.float32) / np.float32(most)
+
+    def _read(self, number: int) -> Kept:
+        """A photograph as it is kept; by any thread."""
+        image = read_view(self.views[number], downscale=self._downscale, light=self.light)
+        return _codes_of(image) if self.light == "display" else image
+
+    def announce(self, view_at: Callable[[int], int]) -> None:
+        """Say which photograph each step asks for, so that it is read while the one before works.
+
+        Args:
+            view_at: the number of a step's photograph.
+        """
+        self._view_at = view_at
+
+    def _read_ahead(self, number: int) -> None:
+        if number in self._kept or number in self._coming:
+            return
+        if self._last is not None and self._last[0] == number:
+            return
+        self._reader = self._reader or ThreadPoolExecutor(1, "read")
+        # What was read for a step that never came would only take memory.
+        self._coming = {number: self._reader.submit(self._read, number)}
 
     def over(self, number: int, background: Floats) -> Floats:
         """(height, width, 3) over a background, which also stands where nothing is known."""
@@ -137,6 +167,9 @@ class CapturePictures:
     def begin(self, step: int) -> None:
         """Announce the next step, which determines the backgrounds."""
         self._step = step
+        if self._view_at is not None:
+            self.image(self._view_at(step))
+            self._read_ahead(self._view_at(step + 1))
 
     def target(self, number: int) -> Any:
         """The picture on the device, over the background of this step."""
