@@ -40,6 +40,7 @@ from paper import (
     merit_study,
     planned_ornament,
     planned_views,
+    slice_bias,
     spectral_bias,
     surface_views,
 )
@@ -63,6 +64,7 @@ FIGURES: tuple[ModuleType, ...] = (
     figure_13,
     figure_14,
     figure_15,
+    slice_bias,
     spectral_bias,
     compensation,
     convergence,
