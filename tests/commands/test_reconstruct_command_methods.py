@@ -118,6 +118,20 @@ def test_a_full_turn_with_an_offset_axis_needs_no_word(tmp_path, center, options
     assert volume[0][seen].mean() == pytest.approx(truth[seen].mean(), rel=0.02)
 
 
+def test_a_full_turn_whose_axis_is_off_by_a_little_has_the_rim(tmp_path):
+    path, bins, center, fine = tmp_path / "scan.npz", 48, 21.5, 8
+    away = (np.arange(bins * fine) + 0.5) / fine - 0.5 - center
+    radius = 0.98 * (bins - 1 - center)
+    chords = 2 * np.sqrt(np.clip(radius**2 - away**2, 0, None)).reshape(bins, fine).mean(axis=1)
+    np.savez(path, projections=np.tile(chords, (180, 1))[:, None], angles=FULL)
+    options = ("--kind", "attenuation", "--center", center)
+    volume, assumed = reconstruct(path, tmp_path / "out", *options)
+    assert "wider than the detector" not in assumed
+    t = np.arange(bins) - (bins - 1) / 2
+    rim = np.abs(np.hypot(t[:, None], t) - 0.85 * radius) < 0.1 * radius
+    assert np.sqrt(np.mean((volume[0][rim] - 1) ** 2)) < 0.02
+
+
 def test_slices_of_an_offset_axis_reach_to_the_farther_end(tmp_path):
     path = tmp_path / "scan.npz"
     save_phantom(path, FULL, 40, 6.4)

@@ -9,6 +9,7 @@ from rift_cl.metrics import psnr
 from rift_cl.reconstruct.direct.offset_axis import (
     is_full_turn,
     is_offset,
+    is_uneven,
     offset_weights,
     widened,
 )
@@ -23,7 +24,7 @@ def half_sinogram(center, bins=BINS, angles=ANGLES):
     return rift.phantom.shepp_logan_sinogram(GRID, scan).astype(np.float32), scan
 
 
-@pytest.mark.parametrize("center", [0.5, 7.0, 11.3, BINS - 9.6])
+@pytest.mark.parametrize("center", [0.5, 7.0, 11.3, 43.0, 44.5, BINS - 9.6])
 def test_weights_of_a_line_and_its_opposite_add_up(center):
     scan = rift.Parallel(ANGLES, BINS, center=center)
     weights, t = offset_weights(scan), np.arange(BINS) - center
@@ -47,6 +48,43 @@ def test_the_slice_is_that_of_a_detector_twice_as_wide(center):
     best = psnr(rift.fbp(rift.Projector(GRID, scan), whole), truth)
     assert psnr(image, truth) > best - 0.7
     assert psnr(naive, truth) < best - 8
+
+
+def disc_sinogram(scan, radius, fine=8):
+    """Line integrals of a uniform disc about the axis, each the mean over its bin."""
+    over = (np.arange(scan.bins * fine) + 0.5) / fine - 0.5 - scan.center
+    chords = 2 * np.sqrt(np.clip(radius**2 - over**2, 0, None)).reshape(-1, fine).mean(axis=1)
+    return np.tile(chords.astype(np.float32), (scan.angles.size, 1))
+
+
+def rim(sinogram, scan, radius):
+    """Error in the outer fifth of a disc, root mean square, short of its edge."""
+    grid = rift.Grid((160, 160), spacing=0.5)
+    image = rift.fbp(rift.Projector(grid, scan), sinogram)
+    away = np.hypot(grid.coordinates(0)[:, None], grid.coordinates(1))
+    within = (away > 0.8 * radius) & (away < radius - 1.2)
+    return float(np.sqrt(np.mean((image[within] - 1) ** 2)))
+
+
+@pytest.mark.parametrize(
+    "off", [pytest.param(off, marks=pytest.mark.full) for off in (-1.0, 1.0, 4.0)] + [2.0]
+)
+def test_an_object_that_fills_the_longer_side_has_its_rim(off):
+    angles = ANGLES[::2]
+    scan = rift.Parallel(angles, 64, center=31.5 - off)
+    radius = 0.99 * (31.5 + abs(off))
+    whole = rift.Parallel(angles, 81)
+    best = rim(disc_sinogram(whole, radius), whole, radius)
+    cut = disc_sinogram(scan, radius)
+    assert rim(*widened(cut, scan), radius) < 1.2 * best + 2e-3
+    assert rim(cut, scan, radius) > 10 * best
+
+
+def test_sides_that_differ_by_a_rounding_are_even():
+    assert not is_uneven(31.7, 64)
+    assert is_uneven(31.8, 64)
+    assert is_uneven(30.0, 64)
+    assert not is_uneven(-1.0, 64)
 
 
 def test_only_full_turns_with_an_axis_off_the_middle_are_offset():

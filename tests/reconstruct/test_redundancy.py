@@ -7,7 +7,8 @@ import pytest
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Fan
-from rift_cl.reconstruct.direct.redundancy import displaced_detector, redundancy, short_scan
+from rift_cl.reconstruct.direct.offset_axis import displaced_detector
+from rift_cl.reconstruct.direct.redundancy import redundancy, short_scan
 
 FAN = 0.3
 TURN = np.arange(90) * 2 * np.pi / 90

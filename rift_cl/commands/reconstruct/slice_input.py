@@ -35,6 +35,7 @@ from rift_cl.reconstruct.direct.fan_rebin import covered_rays, rebin_fan
 from rift_cl.reconstruct.direct.offset_axis import (
     is_full_turn,
     is_offset,
+    is_uneven,
     widened,
 )
 from rift_cl.reconstruct.direct.padding import extended, is_truncated, wider
@@ -168,7 +169,9 @@ class SliceInput:
         ):
             self.stitched, self.offset = self.geometry, False
             self.geometry = stitched(np.zeros((*row.shape[::2],), np.float32), self.stitched)[1]
-        wanted = self.settings.pad == "auto" and is_truncated(row) and not self.offset
+        # What one side of the detector misses is no truncation where the other side has it.
+        measured = row if self.settings.iterative else self._both_sides(row)[0]
+        wanted = self.settings.pad == "auto" and is_truncated(measured) and not self.offset
         if wanted or self.settings.pad == "on":
             self.pad = max(1, self.scan.shape[2] // _PAD_SHARE)
             self.geometry = self.geometry if self.fan is None else self._geometry()
@@ -217,12 +220,22 @@ class SliceInput:
 
     def for_formula(self, projections: Floats) -> tuple[Floats, Parallel | Fan]:
         """Projections as a backprojection wants them, and their geometry."""
-        scan = self.geometry
-        if self.offset and isinstance(scan, Parallel):
-            projections, scan = widened(projections, scan)
+        projections, scan = self._both_sides(projections)
         if self.pad:
             projections, scan = extended(projections, scan, bins=self.pad)
         return np.ascontiguousarray(projections), scan
+
+    def _both_sides(self, projections: Floats) -> tuple[Floats, Parallel | Fan]:
+        """Parallel projections of a full turn with what either side of the detector sees."""
+        scan = self.geometry
+        if (
+            not isinstance(scan, Parallel)
+            or self.rebinned
+            or not is_full_turn(scan.angles)
+            or not is_uneven(scan.center, scan.bins)
+        ):
+            return projections, scan
+        return widened(projections, scan)
 
     def formula_geometry(self) -> Parallel | Fan:
         """What ``for_formula`` would say of the geometry."""

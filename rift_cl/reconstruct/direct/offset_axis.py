@@ -1,12 +1,13 @@
-"""Full turns with the rotation axis near one end of the detector, which sees nearly twice as far.
+"""Full turns with the rotation axis off the detector's middle, which sees further on one side.
 
 Over a full turn every line is met twice, from opposite sides, at t and at -t. Where the detector
 reaches further on one side than on the other, lines near the axis are met twice and those beyond
-once. Weights w(t) that go smoothly from 0 to 1 across the part that is met twice, with
-``w(t) + w(-t) = 1``, count every line once (Wang, X-ray micro-CT with a displaced detector array,
-Medical Physics 29, 1634, 2002; for parallel rays without its cosine factors). Views and weights
-are then those of two half turns that look past each other, and filtered backprojection of the
-longer half, continued by zeros, is right to its far end.
+once. Weights w(t) that go smoothly from 0 to 2 across the part that is met twice, with
+``w(t) + w(-t) = 2``, count every line as often as all others (Wang, X-ray micro-CT with a displaced
+detector array, Medical Physics 29, 1634, 2002; for parallel rays without its cosine factors).
+Filtered backprojection of such views, the shorter side continued by zeros, is right to the far end
+of the longer. Where the axis is off the middle by a little, weights leave 1 next to the ends of the
+shorter side alone, so that noise averages out between the two rays of all other lines.
 """
 
 from __future__ import annotations
@@ -22,6 +23,10 @@ Stack = NDArray[np.float32]
 
 # An axis counts as offset where the shorter side is below this share of the longer.
 _OFFSET = 0.8
+# Sides of a detector that differ by no more bins than this reach as far as each other. Where they
+# do not, and the axis is near the middle, weights go over within this share of the shorter side,
+# and within no fewer bins than these.
+_EVEN, _SHARE, _FEWEST_BINS = 0.5, 0.2, 12.0
 # A full turn may lack as much of it as this many steps between views, or this angle: a view or
 # two that were lost, and the jitter of a turntable, leave it what it is.
 _SLACK, _HOLE = 1.5, np.pi / 36
@@ -49,8 +54,48 @@ def sees_further(center: float, bins: int) -> bool:
     return 0 < short < _OFFSET * long
 
 
+def is_uneven(center: float, bins: int) -> bool:
+    """Whether lines next to the ends of a detector are seen on one side of the axis alone."""
+    short, long = sorted((center, bins - 1 - center))
+    return short > 0 and long - short > _EVEN
+
+
+def weighed_share(center: float, bins: int) -> float:
+    """The share of the shorter side, from its end on, within which weights go over to 0 and 2.
+
+    Args:
+        center: bin of the axis, on the detector.
+        bins: of the detector.
+    """
+    short = min(center, bins - 1 - center)
+    if sees_further(center, bins):
+        return 1.0
+    return min(max(_FEWEST_BINS / short, _SHARE), 1.0)
+
+
+def displaced_detector(away: Floats, share: float = 1.0) -> Floats:
+    """Weights of a full turn whose detector reaches further on one side of the axis.
+
+    Args:
+        away: (bins,) fan angles in radians, or places of parallel rays; ascending, the axis at 0.
+        share: of the shorter side, from its end on, within which weights leave 1. They are Wang's
+            with the whole of it.
+
+    Returns:
+        (bins,) weights from 0 to 2, which add up to 2 for the two rays of a line, and are 2 for
+        rays of lines that are measured once.
+    """
+    short = min(-away[0], away[-1])
+    phase = (away if away[-1] > -away[0] else -away) / short
+    rises = np.clip((np.abs(phase) - (1 - share)) / share, 0, 1)
+    # Level where it begins, but for Wang's, which passes through the axis on a slope.
+    rise = np.sin(np.pi / 2 * rises) ** (1 if share == 1 else 2)
+    weights: Floats = 1 + np.sign(phase) * rise
+    return weights
+
+
 def offset_weights(scan: Parallel) -> Floats:
-    """Weight of each bin of a full turn with an offset axis.
+    """Weight of each bin of a full turn with an axis off the middle.
 
     Returns:
         (bins,) weights that add up to two for opposite bins, t and -t, that both exist, and are
@@ -59,21 +104,17 @@ def offset_weights(scan: Parallel) -> Floats:
     Raises:
         InputError: the axis is not on the detector.
     """
-    t = np.arange(scan.bins) - scan.center
-    short = min(scan.center, scan.bins - 1 - scan.center)
-    if not short > 0:
+    if not min(scan.center, scan.bins - 1 - scan.center) > 0:
         raise InputError(
             f"the rotation axis is at bin {scan.center:g}, off a detector of {scan.bins} bins: "
             "opposite views do not overlap"
         )
-    away = t if scan.bins - 1 - scan.center > scan.center else -t
-    phase = np.clip(away / short, -1, 1)
-    weights: Floats = 1 + np.sin(np.pi / 2 * phase)
-    return weights
+    share = weighed_share(scan.center, scan.bins)
+    return displaced_detector(np.arange(scan.bins, dtype=np.float64) - scan.center, share)
 
 
 def widened(projections: Stack, scan: Parallel) -> tuple[Stack, Parallel]:
-    """Weigh a full turn with an offset axis and continue its shorter side by zeros.
+    """Weigh a full turn with an axis off the middle and continue its shorter side by zeros.
 
     Args:
         projections: line integrals, (angle, bin) or (angle, row, bin).

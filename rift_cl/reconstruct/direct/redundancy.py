@@ -28,7 +28,12 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Fan
-from rift_cl.reconstruct.direct.offset_axis import is_full_turn, sees_further
+from rift_cl.reconstruct.direct.offset_axis import (
+    displaced_detector,
+    is_full_turn,
+    is_uneven,
+    weighed_share,
+)
 from rift_cl.reconstruct.direct.view_weights import view_weights
 
 Floats = NDArray[np.float64]
@@ -37,10 +42,6 @@ Floats = NDArray[np.float64]
 _SLACK = 1.5
 # A gap within the span that is wider than this, and than so many mean gaps, is no sampling.
 _HOLE, _HOLE_MEANS = np.pi / 12, 4.0
-# Sides of a detector that differ by no more bins than this reach as far as each other. Where they
-# do not, and the axis is near the middle, weights go over within this share of the shorter side,
-# and within no fewer bins than these.
-_EVEN, _SHARE, _FEWEST_BINS = 0.5, 0.2, 12.0
 ITERATE = "cgls, sirt and tv reconstruct from any views"
 
 
@@ -88,18 +89,16 @@ def redundancy(scan: Fan | Cone, compensate: str | None = None) -> Redundancy:
         sentence = f"full turn of {scan.views} views, every line measured twice"
         center = scan.center[1] if isinstance(scan, Cone) else scan.center
         left, right = center, scan.bins - 1 - center
-        if min(left, right) > 0 and abs(right - left) > _EVEN:
-            short = min(left, right)
-            width = min(max(_FEWEST_BINS, _SHARE * short), short)
-            width = short if sees_further(center, scan.bins) else width
-            rays = displaced_detector(gamma, width / short)[None]
+        if is_uneven(center, scan.bins):
+            short, share = min(left, right), weighed_share(center, scan.bins)
+            rays = displaced_detector(gamma, share)[None]
             missing = int(np.ceil(abs(right - left)))
             where = f"axis at bin {center:g} of {scan.bins}"
             which = (
                 f"Wang's weights across the {2 * short:.0f} bins about it"
-                if width == short
+                if share == 1
                 else f"lines beyond {short:g} bins from it are measured once and count twice, with "
-                f"weights that go over within {width:.0f} bins"
+                f"weights that go over within {share * short:.0f} bins"
             )
             sentence = f"full turn of {scan.views} views, {where}: {which}"
         elif not min(left, right) > 0:
@@ -143,27 +142,6 @@ def short_scan(beta: Floats, gamma: Floats, excess: float) -> Floats:
     entering = np.sin(np.pi / 4 * np.clip(b / rise, 0, 2)) ** 2
     leaving = np.sin(np.pi / 4 * np.clip((np.pi + 2 * excess - b) / fall, 0, 2)) ** 2
     weights: Floats = np.minimum(entering, leaving)
-    return weights
-
-
-def displaced_detector(gamma: Floats, share: float = 1.0) -> Floats:
-    """Weights of a full turn whose detector reaches further on one side of the axis.
-
-    Args:
-        gamma: (bins,) ascending fan angles in radians.
-        share: of the shorter side, from its end on, within which weights leave 1. They are Wang's
-            with the whole of it.
-
-    Returns:
-        (bins,) weights from 0 to 2, which add up to 2 for the two rays of a line, and are 2 for
-        rays of lines that are measured once.
-    """
-    short = min(-gamma[0], gamma[-1])
-    away = (gamma if gamma[-1] > -gamma[0] else -gamma) / short
-    phase = np.clip((np.abs(away) - (1 - share)) / share, 0, 1)
-    # Level where it begins, but for Wang's, which passes through the axis on a slope.
-    rise = np.sin(np.pi / 2 * phase) ** (1 if share == 1 else 2)
-    weights: Floats = 1 + np.sign(away) * rise
     return weights
 
 
