@@ -201,6 +201,8 @@ def _center(settings: Any, output: Output) -> None:
         _print_notes(job.notes)
     if not ran(job, settings, output):
         return
+    if "doubt" in job.metrics:
+        _print_notes([job.metrics["doubt"]])
     print(f"{job.metrics['center']:.2f}")
     print(f"contact sheet and report.html are in {settings.out}", file=sys.stderr)
 

@@ -159,6 +159,7 @@ class CenterJob:
 def _facts(found: AxisEstimate) -> dict[str, object]:
     low, high = found.interval
     sense = {} if found.sense is None else {"sense of rotation": found.sense.in_words()}
+    doubt = {"doubt": found.doubt} if found.doubt else {}
     return {
         "axis, bins": f"{found.center:.2f}, at the middle row",
         "95 % interval": f"{low:.2f} to {high:.2f}",
@@ -166,6 +167,7 @@ def _facts(found: AxisEstimate) -> dict[str, object]:
         "spread between rows, bins": found.spread,
         "found by": found.by,
         **sense,
+        **doubt,
     }
 
 

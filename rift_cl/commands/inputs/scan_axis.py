@@ -90,7 +90,7 @@ def settled_axis(scan: ScanFile, center: float, device: Device | None = None) ->
     try:
         found = find_axis(scan, device)
     except InputError as error:
-        reason = str(error).removeprefix(f"{scan.path}: ").removesuffix(GIVE_IT)
+        reason = str(error).removeprefix(f"{scan.path}: ").replace(GIVE_IT, "")
         note = (
             f"The axis was taken to be that of {told}, bin {center:.2f} (--center), since the data "
             f"do not tell it: {reason}."

@@ -31,6 +31,7 @@ from rift_cl.io.number_list import read_numbers
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.reconstruct import Attenuation
 from rift_cl.reconstruct.axis import AxisEstimate
+from rift_cl.reconstruct.axis.turn import other_turn
 from rift_cl.reconstruct.direct.fan_rebin import covered_rays, rebin_fan
 from rift_cl.reconstruct.direct.offset_axis import (
     is_full_turn,
@@ -157,6 +158,8 @@ class SliceInput:
         row = self.clean.read(middle, middle + 1).projections
         if not self.settled:
             self._find_axis()
+        elif self.fan is None:
+            self._doubt_angles(row[:, 0])
         self.fan = self._fan()
         self.geometry = self._geometry()
         self.axis = self._axis_record()
@@ -176,6 +179,12 @@ class SliceInput:
             self.pad = max(1, self.scan.shape[2] // _PAD_SHARE)
             self.geometry = self.geometry if self.fan is None else self._geometry()
         self.notes += _notes_of(self)
+
+    def _doubt_angles(self, row: Floats) -> None:
+        """Say what the data have against the angles, where no search for the axis has looked."""
+        other = other_turn(row, self.scan.angles)
+        if other is not None:
+            self.notes.append(f"Doubt: {other.in_words()}.")
 
     def _find_axis(self) -> None:
         """Find the axis, of a fan the sense of rotation too."""

@@ -20,8 +20,9 @@ from rift_cl.cl.host_arrays import as_host_array
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Fan, Scan
 from rift_cl.reconstruct.axis.estimate import AxisEstimate
+from rift_cl.reconstruct.axis.fan_doubt import fan_doubt
 from rift_cl.reconstruct.axis.fan_rays import parallel_views
-from rift_cl.reconstruct.axis.search import axis_of_rows, searched_rows
+from rift_cl.reconstruct.axis.search import searched_axis, searched_rows
 from rift_cl.reconstruct.axis.sense import sense_of
 from rift_cl.reconstruct.axis.views import Views
 
@@ -110,7 +111,27 @@ def axis_of_fan(
             f"span is {span}, wanted two bins in ascending order, between 0 and {fan.bins - 1}"
         )
     mean = rows.mean(axis=1, keepdims=True)
-    ways, found, refusals = (fan, replace(fan, angles=-fan.angles)), [], []
+    ways = fan, replace(fan, angles=-fan.angles)
+    try:
+        found, told = _either_way(rows, mean, places, middle, ways, span)
+    except InputError as error:
+        doubt = fan_doubt(mean[:, 0], ways[0]) or fan_doubt(mean[:, 0], ways[1])
+        if not doubt:
+            raise
+        raise type(error)(f"{error}; {doubt}") from error
+    return replace(found, doubt=fan_doubt(mean[:, 0], replace(told, center=found.center)))
+
+
+def _either_way(
+    rows: Views,
+    mean: Views,
+    places: Floats,
+    middle: float,
+    ways: tuple[Fan, Fan],
+    span: tuple[float, float] | None,
+) -> tuple[AxisEstimate, Fan]:
+    """The axis in the sense of rotation that the data tell, and the fan that turns in it."""
+    found, refusals = [], []
     for way in ways:
         try:
             found.append(_settled(mean, np.array([middle]), middle, way, span).center)
@@ -118,9 +139,9 @@ def axis_of_fan(
             refusals.append(error)
     if not found:
         raise refusals[0]
-    sense = sense_of(mean[:, 0], fan, found)
+    sense = sense_of(mean[:, 0], ways[0], found)
     told = replace(ways[sense.sign < 0], center=found[0])
-    return replace(_settled(rows, places, middle, told, span), sense=sense)
+    return replace(_settled(rows, places, middle, told, span), sense=sense), told
 
 
 def _settled(
@@ -136,7 +157,7 @@ def _settled(
         sinograms = (views[:, row] for row in range(views.shape[1]))
         # Rows counted from the one that the estimate is for.
         offsets = list(places - middle)
-        read = axis_of_rows(sinograms, offsets, 1, directions, within)
+        read = searched_axis(sinograms, offsets, 1, directions, within)
         found = _on_detector(read, bins, middle)
         change = found.center - fan.center
         fan = replace(fan, center=found.center)

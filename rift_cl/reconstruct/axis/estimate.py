@@ -33,6 +33,7 @@ class AxisEstimate:
         scores: (2, m) trial centres and their log-likelihood, all rows together, 0 where the data
             say nothing and greatest at the best.
         sense: of rotation, as fans and cones tell it; None for parallel beams, which do not.
+        doubt: what the data have against the scan's angles or lengths; empty where nothing.
     """
 
     center: float
@@ -45,6 +46,7 @@ class AxisEstimate:
     errors: Floats
     scores: Floats
     sense: Sense | None = None
+    doubt: str = ""
 
     @property
     def tilt_error(self) -> float:
@@ -64,7 +66,8 @@ class AxisEstimate:
             f"at bin {self.center:.2f} ({low:.2f} to {high:.2f} at 95 % confidence, by {self.by} "
             f"in {self.rows.size} rows)"
         )
-        return said if self.sense is None else f"{said}; {self.sense.in_words()}"
+        said = said if self.sense is None else f"{said}; {self.sense.in_words()}"
+        return f"{said}; {self.doubt}" if self.doubt else said
 
     def _repr_html_(self) -> str:
         """What a notebook shows: where the axis is, and the curve that says so."""
@@ -74,6 +77,7 @@ class AxisEstimate:
     def record(self) -> dict[str, Any]:
         """The estimate in words and numbers, as reports and configurations keep it."""
         sense = {} if self.sense is None else {"sense": self.sense.record()}
+        doubt = {"doubt": self.doubt} if self.doubt else {}
         return {
             "center": self.center,
             "interval": list(self.interval),
@@ -82,4 +86,5 @@ class AxisEstimate:
             "by": self.by,
             "rows": [int(row) for row in self.rows],
             **sense,
+            **doubt,
         }

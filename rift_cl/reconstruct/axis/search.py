@@ -7,7 +7,8 @@ contradict each other, nothing stands out, or the interval comes out too wide, n
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from rift_cl.errors import InputError
 from rift_cl.reconstruct.axis.estimate import AxisEstimate
 from rift_cl.reconstruct.axis.measures import RowAxis, chosen_measure
+from rift_cl.reconstruct.axis.turn import other_turn
 from rift_cl.reconstruct.axis.views import Views, without_rings
 
 Floats = NDArray[np.float64]
@@ -53,7 +55,7 @@ def axis_of_rows(
     angles: Floats,
     span: tuple[float, float] | None = None,
 ) -> AxisEstimate:
-    """Find the axis from some rows of a detector.
+    """Find the axis from some rows of a detector, and what they have against the angles.
 
     Args:
         sinograms: line integrals of each row, (angle, bin).
@@ -66,6 +68,33 @@ def axis_of_rows(
         InputError: the data do not tell the axis: no contrast, too few views, a wide gap between
             them, or nothing that stands out of the noise; or the span is not on the detector.
     """
+    middle: list[Views] = []
+
+    def watched() -> Iterator[Views]:
+        for index, views in enumerate(sinograms):
+            if index == len(rows) // 2:
+                middle.append(views)
+            yield views
+
+    try:
+        found = searched_axis(watched(), rows, count, angles, span)
+    except InputError as error:
+        other = other_turn(middle[0], angles) if middle else None
+        if other is None:
+            raise
+        raise type(error)(f"{error}; {other.in_words()}") from error
+    other = other_turn(middle[0], angles)
+    return found if other is None else replace(found, doubt=other.in_words())
+
+
+def searched_axis(
+    sinograms: Iterable[Views],
+    rows: Sequence[float],
+    count: int,
+    angles: Floats,
+    span: tuple[float, float] | None = None,
+) -> AxisEstimate:
+    """The axis of ``axis_of_rows``, the angles taken as they are."""
     measure = chosen_measure(angles, span)
     places, found, why = [], [], ""
     for row, sinogram in zip(rows, sinograms, strict=True):
