@@ -197,6 +197,17 @@ def test_the_interval_holds_the_axis_and_grows_with_noise(noise):
     assert np.median(wide) > 1.5 * (quiet.interval[1] - quiet.interval[0])
 
 
+def test_an_axis_that_moves_during_a_turn_widens_the_interval():
+    still = rift.find_center(sinogram(PARTS, FULL, 83.7), FULL)
+    # It drifts by a bin during the first half turn, and stays there.
+    moving = 83.7 + np.clip(FULL / np.pi, 0, 1)[:, None]
+    rows = [sinogram(PARTS, FULL, moving, seed=seed) for seed in range(3)]
+    for stack in (rows[0], np.stack(rows, axis=1)):
+        found = rift.find_center(stack, FULL)
+        assert found.interval[1] - found.interval[0] > 4 * (still.interval[1] - still.interval[0])
+        assert found.interval[0] < moving.mean() < found.interval[1]
+
+
 @pytest.mark.parametrize("angles", [HALF, FULL], ids=["half", "full"])
 def test_rings_do_not_decide(angles):
     y = sinogram(PARTS, angles, 88.3)

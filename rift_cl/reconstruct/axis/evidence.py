@@ -11,7 +11,9 @@ Each frequency's share, ``X(k) = 2 |C| (1 + cos(2 k c + arg C))`` above its own 
 bounded as in Student's t-distribution, ``nu log(1 + X / nu)``: a frequency that contradicts all
 others, because the object leaves the field of view or the beam drifted, is outvoted instead of
 deciding. The standard error is the sandwich estimate (Huber, Proc. 5th Berkeley Symposium 1, 221,
-1967) over bands of frequencies, so that it also grows where bands disagree.
+1967) over bands of frequencies, so that it also grows where bands disagree. Where groups of
+neighbouring views have their own shares of the evidence and disagree by more than that, the axis
+moved during the scan.
 """
 
 from __future__ import annotations
@@ -40,11 +42,14 @@ class Evidence:
         terms: (n,) the numbers C(k), for centres counted in bins of the detector.
         freedom: degrees of freedom nu of the t-distribution; the fewer, the more a frequency that
             contradicts the others is outvoted.
+        groups: (group, n) the shares of ``terms`` that groups of neighbouring views have; None
+            where they have none of their own.
     """
 
     frequencies: Floats
     terms: Complexes
     freedom: float
+    groups: Complexes | None = None
 
     @cached_property
     def _weight(self) -> Floats:
@@ -89,6 +94,25 @@ class Evidence:
         bands = np.minimum((_BANDS * share / share[-1]).astype(int), _BANDS - 1)
         slopes = np.bincount(bands, slope, minlength=_BANDS)
         return float(max(np.linalg.norm(slopes) / total, 1 / np.sqrt(total)))
+
+    def drift(self, center: float) -> float:
+        """By how much groups of views move a centre at a peak beyond its standard error, in bins.
+
+        A standard error as well, of what all rows of a detector have in common; 0 where groups
+        have no shares of their own.
+        """
+        if self.groups is None or len(self.groups) < 2:
+            return 0.0
+        total = self._derivatives(center)[1].sum()
+        if not total > 0:
+            return 0.0
+        twice = 2 * self.frequencies
+        share = 1 / (1 + self._weight * (1 + np.cos(twice * center + self._phase)))
+        turned = self.groups * np.exp(1j * twice * center)
+        slopes = -2 * (turned.imag * (share * twice)).sum(axis=1)
+        count = slopes.size
+        scatter = float(slopes.std() * count / np.sqrt(count - 1) / total)
+        return float(np.sqrt(max(scatter**2 - self.error(center) ** 2, 0.0)))
 
     def _derivatives(self, center: float) -> tuple[Floats, Floats]:
         """First and second derivative of the negative log-likelihood, by frequency."""

@@ -73,6 +73,7 @@ class RowAxis(NamedTuple):
         evidence: what the row says near the centre, where it is told by frequencies.
         by: the measure that found it.
         mass: what the centres of mass say, where they are part of the answer.
+        drift: the standard error that all rows have in common, as the axis moved during the scan.
     """
 
     center: float
@@ -83,6 +84,7 @@ class RowAxis(NamedTuple):
     evidence: Evidence | None
     by: str
     mass: MassCenter | None = None
+    drift: float = 0.0
 
 
 class Measure(Protocol):
@@ -112,7 +114,10 @@ class OppositeViews:
         row = Row(binned(views, count), count, is_cut(views))
         centers, scores = mirror_scores(row, self._pairs, row.place(low), row.place(high))
         starts = _peaks(row.detector(centers), scores, _APART * bins)
-        return _best([self._settled(row, start) for start in starts], bins)
+        best = _best([self._settled(row, start) for start in starts], bins)
+        return best._replace(
+            drift=0.0 if best.evidence is None else best.evidence.drift(best.center)
+        )
 
     def _settled(self, row: Row, start: float) -> RowAxis:
         def look(window: float, near: float) -> Evidence:

@@ -32,6 +32,8 @@ _SAME = 1e-6
 _SLOPE = 2.0
 # How far a guess may be off, in bins of the row; frequencies over which noise is averaged.
 _DOUBT, _BLUR = 1.0, 9
+# Groups of neighbouring pairs whose disagreement is part of the error.
+_GROUPS = 8
 # Degrees of freedom of the t-distribution: many, as noise is measured over many pairs.
 _FREEDOM = 100.0
 
@@ -135,7 +137,9 @@ def pair_evidence(row: Row, pairs: Pairs, window: float, near: float) -> Evidenc
     first, opposite = pairs.thinned(_MOST).of(row.views)
     ones = spectra(replace(row, views=np.concatenate([first, opposite])), window)
     one, other = np.split(ones.values, 2)
-    terms = -(one * other).sum(axis=0, dtype=np.complex128)
+    ends = np.linspace(0, len(one), min(_GROUPS, len(one)) + 1).astype(int)[:-1]
+    groups = -np.add.reduceat((one * other).astype(np.complex128), ends, axis=0)
+    terms = groups.sum(axis=0)
     energy = (np.abs(one) ** 2 + np.abs(other) ** 2).sum(axis=0, dtype=np.float64)
     phase = np.exp(2j * ones.frequencies * (near - ones.origin))
     # At high frequencies, a guess that is slightly off must not pass for noise.
@@ -147,4 +151,4 @@ def pair_evidence(row: Row, pairs: Pairs, window: float, near: float) -> Evidenc
     # agree tell nothing, and the best weight for two measurements of one signal falls to zero.
     excess = np.maximum(uniform_filter1d(energy, _BLUR, mode="nearest") / noise - 1, 0)
     weights = 2 * excess / (2 * excess + 1) * len(one) / noise
-    return ones.evidence(terms * weights, row, _FREEDOM)
+    return ones.evidence(terms * weights, row, _FREEDOM, groups * weights)

@@ -174,7 +174,9 @@ def _line(places: Floats, found: list[RowAxis], middle: float) -> AxisEstimate:
         kept &= away < away[far].max()
         if 2 * np.count_nonzero(kept) <= places.size:
             raise _refusal("rows of the detector contradict each other")
-    half = _HALF_INTERVAL * error
+    # Rows share what the axis moved by, so that no number of them averages it out.
+    drift = np.median([row.drift for row, counts in zip(found, kept, strict=True) if counts])
+    half = _HALF_INTERVAL * float(np.hypot(error, drift))
     if not half <= _WIDEST:
         raise _refusal(_too_wide(half))
     used = [row for row, counts in zip(found, kept, strict=True) if counts]

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.reconstruct.axis.evidence import Evidence
+from rift_cl.reconstruct.axis.evidence import Complexes, Evidence
 
 Floats = NDArray[np.float64]
 Views = NDArray[np.float32]
@@ -150,11 +150,18 @@ class Spectra:
         turned: NDArray[np.complex64] = phase.astype(np.complex64)
         return turned
 
-    def evidence(self, terms: NDArray[np.complex128], row: Row, freedom: float) -> Evidence:
+    def evidence(
+        self,
+        terms: Complexes,
+        row: Row,
+        freedom: float,
+        groups: Complexes | None = None,
+    ) -> Evidence:
         """Evidence in bins of the detector from terms that count centres from ``origin``."""
         shift = self.origin + (row.bin - 1) / (2 * row.bin)
         phase = np.exp(-2j * self.frequencies * shift)
-        return Evidence(self.frequencies / row.bin, terms * phase, freedom)
+        parts = None if groups is None else groups * phase
+        return Evidence(self.frequencies / row.bin, terms * phase, freedom, parts)
 
 
 def spectra(row: Row, center: float) -> Spectra:
