@@ -4,7 +4,8 @@
  * The first is B_k times what comes in; the lobes' is derived in include/lobe*.h. Those of mean and
  * camera, told in include/shading/seen_color.h, are added to grad_means and to this run's row of
  * camera_parts. inverse_x, _y, _z are the rows of W^-T, each followed by a coordinate of o. A colour
- * that was held at zero passes nothing on, and so no splat that is not drawn.
+ * that was held at zero passes nothing on, and so no splat that is not drawn. With ADAM the linear
+ * coefficients take a step here and now (include/train/adam_step.h), in place of grad_linear.
  *
  * Index space: (runs of RUN splats), LANES of them at a time. Each splat has 3 FUNCTIONS + GEOMETRY + 9
  * numbers that are read, 3 FUNCTIONS + GEOMETRY that are written, and 3 of its mean that are both. */
@@ -14,13 +15,21 @@
 #include "include/shading/lobe.h"
 
 KERNEL void lobe_shade_grad(
-    __global const float *restrict means, __global const float *restrict linear,
+    __global const float *restrict means, __global float *restrict linear,
     __global const float *restrict lobes, __global const float *restrict features,
     __global const float *restrict grad_features, float4 inverse_x, float4 inverse_y,
-    float4 inverse_z, int count, __global float *restrict grad_linear,
+    float4 inverse_z, int count,
+#if ADAM
+    ADAM_PARAMETERS,
+#else
+    __global float *restrict grad_linear,
+#endif
     __global float *restrict grad_lobes, __global float *restrict grad_means,
     __global float *restrict camera_parts)
 {
+#if ADAM
+  const Adam adam = ADAM_GIVEN;
+#endif
   const float3 center = (float3)(inverse_x.w, inverse_y.w, inverse_z.w);
   lanes3 by_means = lanes3_of(0, 0, 0);
   EACH_RUN(first, count) {
@@ -28,7 +37,7 @@ KERNEL void lobe_shade_grad(
     const lanes3 color = read3(features, STRIDE, rows);
     const lanes_int seen = is_seen(color) & are_there(rows);
     const lanes3 incoming = incoming_of(color, read3(grad_features, STRIDE, rows));
-    lanes lobe[GEOMETRY], by_lobe[GEOMETRY], basis[FUNCTIONS], by_basis[FUNCTIONS];
+    lanes lobe[GEOMETRY], by_lobe[GEOMETRY], basis[FUNCTIONS], by_basis[FUNCTIONS], by_linear[3 * FUNCTIONS];
     const Sight s = sight_of(read3(means, 3, rows), center);
     read_columns(lobes, GEOMETRY, 0, GEOMETRY, rows, lobe);
     functions_grad(linear, FUNCTIONS, rows, incoming, by_basis);
@@ -37,7 +46,12 @@ KERNEL void lobe_shade_grad(
     basis[0] = CONSTANT;
     for (int k = 1; k < FUNCTIONS; k++) basis[k] = seen ? basis[k] : 0;
     for (int k = 0; k < GEOMETRY; k++) by_lobe[k] = seen ? by_lobe[k] : 0;
-    write_coefficients_grad(grad_linear, FUNCTIONS, rows, basis, incoming);
+    coefficients_grad(FUNCTIONS, basis, incoming, by_linear);
+#if ADAM
+    step_coefficients(linear, FUNCTIONS, rows, by_linear, adam);
+#else
+    write_kept(grad_linear, 3 * FUNCTIONS, rows, by_linear);
+#endif
     write_columns(grad_lobes, GEOMETRY, 0, GEOMETRY, rows, by_lobe);
     const lanes3 by_mean = mean_grad(g, s, seen);
     add_to_means(grad_means, rows, by_mean);

@@ -4,6 +4,9 @@
  * of camera_parts. inverse_x, _y, _z are the rows of W^-T, each followed by a coordinate of o. A
  * colour that was held at zero passes nothing on, and so no splat that is not drawn.
  *
+ * With ADAM the coefficients take a step here and now (include/train/adam_step.h), in place of grad_sh: also
+ * those of splats that nothing comes in for, which go on by their moments.
+ *
  * Index space: (runs of RUN splats), LANES of them at a time. */
 
 #include "include/portable.h"
@@ -11,11 +14,19 @@
 #include "include/shading/sh.h"
 
 KERNEL void splat_shade_grad(
-    __global const float *restrict means, __global const float *restrict sh,
+    __global const float *restrict means, __global float *restrict sh,
     __global const float *restrict features, __global const float *restrict grad_features,
-    float4 inverse_x, float4 inverse_y, float4 inverse_z, int count, __global float *restrict grad_sh,
+    float4 inverse_x, float4 inverse_y, float4 inverse_z, int count,
+#if ADAM
+    ADAM_PARAMETERS,
+#else
+    __global float *restrict grad_sh,
+#endif
     __global float *restrict grad_means, __global float *restrict camera_parts)
 {
+#if ADAM
+  const Adam adam = ADAM_GIVEN;
+#endif
   const float3 center = (float3)(inverse_x.w, inverse_y.w, inverse_z.w);
   lanes3 by_means = lanes3_of(0, 0, 0);
   EACH_RUN(first, count) {
@@ -24,15 +35,21 @@ KERNEL void splat_shade_grad(
     ask_ahead(sh, COEFFICIENTS, rows);
     const lanes_int seen = is_seen(color) & are_there(rows);
     const lanes3 incoming = incoming_of(color, read3(grad_features, STRIDE, rows));
-    lanes basis[COEFFICIENTS], by_basis[COEFFICIENTS];
+    lanes basis[COEFFICIENTS], by_basis[COEFFICIENTS], by_sh[3 * COEFFICIENTS];
     const Sight s = sight_of(read3(means, 3, rows), center);
     sh_basis(s.direction, basis);
-    write_coefficients_grad(grad_sh, COEFFICIENTS, rows, basis, incoming);
-    if (!any_lane(seen)) continue;
-    functions_grad(sh, COEFFICIENTS, rows, incoming, by_basis);
-    const lanes3 by_mean = mean_grad(sh_basis_grad(s.direction, by_basis), s, seen);
-    add_to_means(grad_means, rows, by_mean);
-    by_means = plus(by_means, by_mean);
+    coefficients_grad(COEFFICIENTS, basis, incoming, by_sh);
+    if (any_lane(seen)) {
+      functions_grad(sh, COEFFICIENTS, rows, incoming, by_basis);
+      const lanes3 by_mean = mean_grad(sh_basis_grad(s.direction, by_basis), s, seen);
+      add_to_means(grad_means, rows, by_mean);
+      by_means = plus(by_means, by_mean);
+    }
+#if ADAM
+    step_coefficients(sh, COEFFICIENTS, rows, by_sh, adam);
+#else
+    write_kept(grad_sh, 3 * COEFFICIENTS, rows, by_sh);
+#endif
   }
   if (HAS_RUN(count)) add_to_camera(by_means, inverse_x, inverse_y, inverse_z, camera_parts);
 }

@@ -132,9 +132,9 @@ class Shade(torch.autograd.Function):
             into = _only_features(device, to_device(device, incoming[0][view]))
             features = to_device(device, out[view])
             found = shade_grad(device, places, given, camera, features=features, gradients=into)
+            assert found is not None and into.camera is not None
             each.append(to_tensor(device, found, means))
             _add(total, "means", device, into.means, means)
-            assert into.camera is not None
             lenses.append(to_tensor(device, sum_columns(device, into.camera), means))
         by_sh = torch.stack(each) if ctx.each else sum(each[1:], each[0])
         return None, total["means"], by_sh, _camera_grads(lenses)[0], None, None

@@ -1,6 +1,6 @@
 """A step of training by its definitions.
 
-Coincident of adam, splat_activate, splat_band, splat_band_coverage, splat_noise and
+Coincident of adam, splat_update, splat_activate, splat_band, splat_band_coverage, splat_noise and
 splat_statistics.
 """
 

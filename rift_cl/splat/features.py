@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rift_cl.basis.angular import ANGULAR_BASES, AngularBasis, angular_basis
+from rift_cl.cl.adam import AdamStep
 from rift_cl.cl.arithmetic import copy_columns
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
@@ -217,7 +218,8 @@ def shade_grad(
     lobes: DeviceArray | None = None,
     angular: str = "sh",
     grad_lobes: DeviceArray | None = None,
-) -> DeviceArray:
+    sh_step: AdamStep | None = None,
+) -> DeviceArray | None:
     """The gradient of ``shade``.
 
     Args:
@@ -232,9 +234,11 @@ def shade_grad(
         angular: as given to ``shade``.
         grad_lobes: (N, G) array that the gradient by the lobes is written to; it is left out if
             not given.
+        sh_step: a step of Adam that ``sh`` takes in place by its gradient, which is not kept;
+            not for lobes that are evaluated on the host.
 
     Returns:
-        (N, K, 3) gradient by the coefficients.
+        (N, K, 3) gradient by the coefficients; None where they took a step.
 
     Raises:
         InputError: the splats have no coefficients, or no such functions are known.
@@ -252,13 +256,14 @@ def shade_grad(
         if grad_lobes is not None:
             copy_columns(device, by_lobes, 0, grad_lobes, 0, by_lobes.shape[1])
         return by_linear
-    found = {
-        f"grad_{name}": device.empty(array.shape) for name, array in shading.parameters.items()
-    }
+    coefficients, *others = shading.parameters
+    found = {f"grad_{name}": device.empty(shading.parameters[name].shape) for name in others}
     if grad_lobes is not None and lobes is not None:
         found["grad_lobes"] = as_device_array(
             device, grad_lobes, lobes.shape, name="shade_grad: grad_lobes"
         )
+    by_sh = device.empty(shading.parameters[coefficients].shape) if sh_step is None else None
+    step = {f"grad_{coefficients}": by_sh} if sh_step is None else sh_step.arguments
     inverse = np.linalg.inv(camera.view[:3, :3]).T
     rows = np.column_stack([inverse, camera.center]).astype(np.float32, order="C")
     device.launch(
@@ -271,14 +276,16 @@ def shade_grad(
         **{f"inverse_{axis}": row for axis, row in zip("xyz", rows, strict=True)},
         count=count,
         **found,
+        **step,
         grad_means=gradients.means,
         camera_parts=gradients.camera,
         RUN=device.traits.run,
         STRIDE=features.shape[1],
         CAMERA_GRADIENT=gradients.camera is not None,
+        ADAM=sh_step is not None,
         **shading.sizes,
     )
-    return next(iter(found.values()))
+    return by_sh
 
 
 def _check_incoming(incoming: DeviceArray, features: DeviceArray) -> None:

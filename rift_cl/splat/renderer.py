@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from rift_cl.cl.adam import AdamStep
 from rift_cl.cl.arithmetic import copy_columns, sum_columns
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
@@ -95,7 +96,8 @@ class FrameGradients:
     Args:
         splats: by the splats' parameters and their positions on the screen.
         colors: (N, D) by the splats' own colours; None where they have none.
-        sh: (N, K, 3) by the spherical harmonics; None where there are none.
+        sh: (N, K, 3) by the spherical harmonics; None where there are none, or where ``backward``
+            took a step along them.
         camera: (16,): by the upper three rows of the view matrix, then fx, fy, cx, cy; None if
             not asked for.
         aperture: (2,): by the aperture's radius and focus; None if the camera's is not asked
@@ -205,6 +207,7 @@ class Renderer:
         *,
         with_camera: bool = False,
         with_background: bool = True,
+        sh_step: AdamStep | None = None,
     ) -> FrameGradients:
         """The gradient of a loss by everything that made a frame.
 
@@ -214,6 +217,9 @@ class Renderer:
             grad_transmittance: dL/d transmittance, (height, width); zero if not given.
             with_camera: differentiate by pose, intrinsics and aperture as well.
             with_background: differentiate by the background, if there is one.
+            sh_step: a step of Adam that the splats' ``sh`` take in place as soon as their gradient
+                is known, which then is not kept: ``FrameGradients.sh`` is None, and the frame's
+                splats are others. Lobes evaluated on the host take no step and have a gradient.
 
         Raises:
             ShapeError: a gradient does not fit the frame.
@@ -235,7 +241,7 @@ class Renderer:
             depth_channel=frame.depth is not None,
         )
         del sums
-        sh, lobes = self._shade_grad(frame, gradients)
+        sh, lobes = self._shade_grad(frame, gradients, sh_step)
         return FrameGradients(
             splats=gradients,
             colors=own_columns(device, gradients.features, frame.channels),
@@ -254,7 +260,7 @@ class Renderer:
         }
 
     def _shade_grad(
-        self, frame: Frame, gradients: SplatGradients
+        self, frame: Frame, gradients: SplatGradients, sh_step: AdamStep | None
     ) -> tuple[DeviceArray | None, DeviceArray | None]:
         """By the coefficients of shaded colours and by their lobes; None where there are none."""
         splats, device = frame.splats, self.device
@@ -269,6 +275,7 @@ class Renderer:
             lobes=splats.lobes,
             angular=self.settings.angular,
             grad_lobes=lobes,
+            sh_step=sh_step,
         )
         return sh, lobes
 

@@ -13,23 +13,21 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.cl.adam import Adam, AdamStep, constants
 from rift_cl.cl.arithmetic import axpby, copy_columns
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.elementwise import multiply
+from rift_cl.splat.projection import SplatGradients
 from rift_cl.splat.renderer import FrameGradients
 from rift_cl.splat.splats import Splats
 from rift_cl.train.band_limit import Detail
 
-# What all splats have, and what some have as well.
-GROUPS = ("means", "quats", "log_scales", "logits", "sh")
+# What a splat is without what it shows, what all splats have, and what some have as well.
+_GEOMETRY = ("means", "quats", "log_scales", "logits")
+GROUPS = (*_GEOMETRY, "sh")
 MODES = ("shape_modes", "color_modes")
 MORE = (*MODES, "lobes")
-
-# Adam's constants, and parameters that one work-item of a CPU goes through, as
-# kernels/train/adam.cl has it.
-_BETA1, _BETA2, _EPSILON = 0.9, 0.999, 1e-15
-_CPU_RUN = 4096
 
 Arrays = Mapping[str, NDArray[np.float32]]
 
@@ -65,7 +63,7 @@ class Parameters:
 
     def __post_init__(self) -> None:
         """Make what takes the steps."""
-        self._adam = _DeviceAdam(self.device)
+        self._adam = Adam(self.device)
 
     @classmethod
     def of(
@@ -143,39 +141,73 @@ class Parameters:
         """One step of Adam.
 
         Args:
-            gradients: of the loss, by what was drawn.
+            gradients: of the loss, by what was drawn; without one by the harmonics where these
+                took their step (``sh_step``) as it was made.
             rates: of each group; of the harmonics, that of the constant one.
             sh_rest: rate of the other harmonics, as a share of that.
             opacity_penalty: weight of the mean opacity in the loss.
             scale_penalty: weight of the mean scale in the loss.
             ridge: weight in the loss of the mean over splats of their modes' squares.
         """
-        count, found = len(self), gradients.splats
-        self.device.launch(
-            "splat_activate_grad",
-            (self.device.traits.runs(count),),
-            **self._before(),
-            by_scales=found.scales,
-            by_opacities=found.opacities,
-            each_scale=scale_penalty / (3 * count),
-            each_opacity=opacity_penalty / count,
-            count=count,
-            RUN=self.device.traits.run,
-            **self._kind(),
-        )
-        by = (found.means, found.quats, found.scales, found.opacities, gradients.sh)
-        more = {name: getattr(gradients, name) for name in MORE if name in self.raw}
-        given = dict(zip(GROUPS, by, strict=True)) | more
+        count = len(self)
         self.step += 1
-        for name, gradient in given.items():
+        for name in self.groups:
+            gradient = None if name in _GEOMETRY else getattr(gradients, name)
+            if gradient is None:
+                continue
             if name in MODES and ridge:
                 axpby(self.device, 2 * ridge / count, self.raw[name], 1.0, gradient)
             if name in self.free:
                 multiply(self.device, self.free[name], gradient)
-            rest, rate = sh_rest if name == "sh" else 1.0, rates[name]
-            moved = self.raw[name], self.first[name], self.second[name]
-            self._adam.step(*moved, gradient, rate=rate, rest=rest, step=self.step)
-        self.activate()
+            self._adam.take(self._adam_step(name, rates, sh_rest), self.raw[name], gradient)
+        self._update_geometry(gradients.splats, rates, opacity_penalty, scale_penalty)
+
+    def _update_geometry(
+        self,
+        by: SplatGradients,
+        rates: Mapping[str, float],
+        opacity_penalty: float,
+        scale_penalty: float,
+    ) -> None:
+        """Step along places, turns, scales and opacities, and compute what is drawn of them."""
+        count = len(self)
+        self.device.launch(
+            "splat_update",
+            (self.device.traits.runs(count),),
+            **self._before(),
+            means=self.raw["means"],
+            quats=self.raw["quats"],
+            **{f"{name}_m": self.first[name] for name in _GEOMETRY},
+            **{f"{name}_v": self.second[name] for name in _GEOMETRY},
+            by_means=by.means,
+            by_quats=by.quats,
+            by_scales=by.scales,
+            by_opacities=by.opacities,
+            scales=self.drawn.scales,
+            opacities=self.drawn.opacities,
+            shares=self._adam.shares(),
+            each_scale=scale_penalty / (3 * count),
+            each_opacity=opacity_penalty / count,
+            rates=np.array([rates[name] for name in _GEOMETRY], np.float32),
+            **constants(self.step),
+            count=count,
+            RUN=self.device.traits.run,
+            **self._kind(),
+        )
+
+    def sh_step(self, rates: Mapping[str, float], *, sh_rest: float) -> AdamStep:
+        """The harmonics' part of the next step, for ``Renderer.backward``; rates as of it."""
+        return self._adam_step("sh", rates, sh_rest, ahead=1)
+
+    def _adam_step(
+        self, name: str, rates: Mapping[str, float], sh_rest: float, ahead: int = 0
+    ) -> AdamStep:
+        return self._adam.next_step(
+            *(self.first[name], self.second[name]),
+            rate=rates[name],
+            rest=sh_rest if name == "sh" else 1.0,
+            number=self.step + ahead,
+        )
 
     def activate(self) -> None:
         """Compute the rendered splats from the trained parameters."""
@@ -265,72 +297,6 @@ class Parameters:
         """Compute the rendered splats again, after arrays of ``raw`` were replaced."""
         self.drawn = _undrawn(self.device, self.raw)
         self.activate()
-
-
-class _DeviceAdam:
-    """Steps of Adam on one device; ``kernels/train/adam.cl`` says what a step is.
-
-    Args:
-        device: where the parameters are.
-    """
-
-    def __init__(self, device: Device) -> None:
-        self.device = device
-        self._sent: dict[tuple[int, float], DeviceArray] = {}
-
-    def step(
-        self,
-        x: DeviceArray,
-        first: DeviceArray,
-        second: DeviceArray,
-        gradient: DeviceArray,
-        *,
-        rate: float,
-        rest: float,
-        step: int,
-    ) -> None:
-        """Move parameters and their moments, in place.
-
-        Args:
-            x: (N, ...) the parameters; the other arrays have their shape.
-            first: means of gradients.
-            second: means of their squares.
-            gradient: of the loss.
-            rate: of the first three numbers of a splat.
-            rest: rate of its other numbers, as a share of that.
-            step: number of the step, counted from 1.
-        """
-        device, size = self.device, x.size
-        period = 1 if rest == 1.0 else size // x.shape[0]
-        run = _CPU_RUN if device.traits.is_cpu else 1
-        device.launch(
-            "adam",
-            (-(-size // run),),
-            x=x,
-            m=first,
-            v=second,
-            g=gradient,
-            shares=self._shares(period, rest),
-            period=period,
-            rate=rate,
-            beta1=_BETA1,
-            beta2=_BETA2,
-            c1=1 / (1 - _BETA1**step),
-            c2=1 / (1 - _BETA2**step),
-            epsilon=_EPSILON,
-            size=size,
-            RUN=run,
-        )
-
-    def _shares(self, period: int, rest: float) -> DeviceArray:
-        """Shares of the rate along a period, one for the first three; sent to the device once."""
-        if (period, rest) not in self._sent:
-            shares = np.where(np.arange(period) < 3, 1.0, rest)
-            # Two periods and a run more, so that shares can be read from any place on.
-            length = 2 * period + self.device.traits.macros["LANES"]
-            table = np.resize(shares, length).astype(np.float32)
-            self._sent[period, rest] = self.device.array(table)
-        return self._sent[period, rest]
 
 
 def _moments(

@@ -183,18 +183,23 @@ class Trainer:
             parameters.drawn, self.camera(number), background=self.pictures.background(number)
         )
         value, by_image = self._compared(frame.image, number, rates["exposures"])
+        shares = settings.learning_rates
+        sh_rest = shares.lobes_rest if "lobes" in parameters.raw else shares.sh_rest
         gradients = self.renderer.backward(
-            frame, by_image, with_camera=self.poses is not None, with_background=False
+            frame,
+            by_image,
+            with_camera=self.poses is not None,
+            with_background=False,
+            sh_step=parameters.sh_step(rates, sh_rest=sh_rest),
         )
         if self.poses is not None and gradients.camera is not None:
             by_view = self.device.get(gradients.camera)[:12].reshape(3, 4).astype(float)
             self.poses.update(number, by_view, rates["poses"])
         penalties = self.strategy.penalties(step)
-        shares = settings.learning_rates
         parameters.update(
             gradients,
             rates,
-            sh_rest=shares.lobes_rest if "lobes" in parameters.raw else shares.sh_rest,
+            sh_rest=sh_rest,
             opacity_penalty=penalties.opacity,
             scale_penalty=penalties.scale,
             ridge=settings.basis.ridge,

@@ -77,7 +77,8 @@ def test_shares_of_a_step_add_up_and_every_part_is_there(bench):
         assert sum(row["share"] for row in found["rows"]) == pytest.approx(1)
         stages = {row["stage"] for row in found["rows"]}
         assert ("homogenisation" in stages) == (way == "homogenised")
-        assert {"raster", "raster gradient", "Adam", "random walk", "upload"} <= stages
+        assert {"raster", "raster gradient", "Adam and activation", "upload"} <= stages
+        assert {"shading gradient and Adam", "random walk"} <= stages
 
 
 def test_every_row_of_a_table_has_its_columns(bench):

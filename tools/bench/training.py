@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from bench.splats import SplatCase
 
 _RATES = {"means": 1e-4, "quats": 1e-3, "log_scales": 5e-3, "logits": 5e-2, "sh": 2.5e-3}
-# Parameters of a splat with harmonics of degree 3; cameras whose resolution limits splats.
-_PARAMETERS, _VIEWS = 11 + 48, 100
+# Harmonics of a splat, of degree 3; cameras whose resolution limits splats.
+_HARMONICS, _VIEWS = 48, 100
 
 
 def training_operations(case: SplatCase) -> dict[str, Callable[[], Any]]:
@@ -83,7 +83,7 @@ def _splats(case: SplatCase) -> float:
 
 
 def _numbers(case: SplatCase) -> float:
-    return _PARAMETERS * case.count
+    return _HARMONICS * case.count
 
 
 def _samples(case: SplatCase) -> float:
@@ -106,9 +106,11 @@ def _transforms(work: Callable[[int], float]) -> Callable[[SplatCase], float]:
 
 
 TRAINING_COSTS: dict[str, Cost] = {
-    "adam": _per("parameter", _numbers, 28, "value, moments, gradient in; value, moments out"),
+    "adam": _per("harmonic", _numbers, 28, "value, moments, gradient in; value, moments out"),
+    "splat_update": _per(
+        "splat", _splats, 11 * 28 + 16, "11 parameters as harmonics; scales and opacity out"
+    ),
     "splat_activate": _per("splat", _splats, 32, "scales and opacity in and out"),
-    "splat_activate_grad": _per("splat", _splats, 48, "scales, opacity, gradients in and out"),
     "splat_noise": _per("splat", _splats, 56, "the splat in, its place out"),
     "splat_statistics": _per(
         "splat", _splats, 41, "gradient, extents, code in; statistics both", 8

@@ -40,9 +40,9 @@ _STAGES = {
     "loss": ("ssim_map", "loss_grad", "sum_columns"),
     "homogenisation": ("fft_", "keep_norm", "axpby"),
     "raster gradient": ("splat_raster_grad_cpu", "splat_raster_grad_gpu", "splat_sum_slots"),
-    "projection gradient": ("splat_project_grad", "splat_shade_grad"),
-    "activation": ("splat_activate", "splat_activate_grad"),
-    "Adam": ("adam",),
+    "projection gradient": ("splat_project_grad",),
+    "shading gradient and Adam": ("splat_shade_grad", "adam"),
+    "Adam and activation": ("splat_update", "splat_activate"),
     "random walk": ("splat_noise",),
 }
 DECODING, UPLOAD = "decoding of the picture", "upload"

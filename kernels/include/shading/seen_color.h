@@ -16,9 +16,14 @@
  * Tables of features have STRIDE numbers for each splat, of which the first three are the colour. */
 
 #include "include/splat/splat_rows.h"
+#include "include/train/adam_step.h"
 
 #ifndef STRIDE
 #define STRIDE 3
+#endif
+/* Whether a gradient's kernel takes a step of Adam along the coefficients and writes no gradient by them. */
+#ifndef ADAM
+#define ADAM 0
 #endif
 #ifndef CAMERA_GRADIENT
 #define CAMERA_GRADIENT 1
@@ -100,10 +105,8 @@ static void functions_grad(
   }
 }
 
-/* Writes dL/d(coefficients). */
-static void write_coefficients_grad(
-    __global float *grad, const int functions, Rows rows, const lanes *basis, lanes3 incoming)
-{
+/* dL/d(coefficients), as LANES rows in memory of the work-item's own. */
+static void coefficients_grad(const int functions, const lanes *basis, lanes3 incoming, lanes *by) {
   UNROLL for (int k = 0; k < functions; k += AT_ONCE) {
     const int some = functions - k < AT_ONCE ? functions - k : AT_ONCE;
     lanes v[NUMBERS_AT_ONCE];
@@ -112,9 +115,19 @@ static void write_coefficients_grad(
       v[3 * n + 1] = basis[k + n] * incoming.y;
       v[3 * n + 2] = basis[k + n] * incoming.z;
     }
-    write_columns(grad, 3 * functions, 3 * k, 3 * some, rows, v);
+    keep_columns(by, 3 * functions, 3 * k, 3 * some, v);
   }
 }
+
+#if ADAM
+/* A step of Adam along the coefficients of splats, by what coefficients_grad found. */
+static void step_coefficients(
+    __global float *coefficients, const int functions, Rows rows, const lanes *by, Adam adam)
+{
+  const int numbers = 3 * functions * (LANES == 1 ? 1 : rows.count);
+  adam_along(coefficients, adam, (ulong)rows.first * 3 * functions, numbers, by);
+}
+#endif
 
 /* dL/dmean from the gradient g by the direction, where a splat is seen. */
 static lanes3 mean_grad(lanes3 g, Sight s, lanes_int seen) {

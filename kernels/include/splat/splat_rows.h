@@ -26,8 +26,10 @@
 
 #if LANES == 8 && RIFT_POCL
 #define STORE_QUAD(p, v) (*(__global quad_at *)(p) = (v))
+#define KEEP_QUAD(p, v) (*(quad_at *)(p) = (v))
 #elif LANES == 8
 #define STORE_QUAD(p, v) vstore4(v, 0, p)
+#define KEEP_QUAD(p, v) vstore4(v, 0, p)
 #endif
 
 /* Whether this work-item has a run: a group may be longer than what is left, and what the items without
@@ -104,6 +106,37 @@ static void write_columns(
     UNROLL for (int k = 0; k < width; k++) p[l * stride + k] = ((const float *)(column + k))[l];
 #else
   UNROLL for (int k = 0; k < width; k++) p[k] = column[k];
+#endif
+}
+
+/* Columns as rows in memory of the work-item's own, which has room for LANES of them. */
+static void keep_columns(lanes *table, const int stride, const int from, const int width, const lanes *column) {
+  float *p = (float *)table + from;
+#if LANES == 8
+  UNROLL for (int k = 0; k + 4 <= width; k += 4) {
+    lanes v[4];
+    UNROLL for (int t = 0; t < 4; t++) v[t] = column[k + t];
+    transpose_halves(v);
+    UNROLL for (int l = 0; l < 4; l++) KEEP_QUAD(p + l * stride + k, v[l].lo);
+    UNROLL for (int l = 0; l < 4; l++) KEEP_QUAD(p + (l + 4) * stride + k, v[l].hi);
+  }
+  UNROLL for (int k = width & ~3; k < width; k++)
+    UNROLL for (int l = 0; l < LANES; l++) p[l * stride + k] = ((const float *)(column + k))[l];
+#else
+  UNROLL for (int k = 0; k < width; k++) p[k] = column[k];
+#endif
+}
+
+/* What keep_columns left, as the rows of a table. */
+static void write_kept(__global float *table, const int stride, Rows rows, const lanes *kept) {
+  __global float *p = table + rows.first * stride;
+#if LANES == 8
+  const int numbers = rows.count * stride;
+  int n = 0;
+  for (; n + LANES <= numbers; n += LANES) STORE(p + n, kept[n / LANES]);
+  for (; n < numbers; n++) p[n] = ((const float *)kept)[n];
+#else
+  UNROLL for (int n = 0; n < stride; n++) p[n] = kept[n];
 #endif
 }
 
