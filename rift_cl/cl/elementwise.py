@@ -1,7 +1,7 @@
 """What solvers do to whole arrays besides adding them: copy, weigh, clip, pull.
 
 Sums and multiples are in ``rift_cl.cl.arithmetic``, inner products in ``rift_cl.cl.reductions``.
-Copies, weights and clips at zero are of arrays on the host as well, all of them there.
+Arrays may be on the host as well, all of them there; levels are on the device.
 """
 
 from __future__ import annotations
@@ -70,15 +70,21 @@ def clip_negative(device: Device, y: AnyArray) -> None:
     _launch(device, "clip_negative", y)
 
 
-def clip_between(device: Device, low: DeviceArray, high: DeviceArray, y: DeviceArray) -> None:
+def clip_between(device: Device, low: AnyArray, high: AnyArray, y: AnyArray) -> None:
     """Y = min(max(y, low), high), sample by sample."""
+    if isinstance(low, np.ndarray) and isinstance(high, np.ndarray) and isinstance(y, np.ndarray):
+        pass_parts(device, lambda a, b, y: clip_between(device, a, b, y), low, high, y)
+        return
     _launch(device, "clip_between", y, low=low, high=high)
 
 
 def pull_to_levels(
-    device: Device, levels: DeviceArray, strength: float, x: DeviceArray, y: DeviceArray
+    device: Device, levels: DeviceArray, strength: float, x: AnyArray, y: AnyArray
 ) -> None:
     """Y += strength (m - x), m the middle of the two of the ascending levels about x."""
+    if isinstance(x, np.ndarray) and isinstance(y, np.ndarray):
+        pass_parts(device, lambda x, y: pull_to_levels(device, levels, strength, x, y), x, y)
+        return
     _launch(device, "level_pull", y, levels=levels, count=levels.size, strength=strength, x=x)
 
 

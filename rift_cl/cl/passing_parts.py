@@ -6,7 +6,7 @@ part ends where the samples of a work-item do.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # Samples that one work-item of a CPU goes through in arithmetic on whole arrays.
 CPU_RUN = 4096
+# Samples of the host's own work on an array at a time.
+_HOST_RUN = 1 << 22
 # Parts that are on the device at a time, with those whose memory is not free again yet.
 _AT_ONCE = 4
 
@@ -26,6 +28,11 @@ def most_samples(device: Device, each: int) -> int:
     """Samples of ``each`` bytes that a part may have, whole runs of them."""
     room = min(device.traits.allocation, device.budget // _AT_ONCE)
     return max(room // (each * CPU_RUN), 1) * CPU_RUN
+
+
+def runs(size: int, most: int = _HOST_RUN) -> Iterator[slice]:
+    """Runs of at most so many of ``size`` items, all but the last as long as that."""
+    return (slice(first, min(first + most, size)) for first in range(0, size, most))
 
 
 def pass_parts(device: Device, work: Callable[..., None], *arrays: NDArray[Any]) -> None:

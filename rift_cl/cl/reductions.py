@@ -36,8 +36,8 @@ def dot(device: Device, x: AnyArray, y: AnyArray) -> float:
     return _reduce(device, x, y, product=True)
 
 
-def total(device: Device, x: DeviceArray) -> float:
-    """The sum of a device array's samples."""
+def total(device: Device, x: AnyArray) -> float:
+    """The sum of the samples of an array on the device or the host."""
     return _reduce(device, x, x, product=False)
 
 

@@ -7,10 +7,17 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.array import DeviceArray
-from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
+from rift_cl.errors import (
+    DeviceError,
+    DTypeError,
+    InputError,
+    ResourceLimitError,
+    ShapeError,
+)
 from rift_cl.operators.linear import Chunk, LinearOperator
 
 
@@ -37,6 +44,12 @@ class Adjoint(LinearOperator):
 
     def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
         self._forward._apply(y, out)
+
+    def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
+        self._forward._apply_adjoint_host(x, y)
+
+    def _apply_adjoint_host(self, y: NDArray[Any], x: NDArray[Any]) -> None:
+        self._forward._apply_host(y, x)
 
     @property
     def scratch(self) -> int:
@@ -167,6 +180,23 @@ class Product(LinearOperator):
         between = self.device.empty(self._inner.range, self.dtype)
         self._outer._apply_adjoint(y, between)
         self._inner._apply_adjoint(between, out)
+
+    def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
+        try:
+            super()._apply_host(x, y)
+        except ResourceLimitError:
+            # One after the other, each of which takes its work in parts where it can.
+            between = np.empty(self._inner.range, self.dtype)
+            self._inner._apply_host(x, between)
+            self._outer._apply_host(between, y)
+
+    def _apply_adjoint_host(self, y: NDArray[Any], x: NDArray[Any]) -> None:
+        try:
+            super()._apply_adjoint_host(y, x)
+        except ResourceLimitError:
+            between = np.empty(self._inner.range, self.dtype)
+            self._outer._apply_adjoint_host(y, between)
+            self._inner._apply_adjoint_host(between, x)
 
 
 def _finite(factor: float, dtype: np.dtype[Any]) -> float:

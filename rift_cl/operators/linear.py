@@ -224,6 +224,7 @@ class LinearOperator(ABC):
         return self * -1.0
 
     def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
+        """Write A x to ``y``, both on the host, in chunks of the operator's work."""
         budget = self.device.budget
         lack: DeviceMemoryError | None = None
         for halving in range(_HALVINGS + 1):
@@ -245,6 +246,10 @@ class LinearOperator(ABC):
                 if lack is not None:
                     raise lack from None
                 raise
+
+    def _apply_adjoint_host(self, y: NDArray[Any], x: NDArray[Any]) -> None:
+        """Write A' y to ``x``, both on the host, in chunks of the adjoint's work."""
+        LinearOperator._apply_host(self.T, y, x)
 
     def _apply_chunk(self, x: NDArray[Any], y: NDArray[Any], chunk: Chunk, *, add: bool) -> None:
         operator = chunk.operator or self

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -139,22 +140,51 @@ def test_binning_keeps_the_density(ball: Path, tmp_path: Path) -> None:
     assert middle_of(found.read()) == pytest.approx(0.02, rel=0.05)
 
 
-def test_a_volume_larger_than_the_memory_is_made_in_slabs(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def tall(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scan whose volume is eight times as large as its projections."""
     angles = 2 * np.pi * np.arange(8) / 8
     cone = Cone(angles, 64, 64, 2.0, 160.0, 320.0)
     views = project([Ellipsoid.ball(14.0, 0.02, (3.0, 1.0, -2.0))], Grid((2, 2, 2)), cone)
     lengths = {"source_to_axis": 160.0, "source_to_detector": 320.0, "pitch": 2.0}
-    path = tmp_path / "ball.npz"
+    path = tmp_path_factory.mktemp("tall") / "ball.npz"
     np.savez(path, projections=views, angles=angles, **lengths)
-    common = {"center": 31.5, "format": "h5"}
-    whole = rift.reconstruct_scan(path, tmp_path / "a", **common)
-    slabs = rift.reconstruct_scan(path, tmp_path / "b", memory="3.2M", **common)
+    return path
+
+
+@pytest.mark.parametrize("method", ["fbp", pytest.param("backproject", marks=pytest.mark.full)])
+def test_a_volume_larger_than_the_memory_is_made_in_slabs(
+    tall: Path, tmp_path: Path, method: str
+) -> None:
+    common = {"center": 31.5, "format": "h5", "method": method}
+    whole = rift.reconstruct_scan(tall, tmp_path / "a", **common)
+    slabs = rift.reconstruct_scan(tall, tmp_path / "b", memory="3.2M", **common)
     assert "slabs" in " ".join(slabs.notes) and "slabs" not in " ".join(whole.notes)
     np.testing.assert_array_equal(slabs.read(), whole.read())
     pictures = [(tmp_path / run / "preview.png").read_bytes() for run in "ab"]
     assert pictures[0] == pictures[1]
     with pytest.raises(InputError, match="--window"):
-        rift.reconstruct_scan(path, tmp_path / "c", memory="3.2M", dtype="uint8", **common)
+        rift.reconstruct_scan(tall, tmp_path / "c", memory="3.2M", dtype="uint8", **common)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"method": "cgls"},
+        pytest.param({"method": "tv", "weights": "counts"}, marks=pytest.mark.full),
+        pytest.param({"method": "sirt", "subsets": 2}, marks=pytest.mark.full),
+    ],
+    ids=lambda given: given["method"],
+)
+def test_steps_on_a_volume_larger_than_the_memory_are_done_in_parts(
+    tall: Path, tmp_path: Path, given: dict[str, Any]
+) -> None:
+    common = {"center": 31.5, "format": "h5", "steps": 2, **given}
+    whole = rift.reconstruct_scan(tall, tmp_path / "a", **common)
+    parts = rift.reconstruct_scan(tall, tmp_path / "b", memory="3.2M", **common)
+    assert "in parts" in " ".join(parts.notes) and "in parts" not in " ".join(whole.notes)
+    found, wanted = parts.read(), whole.read()
+    assert np.abs(found - wanted).max() <= 1e-4 * np.abs(wanted).max()
 
 
 def test_a_preview_and_a_plan(
@@ -176,6 +206,7 @@ def test_a_preview_and_a_plan(
         (("--pad", "on"), "--pad"),
         (("--compensate", "exact"), "--compensate"),
         (("--rows", "3", "90"), "--rows"),
+        (("--footprint", "joseph"), "--footprint joseph"),
         (("--size", "90"), "inside"),
         (("--center", "80"), "--center"),
         (("--memory", "300K"), "--binning"),

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from limited_devices import assert_same, limited, normal
 
-from rift_cl import Cone, Fan, Grid, Projector, Vectors, fbp
+from rift_cl import Cone, Fan, Grid, Projector, Vectors, backproject, fbp
 from rift_cl.errors import ResourceLimitError
 from rift_cl.geometry.leaning import leaning
 from rift_cl.reconstruct import FDK
+from rift_cl.reconstruct.direct.filtered_backprojection import unfiltered_backprojection
 
 # Off the middle, no whole number of lanes, and looked at along both axes.
 GRID = Grid((22, 18, 20), (1.3, 0.8, 1.1), (1, 2, -1))
@@ -106,5 +107,27 @@ def test_fdk_filters_runs_of_views_and_backprojects_slabs(device, scan):
     small, y = FDK(A), normal(*A.range)
     assert parts(small._A)[1] >= 2
     assert_same([fbp(A, y)], [whole(y)])
+    volume = normal(*A.domain)
+    assert_same([small.T(volume)], [whole.T(volume)])
     few = small._weighting.records + 60_000
     assert len(list(small._weighting._chunks(few))) >= 2
+
+
+def test_a_backprojection_without_a_filter_is_made_in_slabs(device):
+    A = Projector(GRID, CONE, device=device)
+    y, small = normal(*A.range), A._need(8, CONE.views, sparing=True)[0]
+    whole = backproject(A, y)
+    slabs = list(unfiltered_backprojection(A).slabs(y, small))
+    assert len(slabs) >= 2
+    assert_same([np.concatenate(slabs)], [whole])
+    assert_same([backproject(Projector(GRID, CONE, device=limited(device, small)), y)], [whole])
+
+
+def test_vectors_on_no_circle_are_backprojected_as_a_cone_is(device):
+    near = leaning(CONE, 1e-9)
+    y = normal(CONE.views, CONE.rows, CONE.bins)
+    found, wanted = (backproject(Projector(GRID, scan, device=device), y) for scan in (near, CONE))
+    assert np.abs(found - wanted).max() <= 1e-3 * np.abs(wanted).max()
+    assert np.isfinite(
+        backproject(Projector(GRID, ANYWHERE, device=device), normal(4, 30, 32))
+    ).all()

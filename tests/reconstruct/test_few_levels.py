@@ -7,6 +7,7 @@ import pytest
 from solver_cases import GRID, SCAN, Matrix, finished, problem
 
 from rift_cl import FastProjector, Grid, Parallel, Projector
+from rift_cl.cl.array_home import ArrayHome
 from rift_cl.cl.elementwise import clip_between, pull_to_levels
 from rift_cl.errors import InputError, RiftError, ShapeError
 from rift_cl.io import open_scan, read_image
@@ -34,7 +35,7 @@ LEVELS = (-0.5, 0.2, 1.0, 1.5)
 def directional(device, shape, spacing, dtype="float32", weights=WEDGE):
     if dtype == "float64" and not device.traits.fp64:
         pytest.skip("a device without float64")
-    return TotalVariation(device, shape, spacing, dtype, weights)
+    return TotalVariation(ArrayHome(device, dtype), shape, spacing, weights)
 
 
 SHAPES = [((17, 23), (1.0, 1.0)), ((12, 9), (0.3, 2.5)), ((5, 7, 9), (4.0, 0.5, 1.5))]

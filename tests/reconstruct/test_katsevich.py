@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 import pytest
 from averaged_rays import averaged_on
+from limited_devices import assert_same, limited, normal
 
 import rift_cl as rift
 from rift_cl import Cone, Grid, Projector, fbp, phantom
@@ -167,3 +168,13 @@ def test_filters_that_are_no_window_and_compensation_are_refused(device):
         Katsevich(A, "high-pass")
     with pytest.raises(InputError, match="compensate"):
         fbp(A, np.zeros(1), compensate="uniform")
+
+
+def test_the_adjoint_takes_parts(device):
+    scan = helix(per_turn=24)
+    whole = Katsevich(Projector(GRID, scan, device=device))
+    need, _ = whole._A._need(N, scan.views // 2, sparing=True)
+    parted = Katsevich(Projector(GRID, scan, device=limited(device, need)))
+    assert len(list(parted._A._chunks(need))) >= 2
+    volume = normal(*GRID.shape)
+    assert_same([parted.T(volume)], [whole.T(volume)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rift_cl.cl.array_home import ArrayHome
 from rift_cl.errors import ShapeError
 from rift_cl.reconstruct.solvers.tv_functional import TotalVariation
 from rift_cl.reference import total_variation as twin
@@ -29,7 +30,7 @@ both_types = pytest.mark.parametrize("dtype", ["float32", "float64"])
 def made(device, shape, spacing, dtype):
     if dtype == "float64" and not device.traits.fp64:
         pytest.skip("a device without float64")
-    return TotalVariation(device, shape, spacing, dtype)
+    return TotalVariation(ArrayHome(device, dtype), shape, spacing)
 
 
 def gradient(variation, image):
@@ -102,7 +103,7 @@ def test_the_variation_of_a_box_is_jump_times_edge_at_any_spacing(device):
         size = tuple(int(20 / h) for h in spacing)
         image = np.zeros(size)
         image[: size[0] // 2] = 3
-        variation = TotalVariation(device, size, spacing, "float32")
+        variation = TotalVariation(ArrayHome(device, "float32"), size, spacing)
         assert variation.value(device.array(image)) == pytest.approx(3 * 20, rel=1e-6)
 
 
@@ -111,7 +112,7 @@ def test_the_adjoint_of_the_gradient_is_the_slope_of_the_value(device):
     if not device.traits.fp64:
         pytest.skip("a device without float64")
     shape, spacing = (7, 9), (0.7, 1.3)
-    variation = TotalVariation(device, shape, spacing, "float64")
+    variation = TotalVariation(ArrayHome(device, "float64"), shape, spacing)
     image, way = RANDOM.standard_normal((2, *shape))
     field = gradient(variation, image)
     length = np.sqrt((field**2).sum(axis=0))
@@ -143,7 +144,7 @@ def test_denoising_equals_its_twin(device, shape, spacing, nonnegative):
 def test_denoising_closes_the_gap_to_its_dual(device, nonnegative):
     """The value at the image less that of the dual field bounds what is left to gain."""
     shape, spacing, weight = (24, 31), (1.0, 0.8), 0.3
-    variation = TotalVariation(device, shape, spacing, "float32")
+    variation = TotalVariation(ArrayHome(device, "float32"), shape, spacing)
     image = RANDOM.standard_normal(shape)
     dual, out = device.zeros(variation.field_shape), device.empty(shape)
     gaps = []
@@ -165,7 +166,7 @@ def test_denoising_closes_the_gap_to_its_dual(device, nonnegative):
 def test_denoising_agrees_with_scikit_image(device):
     chambolle = pytest.importorskip("skimage.restoration").denoise_tv_chambolle
     image = RANDOM.standard_normal((32, 40))
-    variation = TotalVariation(device, image.shape, (1.0, 1.0), "float32")
+    variation = TotalVariation(ArrayHome(device, "float32"), image.shape, (1.0, 1.0))
     dual, out = device.zeros(variation.field_shape), device.empty(image.shape)
     variation.denoise(device.array(image), dual, out, weight=0.4, steps=400, nonnegative=False)
     other = chambolle(image, weight=0.4, eps=1e-9, max_num_iter=4000)
@@ -179,4 +180,4 @@ def test_denoising_agrees_with_scikit_image(device):
 
 def test_shapes_that_are_no_image_are_refused(device):
     with pytest.raises(ShapeError, match=r"\(7,\)"):
-        TotalVariation(device, (7,), (1.0,), "float32")
+        TotalVariation(ArrayHome(device, "float32"), (7,), (1.0,))

@@ -17,6 +17,7 @@ from bench.case import Case
 from bench.costs import Cost
 from bench.operations import Task
 from rift_cl.cl.arithmetic import axpby
+from rift_cl.cl.array_home import ArrayHome
 from rift_cl.cl.elementwise import clip_between, clip_negative, multiply, pull_to_levels
 from rift_cl.cl.reductions import dot
 from rift_cl.reconstruct.direct.ray_factors import RayFactors
@@ -127,7 +128,7 @@ def _runs(device: rift.Device, shape: tuple[int, ...]) -> dict[str, Callable[[],
     x = device.array(head + _NOISE * np.random.default_rng(0).standard_normal(shape))
     y, ones, out = device.array(head), device.array(np.ones(shape)), device.empty(shape)
     low, levels = device.zeros(shape), device.array(np.array([0.0, 0.5, 1.0], np.float32))
-    V = TotalVariation(device, shape, (1.0,) * len(shape), np.float32)
+    V = TotalVariation(ArrayHome(device, np.float32), shape, (1.0,) * len(shape))
     u = device.zeros(V.field_shape)
     rays = RayFactors(device, np.float32, np.ones((1, shape[-1])), np.ones((shape[0], shape[-1])))
     return {

@@ -35,8 +35,9 @@ _REFUSED: dict[str, Any] = {
 }
 # Volumes and stacks of projections that a method holds at a time, on host and device together.
 _HELD = {"fbp": (3, 5), "backproject": (3, 4), "sirt": (6, 6), "cgls": (6, 6), "tv": (16, 7)}
-# Those on the host where a volume is made in slabs: projections as read, corrected, and filtered.
-_HELD_BESIDE_SLABS = 3
+# Stacks of projections on the host where a volume is worked on in parts: as read, corrected, and
+# filtered or with weights of rays.
+_HELD_BESIDE_PARTS = {"fbp": 3, "backproject": 2, "sirt": 5, "cgls": 5, "tv": 5}
 
 
 @dataclass(frozen=True)
@@ -250,26 +251,23 @@ class ConeInput:
         )
 
     @cached_property
-    def slab_budget(self) -> int | None:
-        """Bytes for slabs of the volume, where it is made in such; None where all fits at once."""
-        budget = self.device.budget
-        if self.settings.method != "fbp" or self._need <= budget:
+    def part_budget(self) -> int | None:
+        """Bytes for parts of the volume, where it is worked on in such; None where all fits."""
+        budget, method = self.device.budget, self.settings.method
+        if self._need <= budget:
             return None
-        left = budget - 4 * _HELD_BESIDE_SLABS * int(np.prod(self.scan.shape))
+        left = budget - 4 * _HELD_BESIDE_PARTS[method] * int(np.prod(self.scan.shape))
         # A slab is on the host as well, and is half of what the device holds for it at most.
-        return left * 2 // 3
+        return left if self.settings.iterative else left * 2 // 3
 
     def _check_memory(self) -> None:
         """Refuse what does not fit before anything is read.
 
         Raises:
-            ResourceLimitError: volume and projections are larger than the budget, or where the
-                volume can be made in slabs, the projections.
+            ResourceLimitError: the projections are larger than the budget.
         """
-        need, left = self._need, self.slab_budget
-        if left is not None and left > 0:
-            return
-        if need > self.device.budget:
+        need, left = self._need, self.part_budget
+        if left is not None and left <= 0:
             raise ResourceLimitError(
                 f"{self.file.path}: a volume of {self.solved.shape} from projections of "
                 f"{self.scan.shape} takes {format_bytes(need)}, the memory budget is "
@@ -293,6 +291,10 @@ def check_options(settings: ReconstructSettings) -> None:
     if settings.method == "levels":
         raise InputError(
             "--method levels does not apply to cone-beam scans: choose fbp, cgls, sirt or tv"
+        )
+    if settings.footprint == "joseph":
+        raise InputError(
+            "--footprint joseph does not apply to cone-beam scans: choose strip or linear"
         )
     if settings.compensate not in (None, "uniform", "voronoi"):
         raise InputError(

@@ -1,8 +1,9 @@
 """``rift reconstruct`` of cone beams: all rows of all views become a volume at once.
 
 No slice of a cone-beam scan is independent of its neighbours: every one needs all projections, and
-these are in memory together. Of ``fbp`` the volume need not be: where both do not fit, it is made
-and written in slabs. Other methods hold it as well; what does not fit is told before any work.
+these are in memory together. The volume need not be: where both do not fit, ``fbp`` and
+``backproject`` make and write it in slabs, and methods that take steps keep it in files and work on
+parts of it. What does not fit is told before any work.
 """
 
 from __future__ import annotations
@@ -33,7 +34,12 @@ from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.io.volumes import VOLUME_NAMES, VolumeWriter, open_volume, suggested_window
 from rift_cl.operators import Projector
 from rift_cl.progress import Report
-from rift_cl.reconstruct import FDK, Attenuation, Katsevich, backproject, poisson_weights
+from rift_cl.reconstruct import FDK, Attenuation, Katsevich, poisson_weights
+from rift_cl.reconstruct.direct.fdk import check_part
+from rift_cl.reconstruct.direct.filtered_backprojection import (
+    Backprojection,
+    unfiltered_backprojection,
+)
 from rift_cl.reconstruct.direct.katsevich import cone_inversion
 from rift_cl.reconstruct.direct.offset_axis import is_full_turn, sees_further
 from rift_cl.reconstruct.direct.padding import is_truncated
@@ -78,7 +84,7 @@ class ConeReconstruction:
         self.inversion = ConeInversion(self.source.window)
         # Made now, so that a scan that the method does not take is told before any work.
         self.projector, self._formula = self._operators()
-        self._check_slabs()
+        self._check_parts()
         out = settings.out
         alone = out.is_dir() and {p.name for p in out.iterdir()} <= {PREVIEW_PICTURE, "config.json"}
         overwrite = settings.overwrite or alone
@@ -111,21 +117,33 @@ class ConeReconstruction:
         """The settings with all that was decided."""
         return decided_cone_settings(self.source, self._values)
 
-    def _operators(self) -> tuple[Projector, FDK | Katsevich | None]:
+    def _operators(self) -> tuple[Projector, FDK | Katsevich | Backprojection | None]:
         """The projector of the voxels that are solved for, and the formula where it is one."""
         settings = self.settings
         options: dict[str, Any] = {"device": self.device}
         if settings.footprint is not None:
             options["footprint"] = settings.footprint
+        if settings.iterative and self.source.part_budget is not None:
+            # Of steps the device's share of the budget is all that it may use.
+            options["device"] = settings.open_device(self.source.part_budget)
         A = Projector(self.source.solved, self.source.geometry, **options)
-        if settings.method != "fbp":
-            return A, None
-        return A, cone_inversion(A, settings.view_filter(), settings.compensate)
+        return A, None if settings.iterative else self._formula_of(A)
 
-    def _check_slabs(self) -> None:
-        """Refuse slabs that find no room, or of which no window of values can be chosen."""
-        settings, left = self.settings, self.source.slab_budget
-        if self._formula is None or left is None:
+    def _formula_of(self, A: Projector) -> FDK | Katsevich | Backprojection:
+        """The formula that was asked for."""
+        settings = self.settings
+        if settings.method == "backproject":
+            return unfiltered_backprojection(A)
+        return cone_inversion(A, settings.view_filter(), settings.compensate)
+
+    def _check_parts(self) -> None:
+        """Refuse parts that find no room, or of which no window of values can be chosen."""
+        settings, left = self.settings, self.source.part_budget
+        if left is None:
+            return
+        if self._formula is None:
+            check_part(self.projector, left)
+            check_part(self.projector.T, left)
             return
         self._formula.check_slabs(left)
         if settings.dtype != "float32" and settings.window is None and not settings.preview:
@@ -140,12 +158,15 @@ class ConeReconstruction:
         self.source.locate()
         self.inversion.window = self.source.window
         self.projector, self._formula = self._operators()
-        if self._formula is not None:
+        if self._formula is not None and not isinstance(self._formula, Backprojection):
             self.source.notes.append(f"{self._formula.method}: {self._formula.sentence}.")
-        if self.source.slab_budget is not None:
+        if self.source.part_budget is not None:
             self.source.notes.append(
                 "The volume is made in slabs of slices, since it does not fit the memory budget "
                 "with its projections."
+                if self._formula is not None
+                else "What does not fit the memory budget is kept in temporary files, and the "
+                "volume is solved for in parts."
             )
 
     def plan(self) -> dict[str, str]:
@@ -220,13 +241,11 @@ class ConeReconstruction:
 
     def _solve(self, projections: Floats, total: int) -> Generator[Report, None, Iterable[Floats]]:
         """The volume in slabs, or in one, after a report for every step."""
-        left = self.source.slab_budget
+        left = self.source.part_budget
         if self._formula is not None:
             if left is not None:
                 return self._formula.slabs(projections, left)
             return [np.asarray(self._formula(projections))]
-        if self.settings.method == "backproject":
-            return [np.asarray(backproject(self.projector, projections))]
         options: dict[str, Any] = {}
         if self.settings.weights is not None:
             options["weights"] = poisson_weights(projections).weights
@@ -235,28 +254,27 @@ class ConeReconstruction:
         for report in solver.run(self.settings.most_steps):
             curve.append(report.values["residual"])
             yield Report(1 + report.done, total, "steps", report.values)
-        volume = np.asarray(self.device.get(solver.image))
+        volume = solver.data.home.host(solver.image)
         self.metrics |= {"steps": len(curve), "residual": curve[-1] if curve else 0.0}
-        return [np.ascontiguousarray(volume[self.source.part])]
+        return [volume[self.source.part]]
 
     def _preview(self) -> list[Floats]:
         """The middle slice alone, which a formula makes without the others."""
         if self._formula is None:
             raise InputError(
-                "--preview of a cone-beam scan is for --method fbp: steps need the whole volume"
+                "--preview of a cone-beam scan is for --method fbp or backproject: steps need the "
+                "whole volume"
             )
         first, stop = self.rows
         middle = (first + stop) // 2
         settings = dataclasses.replace(self.settings, rows=(middle, middle + 1))
         grid = VolumeWindow.of(settings, self.source.geometry).grid
         A = Projector(grid, self.source.geometry, device=self.device)
-        formula = cone_inversion(A, settings.view_filter(), settings.compensate)
-        return [np.asarray(formula(self._read().projections))[0]]
+        return [np.asarray(self._formula_of(A)(self._read().projections))[0]]
 
     def _finish(self, slabs: Iterable[Floats]) -> None:
         """Write the volume, its pictures and the report."""
-        if self.source.slab_budget is None:
-            slabs = list(slabs)
+        if isinstance(slabs, list):
             self._values = self._value_window(slabs[0])
         else:
             self._values = self.settings.window
@@ -341,7 +359,7 @@ def _blocks(slabs: Iterable[Floats]) -> Iterator[tuple[int, Floats]]:
     first = 0
     for slab in slabs:
         for start in range(0, len(slab), _WRITTEN):
-            block = slab[start : start + _WRITTEN]
+            block = np.ascontiguousarray(slab[start : start + _WRITTEN])
             yield first, block
             first += len(block)
 

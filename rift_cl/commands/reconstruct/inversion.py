@@ -40,9 +40,8 @@ from rift_cl.reconstruct.solvers.solver import Solver
 
 Floats = NDArray[np.float32]
 AnyProjector = ParallelProjector | Projector
-# Projectors that take arrays of a slice in parts where they must, and solvers that do.
+# Projectors that take arrays of a slice in parts where they must, as solvers do.
 _IN_PARTS = PhaseProjector, FanSlicesProjector
-_STEPS_IN_PARTS = "cgls", "sirt"
 # Images and sinograms, float32, that a slice needs on host and device at a time: a formula's are
 # counts, line integrals, two temporaries and the filtered ones; a method's are its state as well.
 # The next slab is read and the last one written at the same time: an image and two sinograms more.
@@ -134,7 +133,7 @@ class Inversion:
     def _fitting(self, count: int, A: AnyProjector) -> list[slice]:
         """Chunks of so many slices; arrays of a slice are taken in parts where that can be."""
         array = 4 * max(int(np.prod(A.grid.shape[-2:])), A.range[0] * A.range[-1])
-        if self._takes_parts and isinstance(A, _IN_PARTS):
+        if isinstance(A, _IN_PARTS):
             array = 0
         return plan_chunks(
             count,
@@ -145,14 +144,6 @@ class Inversion:
             array=array,
             largest=self.device.traits.allocation,
         )
-
-    @property
-    def _takes_parts(self) -> bool:
-        """Whether the method takes arrays larger than the device does in one piece."""
-        method, weighted = self.settings.method, self.settings.weights is not None
-        if method in _STEPS_IN_PARTS:
-            return not weighted and self.source.seen is None
-        return not self.settings.iterative
 
     def slices(self, first: int, projections: Floats) -> Generator[Report, None, Floats]:
         """Reconstruct a slab; a report after every step of every slice.

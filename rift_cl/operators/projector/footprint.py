@@ -18,6 +18,8 @@ from rift_cl.errors import InputError
 Floats = NDArray[np.float64]
 
 FOOTPRINTS = ("strip", "joseph", "linear")
+# The one that weighs rays and not shadows, which tables of several slices do not.
+_SINGLE = "joseph"
 _RECORD = 8
 # Bins, to which shares beyond edges are rounded as one number: wider shadows go bin by bin.
 _WIDEST_BY_EDGES = 4.0
@@ -56,7 +58,8 @@ def check_footprint(name: str, known: tuple[str, ...] = FOOTPRINTS) -> str:
     """
     if name not in known:
         wanted = ", ".join(map(repr, known[:-1])) + f" or {known[-1]!r}"
-        raise InputError(f"footprint is {name!r}, wanted {wanted}")
+        only = f": {name} is for parallel beams and fans of one slice" if name == _SINGLE else ""
+        raise InputError(f"footprint is {name!r}, wanted {wanted}{only}")
     return name
 
 

@@ -122,7 +122,15 @@ class FDK(LinearOperator):
             # One after the other, each of which takes its work in parts where it must.
             filtered = np.empty(self._weighting.range, self.dtype)
             self._weighting._apply_host(x, filtered)
-            self._A.T._apply_host(filtered, y)
+            self._A._apply_adjoint_host(filtered, y)
+
+    def _apply_adjoint_host(self, y: NDArray[Any], x: NDArray[Any]) -> None:
+        try:
+            super()._apply_adjoint_host(y, x)
+        except ResourceLimitError:
+            rays = np.empty(self._weighting.range, self.dtype)
+            self._A._apply_host(y, rays)
+            self._weighting._apply_adjoint_host(rays, x)
 
     def slabs(self, y: NDArray[Any], budget: int) -> Iterator[NDArray[Any]]:
         """The volume in slabs of slices, from the first on, with the bits of the whole.
@@ -147,7 +155,7 @@ class FDK(LinearOperator):
             ResourceLimitError: not even the smallest part fits.
         """
         for operator in (self._weighting, self._A.T):
-            next(iter(operator._chunks(budget)))
+            check_part(operator, budget)
 
     @property
     def scratch(self) -> int:
@@ -160,6 +168,15 @@ class FDK(LinearOperator):
         """Bytes of the largest array among these."""
         filtered = self.dtype.itemsize * math.prod(self._weighting.range)
         return max(filtered, self._weighting.largest_scratch, self._A.largest_scratch)
+
+
+def check_part(operator: LinearOperator, budget: int) -> None:
+    """Refuse a budget in which not even the smallest part of an operator's work finds room.
+
+    Raises:
+        ResourceLimitError: it does not.
+    """
+    next(iter(operator._chunks(budget)))
 
 
 def backprojected_slabs(

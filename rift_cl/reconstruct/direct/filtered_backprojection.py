@@ -13,7 +13,7 @@ each view gets a filter of its own (rift_cl/operators/filters/compensation.py).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import partial
 from typing import Any
 
@@ -21,13 +21,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError, ResourceLimitError
+from rift_cl.geometry import Vectors
 from rift_cl.geometry.numbers import one_number
+from rift_cl.geometry.seen_grid import scan_lengths
+from rift_cl.operators.algebra import Scaled
 from rift_cl.operators.filters.compensation import Compensation
 from rift_cl.operators.filters.ramp_filters import FilterLike, Gains, ViewFilter, as_filter
 from rift_cl.operators.linear import Chunk, LinearOperator
 from rift_cl.operators.projector.parallel.parallel_projector import ParallelProjector
 from rift_cl.operators.projector.projector import Projector
-from rift_cl.reconstruct.direct.fdk import FDK, amplitude, as_beam
+from rift_cl.reconstruct.direct.fdk import (
+    FDK,
+    amplitude,
+    as_beam,
+    backprojected_slabs,
+    check_part,
+)
 from rift_cl.reconstruct.direct.katsevich import Katsevich, cone_inversion
 from rift_cl.reconstruct.direct.view_weights import view_gains
 
@@ -103,7 +112,15 @@ class FilteredBackprojection(LinearOperator):
             # One after the other, each of which takes a slice in parts where it must.
             filtered = np.empty_like(x)
             self._filter._apply_host(x, filtered)
-            self._A.T._apply_host(filtered, y)
+            self._A._apply_adjoint_host(filtered, y)
+
+    def _apply_adjoint_host(self, y: NDArray[Any], x: NDArray[Any]) -> None:
+        try:
+            super()._apply_adjoint_host(y, x)
+        except ResourceLimitError:
+            projected = np.empty_like(x)
+            self._A._apply_host(y, projected)
+            self._filter._apply_adjoint_host(projected, x)
 
     @property
     def scratch(self) -> int:
@@ -173,11 +190,37 @@ def backproject(A: ParallelProjector | Projector, y: Any, *, out: Any = None) ->
     ``A``, ``y``, ``out`` and errors are those of ``fbp``. The result is the image convolved with
     1 / r, in the image's unit times a length; compare it after an affine fit.
     """
+    return unfiltered_backprojection(A)(y, out, name="y")
+
+
+class Backprojection(Scaled):
+    """Backprojection without a filter, an operator from projections to images."""
+
+    def slabs(self, y: NDArray[Any], budget: int) -> Iterator[NDArray[Any]]:
+        """The volume in slabs of slices, as ``FDK.slabs``."""
+        return backprojected_slabs(self, y, budget)
+
+    def check_slabs(self, budget: int) -> None:
+        """Refuse a budget in which ``slabs`` would find no room.
+
+        Raises:
+            ResourceLimitError: not even the smallest part fits.
+        """
+        check_part(self, budget)
+
+
+def unfiltered_backprojection(A: ParallelProjector | Projector) -> Backprojection:
+    """The operator that ``backproject`` applies, chosen by the scan of ``A``."""
     _check_projector(A)
     if isinstance(A, ParallelProjector):
-        return (A.T * (np.pi / len(A.scan.angles) * _unspread(A)))(y, out, name="y")
-    scan = as_beam(A.scan)
-    return (A.T * (np.pi / scan.views * amplitude(A.grid, scan)))(y, out, name="y")
+        return Backprojection(A.T, np.pi / len(A.scan.angles) * _unspread(A))
+    scan = A.scan
+    if isinstance(scan, Vectors):
+        # The median view stands for all.
+        share = math.prod(scan_lengths(scan).pixel) / math.prod(A.grid.spacing)
+    else:
+        share = amplitude(A.grid, as_beam(scan))
+    return Backprojection(A.T, np.pi / A.range[0] * share)
 
 
 def _check_projector(A: Any) -> None:

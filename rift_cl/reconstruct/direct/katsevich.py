@@ -28,7 +28,14 @@ from rift_cl.operators.filters.ramp_filters import FilterLike, as_filter
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.operators.projector.cone.slab_projector import SlabProjector
 from rift_cl.operators.projector.projector import Projector
-from rift_cl.reconstruct.direct.fdk import FDK, amplitude, as_beam, backprojected_slabs, rises
+from rift_cl.reconstruct.direct.fdk import (
+    FDK,
+    amplitude,
+    as_beam,
+    backprojected_slabs,
+    check_part,
+    rises,
+)
 from rift_cl.reconstruct.direct.helix_filter import Helix, HelixFilter, complete_depth
 from rift_cl.reconstruct.direct.redundancy import ITERATE
 
@@ -110,7 +117,12 @@ class Katsevich(LinearOperator):
         copy(self.device, self.device.array(views, self.dtype), out)
 
     def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
-        self._A.T._apply_host(self._filter(x, self._gain), y)
+        self._A._apply_adjoint_host(self._filter(x, self._gain), y)
+
+    def _apply_adjoint_host(self, y: NDArray[Any], x: NDArray[Any]) -> None:
+        rays = np.empty(self._A.range, self.dtype)
+        self._A._apply_host(y, rays)
+        x[...] = self._filter.adjoint(rays, self._gain)
 
     def slabs(self, y: NDArray[Any], budget: int) -> Iterator[NDArray[Any]]:
         """The volume in slabs of slices, as ``FDK.slabs``."""
@@ -122,7 +134,7 @@ class Katsevich(LinearOperator):
         Raises:
             ResourceLimitError: not even the smallest part fits.
         """
-        next(iter(self._A.T._chunks(budget)))
+        check_part(self._A.T, budget)
 
     @property
     def scratch(self) -> int:

@@ -74,12 +74,11 @@ class Cgls(Solver):
     ) -> None:
         images, sinograms = self.arrays
         scaled = diagonal is not None or free is not None
-        arrays = images + 2 * scaled, sinograms
-        data = DataTerm(A, y, precondition, noise, arrays, weights, in_parts=True)
+        data = DataTerm(A, y, precondition, noise, (images + 2 * scaled, sinograms), weights)
         super().__init__(data, noise)
         self._ridge = _checked_ridge(ridge)
         # How far each sample goes along the gradient; those that are held go nowhere.
-        self._scale = data.array(_scale(A, diagonal, free)) if scaled else None
+        self._scale = data.home.array(_scale(A, diagonal, free)) if scaled else None
         image, residual, direction = data.start(start), data.data(), data.image()
         data.residual(image, residual)
         weighted = None if data.weight is None else data.data()

@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.elementwise import pull_to_levels
-from rift_cl.cl.host_arrays import download
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry.numbers import one_number, real_numbers
 from rift_cl.operators.linear import LinearOperator
@@ -108,7 +107,7 @@ class FewLevels(Pdhg):
 
     def labels(self) -> NDArray[np.uint8]:
         """The level nearest to every sample of the image, by its number, on the host."""
-        image = download(self.data.device, self.image)
+        image = self.data.home.host(self.image)
         middle = (self.levels[1:] + self.levels[:-1]) / 2
         return np.searchsorted(middle, image).astype(np.uint8)
 

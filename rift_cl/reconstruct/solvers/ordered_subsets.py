@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import clip_negative, copy, multiply
+from rift_cl.cl.passing_parts import runs
 from rift_cl.cl.reductions import dot
 from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.geometry.numbers import one_number
@@ -94,7 +95,7 @@ class OrderedSubsets(Solver):
     ) -> None:
         if not 0 < one_number(relaxation) < 2:
             raise InputError(f"relaxation is {relaxation!r}, wanted a number between 0 and 2")
-        data = DataTerm(A, y, None, noise, self.arrays, weights, in_parts=True)
+        data = DataTerm(A, y, None, noise, self.arrays, weights)
         super().__init__(data, noise)
         count, most = one_number(subsets), A.range[0]
         if not (1 <= count <= most and count.is_integer()):
@@ -102,7 +103,7 @@ class OrderedSubsets(Solver):
                 f"subsets is {subsets!r}, wanted a whole number from 1 to the {most} views"
             )
         self._nonnegative, self._length = bool(nonnegative), float(relaxation)
-        whole = data.device.get(data.y)
+        whole = data.home.host(data.y)
         chosen = view_subsets(data.A, int(count))
         self._subsets = [self._subset(views, whole, weights is None) for views in chosen]
         self._pixels = self._inverse_columns(weights is None)
@@ -117,17 +118,23 @@ class OrderedSubsets(Solver):
     def _subset(self, views: Views, whole: NDArray[Any], unweighted: bool) -> _Subset:
         data = self.data
         part = restricted(data.A, views)
-        rays = inverse_sums(part, data) if unweighted else None
-        return _Subset(views, part, data.array(whole[views]), rays, data.empty(part.range))
+        y = data.home.array(whole[views])
+        rays = inverse_sums(part, data.home) if unweighted else None
+        return _Subset(views, part, y, rays, data.home.empty(part.range))
 
     def _inverse_columns(self, unweighted: bool) -> Any:
         """One over the largest of the subsets' sums of columns; 0 where nothing is seen."""
-        least = np.zeros(self.data.A.domain)
+        home = self.data.home
+        least: Any = None
         for part in self._subsets:
-            sums = part.A.T if unweighted else part.A.T @ part.A
-            found = self.data.device.get(inverse_sums(sums, self.data))
-            least = np.where((found > 0) & ((least == 0) | (found < least)), found, least)
-        return self.data.array(least)
+            sums = inverse_sums(part.A.T if unweighted else part.A.T @ part.A, home)
+            found = home.host(sums).reshape(-1)
+            least = found if least is None else least
+            for run in runs(found.size):
+                one, kept = found[run], least[run]
+                np.copyto(kept, one, where=(one > 0) & ((kept == 0) | (one < kept)))
+        least = least.reshape(self.data.A.domain)
+        return home.array(least) if home.on_device else least
 
     def _advance(self) -> None:
         now, data, device = self._now, self.data, self.data.device
@@ -155,11 +162,13 @@ class OrderedSubsets(Solver):
 
     def _measured(self, image: Any, out: Any) -> None:
         """``out`` = A image - y, all views in their order."""
-        whole = np.empty(self.data.A.range, self.data.dtype)
+        home = self.data.home
+        whole = np.empty(out.shape, out.dtype) if home.on_device else out
         for part in self._subsets:
             self._look(part, image)
-            whole[part.views] = self.data.device.get(part.residual)
-        copy(self.data.device, self.data.array(whole), out)
+            whole[part.views] = home.host(part.residual)
+        if home.on_device:
+            copy(self.data.device, home.array(whole), out)
 
     def state(self) -> dict[str, NDArray[Any]]:
         """The solver's state as host arrays; computing it projects all views once."""

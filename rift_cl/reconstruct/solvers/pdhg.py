@@ -101,7 +101,7 @@ class Pdhg(VariationSolver):
         self._tau = 1 / (2 * self._sigma * largest)
         steepest = self.variation.norm_squared
         self._step = self._sigma * largest / steepest if steepest else 0.0
-        dual = data.device.zeros(A.range, data.dtype)
+        dual = data.home.zeros(A.range)
         self._now = _State(**self._begin(start), data_dual=dual)
         self._spare = data.image(), data.data()
 
@@ -151,7 +151,7 @@ class Pdhg(VariationSolver):
 
 
 def checked_bounds(bounds: Any, data: DataTerm) -> tuple[Any, Any]:
-    """The least and greatest image, device arrays.
+    """The least and greatest image.
 
     Raises:
         InputError: they are not two, do not fit the image, are not finite, or cross each other.
@@ -167,5 +167,5 @@ def checked_bounds(bounds: Any, data: DataTerm) -> tuple[Any, Any]:
         raise InputError("bounds hold NaN or infinity: leave them out where there are none")
     if (both[0] > both[1]).any():
         raise InputError("bounds cross: the lower one is above the upper one somewhere")
-    low, high = (data.device.array(np.ascontiguousarray(end), data.dtype) for end in both)
+    low, high = (data.home.array(np.ascontiguousarray(end)) for end in both)
     return low, high

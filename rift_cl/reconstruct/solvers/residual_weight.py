@@ -32,6 +32,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.cl.host_arrays import download, is_device_array
 from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
 from rift_cl.geometry import Parallel, at_axis
 from rift_cl.operators.filters.compensation import COMPENSATIONS, Compensation
@@ -60,7 +61,7 @@ def residual_weight(
 
     Args:
         A: the operator that is inverted.
-        y: the data, of ``A.range``, on the device or on the host.
+        y: the data, of shape ``A.range``, on the device or on the host.
         precondition: None, ``ramp``, a compensation such as ``capped-voronoi`` (each view's ramp
             times what it alone knows, for views that lie unevenly), or a self-adjoint positive
             operator on ``A.range``, which is taken as it is.
@@ -133,7 +134,8 @@ def _kept_share(A: LinearOperator, scan: Parallel, y: Any, noise: float | None) 
     variance = 0.0 if noise is None else min(noise, 1e150) ** 2
     if variance == 0:
         return np.ones_like
-    frequencies, power = mean_power(A.device.get(y), scan.pitch)
+    host = download(A.device, y) if is_device_array(y) else y
+    frequencies, power = mean_power(host, scan.pitch)
     signal = np.minimum.accumulate(np.maximum(power - variance, 0))
     diameter = _diameter(A, scan)
 

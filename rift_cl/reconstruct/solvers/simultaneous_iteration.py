@@ -27,7 +27,9 @@ from typing import Any
 import numpy as np
 
 from rift_cl.cl.arithmetic import axpby
+from rift_cl.cl.array_home import ArrayHome
 from rift_cl.cl.elementwise import clip_negative, copy, multiply
+from rift_cl.cl.passing_parts import runs
 from rift_cl.errors import InputError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.linear import LinearOperator
@@ -80,14 +82,14 @@ class Sirt(Solver):
     ) -> None:
         if not 0 < one_number(relaxation) < 2:
             raise InputError(f"relaxation is {relaxation!r}, wanted a number between 0 and 2")
-        data = DataTerm(A, y, precondition, noise, self.arrays, weights, in_parts=True)
+        data = DataTerm(A, y, precondition, noise, self.arrays, weights)
         super().__init__(data, noise)
         self._nonnegative = nonnegative
         self._rays, self._pixels, self._length = None, None, float(relaxation)
         if data.weight is None and weights is None:
-            self._rays, self._pixels = inverse_sums(A, data), inverse_sums(A.T, data)
+            self._rays, self._pixels = (inverse_sums(B, data.home) for B in (A, A.T))
         elif data.weight is None:
-            self._pixels = inverse_sums(data.A.T @ data.A, data)
+            self._pixels = inverse_sums(data.A.T @ data.A, data.home)
         else:
             largest = data.norm_squared()
             self._length = relaxation / largest if largest > 0 else 0.0
@@ -133,8 +135,8 @@ class Sirt(Solver):
         now.step += 1
 
 
-def inverse_sums(A: LinearOperator, data: DataTerm) -> Any:
-    """One over the sums of an operator's rows, where the data are; 0 where they are next to 0.
+def inverse_sums(A: LinearOperator, home: ArrayHome) -> Any:
+    """One over the sums of an operator's rows, kept at home; 0 where they are next to 0.
 
     Where sums ring below zero, none counts for less than that: a ray that grazes the image would
     get a weight that only ringing has made large.
@@ -142,15 +144,19 @@ def inverse_sums(A: LinearOperator, data: DataTerm) -> Any:
     Raises:
         InputError: a sum is negative, and not by ringing.
     """
-    host = A.device.get(A(data.array(np.ones(A.domain)))).astype(np.float64)
-    largest = host.max(initial=0.0)
-    below = -host.min(initial=0.0)
+    sums = home.host(A(home.made(A.domain, np.ones), out=home.empty(A.range)))
+    largest = float(sums.max(initial=0.0))
+    below = -float(sums.min(initial=0.0))
     if below > _RINGING * largest:
         raise InputError(
             "A has rows or columns with a negative sum, and SIRT wants weights >= 0: use cgls"
         )
-    counts = host > _LEAST * largest
-    return data.array(np.where(counts, 1 / np.where(counts, np.maximum(host, below), 1), 0))
+    flat = sums.reshape(-1)
+    for run in runs(flat.size):
+        given = flat[run].astype(np.float64)
+        counts = given > _LEAST * largest
+        flat[run] = np.where(counts, 1 / np.where(counts, np.maximum(given, below), 1), 0)
+    return home.array(sums) if home.on_device else sums
 
 
 def sirt(

@@ -1,6 +1,6 @@
 """What all iterative methods have in common: steps, when to stop, and a state to go on from.
 
-A method is a class with a record of its state, arrays and numbers; each step is a
+A method is a class with a record of its state, arrays on the device and numbers; each step is a
 function of that record alone, so that a run that was broken off and restored gives the same bits
 as one that was not.
 
@@ -70,15 +70,15 @@ class Solver(ABC):
 
     @property
     def image(self) -> Any:
-        """The image so far, which the next step may change.
+        """The image so far, an array that the next step may change.
 
-        A device array; of what the device does not hold, one on the host (``DataTerm.on_host``).
+        It is on the device, or on the host where the device has no room for it.
         """
         return self._now.image
 
     @property
     def residual(self) -> Any:
-        """``A image - y`` so far, where the image is; the next step may change it."""
+        """``A image - y`` so far, as the image is."""
         return self._now.residual
 
     @property
@@ -111,9 +111,9 @@ class Solver(ABC):
 
     def state(self) -> dict[str, NDArray[Any]]:
         """All that the next step depends on, as host arrays."""
-        device = self.data.device
+        home = self.data.home
         return {
-            name: device.get(value) if _is_array(value) else np.asarray(value)
+            name: home.host(value) if is_device_array(value) else np.array(value)
             for name, value in self._entries()
         }
 
@@ -139,8 +139,11 @@ class Solver(ABC):
             raise CheckpointError(f"state holds {found[low[0]]} for {low[0]}: it is damaged")
         self._demand_own(found)
         for name, value in entries.items():
-            if _is_array(value):
-                copy(self.data.device, self.data.array(found[name]), value)
+            if is_device_array(value):
+                fresh = self.data.device.array(found[name], self.data.dtype)
+                copy(self.data.device, fresh, value)
+            elif isinstance(value, np.ndarray):
+                np.copyto(value, found[name])
             else:
                 setattr(self._now, name, type(value)(found[name]))
         self._exhausted = False
@@ -152,8 +155,8 @@ class Solver(ABC):
             CheckpointError: it is not.
         """
         data, residual = self.data, self.data.data()
-        self._measured(data.array(found["image"]), residual)
-        given = data.array(found["residual"])
+        self._measured(data.home.array(found["image"]), residual)
+        given = data.home.array(found["residual"])
         axpby(data.device, -1.0, residual, 1.0, given)
         size = data.rms(residual) + data.rms(data.y)
         if data.rms(given) > _SAME_RESIDUAL * size:
@@ -195,13 +198,8 @@ def solve(solver: Solver, steps: int, *, like: Any, out: Any = None) -> Any:
         as_device_array(data.device, out, data.A.domain, name="out", dtype=data.dtype)
     for _ in solver.run(steps):
         pass
-    if here:
-        if not data.on_host:
-            return download(data.device, solver.image, out)
-        if out is None:
-            return solver.image
-        np.copyto(out, solver.image)
-        return out
+    if here and data.home.on_device:
+        return download(data.device, solver.image, out)
     if out is None:
         return solver.image
     copy(data.device, solver.image, out)
@@ -220,11 +218,6 @@ def check_steps(steps: Any, *, name: str = "steps") -> int:
     return int(number)
 
 
-def _is_array(value: Any) -> bool:
-    """Whether something of a state is an array, on the device or on the host."""
-    return isinstance(value, np.ndarray) or is_device_array(value)
-
-
 def _form(value: Any) -> tuple[tuple[int, ...], str]:
-    array = value if _is_array(value) else np.asarray(value)
+    array = value if is_device_array(value) else np.asarray(value)
     return tuple(array.shape), str(array.dtype)

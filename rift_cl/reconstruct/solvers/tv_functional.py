@@ -5,7 +5,8 @@
 D the forward differences divided by the grid's spacing. This is the integral of the gradient's
 length, in the image's unit times length^(axes - 1): for an image, jump times length of the edge,
 whatever the grid's spacing. It is isotropic, or weighs D x by direction (``direction_weights``).
-``kernels/include/tomo/differences.h`` says what happens at the borders.
+``kernels/include/tomo/differences.h`` says what happens at the borders. Images that are kept beside
+the device are worked on in runs of slices, with the same bits.
 
 Its proximal map has no closed form; it is found on the dual, where every sample holds a vector
 ``u`` of length at most the weight (Chambolle, J. Math. Imaging Vis. 20, 2004), by the accelerated
@@ -16,14 +17,15 @@ constraint x >= 0 in its stride.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike
 
 from rift_cl.cl.arithmetic import axpby
-from rift_cl.cl.array import DeviceArray
-from rift_cl.cl.device import Device
+from rift_cl.cl.array import AnyArray
+from rift_cl.cl.array_home import ArrayHome
 from rift_cl.cl.elementwise import copy
+from rift_cl.cl.passing_parts import runs
 from rift_cl.cl.reductions import total
 from rift_cl.errors import ShapeError
 from rift_cl.reconstruct.solvers.direction_weights import DirectionWeights
@@ -36,10 +38,9 @@ class TotalVariation:
     """Total variation of images of one shape.
 
     Args:
-        device: where the images are.
+        home: where the images are, and of which type.
         shape: (y, x) or (z, y, x).
         spacing: distance between samples along each axis.
-        dtype: of the images.
         directions: how much a gradient counts by its direction; None: all alike.
 
     Raises:
@@ -48,10 +49,9 @@ class TotalVariation:
 
     def __init__(
         self,
-        device: Device,
+        home: ArrayHome,
         shape: tuple[int, ...],
         spacing: tuple[float, ...],
-        dtype: DTypeLike,
         directions: DirectionWeights | None = None,
     ) -> None:
         if len(shape) not in (2, 3) or len(spacing) != len(shape):
@@ -59,7 +59,9 @@ class TotalVariation:
                 f"total variation of shape {shape} with spacing {spacing}, wanted (y, x) or "
                 "(z, y, x) and a spacing for each"
             )
-        self.device, self.shape, self.dtype = device, shape, np.dtype(dtype)
+        device = home.device
+        self.home, self.device, self.shape, self.dtype = home, device, shape, home.dtype
+        self._spacing, self._directions = spacing, directions
         self.cell = math.prod(spacing)
         """Volume of a sample."""
         self.field_shape = (len(shape), *shape)
@@ -79,60 +81,82 @@ class TotalVariation:
             **dict(zip(("m_yy", "m_yx", "m_xx"), matrix, strict=True)),
             "AXES": len(shape),
             "RUN": run,
-            "DOUBLE": int(self.dtype == np.float64),
+            "DOUBLE": int(home.dtype == np.float64),
             "DIRECTIONAL": int(directions is not None),
         }
 
-    def value(self, image: DeviceArray) -> float:
-        """TV of a device array."""
-        lengths = self.device.empty(self.shape, self.dtype)
-        self.device.launch(
-            "tv_magnitude",
-            self._items,
-            image=image,
-            magnitude=lengths,
-            **self._along("step"),
-            **self._common,
-        )
+    def value(self, image: AnyArray) -> float:
+        """TV of an image."""
+        lengths = self.home.empty(self.shape)
+        self._launch("tv_magnitude", {"image": image}, {"magnitude": lengths}, self._along("step"))
         return self.cell * total(self.device, lengths)
 
     def dual_step(
-        self, u: DeviceArray, image: DeviceArray, moved: DeviceArray, *, step: float, radius: float
+        self, u: AnyArray, image: AnyArray, moved: AnyArray, *, step: float, radius: float
     ) -> None:
         """``moved`` = u + step D image, each sample's vector shortened to the radius."""
-        self.device.launch(
-            "tv_dual_step",
-            self._items,
-            u=u,
-            image=image,
-            moved=moved,
-            radius=radius,
-            **self._along("step", step),
-            **self._common,
-        )
+        numbers = {"radius": radius, **self._along("step", step)}
+        self._launch("tv_dual_step", {"u": u, "image": image}, {"moved": moved}, numbers)
 
     def add_adjoint(
         self,
         a: float,
-        image: DeviceArray,
+        image: AnyArray,
         scale: float,
-        u: DeviceArray,
-        out: DeviceArray,
+        u: AnyArray,
+        out: AnyArray,
         *,
         nonnegative: bool = False,
     ) -> None:
         """``out`` = a image + scale D' u, with negative values cut off if asked for."""
-        self.device.launch(
-            "tv_adjoint",
-            self._items,
-            image=image,
-            u=u,
-            out=out,
-            a=a,
-            **self._along("scale", scale),
-            **self._common,
-            NONNEGATIVE=int(nonnegative),
-        )
+        numbers = {"a": a, **self._along("scale", scale), "NONNEGATIVE": int(nonnegative)}
+        self._launch("tv_adjoint", {"image": image, "u": u}, {"out": out}, numbers)
+
+    def _launch(
+        self,
+        kernel: str,
+        given: dict[str, AnyArray],
+        made: dict[str, AnyArray],
+        numbers: dict[str, float],
+    ) -> None:
+        """Launch a kernel on arrays of the device, or on runs of slices of those of the host."""
+        if self.home.on_device:
+            self.device.launch(kernel, self._items, **given, **made, **numbers, **self._common)
+            return
+        every = (*given.values(), *made.values())
+        slices = self.shape[0]
+        each = sum(x.nbytes for x in every) // slices
+        most = max(self.device.budget // (2 * each) - 2, 1)
+        for run in runs(slices, most):
+            # Differences reach to the slices beside.
+            first, stop = max(run.start - 1, 0), min(run.stop + 1, slices)
+            inside = slice(run.start - first, run.stop - first)
+            self._launch_part(kernel, given, made, numbers, slice(first, stop), inside)
+
+    def _launch_part(
+        self,
+        kernel: str,
+        given: dict[str, AnyArray],
+        made: dict[str, AnyArray],
+        numbers: dict[str, float],
+        part: slice,
+        inside: slice,
+    ) -> None:
+        """Launch a kernel on some slices, and keep what it makes in some of them."""
+        shape = (part.stop - part.start, *self.shape[1:])
+        home = ArrayHome(self.device, self.home.dtype)
+        of_part = TotalVariation(home, shape, self._spacing, self._directions)
+        taken = {name: home.array(self._slices(x, part)) for name, x in given.items()}
+        out = {name: home.empty(self._slices(x, part).shape) for name, x in made.items()}
+        of_part._launch(kernel, taken, out, numbers)
+        wanted = slice(part.start + inside.start, part.start + inside.stop)
+        for name, x in made.items():
+            found = self._slices(home.host(out[name]), inside)
+            self._slices(x, wanted)[...] = found
+
+    def _slices(self, x: Any, part: slice) -> Any:
+        """Some slices of an image, or of all components of a field."""
+        return x[part] if len(x.shape) == len(self.shape) else x[:, part]
 
     def _along(self, name: str, factor: float = 1.0) -> dict[str, float]:
         """A factor over the spacing of each axis, as kernels are told."""
@@ -141,9 +165,9 @@ class TotalVariation:
 
     def denoise(
         self,
-        image: DeviceArray,
-        u: DeviceArray,
-        out: DeviceArray,
+        image: AnyArray,
+        u: AnyArray,
+        out: AnyArray,
         *,
         weight: float,
         steps: int,
@@ -159,7 +183,7 @@ class TotalVariation:
             steps: of the dual.
             nonnegative: whether x >= 0.
         """
-        moved, ahead = (self.device.empty(self.field_shape, self.dtype) for _ in range(2))
+        moved, ahead = (self.home.empty(self.field_shape) for _ in range(2))
         copy(self.device, u, ahead)
         step = 1 / self.norm_squared if self.norm_squared else 0.0
         t = 1.0

@@ -64,9 +64,7 @@ class VariationSolver(Solver):
         super().__init__(data, noise)
         self._weight, self._nonnegative = float(weight), bool(nonnegative)
         spacing = (1.0,) * len(A.domain) if A.grid is None else A.grid.spacing
-        self.variation = TotalVariation(
-            data.device, A.domain, spacing, data.dtype, direction_weights
-        )
+        self.variation = TotalVariation(data.home, A.domain, spacing, direction_weights)
 
     def _begin(self, start: Any) -> dict[str, Any]:
         """What both methods keep, for the image to begin from."""
@@ -77,7 +75,7 @@ class VariationSolver(Solver):
         weighted = None if data.weight is None else data.data()
         if weighted is not None:
             data.weigh(residual, weighted)
-        dual = data.device.zeros(self.variation.field_shape, data.dtype)
+        dual = data.home.zeros(self.variation.field_shape)
         objective = self._objective(image, residual, weighted)
         rms = data.rms(residual)
         return vars(VariationState(image, residual, 0, rms, weighted, dual, objective))

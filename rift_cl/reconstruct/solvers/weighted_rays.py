@@ -8,11 +8,13 @@ compared with and the spectrum a ramp looks at mean what they mean without weigh
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.elementwise import copy, multiply
 from rift_cl.cl.host_arrays import as_real_array, download, is_device_array
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
@@ -38,7 +40,7 @@ class WeightedRays(LinearOperator):
         self.inner, self.weights = A, found
         self.measured = int(np.count_nonzero(found))
         """Samples that count at all."""
-        self._roots = A.device.array(np.sqrt(found), A.dtype)
+        self._host_roots = np.sqrt(found).astype(A.dtype)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.inner, self.weights)
@@ -47,13 +49,17 @@ class WeightedRays(LinearOperator):
         return [f"{self.measured} of {self.weights.size} samples of {self.inner!r}"]
 
     def weigh(self, y: Any) -> None:
-        """Multiply a device array of data by the roots of the weights, in place."""
-        multiply(self.device, self._roots, y)
+        """Multiply data, on the device or on the host, by the roots of the weights, in place."""
+        multiply(self.device, self._roots if is_device_array(y) else self._host_roots, y)
+
+    @cached_property
+    def _roots(self) -> DeviceArray:
+        return self.device.array(self._host_roots, self.dtype)
 
     @property
     def scratch(self) -> int:
         """Scratch bytes: the operator's, square roots of the weights, and weighted data."""
-        return self.inner.scratch + 2 * int(self._roots.nbytes)
+        return self.inner.scratch + 2 * int(self._host_roots.nbytes)
 
     def _apply(self, x: Any, out: Any) -> None:
         self.inner._apply(x, out)
@@ -64,6 +70,15 @@ class WeightedRays(LinearOperator):
         copy(self.device, y, weighed)
         self.weigh(weighed)
         self.inner._apply_adjoint(weighed, out)
+
+    def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
+        self.inner._apply_host(x, y)
+        self.weigh(y)
+
+    def _apply_adjoint_host(self, y: NDArray[Any], x: NDArray[Any]) -> None:
+        weighed = y.copy()
+        self.weigh(weighed)
+        self.inner._apply_adjoint_host(weighed, x)
 
 
 def checked_weights(weights: Any, A: LinearOperator) -> NDArray[np.float64]:
