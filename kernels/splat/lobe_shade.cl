@@ -8,6 +8,9 @@
  * numbers give no finite colour or whose lobes point nowhere (black ones pass no gradient on, so
  * that they spoil nothing else). The colour is written to the first three of STRIDE features.
  *
+ * With LIT 1 these hold the light that a splat reflects already (light_shade.cl), which is added to the
+ * sum above.
+ *
  * Index space: (runs of RUN splats), LANES of them at a time. Each splat has 3 FUNCTIONS + GEOMETRY + 3
  * numbers that are read and 3 that are written. */
 
@@ -30,7 +33,7 @@ KERNEL void lobe_shade(
       read_columns(lobes, GEOMETRY, 0, GEOMETRY, rows, lobe);
       basis[0] = CONSTANT;
       const lanes_int meant = lobe_functions(lobe, d, basis + 1);
-      color = color_of(sum_of_functions(linear, FUNCTIONS, rows, basis), drawn & meant);
+      color = color_of(lit(sum_of_functions(linear, FUNCTIONS, rows, basis), features, rows), drawn & meant);
     }
     write3(features, STRIDE, rows, color);
   }

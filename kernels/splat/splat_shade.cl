@@ -4,7 +4,10 @@
  *
  * Splats that are not drawn are black, and so are those whose coefficients give no finite colour
  * (black ones pass no gradient on, so that they spoil nothing else). The colour is written to the
- * first three of STRIDE features. Index space: (runs of RUN splats), LANES of them at a time. */
+ * first three of STRIDE features. With LIT 1 these hold the light that a splat reflects already
+ * (light_shade.cl), which is added to the sum above.
+ *
+ * Index space: (runs of RUN splats), LANES of them at a time. */
 
 #include "include/portable.h"
 #include "include/shading/seen_color.h"
@@ -22,7 +25,7 @@ KERNEL void splat_shade(
     if (any_lane(drawn)) {
       lanes basis[COEFFICIENTS];
       sh_basis(sight_of(read3(means, 3, rows), center.xyz).direction, basis);
-      color = color_of(sum_of_functions(sh, COEFFICIENTS, rows, basis), drawn);
+      color = color_of(lit(sum_of_functions(sh, COEFFICIENTS, rows, basis), features, rows), drawn);
     }
     write3(features, STRIDE, rows, color);
   }

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.budget import check_array, format_bytes
 from rift_cl.errors import ResourceLimitError
+from rift_cl.splat.environment import ARRIVAL, CHUNK
 from rift_cl.splat.orders import Modal, ModeOrders
 from rift_cl.splat.projection import is_modal
 from rift_cl.splat.raster import MOMENTS
@@ -26,6 +27,8 @@ from rift_cl.splat.tile_lists import Tiles, tile_lists_bytes
 _PROJECTED = 32 + 64 + 4 + 16 + 1
 # Bytes of a splat's part in the gradient by the camera and its aperture, and of what does not grow.
 _CAMERA, _SMALL = 72, 4096
+# Bytes of a lobe of a shared light: axis, radiance, row, and the last part of its gradient.
+_LIGHT = 4 * (3 + 3 + 8 + 3) + 4 * 3 * 4
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,7 @@ class FrameMemory:
         absgrad: whether that has the magnitudes.
         modes: orders of the modes, all 0 where another activation alone asks for their kernels;
             None for plain splats.
+        environment: lobes of the light that splats share; 0 without one.
     """
 
     splats: int
@@ -50,6 +54,7 @@ class FrameMemory:
     gradient: bool = False
     absgrad: bool = False
     modes: ModeOrders | None = None
+    environment: int = 0
 
     @classmethod
     def of(
@@ -63,12 +68,19 @@ class FrameMemory:
 
         The splats may be on a device, or a scene on the host that is yet to be uploaded.
         """
+        light = getattr(splats, "environment", None)
         floats = sum(getattr(array, "size", 0) for array in vars(splats).values())
+        floats -= 0 if light is None else light.size
         parameters = -(-floats // max(len(splats), 1))
         pixels = size[0] * size[1]
         modes = ModeOrders.of(splats) if is_modal(splats, settings) else None
         absgrad = settings.absgrad
-        return cls(len(splats), parameters, pixels, channels, absgrad=absgrad, modes=modes)
+        return cls(
+            *(len(splats), parameters, pixels, channels),
+            absgrad=absgrad,
+            modes=modes,
+            environment=0 if light is None else light.shape[0],
+        )
 
     @property
     def record(self) -> int:
@@ -88,11 +100,15 @@ class FrameMemory:
             if self.modes is not None:
                 # What the moments of modes become before they are gradients.
                 splat += 4 * (MOMENTS + self.channels + 6)
+            if self.environment:
+                # What the light's gradient is summed from, and its parts.
+                splat += 4 * ARRIVAL + 4 * 3 * self.environment // CHUNK + 1
             # The gradients that come in, those of expected depth, the background's parts.
             pixel += 12 * self.channels + 16
         # Sums over columns leave their first level, a part of what they add up.
         summed = 4 * self.pixels * self.channels + self.splats * _CAMERA if self.gradient else 0
-        return self.splats * splat + self.pixels * pixel + summed // 32 + _SMALL
+        light = _LIGHT * self.environment
+        return self.splats * splat + self.pixels * pixel + summed // 32 + light + _SMALL
 
     def lists(self, entries: int, tiles: int) -> int:
         """Bytes of tile lists, with the gradient's records."""

@@ -23,6 +23,7 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.host_arrays import as_device_array
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry import Camera
+from rift_cl.splat.environment import shade_environment
 from rift_cl.splat.host_shading import shade_on_host, shade_on_host_grad
 from rift_cl.splat.projection import Projection, SplatGradients
 from rift_cl.splat.splats import Splats
@@ -135,8 +136,11 @@ def gather_features(projection: Projection, channels: Channels) -> DeviceArray:
         return splats.colors
     features = device.empty((len(splats), channels.total))
     if channels.shaded:
+        lit = splats.environment is not None
+        if lit:
+            shade_environment(device, splats, projection.camera, projection.culled, into=features)
         given = (splats.means, splats.sh, projection.camera, projection.culled)
-        shade(device, *given, into=features, lobes=splats.lobes, angular=angular)
+        shade(device, *given, into=features, lobes=splats.lobes, angular=angular, lit=lit)
     if splats.colors is not None:
         copy_columns(device, splats.colors, 0, features, channels.shaded, channels.own)
     if channels.depth:
@@ -163,6 +167,7 @@ def shade(
     into: DeviceArray | None = None,
     lobes: DeviceArray | None = None,
     angular: str = "sh",
+    lit: bool = False,
 ) -> DeviceArray:
     """Colours of splats as seen from the camera's centre.
 
@@ -175,6 +180,7 @@ def shade(
         into: a table of features whose first three columns are written; a new one if not given.
         lobes: (N, G) geometry of the lobes; None for spherical harmonics.
         angular: what the colours are made of.
+        lit: whether the three columns hold reflected light already, which colours are added to.
 
     Returns:
         The table, (N, 3) if it is new.
@@ -188,7 +194,8 @@ def shade(
     features = device.empty((count, 3)) if into is None else into
     if shading.on_host is not None:
         linear, geometry = shading.parameters["linear"], shading.parameters["lobes"]
-        shade_on_host(device, shading.on_host, means, linear, geometry, camera, culled, features)
+        given = (means, linear, geometry, camera, culled, features)
+        shade_on_host(device, shading.on_host, *given, lit=lit)
         return features
     center = np.array([*camera.center, 0], np.float32)
     device.launch(
@@ -203,6 +210,7 @@ def shade(
         RUN=device.traits.run,
         STRIDE=features.shape[1],
         **shading.sizes,
+        **({"LIT": True} if lit else {}),
     )
     return features
 

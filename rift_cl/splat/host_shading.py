@@ -28,10 +28,14 @@ def shade_on_host(
     camera: Camera,
     culled: DeviceArray,
     features: DeviceArray,
+    *,
+    lit: bool = False,
 ) -> None:
     """Write the colours of splats into the first three columns of ``features``; see ``shade``."""
     away = device.get(means).astype(float) - camera.center
     colors = basis.evaluate(device.get(linear), device.get(lobes), away) + 0.5
+    if lit:
+        colors += device.get(features)[:, :3]
     drawn = np.isfinite(colors).all(axis=1) & (device.get(culled) == 0)
     shown = np.where(drawn[:, None], np.maximum(colors, 0), 0)
     copy_columns(device, device.array(shown), 0, features, 0, 3)

@@ -21,6 +21,7 @@ from rift_cl.cl.host_arrays import as_device_array
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.splat.bands import FrameMemory, check_fixed
+from rift_cl.splat.environment import shade_environment_grad
 from rift_cl.splat.features import Channels, gather_features, own_columns, shade_grad
 from rift_cl.splat.projection import (
     CULL_REASONS,
@@ -104,6 +105,10 @@ class FrameGradients:
             for, or has none.
         background: by the background as it was given; None where there was none.
         lobes: (N, G) by the geometry of the lobes; None where there are none.
+        normals: (N, 3) by the normals of splats that reflect an environment light; None where there
+            is none.
+        reflectance: (N, 7) by how they reflect it; likewise.
+        environment: (K, 3) by the logarithms of that light's radiance; likewise.
     """
 
     splats: SplatGradients
@@ -113,6 +118,9 @@ class FrameGradients:
     aperture: DeviceArray | None
     background: DeviceArray | None
     lobes: DeviceArray | None = None
+    normals: DeviceArray | None = None
+    reflectance: DeviceArray | None = None
+    environment: DeviceArray | None = None
 
     @property
     def shape_modes(self) -> DeviceArray | None:
@@ -242,6 +250,7 @@ class Renderer:
         )
         del sums
         sh, lobes = self._shade_grad(frame, gradients, sh_step)
+        light = self._environment_grad(frame, gradients)
         return FrameGradients(
             splats=gradients,
             colors=own_columns(device, gradients.features, frame.channels),
@@ -250,6 +259,7 @@ class Renderer:
             aperture=_summed(device, gradients.aperture),
             background=self._background_grad(frame, grad_image) if with_background else None,
             lobes=lobes,
+            **light,
         )
 
     def culled(self, frame: Frame) -> dict[str, int]:
@@ -278,6 +288,14 @@ class Renderer:
             sh_step=sh_step,
         )
         return sh, lobes
+
+    def _environment_grad(self, frame: Frame, gradients: SplatGradients) -> dict[str, DeviceArray]:
+        """By the environment light and how it is reflected; empty where there is none."""
+        splats, features = frame.splats, frame.raster_pass.screen.features
+        if splats.environment is None:
+            return {}
+        given = (self.device, splats, frame.camera)
+        return shade_environment_grad(*given, features=features, gradients=gradients)._asdict()
 
     def _channels(self, splats: Splats, depth: DepthKind | None) -> Channels:
         check_depth(depth, self.settings)

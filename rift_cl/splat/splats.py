@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.basis.angular.environment import MOST_LOBES, REFLECTANCE
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.host_arrays import as_plain, as_real_array, upload
@@ -47,12 +48,19 @@ class Splats:
             depth; None for splats of one colour.
         lobes: (N, G) geometry of the splats' angular lobes, in place of spherical harmonics (see
             ``SplatSettings.angular``); ``sh`` are then their (N, L, 3) linear coefficients, L >= 1.
+        normals: (N, 3) normals, of any length, of surfaces that reflect ``environment``; the side
+            does not matter, and a splat without one reflects nothing.
+        reflectance: (N, 7) how they reflect it: logits of tint and of grazing tint, three each,
+            and the natural logarithm of the sharpness; see ``rift_cl.basis.angular.environment``.
+        environment: (K, 3) natural logarithms of the radiance of the K lobes of a light that all
+            splats share, K = 1 to 4096. These three come together or not at all, with ``sh``.
 
     Raises:
         ShapeError: an array does not fit the others.
         DTypeError: an array is not float32.
         InputError: a splat's shape is given twice or not at all, covariances have modes, lobes
-            have no coefficients, or a number of modes belongs to no order.
+            or reflected light have no coefficients beside them, or a number of modes belongs to no
+            order.
     """
 
     means: DeviceArray
@@ -65,6 +73,9 @@ class Splats:
     shape_modes: DeviceArray | None = None
     color_modes: DeviceArray | None = None
     lobes: DeviceArray | None = None
+    normals: DeviceArray | None = None
+    reflectance: DeviceArray | None = None
+    environment: DeviceArray | None = None
 
     def __post_init__(self) -> None:
         """Check that the arrays fit each other."""
@@ -78,6 +89,7 @@ class Splats:
                 if array.dtype != np.float32:
                     raise DTypeError(f"Splats: {name} has type {array.dtype}, wanted float32")
         _check_modes(self)
+        _check_light(self)
 
     def __len__(self) -> int:
         """Number of splats."""
@@ -108,6 +120,9 @@ class Splats:
         shape_modes: Any = None,
         color_modes: Any = None,
         lobes: Any = None,
+        normals: Any = None,
+        reflectance: Any = None,
+        environment: Any = None,
     ) -> Splats:
         """Copy splats to a device; see the class for the arguments.
 
@@ -123,6 +138,7 @@ class Splats:
         hosts = {"means": means, "quats": quats, "scales": scales, "opacities": opacities}
         hosts |= {"colors": colors, "sh": sh, "covars": covars, "lobes": lobes}
         hosts |= {"shape_modes": shape_modes, "color_modes": color_modes}
+        hosts |= {"normals": normals, "reflectance": reflectance, "environment": environment}
         ready: dict[str, Any] = dict.fromkeys(hosts)
         for name, values in hosts.items():
             if values is not None:
@@ -163,6 +179,16 @@ def _check_modes(splats: Splats) -> None:
             )
 
 
+def _check_light(splats: Splats) -> None:
+    names = ("normals", "reflectance", "environment")
+    given = [name for name in names if getattr(splats, name) is not None]
+    if given and (len(given) < len(names) or splats.sh is None):
+        raise InputError(
+            f"Splats: {' and '.join(given)} alone reflect no light: give normals, reflectance, "
+            "environment and sh"
+        )
+
+
 def _check_shape(name: str, shape: tuple[int, ...], count: int, *, lobed: bool) -> None:
     fits = {
         "means": shape == (count, 3),
@@ -176,6 +202,9 @@ def _check_shape(name: str, shape: tuple[int, ...], count: int, *, lobed: bool) 
         "shape_modes": len(shape) == 2 and shape[0] == count,
         "color_modes": len(shape) == 3 and shape[0] == count,
         "lobes": len(shape) == 2 and shape[0] == count and shape[1] >= 1,
+        "normals": shape == (count, 3),
+        "reflectance": shape == (count, REFLECTANCE),
+        "environment": len(shape) == 2 and shape[1] == 3 and 1 <= shape[0] <= MOST_LOBES,
     }
     wanted = {
         "means": "(N, 3)",
@@ -190,6 +219,9 @@ def _check_shape(name: str, shape: tuple[int, ...], count: int, *, lobed: bool) 
         "color_modes": f"({count}, K - 1, C) with K = {count_of(1)}, {count_of(2)}, "
         f"{count_of(3)}..",
         "lobes": f"({count}, G) with G >= 1",
+        "normals": f"({count}, 3)",
+        "reflectance": f"({count}, {REFLECTANCE})",
+        "environment": f"(K, 3) with K = 1 to {MOST_LOBES}",
     }
     if not fits[name]:
         raise ShapeError(f"Splats: {name} has shape {tuple(shape)}, wanted {wanted[name]}")

@@ -1,14 +1,17 @@
 """What is trained: splats before their activations, on the device, with Adam's moments.
 
 Scales are trained as logarithms, opacities as logits and densities as logarithms; what the
-rasterizer draws, ``drawn``, is made from them after every step. Hermite modes and lobes, where
-splats have some, are trained as they are. One owner, the trainer, changes these arrays in place.
+rasterizer draws, ``drawn``, is made from them after every step. Hermite modes, lobes, normals and
+reflectances, where splats have some, are trained as they are. An environment light belongs to all
+splats, and stays as it is whatever becomes of them. One owner, the trainer, changes these arrays in
+place.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +30,37 @@ from rift_cl.train.band_limit import Detail
 _GEOMETRY = ("means", "quats", "log_scales", "logits")
 GROUPS = (*_GEOMETRY, "sh")
 MODES = ("shape_modes", "color_modes")
-MORE = (*MODES, "lobes")
+MORE = (*MODES, "lobes", "normals", "reflectance")
 
 Arrays = Mapping[str, NDArray[np.float32]]
+
+
+class Environment(NamedTuple):
+    """The light that all splats share: (K, 3) device arrays, trained as it is.
+
+    Args:
+        raw: logarithms of its radiance.
+        first: Adam's means of gradients.
+        second: Adam's means of their squares.
+    """
+
+    raw: DeviceArray
+    first: DeviceArray
+    second: DeviceArray
+
+    @classmethod
+    def of(cls, device: Device, raw: NDArray[np.float32]) -> Environment:
+        """Send logarithms of radiance, (K, 3), to a device; moments are zero."""
+        return cls(device.array(raw), device.zeros(raw.shape), device.zeros(raw.shape))
+
+    @classmethod
+    def restored(cls, device: Device, state: Arrays) -> Environment:
+        """Undoes ``state``."""
+        return cls(*(device.array(state[name]) for name in cls._fields))
+
+    def state(self, device: Device) -> dict[str, NDArray[np.float32]]:
+        """All of it, as host arrays by name."""
+        return {name: device.get(array) for name, array in self._asdict().items()}
 
 
 @dataclass
@@ -39,7 +70,7 @@ class Parameters:
     Args:
         device: where they are.
         raw: what is trained: (N, 3), (N, 4), (N, 3), (N,), (N, K, 3), and any of ``MORE``:
-            (N, modes), (N, modes, 3), (N, G).
+            (N, modes), (N, modes, 3), (N, G), (N, 3), (N, 7).
         first: Adam's means of gradients.
         second: Adam's means of their squares.
         drawn: what the rasterizer draws; shares all but scales and opacities with ``raw``.
@@ -47,6 +78,7 @@ class Parameters:
         density: whether ``logits`` are logarithms of densities, for X-rays.
         amplitude: whether optical depths are drawn, those that hide sigmoid(logit).
         band: (N,) lengths below which splats have no detail, or None; see ``limit_band``.
+        environment: the light that all splats share, or None.
         free: by group, of its shape, 1 where a mode is trained and 0 where it stays as it is.
     """
 
@@ -59,6 +91,7 @@ class Parameters:
     density: bool = False
     amplitude: bool = False
     band: DeviceArray | None = None
+    environment: Environment | None = None
     free: dict[str, DeviceArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -77,6 +110,7 @@ class Parameters:
         density: bool = False,
         amplitude: bool = False,
         band: NDArray[np.float32] | None = None,
+        environment: Environment | None = None,
     ) -> Parameters:
         """Send host arrays to a device; moments are zero if not given."""
         names = [*GROUPS, *(name for name in MORE if name in raw)]
@@ -86,11 +120,12 @@ class Parameters:
             sent,
             _moments(device, sent, first),
             _moments(device, sent, second),
-            _undrawn(device, sent),
+            _undrawn(device, sent, environment),
             step,
             density,
             amplitude,
             None if band is None else device.array(band),
+            environment,
         )
         parameters.activate()
         return parameters
@@ -121,6 +156,7 @@ class Parameters:
             step=self.step,
             density=self.density,
             amplitude=self.amplitude,
+            environment=self.environment,
         )
 
     def selected(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Parameters:
@@ -160,6 +196,12 @@ class Parameters:
             if name in self.free:
                 multiply(self.device, self.free[name], gradient)
             self._adam.take(self._adam_step(name, rates, sh_rest), self.raw[name], gradient)
+        if self.environment is not None and gradients.environment is not None:
+            raw, *moments = self.environment
+            step = self._adam.next_step(
+                *moments, rate=rates["environment"], rest=1.0, number=self.step
+            )
+            self._adam.take(step, raw, gradients.environment)
         self._update_geometry(gradients.splats, rates, opacity_penalty, scale_penalty)
 
     def _update_geometry(
@@ -295,7 +337,7 @@ class Parameters:
 
     def redraw(self) -> None:
         """Compute the rendered splats again, after arrays of ``raw`` were replaced."""
-        self.drawn = _undrawn(self.device, self.raw)
+        self.drawn = _undrawn(self.device, self.raw, self.environment)
         self.activate()
 
 
@@ -307,9 +349,13 @@ def _moments(
     return {name: device.array(given[name]) for name in sent}
 
 
-def _undrawn(device: Device, raw: Mapping[str, DeviceArray]) -> Splats:
+def _undrawn(
+    device: Device, raw: Mapping[str, DeviceArray], environment: Environment | None
+) -> Splats:
     """Splats whose scales and opacities are still to be made."""
     count = raw["means"].shape[0]
     scales, opacities = device.empty((count, 3)), device.empty((count,))
     more = {name: raw[name] for name in MORE if name in raw}
+    if environment is not None:
+        more["environment"] = environment.raw
     return Splats(raw["means"], raw["quats"], scales, opacities, sh=raw["sh"], **more)

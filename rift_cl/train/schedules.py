@@ -2,7 +2,8 @@
 
 Degrees of harmonics, orders of modes and lobes are added as a fit goes on, with coefficients of
 zero, so that no image jumps. Which of them there are follows from the step and the settings, so
-that no checkpoint needs to know of it.
+that no checkpoint needs to know of it. An environment light is there from the first step on: a
+reflection that has once been built as a thing behind the surface is never taken apart again.
 """
 
 from __future__ import annotations
@@ -13,13 +14,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rift_cl.basis.angular import angular_basis
+from rift_cl.basis.angular.environment import start_environment, start_reflectance
 from rift_cl.basis.indices import graded
 from rift_cl.geometry import Camera
 from rift_cl.splat.orders import count_of, order_of
 from rift_cl.splat.settings import SplatSettings
-from rift_cl.train.parameters import MODES, Parameters
+from rift_cl.train.parameters import MODES, Environment, Parameters
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.lobes import lobe_axes
+from rift_cl.train.start.normals import neighbour_normals
 
 # Learning rates at the very end of the cooldown, as a fraction of those at its beginning.
 _LAST_SHARE = 0.05
@@ -59,6 +62,9 @@ class LearningRateSchedule:
             "shape_modes": fade * rates.shape_modes,
             "color_modes": fade * rates.color_modes,
             "lobes": fade * rates.lobes,
+            "environment": fade * rates.environment,
+            "reflectance": fade * rates.reflectance,
+            "normals": fade * rates.normals,
             "poses": fade * rates.poses * falling,
             "exposures": fade * rates.exposures * falling,
         }
@@ -102,6 +108,8 @@ class CoefficientSchedule:
                     parameters.add_degree()
         elif "lobes" not in parameters.raw:
             self._add_lobes(parameters)
+        if settings.environment.shared and parameters.environment is None:
+            self._add_environment(parameters)
         self._add_orders(parameters)
 
     def hold(self, parameters: Parameters) -> None:
@@ -126,6 +134,27 @@ class CoefficientSchedule:
                 joined = True
         if joined:
             self.hold(parameters)
+
+    def renew_normals(self, parameters: Parameters) -> None:
+        """Take normals from the places of neighbours as they are now; nothing without a light."""
+        if "normals" in parameters.raw:
+            normals = neighbour_normals(parameters.host()[0]).astype(np.float32)
+            parameters.raw["normals"] = parameters.device.array(normals)
+            parameters.redraw()
+
+    def _add_environment(self, parameters: Parameters) -> None:
+        device, raw = parameters.device, parameters.host()[0]
+        begun = {
+            "normals": neighbour_normals(raw).astype(np.float32),
+            "reflectance": start_reflectance(len(parameters)).astype(np.float32),
+        }
+        for name, values in begun.items():
+            parameters.raw[name] = device.array(values)
+            for moments in (parameters.first, parameters.second):
+                moments[name] = device.zeros(values.shape)
+        light = start_environment(self.settings.environment.lobes).astype(np.float32)
+        parameters.environment = Environment.of(device, light)
+        parameters.redraw()
 
     def _add_lobes(self, parameters: Parameters) -> None:
         chosen, device = self.settings.angular, parameters.device

@@ -14,6 +14,7 @@ from rift_cl.errors import SettingError
 from rift_cl.option_marks import Expert, NoOption, Short, ShortAuto, ShortExpert, ShortSplats
 from rift_cl.splat.orders import count_of
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
+from rift_cl.train.environment_settings import EnvironmentSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.loss.pixel_loss import PIXEL_LOSSES
 from rift_cl.train.ranges import check_choice, check_number, check_whole
@@ -68,6 +69,13 @@ class LearningRates:
     """Learning rate of the geometry of lobes: quaternions or axes, and logarithms of widths."""
     lobes_rest: float = 1.0
     """Learning rate of the coefficients of lobes, as a fraction of ``sh``."""
+    environment: float = 1e-2
+    """Learning rate of the logarithms of an environment light's radiance."""
+    reflectance: float = 5e-2
+    """Learning rate of how splats reflect that light: logits of tints, logarithms of sharpness."""
+    # Normals that learn drift: they come from the places of neighbours instead.
+    normals: float = 0.0
+    """Learning rate of the normals of splats that reflect that light."""
 
     def __post_init__(self) -> None:
         """Check every number's range."""
@@ -119,6 +127,8 @@ class TrainSettings:
     angular: ShortSplats[AngularSettings] = field(default_factory=AngularSettings)
     """Functions of the viewing direction that colours are made of; other kinds than sh take the
     place of all harmonics but the constant one."""
+    environment: ShortSplats[EnvironmentSettings] = field(default_factory=EnvironmentSettings)
+    """A light that all splats share and reflect."""
     strategy: ShortExpert[StrategySettings] = field(
         default_factory=McmcSettings,
         metadata={"registry": STRATEGIES, "without": ("xray",), "help": _STRATEGY_HELP},
@@ -162,16 +172,24 @@ class TrainSettings:
     @property
     def numbers(self) -> int:
         """Trained numbers of a splat at the end of the run."""
-        basis, colors = self.basis, 3 * (self.sh_degree + 1) ** 2
+        basis, colors = self.basis, 3 * (self.degree + 1) ** 2
         shape, color = basis.orders
         modes = count_of(shape) - 1 + 3 * (count_of(color) - 1)
-        return 11 + modes + (self.angular.numbers or colors)
+        return 11 + modes + (self.angular.numbers or colors) + self.environment.numbers
+
+    @property
+    def degree(self) -> int:
+        """Highest degree of the harmonics of the splats' own colours; 0 where these are lobes."""
+        if self.angular.kind != "sh":
+            return 0
+        return self.environment.own_degree if self.environment.shared else self.sh_degree
 
     @property
     def degree_joins(self) -> tuple[int, ...]:
         """Steps after which degrees 1, 2 .. of the harmonics join; none where colours are lobes."""
-        highest = self.sh_degree if self.angular.kind == "sh" else 0
-        return tuple(round(self.sh_every * self.steps * degree) for degree in range(1, highest + 1))
+        return tuple(
+            round(self.sh_every * self.steps * degree) for degree in range(1, self.degree + 1)
+        )
 
     @property
     def needs_noise(self) -> bool:

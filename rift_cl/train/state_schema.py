@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.basis.angular.environment import REFLECTANCE
 from rift_cl.errors import CheckpointError
 from rift_cl.train.parameters import GROUPS, MORE
 
@@ -47,7 +48,11 @@ _GROUPS = {
     "shape_modes": ("splats", "shape modes"),
     "color_modes": ("splats", "color modes", 3),
     "lobes": ("splats", "numbers of lobes"),
+    "normals": ("splats", 3),
+    "reflectance": ("splats", REFLECTANCE),
 }
+# What there is where splats share a light, beside that.
+_LIT = ("normals", "reflectance")
 _PER_VIEW = {
     "poses": {"views": (4, 4), "first": (6,), "second": (6,)},
     "exposures": {"values": (2, 3), "first": (2, 3), "second": (2, 3)},
@@ -79,9 +84,14 @@ def check_state(state: Arrays, *, views: int) -> None:
 def _schema(state: Arrays, views: int) -> dict[str, Field]:
     """The fields by name; the values say which of the groups are there that not all splats have."""
     fields = {"step": Field((), "i8", 0)}
-    for name in (*GROUPS, *(name for name in MORE if f"raw.{name}" in state)):
-        for part, least in (("raw", -np.inf), ("first", -np.inf), ("second", 0.0)):
+    lit = any(name in state for name in ("environment.raw", *(f"raw.{name}" for name in _LIT)))
+    there = [name for name in MORE if f"raw.{name}" in state or (lit and name in _LIT)]
+    parts = {"raw": -np.inf, "first": -np.inf, "second": 0.0}
+    for part, least in parts.items():
+        for name in (*GROUPS, *there):
             fields[f"{part}.{name}"] = Field(_GROUPS[name], least=least)
+        if lit:
+            fields[f"environment.{part}"] = Field(("lobes of light", 3), least=least)
     if "band.lengths" in state:
         fields["band.lengths"] = Field(("splats",), least=0)
     for name, shapes in _PER_VIEW.items():

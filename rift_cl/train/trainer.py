@@ -30,7 +30,7 @@ from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.band_limit import BandLimiter
 from rift_cl.train.loss.coverage_weight import weight_of
 from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
-from rift_cl.train.parameters import Parameters
+from rift_cl.train.parameters import Environment, Parameters
 from rift_cl.train.per_view.exposures import Exposures
 from rift_cl.train.per_view.poses import Poses
 from rift_cl.train.schedules import CoefficientSchedule, LearningRateSchedule
@@ -41,8 +41,8 @@ from rift_cl.train.strategy import TrainingRun
 
 # Steps between two reports; the loss comes to the host for each.
 REPORT_EVERY = 25
-# Steps after which the limit of splats' bands is set anew.
-_BAND_EVERY = 100
+# Steps after which the limit of splats' bands, and normals of reflecting splats, are set anew.
+_BAND_EVERY = _NORMALS_EVERY = 100
 # What a step costs beside its splats, what harmonics of degree 1 add to a splat, and what each
 # further degree adds, all in the cost of as many splats of one color as there may be. Fitted to the
 # times of steps on PoCL (``tools/time_left.py``).
@@ -211,6 +211,8 @@ class Trainer:
         relocated = self.parameters is not parameters
         if relocated:
             self.coefficient_schedule.hold(self.parameters)
+        if relocated or self.parameters.step % _NORMALS_EVERY == 0:
+            self.coefficient_schedule.renew_normals(self.parameters)
         if self._band is not None and (relocated or self.parameters.step % _BAND_EVERY == 0):
             self._limit_band()
         return value
@@ -254,6 +256,8 @@ class Trainer:
             "strategy": self.strategy.state(),
             "loss": self.loss.state(),
         }
+        if parameters.environment is not None:
+            groups["environment"] = parameters.environment.state(self.device)
         if parameters.band is not None:
             groups["band"] = {"lengths": self.device.get(parameters.band)}
         for name, refined in (("poses", self.poses), ("exposures", self.exposures)):
@@ -279,6 +283,7 @@ class Trainer:
                 density=self.parameters.density,
                 amplitude=self.parameters.amplitude,
                 band=groups.get("band", {}).get("lengths"),
+                environment=self._restored_environment(groups),
             )
             self.coefficient_schedule.hold(self.parameters)
             self._update_renderer()
@@ -289,6 +294,13 @@ class Trainer:
                     refined.restore(groups[name])
         except (KeyError, ShapeError) as error:
             raise CheckpointError(f"the checkpoint is of another run ({error})") from error
+
+    def _restored_environment(self, groups: Mapping[str, Group]) -> Environment | None:
+        if (self.parameters.environment is None) == ("environment" in groups):
+            raise CheckpointError("the checkpoint is of another run: one has a shared light")
+        if self.parameters.environment is None:
+            return None
+        return Environment.restored(self.device, groups["environment"])
 
     def _compared(self, image: Any, number: int, rate: float) -> tuple[DeviceArray, DeviceArray]:
         """The loss of a rendered image and its gradient."""

@@ -46,6 +46,7 @@ OTHERS = {
     "rendering.tile": 8,
     "homogenise": 0.75,
     "preset": "harmonics",
+    "environment": "shared",
 }
 
 

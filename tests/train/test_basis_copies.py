@@ -8,7 +8,7 @@ from numpy.polynomial.hermite_e import hermegauss
 from test_basis_parameters import COUNT, with_modes
 
 from rift_cl.basis.indices import graded
-from rift_cl.train.parameters import MORE, Parameters
+from rift_cl.train.parameters import MORE, Environment, Parameters
 from rift_cl.train.per_view.quaternions import rotated
 from rift_cl.train.strategy.default import DefaultSettings, densify
 from rift_cl.train.strategy.mcmc import relocate
@@ -83,10 +83,11 @@ def test_halves_of_x_ray_splats_keep_all_moments_to_the_third(device, order):
     assert not np.allclose(moments_of(new, 4), moments_of(raw, 4), rtol=1e-4)
 
 
-def test_clones_copy_modes_and_lobes(device):
-    raw = with_modes(lobes=6)
+def test_clones_copy_modes_lobes_and_reflectance(device):
+    raw = with_modes(lobes=6, lit=True)
     raw["log_scales"][:] = -6
-    parameters = Parameters.of(device, raw, step=600)
+    light = Environment.of(device, np.zeros((8, 3), np.float32))
+    parameters = Parameters.of(device, raw, step=600, environment=light)
     statistics = np.zeros((COUNT, 3), np.float32)
     statistics[:5, :2] = 1.0
     after = densify(

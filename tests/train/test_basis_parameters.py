@@ -11,21 +11,24 @@ from test_parameters import FREE, RATES, raw_values
 from rift_cl.errors import InputError
 from rift_cl.reference.training import activate, adam_step
 from rift_cl.splat.orders import count_of
-from rift_cl.train.parameters import GROUPS, MORE, Parameters
+from rift_cl.train.parameters import GROUPS, MODES, MORE, Environment, Parameters
 
 pytestmark = pytest.mark.dealt
 
 MORE_RATES = RATES | {"shape_modes": 3e-3, "color_modes": 2e-3, "lobes": 1e-2}
+MORE_RATES |= {"normals": 1e-3, "reflectance": 5e-2, "environment": 1e-2}
 COUNT = 37
 
 
-def with_modes(count=COUNT, shape=2, color=1, lobes=0, seed=0):
+def with_modes(count=COUNT, shape=2, color=1, lobes=0, seed=0, lit=False):
     random = np.random.default_rng((seed, 1))
     raw = raw_values(count, 1, seed)
     more = {
         "shape_modes": random.normal(0, 0.3, (count, count_of(shape) - 1)),
         "color_modes": random.normal(0, 0.3, (count, count_of(color) - 1, 3)),
         "lobes": random.normal(size=(count, lobes)),
+        "normals": random.normal(size=(count, 3 * lit)),
+        "reflectance": random.normal(size=(count, 7 * lit)),
     }
     kept = {name: value for name, value in more.items() if value.shape[1]}
     return raw | {name: value.astype(np.float32) for name, value in kept.items()}
@@ -81,17 +84,22 @@ def test_a_plain_peak_hides_what_its_logit_says(device):
     np.testing.assert_allclose(1 - np.exp(-depths), hidden, rtol=1e-5, atol=1e-7)
 
 
-def test_modes_and_lobes_take_the_steps_of_the_twin(device):
-    raw = with_modes(lobes=5)
-    parameters = Parameters.of(device, raw)
+def test_modes_lobes_and_light_take_the_steps_of_the_twin(device):
+    raw, random = with_modes(lobes=5, lit=True), np.random.default_rng(7)
+    light = random.normal(size=(9, 3)).astype(np.float32)
+    by_light = random.normal(size=(9, 3)).astype(np.float32)
+    parameters = Parameters.of(device, raw, environment=Environment.of(device, light))
+    lit = (light.astype(float), 0 * light, 0 * light)
     assert parameters.groups == (*GROUPS, *MORE)
     wanted = {n: (raw[n].astype(float), 0 * raw[n], 0 * raw[n]) for n in MORE}
     for step in range(1, 4):
         host, found = gradients_of(device, raw, step)
+        found.environment = device.array(by_light)
         parameters.update(found, MORE_RATES, **FREE, ridge=0.5)
+        lit = adam_step(*lit, by_light, rate=MORE_RATES["environment"], step=step)
         for name in MORE:
             by = host[name].astype(float)
-            if name != "lobes":
+            if name in MODES:
                 by += 2 * 0.5 / COUNT * wanted[name][0]
             wanted[name] = adam_step(*wanted[name], by, rate=MORE_RATES[name], step=step)
     for found, part in zip(parameters.host(), range(3), strict=True):
@@ -100,6 +108,8 @@ def test_modes_and_lobes_take_the_steps_of_the_twin(device):
             if part == 0:
                 drawn = device.get(getattr(parameters.drawn, name))
                 assert np.array_equal(drawn, found[name])
+    for found, wanted_light in zip(parameters.environment.state(device).values(), lit, strict=True):
+        np.testing.assert_allclose(found, wanted_light, rtol=2e-4, atol=2e-6)
 
 
 def test_a_ridge_alone_leads_to_zero(device):

@@ -21,12 +21,15 @@ from bench.costs import Cost
 from bench.operations import Task
 from bench.splat_scenes import random_splats
 from bench.training import TRAINING_COSTS, training_operations
+from rift_cl.basis.angular.environment import start_environment, start_reflectance
 from rift_cl.geometry import Camera
 from rift_cl.splat import Frame, FrameGradients, Renderer, Splats
 from rift_cl.splat.raster import MOMENTS
 
 # Operations per lane, forward and backward: the count that the design's prototype used.
 _FORWARD, _BACKWARD = 32, 62
+# Lobes of a light that splats share.
+_LOBES = 128
 # Pixels of a block.
 _ROWS, _COLUMNS = 8, 4
 
@@ -92,6 +95,23 @@ class SplatCase:
         return Renderer(device=self.device).backward(self.frame, grad)
 
     @cached_property
+    def lit_splats(self) -> Splats:
+        """The same splats with normals of all directions under a light that they share."""
+        random = np.random.default_rng(3)
+        return Splats.upload(
+            self.device,
+            **self.parameters,
+            normals=random.normal(size=(self.count, 3)),
+            reflectance=start_reflectance(self.count),
+            environment=start_environment(_LOBES),
+        )
+
+    @cached_property
+    def lit_frame(self) -> Frame:
+        """The scene under that light."""
+        return Renderer(device=self.device).forward(self.lit_splats, self.camera)
+
+    @cached_property
     def depth_frame(self) -> Frame:
         """The scene with its expected depth."""
         return Renderer(device=self.device).forward(self.splats, self.camera, depth="expected")
@@ -110,6 +130,10 @@ class SplatCase:
         runs = {
             "draw": self._forward,
             "gradient": lambda: renderer.backward(self.frame, grad, with_camera=True),
+            "draw with light": lambda: renderer.forward(self.lit_splats, self.camera),
+            "gradient with light": lambda: renderer.backward(
+                self.lit_frame, grad, with_camera=True
+            ),
             "depth": lambda: renderer.forward(self.splats, self.camera, depth="expected"),
             "depth gradient": lambda: renderer.backward(self.depth_frame, deep, with_camera=True),
             **training_operations(self),
@@ -215,6 +239,15 @@ def _raster(flops: int, what: str) -> Cost:
     return Cost("lane", flops, lambda case: case.lanes[0], moved, formula)
 
 
+def _light(flops: int, numbers: int, what: str) -> Cost:
+    formula = (
+        f"{flops} flop per splat and lobe of the light; bytes: {4 * numbers} per splat ({what})"
+    )
+    return Cost(
+        "lobe", flops, lambda case: case.count * _LOBES, lambda c: 4 * numbers * c.count, formula
+    )
+
+
 SPLAT_COSTS: dict[str, Cost] = {
     "splat_project": _bytes_only("splat", _n, 44 + 57, "parameters in, screen and box out"),
     "splat_shade": _bytes_only("splat", _n, 12 + 192 + 12, "harmonics in, colour out"),
@@ -240,6 +273,10 @@ SPLAT_COSTS: dict[str, Cost] = {
     "expected_depth_grad": _bytes_only("pixel", _pixels, 48, "images in and out"),
     "splat_shade_grad": _bytes_only("splat", _n, 12 + 192 + 24 + 192, "harmonics in and out"),
     "sum_columns": _bytes_only("splat", _n, 1, "a row of the camera for 64 splats"),
+    "light_lobes": _bytes_only("lobe", lambda case: _LOBES, 24 + 32, "axes and light in, rows out"),
+    "light_shade": _light(26, 17, "position, normal and reflectance in, light out"),
+    "light_shade_grad": _light(44, 44, "the same and colours in, gradients and arrivals out"),
+    "light_grad": _light(24, 8, "arrivals in"),
     "background_grad": _bytes_only("pixel", _pixels, 16, "gradient and transmittance in"),
     **TRAINING_COSTS,
 }

@@ -33,7 +33,7 @@ from rift_cl.train import (
 from rift_cl.train.strategy.mcmc import relocate
 
 _STAGES = {
-    "project and shade": ("splat_project", "splat_shade"),
+    "project and shade": ("splat_project", "splat_shade", "light_lobes", "light_shade"),
     "tile lists": ("tile_", "radix_", "scan_"),
     "raster": ("splat_pack", "splat_raster_cpu", "splat_raster_gpu"),
     "exposure": ("expose", "expose_grad"),
@@ -41,7 +41,7 @@ _STAGES = {
     "homogenisation": ("fft_", "keep_norm", "axpby"),
     "raster gradient": ("splat_raster_grad_cpu", "splat_raster_grad_gpu", "splat_sum_slots"),
     "projection gradient": ("splat_project_grad",),
-    "shading gradient and Adam": ("splat_shade_grad", "adam"),
+    "shading gradient and Adam": ("splat_shade_grad", "light_shade_grad", "light_grad", "adam"),
     "Adam and activation": ("splat_update", "splat_activate"),
     "random walk": ("splat_noise",),
 }

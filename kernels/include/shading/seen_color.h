@@ -28,6 +28,9 @@
 #ifndef CAMERA_GRADIENT
 #define CAMERA_GRADIENT 1
 #endif
+#ifndef LIT
+#define LIT 0
+#endif
 /* Functions, and columns, that go through registers at once. */
 #define AT_ONCE 4
 #define NUMBERS_AT_ONCE 12
@@ -75,6 +78,15 @@ static lanes3 sum_of_functions(
     }
   }
   return lanes3_of(x, y, z);
+}
+
+/* A sum, with the light that a splat reflects where features hold that already. */
+static lanes3 lit(lanes3 sum, __global const float *features, Rows rows) {
+#if LIT
+  return plus(sum, read3(features, STRIDE, rows));
+#else
+  return sum;
+#endif
 }
 
 /* The colour of a sum, where a splat is drawn. */

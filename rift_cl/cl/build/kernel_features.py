@@ -23,6 +23,7 @@ _BY_NAME = {
     "hermite_voxelise": "X-ray fits and splats summed at voxels",
     "hermite_": "splats with Hermite modes",
     "lobe_": "colours of splats by lobes of direction",
+    "light_": "light that splats share and reflect",
     "expected_depth": "depth images of splats",
     "adam": "training",
     "ssim_map": "losses of images (L1, SSIM)",

@@ -7,8 +7,8 @@ What cannot be kept is converted by a stated approximation, and said in a senten
 - *Activations* exp and square saturate, alpha = 1 - exp(-E g), which is flatter than a Gaussian: it
   becomes one of the same peak and the same integral, whose standard deviations are greater by
   sqrt(Ein(E) / (1 - exp(-E))).
-- *Lobes* become harmonics of degree 3, and *linear light* becomes display light, by least squares
-  over the sphere of directions.
+- *Lobes* and what is reflected of a *shared light* become harmonics of degree 3, and *linear light*
+  becomes display light, by least squares over the sphere of directions.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.special import exp1
 
 from rift_cl.basis.angular import SphericalHarmonics, angular_basis
+from rift_cl.basis.angular.environment import reflected_light
 from rift_cl.basis.hermite import Hermite
 from rift_cl.commands.export.axes import matrices_of, quaternions_of, sphere
 from rift_cl.commands.fit_photos.pictures import Light
@@ -61,7 +62,7 @@ def plain_scene(scene: SplatScene, light: Light) -> tuple[SplatScene, list[str]]
     logits = scene.logit_opacities
     if not basis.plain:
         logits = _one_gaussian_each(scene, plain, notes)
-    if scene.lobes is not None or light == "linear":
+    if scene.lobes is not None or scene.environment is not None or light == "linear":
         plain["sh"] = _harmonics(scene, plain["sh"], light, notes)
     rows = {name: values.astype(np.float32) for name, values in plain.items()}
     found = SplatScene(
@@ -94,6 +95,8 @@ def _one_gaussian_each(
 def _harmonics(scene: SplatScene, given: Floats, light: Light, notes: list[str]) -> Floats:
     """Coefficients (N, K, 3) of harmonics in display light, from (N, L, 3) of what there is."""
     degree = scene.degree if scene.lobes is None else _DEGREE
+    if scene.environment is not None:
+        degree = max(degree, _DEGREE)
     basis = angular_basis(scene.angular, given.shape[1])
     directions = sphere(_DIRECTIONS)
     functions = SphericalHarmonics(degree).functions(None, directions)
@@ -103,6 +106,8 @@ def _harmonics(scene: SplatScene, given: Floats, light: Light, notes: list[str])
         here = slice(start, start + _BLOCK)
         lobes = None if scene.lobes is None else scene.lobes[here, None]
         colors = basis.evaluate(given[here, None], lobes, directions) + 0.5
+        if scene.environment is not None:
+            colors += _reflected(scene, here, directions)
         colors = np.maximum(np.nan_to_num(colors), 0)
         if light == "linear":
             shown = colors.astype(np.float32)
@@ -112,6 +117,7 @@ def _harmonics(scene: SplatScene, given: Floats, light: Light, notes: list[str])
         again = np.maximum(np.einsum("mk,nkc->nmc", functions, sh[here]) + 0.5, 0)
         total += float(np.square(again - colors).sum())
     what = [] if scene.lobes is None else [f"lobes ({scene.angular}) become harmonics"]
+    what += [] if scene.environment is None else ["the shared light becomes harmonics"]
     what += [] if light == "display" else ["linear light becomes display light"]
     error = np.sqrt(total / (3 * _DIRECTIONS * len(scene)))
     notes.append(
@@ -124,6 +130,13 @@ def _harmonics(scene: SplatScene, given: Floats, light: Light, notes: list[str])
             "through (fit in display light what is to be shown elsewhere)"
         )
     return sh
+
+
+def _reflected(scene: SplatScene, here: slice, directions: Floats) -> Floats:
+    """What some splats reflect of the light that they share, (n, D, 3)."""
+    normals, reflectance, environment = scene.normals, scene.reflectance, scene.environment
+    assert normals is not None and reflectance is not None and environment is not None
+    return reflected_light(normals[here], reflectance[here], environment, directions)
 
 
 def _moments(scene: SplatScene, plain: dict[str, Floats], strengths: Floats) -> Floats:

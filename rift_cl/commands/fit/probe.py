@@ -94,9 +94,10 @@ def _late(trainer: Trainer, most: int) -> Trainer:
         step=max(settings.steps - _WARM - _TIMED - 1, 0),
         density=early.density,
         amplitude=early.amplitude,
+        environment=early.environment,
     )
     if settings.angular.kind == "sh":
-        while int(np.sqrt(parameters.raw["sh"].shape[1])) - 1 < settings.sh_degree:
+        while int(np.sqrt(parameters.raw["sh"].shape[1])) - 1 < settings.degree:
             parameters.add_degree()
     return trainer.alike(parameters)
 

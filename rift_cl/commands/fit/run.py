@@ -64,7 +64,7 @@ class FitRun(Generic[S]):
             self.losses = self.checkpoints.restore(trainer)
         else:
             self.folder.mark(**self.decided)
-            self.folder.drop("checkpoints")
+            self.folder.drop("checkpoints", "environment.exr")
 
     def _trained(self, trainer: Trainer, pictures: Any) -> Iterator[Report]:
         """Train, with a checkpoint now and then, at the end, and when broken off."""

@@ -137,6 +137,8 @@ class FitSettings:
             words[0] = f"{basis.kind} splats of {words[0]}"
         words += [] if basis.activation == "clamp" else [f"activation {basis.activation}"]
         words += [] if angular.kind == "sh" else [f"{angular.modes} {angular.kind} functions"]
+        light = self.training.environment
+        words += [f"a shared light of {light.lobes} lobes"] if light.shared else []
         return ", ".join(words)
 
     def basis_facts(self) -> dict[str, str]:

@@ -28,6 +28,7 @@ from rift_cl.io.captures.capture import (
     camera_at,
     capture_name,
 )
+from rift_cl.io.images.environment_map import write_environment_map
 from rift_cl.io.scenes.splat_scene import SplatScene
 from rift_cl.progress import Report
 from rift_cl.splat.bands import FrameMemory
@@ -129,7 +130,8 @@ class Fit(FitRun[FitPhotosSettings]):
         modes = None if training.basis.plain else ModeOrders(order, color_order, channels)
         absgrad = isinstance(training.strategy, DefaultSettings) and training.strategy.absgrad
         numbers = (training.splats, training.numbers, pixels, 3)
-        return FrameMemory(*numbers, gradient=True, absgrad=absgrad, modes=modes)
+        light = training.environment.lobes if training.environment.shared else 0
+        return FrameMemory(*numbers, gradient=True, absgrad=absgrad, modes=modes, environment=light)
 
     @staticmethod
     def _need(frame: FrameMemory) -> int:
@@ -141,7 +143,7 @@ class Fit(FitRun[FitPhotosSettings]):
         """How many splats, and what they are."""
         training, words = self.settings.training, [f"at most {self.settings.training.splats}"]
         if training.angular.kind == "sh":
-            words.append(f"harmonics of degree {training.sh_degree}")
+            words.append(f"harmonics of degree {training.degree}")
         return ", ".join([*words, *filter(None, [self.settings.basis_words()])])
 
     def run(self) -> Iterator[Report]:
@@ -182,9 +184,14 @@ class Fit(FitRun[FitPhotosSettings]):
             self._keep_cameras(capture, trainer)
         splats = trainer.parameters.drawn
         drawn = trainer.renderer.settings
-        SplatScene.of(splats, self.device, activation=drawn.activation, angular=drawn.angular).save(
-            settings.out / "scene.ply"
+        fitted = SplatScene.of(
+            splats, self.device, activation=drawn.activation, angular=drawn.angular
         )
+        fitted.save(settings.out / "scene.ply")
+        if fitted.environment is not None:
+            display = settings.light == "display"
+            path = settings.out / "environment.exr"
+            write_environment_map(path, fitted.environment, display=display)
         for name, views in self._scored().items():
             self.scores[name] = []
             test = self._pictures(views, pictures)

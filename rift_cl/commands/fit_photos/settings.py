@@ -101,10 +101,31 @@ class FitPhotosSettings(RepeatableRun, FitOutput, PhotosTraining, PhotosInput, F
                 f"--sh-degree is about harmonics, which --angular {angular.kind} replaces: give "
                 "--modes, or leave it out"
             )
+        self._check_environment()
         self._check_least("downscale", 1)
         self._check_least("frames", 3)
         if not (self.first_splats is None or 0 < self.first_splats <= 1):
             raise InputError(f"--first-splats is {self.first_splats}, wanted above 0, at most 1")
+
+    def _check_environment(self) -> None:
+        training, usual = self.training, TrainSettings()
+        environment, given = training.environment, usual.environment
+        if environment.shared:
+            if training.sh_degree != usual.sh_degree:
+                raise InputError(
+                    "--sh-degree is replaced by --own-degree where --environment shared gives "
+                    "splats a light in common: give that, or leave it out"
+                )
+            if training.angular.kind != "sh" and environment.own_degree != given.own_degree:
+                raise InputError(
+                    f"--own-degree is about harmonics, which --angular {training.angular.kind} "
+                    "replaces: give --modes, or leave it out"
+                )
+        elif environment != given:
+            raise InputError(
+                "--environment-lobes and --own-degree are about a light that splats share: add "
+                "--environment shared, or leave them out"
+            )
 
     @property
     def first_share(self) -> float:

@@ -20,6 +20,7 @@ from rift_cl.commands.fit_photos.pictures import Light
 from rift_cl.commands.run_folder.saved_settings import read_settings
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.images.display_light import to_display, to_linear
+from rift_cl.io.images.environment_map import read_environment_map
 from rift_cl.io.json_fields import Fields, read_json_object
 from rift_cl.io.scenes.splat_scene import SplatScene
 from rift_cl.splat.settings import SplatSettings
@@ -64,6 +65,8 @@ class OpenedScene:
         eps2d = settings.eps2d
         self.rendering = rendering if eps2d is None else replace(rendering, eps2d=eps2d)
         self.light: Light = self._light()
+        if settings.environment is not None:
+            self.splats = self._relit(settings.environment)
         self.background: NDArray[np.float32] = self._background(settings)
 
     @property
@@ -92,6 +95,17 @@ class OpenedScene:
             RiftError: the files that say so are damaged.
         """
         return None if self.folder is None else open_fit_cameras(self.folder)
+
+    def _relit(self, picture: Path) -> SplatScene:
+        """The splats under another light."""
+        if self.splats.environment is None:
+            raise InputError(
+                f"--environment {picture}: the splats of {self.path} reflect no light that could "
+                "be exchanged; fit them with 'rift fit photos --environment shared'"
+            )
+        lobes = len(self.splats.environment)
+        light = read_environment_map(picture, lobes, display=self.light == "display")
+        return replace(self.splats, environment=light)
 
     def _rendering(self) -> SplatSettings:
         """How the fit drew its splats; the defaults where there is no fit."""

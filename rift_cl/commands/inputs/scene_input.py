@@ -29,6 +29,12 @@ class SceneInput:
     """Background colour: red, green and blue in display light, 0 to 1. Default: that of the fit, or
     black for a file."""
 
+    environment: Auto[Path] = None
+    """Picture of the light that splats shall reflect in place of the one they were fitted with
+    (rift fit photos --environment shared): all directions in equirectangular projection, up (z) at
+    the top, x in the middle; OpenEXR or HDR in linear light, others in display light. Default: the
+    fit's own."""
+
     def open_scene(self, *, densities: bool = False) -> OpenedScene:
         """Read the scene.
 

@@ -30,8 +30,8 @@ _CAMERAS, _BLOCK = 32, 8192
 
 
 def browser_can(scene: SplatScene) -> bool:
-    """Whether a browser draws these splats: neither modes, nor lobes, nor optical depths."""
-    bent = (scene.shape_modes, scene.color_modes, scene.lobes)
+    """Whether a browser draws these splats: no modes, lobes, optical depths or shared light."""
+    bent = (scene.shape_modes, scene.color_modes, scene.lobes, scene.environment)
     plain = scene.mode == "light" and scene.activation == "clamp"
     return plain and all(part is None for part in bent)
 

@@ -1,4 +1,4 @@
-"""What a file of splats says of Hermite modes and lobes: properties of our own, and one comment.
+"""What a file of splats says of modes, lobes and shared light: properties of our own, and comments.
 
 Splats of a higher order (see ``rift_cl.splat.splats``) keep in a PLY file all that other programs
 look for, their constants, and after it
@@ -6,11 +6,14 @@ look for, their constants, and after it
     shape_0 ..    the modes of the shape, in graded order without the constant,
     tint_0 ..     those of the colour, channel by channel as f_rest is,
     lobe_0 ..     the geometry of the lobes that colours vary in, in place of harmonics,
-    angular_0 ..  the lobes' coefficients but the first, which is f_dc, channel by channel.
+    angular_0 ..  the lobes' coefficients but the first, which is f_dc, channel by channel,
+    reflectance_0 .. 6  how splats reflect an environment light, about the normal nx ny nz.
 
 A comment says what they are: ``rift-cl basis: shape order 2, color order 1, activation exp, angular
-lg``, with whatever differs from plain splats. It must agree with the properties; a file that has
-them without it is refused, since it would be drawn as something else.
+lg, environment 128``, with whatever differs from plain splats. It must agree with the properties; a
+file that has them without it is refused, since it would be drawn as something else. The light
+itself is in further comments, ``rift-cl light: -1.5 -1.5 -1.5``, one for each lobe in their order
+(``rift_cl.basis.angular.environment``): natural logarithms of red, green and blue radiance.
 """
 
 from __future__ import annotations
@@ -25,13 +28,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.basis.angular import ANGULAR_BASES, AngularBasis, angular_basis
+from rift_cl.basis.angular.environment import MOST_LOBES, REFLECTANCE
 from rift_cl.errors import FileFormatError, InputError, ShapeError
 from rift_cl.splat.orders import HIGHEST, count_of, order_of
 from rift_cl.splat.settings import Activation
 
-_MARK = "rift-cl basis:"
-_FAMILY = re.compile(r"(shape|tint|lobe|angular)_[0-9]+")
-_PART = re.compile(r"(shape order|color order|activation|angular) ([a-z0-9]+)")
+_MARK, _LIGHT = "rift-cl basis:", "rift-cl light:"
+_FAMILIES = ("shape", "tint", "lobe", "angular", "reflectance")
+_FAMILY = re.compile(rf"({'|'.join(_FAMILIES)})_[0-9]+")
+_PART = re.compile(r"(shape order|color order|activation|angular|environment) ([a-z0-9]+)")
+_LOBES = re.compile(r"[1-9][0-9]{0,3}")
 _SHOWN = 60
 
 Columns = dict[str, NDArray[np.float32]]
@@ -47,6 +53,7 @@ class SceneBasis:
         activation: how densities become opacities; see ``SplatSettings``.
         angular: what colours vary in; see ``SplatSettings``.
         linear: coefficients of a channel's lobes, the constant among them; 0 with harmonics.
+        environment: lobes of an environment light that splats share; 0 without one.
     """
 
     shape_order: int = 0
@@ -54,6 +61,7 @@ class SceneBasis:
     activation: Activation = "clamp"
     angular: str = "sh"
     linear: int = 0
+    environment: int = 0
 
     @classmethod
     def of(cls, scene: Any) -> SceneBasis:
@@ -70,7 +78,10 @@ class SceneBasis:
                 raise InputError(f"SplatScene: {name} is {getattr(scene, name)!r}, wanted {wanted}")
         linear = 0 if scene.angular == "sh" else (*np.shape(scene.sh), 0, 0)[1]
         orders = [_order_of(scene, name) for name in ("shape_modes", "color_modes")]
-        found = cls(orders[0], orders[1], scene.activation, scene.angular, linear)
+        light = 0 if scene.environment is None else len(scene.environment)
+        if light > MOST_LOBES:
+            raise ShapeError(f"SplatScene: environment has {light} lobes, wanted 1 to {MOST_LOBES}")
+        found = cls(orders[0], orders[1], scene.activation, scene.angular, linear, light)
         if scene.mode == "xray" and found != cls(shape_order=orders[0]):
             raise InputError(
                 "SplatScene: splats of X-rays have neither colours nor an activation: leave out "
@@ -94,6 +105,7 @@ class SceneBasis:
         parts += [f"color order {self.color_order}"] if self.color_order else []
         parts += [f"activation {self.activation}"] if self.activation != "clamp" else []
         parts += [f"angular {self.angular}"] if self.angular != "sh" else []
+        parts += [f"environment {self.environment}"] if self.environment else []
         return ", ".join(parts)
 
     @property
@@ -109,24 +121,30 @@ class SceneBasis:
             "tint": 3 * (count_of(self.color_order) - 1),
             "lobe": self._lobes.n_geometry if self._lobes else 0,
             "angular": 3 * (self.linear - 1) if self.linear else 0,
+            "reflectance": REFLECTANCE if self.environment else 0,
         }
 
     @property
     def numbers(self) -> int:
-        """Properties of all families, for each splat."""
-        return sum(self.lengths.values())
+        """Properties of all families, and normals where they mean something, for each splat."""
+        return sum(self.lengths.values()) + (3 if self.environment else 0)
 
     def shapes(self, count: int) -> dict[str, tuple[int, ...]]:
         """The shapes of the arrays that there are, by their names."""
         shape, color = count_of(self.shape_order) - 1, count_of(self.color_order) - 1
         found: dict[str, tuple[int, ...]] = {"shape_modes": (count, shape)} if shape else {}
         found |= {"color_modes": (count, color, 3)} if color else {}
-        return found | ({"lobes": (count, self.lengths["lobe"])} if self.linear else {})
+        found |= {"lobes": (count, self.lengths["lobe"])} if self.linear else {}
+        if self.environment:
+            found |= {"normals": (count, 3), "reflectance": (count, REFLECTANCE)}
+            found["environment"] = (self.environment, 3)
+        return found
 
     def columns(self, arrays: Mapping[str, Any]) -> Columns:
         """Views of the arrays by the names of the properties, in the order of the file."""
         found: Columns = {}
-        for family, name in (("shape", "shape_modes"), ("lobe", "lobes")):
+        tables = ("shape", "shape_modes"), ("lobe", "lobes"), ("reflectance", "reflectance")
+        for family, name in tables:
             for k in range(self.lengths[family]):
                 found[f"{family}_{k}"] = arrays[name][:, k]
         if self.color_order:
@@ -143,7 +161,7 @@ def read_basis(path: Path, comments: Sequence[str], properties: Mapping[str, str
         FileFormatError: it says something that has no meaning, or contradicts the properties.
     """
     said = [line[len(_MARK) :].strip() for line in comments if line.startswith(_MARK)]
-    families = dict.fromkeys(("shape", "tint", "lobe", "angular"), 0)
+    families = dict.fromkeys(_FAMILIES, 0)
     for name in properties:
         if _FAMILY.fullmatch(name):
             families[name.split("_")[0]] += 1
@@ -159,6 +177,32 @@ def read_basis(path: Path, comments: Sequence[str], properties: Mapping[str, str
             f"{said[0][:_SHOWN]!r}, which has {basis.lengths[name]}; the file is damaged"
         )
     return basis
+
+
+def light_comments(environment: NDArray[np.float32]) -> list[str]:
+    """The lines of a header that hold a light, to the bit."""
+    rows = (" ".join(f"{value:.9g}" for value in row) for row in environment.tolist())
+    return [f"comment {_LIGHT} {row}" for row in rows]
+
+
+def read_light(path: Path, comments: Sequence[str], count: int) -> NDArray[np.float32]:
+    """The light of ``count`` lobes that a header's comments hold, (K, 3).
+
+    Raises:
+        FileFormatError: there are other than so many, or one is no light.
+    """
+    rows = [line[len(_LIGHT) :] for line in comments if line.startswith(_LIGHT)]
+    try:
+        # Words that are no finite numbers are met here, or as NaN and infinity by the reader.
+        found = np.array([[float(word) for word in row.split()] for row in rows], np.float32)
+    except ValueError:
+        found = np.empty((0, 0), np.float32)
+    if found.shape != (count, 3):
+        raise FileFormatError(
+            f"{path}: its comments '{_LIGHT}' hold no {count} lobes of red, green and blue, as its "
+            "environment light has; the file is damaged"
+        )
+    return found
 
 
 def _by_channel(family: str, table: Any) -> Columns:
@@ -210,8 +254,10 @@ def _parsed(path: Path, said: str, rest: int) -> SceneBasis:
             angular_basis(angular, linear)
         except InputError as error:
             raise FileFormatError(f"{path}: its properties angular_0..: {error}") from error
-    how = cast(Activation, activation)
-    return SceneBasis(int(orders[0]), int(orders[1]), how, angular, linear)
+    how, light = cast(Activation, activation), found.get("environment", "0")
+    if light != "0" and not (_LOBES.fullmatch(light) and int(light) <= MOST_LOBES):
+        raise _meaningless(path, said)
+    return SceneBasis(int(orders[0]), int(orders[1]), how, angular, linear, int(light))
 
 
 def _meaningless(path: Path, said: str) -> FileFormatError:

@@ -1,14 +1,14 @@
 """Splats in the PLY layout of 3D Gaussian splatting (Kerbl et al. 2023), which viewers read.
 
-One element ``vertex`` of floats: x y z, nx ny nz (zero, never read), f_dc_0 to 2, f_rest_0 to
-3 (K - 1) - 1, opacity, scale_0 to 2, rot_0 to 3. The rest of the harmonics is channel-major: every
-coefficient of red comes before the first of green.
+One element ``vertex`` of floats: x y z, nx ny nz (zero and never read, but where splats reflect
+an environment light), f_dc_0 to 2, f_rest_0 to 3 (K - 1) - 1, opacity, scale_0 to 2, rot_0 to 3.
+The rest of the harmonics is channel-major: all coefficients of red come before the first of green.
 
 Splats of X-rays have a property ``log_density`` in place of ``opacity``, the natural logarithm of
 the density at the peak. To a viewer of photographs their file lacks a property: it can refuse it,
 but cannot show it as what it is not.
 
-What splats have beside all that, modes and lobes, is in ``rift_cl.io.scenes.splat_basis``.
+What splats have beside all that, modes, lobes and light, is in ``rift_cl.io.scenes.splat_basis``.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.scenes.ply_body import read_blocks, record_runs
 from rift_cl.io.scenes.ply_header import PlyHeader, read_header
-from rift_cl.io.scenes.splat_basis import SceneBasis, read_basis
+from rift_cl.io.scenes.splat_basis import SceneBasis, light_comments, read_basis, read_light
 from rift_cl.splat.settings import SplatMode
 
 if TYPE_CHECKING:
@@ -62,6 +62,8 @@ def read_ply(
     check_claim(path, "the scene", 4 * each * header.count, budget)
     arrays = _empty(header.count, coefficients, basis)
     columns = _columns(arrays, mode, basis)
+    if basis.environment:
+        arrays["environment"] = read_light(path, header.comments, basis.environment)
     start = 0
     for block in read_blocks(path, file, header):
         # A number too large for float32 becomes infinite, and is refused with the others.
@@ -77,10 +79,12 @@ def encode_ply(scene: SplatScene) -> tuple[int, Iterator[bytes]]:
     basis = SceneBasis.of(scene)
     columns = _columns(vars(scene), scene.mode, basis)
     names = list(columns)
-    names[3:3] = _NORMALS
+    names[3:3] = () if basis.environment else _NORMALS
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(scene)}"]
     if scene.mode == "xray":
         lines.insert(2, _COMMENT)
+    if scene.environment is not None:
+        lines[2:2] = light_comments(scene.environment)
     if not basis.plain:
         lines.insert(2, basis.comment)
     lines += [f"property float {name}" for name in names]
@@ -125,6 +129,8 @@ def _columns(
     # Coefficients of lobes are none of harmonics, and have a name of their own.
     rest = 0 if basis.linear else sh.shape[1] - 1
     columns: dict[str, NDArray[np.float32]] = dict(zip("xyz", means.T, strict=True))
+    if basis.environment:
+        columns |= dict(zip(_NORMALS, arrays["normals"].T, strict=True))
     columns |= {f"f_dc_{c}": sh[:, 0, c] for c in range(3)}
     columns |= {f"f_rest_{c * rest + k}": sh[:, 1 + k, c] for c in range(3) for k in range(rest)}
     columns[_STRENGTHS[mode]] = arrays["logit_opacities"]

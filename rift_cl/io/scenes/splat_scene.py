@@ -36,6 +36,8 @@ from rift_cl.splat.settings import Activation, SplatMode
 from rift_cl.splat.splats import Splats
 
 _ENCODERS = {".ply": encode_ply, ".splat": encode_splat}
+# What splats reflect light with: all of it, or nothing.
+_LIGHT = ("normals", "reflectance", "environment")
 _PLY_STARTS = (b"ply\n", b"ply\r")
 
 
@@ -53,6 +55,10 @@ class SplatScene:
         shape_modes: (N, K - 1) Hermite modes of the shape, or None; see ``rift_cl.splat.splats``.
         color_modes: (N, K - 1, 3) those of the colour, or None.
         lobes: (N, G) geometry of the lobes that colours vary in, or None.
+        normals: (N, 3) normals of splats that reflect an environment light, or None; see
+            ``rift_cl.splat.splats``.
+        reflectance: (N, 7) how they reflect it, or None.
+        environment: (K, 3) natural logarithms of the radiance of that light's lobes, or None.
         activation: that densities are drawn with; see ``SplatSettings``.
         angular: what colours vary in; see ``SplatSettings``.
 
@@ -71,6 +77,9 @@ class SplatScene:
     shape_modes: NDArray[np.float32] | None = None
     color_modes: NDArray[np.float32] | None = None
     lobes: NDArray[np.float32] | None = None
+    normals: NDArray[np.float32] | None = None
+    reflectance: NDArray[np.float32] | None = None
+    environment: NDArray[np.float32] | None = None
     activation: Activation = "clamp"
     angular: str = "sh"
     mode: ClassVar[SplatMode] = "light"
@@ -91,6 +100,12 @@ class SplatScene:
             raise ShapeError(
                 f"SplatScene: angular is {self.angular!r} {'without' if lobed else 'with'} lobes, "
                 "wanted both, or harmonics ('sh') and none"
+            )
+        lit = [name for name in _LIGHT if getattr(self, name) is not None]
+        if lit and len(lit) < len(_LIGHT):
+            raise ShapeError(
+                f"SplatScene: {' and '.join(lit)} without the rest, wanted all of "
+                f"{', '.join(_LIGHT)} or none"
             )
         for name, shape in scene_shapes(count, sh.shape[1], basis).items():
             array = as_host_array(
@@ -183,6 +198,7 @@ class SplatScene:
             shape_modes=self.shape_modes,
             color_modes=self.color_modes,
             lobes=self.lobes,
+            **{name: getattr(self, name) for name in _LIGHT},
         )
 
     @classmethod
@@ -219,7 +235,8 @@ class SplatScene:
             raise InputError("SplatScene: wants splats with quats, scales and sh, and no colors")
         scales = device.get(splats.scales)
         check_range("scales", scales, np.inf)
-        more = {name: getattr(splats, name) for name in ("shape_modes", "color_modes", "lobes")}
+        names = ("shape_modes", "color_modes", "lobes", *_LIGHT)
+        more = {name: getattr(splats, name) for name in names}
         return cls(
             means=device.get(splats.means),
             log_scales=log_scales_of(scales),

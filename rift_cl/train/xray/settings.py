@@ -11,6 +11,7 @@ from typing import TypeVar
 from rift_cl.option_marks import Expert, NoOption, Short, ShortExpert, ShortSplats
 from rift_cl.splat.settings import Activation
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
+from rift_cl.train.environment_settings import EnvironmentSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.settings import LearningRates, TrainSettings
 from rift_cl.train.strategy import StrategySettings, XraySettings
@@ -36,6 +37,9 @@ class XrayLearningRates(LearningRates):
     color_modes: NoOption[float] = 2.5e-3
     lobes: NoOption[float] = 1e-2
     lobes_rest: NoOption[float] = 1.0
+    environment: NoOption[float] = 1e-2
+    reflectance: NoOption[float] = 5e-2
+    normals: NoOption[float] = 0.0
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,7 @@ class XrayTrainSettings(TrainSettings):
     refine_exposures: NoOption[bool] = False
     basis: ShortSplats[BasisSettings] = field(default_factory=XrayBasisSettings)
     angular: NoOption[AngularSettings] = field(default_factory=AngularSettings)
+    environment: NoOption[EnvironmentSettings] = field(default_factory=EnvironmentSettings)
     strategy: ShortExpert[StrategySettings] = field(default_factory=XraySettings)
     # Orbits are dense along the detector's rows, and along nothing else.
     homogenisation: Short[Homogenisation] = field(

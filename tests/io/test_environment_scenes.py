@@ -1,0 +1,136 @@
+"""Scenes that reflect a light, and the light as a picture: kept to the bit, and found again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import splat_files as made
+from plyfile import PlyData
+
+import rift_cl as rift
+from rift_cl.basis.angular.environment import light_from
+from rift_cl.errors import FileFormatError, InputError, NonFiniteError, ShapeError
+from rift_cl.io.images.environment_map import read_environment_map, write_environment_map
+from rift_cl.io.images.image import read_image, write_png
+
+LIGHT = ("normals", "reflectance", "environment")
+
+
+def scene(count=7, lobes=9):
+    random, plain = np.random.default_rng(8), made.scene(count, 1)
+    return replace(
+        plain,
+        normals=random.normal(size=(count, 3)),
+        reflectance=random.normal(size=(count, 7)),
+        environment=random.normal(size=(lobes, 3)),
+    )
+
+
+def test_a_ply_keeps_every_bit_and_others_find_normals_and_the_plain_scene(tmp_path):
+    wanted = scene()
+    wanted.save(tmp_path / "a.ply")
+    found = rift.SplatScene.load(tmp_path / "a.ply")
+    made.assert_same(found, wanted)
+    for name in LIGHT:
+        assert getattr(found, name).tobytes() == getattr(wanted, name).tobytes(), name
+    read = PlyData.read(str(tmp_path / "a.ply"))
+    names = [entry.name for entry in read["vertex"].properties]
+    assert names[: len(made.names(1))] == made.names(1)
+    np.testing.assert_array_equal(read["vertex"]["ny"], wanted.normals[:, 1])
+
+
+def test_what_is_uploaded_comes_back(device):
+    wanted = scene()
+    splats = wanted.upload(device)
+    found = rift.SplatScene.of(splats, device)
+    for name in LIGHT:
+        assert getattr(found, name).tobytes() == getattr(wanted, name).tobytes(), name
+
+
+def test_what_lies_about_its_light_is_refused(tmp_path):
+    scene().save(tmp_path / "a.ply")
+    whole = (tmp_path / "a.ply").read_bytes()
+    line = next(row for row in whole.split(b"\n") if row.startswith(b"comment rift-cl light"))
+    changes = [
+        (b"environment 9", b"environment 8", "8 lobes"),
+        (b"environment 9", b"environment 0", "reflectance_0"),
+        (b"environment 9", b"environment 99999", "no meaning"),
+        (line, b"comment rift-cl light: 1 2", "9 lobes"),
+        (line, b"comment rift-cl light: 1 2 red", "9 lobes"),
+        (line, b"comment", "9 lobes"),
+        (b"comment rift-cl basis", b"comment other basis", "no comment"),
+    ]
+    for old, new, words in changes:
+        (tmp_path / "b.ply").write_bytes(whole.replace(old, new, 1))
+        with pytest.raises(FileFormatError, match=words):
+            rift.SplatScene.load(tmp_path / "b.ply")
+    (tmp_path / "b.ply").write_bytes(whole.replace(line, b"comment rift-cl light: 1 2 nan", 1))
+    with pytest.raises(NonFiniteError, match="environment"):
+        rift.SplatScene.load(tmp_path / "b.ply")
+
+
+def test_arrays_that_make_no_reflecting_scene():
+    with pytest.raises(ShapeError, match="normals and environment without the rest"):
+        replace(scene(), reflectance=None)
+    with pytest.raises(ShapeError, match="reflectance"):
+        replace(scene(), reflectance=np.zeros((7, 6)))
+    with pytest.raises(ShapeError, match="environment"):
+        replace(scene(), environment=np.zeros((3, 4)))
+    with pytest.raises(ShapeError, match="4097 lobes"):
+        replace(scene(), environment=np.zeros((4097, 3)))
+
+
+def test_a_splat_file_holds_no_light(tmp_path):
+    with pytest.raises(InputError, match="environment"):
+        scene().save(tmp_path / "a.splat")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("display", [False, True])
+def test_a_light_comes_back_from_its_picture(tmp_path, display):
+    light = np.random.default_rng(2).normal(-2, 1, (32, 3)).astype(np.float32)
+    write_environment_map(tmp_path / "a.exr", light, display=display)
+    found = read_environment_map(tmp_path / "a.exr", 32, display=display)
+    directions = np.random.default_rng(3).normal(size=(200, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    given, again = (light_from(a.astype(float), directions) for a in (light, found))
+    assert np.abs(again - given).max() < 0.01 * given.max()
+
+
+def test_up_is_at_the_top_x_in_the_middle_and_y_left_of_it(tmp_path):
+    picture = np.zeros((32, 64, 3), np.float32)
+    picture[:4, :, 0] = 1
+    picture[14:18, 30:34, 1] = 1
+    picture[14:18, 14:18, 2] = 1
+    write_png(tmp_path / "a.png", picture)
+    found = read_environment_map(tmp_path / "a.png", 64, display=True)
+    light = light_from(found.astype(float), np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]))
+    np.testing.assert_array_equal(light.argmax(axis=1), [0, 1, 2])
+    write_environment_map(tmp_path / "b.exr", found, display=True)
+    again = read_image(tmp_path / "b.exr")
+    assert again[2, :, 0].min() > 2 * again[-3:, :, 0].max()
+    assert again[64, 128, 1] == again[..., 1].max() or again[64, 128, 1] > again[64, 64, 1]
+
+
+def test_a_small_lamp_does_not_fall_between_pixels(tmp_path):
+    picture = np.zeros((256, 512, 3), np.float32)
+    picture[131, 77] = 1
+    write_png(tmp_path / "a.png", picture)
+    found = read_environment_map(tmp_path / "a.png", 32, display=False)
+    assert np.exp(found).max() > 1e-4
+
+
+def test_a_dark_picture_is_a_dark_light_of_finite_numbers(tmp_path):
+    write_png(tmp_path / "a.png", np.zeros((8, 16, 3)))
+    found = read_environment_map(tmp_path / "a.png", 16, display=True)
+    assert np.isfinite(found).all() and np.exp(found).max() < 1e-6
+
+
+def test_pictures_of_another_shape_are_refused(tmp_path):
+    write_png(tmp_path / "a.png", np.zeros((8, 8, 3)))
+    with pytest.raises(InputError, match="twice as wide as high"):
+        read_environment_map(tmp_path / "a.png", 16, display=True)
+    with pytest.raises(InputError):
+        read_environment_map(tmp_path / "none.png", 16, display=True)
