@@ -17,7 +17,7 @@
  * A pixel and a splat have `stride` channels, of which this launch does CHANNELS from `first`; with
  * PACKED they are in the splats' records. Written for each pixel: image (CHANNELS numbers), the
  * final transmittance, and one past the last of the tile's entries that may have changed it, where
- * the gradient begins its way back. */
+ * the gradient begins its way back. These arrays begin with row `above` of the image. */
 
 #include "include/portable.h"
 #include "include/exponential.h"
@@ -55,13 +55,13 @@ static ulong clear_blocks(lanes (*state)[VECTORS][1 + CHANNELS], lanes_int (*end
 
 /* Write a block's pixels, row by row; `looked` entries of the tile there are. */
 static void write_block(
-    lanes (*state)[1 + CHANNELS], const lanes_int *end, int block, Window window, int stride, int first,
-    int looked, __global const float *background, __global float *image, __global float *transmittance,
-    __global int *last)
+    lanes (*state)[1 + CHANNELS], const lanes_int *end, int block, Window window, int above, int stride,
+    int first, int looked, __global const float *background, __global float *image,
+    __global float *transmittance, __global int *last)
 {
   const Rows rows = rows_of(window, block);
   for (int row = 0; row < rows.down; row++) {
-    const long pixel = rows.first + (long)row * window.width;
+    const long pixel = rows.first + (long)(row - above) * window.width;
     const float *numbers = (const float *)state[row / 2] + row % 2 * 4;
     const int *ends = (const int *)&end[row / 2] + row % 2 * 4;
     __global float *out = image + pixel * stride + first;
@@ -138,7 +138,8 @@ KERNEL void splat_raster_cpu(
     __global int *restrict last, __global const float *restrict packed, MODES_PARAMETER
     __global const float *restrict features, __global const float *restrict background,
     __global const int2 *restrict entries, __global const int *restrict starts,
-    int height, int width, int tiles_x, int first_tile_row, float cap, int stride, int first)
+    int height, int width, int tiles_x, int first_tile_row, int above, float cap, int stride,
+    int first)
 {
   const int tile = (int)get_global_id(0), start = starts[tile], stop = starts[tile + 1];
   const Window window = {
@@ -161,6 +162,6 @@ KERNEL void splat_raster_cpu(
   }
   for (int block = 0; block < BLOCKS; block++)
     write_block(
-        state[block], end[block], block, window, stride, first, stop - start, background, image,
+        state[block], end[block], block, window, above, stride, first, stop - start, background, image,
         transmittance, last);
 }

@@ -10,7 +10,8 @@
  * waits for.
  *
  * Written for each pixel: the image's CHANNELS numbers from `first` on of `stride`, the final
- * transmittance, and one past the last entry of the tile's that it saw.
+ * transmittance, and one past the last entry of the tile's that it saw. These arrays begin with row
+ * `above` of the image.
  *
  * Index space: (pixels), tile after tile of the rows of tiles from first_tile_row on, in tiles part
  * after part. */
@@ -33,8 +34,8 @@ KERNEL void splat_raster_gpu(
     __global float *restrict image, __global float *restrict transmittance, __global int *restrict last,
     __global const float *restrict packed, __global const float *restrict features,
     __global const float *restrict background, __global const int2 *restrict entries,
-    __global const int *restrict starts, int height, int width, int tiles_x, int first_tile_row, int tiles,
-    float cap, int stride, int first MODE_PARAMETERS)
+    __global const int *restrict starts, int height, int width, int tiles_x, int first_tile_row, int above,
+    int tiles, float cap, int stride, int first MODE_PARAMETERS)
 {
   __local float4 staged[QUADS * BATCH];
   __local uchar reached[BATCH] __attribute__((aligned(4)));
@@ -90,7 +91,7 @@ KERNEL void splat_raster_gpu(
       }
   }
   if (!inside) return;
-  const long pixel = (long)(y0 + row) * width + x0 + column;
+  const long pixel = (long)(y0 + row - above) * width + x0 + column;
   transmittance[pixel] = left;
   last[pixel] = end - start;
   UNROLL for (int n = 0; n < CHANNELS; n++)

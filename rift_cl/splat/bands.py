@@ -4,6 +4,8 @@ Tile lists and the gradient's records grow with the number of (splat, tile) pair
 any multiple of the number of splats. Where they do not fit, the image is drawn in bands of whole
 rows of tiles, one after the other. Each tile's list is the same in every band, and a splat's
 records are summed in the order of the tiles whatever the band, so that every bit stays the same.
+A picture for the host need not be on the device at once either: of ``PictureMemory`` a band brings
+its pixels along.
 """
 
 from __future__ import annotations
@@ -125,6 +127,31 @@ class FrameMemory:
         return within and self.fixed + self.lists(entries, tiles) <= budget
 
 
+@dataclass(frozen=True)
+class PictureMemory(FrameMemory):
+    """Bytes that a picture takes of which one band at a time is on the device.
+
+    Args:
+        tile: pixels of a tile.
+    """
+
+    tile: int = 0
+
+    @classmethod
+    def within(cls, frame: FrameMemory, tile: int) -> PictureMemory:
+        """The same splats and channels, without the pixels of the whole image."""
+        return cls(**{**vars(frame), "pixels": 0}, tile=tile)
+
+    def lists(self, entries: int, tiles: int) -> int:
+        """Bytes of tile lists and of the band's pixels."""
+        return super().lists(entries, tiles) + tiles * self.tile * (4 * self.channels + 8)
+
+    def fits(self, entries: int, tiles: int, budget: int, largest: int) -> bool:
+        """Whether such a band fits a budget, and its pixels and lists the largest buffer."""
+        image = 4 * tiles * self.tile * self.channels
+        return image <= largest and super().fits(entries, tiles, budget, largest)
+
+
 def check_fixed(memory: FrameMemory, budget: int, largest: int) -> None:
     """Raise an error if a frame does not fit the memory in any number of bands.
 
@@ -182,6 +209,9 @@ def _refuse(memory: FrameMemory, entries: int, tiles: int, budget: int, largest:
     """Say why one row of tiles does not fit."""
     what = f"one row of tiles ({entries} splat and tile pairs)"
     check_array(memory.longest(entries), largest, what=f"a list of {what}")
+    if isinstance(memory, PictureMemory):
+        row = 4 * tiles * memory.tile * memory.channels
+        check_array(row, largest, what="one row of tiles of the picture")
     raise ResourceLimitError(
         f"{what} needs {format_bytes(memory.fixed + memory.lists(entries, tiles))}, the memory "
         f"budget is {format_bytes(budget)}: raise the budget (RIFT_MEMORY or --memory), "

@@ -164,17 +164,26 @@ class SlotRecords:
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """A rendered image, and what its gradient needs; device arrays.
+    """A rendered image or a band of its rows, and what its gradient needs; device arrays.
 
     Args:
         image: (height, width, D), with the background.
         transmittance: (height, width), what of the background is seen.
         last: (height, width) int32, how many of its tile's entries the gradient looks at.
+        above: rows of the image above those that are here; 0 in a whole image, which alone has a
+            gradient.
     """
 
     image: DeviceArray
     transmittance: DeviceArray
     last: DeviceArray
+    above: int = 0
+
+    @classmethod
+    def empty(cls, device: Device, size: tuple[int, int], channels: int, above: int = 0) -> Raster:
+        """Room for so many rows and columns, not drawn yet."""
+        pixels, codes = device.empty(size), device.empty(size, np.int32)
+        return cls(device.empty((*size, channels)), pixels, codes, above)
 
 
 def packed(device: Device, splats: ScreenSplats) -> ScreenSplats:
@@ -235,14 +244,9 @@ def rasterize(
     settings = settings.for_image(size, cpu=device.traits.is_cpu)
     _check(splats, lists, size, settings)
     splats = packed(device, splats)
-    height, width = size
     channels = splats.features.shape[1]
     background = _background(device, background, channels)
-    raster = into or Raster(
-        device.empty((height, width, channels)),
-        device.empty((height, width)),
-        device.empty((height, width), np.int32),
-    )
+    raster = into or Raster.empty(device, size, channels)
     for first, count in _channel_runs(device, splats):
         device.launch(
             _kernel(device, "raster"),
@@ -250,6 +254,7 @@ def rasterize(
             image=raster.image,
             transmittance=raster.transmittance,
             last=raster.last,
+            above=raster.above,
             **_drawn(device, splats, background, lists, size, settings),
             **_channels(splats, first, count),
             **_macros(device, splats, settings, count),

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
-from rift_cl.splat.bands import FrameMemory, plan_bands
+from rift_cl.splat.bands import FrameMemory, PictureMemory, plan_bands
 from rift_cl.splat.raster import Raster, ScreenSplats, packed, raster_grad, rasterize, sum_slots
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.tile_lists import TileLists, Tiles, count_tiles, list_tiles, tile_lists
@@ -94,6 +94,33 @@ def draw(
         )
     assert raster is not None
     return RasterPass(screen, boxes, depths, size, settings, background, memory, None, raster)
+
+
+def draw_bands(
+    device: Device,
+    screen: ScreenSplats,
+    boxes: DeviceArray,
+    depths: DeviceArray,
+    size: tuple[int, int],
+    *,
+    settings: SplatSettings,
+    memory: PictureMemory,
+    background: DeviceArray | None = None,
+) -> Iterator[Raster]:
+    """Rasterize splats in bands of rows that are on the device one at a time, from above.
+
+    Arguments and errors are those of ``draw``.
+    """
+    edge = settings.edge
+    tiles, sort = Tiles.of(size, edge), settings.mode == "light"
+    screen = packed(device, screen)
+    for lists in _bands(device, boxes, depths, tiles, memory, sort=sort):
+        above = lists.tiles.first_row * edge
+        rows = min(lists.tiles.rows * edge, size[0] - above)
+        band = Raster.empty(device, (rows, size[1]), memory.channels, above)
+        yield rasterize(
+            device, screen, lists, size, settings=settings, background=background, into=band
+        )
 
 
 def draw_grad(

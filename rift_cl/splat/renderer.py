@@ -2,25 +2,27 @@
 
 ``forward`` keeps what its gradient needs in a ``Frame``; ``backward`` turns dL/d image into
 gradients of every parameter. Nothing is summed by atomics, so the same call gives the same bits,
-and so it does in a smaller memory budget, in which the image is drawn in bands.
+and so it does in a smaller memory budget, in which the image is drawn in bands. ``picture`` renders
+to the host, images too that the device does not hold.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rift_cl.cl.adam import AdamStep
 from rift_cl.cl.arithmetic import copy_columns, sum_columns
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
-from rift_cl.cl.host_arrays import as_device_array
-from rift_cl.errors import InputError
+from rift_cl.cl.host_arrays import as_device_array, download
+from rift_cl.errors import InputError, ResourceLimitError
 from rift_cl.geometry import Camera
-from rift_cl.splat.bands import FrameMemory, check_fixed
+from rift_cl.splat.bands import FrameMemory, PictureMemory, check_fixed
 from rift_cl.splat.environment import shade_environment_grad
 from rift_cl.splat.features import Channels, gather_features, own_columns, shade_grad
 from rift_cl.splat.projection import (
@@ -32,7 +34,7 @@ from rift_cl.splat.projection import (
     project_grad,
 )
 from rift_cl.splat.raster import Raster, ScreenSplats, unpack
-from rift_cl.splat.raster_pass import RasterPass, draw, draw_grad
+from rift_cl.splat.raster_pass import RasterPass, draw, draw_bands, draw_grad
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 from rift_cl.splat.tile_lists import TileLists
@@ -88,6 +90,18 @@ class Frame:
     def raster(self) -> Raster:
         """The image, and what the raster left for its gradient."""
         return self.raster_pass.raster
+
+
+class Picture(NamedTuple):
+    """A rendered image on the host.
+
+    Args:
+        image: (height, width, D), the background included.
+        transmittance: (height, width), what of the background is seen; alpha is one minus it.
+    """
+
+    image: NDArray[np.float32]
+    transmittance: NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,21 +198,18 @@ class Renderer:
             InputError: there is nothing to draw, no depth or no lens in this mode, or splats
                 with modes have more than 32 channels or shall have magnitudes of gradients.
             ShapeError: the background or the lobes do not fit.
-            ResourceLimitError: not even one row of tiles fits the memory budget.
+            ResourceLimitError: the image does not fit the memory budget or the largest buffer, or
+                not even the lists of one row of tiles do.
         """
         device = self.device
-        settings = self.settings.for_image(camera.size, cpu=device.traits.is_cpu)
-        check_modal(splats, settings)
-        channels = self._channels(splats, depth)
-        behind = self._behind(background, channels)
+        settings, channels = self._checked(splats, camera, depth)
         memory = FrameMemory.of(splats, camera.size, channels.total, settings)
         check_fixed(memory, device.budget, device.traits.allocation)
+        behind = self._behind(background, channels)
         projection = project(device, splats, camera, settings)
-        features = gather_features(projection, channels)
         raster_pass = draw(
             device,
-            ScreenSplats(projection.screen, features, projection.modes),
-            *(projection.boxes, projection.depths, camera.size),
+            *_on_screen(projection, channels),
             settings=settings,
             memory=memory,
             background=behind,
@@ -206,6 +217,58 @@ class Renderer:
         if depth == "expected":
             _expected_depth(device, raster_pass.raster)
         return Frame(projection, depth, channels, raster_pass)
+
+    def picture(
+        self,
+        splats: Splats,
+        camera: Camera,
+        *,
+        background: DeviceArray | None = None,
+        depth: DepthKind | None = None,
+    ) -> Picture:
+        """Render splats to the host, an image that the device does not hold band by band.
+
+        Arguments, channels and bits are those of ``forward``, and so are the errors, but that only
+        one row of tiles must fit.
+        """
+        device = self.device
+        settings, channels = self._checked(splats, camera, depth)
+        memory = FrameMemory.of(splats, camera.size, channels.total, settings)
+        try:
+            check_fixed(memory, device.budget, device.traits.allocation)
+        except ResourceLimitError:
+            return self._in_bands(splats, camera, background, depth, memory)
+        frame = self.forward(splats, camera, background=background, depth=depth)
+        return Picture(device.get(frame.image), device.get(frame.transmittance))
+
+    def _in_bands(
+        self,
+        splats: Splats,
+        camera: Camera,
+        background: DeviceArray | None,
+        depth: DepthKind | None,
+        whole: FrameMemory,
+    ) -> Picture:
+        device = self.device
+        settings, channels = self._checked(splats, camera, depth)
+        memory = PictureMemory.within(whole, settings.edge**2)
+        check_fixed(memory, device.budget, device.traits.allocation)
+        behind = self._behind(background, channels)
+        image = np.empty((*camera.size, channels.total), np.float32)
+        rest = np.empty(camera.size, np.float32)
+        for band in draw_bands(
+            device,
+            *_on_screen(project(device, splats, camera, settings), channels),
+            settings=settings,
+            memory=memory,
+            background=behind,
+        ):
+            if depth == "expected":
+                _expected_depth(device, band)
+            rows = slice(band.above, band.above + len(band.image))
+            download(device, band.image, image[rows])
+            download(device, band.transmittance, rest[rows])
+        return Picture(image, rest)
 
     def backward(
         self,
@@ -297,9 +360,14 @@ class Renderer:
         given = (self.device, splats, frame.camera)
         return shade_environment_grad(*given, features=features, gradients=gradients)._asdict()
 
-    def _channels(self, splats: Splats, depth: DepthKind | None) -> Channels:
-        check_depth(depth, self.settings)
-        return Channels.of(splats, depth=depth is not None)
+    def _checked(
+        self, splats: Splats, camera: Camera, depth: DepthKind | None
+    ) -> tuple[SplatSettings, Channels]:
+        """How the image is drawn, its tiles' edge chosen, and what its channels are."""
+        settings = self.settings.for_image(camera.size, cpu=self.device.traits.is_cpu)
+        check_modal(splats, settings)
+        check_depth(depth, settings)
+        return settings, Channels.of(splats, depth=depth is not None)
 
     def _behind(self, background: DeviceArray | None, channels: Channels) -> DeviceArray | None:
         """The background of all channels; None where there is none."""
@@ -337,6 +405,15 @@ class Renderer:
         ours = self.device.empty((1, color))
         copy_columns(self.device, total.reshape((1, channels)), 0, ours, 0, color)
         return ours.reshape((color,))
+
+
+def _on_screen(
+    projection: Projection, channels: Channels
+) -> tuple[ScreenSplats, DeviceArray, DeviceArray, tuple[int, int]]:
+    """What the raster is given: splats on the screen, their boxes and depths, and its size."""
+    features = gather_features(projection, channels)
+    screen = ScreenSplats(projection.screen, features, projection.modes)
+    return screen, projection.boxes, projection.depths, projection.camera.size
 
 
 def _summed(device: Device, table: DeviceArray | None) -> DeviceArray | None:

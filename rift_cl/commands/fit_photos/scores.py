@@ -74,8 +74,8 @@ def score_views(
     cameras = (training or test).cameras
     behind, focus, up = test.behind, focus_of(cameras), common_up(cameras)
     for number, camera in enumerate(test.cameras):
-        frame = renderer.forward(splats, camera, background=renderer.device.array(behind))
-        image = test.shown(renderer.device.get(frame.image))
+        drawn = renderer.picture(splats, camera, background=renderer.device.array(behind))
+        image = test.shown(drawn.image)
         truth = test.shown(test.over(number, behind))
         masks = test.counted(number), test.foreground(number)
         values, angle, distance = scores_of(image, truth, masks, "fit", more), math.nan, math.nan

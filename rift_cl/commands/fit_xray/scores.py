@@ -67,7 +67,7 @@ def first_volume(device: Device, training: Projections) -> NDArray[np.float64]:
 
 def drawn(renderer: Renderer, splats: Splats, camera: Camera) -> Floats:
     """What a camera sees of splats, (rows, bins)."""
-    return np.asarray(renderer.device.get(renderer.forward(splats, camera).image)[..., 0])
+    return np.asarray(renderer.picture(splats, camera).image[..., 0])
 
 
 def score_projections(

@@ -33,10 +33,8 @@ LEAST_ALPHA = 1 / 255
 
 def depth_and_alpha(renderer: Renderer, splats: Splats, camera: Camera) -> tuple[Floats, Floats]:
     """Expected depth and alpha, (height, width) each."""
-    frame = renderer.forward(splats, camera, depth="expected")
-    device = renderer.device
-    depth = device.get(frame.image)[..., -1]
-    return depth, np.clip(1 - device.get(frame.transmittance), 0, 1)
+    image, seen = renderer.picture(splats, camera, depth="expected")
+    return image[..., -1], np.clip(1 - seen, 0, 1)
 
 
 def depth_window(

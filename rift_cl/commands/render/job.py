@@ -221,15 +221,14 @@ class Render:
         sheet, names = Sheet(total), []
         with self._film_file() as add:
             for number, camera in enumerate(self.cameras):
-                frame = renderer.forward(splats, camera, background=behind, depth=depth)
-                image = self.device.get(frame.image)
+                image, seen = renderer.picture(splats, camera, background=behind, depth=depth)
                 colors = in_display_light(image[..., :3], self.scene.light)
                 names.append(f"frames/{number:04}.png")
                 write_png(folder / names[-1], colors)
                 add(shrunk(colors, max(camera.size)))
                 pictures = [colors]
                 if self.settings.depth:
-                    alpha = np.clip(1 - self.device.get(frame.transmittance), 0, 1)
+                    alpha = np.clip(1 - seen, 0, 1)
                     pictures.append(self._save_depth(number, image[..., -1], alpha, window))
                 sheet.add(number, [shrunk(picture, _MOVING) for picture in pictures])
                 yield Report(number + 1, total, "frames")
