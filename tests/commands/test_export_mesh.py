@@ -72,7 +72,7 @@ def test_what_has_no_surface_is_told_so(bone, capsys):
     arrays = {"means": [[0, 0, 0]], "log_scales": np.zeros((1, 3)), "quats": [[1, 0, 0, 0]]}
     SplatScene(**arrays, logit_opacities=[0.0], sh=np.zeros((1, 1, 3))).save("photo.ply")
     for arguments, words in (
-        (["photo.ply", "--mesh"], "photographs"),
+        (["photo.ply", "--mesh"], "--capture"),
         (["bone.ply", "--mesh", "--level", "5"], "there is no surface"),
         (["bone.ply", "--mesh", "--level", "-1"], "there is no surface"),
         (["bone.ply", "--mesh", "--to", "spz"], "no triangles"),

@@ -1,8 +1,10 @@
-"""``rift export --mesh``: the surface of one density in an X-ray scene, as triangles.
+"""``rift export --mesh``: the surface of a scene as triangles.
 
-The splats are summed on a grid, whose samples are means over voxels, and the surface is found by
-marching cubes (Lewiner et al. 2003, scikit-image). The grid ends in empty voxels, so that the
-surface is closed; where no density is named, it is the one that parts the voxels best (Otsu 1979).
+In an X-ray scene it is that of one density: the splats are summed on a grid, whose samples are
+means over voxels, and the surface is found by marching cubes (Lewiner et al. 2003, scikit-image).
+The grid ends in empty voxels, so that the surface is closed; where no density is named, it is the
+one that parts the voxels best (Otsu 1979). In a scene of photographs it is where ``FusedDepth``
+finds it.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.commands.export.export import output_path, write_whole
+from rift_cl.commands.export.fused_depth import FusedDepth
 from rift_cl.commands.export.settings import ExportSettings
 from rift_cl.commands.inputs.opened_scene import scene_file
 from rift_cl.errors import InputError
@@ -39,7 +42,7 @@ class MeshExport:
         settings: what to do.
 
     Raises:
-        RiftError: the scene cannot be read, has no densities, or the file is there.
+        RiftError: the scene cannot be read, no camera is known, or the file is there.
     """
 
     def __init__(self, settings: ExportSettings) -> None:
@@ -52,23 +55,25 @@ class MeshExport:
             raise InputError(f"--voxels is {settings.voxels}, wanted {_FEWEST} to {_MOST}")
         path = scene_file(settings.scene)
         self.scene = SplatScene.load(path)
-        if self.scene.mode != "xray":
-            raise InputError(
-                f"{path}: is a scene of photographs, whose opacities are no densities: --mesh is "
-                "about scenes of 'rift fit xray'"
-            )
         if not len(self.scene):
             raise InputError(f"{path}: holds no splats, there is no surface")
-        self.grid = _grid(self.scene, settings.voxels)
+        self._depth = None if self.scene.mode == "xray" else FusedDepth(settings)
+        if self._depth is None:
+            self.grid = _grid(self.scene, settings.voxels)
         self.path = output_path(settings, f".{self._name}")
         self.device = settings.open_device()
 
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""
-        level = self.settings.level
-        return {
+        head = {
             "scene": f"{self.settings.scene}, {len(self.scene)} splats",
             "output": str(self.path),
+        }
+        if self._depth is not None:
+            return {**head, **self._depth.plan(), "device": self.device.name}
+        level = self.settings.level
+        return {
+            **head,
             "voxels": f"{self.grid.shape} (z, y, x), {self.grid.spacing[0]:.4g} wide",
             "density": "that which parts the voxels best" if level is None else f"{level:g}",
             "device": self.device.name,
@@ -78,8 +83,15 @@ class MeshExport:
         """Do it; a report as each step is done.
 
         Raises:
-            InputError: nowhere is the density so high, or so low.
+            InputError: there is no surface.
         """
+        if self._depth is not None:
+            yield from self._depth.run(self.device)
+            self.grid = self._depth.grid
+            found = surface(self._depth.inside, self.grid, 0.0, self._depth.seen)
+            yield Report(1, 2, "steps: surface")
+            yield self._written(*found, f"{len(self._depth.cameras)} depths")
+            return
         # The variance of a voxel's box along each axis: samples are means over voxels.
         dilation = self.grid.spacing[0] ** 2 / 12
         splats = self.scene.upload(self.device)
@@ -91,13 +103,17 @@ class MeshExport:
         if self._name == "glb":
             vertices = (vertices @ _UPRIGHT.T).astype(np.float32)
             self.announce("the scene is turned so that the axis of rotation, z, is y")
+        yield self._written(vertices, triangles, f"density {level:.6g}")
+
+    def _written(
+        self, vertices: NDArray[np.float32], triangles: NDArray[np.uint32], where: str
+    ) -> Report:
         content = MESH_FORMATS[self._name](vertices, triangles)
         write_whole(self.path, content)
         self.result = (
-            f"{self.path}, {len(triangles)} triangles at density {level:.6g}, "
-            f"{format_bytes(len(content))}"
+            f"{self.path}, {len(triangles)} triangles at {where}, {format_bytes(len(content))}"
         )
-        yield Report(3, 3, "steps: file")
+        return Report(1, 1, "steps: file")
 
     def _level(self, volume: NDArray[np.float32]) -> float:
         from skimage.filters import threshold_otsu
@@ -115,7 +131,7 @@ class MeshExport:
 
 
 def surface(
-    volume: NDArray[np.float32], grid: Grid, level: float
+    volume: NDArray[np.float32], grid: Grid, level: float, known: NDArray[np.bool_] | None = None
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     """(V, 3) places (x, y, z) of a density's surface, and (T, 3) triangles of them.
 
@@ -124,14 +140,32 @@ def surface(
     Args:
         volume: (z, y, x) densities.
         grid: where they are.
-        level: positive, and less than the greatest.
+        level: less than the greatest.
+        known: (z, y, x) the voxels beside which there may be a surface; all, and the empty ones
+            around the grid, when not given.
+
+    Raises:
+        InputError: there is no surface.
     """
     from skimage.measure import marching_cubes
 
-    vertices, triangles, _, _ = marching_cubes(np.pad(volume, 1), level, spacing=grid.spacing)
+    padded = np.pad(volume, 1, constant_values=0.0 if level > 0 else level - 1)
+    if not padded.min() < level < padded.max():
+        raise InputError("there is no surface: all voxels are on one side of it")
+    vertices, triangles, _, _ = marching_cubes(padded, level)
+    if known is not None:
+        # A vertex lies between two voxels, and the surface between what is known alone.
+        ends = [np.floor(vertices).astype(int), np.ceil(vertices).astype(int)]
+        sure = np.pad(known, 1)
+        kept = np.logical_and(*(sure[tuple(end.T)] for end in ends))
+        triangles = triangles[kept[triangles].all(axis=1)]
+        if not len(triangles):
+            raise InputError("there is no surface between voxels that cameras know")
+        used, triangles = np.unique(triangles, return_inverse=True)
+        vertices, triangles = vertices[used], triangles.reshape(-1, 3)
     first = [grid.coordinates(axis)[0] - grid.spacing[axis] for axis in range(3)]
     # In (z, y, x) its triangles are seen clockwise; (x, y, z) is a reflection of that.
-    places = (vertices + first)[:, ::-1]
+    places = (vertices * grid.spacing + first)[:, ::-1]
     return np.ascontiguousarray(places, np.float32), triangles.astype(np.uint32)
 
 

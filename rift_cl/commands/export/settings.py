@@ -29,14 +29,16 @@ class ExportOutput:
 
 @dataclass(frozen=True, kw_only=True)
 class MeshOptions:
-    """Surfaces of X-ray scenes, by marching cubes."""
+    """Surfaces, by marching cubes."""
 
     group: ClassVar[str] = "mesh"
 
     mesh: bool = False
-    """Export an isosurface of an X-ray scene's density as triangles."""
+    """Export a surface as triangles: of an X-ray scene's density, or of a scene of photographs from
+    the depth of its splats as its cameras see them."""
     level: Auto[float] = None
-    """With --mesh: density of the surface, per unit of length. Default: Otsu's threshold."""
+    """With --mesh of an X-ray scene: density of the surface, per unit of length. Default: Otsu's
+    threshold."""
     voxels: int = 256
     """With --mesh: number of voxels along the longest edge of the grid that is searched for the
     surface."""

@@ -1,0 +1,184 @@
+"""The surface of a scene of photographs, from the depth of its splats as its cameras see them.
+
+Opacities are no densities, so that no level of theirs is the surface. But each camera sees how far
+off it is: rendered depths are fused into a truncated signed distance on a grid (Curless and Levoy,
+SIGGRAPH 1996), positive inside, and the surface is where that is 0. A voxel that no camera sees, or
+only behind a surface, is unknown, and there is no surface beside it: where nobody looked the mesh
+is open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.cl.device import Device
+from rift_cl.commands.export.settings import ExportSettings
+from rift_cl.commands.inputs.opened_scene import OpenedScene
+from rift_cl.commands.pictures.depth_picture import depth_and_alpha
+from rift_cl.commands.pictures.evenly_spaced import evenly
+from rift_cl.errors import InputError
+from rift_cl.geometry import Camera, Grid
+from rift_cl.io.captures.capture import open_capture
+from rift_cl.progress import Report
+from rift_cl.splat.renderer import Renderer
+
+# Cameras that are asked, evenly chosen; alpha above which a pixel shows a surface.
+_CAMERAS, _SOLID = 64, 0.5
+# Voxels over which the distance falls from 1 to 0 before the surface.
+_REACH = 4.0
+# Voxels along each axis beyond what cameras see.
+_MARGIN = 10
+# Share of the places that cameras see which lies beyond each side of the grid.
+_BEYOND = 0.005
+
+Depth = NDArray[np.float32]
+Values = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+
+class FusedDepth:
+    """Depths of a scene of photographs, to be fused.
+
+    Args:
+        settings: the scene, its cameras, and how fine the grid is.
+
+    Raises:
+        RiftError: the scene cannot be read, no camera is known, or a setting is about densities.
+    """
+
+    def __init__(self, settings: ExportSettings) -> None:
+        if settings.level is not None:
+            raise InputError(
+                "--level is a density, which scenes of photographs have not: leave it out"
+            )
+        self._scene = OpenedScene(settings)
+        self._voxels = settings.voxels
+        cameras = [camera for camera in self._known(settings) if camera.model == "pinhole"]
+        self.cameras = [cameras[place] for place in evenly(len(cameras), _CAMERAS)]
+        if not self.cameras:
+            raise InputError(f"{settings.scene}: none of its cameras is a pinhole, as --mesh wants")
+
+    def _known(self, settings: ExportSettings) -> list[Camera]:
+        if settings.capture is not None:
+            return [v.camera for v in open_capture(settings.capture, photographs=False).views]
+        if self._scene.cameras is None:
+            raise InputError(
+                f"{settings.scene} holds no cameras, from which --mesh looks at a scene of "
+                "photographs: name the folder of the fit, or a capture with --capture"
+            )
+        return [view.camera for view in self._scene.cameras.views]
+
+    def plan(self) -> dict[str, str]:
+        """What would be done, by name."""
+        return {
+            "depths": f"{len(self.cameras)} cameras",
+            "voxels": f"{self._voxels} along the longest edge",
+        }
+
+    def run(self, device: Device) -> Iterator[Report]:
+        """Fuse; a report after each camera. Then ``grid``, ``inside`` and ``seen`` are there.
+
+        Raises:
+            InputError: no camera sees a surface.
+        """
+        renderer = Renderer(self._scene.rendering, device=device)
+        splats = self._scene.splats.upload(device)
+        depths = [_depth(*depth_and_alpha(renderer, splats, camera)) for camera in self.cameras]
+        self.grid = grid_of(self.cameras, depths, self._voxels)
+        volume = Distances(self.grid)
+        for number, (camera, depth) in enumerate(zip(self.cameras, depths, strict=True)):
+            volume.add(camera, depth)
+            yield Report(number + 1, len(depths), "depths")
+        self.inside, self.seen = volume.inside(), volume.seen()
+
+
+def _depth(depth: Depth, alpha: Depth) -> Depth:
+    """Depth where there is a surface, infinity elsewhere."""
+    return np.where((alpha > _SOLID) & (depth > 0), depth, np.float32(np.inf))
+
+
+def grid_of(cameras: Sequence[Camera], depths: Sequence[Depth], voxels: int) -> Grid:
+    """The grid over what cameras see, by voxels along its longest edge.
+
+    Args:
+        cameras: pinholes.
+        depths: along their axes, by pixel; infinity where nothing is seen.
+        voxels: how many.
+
+    Raises:
+        InputError: nothing is seen.
+    """
+    seen = [_places(*pair) for pair in zip(cameras, depths, strict=True)]
+    places = np.concatenate(seen)
+    if not len(places):
+        raise InputError("no camera sees a surface: everywhere alpha is below a half")
+    low, high = np.quantile(places, (_BEYOND, 1 - _BEYOND), axis=0)
+    spacing = float((high - low).max()) / max(voxels - _MARGIN, 1)
+    if not spacing > 0:
+        raise InputError("what the cameras see is a single point: there is no surface")
+    shape = np.ceil((high - low) / spacing + _MARGIN).astype(int)[::-1]
+    return Grid(shape.tolist(), spacing, ((low + high) / 2)[::-1].tolist())
+
+
+def _places(camera: Camera, depth: Depth) -> NDArray[np.float64]:
+    """Places (n, 3) of the surface that a camera sees."""
+    fx, fy, cx, cy = camera.intrinsics
+    y, x = np.nonzero(np.isfinite(depth))
+    z = depth[y, x].astype(np.float64)
+    seen = np.stack([(x + 0.5 - cx) / fx * z, (y + 0.5 - cy) / fy * z, z], axis=1)
+    return np.asarray((seen - camera.view[:3, 3]) @ camera.view[:3, :3])
+
+
+class Distances:
+    """A truncated signed distance on a grid, as a mean over the cameras that know it.
+
+    Args:
+        grid: of the voxels.
+    """
+
+    def __init__(self, grid: Grid) -> None:
+        self.grid = grid
+        self._sum = np.zeros(grid.shape, np.float32)
+        self._count = np.zeros(grid.shape, np.float32)
+
+    def add(self, camera: Camera, depth: Depth) -> None:
+        """What a camera sees; voxels far behind its surface it does not know.
+
+        Args:
+            camera: a pinhole.
+            depth: (height, width) along its axis; infinity where there is no surface.
+        """
+        z, y, x = (self.grid.coordinates(axis) for axis in range(3))
+        turn, shift = camera.view[:3, :3], camera.view[:3, 3]
+        plane = y[:, None, None] * turn[:, 1] + x[:, None] * turn[:, 0] + shift
+        for number, height in enumerate(z.tolist()):
+            distance, known = self._of_slice(plane + height * turn[:, 2], camera, depth)
+            self._sum[number] += np.where(known, distance, 0)
+            self._count[number] += known
+
+    def _of_slice(
+        self, places: NDArray[np.float64], camera: Camera, depth: Depth
+    ) -> tuple[Values, Mask]:
+        """Distances of voxels (rows, columns, 3) in the camera's axes, and where they are known."""
+        fx, fy, cx, cy = camera.intrinsics
+        away = places[..., 2]
+        ahead = away > 0
+        safe = np.where(ahead, away, 1)
+        u, v = fx * places[..., 0] / safe + cx, fy * places[..., 1] / safe + cy
+        inside = ahead & (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
+        columns, rows = (np.where(inside, at, 0).astype(np.intp) for at in (u, v))
+        reach = _REACH * self.grid.spacing[0]
+        distance = (depth[rows, columns] - away) / reach
+        return np.minimum(distance, 1).astype(np.float32), inside & (distance > -1)
+
+    def seen(self) -> Mask:
+        """(z, y, x) the voxels that a camera knows."""
+        return np.asarray(self._count > 0)
+
+    def inside(self) -> Values:
+        """(z, y, x) distances from the surface over their reach, positive inside; -1 if unknown."""
+        mean = self._sum / np.maximum(self._count, 1)
+        return np.where(self._count > 0, -mean, np.float32(-1))

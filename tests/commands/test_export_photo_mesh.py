@@ -1,0 +1,124 @@
+"""``rift export --mesh`` of photographs: a sphere from its depths, open where nobody looked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rift_cl.commands.cli import main
+from rift_cl.commands.export.fused_depth import Distances, grid_of
+from rift_cl.commands.export.mesh import surface
+from rift_cl.errors import InputError
+from rift_cl.geometry import Camera, look_at
+from rift_cl.io.captures.transforms_record import transforms_of
+from rift_cl.io.output import write_json
+from rift_cl.io.scenes.splat_scene import SplatScene
+
+MIDDLE = np.array([0.3, -0.2, 0.1])
+
+
+def cameras(count=8, size=(48, 56)):
+    """All round a unit sphere, above and below by turns; in pixels high and wide."""
+    found = []
+    for number in range(count):
+        turn, rise = 2 * np.pi * number / count, 1.5 * (-1) ** number
+        place = MIDDLE + 3 * np.array([np.cos(turn), np.sin(turn), rise / 3])
+        K = [[1.1 * size[1], 0, size[1] / 2], [0, 1.1 * size[1], size[0] / 2], [0, 0, 1]]
+        found.append(Camera(size, K, look_at(place, MIDDLE, (0, 0, 1))))
+    return found
+
+
+def depth_of_sphere(camera):
+    """Depth along the axis by pixel, from the quadratic equation."""
+    fx, fy, cx, cy = camera.intrinsics
+    y, x = np.mgrid[: camera.height, : camera.width] + 0.5
+    ways = np.stack([(x - cx) / fx, (y - cy) / fy, np.ones_like(x)], axis=-1)
+    middle = camera.view[:3, :3] @ MIDDLE + camera.view[:3, 3]
+    a, b, c = (ways**2).sum(axis=-1), ways @ middle, middle @ middle - 1
+    inside = b**2 - a * c
+    depth = (b - np.sqrt(np.maximum(inside, 0))) / a
+    return np.where(inside > 0, depth, np.inf).astype(np.float32)
+
+
+def fused(views, voxels=28):
+    depths = [depth_of_sphere(camera) for camera in views]
+    volume = Distances(grid_of(views, depths, voxels))
+    for camera, depth in zip(views, depths, strict=True):
+        volume.add(camera, depth)
+    return volume
+
+
+def test_depths_of_a_sphere_are_its_surface_seen_from_outside():
+    volume = fused(cameras())
+    grid = volume.grid
+    vertices, triangles = surface(volume.inside(), grid, 0.0, volume.seen())
+    away = np.linalg.norm(vertices - MIDDLE, axis=1)
+    assert np.median(np.abs(away - 1)) < 0.15 * grid.spacing[0]
+    assert np.abs(away - 1).max() < 2 * grid.spacing[0]
+    corners = vertices[triangles].astype(float)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    outward = ((corners.mean(axis=1) - MIDDLE) * normals).sum(axis=1)
+    assert (outward > 0).mean() > 0.99
+    area = np.linalg.norm(normals, axis=1).sum() / 2
+    assert area == pytest.approx(4 * np.pi, rel=0.1)
+
+
+def test_where_nobody_looked_there_is_no_surface():
+    volume = fused(cameras(2)[:1])
+    vertices, _ = surface(volume.inside(), volume.grid, 0.0, volume.seen())
+    way = cameras(2)[0].center - MIDDLE
+    toward = (vertices - MIDDLE) @ way / np.linalg.norm(way)
+    # Behind the sphere's limb lies what the distance's reach covers, and no far side.
+    assert toward.max() > 0.9 and toward.min() > -5 * volume.grid.spacing[0] > -0.7
+
+
+def test_a_slice_of_distances_is_their_definition():
+    camera, volume = cameras()[0], fused(cameras()[:1])
+    depth, grid = depth_of_sphere(camera), volume.grid
+    inside, seen = volume.inside(), volume.seen()
+    random = np.random.default_rng(0)
+    for at in zip(*(random.integers(0, n, 60) for n in grid.shape), strict=True):
+        place = np.array([grid.coordinates(axis)[at[axis]] for axis in range(3)])[::-1]
+        x, y, z = camera.view[:3, :3] @ place + camera.view[:3, 3]
+        column, row = (camera.K @ [x / z, y / z, 1])[:2]
+        on = 0 <= column < camera.width and 0 <= row < camera.height
+        away = (depth[int(row), int(column)] - z) / (4 * grid.spacing[0]) if on else -np.inf
+        assert seen[at] == (away > -1)
+        assert inside[at] == pytest.approx(-min(away, 1) if away > -1 else -1, abs=1e-4)
+
+
+def test_cameras_that_see_nothing_are_told_so():
+    views = cameras(2)
+    with pytest.raises(InputError, match="no camera sees"):
+        grid_of(views, [np.full(camera.size, np.inf, np.float32) for camera in views], 16)
+
+
+@pytest.fixture
+def ball(tmp_path, monkeypatch):
+    """Opaque splats on the sphere, and a capture's cameras without photographs."""
+    monkeypatch.chdir(tmp_path)
+    count = 600
+    z = 1 - 2 * (np.arange(count) + 0.5) / count
+    turn = np.pi * (3 - np.sqrt(5)) * np.arange(count)
+    ways = np.stack([*(np.sqrt(1 - z**2) * f(turn) for f in (np.cos, np.sin)), z], axis=1)
+    SplatScene(MIDDLE + 0.95 * ways, np.full((count, 3), np.log(0.06)), [[1, 0, 0, 0]] * count,
+               np.full(count, 5.0), np.zeros((count, 1, 3))).save("ball.ply")  # fmt: skip
+    views = cameras()
+    write_json(tmp_path / "transforms.json", transforms_of(views, [f"{k}.png" for k in range(8)]))
+    return tmp_path
+
+
+def test_a_scene_of_photographs_becomes_a_mesh(ball, capsys):
+    words = ["--capture", str(ball / "transforms.json"), "--voxels", "24", "--to", "obj", "--quiet"]
+    assert main(["export", "ball.ply", "--mesh", "--out", "ball.obj", *words]) == 0
+    assert "8 depths" in capsys.readouterr().out
+    lines = (ball / "ball.obj").read_text().splitlines()
+    vertices = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], float)
+    away = np.linalg.norm(vertices - MIDDLE, axis=1)
+    assert np.median(away) == pytest.approx(1, abs=0.08)
+
+
+def test_a_level_is_about_densities(ball, capsys):
+    words = ["--capture", str(ball / "transforms.json"), "--level", "1"]
+    assert main(["export", "ball.ply", "--mesh", *words]) == 3
+    assert "--level" in capsys.readouterr().err
