@@ -15,6 +15,13 @@ from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.inputs.surfaces import SURFACE, hidden_places, surface_of
 from rift_cl.commands.inputs.view_set import Floats, ViewSet
 from rift_cl.commands.options import absolute_paths
+from rift_cl.commands.plan.scanner import (
+    COVER,
+    elevations,
+    scanned,
+    scanner_choice,
+    source_distance,
+)
 from rift_cl.commands.plan.settings import PlanSettings
 from rift_cl.errors import InputError
 from rift_cl.geometry.camera_type import CameraType
@@ -72,9 +79,18 @@ def plan_input(settings: PlanSettings) -> PlanInput:
     """
     notes: list[str] = []
     have = None if settings.have is None else _have(settings, settings.have)
+    scanner = settings.have is not None and not holds_capture(settings.have)
+    if have is not None and scanner:
+        settings = replace(
+            settings,
+            mode="volume",
+            distance=settings.distance or source_distance(have),
+            elevation=elevations(have, settings.elevation),
+            cover=min(settings.cover, COVER),
+        )
     volume = None if settings.pilot is None else read_volume(settings.pilot)
     target = _target(settings, have, volume, notes)
-    choices = _choices(settings, notes)
+    choices = (scanner_choice(have),) if have and scanner else _choices(settings, notes)
     constraints = _constraints(settings, choices, have)
     if have is not None and have.space is not None:
         constraints, target = _in_sight(have, target, constraints, choices)
@@ -118,7 +134,9 @@ def _in_sight(
 
 def _have(settings: PlanSettings, path: Path) -> ViewSet:
     if not holds_capture(path):
-        raise InputError(f"--have {path} is no capture, wanted photographs with camera poses")
+        return scanned(settings, path)
+    if settings.geometry is not None:
+        raise InputError(f"--geometry applies to scans, --have {path} is a capture")
     asked = AnalyzeSettings(
         source=path, center=_in_units(settings), diameter=_over(settings.diameter, settings.unit),
         unit=settings.unit, mode="surface" if settings.opaque else "volume", device=settings.device,
@@ -165,21 +183,22 @@ def _target(
                 "Occlusion is not known: name regions to keep out of (--keep-out), or give the "
                 "folder of a fit."
             )
-    else:
+    elif settings.have is None or holds_capture(settings.have):
         notes.append(
             "The target is taken to be transparent, so that opposite views are equivalent and one "
             "side may stay without views; for an opaque one use --mode surface."
         )
-    return Target(
-        center=center,
-        diameter=diameter,
-        points=points,
-        normals=normals,
-        mode="surface" if settings.opaque else "volume",
-        prior=prior,
-        snr=settings.snr,
-        band=settings.band,
-    )
+    given: dict[str, Any] = {
+        "points": points,
+        "normals": normals,
+        "mode": "surface" if settings.opaque else "volume",
+        "prior": prior,
+        "snr": settings.snr,
+        "band": settings.band,
+    }
+    if have is not None and have.is_flat:
+        return Target.flat(diameter, center, **given)
+    return Target(center=center, diameter=diameter, **given)
 
 
 def _prior(

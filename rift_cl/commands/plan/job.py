@@ -12,8 +12,16 @@ from rift_cl.commands.inputs.view_set import ViewSet, place_of
 from rift_cl.commands.pictures.views_table import csv_text, view_row
 from rift_cl.commands.plan.input import plan_input
 from rift_cl.commands.plan.report import plan_page
+from rift_cl.commands.plan.scanner import (
+    joined,
+    missed_share,
+    planes_sentence,
+    vectors_of,
+    vectors_text,
+)
 from rift_cl.commands.plan.settings import PlanSettings
 from rift_cl.commands.run_folder.run_folder import RunFolder
+from rift_cl.geometry import Vectors
 from rift_cl.io.captures.transforms_record import transforms_of
 from rift_cl.io.output import write_json, write_text
 from rift_cl.progress import Report
@@ -49,6 +57,9 @@ class Planning:
         self.found: Plan | None = None
         self.verdict = ""
         self.wrong: tuple[WrongPrior, ...] = ()
+        # The planned views of a cone-beam scanner, and the planes that its source never crosses.
+        self.vectors: Vectors | None = None
+        self.planes: dict[str, float] | None = None
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -100,6 +111,7 @@ class Planning:
         yield Report(1, _STEPS, "steps", {"criterion": found.elsewhere})
         self.wrong = if_wrong(found)
         self.verdict = " ".join([found.verdict(), *(entry.sentence for entry in self.wrong)])
+        self._count_planes(found)
         diminishing_returns = found.diminishing_returns()
         yield Report(2, _STEPS, "steps", {"criterion": found.elsewhere})
         sampled = self._sampled(found)
@@ -109,6 +121,17 @@ class Planning:
         self._write(found)
         self.folder.finish(given.decided, self.metrics, page, self.device, asked=settings)
         yield Report(_STEPS, _STEPS, "steps", {"criterion": found.elsewhere})
+
+    def _count_planes(self, found: Plan) -> None:
+        """Of a cone-beam scanner, say what the planned views change of Tuy's condition."""
+        have = self.given.have
+        if have is None or have.orbit is None:
+            return
+        self.vectors = vectors_of(tuple(found.cameras[n] for n in found.order), have.orbit)
+        before = missed_share(have.orbit, have)
+        after = missed_share(joined(have.orbit, self.vectors), have)
+        self.planes = {"before": before, "after": after}
+        self.verdict += " " + planes_sentence(before, after)
 
     def _sampled(self, found: Plan) -> ViewSet:
         """All views, those that were there already first."""
@@ -139,6 +162,7 @@ class Planning:
             "diminishing_returns": diminishing_returns.views,
             "values": diminishing_returns.merits,
             "target": {"center": given.target.center, "diameter": given.target.diameter},
+            **({} if self.planes is None else {"planes_never_crossed": self.planes}),
             "assumed": list(given.notes),
         }
 
@@ -171,3 +195,5 @@ class Planning:
             for name, camera, kind in zip(names, cameras, types, strict=True)
         ]
         write_text(out / "views.csv", csv_text(rows))
+        if self.vectors is not None:
+            write_text(out / "vectors.txt", vectors_text(self.vectors))

@@ -21,7 +21,11 @@ class PlanTarget:
     group: ClassVar[str] = "target"
 
     have: Auto[Path] = None
-    """A capture with views that are taken already: plan those that add most."""
+    """A capture, or a fan-beam or cone-beam scan, with views that are taken already: plan those
+    that add most."""
+    geometry: Auto[Path] = None
+    """With a scan as --have: its geometry, where its file does not hold it (see 'rift
+    reconstruct')."""
     unit: float = 1.0
     """Millimetres per world unit of --have."""
     diameter: Auto[float] = None
@@ -61,12 +65,13 @@ class PlanCameras:
     lens: Auto[Path] = None
     """Lens prescription (.json or .zmx) for every camera. Default: the camera's own lens."""
     elevation: tuple[float, float] = (0.0, 75.0)
-    """Lowest and highest elevation above the horizon in degrees; negative is from below."""
+    """Lowest and highest elevation above the horizon in degrees; negative is from below. Of a
+    scanner: tilts against its orbit (0 0: places on the orbit); a fan has none."""
     azimuth: tuple[float, float] = (-180.0, 180.0)
     """First and last azimuth around the target in degrees: 0 along x, 90 along y."""
     distance: Auto[tuple[float, float]] = None
     """Nearest and farthest distance from the target's centre in millimetres. Default: as near as
-    the target fits into the picture."""
+    the target fits into the picture; of a scanner, that of its source."""
     cover: Expert[float] = 1.0
     """Fraction of the target's outline that must lie in each picture, above 0, up to 1."""
     path: Literal["free", "ring", "tilted-rings", "spline"] = "free"
@@ -105,7 +110,8 @@ class PlanOutput:
     group: ClassVar[str] = "output"
 
     out: Path = Path("rift-plan")
-    """Folder for transforms.json, views.csv, report.html, config.json and metrics.json."""
+    """Folder for transforms.json, views.csv, report.html, config.json and metrics.json; of a
+    cone-beam scanner also vectors.txt (source, detector, steps of bins and rows; a view a line)."""
 
 
 @dataclass(frozen=True)
@@ -152,8 +158,9 @@ class PlanSettings(RepeatableRun, PlanOutput, PlanCameras, PlanTarget, PlanMetho
             )
         if self.seed < 0:
             raise InputError(f"--seed is {self.seed}, wanted 0 or more")
-        if self.unit != 1 and self.have is None:
-            raise InputError("--unit applies to --have: name a capture")
+        for name, unused in (("unit", 1.0), ("geometry", None)):
+            if getattr(self, name) != unused and self.have is None:
+                raise InputError(f"--{name} applies to --have: name a capture or a scan")
         self._check_pilot()
 
     def _check_pilot(self) -> None:

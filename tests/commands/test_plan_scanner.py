@@ -1,0 +1,106 @@
+"""``rift plan --have SCAN``: further places of a scanner's source, where those it has miss most."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from rift_cl.commands.cli import main
+from rift_cl.geometry import Cone
+from rift_cl.io.scans.geometries.astra_vectors import read_vectors
+
+R, S, ROWS, BINS, PITCH = 60.0, 90.0, 12, 16, 3.0
+SEEN = np.deg2rad(np.arange(0, 120, 8))
+
+
+def scan_file(path, **changes):
+    """A scan of a third of a turn, its values of no matter."""
+    given = {"source_to_axis": R, "source_to_detector": S, "pitch": PITCH, **changes}
+    rows = given.pop("rows", ROWS)
+    given = {name: value for name, value in given.items() if value is not None}
+    np.savez(path, projections=np.ones((len(SEEN), rows, BINS), np.float32), angles=SEEN, **given)
+    return path
+
+
+@pytest.fixture(scope="module")
+def cone(tmp_path_factory):
+    return scan_file(tmp_path_factory.mktemp("scan") / "cone.npz")
+
+
+def plan(scan, out, *more):
+    words = ["plan", "--have", scan, "--out", out, "--views", 3, "--quiet", *more]
+    return main([str(word) for word in words])
+
+
+def views_of(out):
+    with (out / "views.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def on_orbit(cone, tmp_path_factory):
+    out = tmp_path_factory.mktemp("plans") / "orbit"
+    assert plan(cone, out, "--elevation", 0, 0) == 0
+    return out
+
+
+def test_views_on_the_orbit_fill_the_widest_gap(on_orbit):
+    """Sources were at azimuths from -90 to 22 degrees, and opposite ones are as good."""
+    for view in views_of(on_orbit):
+        azimuth = float(view["azimuth, degrees"])
+        behind = (azimuth + 90) % 180
+        assert 112 < behind < 180
+        assert float(view["elevation, degrees"]) == pytest.approx(0, abs=1e-6)
+        assert float(view["distance"]) == pytest.approx(R)
+        assert view["camera"] == "the scanner"
+
+
+def test_vectors_are_those_of_the_scanner_at_these_places(on_orbit):
+    found = read_vectors(on_orbit / "vectors.txt")
+    azimuths = np.deg2rad([float(view["azimuth, degrees"]) for view in views_of(on_orbit)])
+    wanted = Cone(azimuths + np.pi / 2, ROWS, BINS, PITCH, R, S).vectors()
+    for name in ("source", "middle", "across", "down"):
+        np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), atol=1e-3)
+
+
+def test_tilts_cross_planes_that_the_orbit_does_not(cone, on_orbit, tmp_path):
+    assert plan(cone, tmp_path / "a", "--elevation", 0, 90) == 0
+    flat, tilted = (
+        json.loads((out / "metrics.json").read_text()) for out in (on_orbit, tmp_path / "a")
+    )
+    before = flat["planes_never_crossed"]["before"]
+    assert 0 < flat["planes_never_crossed"]["after"] <= before
+    assert tilted["planes_never_crossed"]["after"] < 0.5 * before
+    assert "never crosses" in tilted["verdict"]
+
+
+@pytest.mark.full
+def test_a_fan_is_planned_in_its_plane(tmp_path):
+    fan = scan_file(tmp_path / "fan.npz", rows=1)
+    assert plan(fan, tmp_path / "out") == 0
+    for view in views_of(tmp_path / "out"):
+        assert float(view["elevation, degrees"]) == pytest.approx(0, abs=1e-6)
+    assert not (tmp_path / "out" / "vectors.txt").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (("--mode", "surface"), "--mode surface"),
+        (("--center", 0, 0, 1), "--center"),
+        (("--camera", "mine.json"), "--camera"),
+    ],
+)
+def test_options_of_photographs_are_refused(cone, tmp_path, capsys, options, word):
+    assert plan(cone, tmp_path / "out", *options) == 3
+    assert word in capsys.readouterr().err
+
+
+def test_parallel_rays_have_no_place_to_plan(tmp_path, capsys):
+    lengths = {"source_to_axis": None, "source_to_detector": None}
+    scan = scan_file(tmp_path / "parallel.npz", **lengths)
+    assert plan(scan, tmp_path / "out") == 3
+    assert "parallel rays" in capsys.readouterr().err
