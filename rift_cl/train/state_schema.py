@@ -86,12 +86,12 @@ def _schema(state: Arrays, views: int) -> dict[str, Field]:
     fields = {"step": Field((), "i8", 0)}
     lit = any(name in state for name in ("environment.raw", *(f"raw.{name}" for name in _LIT)))
     there = [name for name in MORE if f"raw.{name}" in state or (lit and name in _LIT)]
-    parts = {"raw": -np.inf, "first": -np.inf, "second": 0.0}
-    for part, least in parts.items():
-        for name in (*GROUPS, *there):
+    parts = ("raw", -np.inf), ("first", -np.inf), ("second", 0.0)
+    for name in (*GROUPS, *there):
+        for part, least in parts:
             fields[f"{part}.{name}"] = Field(_GROUPS[name], least=least)
-        if lit:
-            fields[f"environment.{part}"] = Field(("lobes of light", 3), least=least)
+    for part, least in parts if lit else ():
+        fields[f"environment.{part}"] = Field(("lobes of light", 3), least=least)
     if "band.lengths" in state:
         fields["band.lengths"] = Field(("splats",), least=0)
     for name, shapes in _PER_VIEW.items():
