@@ -46,13 +46,7 @@ def shade_light(
     """What splats reflect towards a camera, (N, 3); see ``reflected_light`` for the arguments."""
     away = means - camera.center
     directions = away / np.linalg.norm(away, axis=1, keepdims=True)
-    return np.concatenate(
-        [
-            reflected_light(normals[i : i + 1], reflectance[i : i + 1], environment, d[None])[:, 0]
-            for i, d in enumerate(directions)
-        ]
-        or [np.zeros((0, 3))]
-    )
+    return reflected_light(normals, reflectance, environment, directions[:, None])[:, 0]
 
 
 def shade_light_grad(

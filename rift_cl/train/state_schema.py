@@ -53,7 +53,7 @@ _GROUPS = {
 }
 # What there is where splats share a light, beside that.
 _LIT = ("normals", "reflectance")
-_PER_VIEW = {
+_PER_VIEW: Mapping[str, Mapping[str, tuple[int, ...]]] = {
     "poses": {"views": (4, 4), "first": (6,), "second": (6,)},
     "exposures": {"values": (2, 3), "first": (2, 3), "second": (2, 3)},
 }

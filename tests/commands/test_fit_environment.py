@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
+from rift_cl.basis.angular import SphericalHarmonics
+from rift_cl.basis.angular.environment import reflected_light
+from rift_cl.commands.cameras.fit_cameras import open_fit_cameras
 from rift_cl.commands.cli import main
 from rift_cl.commands.export.plain_scene import plain_scene
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
@@ -64,6 +67,25 @@ def test_other_viewers_get_harmonics(fitted, tmp_path):
     out = tmp_path / "plain.ply"
     assert main(["export", str(fitted), "--to", "ply", "--out", str(out), "--quiet"]) == 0
     assert rift.SplatScene.load(out).environment is None
+
+
+def test_harmonics_are_right_where_the_photographs_were_taken(fitted):
+    """Seen from a camera of the fit, what is exported is nearer than what all directions give."""
+    scene = rift.SplatScene.load(fitted / "scene.ply")
+    # Of a gloss that harmonics cannot hold for all directions.
+    scene.reflectance[:, 6], scene.environment[::3] = 5, 1
+    cameras = [view.camera for view in open_fit_cameras(fitted).training_views]
+    ways = scene.means - cameras[0].center
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    basis = SphericalHarmonics(1)
+    light = (scene.normals, scene.reflectance, scene.environment, ways[:, None])
+    right = basis.evaluate(scene.sh, None, ways) + 0.5 + reflected_light(*light)[:, 0]
+    errors = []
+    for given in ((), cameras):
+        plain, _ = plain_scene(scene, "display", given)
+        found = SphericalHarmonics(3).evaluate(plain.sh, None, ways) + 0.5
+        errors.append(np.abs(found - np.maximum(right, 0)).mean())
+    assert errors[1] < 0.3 * errors[0]
 
 
 def test_scenes_without_a_light_cannot_be_lit(capture, fitted, tmp_path, capsys):

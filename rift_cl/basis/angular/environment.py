@@ -85,9 +85,9 @@ def reflected_light(
         normals: (N, 3), of any length but none; splats without one reflect nothing.
         reflectance: (N, 7).
         environment: (K, 3) logarithms of the radiance.
-        directions: (D, 3) unit vectors from the camera to the splats.
+        directions: (D, 3) unit vectors from the camera to the splats, or (N, D, 3) to each.
     """
-    count, found = len(environment), np.empty((len(normals), len(directions), 3))
+    count, found = len(environment), np.empty((len(normals), directions.shape[-2], 3))
     lattice, axes = lattice_sharpness(count), environment_axes(count)
     radiance = np.exp(environment.astype(float))
     for start in range(0, len(normals), _PARTS):
@@ -95,8 +95,9 @@ def reflected_light(
         n, numbers = normals[here].astype(float), reflectance[here].astype(float)
         length = np.linalg.norm(n, axis=1, keepdims=True)
         n = n / np.where(length > 0, length, 1)
-        facing = n @ directions.T
-        mirrored = directions - 2 * facing[..., None] * n[:, None]
+        d = directions[here] if directions.ndim == 3 else directions
+        facing = (n[:, None] * d).sum(-1)
+        mirrored = d - 2 * facing[..., None] * n[:, None]
         held = np.clip(numbers[:, 6], -MOST_LOG_SHARPNESS, MOST_LOG_SHARPNESS)
         kappa = np.exp(held)
         w = kappa / (lattice + kappa)

@@ -46,12 +46,14 @@ class Export:
         self.scene = settings.open_scene()
         self.format = self._format(settings.to or "html")
         self.path = output_path(settings, self.format.suffix)
-        self.plain, self.notes = plain_scene(self.scene.splats, self.scene.light)
+        self._bounds = settings.bounds(self.scene)
+        self.plain, self.notes = plain_scene(
+            self.scene.splats, self.scene.light, self._bounds.cameras
+        )
         if self.plain.degree > DEGREE:
             kept = np.ascontiguousarray(self.plain.sh[:, : (DEGREE + 1) ** 2])
             self.plain = dataclasses.replace(self.plain, sh=kept)
             self.notes.append(f"harmonics of degree {DEGREE + 1} are left out")
-        self._bounds = settings.bounds(self.scene)
         self.notes += settings.notes(self.scene)
         self.turn = np.eye(3)
         if self.format.upright:

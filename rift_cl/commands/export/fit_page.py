@@ -58,7 +58,7 @@ def leave_page(fit: Path, pictures: CapturePictures, announce: Callable[[str], N
 def _page(
     fit: Path, scene: SplatScene, pictures: CapturePictures, behind: NDArray[np.float32]
 ) -> str:
-    plain, _ = plain_scene(scene, pictures.light)
+    plain, _ = plain_scene(scene, pictures.light, pictures.cameras)
     bounds = bounds_of_cameras(pictures.cameras, bounds_of_splats(plain))
     camera, target = first_view(bounds)
     return web_page(

@@ -8,11 +8,13 @@ What cannot be kept is converted by a stated approximation, and said in a senten
   becomes one of the same peak and the same integral, whose standard deviations are greater by
   sqrt(Ein(E) / (1 - exp(-E))).
 - *Lobes* and what is reflected of a *shared light* become harmonics of degree 3, and *linear light*
-  becomes display light, by least squares over the sphere of directions.
+  becomes display light, by least squares over the sphere of directions; with a light, mostly over
+  the directions of the photographs, where these are known.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -24,6 +26,8 @@ from rift_cl.basis.angular.environment import reflected_light
 from rift_cl.basis.hermite import Hermite
 from rift_cl.commands.export.axes import matrices_of, quaternions_of, sphere
 from rift_cl.commands.fit_photos.pictures import Light
+from rift_cl.commands.pictures.evenly_spaced import evenly
+from rift_cl.geometry import Camera
 from rift_cl.io.images.display_light import to_display
 from rift_cl.io.scenes.formats.plain import rows_of
 from rift_cl.io.scenes.splat_activations import drawn_strengths, logits_of
@@ -35,6 +39,9 @@ Floats = NDArray[np.float64]
 
 # Directions of the least squares, splats at a time, and the degree that lobes become.
 _DIRECTIONS, _BLOCK, _DEGREE = 256, 1024, 3
+# Most cameras of those for a shared light, what all directions count beside them, and the distance
+# below which a camera stands in a splat.
+_CAMERAS, _ELSEWHERE, _NEAREST = 64, 0.05, 1e-30
 # Nodes of the quadrature along an axis: exact for products of polynomials to degree 13 together.
 _NODES = 7
 # What the moments of a splat that is hardly one may be: variances in those of its Gaussian.
@@ -43,12 +50,16 @@ _THINNEST, _WIDEST = 0.05, 20.0
 _OPAQUE = 0.999
 
 
-def plain_scene(scene: SplatScene, light: Light) -> tuple[SplatScene, list[str]]:
+def plain_scene(
+    scene: SplatScene, light: Light, cameras: Sequence[Camera] = ()
+) -> tuple[SplatScene, list[str]]:
     """A scene that every viewer can render, and a sentence for each loss.
 
     Args:
         scene: of photographs.
         light: that its colours are in.
+        cameras: of the photographs: what splats reflect of an environment light is right as those
+            see it, where they are given.
     """
     basis, notes = SceneBasis.of(scene), list[str]()
     # A splat without a direction is not drawn, and would be with any other quaternion.
@@ -63,7 +74,10 @@ def plain_scene(scene: SplatScene, light: Light) -> tuple[SplatScene, list[str]]
     if not basis.plain:
         logits = _one_gaussian_each(scene, plain, notes)
     if scene.lobes is not None or scene.environment is not None or light == "linear":
-        plain["sh"] = _harmonics(scene, plain["sh"], light, notes)
+        centers = None
+        if scene.environment is not None and cameras:
+            centers = np.array([cameras[k].center for k in evenly(len(cameras), _CAMERAS)])
+        plain["sh"] = _harmonics(scene, plain["sh"], light, centers, notes)
     rows = {name: values.astype(np.float32) for name, values in plain.items()}
     found = SplatScene(
         rows["means"], rows["log_scales"], rows["quats"], logit_opacities=logits, sh=rows["sh"]
@@ -92,37 +106,43 @@ def _one_gaussian_each(
     return logits_of(np.clip(strengths, 0, _OPAQUE))
 
 
-def _harmonics(scene: SplatScene, given: Floats, light: Light, notes: list[str]) -> Floats:
+def _harmonics(
+    scene: SplatScene, given: Floats, light: Light, centers: Floats | None, notes: list[str]
+) -> Floats:
     """Coefficients (N, K, 3) of harmonics in display light, from (N, L, 3) of what there is."""
     degree = scene.degree if scene.lobes is None else _DEGREE
     if scene.environment is not None:
         degree = max(degree, _DEGREE)
-    basis = angular_basis(scene.angular, given.shape[1])
-    directions = sphere(_DIRECTIONS)
-    functions = SphericalHarmonics(degree).functions(None, directions)
+    harmonics, directions = SphericalHarmonics(degree), sphere(_DIRECTIONS)
+    functions = harmonics.functions(None, directions)
     solve = np.linalg.pinv(functions)
-    sh, total = np.empty((len(scene), (degree + 1) ** 2, 3)), 0.0
+    sh, total, looked = np.empty((len(scene), (degree + 1) ** 2, 3)), 0.0, _DIRECTIONS
     for start in range(0, len(scene), _BLOCK):
         here = slice(start, start + _BLOCK)
-        lobes = None if scene.lobes is None else scene.lobes[here, None]
-        colors = basis.evaluate(given[here, None], lobes, directions) + 0.5
-        if scene.environment is not None:
-            colors += _reflected(scene, here, directions)
-        colors = np.maximum(np.nan_to_num(colors), 0)
-        if light == "linear":
-            shown = colors.astype(np.float32)
-            to_display(shown)
-            colors = shown.astype(np.float64)
-        sh[here] = np.einsum("km,nmc->nkc", solve, colors - 0.5)
-        again = np.maximum(np.einsum("mk,nkc->nmc", functions, sh[here]) + 0.5, 0)
-        total += float(np.square(again - colors).sum())
+        colors = _colors(scene, given, light, here, directions)
+        if centers is None:
+            sh[here] = np.einsum("km,nmc->nkc", solve, colors - 0.5)
+            again = np.einsum("mk,nkc->nmc", functions, sh[here])
+        else:
+            ways = scene.means[here, None].astype(np.float64) - centers
+            ways /= np.maximum(np.linalg.norm(ways, axis=2, keepdims=True), _NEAREST)
+            seen, looked = harmonics.functions(None, ways), len(centers)
+            elsewhere = _ELSEWHERE * looked / _DIRECTIONS
+            normal = np.einsum("nvk,nvl->nkl", seen, seen) + elsewhere * functions.T @ functions
+            wanted = elsewhere * np.einsum("mk,nmc->nkc", functions, colors - 0.5)
+            colors = _colors(scene, given, light, here, ways)
+            wanted += np.einsum("nvk,nvc->nkc", seen, colors - 0.5)
+            sh[here] = np.linalg.solve(normal, wanted)
+            again = np.einsum("nvk,nkc->nvc", seen, sh[here])
+        total += float(np.square(np.maximum(again + 0.5, 0) - colors).sum())
     what = [] if scene.lobes is None else [f"lobes ({scene.angular}) become harmonics"]
     what += [] if scene.environment is None else ["the shared light becomes harmonics"]
     what += [] if light == "display" else ["linear light becomes display light"]
-    error = np.sqrt(total / (3 * _DIRECTIONS * len(scene)))
+    error = np.sqrt(total / (3 * looked * len(scene)))
+    where = "all directions" if centers is None else "the directions of the photographs"
     notes.append(
-        f"{' and '.join(what)}, by least squares over all directions: colours differ by "
-        f"{error:.3f} of 1 (root mean square)"
+        f"{' and '.join(what)}, by least squares over {where}: colours differ by {error:.3f} of 1 "
+        "(root mean square)"
     )
     if light == "linear":
         notes.append(
@@ -132,11 +152,23 @@ def _harmonics(scene: SplatScene, given: Floats, light: Light, notes: list[str])
     return sh
 
 
-def _reflected(scene: SplatScene, here: slice, directions: Floats) -> Floats:
-    """What some splats reflect of the light that they share, (n, D, 3)."""
-    normals, reflectance, environment = scene.normals, scene.reflectance, scene.environment
-    assert normals is not None and reflectance is not None and environment is not None
-    return reflected_light(normals[here], reflectance[here], environment, directions)
+def _colors(
+    scene: SplatScene, given: Floats, light: Light, here: slice, directions: Floats
+) -> Floats:
+    """Colours (n, D, 3) in display light of some splats along directions (D, 3) or (n, D, 3)."""
+    lobes = None if scene.lobes is None else scene.lobes[here, None]
+    basis = angular_basis(scene.angular, given.shape[1])
+    colors = basis.evaluate(given[here, None], lobes, directions) + 0.5
+    if scene.environment is not None:
+        normals, reflectance = scene.normals, scene.reflectance
+        assert normals is not None and reflectance is not None
+        colors += reflected_light(normals[here], reflectance[here], scene.environment, directions)
+    colors = np.maximum(np.nan_to_num(colors), 0)
+    if light == "linear":
+        shown = colors.astype(np.float32)
+        to_display(shown)
+        colors = shown.astype(np.float64)
+    return colors
 
 
 def _moments(scene: SplatScene, plain: dict[str, Floats], strengths: Floats) -> Floats:
