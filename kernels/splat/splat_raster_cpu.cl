@@ -33,6 +33,11 @@
 
 /* Splats between two looks at whether a block is finished. */
 #define PATIENCE 8
+/* Splats that go through the steps of compositing together: how far off they are, what they hide, what
+ * each takes of the light that is left, and colours. A step is a loop whose numbers fit 16 registers,
+ * and but for the third no splat waits for the one before it. Modes have polynomials of their own
+ * along each column, which would have to be kept: they go one by one. */
+#define AT_ONCE (MODAL ? 1 : PATIENCE)
 
 /* Pixels that nothing hides yet; the blocks that have some are returned, a bit for each. */
 static ulong clear_blocks(lanes (*state)[VECTORS][1 + CHANNELS], lanes_int (*end)[VECTORS], Window window) {
@@ -91,32 +96,51 @@ static int draw_block(
   int going = 1;
   for (int i = 0; i < length && going;) {
     const int pause = i + PATIENCE < length ? i + PATIENCE : length;
-    for (; i < pause; i++) {
-      const int k = list[i];
-      const lanes_int past = batch->order[k] + before;
-      Sight s = see_splat(batch, k, px, py);
-      UNROLL for (int v = 0; v < VECTORS; v++) {
-        const lanes power = s.level - s.place * s.place, within = place_within(s.place, power, s.peak);
-        const lanes density = density_of(falloff_of(power, s.peak), shape_at(&s, within));
-        const lanes_int counts = splat_counts(power, density, s.peak);
-#if ADDITIVE
-        const lanes w = counts ? density : 0;
-#else
-        const lanes hidden = hidden_by(density), held = hidden < most ? hidden : most;
-        const lanes share = counts ? held * t[v] : 0, rest = t[v] - share;
+    for (; i < pause; i += AT_ONCE) {
+      const int some = pause - i < AT_ONCE ? pause - i : AT_ONCE;
+      /* The power, then alpha, then its share of the light. */
+      lanes found[AT_ONCE][VECTORS], within[VECTORS];
+      Sight s;
+      for (int j = 0; j < some; j++) {
+        s = see_splat(batch, list[i + j], px, py);
+        UNROLL for (int v = 0; v < VECTORS; v++) {
+          const lanes power = s.level - s.place * s.place;
+          within[v] = place_within(s.place, power, s.peak);
+          found[j][v] = power;
+          s.place = s.place + s.down;
+        }
+      }
+      for (int j = 0; j < some; j++) {
+        const float peak = batch->peak[list[i + j]];
+        UNROLL for (int v = 0; v < VECTORS; v++) {
+          const lanes power = found[j][v];
+          const lanes density = density_of(falloff_of(power, peak), shape_at(&s, within[v]));
+          const lanes hidden = hidden_by(density), held = hidden < most ? hidden : most;
+          found[j][v] = splat_counts(power, density, peak) ? (ADDITIVE ? density : held) : 0;
+        }
+      }
+#if !ADDITIVE
+      for (int j = 0; j < some; j++) {
+        const lanes_int past = batch->order[list[i + j]] + before;
+        UNROLL for (int v = 0; v < VECTORS; v++) {
+          const lanes share = found[j][v] * t[v], rest = t[v] - share;
 #if SMOOTH
-        const lanes w = share;
-        t[v] = rest;
+          found[j][v] = share;
+          t[v] = rest;
 #else
-        const lanes_int goes_on = rest > TRANSMITTANCE_THRESHOLD;
-        const lanes w = goes_on ? share : 0;
-        t[v] = goes_on ? rest : AS_LANES(AS_INT(t[v]) | SIGN_BIT);
-        last[v] = goes_on ? past : last[v];
+          const lanes_int goes_on = rest > TRANSMITTANCE_THRESHOLD;
+          found[j][v] = goes_on ? share : 0;
+          t[v] = goes_on ? rest : AS_LANES(AS_INT(t[v]) | SIGN_BIT);
+          last[v] = goes_on ? past : last[v];
 #endif
+        }
+      }
 #endif
-        UNROLL for (int n = 0; n < CHANNELS; n++)
-          color[v][n] = color[v][n] + w * color_seen(batch, &s, k, n, within);
-        s.place = s.place + s.down;
+      for (int j = 0; j < some; j++) {
+        const int k = list[i + j];
+        UNROLL for (int v = 0; v < VECTORS; v++)
+          UNROLL for (int n = 0; n < CHANNELS; n++)
+            color[v][n] = color[v][n] + found[j][v] * color_seen(batch, &s, k, n, within[v]);
       }
     }
 #if !ADDITIVE && !SMOOTH

@@ -42,6 +42,9 @@
 #include "include/raster/gaussian_moments.h"
 #endif
 
+/* Splats that go together from step to step of the way back, as in splat_raster_cpu.cl. */
+#define AT_ONCE (MODAL ? 1 : 8)
+
 /* Of each pixel: T on the way back, q, and v. */
 typedef lanes Pixels[VECTORS][2 + CHANNELS];
 
@@ -94,45 +97,81 @@ static void undo_block(
     until[v] = end[v] - begin;
     UNROLL for (int n = 0; n < CHANNELS; n++) view[v][n] = state[v][2 + n];
   }
-  for (int i = length - 1; i >= 0; i--) {
-    const int k = list[i];
-    const lanes_int order = batch->order[k];
-    Sight s = see_splat(batch, k, px, py);
-    BlockSums found;
-    clear_sums(&found);
-    UNROLL for (int v = 0; v < VECTORS; v++) {
-      const lanes power = s.level - s.place * s.place, within = place_within(s.place, power, s.peak);
-      const lanes shaped = shape_at(&s, within), g = falloff_of(power, s.peak);
-      const lanes density = density_of(g, shaped);
-      lanes_int counts = splat_counts(power, density, s.peak);
-      lanes cv = 0;
-      UNROLL for (int n = 0; n < CHANNELS; n++)
-        cv = cv + color_seen(batch, &s, k, n, within) * view[v][n];
-#if ADDITIVE
-      const lanes w = counts ? density : 0;
-      const lanes h = counts ? g * cv : 0;
-#else
-      if (!SMOOTH) counts = counts & (order < until[v]);
-      const lanes hidden = hidden_by(density), held = hidden < most ? hidden : most;
-      const lanes alpha = counts ? held : 0;
-      t[v] = t[v] / (1.0f - alpha);
-      const lanes difference = cv - q[v], w = alpha * t[v];
-      q[v] = q[v] + alpha * difference;
-#if SHAPE_ORDER == 0 && ACTIVATION == CLAMP
-      const lanes h = hidden > most ? 0 : w * difference;
-#else
-      /* dE/dQ dalpha/dE, or half of it where the square of Q counts; far from the splat no number. */
-      lanes lever = g;
-      if (ACTIVATION != CLAMP) lever = lever * (1.0f - hidden);
-      if (SQUARED) lever = lever * shaped;
-      lever = (counts & (hidden <= most)) ? lever : 0;
-      const lanes h = lever * (t[v] * difference);
-#endif
-#endif
-      add_pixels(&found, v, h, w, view[v], &s, batch, k, power, within);
-      s.place = s.place + s.down;
+  for (int i = length - 1; i >= 0; i -= AT_ONCE) {
+    const int some = i < AT_ONCE ? i + 1 : AT_ONCE;
+    /* The power, then alpha, then w; c . v, then h. */
+    lanes weight[AT_ONCE][VECTORS], value[AT_ONCE][VECTORS], lever[VECTORS], within[VECTORS], top = 0;
+    Sight s;
+    for (int j = 0; j < some; j++) {
+      s = see_splat(batch, list[i - j], px, py);
+      top = s.place;
+      UNROLL for (int v = 0; v < VECTORS; v++) {
+        const lanes power = s.level - s.place * s.place;
+        within[v] = place_within(s.place, power, s.peak);
+        weight[j][v] = power;
+        s.place = s.place + s.down;
+      }
     }
-    add_block(sums[k], &found, &s);
+    for (int j = 0; j < some; j++) {
+      const lanes_int order = batch->order[list[i - j]];
+      const float peak = batch->peak[list[i - j]];
+      UNROLL for (int v = 0; v < VECTORS; v++) {
+        const lanes power = weight[j][v], shaped = shape_at(&s, within[v]), g = falloff_of(power, peak);
+        const lanes density = density_of(g, shaped);
+        lanes_int counts = splat_counts(power, density, peak);
+#if ADDITIVE
+        weight[j][v] = counts ? density : 0;
+        lever[v] = counts ? g : 0;
+#else
+        if (!SMOOTH) counts = counts & (order < until[v]);
+        const lanes hidden = hidden_by(density), held = hidden < most ? hidden : most;
+        weight[j][v] = counts ? held : 0;
+        /* dE/dQ dalpha/dE, or half of it where the square of Q counts; far from the splat no number. */
+        lanes rate = g;
+        if (ACTIVATION != CLAMP) rate = rate * (1.0f - hidden);
+        if (SQUARED) rate = rate * shaped;
+        lever[v] = (counts & (hidden <= most)) ? rate : 0;
+#endif
+      }
+    }
+    for (int j = 0; j < some; j++) {
+      const int k = list[i - j];
+      UNROLL for (int v = 0; v < VECTORS; v++) {
+        value[j][v] = 0;
+        UNROLL for (int n = 0; n < CHANNELS; n++)
+          value[j][v] = value[j][v] + color_seen(batch, &s, k, n, within[v]) * view[v][n];
+      }
+    }
+    for (int j = 0; j < some; j++) {
+      UNROLL for (int v = 0; v < VECTORS; v++) {
+#if ADDITIVE
+        value[j][v] = (SHAPE_ORDER == 0 ? weight[j][v] : lever[v]) * value[j][v];
+#else
+        const lanes alpha = weight[j][v], difference = value[j][v] - q[v];
+        t[v] = t[v] / (1.0f - alpha);
+        weight[j][v] = alpha * t[v];
+        q[v] = q[v] + alpha * difference;
+#if SHAPE_ORDER == 0 && ACTIVATION == CLAMP
+        value[j][v] = alpha >= most ? 0 : weight[j][v] * difference;
+#else
+        value[j][v] = lever[v] * (t[v] * difference);
+#endif
+#endif
+      }
+    }
+    for (int j = 0; j < some; j++) {
+      const int k = list[i - j];
+      if (MODAL) s.place = top;
+      else s = see_splat(batch, k, px, py);
+      BlockSums found;
+      clear_sums(&found);
+      UNROLL for (int v = 0; v < VECTORS; v++) {
+        const lanes power = s.level - s.place * s.place;
+        add_pixels(&found, v, value[j][v], weight[j][v], view[v], &s, batch, k, power, within[v]);
+        s.place = s.place + s.down;
+      }
+      add_block(sums[k], &found, &s);
+    }
   }
   UNROLL for (int v = 0; v < VECTORS; v++) {
     state[v][0] = t[v];
