@@ -302,8 +302,8 @@ def raster_grad(
     record = MOMENTS + channels + 2 * settings.absgrad
     if splats.modes is not None:
         record = splats.modes.record_length(channels, settings)
-    slots = device.empty((lists.n_entries, record))
-    live = device.zeros(lists.n_entries, np.uint8)
+    slots = device.empty((lists.n_slots, record))
+    live = device.zeros(lists.n_slots, np.uint8)
     nothing = device.zeros((height, width)) if channels > _GROUP_CHANNELS else grad_transmittance
     for first, count in _channel_runs(device, splats):
         device.launch(

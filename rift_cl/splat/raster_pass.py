@@ -17,7 +17,17 @@ from rift_cl.cl.device import Device
 from rift_cl.splat.bands import FrameMemory, PictureMemory, plan_bands
 from rift_cl.splat.raster import Raster, ScreenSplats, packed, raster_grad, rasterize, sum_slots
 from rift_cl.splat.settings import SplatSettings
-from rift_cl.splat.tile_lists import TileLists, Tiles, count_tiles, list_tiles, tile_lists
+from rift_cl.splat.tile_lists import (
+    TileLists,
+    Tiles,
+    count_tiles,
+    list_tiles,
+    seen_slots,
+    tile_lists,
+)
+
+# Bytes of the gradient's records from which on it pays to leave out those of hidden entries.
+_LARGE_RECORDS = 1 << 26
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +42,8 @@ class RasterPass:
         settings: how it was drawn, its tiles' edge chosen.
         background: (D,) or None.
         memory: what it takes.
-        lists: the tile lists; None where they did not fit and the image was drawn in bands.
+        lists: the tile lists; None where they did not fit and the image was drawn in bands, and
+            where the gradient has used them up.
         raster: the image, and what the raster left for its gradient.
     """
 
@@ -204,6 +215,20 @@ def _lists_again(device: Device, done: RasterPass) -> Iterator[TileLists]:
     kept = done.lists
     room = device.budget, device.traits.allocation
     if kept is not None and memory.fits(kept.n_entries, done.tiles.count, *room):
+        if _mostly_hidden(device, done, memory):
+            # Another gradient of this frame would make the lists again.
+            object.__setattr__(done, "lists", None)
+            kept = seen_slots(device, kept, done.raster.last, done.size, done.settings.edge)
         yield kept
         return
     yield from _bands_of(device, done, memory)
+
+
+def _mostly_hidden(device: Device, done: RasterPass, memory: FrameMemory) -> bool:
+    """Whether records are large enough to look first which of them there will be.
+
+    Where X-rays pass, nothing is hidden.
+    """
+    assert done.lists is not None
+    light = done.settings.mode == "light" and device.traits.is_cpu
+    return light and memory.longest(done.lists.n_entries) > _LARGE_RECORDS

@@ -16,7 +16,7 @@ goes by splats is enqueued before it is waited for, so that the device works on 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -138,6 +138,7 @@ class TileLists:
         starts: (tiles + 1,) int32, where each tile's entries begin.
         n_entries: M.
         tiles: the tiles that were listed.
+        n_slots: how many slots there are: M, or fewer after ``seen_slots``.
     """
 
     slots: DeviceArray
@@ -145,6 +146,12 @@ class TileLists:
     starts: DeviceArray
     n_entries: int
     tiles: Tiles
+    n_slots: int = field(default=-1)
+
+    def __post_init__(self) -> None:
+        """Every entry has a slot where nothing else is said."""
+        if self.n_slots < 0:
+            object.__setattr__(self, "n_slots", self.n_entries)
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,6 +272,47 @@ def list_tiles(device: Device, counts: TileCounts) -> TileLists:
         return TileLists(slots, nothing, device.zeros(tiles.count + 1, np.int32), 0, tiles)
     listed, starts = _sort_by_tile(device, counts)
     return TileLists(slots, listed, starts, entries, tiles)
+
+
+def seen_slots(
+    device: Device, lists: TileLists, last: DeviceArray, size: tuple[int, int], edge: int
+) -> TileLists:
+    """Give slots to those entries alone that a gradient looks at, in the same order.
+
+    Arrays of the lists are written over, so that these are no lists of all splats any more: slots
+    of other entries mean nothing.
+
+    Args:
+        device: where the arrays are, a CPU: gradients on GPUs clear the slots of all entries.
+        lists: of an image that was drawn.
+        last: (height, width) int32, how many entries of its tile each pixel looks at.
+        size: (height, width) in pixels.
+        edge: pixels along a side of a tile.
+    """
+    tiles, pairs = lists.tiles, lists.n_slots + 1
+    seen = device.zeros(pairs, np.int32)
+    device.launch(
+        "slot_seen",
+        (tiles.count,),
+        entries=lists.entries,
+        starts=lists.starts,
+        last=last,
+        seen=seen,
+        height=size[0],
+        width=size[1],
+        tiles_x=tiles.across,
+        first_tile_row=tiles.first_row,
+        tiles=tiles.count,
+        TILE=edge,
+    )
+    total = exclusive_scan(device, seen, pairs, scan_levels(device, pairs))
+    count = fetch(device, total, 1)
+    for numbers, stride in ((lists.entries, 2), (lists.slots, 1)):
+        length = len(numbers)
+        run = run_length(device, length, gpu=1)
+        work = {"numbers": numbers, "before": seen, "count": length, "run": run}
+        device.launch("slot_number", (pieces(length, run),), **work, STRIDE=stride)
+    return replace(lists, n_slots=int(count()[0]))
 
 
 def tile_lists_bytes(n: int, m: int, *, tiles: int = 0) -> int:

@@ -23,6 +23,7 @@ import rift_cl as rift
 from rift_cl.errors import ResourceLimitError
 from rift_cl.splat import Renderer, Splats, SplatSettings
 from rift_cl.splat.bands import FrameMemory, check_fixed, entries_per_row, plan_bands
+from rift_cl.splat.raster import raster_grad
 from rift_cl.splat.tile_lists import Tiles
 
 pytestmark = pytest.mark.dealt
@@ -144,6 +145,23 @@ def test_lists_are_cut_again_where_records_do_not_fit(device, monkeypatch):
     assert frame.lists is not None
     assert digest(renderer, frame) == whole
     assert len(plans) == 1 and len(plans[0]) > 1
+
+
+def test_records_of_what_is_seen_alone_give_the_same_bits(device, monkeypatch):
+    """Again, too: the second gradient lists and packs anew."""
+    renderer, frame = drawn(device)
+    whole, slots = digest(renderer, frame), []
+
+    def noted(device, splats, lists, *given, **more):
+        slots.append((lists.n_slots, lists.n_entries))
+        return raster_grad(device, splats, lists, *given, **more)
+
+    monkeypatch.setattr(RASTER_PASS, "_LARGE_RECORDS", 0)
+    monkeypatch.setattr(RASTER_PASS, "raster_grad", noted)
+    frame = drawn(device)[1]
+    assert [digest(renderer, frame) for _ in range(2)] == [whole, whole]
+    assert (slots[0][0] < slots[0][1]) == device.traits.is_cpu
+    assert (frame.lists is None) == device.traits.is_cpu
 
 
 @pytest.mark.full

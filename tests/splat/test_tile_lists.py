@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -12,7 +13,13 @@ from hypothesis import strategies as st
 import rift_cl as rift
 from rift_cl.errors import DTypeError, InputError, ResourceLimitError, ShapeError
 from rift_cl.reference.tile_lists import tile_lists as twin
-from rift_cl.splat.tile_lists import Tiles, scan_levels, tile_lists, tile_lists_bytes
+from rift_cl.splat.tile_lists import (
+    Tiles,
+    scan_levels,
+    seen_slots,
+    tile_lists,
+    tile_lists_bytes,
+)
 
 MODULE = importlib.import_module("rift_cl.splat.tile_lists")
 FIELDS = ("slots", "entries", "starts")
@@ -184,6 +191,32 @@ def test_slots_are_a_permutation_and_lists_go_from_front_to_back(device):
     forward = np.diff(depth[splat]) >= 0
     forward[starts[1:-1] - 1] = True
     assert forward.all()
+
+
+@pytest.mark.parametrize("size", [(37, 50), (8, 8)])
+def test_slots_of_what_is_seen_keep_their_order(device, size):
+    edge, first_row = 8, 1
+    tiles = Tiles(-(-size[1] // edge), -(-size[0] // edge), first_row)
+    boxes, depth = _scene(300, tiles_x=tiles.across, tiles_y=tiles.rows + 1)
+    arrays = device.array(boxes.astype(np.int32)), device.array(depth)
+    lists = tile_lists(device, *arrays, tiles)
+    slots, entries, starts = (device.get(getattr(lists, field)) for field in FIELDS)
+    last = np.zeros(((first_row + tiles.rows) * edge, tiles.across * edge), np.int32)
+    random, seen = np.random.default_rng(0), np.zeros(len(entries), bool)
+    for tile, (begin, end) in enumerate(pairwise(starts)):
+        y, x = tile // tiles.across + first_row, tile % tiles.across
+        deepest = random.integers(0, end - begin + 1)
+        last[y * edge + random.integers(edge) % max(1, size[0] % edge), x * edge] = deepest
+        seen[begin : begin + deepest] = True
+    image = first_row * edge + size[0], size[1]
+    last = np.ascontiguousarray(last[: image[0], : image[1]])
+    ours = seen_slots(device, lists, device.array(last), image, edge)
+    number = np.cumsum(np.bincount(entries[seen, 1], minlength=len(entries)))
+    assert ours.n_slots == seen.sum() and ours.n_entries == len(entries)
+    assert np.array_equal(device.get(ours.slots), np.concatenate([[0], number])[slots])
+    found = device.get(ours.entries)
+    assert np.array_equal(found[:, 0], entries[:, 0])
+    assert np.array_equal(found[seen, 1], number[entries[seen, 1]] - 1)
 
 
 def test_runs_repeat_bit_for_bit(device):

@@ -261,6 +261,8 @@ SPLAT_COSTS: dict[str, Cost] = {
     "tile_histogram": _bytes_only("entry", _m, 4, "tiles counted"),
     "tile_offsets": _bytes_only("entry", _m, 4, "counts to offsets"),
     "tile_scatter": _bytes_only("entry", _m, 12, "offsets in, entries out"),
+    "slot_seen": _bytes_only("entry", _m, 8, "entries in, marks out"),
+    "slot_number": _bytes_only("entry", _m, 16, "numbers in and out"),
     "splat_pack": _bytes_only("splat", _n, 32 + 12 + 64, "screen and colours in, records out"),
     "splat_raster_cpu": _raster(_FORWARD, "each entry's splat, the image"),
     "splat_raster_gpu": _raster(_FORWARD, "each entry's splat, the image"),

@@ -39,7 +39,12 @@ _STAGES = {
     "exposure": ("expose", "expose_grad"),
     "loss": ("ssim_map", "loss_grad", "sum_columns"),
     "homogenisation": ("fft_", "keep_norm", "axpby"),
-    "raster gradient": ("splat_raster_grad_cpu", "splat_raster_grad_gpu", "splat_sum_slots"),
+    "raster gradient": (
+        "splat_raster_grad_cpu",
+        "splat_raster_grad_gpu",
+        "slot_",
+        "splat_sum_slots",
+    ),
     "projection gradient": ("splat_project_grad",),
     "shading gradient and Adam": ("splat_shade_grad", "light_shade_grad", "light_grad", "adam"),
     "Adam and activation": ("splat_update", "splat_activate"),
