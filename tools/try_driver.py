@@ -56,16 +56,23 @@ class _Driver(NamedTuple):
         package: that brings it.
         library: pattern of the driver's library within the package.
         environment: that it wants.
+        files: that it looks for in one place of the system alone.
     """
 
     package: str
     library: str
     environment: dict[str, str]
+    files: tuple[str, ...] = ()
 
 
 _DRIVERS = {
     "pocl": _Driver("pocl-opencl-icd", "libpocl.so.2*", {}),
-    "rusticl": _Driver("mesa-opencl-icd", "libRusticlOpenCL.so.1", {"RUSTICL_ENABLE": "llvmpipe"}),
+    "rusticl": _Driver(
+        "mesa-opencl-icd",
+        "libRusticlOpenCL.so.1",
+        {"RUSTICL_ENABLE": "llvmpipe"},
+        ("usr/lib/clc/spirv-mesa3d-.spv", "usr/lib/clc/spirv64-mesa3d-.spv"),
+    ),
     "oclgrind": _Driver(
         "oclgrind",
         "liboclgrind-rt-icd.so",
@@ -144,6 +151,13 @@ def _environment(driver: _Driver, folder: Path, suite: str = "") -> tuple[str, d
     found = sorted(root.rglob(driver.library))
     if not found:
         raise UnpackError(f"package {driver.package} brings no {driver.library} here")
+    absent = [name for name in driver.files if not Path("/", name).exists()]
+    if absent and (root / absent[0]).exists():
+        links = " ".join(str(root / name) for name in absent)
+        raise UnpackError(
+            f"{driver.package} looks for /{absent[0]} alone, which is not there: as root, run "
+            f"'ln -s {links} {Path('/', absent[0]).parent}/'"
+        )
     vendors = root / "vendors"
     vendors.mkdir(exist_ok=True)
     (vendors / "driver.icd").write_text(f"{found[0]}\n")
@@ -186,8 +200,7 @@ def _compile_all(options: Options, fault_of: Callable[[Variant], str]) -> int:
     ]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         faults = [fault for fault in pool.map(fault_of, known) if fault]
-    print(*faults, sep="\n")
-    print(f"{options.driver}: {len(known)} variants, {len(faults)} faults")
+    print(*faults, f"{options.driver}: {len(known)} variants, {len(faults)} faults", sep="\n")
     return int(bool(faults))
 
 

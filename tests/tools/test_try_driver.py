@@ -64,3 +64,18 @@ def _c_library() -> tuple[Path, Path]:
     if not (loaders and libraries):
         pytest.skip("another C library than GNU's")
     return loaders[0], libraries[0]
+
+
+def test_a_file_that_a_driver_wants_in_one_place_is_told_with_what_helps(
+    tool, tmp_path, monkeypatch
+):
+    driver = tool("try_driver")
+    for name in ("nowhere/at/all.spv", "lib.so"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("")
+    monkeypatch.setattr(driver, "unpack", lambda package, folder, suite="": tmp_path)
+    wants = driver._Driver("some-icd", "lib.so", {}, ("nowhere/at/all.spv",))
+    with pytest.raises(
+        driver.UnpackError, match=rf"some-icd.*ln -s {tmp_path}.*all.spv /nowhere/at"
+    ):
+        driver._environment(wants, tmp_path)
