@@ -26,6 +26,7 @@ from paper import (
     capture_support,
     compensation,
     convergence,
+    field_bias,
     figure_02_04,
     figure_05,
     figure_06,
@@ -66,6 +67,7 @@ FIGURES: tuple[ModuleType, ...] = (
     figure_15,
     slice_bias,
     spectral_bias,
+    field_bias,
     compensation,
     convergence,
     merit_study,
@@ -80,6 +82,7 @@ FITTED: tuple[ModuleType, ...] = (
     figure_11,
     figure_12,
     spectral_bias,
+    field_bias,
     aperture_filter,
 )
 

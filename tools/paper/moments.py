@@ -37,7 +37,7 @@ def watched(settings: FitPhotosSettings, test: Any, device: Device) -> dict[str,
         JSON: the frequencies in cycles per pixel, and for each moment the step, the mean PSNR,
         and by frequency the error's and the pictures' power over the truth's.
     """
-    trainer, pictures = _trainer(settings, device)
+    trainer, pictures = start(settings, device)
     views = open_capture(test).views
     few = evenly(len(views), _PICTURES)
     unseen = CapturePictures(device, [views[k] for k in few], like=pictures)
@@ -50,7 +50,8 @@ def watched(settings: FitPhotosSettings, test: Any, device: Device) -> dict[str,
     return {"frequency": frequency, "pictures": len(few), "moments": moments}
 
 
-def _trainer(settings: FitPhotosSettings, device: Device) -> tuple[Trainer, CapturePictures]:
+def start(settings: FitPhotosSettings, device: Device) -> tuple[Trainer, CapturePictures]:
+    """A fit before its first step, as ``Fit`` would begin it, and its photographs."""
     capture = open_capture(settings.capture)
     pictures = CapturePictures(device, capture.views, seed=settings.training.seed)
     first = first_splats(
