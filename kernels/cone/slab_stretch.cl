@@ -48,7 +48,7 @@ KERNEL void slab_stretch(
       const int begin = from > 0 ? (int)from : 0;
       const int end = to < detector_rows - 1 ? (int)to + 1 : detector_rows;
       for (int i = begin; i < end; i++)
-        sum = sum + row_weight(stretched, step, center, i) *
+        sum = sum + row_weight(stretched, step, center, i, detector_rows) *
                         (some(lengths + (long)i * bins + u, bins - u) *
                          some(seen + (long)i * bins + u, bins - u));
       sum = LOAD(gains + (long)(first + view) * columns + c) * sum;

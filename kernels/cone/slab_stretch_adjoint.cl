@@ -33,7 +33,8 @@ KERNEL void slab_stretch_adjoint(
     const int begin = from > 0 ? (int)from : 0, end = to < rows - 1 ? (int)to + 1 : rows;
     lanes sum = 0;
     for (int r = begin; r < end; r++)
-      sum = sum + row_weight(r + origin, step, center, i) * LOAD(table + ENTRY(view, r, pad + u));
+      sum = sum + row_weight(r + origin, step, center, i, detector_rows) *
+                      LOAD(table + ENTRY(view, r, pad + u));
     sum = LOAD(gains + (long)(first + view) * columns + pad + u) * sum;
     for (int n = 0; n < LANES && u + n < bins; n++) out[u + n] = length[u + n] * ((real *)&sum)[n];
   }

@@ -16,7 +16,8 @@ its ray leaves the slabs at the slope d,
 with the length of the ray over its reach. ``q`` is one row of the detector, unless a shadow is more
 than 7 of them: it is a seventh of the largest one then, and the convolution's kernel is as wide as
 ``q d``, integrated over the detector's rows. The footprint ``point`` takes samples for points
-instead: shares are those of linear interpolation, and ``q`` is half a row.
+instead: shares are those of linear interpolation, ``q`` is half a row, and as far as the detector
+reaches the cubic takes what it misses beyond its rows from the straight line through two of them.
 """
 
 from __future__ import annotations
@@ -84,7 +85,7 @@ def _view(grid: Grid, scan: Cone, view: int, footprint: str, q: float) -> Any:
     slopes = np.abs(np.cos(turned) if across_y else np.sin(turned))
     slopes = slopes if scan.curved else slopes / np.cos(gamma)
     columns = np.arange(scan.bins) - scan.center[1]
-    passed, numbers = _passed_on(scan, q * slopes, wide=q > 1)
+    passed, numbers = _passed_on(scan, q * slopes, wide=q > 1, continued=footprint == "point")
     matrix = np.zeros((scan.rows, scan.bins, len(z), len(y), len(x)))
     for j, (slab, distance) in enumerate(zip(slabs, distances, strict=True)):
         edges = np.stack([lines - step / 2, lines + step / 2])
@@ -103,16 +104,32 @@ def _view(grid: Grid, scan: Cone, view: int, footprint: str, q: float) -> Any:
     return (matrix * _lengths(scan)).reshape(scan.rows * scan.bins, -1)
 
 
-def _passed_on(scan: Cone, steps: Floats, *, wide: bool) -> tuple[Floats, Floats]:
+def _passed_on(scan: Cone, steps: Floats, *, wide: bool, continued: bool) -> tuple[Floats, Floats]:
     """Weights in the detector's rows of those along the slabs, (rows, n, bins), and their n."""
     reach = 1 + 2 * max(1.0, steps.max())
     ends = (np.array([-reach, scan.rows - 1 + reach]) - scan.center[0])[:, None] / steps
     numbers = np.arange(np.floor(ends.min()), np.ceil(ends.max()) + 1)
-    off = numbers[:, None] * steps + scan.center[0] - np.arange(scan.rows)[:, None, None]
+    places = numbers[:, None] * steps + scan.center[0]
+    off = places - np.arange(scan.rows)[:, None, None]
+    if continued:
+        return steps**2 * _continued(places, scan.rows), numbers
     if not wide:
         return steps**2 * _cubic(off), numbers
     weights = _cubic_integral((off + 0.5) / steps) - _cubic_integral((off - 0.5) / steps)
     return steps**2 * weights, numbers
+
+
+def _continued(places: Floats, rows: int) -> Floats:
+    """Weights of rows by the cubic, beyond whose ends the detector goes on in a straight line."""
+    weights = _cubic(places - np.arange(rows)[:, None, None])
+    within = (places >= -0.5) & (places <= rows - 0.5)
+    for n in (1, 2):
+        for beyond, end, inner in ((-n, 0, 1), (rows - 1 + n, rows - 1, rows - 2)):
+            missed = within * _cubic(places - beyond)
+            weights[end] += (n + 1 if rows > 1 else 1) * missed
+            if rows > 1:
+                weights[inner] -= n * missed
+    return weights
 
 
 def _column(scan: Cone, angle: float, x: Any, y: Any) -> Any:

@@ -104,6 +104,21 @@ def test_levels_are_right_at_any_pitch(device, share, voxel):
     assert level(plane, np.broadcast_to(middle, plane.shape)) == pytest.approx(1, abs=1e-3)
 
 
+@pytest.mark.parametrize("rows", [8, pytest.param(1, marks=pytest.mark.full)])
+def test_levels_are_right_from_the_first_row_to_the_last(device, rows):
+    """Of a cylinder, whose densities no cone's angle lowers."""
+    scan = circle(FULL[::2], distance=10.0, share=2.0)
+    scan = replace(scan, rows=rows, center=((rows - 1) / 2, scan.center[1]))
+    row = scan.pitch[0] / scan.magnification
+    places = np.arange(4 * rows - 3)
+    grid = Grid((len(places), 3, 3), (row / 4, 1, 1))
+    cylinder = phantom.Ellipsoid((0.0, 0.0, 0.0), (1e5, 0.35 * N, 0.35 * N), 0.0, 1.0)
+    y = phantom.project([cylinder], GRID, scan)
+    levels = FDK(Projector(grid, scan, device=device))(y).mean(axis=(1, 2))
+    np.testing.assert_allclose(levels, levels[len(levels) // 2], rtol=2e-3)
+    np.testing.assert_allclose(levels[0], 1, rtol=5e-2)
+
+
 HEAD = phantom.head(GRID)
 HEAD_VOLUME = phantom.render(HEAD, GRID)
 SPAN = np.pi + 2.2 * np.arcsin(0.5 / 3)

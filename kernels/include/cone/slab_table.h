@@ -44,6 +44,12 @@
 #define WIDE 0
 #endif
 
+/* Whether a table's rows as far as the detector reaches, half a row beyond its first and last, are
+ * read as if it went on in a straight line, for the cubic's taps beyond its ends. */
+#ifndef CONTINUED
+#define CONTINUED 0
+#endif
+
 #if LANES == 8
 #define ENTRY(view, row, column) (((long)(view) * rows + (row)) * columns + (column))
 #else
@@ -95,16 +101,39 @@ static real largest(lanes v) { return -least(-v); }
 #define largest(v) (v)
 #endif
 
-/* Weight of detector row i in table row r of a column; those of a table's row add up to 1. Rows one
- * detector row apart are interpolated; of WIDE 1 the kernel is as wide as their step, integrated over
- * the detector's rows. Both stretching kernels ask here, so that they weight alike. */
-static lanes row_weight(int r, lanes step, real center, int i) {
+/* Weight of detector row i in table row r of a column; those of a table's row add up to 1 over all
+ * rows, also those that no detector has. Rows one detector row apart are interpolated; of WIDE 1 the
+ * kernel is as wide as their step, integrated over the detector's rows. */
+static lanes plain_row_weight(int r, lanes step, real center, int i) {
   const lanes away = step * (real)r + (center - (real)i);
 #if WIDE
   return (cubic_integral((away + 0.5f) / step) - cubic_integral((away - 0.5f) / step)) / 24.0f;
 #else
   return cubic_kernel(away);
 #endif
+}
+
+/* The same with what a row takes for the two beyond each of the detector's ends, n rows beyond the
+ * outermost: n + 1 times that less n times its neighbour, or that alone of a single row. Both
+ * stretching kernels ask here, so that they weight alike. */
+static lanes row_weight(int r, lanes step, real center, int i, int detector_rows) {
+  lanes weight = plain_row_weight(r, step, center, i);
+#if CONTINUED
+  const int last = detector_rows - 1;
+  const lanes place = step * (real)r + center, none = 0;
+  UNROLL for (int n = 1; n < 3; n++) {
+    const real own = last > 0 ? n + 1 : 1, inner = -n;
+    if (i < 2) {
+      const lanes beyond = (i == 0 ? own : inner) * plain_row_weight(r, step, center, -n);
+      weight = weight + (place < -0.5f ? none : (place > last + 0.5f ? none : beyond));
+    }
+    if (i > last - 2) {
+      const lanes beyond = (i == last ? own : inner) * plain_row_weight(r, step, center, last + n);
+      weight = weight + (place < -0.5f ? none : (place > last + 0.5f ? none : beyond));
+    }
+  }
+#endif
+  return weight;
 }
 
 /* Detector rows to either side of a table's row that have such weights. */

@@ -282,7 +282,9 @@ class _Walk:
         self._arc = int(projector._beam.curved)
         self._precision = projector._precision
         self.table = table
-        self.stage = _Stretch(self._device, projector._beam, table, self._dtype)
+        self.stage = _Stretch(
+            self._device, projector._beam, table, self._dtype, continued=bool(self._point)
+        )
         self._column_forms = self._device.array(table.column_forms, self._dtype)
         self._row_forms = self._device.array(table.row_forms, self._dtype)
         self._amplitudes = self._device.array(table.amplitudes, self._dtype)
@@ -433,6 +435,7 @@ class _Stretch:
         scan: the scan.
         table: of the views that are walked alike.
         dtype: of data and tables.
+        continued: whether the cubic between rows takes a straight line beyond the detector's ends.
     """
 
     def __init__(
@@ -441,6 +444,8 @@ class _Stretch:
         scan: Cone,
         table: SlabTable,
         dtype: np.dtype[Any],
+        *,
+        continued: bool,
     ) -> None:
         self._device, self._table = device, table
         self._run = 1 << 30 if device.traits.is_cpu else 1
@@ -459,6 +464,7 @@ class _Stretch:
             "center": scan.center[0],
             "DOUBLE": int(dtype == np.float64),
             "WIDE": int(table.wide),
+            "CONTINUED": int(continued),
             "RUN": self._run,
         }
 
