@@ -30,6 +30,9 @@ Floats = NDArray[np.float64]
 
 # Most groups of a cone's rows, and by how many rows opposite rays may part at the object's edge.
 _GROUPS, _PARTED = 5, 2.0
+# The widest half interval that is still an answer, in bins: rays read by wrong angles or lengths
+# may agree on an axis as vaguely as noisy ones.
+_WIDEST = 0.5
 # Most readings, and the change of the centre that ends them, in bins.
 _READINGS, _SETTLED = 6, 0.01
 
@@ -157,7 +160,7 @@ def _settled(
         sinograms = (views[:, row] for row in range(views.shape[1]))
         # Rows counted from the one that the estimate is for.
         offsets = list(places - middle)
-        read = searched_axis(sinograms, offsets, 1, directions, within)
+        read = searched_axis(sinograms, offsets, 1, directions, within, _WIDEST)
         found = _on_detector(read, bins, middle)
         change = found.center - fan.center
         fan = replace(fan, center=found.center)

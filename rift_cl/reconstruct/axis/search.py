@@ -31,8 +31,8 @@ _ROWS = 5
 _HALF_INTERVAL = 2.3
 # The least standard error: views are sums over bins, and detectors are not perfect.
 _FINEST = 0.01
-# The widest half interval that is still an answer, in bins.
-_WIDEST = 0.5
+# The widest half interval that is still an answer, in bins, and that of a single row.
+_WIDEST, _WIDEST_ROW = 0.75, 2.0
 # A rival's share of the best log-likelihood from which on neither is believed; the least of the
 # best, and the least share of it of what it were if all frequencies agreed.
 _RIVAL, _SCORE, _COHERENCE = 0.75, 25.0, 0.5
@@ -93,8 +93,12 @@ def searched_axis(
     count: int,
     angles: Floats,
     span: tuple[float, float] | None = None,
+    widest: float = _WIDEST,
 ) -> AxisEstimate:
-    """The axis of ``axis_of_rows``, the angles taken as they are."""
+    """The axis of ``axis_of_rows``, the angles taken as they are.
+
+    ``widest`` is the half interval, in bins, from which on no answer is given.
+    """
     measure = chosen_measure(angles, span)
     places, found, why = [], [], ""
     for row, sinogram in zip(rows, sinograms, strict=True):
@@ -112,7 +116,7 @@ def searched_axis(
             found.append(told)
     if 2 * len(found) <= len(rows):
         raise _refusal(why)
-    return _line(np.array(places, float), found, (count - 1) / 2)
+    return _line(np.array(places, float), found, (count - 1) / 2, widest)
 
 
 def _check_searchable(views: Views, span: tuple[float, float] | None) -> None:
@@ -143,7 +147,7 @@ def _doubt(told: RowAxis | None, span: tuple[float, float] | None, views: Views)
         return f"nothing between the bins {low:g} and {high:g} stands out"
     if told.score < _SCORE or told.coherence < _COHERENCE or told.rival > _RIVAL * told.score:
         return "no place on the detector stands out from the others"
-    if not _HALF_INTERVAL * told.error <= _WIDEST * 4:
+    if not _HALF_INTERVAL * told.error <= _WIDEST_ROW:
         return _too_wide(_HALF_INTERVAL * told.error)
     return ""
 
@@ -156,7 +160,7 @@ def _refusal(why: str) -> InputError:
     return InputError(f"the rotation axis cannot be found: {why}{GIVE_IT}")
 
 
-def _line(places: Floats, found: list[RowAxis], middle: float) -> AxisEstimate:
+def _line(places: Floats, found: list[RowAxis], middle: float, widest: float) -> AxisEstimate:
     """The axis through the rows' centres.
 
     Raises:
@@ -177,7 +181,7 @@ def _line(places: Floats, found: list[RowAxis], middle: float) -> AxisEstimate:
     # Rows share what the axis moved by, so that no number of them averages it out.
     drift = np.median([row.drift for row, counts in zip(found, kept, strict=True) if counts])
     half = _HALF_INTERVAL * float(np.hypot(error, drift))
-    if not half <= _WIDEST:
+    if not half <= widest:
         raise _refusal(_too_wide(half))
     used = [row for row, counts in zip(found, kept, strict=True) if counts]
     said = [part for row in used for part in (row.evidence, row.mass) if part is not None]
