@@ -290,6 +290,7 @@ def project_modes_grad(projection: Projection, moments: DeviceArray) -> ModeGrad
         grad_shape_modes=out.shape_modes,
         grad_color_modes=out.color_modes,
         **_mode_macros(splats),
+        SQUARE=projection.settings.activation == "square",
         RUN=device.traits.run,
         CHANNELS=channels,
     )
