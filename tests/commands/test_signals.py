@@ -14,10 +14,13 @@ from rift_cl.commands.runner import exit_status, gentle_interrupt
 
 @pytest.fixture(autouse=True)
 def handlers():
-    """The handlers are those of before, whatever was heard."""
+    """The handlers are those of before, whatever was heard; a background job ignores Ctrl-C."""
+    usual = signal.signal(signal.SIGINT, signal.default_int_handler)
     before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     yield
-    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
+    after = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    signal.signal(signal.SIGINT, usual)
+    assert after == before
 
 
 def test_a_command_that_is_terminated_ends_with_a_sentence(capsys):

@@ -126,7 +126,8 @@ def run(device, chosen, scene, values):
     random = np.random.default_rng(scene.seed)
     coming = [device.array(random.normal(size=a.shape)) for a in (frame.image, frame.transmittance)]
     found = renderer.backward(frame, *coming, with_camera=True)
-    arrays = arrays_of(frame.projection) | vars(frame.raster)
+    raster = {name: vars(frame.raster)[name] for name in ("image", "transmittance", "last")}
+    arrays = arrays_of(frame.projection) | raster
     arrays |= {"features": frame.raster_pass.screen.features}
     arrays |= {"coming": coming[0], "by camera": found.camera, "by background": found.background}
     gradients = vars(found.splats) | {"colors": found.colors, "sh": found.sh}
