@@ -10,7 +10,6 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -21,6 +20,7 @@ from rift_cl.commands.console_table import print_table
 from rift_cl.commands.progress_bar import print_line
 from rift_cl.commands.runner import (
     Output,
+    Terminated,
     command,
     exit_status,
     gentle_interrupt,
@@ -259,11 +259,16 @@ def _render(settings: Any, output: Output) -> None:
 def _view(settings: Any, output: Output) -> None:
     from rift_cl.commands.view.job import ViewJob
 
-    # Ctrl-C is the usual way to end it, and nothing is lost by it.
-    with ViewJob(settings) as job, suppress(KeyboardInterrupt):
+    with ViewJob(settings) as job:
         _print_notes(job.notes)
         print(f"{job.url} shows {settings.scene}; Ctrl-C ends it", flush=True)
-        watch(job.run(), Output(quiet=True))
+        try:
+            watch(job.run(), Output(quiet=True))
+        except Terminated:
+            raise
+        except KeyboardInterrupt:
+            # Ctrl-C is the usual way to end it, and nothing is lost by it.
+            return
 
 
 def _export(settings: Any, output: Output) -> None:
@@ -299,7 +304,8 @@ def _plan(settings: Any, output: Output) -> None:
         return
     print_table(*worth_table(job.metrics), caption=caption_of(job.metrics))
     print(job.verdict)
-    print(f"transforms.json, views.csv and report.html are in {settings.out}")
+    more = "" if job.vectors is None else ", vectors.txt"
+    print(f"transforms.json, views.csv{more} and report.html are in {settings.out}")
 
 
 def _print_notes(notes: Sequence[str]) -> None:

@@ -68,7 +68,7 @@ class RunOptions(DeviceOption):
 
 @dataclass(frozen=True, kw_only=True)
 class RepeatableRun(RunOptions):
-    """How a command runs that leaves a config.json."""
+    """How the command runs."""
 
     group: ClassVar[str] = "run"
 
@@ -151,8 +151,7 @@ def _options_in(
         registry = field.metadata.get("registry")
         if registry is not None:
             usually = registry.name_of(type(default))
-            hidden = {*field.metadata.get("without", ())} - {usually}
-            choice: Any = Literal[tuple(kind for kind in registry if kind not in hidden)]
+            choice: Any = Literal[kinds_of(field)]
             text = field.metadata["help"]
             yield ShownOption(name, (*place, KIND), choice, usually, group, text)
         if is_dataclass(default):
@@ -217,6 +216,12 @@ def default_of(field: Field[Any], usual: Any) -> Any:
     if field.default_factory is not dataclasses.MISSING:
         return field.default_factory()
     return field.default
+
+
+def kinds_of(field: Field[Any]) -> tuple[str, ...]:
+    """The kinds that a part of the tree may be of, by their names in its registry."""
+    without = field.metadata.get("without", ())
+    return tuple(kind for kind in field.metadata["registry"] if kind not in without)
 
 
 def _helps(settings: type) -> dict[str, str]:

@@ -1,7 +1,8 @@
 """How a command is run: its errors become sentences and exit statuses, its progress goes to stderr.
 
 Exit statuses: 0 ok, 2 usage (an unknown option, or no number where one is wanted), 3 input (a file
-or a value that cannot be used), 4 device, 5 output, 130 interrupted, 143 ended by SIGTERM.
+or a value that cannot be used), 4 device, 5 output, 130 interrupted (also a fit that keeps a
+checkpoint at SIGTERM), 143 ended by SIGTERM.
 """
 
 from __future__ import annotations
@@ -145,7 +146,7 @@ class _Entry(NamedTuple):
         above, dot, last = option.name.replace("_", "-").rpartition(".")
         negated = option.default is True and not twins
         name = above + dot + ("no-" if negated else "") + last
-        hint = "(default: True)" if negated else None
+        hint = "(on by default; this option turns it off)" if negated else None
         mark = tyro.conf.arg(name=name, help=option.help, help_behavior_hint=hint)
         kind: Any = Annotated[option.kind, mark]
         default = False if negated else option.default
@@ -238,7 +239,7 @@ def gentle_interrupt(stop: Callable[[], None]) -> Iterator[None]:
         def heard(number: int, frame: FrameType | None) -> None:
             usual.close()
             stop()
-            print_line("rift: stopping after this step; Ctrl-C again stops at once")
+            print_line("rift: stopping after this step; a second Ctrl-C or SIGTERM stops at once")
 
         usual.enter_context(_heard((signal.SIGINT, signal.SIGTERM), heard))
         yield

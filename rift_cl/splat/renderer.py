@@ -83,7 +83,10 @@ class Frame:
 
     @property
     def lists(self) -> TileLists | None:
-        """The tile lists; None where the image was rendered in bands."""
+        """The tile lists.
+
+        None where the image was rendered in bands, and where a gradient has used them up.
+        """
         return self.raster_pass.lists
 
     @property

@@ -223,3 +223,11 @@ def test_a_refused_setting_is_named_as_its_option_and_in_python_as_its_field(
     values = [json.loads(v) if v[-1].isdigit() and v != "l3" else v for v in words.split()[1::2]]
     with pytest.raises(InputError, match=f"^'rift {job}': {field}"):
         CLASSES[job].of(tmp_path, tmp_path, **dict(zip(names, values, strict=True)))
+
+
+@pytest.mark.parametrize("kind", ["nope", "xray"])
+def test_a_kind_that_is_none_of_these_fits_is_refused(kind, capsys, tmp_path):
+    assert main(["fit", "photos", str(tmp_path), "--strategy", kind]) == 3
+    assert capsys.readouterr().err == f"rift: --strategy is {kind!r}, wanted one of mcmc, default\n"
+    with pytest.raises(InputError, match="strategy is "):
+        FitPhotosSettings.of(Path("x"), Path("y"), strategy=kind)

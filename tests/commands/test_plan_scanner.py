@@ -92,6 +92,7 @@ def test_a_fan_is_planned_in_its_plane(tmp_path):
         (("--mode", "surface"), "--mode surface"),
         (("--center", 0, 0, 1), "--center"),
         (("--camera", "mine.json"), "--camera"),
+        (("--cover", 0.5), "--cover"),
     ],
 )
 def test_options_of_photographs_are_refused(cone, tmp_path, capsys, options, word):

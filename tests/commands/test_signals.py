@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
+from contextlib import nullcontext
+from types import SimpleNamespace
 
 import pytest
 
+from rift_cl.commands.cli import main
 from rift_cl.commands.fit import checkpoints
 from rift_cl.commands.fit.checkpoints import CheckpointSchedule
 from rift_cl.commands.runner import exit_status, gentle_interrupt
@@ -30,6 +33,17 @@ def test_a_command_that_is_terminated_ends_with_a_sentence(capsys):
 
     assert exit_status(run) == 143
     assert "interrupted" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
+def test_a_page_ends_well_at_ctrl_c_alone(number, status, monkeypatch, capsys):
+    def run():
+        os.kill(os.getpid(), number)
+        yield
+
+    page = SimpleNamespace(url="here", notes=(), run=run)
+    monkeypatch.setattr("rift_cl.commands.view.job.ViewJob", lambda settings: nullcontext(page))
+    assert main(["view", "scene.ply"]) == status
 
 
 def test_an_interrupted_command_has_a_status_of_its_own():

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -112,3 +113,13 @@ def test_two_versions_take_turns(tool, tmp_path, capsys, monkeypatch):
 def test_photographs_that_are_none_are_refused(tool, text):
     with pytest.raises(InputError, match="wanted"):
         tool("bench.photographs").PhotographsCase.parse(text)
+
+
+def test_entries_and_lanes_are_counted_after_a_gradient_as_before(tool, monkeypatch):
+    """A gradient of a large scene uses up the lists of the frame that it is of."""
+    monkeypatch.setattr(import_module("rift_cl.splat.raster_pass"), "_LARGE_RECORDS", 0)
+    device = rift.default_device()
+    before, case = (tool("bench.splats").SplatCase(60, 24, device) for _ in range(2))
+    assert case.gradients
+    assert case.record() == before.record()
+    assert case.entries > 0 and case.lanes[0] >= case.lanes[1] > 0

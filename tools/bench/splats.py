@@ -140,10 +140,11 @@ class SplatCase:
         }
         return [Task(name, self, run, SPLAT_COSTS) for name, run in runs.items()]
 
-    @property
+    # A gradient uses up a frame's lists: both counts are of frames of their own.
+    @cached_property
     def entries(self) -> int:
         """Pairs of a splat and a tile."""
-        return self.frame.lists.n_entries
+        return self._forward().lists.n_entries
 
     @property
     def pixels(self) -> int:
@@ -153,7 +154,7 @@ class SplatCase:
     @cached_property
     def lanes(self) -> tuple[int, int]:
         """Lanes that are evaluated, and those of them in which the splat counted."""
-        return _count_lanes(self.device, self.frame)
+        return _count_lanes(self.device, self._forward())
 
     def record(self) -> dict[str, Any]:
         """How the JSON file tells it from others."""

@@ -43,6 +43,10 @@ def scanned(settings: PlanSettings, path: Path) -> ViewSet:
     for name in ("center", "lens", "camera"):
         if getattr(settings, name):
             raise InputError(f"--{name} applies to photographs, --have {path} is a scan")
+    if COVER < settings.cover < 1:
+        raise InputError(
+            f"--cover is {settings.cover:g}, but --have {path} is a scan: wanted {COVER:g} at most"
+        )
     diameter = None if settings.diameter is None else settings.diameter / settings.unit
     asked = AnalyzeSettings(
         source=path, geometry=settings.geometry, diameter=diameter, device=settings.device

@@ -31,11 +31,12 @@ class PlanTarget:
     diameter: Auto[float] = None
     """Diameter of the target in millimetres. Default: that of --have, or 100."""
     center: Auto[tuple[float, float, float]] = None
-    """Centre of the target in millimetres. Default: where the cameras of --have look, or 0 0 0."""
+    """Centre of the target in millimetres. Default: where the cameras of --have look, or 0 0 0.
+    Not with a scan."""
     mode: Auto[Literal["surface", "volume"]] = None
     """Whether the target is opaque, a sphere standing for its surface (surface), or transparent as
-    for X-rays, so that opposite views are equivalent (volume). Default: volume with --pilot,
-    otherwise surface."""
+    for X-rays, so that opposite views are equivalent (volume). Default: volume with --pilot
+    or a scan as --have, otherwise surface."""
     pilot: Auto[Path] = None
     """A first reconstruction (a volume of 'rift reconstruct') as the prior of the target's power
     spectrum. Default: a power law 1/k^2."""
@@ -65,15 +66,17 @@ class PlanCameras:
     lens: Auto[Path] = None
     """Lens prescription (.json or .zmx) for every camera. Default: the camera's own lens."""
     elevation: tuple[float, float] = (0.0, 75.0)
-    """Lowest and highest elevation above the horizon in degrees; negative is from below. Of a
-    scanner: tilts against its orbit (0 0: places on the orbit); a fan has none."""
+    """Lowest and highest elevation above the horizon in degrees; negative is from below. With
+    a scan as --have: lowest and highest angle of the source out of the plane of its orbit (0 0
+    stays in the plane; a fan always does)."""
     azimuth: tuple[float, float] = (-180.0, 180.0)
     """First and last azimuth around the target in degrees: 0 along x, 90 along y."""
     distance: Auto[tuple[float, float]] = None
     """Nearest and farthest distance from the target's centre in millimetres. Default: as near as
     the target fits into the picture; of a scanner, that of its source."""
     cover: Expert[float] = 1.0
-    """Fraction of the target's outline that must lie in each picture, above 0, up to 1."""
+    """Fraction of the target's outline that must lie in each picture, above 0, up to 1. For a
+    scan as --have it is 0.05 at most."""
     path: Literal["free", "ring", "tilted-rings", "spline"] = "free"
     """Shape of the camera path: free positions, one ring, several tilted rings, or a smooth
     curve."""
@@ -110,8 +113,9 @@ class PlanOutput:
     group: ClassVar[str] = "output"
 
     out: Path = Path("rift-plan")
-    """Folder for transforms.json, views.csv, report.html, config.json and metrics.json; of a
-    cone-beam scanner also vectors.txt (source, detector, steps of bins and rows; a view a line)."""
+    """Folder for transforms.json, views.csv, report.html, config.json and metrics.json; for a
+    cone-beam scan also vectors.txt, a line per view in ASTRA's order (source, detector centre, step
+    between bins, step between rows), in millimetres."""
 
 
 @dataclass(frozen=True)

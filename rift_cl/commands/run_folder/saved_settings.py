@@ -19,7 +19,7 @@ from typing import get_type_hints as type_hints
 import tyro
 
 from rift_cl import __version__
-from rift_cl.commands.options import KIND, MISSING, default_of, option_name
+from rift_cl.commands.options import KIND, MISSING, default_of, kinds_of, option_name
 from rift_cl.errors import InputError, SettingError
 
 S = TypeVar("S")
@@ -277,8 +277,14 @@ def chosen(settings: type[S], default: S | None, arguments: Sequence[str]) -> S 
         settings: a command's settings.
         default: those of an earlier run, if it is repeated.
         arguments: the command line.
+
+    Raises:
+        InputError: there is no such kind.
     """
-    return _of_kinds(settings, default, lambda name: _given(arguments, f"--{name}"))
+    try:
+        return _of_kinds(settings, default, lambda name: _given(arguments, f"--{name}"))
+    except InputError as error:
+        raise InputError(f"--{error}") from error
 
 
 def _of_kinds(settings: type[S], default: S | None, kind_of: Callable[[str], Any]) -> S | None:
@@ -361,6 +367,9 @@ def _kind_of(field: dataclasses.Field[Any], default: Any, given: Any) -> tuple[A
     kind = given[KIND]
     if dataclasses.is_dataclass(kind):
         return kind, kind
+    known = kinds_of(field)
+    if kind not in known:
+        raise InputError(f"{field.name} is {kind!r}, wanted one of {', '.join(known)}")
     return (default if registry[kind] is type(default) else registry[kind]()), values
 
 
