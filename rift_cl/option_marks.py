@@ -42,5 +42,7 @@ AutoExpert = Annotated[T | None, tyro.conf.arg(help_behavior_hint=""), EXPERT]
 # Listed with what the splats are.
 SPLATS = Group("splats", "What the splats are and how they are drawn.")
 ShortSplats = Annotated[T, tyro.conf.arg(prefix_name=False), SPLATS]
+# Listed with how the command runs.
+RUN = Group("run", "How the command runs.")
 # Any number of values, none where it is not given.
 Several = Annotated[tuple[T, ...], tyro.conf.arg(help_behavior_hint="")]

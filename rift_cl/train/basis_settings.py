@@ -115,7 +115,8 @@ class AngularSettings:
     modes: Short[int] = 8
     """Number of lobe modes or spherical Gaussians besides the constant, 1 to 35; not for sh."""
     first: Expert[float] = 0.15
-    """Fraction of the run after which they are added, with coefficients of zero; not for sh."""
+    """Fraction of the run after which lobes or spherical Gaussians are added, with coefficients of
+    zero; not for sh."""
 
     def __post_init__(self) -> None:
         """Check every number's range."""

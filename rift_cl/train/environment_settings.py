@@ -29,7 +29,7 @@ class EnvironmentSettings:
 
     kind: Annotated[EnvironmentKind, arg(name="environment", prefix_name=False)] = "none"
     """Light from far away: none, or one that all splats share and reflect about their normals
-    (shared), each with its tint, its tint at grazing angles and its roughness; for glossy subjects
+    (shared), each with its tint, its tint at grazing angles and its sharpness; for glossy subjects
     and views that leave the photographed orbit. The fit writes it as a picture, environment.exr."""
     lobes: Annotated[int, arg(name="environment-lobes", prefix_name=False)] = 128
     """Number of lobes of a shared light, spread evenly over all directions, 8 to 4096."""

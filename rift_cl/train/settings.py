@@ -54,7 +54,7 @@ class LearningRates:
     sh: float = 2.5e-3
     """Learning rate of the constant colour (spherical harmonic of degree 0)."""
     sh_rest: float = 0.2
-    """Learning rate of harmonics of degree 1 and above, as a fraction of ``sh``."""
+    """Learning rate of harmonics of degree 1 and above, as a fraction of --learning-rates.sh."""
     poses: float = 1e-3
     """Learning rate of camera poses, if they are refined: of rotations in radians, of positions as
     a fraction of the scene's extent; it falls as that of the splats' positions does."""
@@ -68,7 +68,7 @@ class LearningRates:
     lobes: float = 1e-2
     """Learning rate of the geometry of lobes: quaternions or axes, and logarithms of widths."""
     lobes_rest: float = 1.0
-    """Learning rate of the coefficients of lobes, as a fraction of ``sh``."""
+    """Learning rate of the coefficients of lobes, as a fraction of --learning-rates.sh."""
     environment: float = 1e-2
     """Learning rate of the logarithms of an environment light's radiance."""
     reflectance: float = 5e-2

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from rift_cl.commands.inputs.scene_input import SceneInput
 from rift_cl.commands.options import RepeatableRun
@@ -19,7 +19,7 @@ class EvalInput(SceneInput):
 
     group: ClassVar[str] = "input"
 
-    captures: Annotated[tuple[Path, ...], Positional] = ()
+    captures: Annotated[tuple[Path, ...], Positional, arg(help_behavior_hint="")] = ()
     """Captures to score: each a transforms.json, a folder with one, or a COLMAP model. Default: the
     photographs that the fit held out."""
     train: Auto[Path] = None
@@ -33,10 +33,10 @@ class EvalInput(SceneInput):
     downscale: Auto[int] = None
     """Whole factor by which photographs are downscaled. Default: that of the fit, or 1."""
     flip: bool = False
-    """Score FLIP too, the difference that a person sees who flips between two pictures (0 is
-    best). Needs flip-evaluator (pip install flip-evaluator)."""
+    """Also score FLIP, a perceptual difference from 0 (equal) to 1. Needs flip-evaluator (pip
+    install flip-evaluator)."""
     lpips: Auto[Path] = None
-    """Score LPIPS too (0 is best), with the network's weights from this file: torch.save of the
+    """Also score LPIPS (0 is equal), with the network's weights from this file: torch.save of the
     state_dict() of lpips.LPIPS, net 'alex' or 'vgg'. Needs torch. Default: no LPIPS."""
 
 

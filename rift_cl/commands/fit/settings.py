@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, cast
 
 from rift_cl.commands.run_folder.saved_settings import (
     begun_settings,
@@ -13,7 +13,7 @@ from rift_cl.commands.run_folder.saved_settings import (
     parsed_settings,
 )
 from rift_cl.errors import InputError
-from rift_cl.option_marks import Expert
+from rift_cl.option_marks import RUN, Expert
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.settings import TrainSettings
 
@@ -49,8 +49,9 @@ class FitOutput:
     checkpoint_every: Expert[int] = 1000
     """Steps between two checkpoints, of which the last two are kept (0 = none)."""
     checkpoint_minutes: Expert[float] = 10.0
-    """Minutes after which there is a checkpoint before those steps are over (0 = not by time)."""
-    resume: bool = False
+    """Most minutes between two checkpoints (0 = by steps alone); without effect if
+    --checkpoint-every is 0."""
+    resume: Annotated[bool, RUN] = False
     """Resume from the last checkpoint in --out, to the same bits. With more --steps than before, a
     fit is trained on with the learning rates, densification and cooldown of a fit of that many
     steps, so that learning rates rise again before they fall."""

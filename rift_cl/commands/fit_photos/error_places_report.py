@@ -17,10 +17,10 @@ BAND_COLUMNS = (
 )  # fmt: skip
 _REGIONS = (
     "Where the squared error lies; PSNR in dB of all pixels of a region together. The photographs "
-    "alone tell regions: the silhouette is what lies within 2 pixels of the border between "
-    "foreground and background, highlights are at least halfway from the foreground's median "
-    "brightness to white, texture varies by more than 5 codes of 255 over 5 x 5 pixels. A pixel is "
-    "in the first of these that fits."
+    "alone tell regions: silhouette lies within 2 pixels of the border between foreground "
+    "and background; background is not foreground; highlights are at least halfway from the "
+    "foreground's median brightness to white; texture varies by more than 5 codes of 255 over 5 x "
+    "5 pixels; smooth is the rest. A pixel is in the first of these that fits."
 )
 _BANDS = (
     "How fine it is: bands of spatial frequency, power of the error and of the picture drawn over "

@@ -13,7 +13,7 @@ from rift_cl.commands.fit.settings import FitOutput, FitSettings, SplitOptions
 from rift_cl.commands.fit_photos.presets import PRESETS
 from rift_cl.commands.options import RepeatableRun
 from rift_cl.errors import InputError
-from rift_cl.option_marks import Auto, AutoExpert, Expert, Short, ShortSplats
+from rift_cl.option_marks import Auto, AutoExpert, Expert, Several, Short, ShortSplats
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.basis_settings import BasisSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
@@ -30,8 +30,8 @@ class PhotosInput(SplitOptions):
     capture: Annotated[Path, Positional]
     """A transforms.json, a folder with one, a COLMAP model, a folder of photographs without poses,
     or a video (mp4, mov, webm)."""
-    test: tuple[Path, ...] = ()
-    """Further captures to score, never trained on."""
+    test: Several[Path] = ()
+    """Further captures to score, never trained on. Default: none."""
     downscale: Auto[int] = None
     """Whole factor by which photographs are downscaled. Default: the least that leaves none above
     1.6 megapixels, or 0.7 on a CPU."""

@@ -30,10 +30,9 @@ class SceneInput:
     black for a file."""
 
     environment: Auto[Path] = None
-    """Picture of the light that splats shall reflect in place of the one they were fitted with
-    (rift fit photos --environment shared): all directions in equirectangular projection, up (z) at
-    the top, x in the middle; OpenEXR or HDR in linear light, others in display light. Default: the
-    fit's own."""
+    """Picture of a light that replaces the one a fit with --environment shared found: all
+    directions in equirectangular projection, z at the top, x in the middle; OpenEXR or HDR in
+    linear light, other formats in display light. Default: the fit's own light."""
 
     def open_scene(self, *, densities: bool = False) -> OpenedScene:
         """Read the scene.

@@ -59,7 +59,8 @@ class Homogenisation:
         float | None, arg(name="homogenise", prefix_name=False, help_behavior_hint="")
     ] = 0.0
     """Exponent of the weight of the residual's frequencies, so that fine detail counts as much as
-    coarse, 0 to 4 (0 = none). Default: 0.5, but 0 for X-rays and for fewer than 40 photographs."""
+    coarse, 0 to 4 (0 = none). Default: 0 for X-rays; for photographs 0.5, or 0 for fewer than
+    40."""
     weight: Annotated[WeightKind, arg(name="homogenise-by", prefix_name=False)] = "ramp"
     """What that exponent is of: the frequency (ramp), which suits evenly spaced views, or one over
     the coverage of the frequency by all views (coverage)."""
