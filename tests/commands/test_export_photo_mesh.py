@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from rift_cl.commands.cli import main
-from rift_cl.commands.export.fused_depth import Distances, grid_of
+from rift_cl.commands.export import fused_depth
+from rift_cl.commands.export.fused_depth import Distances, chosen_cameras, grid_of, places_of
 from rift_cl.commands.export.mesh import surface
 from rift_cl.errors import InputError
-from rift_cl.geometry import Camera, look_at
+from rift_cl.geometry import Aperture, Camera, look_at
 from rift_cl.io.captures.transforms_record import transforms_of
+from rift_cl.io.captures.view import View
 from rift_cl.io.output import write_json
 from rift_cl.io.scenes.splat_scene import SplatScene
 
@@ -42,7 +46,8 @@ def depth_of_sphere(camera):
 
 def fused(views, voxels=28):
     depths = [depth_of_sphere(camera) for camera in views]
-    volume = Distances(grid_of(views, depths, voxels))
+    places = [places_of(camera, depth) for camera, depth in zip(views, depths, strict=True)]
+    volume = Distances(grid_of(np.concatenate(places), voxels))
     for camera, depth in zip(views, depths, strict=True):
         volume.add(camera, depth)
     return volume
@@ -88,9 +93,29 @@ def test_a_slice_of_distances_is_their_definition():
 
 
 def test_cameras_that_see_nothing_are_told_so():
-    views = cameras(2)
+    camera = cameras(1)[0]
+    places = places_of(camera, np.full(camera.size, np.inf, np.float32))
     with pytest.raises(InputError, match="no camera sees"):
-        grid_of(views, [np.full(camera.size, np.inf, np.float32) for camera in views], 16)
+        grid_of(places, 16)
+
+
+def test_a_large_picture_tells_few_places_from_edge_to_edge():
+    camera = Camera((300, 400), [[400, 0, 200], [0, 400, 150], [0, 0, 1]], np.eye(4))
+    places = places_of(camera, np.full(camera.size, 2, np.float32))
+    assert len(places) == 20_000
+    np.testing.assert_allclose(np.ptp(places, axis=0), [2 * 399 / 400, 2 * 299 / 400, 0], rtol=0.02)
+
+
+def test_cameras_are_those_of_the_fit_without_their_apertures():
+    view, lens = np.eye(4), Aperture(0.1, 2.0)
+    K = [[400, 0, 200], [0, 400, 150], [0, 0, 1]]
+    wide = Camera((300, 400), K, view, "fisheye")
+    views = [View("a", Camera((300, 400), K, view, aperture=lens), Path("a"), None, None),
+             View("b", wide, Path("b"), None, None)]  # fmt: skip
+    (found,) = chosen_cameras(views, 4)
+    assert found.size == (75, 100) and found.aperture is None
+    assert found.intrinsics == (100, 100, 50, 37.5)
+    assert chosen_cameras(views[1:], 4) == []
 
 
 @pytest.fixture
@@ -116,6 +141,15 @@ def test_a_scene_of_photographs_becomes_a_mesh(ball, capsys):
     vertices = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], float)
     away = np.linalg.norm(vertices - MIDDLE, axis=1)
     assert np.median(away) == pytest.approx(1, abs=0.08)
+
+
+def test_a_grid_without_room_is_refused_before_it_is_made(ball, monkeypatch, capsys):
+    monkeypatch.setattr(fused_depth, "host_budget", lambda: 1000)
+    words = ["--capture", str(ball / "transforms.json"), "--voxels", "24", "--to", "obj"]
+    assert main(["export", "ball.ply", "--mesh", "--out", "ball.obj", *words]) != 0
+    told = capsys.readouterr().err
+    assert "--voxels 24" in told and "16/16 depths" not in told
+    assert not (ball / "ball.obj").exists()
 
 
 def test_a_level_is_about_densities(ball, capsys):

@@ -9,19 +9,21 @@ is open.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.cl.budget import format_bytes, host_budget
 from rift_cl.cl.device import Device
 from rift_cl.commands.export.settings import ExportSettings
 from rift_cl.commands.inputs.opened_scene import OpenedScene
 from rift_cl.commands.pictures.depth_picture import depth_and_alpha
 from rift_cl.commands.pictures.evenly_spaced import evenly
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, ResourceLimitError
 from rift_cl.geometry import Camera, Grid
-from rift_cl.io.captures.capture import open_capture
+from rift_cl.io.captures.capture import View, camera_at, open_capture
 from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
 
@@ -31,6 +33,8 @@ _CAMERAS, _SOLID = 64, 0.5
 _REACH = 4.0
 # Voxels along each axis beyond what cameras see.
 _MARGIN = 10
+# Pixels of each camera by which the grid is laid, at most, and bytes that a voxel takes at most.
+_PLACES, _BYTES = 20_000, 24
 # Share of the places that cameras see which lies beyond each side of the grid.
 _BEYOND = 0.005
 
@@ -56,20 +60,19 @@ class FusedDepth:
             )
         self._scene = OpenedScene(settings)
         self._voxels = settings.voxels
-        cameras = [camera for camera in self._known(settings) if camera.model == "pinhole"]
-        self.cameras = [cameras[place] for place in evenly(len(cameras), _CAMERAS)]
+        self.cameras = chosen_cameras(self._known(settings), self._scene.downscale)
         if not self.cameras:
             raise InputError(f"{settings.scene}: none of its cameras is a pinhole, as --mesh wants")
 
-    def _known(self, settings: ExportSettings) -> list[Camera]:
+    def _known(self, settings: ExportSettings) -> Sequence[View]:
         if settings.capture is not None:
-            return [v.camera for v in open_capture(settings.capture, photographs=False).views]
+            return open_capture(settings.capture, photographs=False).views
         if self._scene.cameras is None:
             raise InputError(
                 f"{settings.scene} holds no cameras, from which --mesh looks at a scene of "
                 "photographs: name the folder of the fit, or a capture with --capture"
             )
-        return [view.camera for view in self._scene.cameras.views]
+        return self._scene.cameras.views
 
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""
@@ -81,18 +84,49 @@ class FusedDepth:
     def run(self, device: Device) -> Iterator[Report]:
         """Fuse; a report after each camera. Then ``grid``, ``inside`` and ``seen`` are there.
 
+        Depths are drawn twice, once to lay the grid and once to fuse them, so that none is kept.
+
         Raises:
             InputError: no camera sees a surface.
+            ResourceLimitError: the grid does not fit the free memory.
         """
         renderer = Renderer(self._scene.rendering, device=device)
         splats = self._scene.splats.upload(device)
-        depths = [_depth(*depth_and_alpha(renderer, splats, camera)) for camera in self.cameras]
-        self.grid = grid_of(self.cameras, depths, self._voxels)
+        places, count = [], len(self.cameras)
+        for number, camera in enumerate(self.cameras):
+            places.append(places_of(camera, _depth(*depth_and_alpha(renderer, splats, camera))))
+            yield Report(number + 1, 2 * count, "depths")
+        self.grid = grid_of(np.concatenate(places), self._voxels)
+        _check_memory(self.grid, self._voxels)
         volume = Distances(self.grid)
-        for number, (camera, depth) in enumerate(zip(self.cameras, depths, strict=True)):
-            volume.add(camera, depth)
-            yield Report(number + 1, len(depths), "depths")
+        for number, camera in enumerate(self.cameras):
+            volume.add(camera, _depth(*depth_and_alpha(renderer, splats, camera)))
+            yield Report(count + number + 1, 2 * count, "depths")
         self.inside, self.seen = volume.inside(), volume.seen()
+
+
+def chosen_cameras(views: Sequence[View], downscale: int) -> list[Camera]:
+    """Pinholes, evenly chosen among views, without apertures, at the size of a fit's photographs.
+
+    Args:
+        views: at the photographs' own size.
+        downscale: the factor by which the fit made them smaller.
+    """
+    pinholes = [view for view in views if view.camera.model == "pinhole"]
+    if not pinholes:
+        return []
+    chosen = [pinholes[place] for place in evenly(len(pinholes), _CAMERAS)]
+    small = [camera_at(view, min(downscale, *view.camera.size)) for view in chosen]
+    return [Camera(camera.size, camera.K, camera.view) for camera in small]
+
+
+def _check_memory(grid: Grid, voxels: int) -> None:
+    need, free = _BYTES * math.prod(grid.shape), host_budget()
+    if need > free:
+        raise ResourceLimitError(
+            f"--voxels {voxels} makes a grid of {grid.shape}, which takes {format_bytes(need)}; "
+            f"{format_bytes(free)} may be taken: ask for fewer voxels"
+        )
 
 
 def _depth(depth: Depth, alpha: Depth) -> Depth:
@@ -100,19 +134,16 @@ def _depth(depth: Depth, alpha: Depth) -> Depth:
     return np.where((alpha > _SOLID) & (depth > 0), depth, np.float32(np.inf))
 
 
-def grid_of(cameras: Sequence[Camera], depths: Sequence[Depth], voxels: int) -> Grid:
+def grid_of(places: NDArray[np.float64], voxels: int) -> Grid:
     """The grid over what cameras see, by voxels along its longest edge.
 
     Args:
-        cameras: pinholes.
-        depths: along their axes, by pixel; infinity where nothing is seen.
+        places: (n, 3) of the surface, of all cameras.
         voxels: how many.
 
     Raises:
         InputError: nothing is seen.
     """
-    seen = [_places(*pair) for pair in zip(cameras, depths, strict=True)]
-    places = np.concatenate(seen)
     if not len(places):
         raise InputError("no camera sees a surface: everywhere alpha is below a half")
     low, high = np.quantile(places, (_BEYOND, 1 - _BEYOND), axis=0)
@@ -123,10 +154,18 @@ def grid_of(cameras: Sequence[Camera], depths: Sequence[Depth], voxels: int) -> 
     return Grid(shape.tolist(), spacing, ((low + high) / 2)[::-1].tolist())
 
 
-def _places(camera: Camera, depth: Depth) -> NDArray[np.float64]:
-    """Places (n, 3) of the surface that a camera sees."""
+def places_of(camera: Camera, depth: Depth) -> NDArray[np.float64]:
+    """Places (n, 3) of the surface that a camera sees, of evenly chosen pixels.
+
+    Args:
+        camera: a pinhole.
+        depth: (height, width) along its axis; infinity where nothing is seen.
+    """
     fx, fy, cx, cy = camera.intrinsics
-    y, x = np.nonzero(np.isfinite(depth))
+    seen_at = np.flatnonzero(np.isfinite(depth))
+    if len(seen_at):
+        seen_at = seen_at[evenly(len(seen_at), _PLACES)]
+    y, x = np.unravel_index(seen_at, depth.shape)
     z = depth[y, x].astype(np.float64)
     seen = np.stack([(x + 0.5 - cx) / fx * z, (y + 0.5 - cy) / fy * z, z], axis=1)
     return np.asarray((seen - camera.view[:3, 3]) @ camera.view[:3, :3])

@@ -90,7 +90,7 @@ class MeshExport:
             self.grid = self._depth.grid
             found = surface(self._depth.inside, self.grid, 0.0, self._depth.seen)
             yield Report(1, 2, "steps: surface")
-            yield self._written(*found, f"{len(self._depth.cameras)} depths")
+            yield self._written(*found, f"{len(self._depth.cameras)} depths", 2)
             return
         # The variance of a voxel's box along each axis: samples are means over voxels.
         dilation = self.grid.spacing[0] ** 2 / 12
@@ -103,17 +103,17 @@ class MeshExport:
         if self._name == "glb":
             vertices = (vertices @ _UPRIGHT.T).astype(np.float32)
             self.announce("the scene is turned so that the axis of rotation, z, is y")
-        yield self._written(vertices, triangles, f"density {level:.6g}")
+        yield self._written(vertices, triangles, f"density {level:.6g}", 3)
 
     def _written(
-        self, vertices: NDArray[np.float32], triangles: NDArray[np.uint32], where: str
+        self, vertices: NDArray[np.float32], triangles: NDArray[np.uint32], where: str, steps: int
     ) -> Report:
         content = MESH_FORMATS[self._name](vertices, triangles)
         write_whole(self.path, content)
         self.result = (
             f"{self.path}, {len(triangles)} triangles at {where}, {format_bytes(len(content))}"
         )
-        return Report(1, 1, "steps: file")
+        return Report(steps, steps, "steps: file")
 
     def _level(self, volume: NDArray[np.float32]) -> float:
         from skimage.filters import threshold_otsu
