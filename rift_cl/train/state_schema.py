@@ -29,13 +29,15 @@ class Field:
         shape: numbers, or names of sizes that are the same wherever they are named.
         dtype: NumPy's code of the type.
         least: smallest value.
-        finite: whether infinity is refused; what is not a number is in any case.
+        finite: whether infinity is refused.
+        numbers: whether what is not a number is refused.
     """
 
     shape: tuple[int | str, ...]
     dtype: str = "f4"
     least: float = -np.inf
     finite: bool = True
+    numbers: bool = True
 
 
 # (splats, ...); what modes, coefficients and lobes count is the same in values and moments.
@@ -89,11 +91,11 @@ def _schema(state: Arrays, views: int) -> dict[str, Field]:
     parts = ("raw", -np.inf), ("first", -np.inf), ("second", 0.0)
     for name in (*GROUPS, *there):
         for part, least in parts:
-            fields[f"{part}.{name}"] = Field(_GROUPS[name], least=least)
+            fields[f"{part}.{name}"] = _trained(_GROUPS[name], least)
     for part, least in parts if lit else ():
-        fields[f"environment.{part}"] = Field(("lobes of light", 3), least=least)
+        fields[f"environment.{part}"] = _trained(("lobes of light", 3), least)
     if "band.lengths" in state:
-        fields["band.lengths"] = Field(("splats",), least=0)
+        fields["band.lengths"] = _trained(("splats",), 0)
     for name, shapes in _PER_VIEW.items():
         if any(key.startswith(f"{name}.") for key in state):
             fields[f"{name}.counts"] = Field((views,), "f8", 0)
@@ -101,6 +103,11 @@ def _schema(state: Arrays, views: int) -> dict[str, Field]:
                 least = 0 if key == "second" else -np.inf
                 fields[f"{name}.{key}"] = Field((views, *shape), "f8", least)
     return {**fields, "loss.mean_square": _LOSS, "loss.noise": _LOSS}
+
+
+def _trained(shape: tuple[int | str, ...], least: float) -> Field:
+    """What is known of splats, which may be no numbers until a strategy removes them."""
+    return Field(shape, least=least, finite=False, numbers=False)
 
 
 def _check(name: str, array: NDArray[Any], field: Field, sizes: dict[str, int]) -> None:
@@ -115,8 +122,12 @@ def _check(name: str, array: NDArray[Any], field: Field, sizes: dict[str, int]) 
             f"the checkpoint is of another run: {name} is {array.dtype} {shape}, wanted {dtype} "
             f"({', '.join(map(str, wanted))})"
         )
-    allowed = np.isfinite(array) if field.finite else ~np.isnan(array)
-    if not (allowed & (array >= field.least)).all():
+    refused = array < field.least
+    if field.finite:
+        refused |= np.isinf(array)
+    if field.numbers:
+        refused |= np.isnan(array)
+    if refused.any():
         raise CheckpointError(f"the checkpoint is damaged: values of {name} cannot be right")
     named = zip(field.shape, shape, strict=True)
     sizes.update((size, found) for size, found in named if isinstance(size, str))
