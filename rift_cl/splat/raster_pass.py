@@ -132,6 +132,8 @@ def draw_bands(
         yield rasterize(
             device, screen, lists, size, settings=settings, background=background, into=band
         )
+        # Gone before the next ones are made.
+        del band, lists
 
 
 def draw_grad(

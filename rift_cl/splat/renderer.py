@@ -8,6 +8,7 @@ to the host, images too that the device does not hold.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -237,12 +238,11 @@ class Renderer:
         device = self.device
         settings, channels = self._checked(splats, camera, depth)
         memory = FrameMemory.of(splats, camera.size, channels.total, settings)
-        try:
-            check_fixed(memory, device.budget, device.traits.allocation)
-        except ResourceLimitError:
-            return self._in_bands(splats, camera, background, depth, memory)
-        frame = self.forward(splats, camera, background=background, depth=depth)
-        return Picture(device.get(frame.image), device.get(frame.transmittance))
+        with suppress(ResourceLimitError):
+            frame = self.forward(splats, camera, background=background, depth=depth)
+            return Picture(device.get(frame.image), device.get(frame.transmittance))
+        # Out here, since what was made before an error lives as long as it is handled.
+        return self._in_bands(splats, camera, background, depth, memory)
 
     def _in_bands(
         self,
@@ -271,6 +271,8 @@ class Renderer:
             rows = slice(band.above, band.above + len(band.image))
             download(device, band.image, image[rows])
             download(device, band.transmittance, rest[rows])
+            # Gone before the next one is made.
+            del band
         return Picture(image, rest)
 
     def backward(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from importlib import import_module
 
 import pytest
@@ -14,6 +15,7 @@ import rift_cl as rift
 from rift_cl.errors import InputError, ResourceLimitError
 from rift_cl.splat import Renderer, Splats, SplatSettings
 from rift_cl.splat.bands import FrameMemory
+from rift_cl.splat.raster import Raster
 
 RENDERER = import_module("rift_cl.splat.renderer")
 
@@ -75,6 +77,28 @@ def test_an_image_larger_than_the_budget_has_the_same_bits(device, monkeypatch):
     found = drawn(limited(device, memory.fixed - 1), values)
     assert len(rows) > 1
     assert_same(found, drawn(device, values))
+
+
+def test_an_image_that_fits_without_its_lists_has_the_same_bits(device, monkeypatch):
+    values, rows = visible_splats(150), bands_of(monkeypatch)
+    memory = FrameMemory.of(Splats.upload(device, **values), SIZE, 3, SETTINGS)
+    found = drawn(limited(device, memory.fixed + 1), values)
+    assert len(rows) > 1
+    assert_same(found, drawn(device, values))
+
+
+def test_one_band_at_a_time_is_on_the_device(device, monkeypatch):
+    made, empty = [], Raster.empty
+
+    def noted(*given, **how):
+        assert all(image() is None for image in made)
+        band = empty(*given, **how)
+        made.append(weakref.ref(band.image))
+        return band
+
+    monkeypatch.setattr(Raster, "empty", noted)
+    drawn(limited(device, allocation=30_000), visible_splats(150))
+    assert len(made) > 2
 
 
 def test_what_is_no_picture_is_refused_in_one_sentence(device):
