@@ -251,7 +251,7 @@ def shade_grad(
     Raises:
         InputError: the splats have no coefficients, or no such functions are known.
         ShapeError: the gradient and the features have not the same channels, three or more, or
-            the coefficients, the lobes and their gradient do not fit.
+            the coefficients, the moments of their step, the lobes and their gradient do not fit.
     """
     shading = Shading.of(means, sh, lobes, angular)
     count = means.shape[0]
@@ -271,7 +271,12 @@ def shade_grad(
             device, grad_lobes, lobes.shape, name="shade_grad: grad_lobes"
         )
     by_sh = device.empty(shading.parameters[coefficients].shape) if sh_step is None else None
-    step = {f"grad_{coefficients}": by_sh} if sh_step is None else sh_step.arguments
+    step = {f"grad_{coefficients}": by_sh}
+    if sh_step is not None:
+        step = sh_step.arguments
+        for name, moment in (("first", sh_step.first), ("second", sh_step.second)):
+            shape = shading.parameters[coefficients].shape
+            as_device_array(device, moment, shape, name=f"shade_grad: sh_step.{name}")
     inverse = np.linalg.inv(camera.view[:3, :3]).T
     rows = np.column_stack([inverse, camera.center]).astype(np.float32, order="C")
     device.launch(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_parameters import RATES, raw_values
 
 from rift_cl.basis.angular import angular_basis
+from rift_cl.errors import ShapeError
 from rift_cl.geometry import Camera
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
@@ -44,6 +47,17 @@ def stepped(device, raw, angular, rest, *, inside):
         assert (found.sh is None) == inside
         parameters.update(found, rates, sh_rest=rest, opacity_penalty=0.1, scale_penalty=0.1)
     return [*parameters.host(), {"camera": device.get(found.camera)}]
+
+
+@pytest.mark.parametrize("moment", ["first", "second"])
+def test_moments_of_another_shape_are_refused(device, moment):
+    parameters = Parameters.of(device, values_of("sh", 4, 20))
+    renderer = Renderer(device=device)
+    frame = renderer.forward(parameters.drawn, CAMERA)
+    step = parameters.sh_step(RATES, sh_rest=1.0)
+    step = replace(step, **{moment: device.zeros((19, 4, 3))})
+    with pytest.raises(ShapeError, match=moment):
+        renderer.backward(frame, device.zeros((*SIZE, 3)), sh_step=step)
 
 
 @pytest.mark.parametrize(
