@@ -185,12 +185,13 @@ class Trainer:
         value, by_image = self._compared(frame.image, number, rates["exposures"])
         shares = settings.learning_rates
         sh_rest = shares.lobes_rest if "lobes" in parameters.raw else shares.sh_rest
+        kept = self.strategy.wants_sh_gradient
         gradients = self.renderer.backward(
             frame,
             by_image,
             with_camera=self.poses is not None,
             with_background=False,
-            sh_step=parameters.sh_step(rates, sh_rest=sh_rest),
+            sh_step=None if kept else parameters.sh_step(rates, sh_rest=sh_rest),
         )
         if self.poses is not None and gradients.camera is not None:
             by_view = self.device.get(gradients.camera)[:12].reshape(3, 4).astype(float)
@@ -269,7 +270,8 @@ class Trainer:
         """Go on from a state of a run with the same settings and views.
 
         Raises:
-            CheckpointError: it is of another run, or no state at all; nothing was changed then.
+            CheckpointError: it is of another run, or no state at all; nothing was changed then if
+                an array is not what it has to be.
         """
         check_state(state, views=len(self.pictures.cameras))
         groups = _grouped(state)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from rift_cl.train.parameters import GROUPS, Parameters
 from rift_cl.train.schedules import LearningRateSchedule
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import hull_points, random_points, start_splats
-from rift_cl.train.strategy import McmcSettings
+from rift_cl.train.strategy import McmcSettings, Strategy, StrategySettings
 from rift_cl.train.trainer import Trainer
 
 pytestmark = pytest.mark.once
@@ -84,6 +84,38 @@ def test_two_runs_give_the_same_splats_bit_by_bit(device):
     for _ in range(2):
         trainer = trainer_of(device)
         list(trainer.run())
+        found.append(trainer.parameters.host())
+    for first, second in zip(*found, strict=True):
+        assert all(first[name].tobytes() == second[name].tobytes() for name in GROUPS)
+
+
+@dataclass(frozen=True)
+class Watching(StrategySettings):
+    """Nothing changes; what is seen of the harmonics' gradient is kept."""
+
+    wants: bool
+
+    def begin(self, parameters, run):
+        return Watcher(run, self.wants)
+
+
+class Watcher(Strategy):
+    def __init__(self, run, wants):
+        super().__init__(run)
+        self.wants_sh_gradient, self.seen = wants, []
+
+    def after_step(self, parameters, frame, gradients, learning_rate):
+        self.seen.append(None if gradients.sh is None else gradients.sh.shape)
+        return parameters
+
+
+def test_a_strategy_that_wants_the_harmonics_gradient_has_it_and_the_same_bits(device):
+    found = []
+    for wants in (False, True):
+        trainer = trainer_of(device, replace(SETTINGS, strategy=Watching(wants)))
+        for _ in range(3):
+            trainer.step()
+        assert trainer.strategy.seen == [(100, 1, 3) if wants else None] * 3
         found.append(trainer.parameters.host())
     for first, second in zip(*found, strict=True):
         assert all(first[name].tobytes() == second[name].tobytes() for name in GROUPS)

@@ -85,6 +85,9 @@ class Strategy:
         run: the run that the strategy serves.
     """
 
+    # Whether ``after_step`` reads ``gradients.sh``, for which memory and time are spent then.
+    wants_sh_gradient = False
+
     def __init__(self, run: TrainingRun) -> None:
         self.run = run
 
@@ -108,7 +111,9 @@ class Strategy:
         Args:
             parameters: the splats after the step, in the same order as in the frame.
             frame: what was rendered in the step.
-            gradients: of its loss.
+            gradients: of its loss, without the penalties, by what was drawn: scales and opacities,
+                not their logarithms and logits. ``gradients.sh`` is None unless the class sets
+                ``wants_sh_gradient``: coefficients take their step of Adam as it is made.
             learning_rate: of the positions in the step, in units of the scene.
 
         Returns:
