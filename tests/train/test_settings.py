@@ -6,9 +6,11 @@ from dataclasses import fields
 
 import pytest
 
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, SettingError
+from rift_cl.train.environment_settings import EnvironmentSettings
 from rift_cl.train.settings import LearningRates, TrainSettings
 from rift_cl.train.strategy import DefaultSettings, McmcSettings, XraySettings
+from rift_cl.train.xray.settings import XrayTrainSettings
 
 NAN, INF = float("nan"), float("inf")
 
@@ -55,6 +57,11 @@ def test_what_is_no_number_is_refused_everywhere(kind, value):
         if item.type != "bool":
             with pytest.raises(InputError, match=f"{item.name} is"):
                 kind(**{item.name: value})
+
+
+def test_xrays_have_no_light_to_reflect():
+    with pytest.raises(SettingError, match="kind is 'shared'"):
+        XrayTrainSettings(environment=EnvironmentSettings("shared"))
 
 
 def test_zero_switches_off_what_can_be_switched_off():

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
+from rift_cl.errors import SettingError
 from rift_cl.option_marks import Expert, NoOption, Short, ShortExpert, ShortSplats
 from rift_cl.splat.settings import Activation
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
@@ -72,6 +73,14 @@ class XrayTrainSettings(TrainSettings):
     )
     learning_rates: ShortExpert[LearningRates] = field(default_factory=XrayLearningRates)
     solve: Short[SolveSettings] = field(default_factory=SolveSettings)
+
+    def __post_init__(self) -> None:
+        """Check every number's range, and that nothing is wanted that X-rays do not have."""
+        super().__post_init__()
+        if self.environment.shared:
+            raise SettingError(
+                self.environment, "kind", "is 'shared', but X-rays are not reflected: wanted none"
+            )
 
     def decided(self: X, views: int) -> X:
         """These settings, with a value for what was left open.
