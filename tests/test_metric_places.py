@@ -32,7 +32,8 @@ def told(image, front, counted, at):
     y, x = at
     if not counted[at]:
         return None
-    near = front[max(0, y - 2) : y + 3, max(0, x - 2) : x + 3]
+    about = np.s_[max(0, y - 2) : y + 3, max(0, x - 2) : x + 3]
+    near = front[about][counted[about]]
     if near.any() and not near.all():
         return "silhouette"
     if not front[at]:
@@ -62,6 +63,12 @@ def test_without_a_foreground_there_is_no_silhouette_and_no_background(photograp
     found = metrics.photograph_regions(photograph[0])
     assert not found["silhouette"].any() and not found["background"].any()
     assert np.sum(list(found.values()), axis=0).min() == 1
+
+
+def test_the_edge_of_what_counts_is_no_silhouette(photograph):
+    """A mask that cuts an object, or that is the object, is no border of it."""
+    image, front = photograph
+    assert not metrics.photograph_regions(image, front, front)["silhouette"].any()
 
 
 def test_a_matte_photograph_has_no_highlights(photograph):

@@ -33,8 +33,8 @@ def photograph_regions(
 
     Each pixel that counts is in one region, the first of these that fits:
 
-    - *silhouette*: a pixel of the other kind, foreground or background, lies within 2 pixels along
-      rows and columns;
+    - *silhouette*: a pixel of the other kind, foreground or background, that counts lies within 2
+      pixels along rows and columns;
     - *background*: it is not foreground;
     - *highlights*: its luma (Rec. 709 of the display values) is at least halfway from the median
       of the foreground to white;
@@ -74,7 +74,7 @@ def photograph_regions(
     object_pixels = front & free
     middle = float(np.median(luma[object_pixels])) if object_pixels.any() else 1.0
     tests = {
-        "silhouette": _border(front),
+        "silhouette": _border(front, free),
         "background": ~front,
         "highlights": luma >= middle + _BRIGHT * max(1 - middle, 0.0),
         "texture": variance > _VARIED**2,
@@ -87,13 +87,13 @@ def photograph_regions(
     return {name: found[name] for name in REGIONS}
 
 
-def _border(front: _Mask) -> _Mask:
-    """Pixels near which there are foreground and background."""
-    from scipy.ndimage import maximum_filter, minimum_filter
+def _border(front: _Mask, counted: _Mask) -> _Mask:
+    """Pixels near which there are foreground and background that count."""
+    from scipy.ndimage import maximum_filter
 
-    side = 2 * _REACH + 1
-    near = [filtered(front.astype(np.uint8), side) for filtered in (maximum_filter, minimum_filter)]
-    return np.asarray(near[0] > near[1])
+    kinds = (mask.astype(np.uint8) for mask in (front & counted, ~front & counted))
+    near = [maximum_filter(kind, 2 * _REACH + 1) for kind in kinds]
+    return np.asarray(near[0] & near[1], np.bool_)
 
 
 def _mask(name: str, mask: ArrayLike | None, shape: tuple[int, ...]) -> _Mask:
