@@ -3,7 +3,7 @@
  *     color = max(sum over k of B_k(direction; lobes) linear[k] + 1/2, 0),
  *     direction = mean - camera, unit,
  *
- * B_0 the constant of the harmonics and the others as include/lobe*.h derive them: modes on a
+ * B_0 the constant of the harmonics and the others as include/shading/lobe*.h derive them: modes on a
  * chart, or spherical Gaussians. Splats that are not drawn are black, and so are those whose
  * numbers give no finite colour or whose lobes point nowhere (black ones pass no gradient on, so
  * that they spoil nothing else). The colour is written to the first three of STRIDE features.

@@ -1,7 +1,7 @@
 /* Gradient of lobe_shade: to linear coefficients and lobes, and through the direction to mean and
  * camera.
  *
- * The first is B_k times what comes in; the lobes' is derived in include/lobe*.h. Those of mean and
+ * The first is B_k times what comes in; the lobes' is derived in include/shading/lobe*.h. Those of mean and
  * camera, told in include/shading/seen_color.h, are added to grad_means and to this run's row of
  * camera_parts. inverse_x, _y, _z are the rows of W^-T, each followed by a coordinate of o. A colour
  * that was held at zero passes nothing on, and so no splat that is not drawn. With ADAM the linear

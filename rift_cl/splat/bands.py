@@ -168,11 +168,13 @@ def check_fixed(memory: FrameMemory, budget: int, largest: int) -> None:
     what = f"an image of {memory.pixels} pixels with {memory.channels} channels"
     check_array(image, largest, what=what, instead="draw a smaller image, or fewer channels")
     if memory.fixed > budget:
+        drawn, fewer = f"{memory.splats} splats", "fewer splats"
+        if memory.pixels:
+            drawn, fewer = f"{drawn} and {what}", f"{fewer} or a smaller image"
         raise ResourceLimitError(
-            f"{memory.splats} splats and an image of {memory.pixels} pixels with "
-            f"{memory.channels} channels need {format_bytes(memory.fixed)}, the memory budget is "
+            f"{drawn} need {format_bytes(memory.fixed)}, the memory budget is "
             f"{format_bytes(budget)}: raise the budget (RIFT_MEMORY or --memory), use a device "
-            "with more memory, or draw fewer splats or a smaller image"
+            f"with more memory, or draw {fewer}"
         )
 
 

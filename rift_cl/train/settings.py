@@ -75,7 +75,9 @@ class LearningRates:
     """Learning rate of how splats reflect that light: logits of tints, logarithms of sharpness."""
     # Normals that learn drift: they come from the places of neighbours instead.
     normals: float = 0.0
-    """Learning rate of the normals of splats that reflect that light."""
+    """Learning rate of the normals of splats that reflect that light; what they learn lasts until
+    they are taken from the places of neighbours again, every 100 steps and whenever splats were
+    relocated."""
 
     def __post_init__(self) -> None:
         """Check every number's range."""

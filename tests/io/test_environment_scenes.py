@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import splat_files as made
+from PIL import Image
 from plyfile import PlyData
 
 import rift_cl as rift
@@ -132,5 +133,8 @@ def test_pictures_of_another_shape_are_refused(tmp_path):
     write_png(tmp_path / "a.png", np.zeros((8, 8, 3)))
     with pytest.raises(InputError, match="twice as wide as high"):
         read_environment_map(tmp_path / "a.png", 16, display=True)
+    Image.new("LA", (16, 8)).save(tmp_path / "two.png")
+    with pytest.raises(InputError, match="has 2 channels"):
+        read_environment_map(tmp_path / "two.png", 16, display=True)
     with pytest.raises(InputError):
         read_environment_map(tmp_path / "none.png", 16, display=True)

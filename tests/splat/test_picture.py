@@ -105,6 +105,8 @@ def test_what_is_no_picture_is_refused_in_one_sentence(device):
     values = visible_splats(20, coefficients=1)
     with pytest.raises(ResourceLimitError, match=r"one row of tiles of the picture takes 7\.5 KiB"):
         drawn(limited(device, allocation=5_000), values)
+    with pytest.raises(ResourceLimitError, match=r"^20 splats need .* or draw fewer splats$"):
+        drawn(limited(device, 5_000), values)
     renderer = Renderer(SETTINGS, device=limited(device, allocation=30_000))
     splats = Splats.upload(renderer.device, **values)
     camera = camera_of("pinhole", size=SIZE)

@@ -1,4 +1,4 @@
-/* What splat_activate and its gradient have in common: splats' scales and opacities, before and after
+/* What splat_activate and splat_update have in common: splats' scales and opacities, before and after
  * the limit of their band, LANES at a time. */
 
 #include "include/splat/splat_rows.h"

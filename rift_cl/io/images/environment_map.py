@@ -64,7 +64,7 @@ def read_environment_map(
         display: whether the radiance shall be in display light.
 
     Raises:
-        InputError: there is no such file, or its picture has another shape.
+        InputError: there is no such file, or its picture has another shape or two channels.
         FileFormatError: it is damaged, or no picture.
         NonFiniteError: it holds NaN or infinity.
     """
@@ -73,7 +73,12 @@ def read_environment_map(
     if picture.ndim == 2:
         picture = np.repeat(picture[..., None], 3, axis=2)
     rows, columns = picture.shape[:2]
-    if columns != 2 * rows or picture.shape[2] < 3:
+    if picture.shape[2] < 3:
+        raise InputError(
+            f"{path}: has {picture.shape[2]} channels, wanted one (grey) or three (red, green and "
+            "blue); further ones are not read"
+        )
+    if columns != 2 * rows:
         raise InputError(
             f"{path}: has {rows} rows of {columns} pixels, wanted a picture of all directions, "
             "twice as wide as high"

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast, get_args
 
@@ -106,6 +106,14 @@ class SceneBasis:
         parts += [f"activation {self.activation}"] if self.activation != "clamp" else []
         parts += [f"angular {self.angular}"] if self.angular != "sh" else []
         parts += [f"environment {self.environment}"] if self.environment else []
+        return ", ".join(parts)
+
+    @property
+    def named(self) -> str:
+        """What there is, in the words of an error."""
+        other = replace(self, environment=0).words
+        parts = [other] if other else []
+        parts += ["environment light"] if self.environment else []
         return ", ".join(parts)
 
     @property

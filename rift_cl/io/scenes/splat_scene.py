@@ -166,7 +166,7 @@ class SplatScene:
 
         Raises:
             InputError: the ending is another, or a .splat file cannot hold the scene: one that is
-                empty, or of X-rays, or has modes, lobes or an activation.
+                empty, or of X-rays, or has modes, lobes, an environment light or an activation.
             OutputError: the file cannot be written.
         """
         path = Path(path)
@@ -176,7 +176,7 @@ class SplatScene:
             raise InputError(f"{path}: a .splat file holds opacities, not densities: save a .ply")
         basis = SceneBasis.of(self)
         if path.suffix.lower() == ".splat" and not basis.plain:
-            raise InputError(f"{path}: a .splat file holds no {basis.words}: save a .ply")
+            raise InputError(f"{path}: a .splat file holds no {basis.named}: save a .ply")
         size, blocks = _ENCODERS[path.suffix.lower()](self)
         check_space(path, size)
         with atomic_path(path) as part:

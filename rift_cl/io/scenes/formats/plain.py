@@ -42,7 +42,7 @@ def check_plain(scene: SplatScene, degree: int) -> None:
     if not len(scene):
         raise InputError("the scene holds no splats, there is nothing to write")
     if not SceneBasis.of(scene).plain:
-        raise InputError(f"the format holds no {SceneBasis.of(scene).words}: convert it first")
+        raise InputError(f"the format holds no {SceneBasis.of(scene).named}: convert it first")
     if scene.degree > degree:
         raise InputError(f"the format holds harmonics to degree {degree}, not {scene.degree}")
 
