@@ -45,39 +45,52 @@ SHIPPED: Settings = {
 }
 FOUND: Settings = dict(PRESETS["fast"])
 
+# Rates of the default settings that a preset leaves as they are.
+_RATES: Settings = {
+    **FOUND,
+    "learning_rates.logits": 5e-2,
+    "learning_rates.sh": 2.5e-3,
+    "learning_rates.lobes": 1e-2,
+    "strategy.opacity_penalty": 0.01,
+    "strategy.scale_penalty": 0.01,
+}
+
+
+def times(factor: float, *names: str, of: Settings = FOUND) -> Settings:
+    """Settings in which some values are larger by a factor than those that were found."""
+    return {**of, **{name: factor * {**_RATES, **of}[name] for name in names}}
+
+
+_MEANS = "learning_rates.means"
+_SHAPES = ("learning_rates.log_scales", "learning_rates.quats")
+_PENALTIES = ("strategy.opacity_penalty", "strategy.scale_penalty")
+_HARMONICS: Settings = dict(PRESETS["harmonics"])
+
 VARIANTS: dict[str, Settings] = {
     "shipped": SHIPPED,
     "found": FOUND,
-    "harmonics": dict(PRESETS["harmonics"]),
-    "scales x 2": {**FOUND, "learning_rates.log_scales": 2e-2},
-    "scales and quaternions x 2": {
-        **FOUND,
-        "learning_rates.log_scales": 2e-2,
-        "learning_rates.quats": 4e-3,
-    },
-    "scales and quaternions x 4": {
-        **FOUND,
-        "learning_rates.log_scales": 4e-2,
-        "learning_rates.quats": 8e-3,
-    },
-    "positions x 2": {**FOUND, "learning_rates.means": 1.28e-3},
-    "positions / 2": {**FOUND, "learning_rates.means": 3.2e-4},
-    "logits x 2": {**FOUND, "learning_rates.logits": 0.1},
-    "logits / 2": {**FOUND, "learning_rates.logits": 0.025},
-    "colours x 2": {**FOUND, "learning_rates.sh": 5e-3},
-    "colours / 2": {**FOUND, "learning_rates.sh": 1.25e-3},
-    "lobes x 2": {**FOUND, "learning_rates.lobes": 2e-2},
-    "lobes / 2": {**FOUND, "learning_rates.lobes": 5e-3},
+    "harmonics": _HARMONICS,
+    "all x 2": times(2, _MEANS, *_SHAPES),
+    "all / 2": times(0.5, _MEANS, *_SHAPES),
+    "harmonics, all x 2": times(2, _MEANS, *_SHAPES, of=_HARMONICS),
+    "harmonics, all / 2": times(0.5, _MEANS, *_SHAPES, of=_HARMONICS),
+    "scales x 2": times(2, _SHAPES[0]),
+    "scales and quaternions x 2": times(2, *_SHAPES),
+    "scales and quaternions / 2": times(0.5, *_SHAPES),
+    "positions x 2": times(2, _MEANS),
+    "positions / 2": times(0.5, _MEANS),
+    "logits x 2": times(2, "learning_rates.logits"),
+    "logits / 2": times(0.5, "learning_rates.logits"),
+    "colours x 2": times(2, "learning_rates.sh"),
+    "colours / 2": times(0.5, "learning_rates.sh"),
+    "lobes x 2": times(2, "learning_rates.lobes"),
+    "lobes / 2": times(0.5, "learning_rates.lobes"),
     "4 lobes": {**FOUND, "modes": 4},
     "walk / 10": {**FOUND, "strategy.noise": 5e4},
     "cooldown 0.25": {**FOUND, "cooldown": 0.25},
     "cooldown 0.5": {**FOUND, "cooldown": 0.5},
-    "penalties / 2": {
-        **FOUND,
-        "strategy.opacity_penalty": 0.005,
-        "strategy.scale_penalty": 0.005,
-    },
-    "penalties x 2": {**FOUND, "strategy.opacity_penalty": 0.02, "strategy.scale_penalty": 0.02},
+    "penalties / 2": times(0.5, *_PENALTIES),
+    "penalties x 2": times(2, *_PENALTIES),
     "relocation from 200": {**FOUND, "strategy.first": 200},
     "relocation every 50": {**FOUND, "strategy.first": 200, "strategy.every": 50},
 }

@@ -13,9 +13,9 @@ from typing import Any
 # Positions, scales and rotations that move faster serve short fits, and so does colour by direction
 # that is there nearly from the start; the random walk only blurs what has been found.
 _RATES = {
-    "learning_rates.means": 6.4e-4,
-    "learning_rates.log_scales": 1e-2,
-    "learning_rates.quats": 2e-3,
+    "learning_rates.means": 1.28e-3,
+    "learning_rates.log_scales": 2e-2,
+    "learning_rates.quats": 4e-3,
     "strategy.noise": 0.0,
 }
 PRESETS: Mapping[str, Mapping[str, Any]] = {
