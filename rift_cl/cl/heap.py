@@ -1,4 +1,4 @@
-"""Memory for the large arrays of a device that computes in the host's memory.
+"""Memory for the large arrays of a CPU.
 
 A pool that keeps what arrays leave for arrays of the same size has, after a while, as much memory
 for every size as was ever needed of it: a third more than all arrays together take at any time. A
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 import threading
+from bisect import insort
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -160,6 +161,6 @@ class _Segment:
     def cut(self, begin: int, size: int) -> Any:
         """The buffer of a new block in a hole."""
         buffer = self._buffer.get_sub_region(begin, size)
-        self.blocks.append(_Block(buffer, begin, begin + size))
-        self.blocks.sort(key=lambda block: block.begin)
+        # In one step: an interrupt between two would leave the blocks out of order.
+        insort(self.blocks, _Block(buffer, begin, begin + size), key=lambda block: block.begin)
         return buffer

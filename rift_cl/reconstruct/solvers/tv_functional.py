@@ -1,4 +1,4 @@
-"""Total variation on the device: its value, its dual steps, and its proximal map.
+"""Total variation: its value, its dual steps, and its proximal map.
 
     TV(x) = sum over samples of |D x| * volume of a sample,
 
@@ -126,7 +126,9 @@ class TotalVariation:
         every = (*given.values(), *made.values())
         slices = self.shape[0]
         each = sum(x.nbytes for x in every) // slices
-        most = max(self.device.budget // (2 * each) - 2, 1)
+        array = max(x.nbytes for x in every) // slices
+        room = min(self.device.budget // (2 * each), self.device.traits.allocation // array)
+        most = max(room - 2, 1)
         for run in runs(slices, most):
             # Differences reach to the slices beside.
             first, stop = max(run.start - 1, 0), min(run.stop + 1, slices)
