@@ -1,7 +1,7 @@
 """Adam on device arrays: what a step is made of, and steps by a gradient that is an array.
 
-A kernel that makes a gradient can take a step along it at once (``kernels/include/adam_step.h``):
-it is given ``AdamStep.arguments``.
+A kernel that makes a gradient can take a step along it at once
+(``kernels/include/train/adam_step.h``): it is given ``AdamStep.arguments``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Where the arrays of a method are kept: on a device, or beside it where they do not fit.
 
 Arrays beside it are NumPy's. Where the device has memory of its own and the host has room, they are
-in the host's memory; else they are temporary files that are mapped into it, so that the system
-keeps of them what there is room for. What is done to them (``axpby``, ``dot`` and the like, and
+in the host's memory; else they are temporary files (in ``TMPDIR``) that are mapped into it, so that
+the system keeps of them what there is room for. Where that folder is itself in memory they may take
+no more than the host's budget. What is done to them (``axpby``, ``dot`` and the like, and
 every operator that takes host arrays) is done in parts.
 """
 
@@ -13,6 +14,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
 Shape = tuple[int, ...]
 # What temporary files may take of the free room on their disk.
 _DISK_SHARE = 0.9
+# Types of file systems that are in memory.
+_IN_MEMORY = ("tmpfs", "ramfs")
 
 
 class ArrayHome:
@@ -40,7 +44,7 @@ class ArrayHome:
         beside: bytes of all arrays together that are to be kept beside the device; None: on it.
 
     Raises:
-        ResourceLimitError: there is no room for them on the disk of temporary files.
+        ResourceLimitError: there is no room for them in the folder of temporary files.
     """
 
     def __init__(self, device: Device, dtype: DTypeLike, beside: int | None = None) -> None:
@@ -90,19 +94,19 @@ def mapped_file(shape: Shape, dtype: DTypeLike) -> NDArray[Any]:
     """An array of zeros in a temporary file that goes when the array does.
 
     Raises:
-        ResourceLimitError: the disk of temporary files has no room for it.
+        ResourceLimitError: the folder of temporary files has no room for it.
     """
     size = math.prod(shape) * np.dtype(dtype).itemsize
     if size == 0:
         return np.zeros(shape, dtype)
-    with tempfile.TemporaryFile(prefix="rift-") as file:
-        try:
+    try:
+        with tempfile.TemporaryFile(prefix="rift-") as file:
             # A disk that is full when a mapped page is written ends the process.
             if hasattr(os, "posix_fallocate"):
                 os.posix_fallocate(file.fileno(), 0, size)
             return np.asarray(np.memmap(file, dtype, "r+", shape=shape))
-        except OSError as failure:
-            raise ResourceLimitError(_no_room(size)) from failure
+    except OSError as failure:
+        raise ResourceLimitError(_no_room(size, failure.strerror)) from failure
 
 
 def _wants_files(device: Device, size: int) -> bool:
@@ -113,14 +117,37 @@ def _wants_files(device: Device, size: int) -> bool:
     """
     if not (device.traits.is_cpu or device.traits.unified) and size <= host_budget():
         return False
-    if size > _DISK_SHARE * shutil.disk_usage(tempfile.gettempdir()).free:
-        raise ResourceLimitError(_no_room(size))
+    try:
+        folder = tempfile.gettempdir()
+        room = _DISK_SHARE * shutil.disk_usage(folder).free
+    except OSError as failure:
+        raise ResourceLimitError(_no_room(size, failure.strerror)) from failure
+    if _is_memory(folder) and host_budget() < room:
+        room, why = host_budget(), "files there are in memory"
+    else:
+        why = f"{format_bytes(room)} are free for them"
+    if size > room:
+        raise ResourceLimitError(_no_room(size, why))
     return True
 
 
-def _no_room(size: int) -> str:
+def _is_memory(folder: str) -> bool:
+    """Whether files of a folder are kept in the host's memory, as Linux tells."""
+    try:
+        mounts = Path("/proc/mounts").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return False
+    place = Path(folder).resolve()
+    # Later mounts hide earlier ones at the same place.
+    kinds = {where: kind for _, where, kind, *_ in map(str.split, mounts.splitlines())}
+    around = map(str, (place, *place.parents))
+    return next((kinds[each] for each in around if each in kinds), "") in _IN_MEMORY
+
+
+def _no_room(size: int, why: str | None) -> str:
+    where = tempfile.tempdir or "any folder that is usual for them"
     return (
         f"{format_bytes(size)} of arrays that fit no memory have no room in temporary files in "
-        f"{tempfile.gettempdir()}: name a folder with more room (TMPDIR), raise the memory budget "
-        "(RIFT_MEMORY or --memory), or make the problem smaller"
+        f"{where} ({why or 'which cannot be written'}): name a folder with more room (TMPDIR), "
+        "raise the memory budget (RIFT_MEMORY or --memory), or make the problem smaller"
     )

@@ -236,8 +236,8 @@ class _Opened(NamedTuple):
         context: the ``pyopencl.Context``.
         queue: the ``pyopencl.CommandQueue``.
         pool: memory for arrays, which keeps what they leave for the next ones.
-        heap: that for large arrays, where the device computes in the host's memory; otherwise None,
-            as GPUs may ask for more of parts of buffers than is known here.
+        heap: that for large arrays, where the device is a CPU; otherwise None, as GPUs may ask for
+            more of parts of buffers than is known here.
         direct: memory for arrays, from the driver.
         plain_array: a new array without memory, by shape and type.
     """

@@ -113,7 +113,11 @@ def _fitting(found: tuple[Device, ...], selector: str) -> list[Device]:
 def _tell_namesakes(fitting: list[Device], selector: str) -> None:
     """Warn where a name fits two drivers of that name, of which the first is taken."""
     first, *others = fitting
-    alike = [d for d in others if (d.name, d.platform) == (first.name, first.platform)]
+    alike = [
+        d
+        for d in others
+        if (d.name, d.platform) == (first.name, first.platform) and d.driver != first.driver
+    ]
     if alike:
         known = ", ".join(f"{d.selector} (driver {d.driver})" for d in (first, *alike))
         warnings.warn(

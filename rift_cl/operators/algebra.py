@@ -13,6 +13,7 @@ from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.array import DeviceArray
 from rift_cl.errors import (
     DeviceError,
+    DeviceMemoryError,
     DTypeError,
     InputError,
     ResourceLimitError,
@@ -56,6 +57,11 @@ class Adjoint(LinearOperator):
         """Bytes of device memory that the operator needs."""
         return self._forward.scratch
 
+    @property
+    def largest_scratch(self) -> int:
+        """Bytes of the largest array among these."""
+        return self._forward.largest_scratch
+
     def _chunks(self, budget: int) -> Iterable[Chunk]:
         return self._forward._adjoint_chunks(budget)
 
@@ -76,7 +82,7 @@ class Scaled(LinearOperator):
         return f"({self._factor:g} * {self._inner!r})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Scaled, (self._inner, self._factor)
+        return type(self), (self._inner, self._factor)
 
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
         self._inner._apply(x, out)
@@ -90,6 +96,11 @@ class Scaled(LinearOperator):
     def scratch(self) -> int:
         """Bytes of device memory that the operator needs."""
         return self._inner.scratch
+
+    @property
+    def largest_scratch(self) -> int:
+        """Bytes of the largest array among these."""
+        return self._inner.largest_scratch
 
     def _chunks(self, budget: int) -> Iterable[Chunk]:
         return map(self._scaled, self._inner._chunks(budget))
@@ -129,6 +140,12 @@ class Sum(LinearOperator):
         """Bytes of the second term's result, and of what the terms need."""
         other = self.dtype.itemsize * max(math.prod(self.domain), math.prod(self.range))
         return other + max(term.scratch for term in self._terms)
+
+    @property
+    def largest_scratch(self) -> int:
+        """Bytes of the largest array among these."""
+        other = self.dtype.itemsize * max(math.prod(self.domain), math.prod(self.range))
+        return max(other, *(term.largest_scratch for term in self._terms))
 
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
         left, right = self._terms
@@ -171,6 +188,12 @@ class Product(LinearOperator):
         between = self.dtype.itemsize * math.prod(self._inner.range)
         return between + max(self._outer.scratch, self._inner.scratch)
 
+    @property
+    def largest_scratch(self) -> int:
+        """Bytes of the largest array among these."""
+        between = self.dtype.itemsize * math.prod(self._inner.range)
+        return max(between, self._outer.largest_scratch, self._inner.largest_scratch)
+
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
         between = self.device.empty(self._inner.range, self.dtype)
         self._inner._apply(x, between)
@@ -184,7 +207,7 @@ class Product(LinearOperator):
     def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
         try:
             super()._apply_host(x, y)
-        except ResourceLimitError:
+        except (ResourceLimitError, DeviceMemoryError):
             # One after the other, each of which takes its work in parts where it can.
             between = np.empty(self._inner.range, self.dtype)
             self._inner._apply_host(x, between)
@@ -193,7 +216,7 @@ class Product(LinearOperator):
     def _apply_adjoint_host(self, y: NDArray[Any], x: NDArray[Any]) -> None:
         try:
             super()._apply_adjoint_host(y, x)
-        except ResourceLimitError:
+        except (ResourceLimitError, DeviceMemoryError):
             between = np.empty(self._inner.range, self.dtype)
             self._outer._apply_adjoint_host(y, between)
             self._inner._apply_adjoint_host(between, x)

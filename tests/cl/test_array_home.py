@@ -88,3 +88,29 @@ def test_a_file_that_finds_no_room_is_told(monkeypatch):
     monkeypatch.setattr("os.posix_fallocate", full, raising=False)
     with pytest.raises(ResourceLimitError, match="temporary files"):
         mapped_file((4, 3), "float64")
+
+
+@pytest.mark.parametrize("call", ["gettempdir", "TemporaryFile"])
+def test_a_folder_that_cannot_be_used_is_told(device, monkeypatch, call):
+    def unusable(*given, **options):
+        raise FileNotFoundError(2, "No usable temporary directory found")
+
+    monkeypatch.setattr(f"tempfile.{call}", unusable)
+    with pytest.raises(ResourceLimitError, match="No usable temporary directory"):
+        ArrayHome(limited(device, is_cpu=True), "float32", beside=8).empty((2,))
+
+
+@pytest.mark.parametrize("kind", ["tmpfs", "ext4"])
+def test_files_in_memory_take_no_more_than_memory(device, monkeypatch, tmp_path, kind):
+    mounts = f"none / ext4 rw 0 0\nnone {tmp_path} {kind} rw 0 0\n"
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "below"))
+    (tmp_path / "below").mkdir()
+    monkeypatch.setattr("pathlib.Path.read_text", lambda path, **options: mounts)
+    monkeypatch.setattr("rift_cl.cl.array_home.host_budget", lambda: 1000)
+    cpu = limited(device, is_cpu=True)
+    assert ArrayHome(cpu, "float32", beside=999).empty((2,)).shape == (2,)
+    if kind == "tmpfs":
+        with pytest.raises(ResourceLimitError, match="in memory"):
+            ArrayHome(cpu, "float32", beside=1001)
+    else:
+        ArrayHome(cpu, "float32", beside=1001)

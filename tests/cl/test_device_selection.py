@@ -134,6 +134,13 @@ def test_drivers_of_one_name_differ_by_their_version_and_are_told(pocl, monkeypa
     assert rift.open_device() is pocl
 
 
+def test_two_devices_of_one_driver_are_no_question_of_drivers(pocl, monkeypatch):
+    twin = rift.Device(Accelerator(pocl._handle), "9:0")
+    monkeypatch.setattr("rift_cl.cl.discovery._found", lambda: (pocl, twin))
+    assert twin.driver == pocl.driver
+    assert rift.open_device(pocl.name) is pocl
+
+
 def test_device_travels_as_its_selector(monkeypatch):
     monkeypatch.setenv("RIFT_DEVICE", "nonsense")
     for device in rift.devices():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
-from rift_cl.errors import DTypeError, InputError, NonFiniteError, ShapeError
+from rift_cl.errors import DeviceMemoryError, DTypeError, InputError, NonFiniteError, ShapeError
 from rift_cl.operators import Compensation, HighPass, LinearOperator, Ramp, ViewFilter
 from rift_cl.reconstruct import FilteredBackprojection, MeasuredRays
 from rift_cl.reconstruct.solvers.view_subsets import restricted
@@ -312,6 +312,33 @@ def test_adjoints_of_the_algebra(A, F):
     assert close((F @ A).T(Y), A.T(F(Y)))
     assert close((A - 3 * A).T(Y), -2 * A.T(Y))
     assert np.array_equal((2 * A.T)(Y), (2 * A).T(Y))
+
+
+@pytest.mark.parametrize("side", ["forward", "adjoint"])
+def test_a_product_that_the_device_has_no_memory_for_is_taken_one_by_one(A, monkeypatch, side):
+    def out_of_memory(*given):
+        raise DeviceMemoryError("full")
+
+    both = A.T @ (2 * A)
+    operator = both if side == "forward" else both.T
+    x = np.random.default_rng(5).random(A.domain, np.float32)
+    wanted = operator(x)
+    for name in ("_apply", "_apply_adjoint"):
+        monkeypatch.setattr(both, name, out_of_memory)
+    assert np.array_equal(operator(x), wanted)
+
+
+def test_the_largest_array_of_an_operator_is_known_of_what_is_made_of_it(A):
+    size = 1 << 20
+
+    class Hungry(type(A)):
+        largest_scratch = size
+
+    inner = copy.copy(A)
+    inner.__class__ = Hungry
+    made = (inner.T, 2 * inner, inner + A, A.T @ inner, WeightedRays(inner, np.ones(A.range)))
+    assert [each.largest_scratch for each in made] == [size] * len(made)
+    assert (A.T @ A).largest_scratch >= 4 * A.shape[0]
 
 
 def test_operators_that_do_not_fit_are_refused(A, F):

@@ -7,6 +7,8 @@ where the pair is.
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ from rift_cl import Grid, Parallel, Projector, backproject, fbp, phantom
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.operators import Ramp, ViewFilter
 from rift_cl.reconstruct import FilteredBackprojection
+from rift_cl.reconstruct.direct.filtered_backprojection import unfiltered_backprojection
 from rift_cl.reconstruct.direct.view_weights import view_weights
 from rift_cl.reference import filter_rows, radon, ramp_taps
 
@@ -165,6 +168,13 @@ def test_backproject_is_the_scaled_adjoint(device):
     even = Parallel(np.linspace(0, np.pi, 12, endpoint=False), 33, 0.8)
     A = Projector(grid, even, device=device)
     np.testing.assert_allclose(backproject(A, y), fbp(A, y, np.ones_like), atol=1e-5 * abs(y).max())
+
+
+def test_a_copy_of_the_backprojection_makes_slabs_too(device):
+    A = Projector(Grid((3, 8, 8)), Parallel([0.1, 1.2], 9), device=device)
+    formula, y = unfiltered_backprojection(A), np.ones(A.range, np.float32)
+    slabs = copy.copy(formula).slabs(y, device.budget)
+    assert np.array_equal(np.concatenate(list(slabs)), formula(y))
 
 
 def test_a_stack_is_its_slices_to_the_bit(device):

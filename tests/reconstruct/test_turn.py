@@ -96,6 +96,11 @@ def test_a_span_without_opposite_rays_says_nothing():
     assert fan_doubt(y, replace(scan, pitch=scan.pitch / 10)) == ""
 
 
+def test_two_views_of_a_fan_say_nothing():
+    scan = rift.Fan([0.0, 1.0], 64, 1.0, 100.0, 150.0)
+    assert fan_doubt(np.ones((2, 64), np.float32), scan) == ""
+
+
 def test_the_search_doubts_a_fan():
     scan = fan(SHORT)
     wrong = replace(scan, angles=1.75 * scan.angles, center=None)

@@ -2,8 +2,8 @@
 
 No slice of a cone-beam scan is independent of its neighbours: every one needs all projections, and
 these are in memory together. The volume need not be: where both do not fit, ``fbp`` and
-``backproject`` make and write it in slabs, and methods that take steps keep it in files and work on
-parts of it. What does not fit is told before any work.
+``backproject`` make and write it in slabs, and methods that take steps keep it beside the device,
+in memory or in temporary files, and work on parts of it. What does not fit is told before any work.
 """
 
 from __future__ import annotations
@@ -165,8 +165,8 @@ class ConeReconstruction:
                 "The volume is made in slabs of slices, since it does not fit the memory budget "
                 "with its projections."
                 if self._formula is not None
-                else "What does not fit the memory budget is kept in temporary files, and the "
-                "volume is solved for in parts."
+                else "What does not fit the memory budget is kept beside the device, in memory or "
+                "in temporary files (TMPDIR), and the volume is solved for in parts."
             )
 
     def plan(self) -> dict[str, str]:

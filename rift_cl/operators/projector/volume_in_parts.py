@@ -55,8 +55,8 @@ class VolumeInParts(Projector):
         """
         if not isinstance(grid, Grid) or len(grid.shape) != 3:
             raise InputError(
-                f"grid is {grid!r:.60}, wanted that of a volume, such as Grid((256, 256, 256)): "
-                f"the rays of a {type(scan).__name__} run through one"
+                f"grid is {grid!r:.60}, wanted a grid of three axes, such as "
+                f"Grid((256, 256, 256)): a scan of type {type(scan).__name__} is of a volume"
             )
         shape = scan.views, grid.slices if rows is None else rows, scan.bins
         super().__init__(grid.shape, shape, device or default_device(), dtype)

@@ -45,6 +45,8 @@ def fan_doubt(sinogram: Views, fan: Fan) -> str:
     Returns:
         The end of a sentence; empty where the rays agree, or do not tell.
     """
+    if fan.views < 3:
+        return ""
     rays = _Rays(sinogram, fan)
     given = rays.disagreement(1.0, 1.0)
     if not _DOUBTED_DISTANCE < given < np.inf:

@@ -73,7 +73,7 @@ def axis_of_rows(
     def watched() -> Iterator[Views]:
         for index, views in enumerate(sinograms):
             if index == len(rows) // 2:
-                middle.append(views)
+                middle.append(np.asarray(views, np.float32))
             yield views
 
     try:

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.budget import cut_evenly, plan_chunks
-from rift_cl.errors import InputError, ResourceLimitError
+from rift_cl.errors import DeviceMemoryError, InputError, ResourceLimitError
 from rift_cl.geometry import Cone, Fan, Grid, Scan, Vectors, at_axis
 from rift_cl.operators.filters.ramp_filters import Filter, FilterLike, ViewFilter, as_filter
 from rift_cl.operators.linear import Chunk, LinearOperator
@@ -118,7 +118,7 @@ class FDK(LinearOperator):
     def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
         try:
             super()._apply_host(x, y)
-        except ResourceLimitError:
+        except (ResourceLimitError, DeviceMemoryError):
             # One after the other, each of which takes its work in parts where it must.
             filtered = np.empty(self._weighting.range, self.dtype)
             self._weighting._apply_host(x, filtered)
@@ -127,7 +127,7 @@ class FDK(LinearOperator):
     def _apply_adjoint_host(self, y: NDArray[Any], x: NDArray[Any]) -> None:
         try:
             super()._apply_adjoint_host(y, x)
-        except ResourceLimitError:
+        except (ResourceLimitError, DeviceMemoryError):
             rays = np.empty(self._weighting.range, self.dtype)
             self._A._apply_host(y, rays)
             self._weighting._apply_adjoint_host(rays, x)

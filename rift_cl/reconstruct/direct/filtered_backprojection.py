@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import InputError, ResourceLimitError
+from rift_cl.errors import DeviceMemoryError, InputError, ResourceLimitError
 from rift_cl.geometry import Vectors
 from rift_cl.geometry.numbers import one_number
 from rift_cl.geometry.seen_grid import scan_lengths
@@ -108,7 +108,7 @@ class FilteredBackprojection(LinearOperator):
     def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
         try:
             super()._apply_host(x, y)
-        except ResourceLimitError:
+        except (ResourceLimitError, DeviceMemoryError):
             # One after the other, each of which takes a slice in parts where it must.
             filtered = np.empty_like(x)
             self._filter._apply_host(x, filtered)
@@ -117,7 +117,7 @@ class FilteredBackprojection(LinearOperator):
     def _apply_adjoint_host(self, y: NDArray[Any], x: NDArray[Any]) -> None:
         try:
             super()._apply_adjoint_host(y, x)
-        except ResourceLimitError:
+        except (ResourceLimitError, DeviceMemoryError):
             projected = np.empty_like(x)
             self._A._apply_host(y, projected)
             self._filter._apply_adjoint_host(projected, x)

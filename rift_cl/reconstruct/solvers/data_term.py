@@ -203,7 +203,7 @@ def _home(A: LinearOperator, arrays: tuple[int, int], *, on_device: bool) -> Arr
             A.scratch,
             A.device.budget,
             what="solver",
-            array=A.dtype.itemsize * max(images, sinograms),
+            array=max(A.dtype.itemsize * max(images, sinograms), A.largest_scratch),
             largest=A.device.traits.allocation,
             instead="give y on the host, and arrays that do not fit are kept there",
         )

@@ -1,6 +1,6 @@
 """What all iterative methods have in common: steps, when to stop, and a state to go on from.
 
-A method is a class with a record of its state, arrays on the device and numbers; each step is a
+A method is a class with a record of its state, arrays and numbers; each step is a
 function of that record alone, so that a run that was broken off and restored gives the same bits
 as one that was not.
 
@@ -58,7 +58,7 @@ class Solver(ABC):
     """
 
     arrays: ClassVar[tuple[int, int]]
-    """Arrays of the shape of x and of the shape of y that it keeps on the device."""
+    """Arrays of the shape of x and of the shape of y that it keeps, on the device if they fit."""
     least: ClassVar[Mapping[str, float]] = MappingProxyType({"step": 0.0})
     """The least values of numbers of its state."""
     _now: SolverState

@@ -61,6 +61,11 @@ class WeightedRays(LinearOperator):
         """Scratch bytes: the operator's, square roots of the weights, and weighted data."""
         return self.inner.scratch + 2 * int(self._host_roots.nbytes)
 
+    @property
+    def largest_scratch(self) -> int:
+        """Bytes of the largest array among these."""
+        return max(self.inner.largest_scratch, int(self._host_roots.nbytes))
+
     def _apply(self, x: Any, out: Any) -> None:
         self.inner._apply(x, out)
         self.weigh(out)
