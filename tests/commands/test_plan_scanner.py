@@ -66,8 +66,9 @@ def test_vectors_are_those_of_the_scanner_at_these_places(on_orbit):
         np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), atol=1e-3)
 
 
-def test_tilts_cross_planes_that_the_orbit_does_not(cone, on_orbit, tmp_path):
+def test_tilts_cross_planes_that_the_orbit_does_not(cone, on_orbit, tmp_path, capsys):
     assert plan(cone, tmp_path / "a", "--elevation", 0, 90) == 0
+    assert "vectors.txt" in capsys.readouterr().out
     flat, tilted = (
         json.loads((out / "metrics.json").read_text()) for out in (on_orbit, tmp_path / "a")
     )
