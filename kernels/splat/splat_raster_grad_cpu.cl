@@ -99,7 +99,7 @@ static void undo_block(
   }
   for (int i = length - 1; i >= 0; i -= AT_ONCE) {
     const int some = i < AT_ONCE ? i + 1 : AT_ONCE;
-    /* The power, then alpha, then w; c . v, then h. */
+    /* The power, then alpha before the cap, then w; c . v, then h. */
     lanes weight[AT_ONCE][VECTORS], value[AT_ONCE][VECTORS], lever[VECTORS], within[VECTORS], top = 0;
     Sight s;
     for (int j = 0; j < some; j++) {
@@ -124,8 +124,8 @@ static void undo_block(
         lever[v] = counts ? g : 0;
 #else
         if (!SMOOTH) counts = counts & (order < until[v]);
-        const lanes hidden = hidden_by(density), held = hidden < most ? hidden : most;
-        weight[j][v] = counts ? held : 0;
+        const lanes hidden = hidden_by(density);
+        weight[j][v] = counts ? hidden : 0;
         /* dE/dQ dalpha/dE, or half of it where the square of Q counts; far from the splat no number. */
         lanes rate = g;
         if (ACTIVATION != CLAMP) rate = rate * (1.0f - hidden);
@@ -147,12 +147,13 @@ static void undo_block(
 #if ADDITIVE
         value[j][v] = (SHAPE_ORDER == 0 ? weight[j][v] : lever[v]) * value[j][v];
 #else
-        const lanes alpha = weight[j][v], difference = value[j][v] - q[v];
+        const lanes hidden = weight[j][v], difference = value[j][v] - q[v];
+        const lanes alpha = hidden < most ? hidden : most;
         t[v] = t[v] / (1.0f - alpha);
         weight[j][v] = alpha * t[v];
         q[v] = q[v] + alpha * difference;
 #if SHAPE_ORDER == 0 && ACTIVATION == CLAMP
-        value[j][v] = alpha >= most ? 0 : weight[j][v] * difference;
+        value[j][v] = hidden > most ? 0 : weight[j][v] * difference;
 #else
         value[j][v] = lever[v] * (t[v] * difference);
 #endif

@@ -211,6 +211,18 @@ def test_capped_alpha_has_no_gradient(device):
     assert (sums[:, 6:] > 0).all()
 
 
+def test_alpha_that_just_reaches_its_cap_has_a_gradient(device):
+    scene = random_scene(1, (16, 16), scale=200.0, weights=(0.5, 0.5))
+    scene.screen[:, :2] = 8.5
+    grad_image = np.zeros((16, 16, 3), np.float32)
+    grad_image[8, 8] = 1
+    # About a half, so that the difference is exact.
+    drawn = draw(device, scene, SplatSettings())[2]
+    cap = 1 - float(device.get(drawn.transmittance)[8, 8])
+    given = SplatSettings(alpha_cap=cap), grad_image, np.zeros((16, 16), np.float32)
+    assert gradient(device, scene, *given)[0, 0]
+
+
 def test_what_does_not_fit_is_told(device):
     scene = random_scene(5, SIZE)
     splats, lists = scene.upload(device)
