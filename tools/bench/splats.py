@@ -25,6 +25,7 @@ from rift_cl.basis.angular.environment import start_environment, start_reflectan
 from rift_cl.geometry import Camera
 from rift_cl.splat import Frame, FrameGradients, Renderer, Splats
 from rift_cl.splat.raster import MOMENTS
+from rift_cl.splat.tile_lists import TileLists, seen_slots
 
 # Operations per lane, forward and backward: the count that the design's prototype used.
 _FORWARD, _BACKWARD = 32, 62
@@ -120,6 +121,12 @@ class SplatCase:
         background = self.device.array(self.background)
         return Renderer(device=self.device).forward(self.splats, self.camera, background=background)
 
+    def _seen(self) -> TileLists:
+        """The scene drawn, and what a gradient of large scenes on CPUs does to its lists then."""
+        frame = self._forward()
+        edge = frame.raster_pass.settings.edge
+        return seen_slots(self.device, frame.lists, frame.raster.last, frame.camera.size, edge)
+
     @cached_property
     def tasks(self) -> list[Task]:
         """What is done with the scene, on device arrays."""
@@ -136,6 +143,7 @@ class SplatCase:
             ),
             "depth": lambda: renderer.forward(self.splats, self.camera, depth="expected"),
             "depth gradient": lambda: renderer.backward(self.depth_frame, deep, with_camera=True),
+            "draw and find seen entries": self._seen,
             **training_operations(self),
         }
         return [Task(name, self, run, SPLAT_COSTS) for name, run in runs.items()]
