@@ -184,8 +184,7 @@ def _reconstruct(settings: Any, output: Output) -> None:
     from rift_cl.commands.reconstruct.choice import reconstruction_of
 
     job = reconstruction_of(settings)
-    if not output.quiet:
-        job.announce = print_line
+    job.announce = print_line
     if not ran(job, settings, output):
         return
     if job.metrics:
@@ -197,8 +196,7 @@ def _center(settings: Any, output: Output) -> None:
     from rift_cl.commands.center.job import CenterJob
 
     job = CenterJob(settings)
-    if not output.quiet:
-        _print_notes(job.notes)
+    _print_notes(job.notes)
     if not ran(job, settings, output):
         return
     if "doubt" in job.metrics:
@@ -276,8 +274,7 @@ def _export(settings: Any, output: Output) -> None:
     from rift_cl.commands.export.mesh import MeshExport
 
     job = MeshExport(settings) if settings.mesh else Export(settings)
-    if not output.quiet:
-        job.announce = lambda note: print_line(f"rift: {note}")
+    job.announce = lambda note: print_line(f"rift: {note}")
     if ran(job, settings, output):
         print(job.result)
 

@@ -136,7 +136,7 @@ def ball(tmp_path, monkeypatch):
 def test_a_scene_of_photographs_becomes_a_mesh(ball, capsys):
     words = ["--capture", str(ball / "transforms.json"), "--voxels", "24", "--to", "obj", "--quiet"]
     assert main(["export", "ball.ply", "--mesh", "--out", "ball.obj", *words]) == 0
-    assert "8 depths" in capsys.readouterr().out
+    assert "from 8 depth maps" in capsys.readouterr().out
     lines = (ball / "ball.obj").read_text().splitlines()
     vertices = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], float)
     away = np.linalg.norm(vertices - MIDDLE, axis=1)

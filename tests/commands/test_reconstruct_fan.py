@@ -128,7 +128,10 @@ def test_data_without_contrast_leave_the_axis_to_the_file(tmp_path: Path) -> Non
     assert "The axis was taken to be that of the file, bin 75.00" in said
 
 
-def test_lengths_in_two_units_are_doubted(tmp_path: Path) -> None:
+def test_lengths_in_two_units_are_doubted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By the quiet as well, who want no progress and yet would not miss a doubt."""
     scan = fan(SPANS["turn"], 75.0)
     save(tmp_path / "fan.npz", sinogram(KINDS["parts"], scan), scan.angles)
     _, said = reconstructed(tmp_path / "fan.npz", tmp_path / "out", "--size", 8)
@@ -137,3 +140,5 @@ def test_lengths_in_two_units_are_doubted(tmp_path: Path) -> None:
         np.savez(tmp_path / "two.npz", **{**file, "pitch": 1e-3})
     _, said = reconstructed(tmp_path / "two.npz", tmp_path / "two", "--size", 8)
     assert "in one unit of length" in said
+    printed = capsys.readouterr()
+    assert "in one unit of length" in printed.out + printed.err

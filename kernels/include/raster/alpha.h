@@ -3,9 +3,8 @@
  *     d = mean - pixel centre,     sigma = (a dx^2 + c dy^2) / 2 + b dx dy,
  *     alpha = min(cap, weight exp(-sigma)).
  *
- * A splat counts where alpha >= 1/255, and a pixel is finished by the splat that would leave no
- * more than 1e-4 of its transmittance (3D Gaussian Splatting, Kerbl et al. 2023; conventions of
- * gsplat). These thresholds make the image jump as parameters move, so a test can ask for SMOOTH:
+ * A splat counts from an alpha on, and a pixel is finished by the splat that would leave too little
+ * of its transmittance: include/raster/alpha_threshold.h. These thresholds make the image jump as parameters move, so a test can ask for SMOOTH:
  * no thresholds, and exp(-sigma) fades to zero at SMOOTH_EDGE with a continuous slope. Rounding
  * may leave sigma a little below zero next to a needle's mean; it is zero then.
  *

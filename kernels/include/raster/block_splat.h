@@ -18,7 +18,7 @@
 /* A Gaussian that fades, see above. */
 #define FADES (SMOOTH && !MODAL)
 /* log2 of LEAST_DENSITY. */
-#define LEAST_SEEN (ACTIVATION == CLAMP ? -7.99435344f : -7.99152702f)
+#define LEAST_SEEN (ACTIVATION == CLAMP ? ALPHA_THRESHOLD_LOG2 : DEPTH_THRESHOLD_LOG2)
 
 /* How far u1 wants Hermite polynomials. */
 #ifndef HE_ORDER

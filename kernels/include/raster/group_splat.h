@@ -7,8 +7,8 @@
  * ones. A splat with modes has its own number before its features: its modes, too many for local
  * memory, are read where they lie.
  *
- * Thresholds and smooth cut-offs are those of include/raster/alpha.h and
- * include/raster/hermite_alpha.h. */
+ * Thresholds are those of include/raster/alpha_threshold.h, smooth cut-offs those of
+ * include/raster/alpha.h and include/raster/hermite_alpha.h. */
 
 /* Whether the features are those in the records. */
 #ifndef PACKED
@@ -25,9 +25,6 @@
 #define SPLAT_RISE 4
 #define SPLAT_PEAK 5
 #define SPLAT_NUMBER 6
-
-/* log2(1/255) */
-#define FAINTEST -7.99435344f
 
 /* A splat at a pixel: its peak times the exponential, and that as it counts, with its polynomial. */
 typedef struct {
@@ -70,7 +67,7 @@ static Seen see(const float *splat, float x, float y AND_MODES_ARGUMENT) {
 #elif ADDITIVE
   s.density = s.distance <= -TO_POWER * ADDED_EDGE ? s.exponential : 0;
 #else
-  s.density = power >= FAINTEST ? s.exponential : 0;
+  s.density = power >= ALPHA_THRESHOLD_LOG2 ? s.exponential : 0;
 #endif
   return s;
 }

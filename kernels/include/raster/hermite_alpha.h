@@ -24,8 +24,7 @@
 #elif ACTIVATION == CLAMP
 #define LEAST_DENSITY ALPHA_THRESHOLD
 #else
-/* -log(1 - 1/255) */
-#define LEAST_DENSITY 0.0039292923f
+#define LEAST_DENSITY DEPTH_THRESHOLD
 #endif
 
 /* E where the splat counts, zero elsewhere. */

@@ -1,4 +1,7 @@
-"""``rift export``: one file out of a scene, and a sentence for each thing that it cannot hold."""
+"""``rift export``: one file out of a scene, and a sentence for each thing that it cannot hold.
+
+``rift_cl/io/scenes/formats`` makes the bytes, a file for each format.
+"""
 
 from __future__ import annotations
 

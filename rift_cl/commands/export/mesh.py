@@ -90,7 +90,7 @@ class MeshExport:
             self.grid = self._depth.grid
             found = surface(self._depth.inside, self.grid, 0.0, self._depth.seen)
             yield Report(1, 2, "steps: surface")
-            yield self._written(*found, f"{len(self._depth.cameras)} depths", 2)
+            yield self._written(*found, f"from {len(self._depth.cameras)} depth maps", 2)
             return
         # The variance of a voxel's box along each axis: samples are means over voxels.
         dilation = self.grid.spacing[0] ** 2 / 12
@@ -103,7 +103,7 @@ class MeshExport:
         if self._name == "glb":
             vertices = (vertices @ _UPRIGHT.T).astype(np.float32)
             self.announce("the scene is turned so that the axis of rotation, z, is y")
-        yield self._written(vertices, triangles, f"density {level:.6g}", 3)
+        yield self._written(vertices, triangles, f"at density {level:.6g}", 3)
 
     def _written(
         self, vertices: NDArray[np.float32], triangles: NDArray[np.uint32], where: str, steps: int
@@ -111,7 +111,7 @@ class MeshExport:
         content = MESH_FORMATS[self._name](vertices, triangles)
         write_whole(self.path, content)
         self.result = (
-            f"{self.path}, {len(triangles)} triangles at {where}, {format_bytes(len(content))}"
+            f"{self.path}, {len(triangles)} triangles {where}, {format_bytes(len(content))}"
         )
         return Report(steps, steps, "steps: file")
 

@@ -125,8 +125,8 @@ def _repeated(
     images = len(stack.files) * stack.pages
     if images != 1 or not 2 <= count <= _MOST_REPEATED:
         raise InputError(
-            f"{place.path}: repeat is {count} (--repeat) with {images} images: wanted one image, "
-            f"and from 2 to {_MOST_REPEATED} views"
+            f"{place.path}: repeat is {count} (--repeat), images found: {images}; wanted one "
+            f"image, and from 2 to {_MOST_REPEATED} views"
         )
     return (
         replace(stack, files=stack.files * count),
@@ -145,8 +145,8 @@ def _check_complete(place: _Place, stack: TiffStack, request: ScanRequest) -> No
     if named is None or named == count or request.theta is not None or request.axes is not None:
         return
     raise ShapeError(
-        f"{place.path}: {named} projections are named, and there are {count} images: add the "
-        "missing ones, or give the angles of those that are there with theta= (--theta)"
+        f"{place.path}: {named} projections are named, images found: {count}. Add the missing "
+        "ones, or give the angles of those that are there with theta= (--theta)"
     )
 
 

@@ -4,8 +4,8 @@ A filter is designed on the host as a convolution kernel in real space and appli
 without wrap-around; each view may have a response of its own. The ramp is built from its exact
 samples in real space (Ramachandran and Lakshminarayanan 1971; Kak and Slaney, Principles of
 Computerized Tomographic Imaging, eq. 3.61), so that its value at frequency zero, and with it the
-level of a reconstruction, is right: 1 / (pi^2 bins pitch), the part of the infinite kernel that
-lies beyond the detector, which is small and not zero.
+level of a reconstruction, is right: about 1 / (pi^2 bins pitch), the part of the infinite kernel
+that lies beyond the detector, which is small and not zero.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Ramp:
         length = 1 << (2 * bins).bit_length()
         n = np.abs(np.fft.fftfreq(length, 1 / length))
         exact = np.where(n % 2 == 1, -1 / (np.pi * np.maximum(n, 1)) ** 2, 0.0)
-        exact[0] = 0.25  # the sample at position zero
+        exact[0] = 0.25  # at position zero; what is at frequency zero is the sum of all taps
         u = 2 * np.fft.rfftfreq(length) / self.cutoff
         window = np.where(u <= 1, WINDOWS[self.window](np.minimum(u, 1)), 0.0)
         kernel = np.fft.irfft(np.fft.rfft(exact) * window, length)[:bins] / pitch**2

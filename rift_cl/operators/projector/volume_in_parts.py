@@ -55,8 +55,8 @@ class VolumeInParts(Projector):
         """
         if not isinstance(grid, Grid) or len(grid.shape) != 3:
             raise InputError(
-                f"grid is {grid!r:.60}, wanted a grid of three axes, such as "
-                f"Grid((256, 256, 256)): a scan of type {type(scan).__name__} is of a volume"
+                f"grid is {grid!r:.60}, wanted a grid of three axes (z, y, x), such as "
+                f"Grid((256, 256, 256)), for a {type(scan).__name__} measures a volume"
             )
         shape = scan.views, grid.slices if rows is None else rows, scan.bins
         super().__init__(grid.shape, shape, device or default_device(), dtype)

@@ -11,7 +11,9 @@ the one before:
 Where densities are drawn as optical depths (``SplatSettings.activation``) depths add up: each of
 the k gets one k-th, which is the same o', and keeps its scale, whatever its modes. That is exact.
 
-Relocation is seldom, on the host, in NumPy; what is random comes from (seed, step) alone.
+Relocation is seldom and has no kernel: it is done on the host, in NumPy. The random walk is
+``kernels/train/splat_noise.cl`` (``Parameters.shake``); what is random comes from (seed, step)
+alone.
 """
 
 from __future__ import annotations

@@ -23,7 +23,6 @@ from rift_cl.operators.projector.cone.slab_table import Samples, SlabTable, ray_
 from rift_cl.operators.projector.footprint import check_depth_power, check_footprint
 from rift_cl.operators.projector.volume_in_parts import VolumeInParts
 
-_FOOTPRINTS = ("strip", "linear", "point")
 # Tables and places of a run of views together: on a CPU they should stay in its caches.
 _TABLE_BYTES = {"cpu": 8 << 20, "gpu": 64 << 20}
 _FEWEST_VIEWS = 16
@@ -70,6 +69,9 @@ class SlabProjector(VolumeInParts):
 
     scan: Cone
     _settled = ("depth_power",)
+    # The footprints of this beam, and what makes the table of one walk.
+    _footprints: tuple[str, ...] = ("strip", "linear", "point")
+    _table: Callable[..., SlabTable] = staticmethod(slab_table)
 
     def __init__(
         self,
@@ -81,24 +83,20 @@ class SlabProjector(VolumeInParts):
         *,
         depth_power: int = 2,
     ) -> None:
-        super().__init__(grid, scan, device, dtype, rows=scan.rows)
-        self._settle(footprint, _FOOTPRINTS, depth_power, slab_table)
-
-    def _settle(
-        self,
-        footprint: str,
-        footprints: tuple[str, ...],
-        depth_power: int,
-        table: Callable[..., SlabTable],
-    ) -> None:
-        """Check how shadows are shared and weighted, and make the tables of both walks."""
-        self.footprint = check_footprint(footprint, footprints)
+        super().__init__(grid, scan, device, dtype, rows=self._data_rows(scan))
+        self.footprint = check_footprint(footprint, self._footprints)
         self.depth_power = check_depth_power(depth_power)
         self._tables = [
-            table(self.grid, self._beam, footprint, depth_power, along_x=way)
+            self._table(self.grid, self._beam, footprint, depth_power, along_x=way)
             for way in (True, False)
         ]
         self._precision = {"DOUBLE": int(self.dtype == np.float64)}
+
+    @staticmethod
+    def _data_rows(scan: Any) -> int | None:
+        """Rows of the data; as many as there are slices where it is None."""
+        rows: int = scan.rows
+        return rows
 
     def _facts(self) -> list[str]:
         scan = self.scan

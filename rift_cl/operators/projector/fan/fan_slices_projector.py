@@ -17,7 +17,6 @@ from rift_cl.geometry import Cone, Fan, Grid
 from rift_cl.operators.projector.cone.slab_projector import SlabProjector
 from rift_cl.operators.projector.cone.slab_table import Samples, SlabTable, fan_table
 
-_FOOTPRINTS = ("strip", "linear")
 # Rows next to which a detector is far away: slices have no height on it.
 _FLAT = 1e-12
 
@@ -43,6 +42,8 @@ class FanSlicesProjector(SlabProjector):
     """
 
     scan: Any
+    _footprints = ("strip", "linear")
+    _table = staticmethod(fan_table)
 
     def __init__(
         self,
@@ -54,9 +55,11 @@ class FanSlicesProjector(SlabProjector):
         *,
         depth_power: int = 1,
     ) -> None:
-        # Not that of a SlabProjector, which sees rows.
-        super(SlabProjector, self).__init__(grid, scan, device, dtype)
-        self._settle(footprint, _FOOTPRINTS, depth_power, fan_table)
+        super().__init__(grid, cast(Any, scan), footprint, device, dtype, depth_power=depth_power)
+
+    @staticmethod
+    def _data_rows(scan: Any) -> int | None:
+        return None
 
     @cached_property
     def _beam(self) -> Cone:
