@@ -11,14 +11,8 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.array import DeviceArray
-from rift_cl.errors import (
-    DeviceError,
-    DeviceMemoryError,
-    DTypeError,
-    InputError,
-    ResourceLimitError,
-    ShapeError,
-)
+from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
+from rift_cl.operators.composite import Composite
 from rift_cl.operators.linear import Chunk, LinearOperator
 
 
@@ -69,7 +63,7 @@ class Adjoint(LinearOperator):
         return self._forward._chunks(budget)
 
 
-class Scaled(LinearOperator):
+class Scaled(Composite):
     """A multiple of an operator."""
 
     def __init__(self, inner: LinearOperator, factor: float) -> None:
@@ -92,6 +86,14 @@ class Scaled(LinearOperator):
         self._inner._apply_adjoint(y, out)
         axpby(self.device, 0.0, out, self._factor, out)
 
+    def _apply_steps(self, x: NDArray[Any], y: NDArray[Any]) -> None:
+        self._inner._apply_host(x, y)
+        axpby(self.device, 0.0, y, self._factor, y)
+
+    def _apply_adjoint_steps(self, y: NDArray[Any], x: NDArray[Any]) -> None:
+        self._inner._apply_adjoint_host(y, x)
+        axpby(self.device, 0.0, x, self._factor, x)
+
     @property
     def scratch(self) -> int:
         """Bytes of device memory that the operator needs."""
@@ -113,7 +115,7 @@ class Scaled(LinearOperator):
         return chunk if part is None else chunk._replace(operator=part * self._factor)
 
 
-class Sum(LinearOperator):
+class Sum(Composite):
     """The sum of two operators between the same spaces."""
 
     def __init__(self, left: LinearOperator, right: LinearOperator) -> None:
@@ -161,8 +163,22 @@ class Sum(LinearOperator):
         right._apply_adjoint(y, other)
         axpby(self.device, 1.0, other, 1.0, out)
 
+    def _apply_steps(self, x: NDArray[Any], y: NDArray[Any]) -> None:
+        left, right = self._terms
+        left._apply_host(x, y)
+        other = np.empty(self.range, self.dtype)
+        right._apply_host(x, other)
+        axpby(self.device, 1.0, other, 1.0, y)
 
-class Product(LinearOperator):
+    def _apply_adjoint_steps(self, y: NDArray[Any], x: NDArray[Any]) -> None:
+        left, right = self._terms
+        left._apply_adjoint_host(y, x)
+        other = np.empty(self.domain, self.dtype)
+        right._apply_adjoint_host(y, other)
+        axpby(self.device, 1.0, other, 1.0, x)
+
+
+class Product(Composite):
     """One operator after another."""
 
     def __init__(self, outer: LinearOperator, inner: LinearOperator) -> None:
@@ -204,22 +220,15 @@ class Product(LinearOperator):
         self._outer._apply_adjoint(y, between)
         self._inner._apply_adjoint(between, out)
 
-    def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
-        try:
-            super()._apply_host(x, y)
-        except (ResourceLimitError, DeviceMemoryError):
-            # One after the other, each of which takes its work in parts where it can.
-            between = np.empty(self._inner.range, self.dtype)
-            self._inner._apply_host(x, between)
-            self._outer._apply_host(between, y)
+    def _apply_steps(self, x: NDArray[Any], y: NDArray[Any]) -> None:
+        between = np.empty(self._inner.range, self.dtype)
+        self._inner._apply_host(x, between)
+        self._outer._apply_host(between, y)
 
-    def _apply_adjoint_host(self, y: NDArray[Any], x: NDArray[Any]) -> None:
-        try:
-            super()._apply_adjoint_host(y, x)
-        except (ResourceLimitError, DeviceMemoryError):
-            between = np.empty(self._inner.range, self.dtype)
-            self._outer._apply_adjoint_host(y, between)
-            self._inner._apply_adjoint_host(between, x)
+    def _apply_adjoint_steps(self, y: NDArray[Any], x: NDArray[Any]) -> None:
+        between = np.empty(self._inner.range, self.dtype)
+        self._outer._apply_adjoint_host(y, between)
+        self._inner._apply_adjoint_host(between, x)
 
 
 def _finite(factor: float, dtype: np.dtype[Any]) -> float:

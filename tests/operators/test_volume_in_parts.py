@@ -113,6 +113,19 @@ def test_fdk_filters_runs_of_views_and_backprojects_slabs(device, scan):
     assert len(list(small._weighting._chunks(few))) >= 2
 
 
+def test_sums_products_and_multiples_are_taken_step_by_step(device):
+    """Where the device holds no two results at a time."""
+
+    def combined(A: Any) -> Any:
+        return 0.5 * (A + 2.0 * A) @ (A.T @ A)
+
+    whole = Projector(GRID, CONE, device=device)
+    small = limited(device, memory_of(whole, 8, CONE.views // 2))
+    A = Projector(GRID, CONE, device=small)
+    assert min(parts(A)) >= 2
+    assert_same(both(combined(A)), both(combined(whole)))
+
+
 def test_a_backprojection_without_a_filter_is_made_in_slabs(device):
     A = Projector(GRID, CONE, device=device)
     y, small = normal(*A.range), A._need(8, CONE.views, sparing=True)[0]

@@ -32,8 +32,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.budget import cut_evenly, plan_chunks
-from rift_cl.errors import DeviceMemoryError, InputError, ResourceLimitError
+from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Fan, Grid, Scan, Vectors, at_axis
+from rift_cl.operators.composite import Composite
 from rift_cl.operators.filters.ramp_filters import Filter, FilterLike, ViewFilter, as_filter
 from rift_cl.operators.linear import Chunk, LinearOperator
 from rift_cl.operators.projector.cone.rectification import Rectification
@@ -49,7 +50,7 @@ Floats = NDArray[np.float64]
 _LEVEL = 1e-6
 
 
-class FDK(LinearOperator):
+class FDK(Composite):
     """Filtered backprojection of a cone or a fan, from projections to a volume or an image.
 
     Args:
@@ -115,22 +116,15 @@ class FDK(LinearOperator):
         self._A._apply(y, rays)
         self._weighting._apply_adjoint(rays, out)
 
-    def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
-        try:
-            super()._apply_host(x, y)
-        except (ResourceLimitError, DeviceMemoryError):
-            # One after the other, each of which takes its work in parts where it must.
-            filtered = np.empty(self._weighting.range, self.dtype)
-            self._weighting._apply_host(x, filtered)
-            self._A._apply_adjoint_host(filtered, y)
+    def _apply_steps(self, x: NDArray[Any], y: NDArray[Any]) -> None:
+        filtered = np.empty(self._weighting.range, self.dtype)
+        self._weighting._apply_host(x, filtered)
+        self._A._apply_adjoint_host(filtered, y)
 
-    def _apply_adjoint_host(self, y: NDArray[Any], x: NDArray[Any]) -> None:
-        try:
-            super()._apply_adjoint_host(y, x)
-        except (ResourceLimitError, DeviceMemoryError):
-            rays = np.empty(self._weighting.range, self.dtype)
-            self._A._apply_host(y, rays)
-            self._weighting._apply_adjoint_host(rays, x)
+    def _apply_adjoint_steps(self, y: NDArray[Any], x: NDArray[Any]) -> None:
+        rays = np.empty(self._weighting.range, self.dtype)
+        self._A._apply_host(y, rays)
+        self._weighting._apply_adjoint_host(rays, x)
 
     def slabs(self, y: NDArray[Any], budget: int) -> Iterator[NDArray[Any]]:
         """The volume in slabs of slices, from the first on, with the bits of the whole.

@@ -20,14 +20,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import DeviceMemoryError, InputError, ResourceLimitError
+from rift_cl.errors import InputError
 from rift_cl.geometry import Vectors
 from rift_cl.geometry.numbers import one_number
 from rift_cl.geometry.seen_grid import scan_lengths
 from rift_cl.operators.algebra import Scaled
+from rift_cl.operators.composite import Composite
 from rift_cl.operators.filters.compensation import Compensation
 from rift_cl.operators.filters.ramp_filters import FilterLike, Gains, ViewFilter, as_filter
-from rift_cl.operators.linear import Chunk, LinearOperator
+from rift_cl.operators.linear import Chunk
 from rift_cl.operators.projector.parallel.parallel_projector import ParallelProjector
 from rift_cl.operators.projector.projector import Projector
 from rift_cl.reconstruct.direct.fdk import (
@@ -43,7 +44,7 @@ from rift_cl.reconstruct.direct.view_weights import view_gains
 Floats = NDArray[np.float64]
 
 
-class FilteredBackprojection(LinearOperator):
+class FilteredBackprojection(Composite):
     """Filtered backprojection as an operator from sinograms to images.
 
     Args:
@@ -105,22 +106,15 @@ class FilteredBackprojection(LinearOperator):
         self._A._apply(y, projected)
         self._filter._apply_adjoint(projected, out)
 
-    def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
-        try:
-            super()._apply_host(x, y)
-        except (ResourceLimitError, DeviceMemoryError):
-            # One after the other, each of which takes a slice in parts where it must.
-            filtered = np.empty_like(x)
-            self._filter._apply_host(x, filtered)
-            self._A._apply_adjoint_host(filtered, y)
+    def _apply_steps(self, x: NDArray[Any], y: NDArray[Any]) -> None:
+        filtered = np.empty_like(x)
+        self._filter._apply_host(x, filtered)
+        self._A._apply_adjoint_host(filtered, y)
 
-    def _apply_adjoint_host(self, y: NDArray[Any], x: NDArray[Any]) -> None:
-        try:
-            super()._apply_adjoint_host(y, x)
-        except (ResourceLimitError, DeviceMemoryError):
-            projected = np.empty_like(x)
-            self._A._apply_host(y, projected)
-            self._filter._apply_adjoint_host(projected, x)
+    def _apply_adjoint_steps(self, y: NDArray[Any], x: NDArray[Any]) -> None:
+        projected = np.empty_like(x)
+        self._A._apply_host(y, projected)
+        self._filter._apply_adjoint_host(projected, x)
 
     @property
     def scratch(self) -> int:
