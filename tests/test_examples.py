@@ -6,6 +6,7 @@ import ast
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -24,12 +25,18 @@ RUNS = {
     "own_solver": ("32", "SciPy's LSQR: "),
     "own_strategy": ("30", "step 30: loss "),
     "plan_views": ("3", "Plan(3 views"),
+    "register_camera": ("3", "degrees off,"),
     "tomography": ("32", "total variation"),
 }
+# Packages that an example wants besides.
+WANTS = {"register_camera": ("torch", "kornia")}
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_runs(path, tmp_path):
+    for name in WANTS.get(path.stem, ()):
+        if find_spec(name) is None:
+            pytest.skip(f"{name} is not installed")
     size, printed = RUNS.get(path.stem, ("", ""))
     done = subprocess.run(
         [sys.executable, "-W", "error", str(path), *size.split()],

@@ -21,6 +21,16 @@ if TYPE_CHECKING:
     from rift_cl.cl.device import Device
 
 _BLOCK = 1 << 20
+# Devices of the DLPack standard whose memory the host does not read, by their numbers.
+_ELSEWHERE = {
+    2: "CUDA",
+    4: "OpenCL",
+    7: "Vulkan",
+    8: "Metal",
+    10: "ROCm",
+    14: "oneAPI",
+    15: "WebGPU",
+}
 
 
 def as_host_array(
@@ -59,18 +69,45 @@ def as_host_array(
 def as_real_array(values: Any, *, name: str) -> NDArray[Any]:
     """Read anything as a NumPy array of real numbers.
 
+    Arrays of other packages are read by ``__array__`` or, where they have none, by DLPack.
+
     Raises:
         DTypeError: the values are not real numbers.
+        DeviceError: they are on a device whose memory the host does not read.
     """
     if isinstance(values, np.ma.MaskedArray):
         raise DTypeError(f"{name} is a masked array: fill the masked values first")
     try:
-        array = np.asarray(values)
-    except (TypeError, ValueError, RuntimeError) as error:
-        raise DTypeError(f"{name} cannot be read as an array of numbers: {error}") from error
+        array = np.from_dlpack(values) if _dlpack_alone(values) else np.asarray(values)
+    except (TypeError, ValueError, RuntimeError, BufferError) as error:
+        check_reachable(values, name=name)
+        reason = next(iter(str(error).splitlines()), type(error).__name__)
+        raise DTypeError(f"{name} cannot be read as an array of numbers: {reason}") from error
     if array.dtype.kind not in "fiub":
         raise DTypeError(f"{name} has type {array.dtype}, wanted real numbers (float32)")
     return array
+
+
+def _dlpack_alone(values: Any) -> bool:
+    kind = type(values)
+    return hasattr(kind, "__dlpack__") and not hasattr(kind, "__array__")
+
+
+def check_reachable(values: Any, *, name: str) -> None:
+    """Refuse an array on a device of which the host cannot read, as DLPack tells it.
+
+    Raises:
+        DeviceError: it is on such a device; the sentence says how to copy it to the host.
+    """
+    if not hasattr(type(values), "__dlpack_device__"):
+        return
+    kind = _ELSEWHERE.get(int(values.__dlpack_device__()[0]))
+    if kind is not None:
+        raise DeviceError(
+            f"{name} is a {type(values).__name__} on a {kind} device, whose memory is not read "
+            "here: copy it to the host first, by x.cpu() (torch), cupy.asnumpy(x) or "
+            "jax.device_get(x)"
+        )
 
 
 def as_plain(array: NDArray[Any], dtype: DTypeLike) -> NDArray[Any]:

@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from rift_cl.cl.host_arrays import check_finite
 from rift_cl.errors import DTypeError
+from rift_cl.interop.batches import apply_to_each
 from rift_cl.interop.tensors import check_tensor, to_host
 from rift_cl.operators.linear import LinearOperator
 
@@ -65,7 +65,7 @@ class Apply(torch.autograd.Function):
             check_finite(host, name=name)
         elif not np.isfinite(host).all():
             return x.new_full((*_batch(A, x), *A.range), math.nan)
-        return torch.from_numpy(_each(A, host, _batch(A, x))).to(x.device)
+        return torch.from_numpy(apply_to_each(A, host)).to(x.device)
 
     @staticmethod
     def setup_context(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:
@@ -92,13 +92,6 @@ class Apply(torch.autograd.Function):
 
 def _batch(A: LinearOperator, x: torch.Tensor) -> tuple[int, ...]:
     return tuple(x.shape[: x.dim() - len(A.domain)])
-
-
-def _each(A: LinearOperator, host: NDArray[Any], batch: tuple[int, ...]) -> NDArray[Any]:
-    results = np.empty((*batch, *A.range), A.dtype)
-    for place in np.ndindex(batch):
-        A(host[place], out=results[place])
-    return results
 
 
 def _check(A: LinearOperator, x: Any, name: str) -> None:

@@ -5,7 +5,13 @@ file for each format, and what formats share: the samples' integers, the layout,
 """
 
 from rift_cl.io.volumes.sample_window import SampleWindow, suggested_window
-from rift_cl.io.volumes.volume import VOLUME_NAMES, VolumeWriter, open_volume, read_volume
+from rift_cl.io.volumes.volume import (
+    VOLUME_NAMES,
+    VolumeWriter,
+    open_volume,
+    read_volume,
+    read_volume_place,
+)
 
 __all__ = [
     "VOLUME_NAMES",
@@ -13,5 +19,6 @@ __all__ = [
     "VolumeWriter",
     "open_volume",
     "read_volume",
+    "read_volume_place",
     "suggested_window",
 ]

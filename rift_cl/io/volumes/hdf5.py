@@ -13,7 +13,7 @@ import numpy as np
 from rift_cl.errors import ShapeError
 from rift_cl.io.boundary import check_claim, check_numeric
 from rift_cl.io.hdf5_tree import open_tree
-from rift_cl.io.volumes.layout import Floats, VolumeLayout, WriteSlab
+from rift_cl.io.volumes.layout import Floats, VolumeLayout, VolumePlace, WriteSlab
 from rift_cl.io.volumes.plain_samples import staged_samples
 from rift_cl.io.volumes.sample_window import restored
 
@@ -45,6 +45,12 @@ def load_volume(path: Path, *, budget: int | None) -> Floats:
     if scale is None:
         return volume
     return restored(volume, float(scale), 0.0 if offset is None else float(offset))
+
+
+def load_place(path: Path) -> VolumePlace:
+    """What the dataset's attributes say of where its samples stand."""
+    with open_tree(path) as tree:
+        return VolumePlace.of(tree.dataset(f"/{_DATASET}").attrs)
 
 
 def _write_header(layout: VolumeLayout, part: Path) -> int:

@@ -3,19 +3,50 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.geometry.length_units import length_unit
+from rift_cl.geometry.numbers import real_numbers
 from rift_cl.io.volumes.sample_window import SampleWindow
 
 Floats = NDArray[np.float32]
 # Takes the number of a first slice, and slices in the file's type.
 WriteSlab = Callable[[int, NDArray[Any]], None]
+
+
+class VolumePlace(NamedTuple):
+    """Where the samples of a volume stand.
+
+    Args:
+        spacing: distance between samples along z, y and x.
+        origin: position of the first sample, in the same unit.
+        unit: of both; empty where it is not known.
+    """
+
+    spacing: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    unit: str = ""
+
+    @classmethod
+    def of(cls, noted: Mapping[str, Any]) -> VolumePlace:
+        """Read ``VolumeLayout.attributes``; what is not there or no place is left as it is here."""
+        unit = noted.get("unit", "")
+        place = cls(unit=unit if isinstance(unit, str) else "")
+        spacing, origin = (real_numbers(noted.get(name)) for name in ("spacing", "origin"))
+        if spacing is not None and spacing.shape == (3,) and _all_positive(spacing):
+            place = place._replace(spacing=tuple(spacing.tolist()))
+        if origin is not None and origin.shape == (3,) and np.isfinite(origin).all():
+            place = place._replace(origin=tuple(origin.tolist()))
+        return place
+
+
+def _all_positive(numbers: NDArray[np.float64]) -> bool:
+    return bool(np.isfinite(numbers).all() and (numbers > 0).all())
 
 
 @dataclass(frozen=True)

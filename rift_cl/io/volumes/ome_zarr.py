@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from rift_cl.errors import FileFormatError, PathEscapeError, ShapeError
 from rift_cl.io.boundary import check_claim, check_numeric
 from rift_cl.io.output import staged_folder, writing
-from rift_cl.io.volumes.layout import Floats, VolumeLayout, WriteSlab
+from rift_cl.io.volumes.layout import Floats, VolumeLayout, VolumePlace, WriteSlab
 from rift_cl.io.volumes.sample_window import restored, suggested_window
 from rift_cl.io.volumes.slice_statistics import SliceStatistics
 
@@ -89,6 +89,12 @@ def load_volume(path: Path, *, budget: int | None) -> Floats:
     if "scale_factor" in ours:
         return restored(array[...], float(ours["scale_factor"]), float(ours["add_offset"]))
     return np.asarray(array[...], np.float32)
+
+
+def load_place(path: Path) -> VolumePlace:
+    """What our own entry among a store's attributes says of where its samples stand."""
+    ours = _finest(path)[0].get(_OURS)
+    return VolumePlace.of(ours if isinstance(ours, dict) else {})
 
 
 def _create(place: Path, shape: tuple[int, ...], layout: VolumeLayout) -> Any:

@@ -31,7 +31,7 @@ from rift_cl.geometry import Grid
 from rift_cl.geometry.numbers import real_numbers
 from rift_cl.io.boundary import reading
 from rift_cl.io.output import check_space
-from rift_cl.io.volumes.layout import Floats, VolumeLayout, WriteSlab
+from rift_cl.io.volumes.layout import Floats, VolumeLayout, VolumePlace, WriteSlab
 from rift_cl.io.volumes.sample_window import SampleWindow
 
 Format = Literal["tiff", "tiff-stack", "zarr", "h5", "mrc"]
@@ -139,6 +139,25 @@ def read_volume(path: str | os.PathLike[str], *, budget: int | None = None) -> F
     path = Path(path)
     with reading(path, "the volume"):
         return _module(_format_of(path)).load_volume(path, budget=budget)
+
+
+def read_volume_place(path: str | os.PathLike[str]) -> VolumePlace:
+    """Where the samples of a volume stand that ``open_volume`` wrote as "zarr" or "h5".
+
+    Spacing 1, origin 0 and no unit where the file does not say, or is of another format.
+
+    Args:
+        path: the folder, store or file.
+
+    Raises:
+        InputError: there is nothing of that name.
+        FileFormatError: it is damaged, or no volume.
+    """
+    path = Path(path)
+    with reading(path, "the volume"):
+        load = getattr(_module(_format_of(path)), "load_place", None)
+        place: VolumePlace = VolumePlace() if load is None else load(path)
+    return place
 
 
 class VolumeWriter:

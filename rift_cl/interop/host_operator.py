@@ -1,0 +1,74 @@
+"""An operator that another package computes on the host, as one of ours.
+
+Solvers, sums and products take it like any other; device arrays come to the host and go back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from rift_cl.cl.array import DeviceArray
+from rift_cl.cl.device import Device
+from rift_cl.cl.discovery import default_device
+from rift_cl.cl.elementwise import copy
+from rift_cl.cl.host_arrays import as_host_array, download, upload
+from rift_cl.errors import DTypeError
+from rift_cl.operators.linear import LinearOperator, Shape
+
+Function = Callable[[NDArray[Any]], Any]
+
+
+class HostOperator(LinearOperator):
+    """A linear map that two functions of NumPy arrays compute.
+
+    Args:
+        forward: takes (*domain), gives what has the numbers of (*range) in C order.
+        adjoint: the other way; ``rift_cl.dot_test`` says whether it is the adjoint.
+        domain: shape of the input.
+        range: shape of the output.
+        dtype: float32 or float64, of both.
+        device: whose arrays it takes as well; the default one if not given.
+
+    Raises:
+        DTypeError: ``dtype`` is complex.
+    """
+
+    def __init__(
+        self,
+        forward: Function,
+        adjoint: Function,
+        domain: Shape,
+        range: Shape,
+        *,
+        dtype: DTypeLike = np.float32,
+        device: Device | None = None,
+    ) -> None:
+        if np.dtype(dtype).kind == "c":
+            raise DTypeError(f"the operator is of type {np.dtype(dtype)}, wanted a real one")
+        real = np.float64 if np.dtype(dtype) == np.float64 else np.float32
+        super().__init__(domain, range, device or default_device(), real)
+        self._forward, self._backward = forward, adjoint
+
+    def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
+        self._on_host(self._forward, x, out)
+
+    def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
+        self._on_host(self._backward, y, out)
+
+    def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
+        y[...] = self._computed(self._forward, x, self.range)
+
+    def _apply_adjoint_host(self, y: NDArray[Any], x: NDArray[Any]) -> None:
+        x[...] = self._computed(self._backward, y, self.domain)
+
+    def _on_host(self, function: Function, given: DeviceArray, out: DeviceArray) -> None:
+        found = self._computed(function, download(self.device, given), out.shape)
+        copy(self.device, upload(self.device, found), out)
+
+    def _computed(self, function: Function, given: NDArray[Any], shape: Shape) -> NDArray[Any]:
+        flat = np.asarray(function(given)).reshape(shape)
+        return as_host_array(flat, shape, name="result", wants="the operator", dtype=self.dtype)

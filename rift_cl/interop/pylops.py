@@ -1,0 +1,69 @@
+"""PyLops' operators as ours, and ours as PyLops'.
+
+    from rift_cl.interop.pylops import from_pylops, to_pylops
+
+    P = to_pylops(A)                     # P.dims, P.dimsd are A.domain, A.range
+    x = pylops.optimization.basic.cgls(P, y, niter=20)[0]
+    D = from_pylops(pylops.Gradient((256, 256)), device=A.device)
+
+Numbers are on the host on PyLops' side. What it computes of a float32 operator is good to 7 digits.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from rift_cl.cl.device import Device
+from rift_cl.errors import DTypeError
+from rift_cl.interop.host_operator import HostOperator
+from rift_cl.interop.optional_package import optional_package
+from rift_cl.interop.scipy import aslinearoperator
+from rift_cl.operators.linear import LinearOperator
+
+__all__ = ["from_pylops", "to_pylops"]
+
+
+def to_pylops(A: LinearOperator) -> Any:
+    """An operator as a ``pylops.LinearOperator`` with the same shapes.
+
+    Raises:
+        DTypeError: A is no operator of this package.
+        InputError: PyLops is not installed.
+    """
+    flat = aslinearoperator(A)
+    return optional_package("pylops", what="to_pylops").aslinearoperator(flat)
+
+
+def from_pylops(P: Any, *, device: Device | None = None) -> LinearOperator:
+    """An operator of PyLops, or of SciPy, as one of ours; it computes on the host.
+
+    Args:
+        P: a real operator with ``shape``, ``dtype``, ``matvec`` and ``rmatvec``; ``dims`` and
+            ``dimsd``, where it has them, are the shapes of domain and range.
+        device: whose arrays the result takes as well; the default one if not given.
+
+    Raises:
+        DTypeError: P is no such operator, or complex.
+    """
+    missing = [n for n in ("shape", "dtype", "matvec", "rmatvec") if not hasattr(P, n)]
+    if missing:
+        raise DTypeError(
+            f"P is a {type(P).__name__} without {missing[0]}, wanted an operator of PyLops or SciPy"
+        )
+    rows, columns = P.shape
+    return HostOperator(
+        lambda x: P.matvec(x.ravel()),
+        lambda y: P.rmatvec(y.ravel()),
+        _shape(P, "dims", columns),
+        _shape(P, "dimsd", rows),
+        dtype=np.float32 if P.dtype is None else P.dtype,
+        device=device,
+    )
+
+
+def _shape(P: Any, name: str, count: int) -> tuple[int, ...]:
+    shape = tuple(int(n) for n in getattr(P, name, ()))
+    return shape if math.prod(shape) == count and shape else (count,)

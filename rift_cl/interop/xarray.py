@@ -1,0 +1,198 @@
+"""Slices, volumes and sinograms with their coordinates, as xarray keeps them.
+
+    from rift_cl.interop.xarray import from_xarray, to_xarray
+
+    labelled = to_xarray(volume, grid, unit="mm")      # dims z, y, x
+    labelled.sel(z=1.5, method="nearest")
+    values, grid = from_xarray(labelled)
+
+Slices have the dimensions y, x, volumes z, y, x. Sinograms have theta (radians), then row where
+there are several, then detector, both in the unit of length from where the axis is seen. What
+coordinates do not tell, as the distances of a source, is in the attributes, so that either kind is
+written and read by xarray's own formats.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rift_cl.cl.host_arrays import as_host_array, as_real_array
+from rift_cl.errors import DTypeError, InputError, ShapeError
+from rift_cl.geometry import Cone, Fan, Grid, Parallel
+from rift_cl.geometry.numbers import one_number
+from rift_cl.interop.optional_package import optional_package
+
+__all__ = ["from_xarray", "to_xarray"]
+
+Floats = NDArray[np.float32]
+Labelled = Grid | Parallel | Fan | Cone
+_KIND, _STEP = "scan", "spacing"
+_DEGREES = ("deg", "degree", "degrees", "°")
+# By how much of a step coordinates may stray from even spacing.
+_EVEN = 1e-3
+
+
+def to_xarray(values: ArrayLike, of: Labelled, *, unit: str = "", name: str | None = None) -> Any:
+    """Label an image, a volume or a sinogram.
+
+    Args:
+        values: (ny, nx) or (nz, ny, nx) on a grid; (views, bins) or (views, rows, bins) of a scan.
+        of: what the values stand on.
+        unit: of its lengths, such as "mm"; empty where it is not known.
+        name: of the array; "attenuation" on a grid and "line_integral" of a scan if not given.
+
+    Returns:
+        An ``xarray.DataArray`` of float32.
+
+    Raises:
+        ShapeError: the values do not fit.
+        DTypeError: they are not real numbers, or ``of`` is no grid and no scan with angles.
+        InputError: xarray is not installed.
+    """
+    xarray = optional_package("xarray", what="to_xarray")
+    if not isinstance(of, Labelled):
+        raise DTypeError(
+            f"of is a {type(of).__name__}, wanted a Grid, or a Parallel, Fan or Cone scan"
+        )
+    array = as_real_array(values, name="values")
+    coordinates, attributes = _grid_labels(of) if isinstance(of, Grid) else _scan_labels(of, array)
+    shape = tuple(len(places) for places, _ in coordinates.values())
+    array = as_host_array(array, shape, name="values", wants=repr(type(of).__name__))
+    on_grid = isinstance(of, Grid)
+    value_unit = (f"1/{unit}" if unit else "") if on_grid else "1"
+    return xarray.DataArray(
+        array,
+        dims=list(coordinates),
+        coords={
+            axis: (axis, places, {**about, **({"units": unit} if unit and axis != "theta" else {})})
+            for axis, (places, about) in coordinates.items()
+        },
+        attrs={**attributes, **({"units": value_unit} if value_unit else {})},
+        name=name or ("attenuation" if on_grid else "line_integral"),
+    )
+
+
+def from_xarray(array: Any) -> tuple[Floats, Labelled]:
+    """Read what is labelled as ``to_xarray`` labels it, whoever did.
+
+    Args:
+        array: a ``DataArray`` with the dimensions y, x or z, y, x, or with theta and detector and
+            perhaps row, in any order. Coordinates are evenly spaced, those of theta in radians or,
+            as their attribute "units" says, in degrees. Those that fall are turned round. A scan is
+            parallel unless the attribute "scan" is "Fan" or "Cone" and the distances are there.
+
+    Returns:
+        The values, float32 in the order of dimensions named here, and the grid or scan.
+
+    Raises:
+        DTypeError: it is no ``DataArray`` of real numbers.
+        ShapeError: it has other dimensions.
+        InputError: a coordinate is missing or uneven, or a distance is.
+    """
+    if not all(hasattr(array, name) for name in ("dims", "coords", "attrs", "transpose")):
+        raise DTypeError(f"array is a {type(array).__name__}, wanted an xarray.DataArray")
+    names, scan = set(map(str, array.dims)), "theta" in array.dims
+    wanted = ("theta", "row", "detector") if scan else ("z", "y", "x")
+    order = [axis for axis in wanted if axis in names]
+    if len(order) != len(names) or not {*wanted} - {wanted[1 if scan else 0]} <= names:
+        raise ShapeError(
+            f"array has the dimensions {', '.join(map(str, array.dims))}; wanted y, x or z, y, x, "
+            "or theta, detector or theta, row, detector: rename them with .rename()"
+        )
+    array = array.transpose(*order)
+    for axis in order:
+        if axis != "theta":
+            # Whoever has no coordinates of rows has their numbers.
+            places = _places(array, axis) if axis != "row" or axis in array.coords else None
+            if places is not None and places[0] > places[-1]:
+                array = array.isel({axis: slice(None, None, -1)})
+    values = as_host_array(array.values, array.shape, name="array", wants="a copy")
+    return values, (_scan(array) if scan else _grid(array, order))
+
+
+def _grid_labels(grid: Grid) -> tuple[dict[str, Any], dict[str, Any]]:
+    axes = "zyx"[-len(grid.shape) :]
+    labels = {
+        axis: (grid.coordinates(number), {_STEP: grid.spacing[number]})
+        for number, axis in enumerate(axes)
+    }
+    return labels, {}
+
+
+def _scan_labels(
+    scan: Parallel | Fan | Cone, values: NDArray[Any]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    labels: dict[str, Any] = {"theta": (scan.angles, {"units": "rad"})}
+    if isinstance(scan, Cone):
+        (high, wide), (row, column) = scan.pitch, scan.center
+        labels["row"] = ((np.arange(scan.rows) - row) * high, {_STEP: high})
+        if np.any(scan.heights):
+            raise InputError("a cone with heights has no one place of each row: label its views")
+    else:
+        wide, column = scan.pitch, scan.center
+        if values.ndim == 3:
+            labels["row"] = (np.arange(values.shape[1], dtype=np.float64), {_STEP: 1.0})
+    labels["detector"] = ((np.arange(scan.bins) - column) * wide, {_STEP: wide})
+    attributes: dict[str, Any] = {_KIND: type(scan).__name__}
+    if not isinstance(scan, Parallel):
+        attributes |= {n: getattr(scan, n) for n in ("source_to_axis", "source_to_detector")}
+        attributes["curved"] = int(scan.curved)
+    return labels, attributes
+
+
+def _grid(array: Any, order: list[str]) -> Grid:
+    steps = [_step(array, axis) for axis in order]
+    middles = [(places[0] + places[-1]) / 2 for places in (_places(array, a) for a in order)]
+    return Grid(array.shape, steps, middles)
+
+
+def _scan(array: Any) -> Parallel | Fan | Cone:
+    theta = _places(array, "theta")
+    if str(array.coords["theta"].attrs.get("units", "rad")).strip().lower() in _DEGREES:
+        theta = np.deg2rad(theta)
+    pitch, bins = _step(array, "detector"), array.sizes["detector"]
+    center = -_places(array, "detector")[0] / pitch
+    kind = array.attrs.get(_KIND, "Parallel")
+    if kind == "Parallel":
+        return Parallel(theta, bins, pitch, center)
+    if kind not in ("Fan", "Cone"):
+        raise InputError(f"the attribute scan is {kind!r}, wanted Parallel, Fan or Cone")
+    near, far = (_distance(array, name) for name in ("source_to_axis", "source_to_detector"))
+    curved = bool(array.attrs.get("curved", 0))
+    if kind == "Fan":
+        return Fan(theta, bins, pitch, near, far, center, curved)
+    if "row" not in array.dims:
+        raise ShapeError("the attribute scan is Cone, and the array has no dimension row")
+    high = _step(array, "row")
+    middle = (-_places(array, "row")[0] / high, center)
+    return Cone(theta, array.sizes["row"], bins, (high, pitch), near, far, middle, None, curved)
+
+
+def _distance(array: Any, name: str) -> float:
+    if name not in array.attrs:
+        raise InputError(f"the array has no attribute {name}, which a {array.attrs[_KIND]} needs")
+    return one_number(array.attrs[name])
+
+
+def _places(array: Any, axis: str) -> NDArray[np.float64]:
+    if axis not in array.coords:
+        raise InputError(f"the array has no coordinate {axis}: give it with .assign_coords()")
+    places = as_real_array(array.coords[axis].values, name=axis).astype(np.float64)
+    if not places.size or not np.isfinite(places).all():
+        raise InputError(f"the coordinate {axis} is empty or not finite")
+    return places
+
+
+def _step(array: Any, axis: str) -> float:
+    """The spacing of a coordinate that rises evenly; as it is noted where the places agree."""
+    places = _places(array, axis)
+    noted = one_number(array.coords[axis].attrs.get(_STEP, 1.0))
+    if len(places) == 1:
+        return noted
+    step = float((places[-1] - places[0]) / (len(places) - 1))
+    if not (step > 0 and np.abs(np.diff(places) - step).max() <= _EVEN * step):
+        raise InputError(f"the coordinate {axis} is not evenly spaced: resample it with .interp()")
+    return noted if abs(noted - step) <= _EVEN * step / len(places) else step

@@ -1,0 +1,73 @@
+"""ODL's operators and ours are each other's, with the weights of ODL's spaces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.errors import DTypeError, ShapeError
+from rift_cl.interop.odl import from_odl, to_odl
+
+# ODL warns of what Python and NumPy have given up.
+pytestmark = [pytest.mark.once, pytest.mark.filterwarnings("ignore")]
+
+
+@pytest.fixture(scope="module")
+def odl():
+    return pytest.importorskip("odl", reason="ODL is not installed")
+
+
+def projector(device):
+    grid, scan = rift.Grid((6, 7)), rift.Parallel(np.linspace(0, 3, 8), 9)
+    return rift.Projector(grid, scan, device=device)
+
+
+def white(*shape):
+    return np.random.default_rng(5).standard_normal(shape).astype(np.float32)
+
+
+def test_our_operator_between_plain_spaces(device, odl):
+    A, x, y = projector(device), white(6, 7), white(8, 9)
+    P = to_odl(A)
+    assert np.array_equal(P(P.domain.element(x)).asarray(), A(x))
+    assert np.array_equal(P.adjoint(P.range.element(y)).asarray(), A.T(y))
+    assert np.array_equal(P.adjoint.adjoint(P.domain.element(x)).asarray(), A(x))
+
+
+def test_the_adjoint_holds_between_weighted_spaces(device, odl):
+    A = projector(device)
+    domain = odl.uniform_discr([-3, -3.5], [3, 3.5], (6, 7), dtype="float32")
+    range = odl.uniform_discr([0, -4], [3, 4], (8, 9), dtype="float32")
+    P = to_odl(A, domain=domain, range=range)
+    x, y = domain.element(white(6, 7)), range.element(white(8, 9))
+    assert np.isclose(P(x).inner(y), x.inner(P.adjoint(y)), rtol=1e-4)
+    assert rift.dot_test(from_odl(P, device=device)) < 1e-6
+
+
+def test_their_solver_takes_our_operator(device, odl):
+    A, x = projector(device), white(6, 7)
+    P = to_odl(A)
+    found = P.domain.zero()
+    odl.solvers.conjugate_gradient_normal(P, found, P.range.element(A(x)), niter=60)
+    assert np.linalg.norm(A(found.asarray()) - A(x)) < 1e-2 * np.linalg.norm(A(x))
+
+
+def test_their_operator_goes_into_our_algebra(device, odl):
+    space = odl.uniform_discr([-3, -3.5], [3, 3.5], (6, 7), dtype="float32")
+    D = odl.PartialDerivative(space, axis=0)
+    ours, x = from_odl(D, device=device), white(6, 7)
+    assert np.allclose(ours(x), D(space.element(x)).asarray(), atol=1e-6)
+    assert rift.dot_test(ours) < 1e-6
+    assert rift.dot_test(projector(device) @ ours) < 1e-5
+
+
+def test_what_does_not_fit_is_named(device, odl):
+    with pytest.raises(ShapeError, match="domain has shape"):
+        to_odl(projector(device), domain=odl.rn((7, 6), dtype="float32"))
+    with pytest.raises(DTypeError, match="A is a int"):
+        to_odl(3)
+    with pytest.raises(DTypeError, match="P is a ndarray, wanted a linear operator of ODL"):
+        from_odl(np.eye(3), device=device)
+    with pytest.raises(DTypeError, match="product of spaces"):
+        from_odl(odl.Gradient(odl.uniform_discr([0, 0], [1, 1], (4, 4))), device=device)

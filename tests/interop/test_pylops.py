@@ -1,0 +1,83 @@
+"""PyLops' operators and ours are each other's: adjoints, solvers, products."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from scipy.sparse.linalg import aslinearoperator as scipy_operator
+
+import rift_cl as rift
+from rift_cl.errors import DTypeError, InputError
+from rift_cl.interop.host_operator import HostOperator
+from rift_cl.interop.pylops import from_pylops, to_pylops
+
+pytestmark = pytest.mark.once
+
+
+def projector(device, dtype="float32"):
+    grid, scan = rift.Grid((6, 7)), rift.Parallel(np.linspace(0, 3, 8), 9)
+    return rift.Projector(grid, scan, device=device, dtype=dtype)
+
+
+def white(*shape):
+    return np.random.default_rng(5).standard_normal(shape).astype(np.float32)
+
+
+def test_our_operator_passes_their_dot_test_and_their_solver(device):
+    pylops = pytest.importorskip("pylops", reason="PyLops is not installed")
+    A, x = projector(device), white(6, 7)
+    P = to_pylops(A)
+    assert (P.dims, P.dimsd) == (A.domain, A.range)
+    assert pylops.utils.dottest(P, rtol=1e-3, raiseerror=True)
+    found = pylops.optimization.basic.cgls(P, A(x).ravel(), niter=60, tol=0)[0]
+    assert np.linalg.norm(A(found.reshape(6, 7)) - A(x)) < 1e-2 * np.linalg.norm(A(x))
+
+
+def test_their_operator_passes_our_dot_test_and_goes_into_our_algebra(device):
+    pylops = pytest.importorskip("pylops", reason="PyLops is not installed")
+    D = pylops.FirstDerivative((6, 7), axis=0, dtype="float32")
+    ours, x = from_pylops(D, device=device), white(6, 7)
+    assert (ours.domain, ours.range) == ((6, 7), (6, 7))
+    assert np.allclose(ours(x), D @ x, atol=1e-6)
+    assert rift.dot_test(ours) < 1e-6
+    A = projector(device)
+    product = A @ ours
+    assert rift.dot_test(product) < 1e-5
+    assert np.allclose(product(x), A(ours(x)), atol=1e-5)
+    assert np.array_equal(device.get(ours(device.array(x))), ours(x))
+
+
+def test_a_round_trip_gives_the_same_numbers(device):
+    pytest.importorskip("pylops", reason="PyLops is not installed")
+    A, x = projector(device), white(6, 7)
+    assert np.array_equal(from_pylops(to_pylops(A), device=device)(x), A(x))
+
+
+def test_an_operator_of_scipy_is_taken_too(device):
+    matrix = white(5, 4)
+    S = from_pylops(scipy_operator(matrix), device=device)
+    assert (S.domain, S.range, S.dtype) == ((4,), (5,), np.float32)
+    assert rift.dot_test(S) < 1e-6
+    assert np.allclose(S(np.ones(4)), matrix.sum(1), atol=1e-6)
+
+
+def test_what_cannot_be_an_operator_of_ours_is_named(device):
+    with pytest.raises(DTypeError, match="P is a ndarray without matvec"):
+        from_pylops(np.eye(3), device=device)
+    with pytest.raises(DTypeError, match="complex128"):
+        from_pylops(scipy_operator(1j * np.eye(3)), device=device)
+    with pytest.raises(DTypeError, match="A is a int"):
+        to_pylops(3)
+
+
+def test_a_wrong_adjoint_is_found_by_the_dot_test(device):
+    wrong = HostOperator(lambda x: 2 * x, lambda y: 3 * y, (4,), (4,), device=device)
+    assert rift.dot_test(wrong) > 0.1
+
+
+def test_a_package_that_is_missing_is_named_with_its_install(device, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pylops", None)
+    with pytest.raises(InputError, match=r"to_pylops needs pylops.*pip install pylops$"):
+        to_pylops(projector(device))

@@ -1,0 +1,131 @@
+"""Arrays with coordinates: what is labelled and read again is the same grid or scan."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.errors import DTypeError, InputError, ShapeError
+from rift_cl.interop.xarray import from_xarray, to_xarray
+
+xarray = pytest.importorskip("xarray", reason="xarray is not installed")
+
+ANGLES = np.linspace(0.1, 3, 5)
+THINGS = {
+    "slice": (rift.Grid((4, 6), 0.3, (1, -2)), (4, 6), ("y", "x")),
+    "volume": (rift.Grid((3, 4, 6), (0.5, 0.3, 0.2), (1, 2, 3)), (3, 4, 6), ("z", "y", "x")),
+    "one slice": (rift.Grid((1, 4, 6), (0.5, 0.3, 0.2)), (1, 4, 6), ("z", "y", "x")),
+    "sinogram": (rift.Parallel(ANGLES, 7, 0.25, 2.5), (5, 7), ("theta", "detector")),
+    "sinograms": (rift.Parallel(ANGLES, 7, 0.25), (5, 3, 7), ("theta", "row", "detector")),
+    "fan": (rift.Fan(ANGLES, 7, 0.25, 20, 30, 2.5, True), (5, 7), ("theta", "detector")),
+    "cone": (
+        rift.Cone(ANGLES, 3, 7, (0.5, 0.25), 20, 30, (1.5, 3)),
+        (5, 3, 7),
+        ("theta", "row", "detector"),
+    ),
+}
+
+
+def values_of(shape):
+    return np.random.default_rng(0).standard_normal(shape).astype(np.float32)
+
+
+def fields(thing):
+    return {name: np.asarray(value) for name, value in vars(thing).items() if name != "heights"}
+
+
+@pytest.mark.each
+@pytest.mark.parametrize("name", THINGS)
+def test_what_is_labelled_is_read_again(name):
+    thing, shape, dims = THINGS[name]
+    values = values_of(shape)
+    labelled = to_xarray(values, thing, unit="mm")
+    assert labelled.dims == dims
+    assert all(
+        labelled[axis].attrs["units"] == ("rad" if axis == "theta" else "mm") for axis in dims
+    )
+    for order in (dims, dims[::-1]):
+        again, found = from_xarray(labelled.transpose(*order))
+        assert np.array_equal(again, values)
+        assert type(found) is type(thing)
+        for field, value in fields(thing).items():
+            assert np.allclose(fields(found)[field], value, atol=1e-12), field
+
+
+def test_coordinates_are_those_of_the_grid_and_the_scan():
+    grid, scan = THINGS["slice"][0], THINGS["sinogram"][0]
+    labelled = to_xarray(values_of((4, 6)), grid, unit="mm")
+    assert np.array_equal(labelled.y, grid.coordinates(0))
+    assert labelled.attrs["units"] == "1/mm"
+    assert np.array_equal(to_xarray(values_of((5, 7)), scan).detector, scan.coordinates())
+
+
+def test_an_operator_takes_what_is_labelled(device):
+    grid, scan = rift.Grid((4, 6)), rift.Parallel(ANGLES, 7)
+    A, x = rift.Projector(grid, scan, device=device), values_of((4, 6))
+    assert np.array_equal(A(to_xarray(x, grid)), A(x))
+
+
+def test_a_file_keeps_it_all(tmp_path):
+    cone, shape, _ = THINGS["cone"]
+    labelled = to_xarray(values_of(shape), cone, unit="mm")
+    pytest.importorskip("scipy.io", reason="netCDF is written by SciPy here")
+    labelled.to_netcdf(tmp_path / "scan.nc", engine="scipy")
+    with xarray.open_dataarray(tmp_path / "scan.nc", engine="scipy") as read:
+        values, found = from_xarray(read)
+    assert np.array_equal(values, labelled.values)
+    assert np.allclose(found.center, cone.center)
+    assert found.source_to_axis == 20
+
+
+def test_a_coordinate_that_falls_is_turned_round():
+    grid = THINGS["slice"][0]
+    values = values_of((4, 6))
+    again, found = from_xarray(to_xarray(values, grid)[::-1])
+    assert np.array_equal(again, values)
+    assert np.allclose(found.center, grid.center)
+
+
+def test_degrees_are_read_as_they_are_marked():
+    scan = THINGS["sinogram"][0]
+    labelled = to_xarray(values_of((5, 7)), scan)
+    turned = labelled.assign_coords(theta=("theta", np.rad2deg(ANGLES), {"units": "degrees"}))
+    assert np.allclose(from_xarray(turned)[1].angles, ANGLES)
+
+
+def uneven(labelled):
+    return labelled.assign_coords(x=np.arange(6.0) ** 2)
+
+
+BAD = {
+    "array": (lambda a: a.values, DTypeError, "ndarray, wanted an xarray.DataArray"),
+    "names": (lambda a: a.rename(x="u"), ShapeError, r"dimensions y, u.*rename"),
+    "no coordinate": (lambda a: a.drop_vars("x"), InputError, "no coordinate x.*assign_coords"),
+    "uneven": (uneven, InputError, "coordinate x is not evenly spaced"),
+    "NaN": (lambda a: a * np.nan, InputError, "array holds NaN"),
+    "scan": (
+        lambda a: to_xarray(values_of((5, 7)), THINGS["fan"][0]).assign_attrs(scan="spiral"),
+        InputError,
+        "'spiral'",
+    ),
+    "distance": (
+        lambda a: to_xarray(values_of((5, 7)), THINGS["sinogram"][0]).assign_attrs(scan="Fan"),
+        InputError,
+        "no attribute source_to_axis, which a Fan needs",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_cannot_be_read_is_named(case):
+    change, error, words = BAD[case]
+    with pytest.raises(error, match=words):
+        from_xarray(change(to_xarray(values_of((4, 6)), THINGS["slice"][0])))
+
+
+def test_what_cannot_be_labelled_is_named():
+    with pytest.raises(ShapeError, match=r"values has shape \(3, 6\).*\(4, 6\)"):
+        to_xarray(values_of((3, 6)), THINGS["slice"][0])
+    with pytest.raises(DTypeError, match="of is a int, wanted a Grid"):
+        to_xarray(values_of((3, 6)), 3)
