@@ -4,6 +4,12 @@ A pool that keeps what arrays leave for arrays of the same size has, after a whi
 for every size as was ever needed of it: a third more than all arrays together take at any time. A
 heap gives what one array leaves to arrays of other sizes too. It has segments from the driver, each
 as large as the array that it was made for, and blocks of them are sub-buffers.
+
+Memory from the driver is dear: the system clears each page of it when it is first touched, which
+may take longer than what a kernel does there. A loop that makes the same arrays in every turn must
+find all of them in the segments that it had before. So a new segment takes the place of those that
+got no array for the longest time, and a size that was given back and is wanted again was given back
+wrongly: from then on more may be held than arrays ever had at a time.
 """
 
 from __future__ import annotations
@@ -11,6 +17,7 @@ from __future__ import annotations
 import sys
 import threading
 from bisect import insort
+from collections import deque
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -21,6 +28,12 @@ _STEP = 4096
 # A block lies in no segment of more than so many times its size: a small array would keep a large
 # one from the place that was made for it, and that one would get a second place.
 _LARGER = 6
+# Segments are made a little larger than what is asked for, by up to a sixteenth: the next array of
+# the kind may need a few more bytes, where one has as many as some splats are seen.
+_FINENESS = 4
+# The part of a segment by which more is held where it was given back wrongly, and how many segments
+# that were given back are remembered.
+_SHARE, _REMEMBERED = 4, 64
 
 
 class Heap:
@@ -36,7 +49,8 @@ class Heap:
     def __init__(self, make: Callable[[int], Any]) -> None:
         self._make = make
         self._segments: list[_Segment] = []
-        self._most = 0
+        self._most = self._spare = self._requests = 0
+        self._gone: deque[int] = deque(maxlen=_REMEMBERED)
         self._turn = threading.Lock()
 
     @property
@@ -48,12 +62,13 @@ class Heap:
         """Give segments that no array uses any more back to the driver."""
         with self._turn:
             self._sweep()
-            self._give_back(self.managed_bytes)
-            self._most = self._in_use
+            self._give_back(down_to=0)
+            self._most, self._spare = self._in_use, 0
+            self._gone.clear()
 
     def fits(self, size: int, largest: int) -> bool:
-        """Whether a block of ``size`` bytes lies in a buffer of ``largest`` bytes."""
-        return _rounded(size) <= largest
+        """Whether the segment of a block of ``size`` bytes has ``largest`` bytes at most."""
+        return _roomy(_rounded(size)) <= largest
 
     @property
     def _in_use(self) -> int:
@@ -65,6 +80,7 @@ class Heap:
         with self._turn:
             self._sweep()
             self._most = max(self._most, self._in_use + size)
+            self._requests += 1
             holes = [
                 (length, number, begin)
                 for number, segment in enumerate(self._segments)
@@ -74,16 +90,20 @@ class Heap:
             ]
             if holes:
                 _, number, begin = min(holes)
-                return self._segments[number].cut(begin, size)
-            return self._new_segment(size).cut(0, size)
+                return self._segments[number].cut(begin, size, self._requests)
+            return self._new_segment(size).cut(0, size, self._requests)
 
     def _new_segment(self, size: int) -> _Segment:
         """A segment in place of others that nothing is in, where there is memory enough in them."""
-        self._give_back(self.managed_bytes + size - self._most)
+        size = _roomy(size)
+        if size in self._gone:
+            self._gone.remove(size)
+            self._spare += size // _SHARE
+        self._give_back(down_to=self._most + self._spare - size)
         try:
             buffer = self._make(size)
         except driver_errors():
-            self._give_back(self.managed_bytes)
+            self._give_back(down_to=0)
             buffer = self._make(size)
         self._segments.append(_Segment(buffer, size))
         return self._segments[-1]
@@ -92,18 +112,26 @@ class Heap:
         for segment in self._segments:
             segment.sweep()
 
-    def _give_back(self, amount: int) -> None:
-        """Give so many bytes of empty segments back, the smallest first, or what there is."""
-        for segment in sorted(self._segments, key=lambda segment: segment.size):
-            if amount <= 0:
+    def _give_back(self, *, down_to: int) -> None:
+        """Give empty segments back until so many bytes are held, the longest unused first."""
+        held = self.managed_bytes
+        for segment in sorted(self._segments, key=lambda segment: segment.last_use):
+            if held <= down_to:
                 return
             if not segment.blocks:
                 self._segments.remove(segment)
-                amount -= segment.size
+                self._gone.append(segment.size)
+                held -= segment.size
 
 
 def _rounded(size: int) -> int:
     return -(-size // _STEP) * _STEP
+
+
+def _roomy(size: int) -> int:
+    """The size of a segment for a block of ``size`` bytes."""
+    unit = max(_STEP, 1 << max(size.bit_length() - 1 - _FINENESS, 0))
+    return -(-size // unit) * unit
 
 
 class _Block:
@@ -138,6 +166,7 @@ class _Segment:
     def __init__(self, buffer: Any, size: int) -> None:
         self._buffer, self.size = buffer, size
         self.blocks: list[_Block] = []
+        self.last_use = 0
 
     @property
     def in_use(self) -> int:
@@ -158,8 +187,9 @@ class _Segment:
         if self.size > begin:
             yield begin, self.size - begin
 
-    def cut(self, begin: int, size: int) -> Any:
-        """The buffer of a new block in a hole."""
+    def cut(self, begin: int, size: int, request: int) -> Any:
+        """The buffer of a new block in a hole, for the request of that number."""
+        self.last_use = request
         buffer = self._buffer.get_sub_region(begin, size)
         # In one step: an interrupt between two would leave the blocks out of order.
         insort(self.blocks, _Block(buffer, begin, begin + size), key=lambda block: block.begin)

@@ -68,11 +68,58 @@ def test_a_small_array_is_no_lodger_of_a_large_segment():
 def test_a_segment_takes_the_place_of_empty_ones():
     """As much is held as was in use at a time, whatever the sizes were."""
     ours = heap()
-    for size in (60, 100, 80, 140, 90):
+    for size in (60, 100, 80, 144, 90):
         block = ours(size * PAGE)
         del block
-        assert ours.managed_bytes <= 140 * PAGE
-    assert ours.managed_bytes == 140 * PAGE
+        assert ours.managed_bytes <= 144 * PAGE
+    assert ours.managed_bytes == 144 * PAGE
+
+
+def test_what_was_used_lately_stays():
+    ours = heap()
+    idle, lately = ours(144 * PAGE), ours(48 * PAGE)
+    segment = lately.segment
+    del idle, lately
+    lately = ours(48 * PAGE)
+    del lately
+    small = ours(7 * PAGE)
+    assert small.end == 7 * PAGE
+    assert ours.managed_bytes == 55 * PAGE
+    assert ours(48 * PAGE).segment is segment
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.lists(st.tuples(st.integers(1, 200), st.integers(0, 12)), min_size=1, max_size=12))
+def test_a_loop_finds_all_its_memory_again(turn):
+    """Arrays of a turn live to its end or shorter, or until the same array of the next one."""
+    taken = []
+
+    def make(size):
+        taken.append(size)
+        return Buffer(None, 0, size)
+
+    ours, lasting = Heap(make), {}
+    for k in range(40):
+        if k == 30:
+            taken.clear()
+        held = []
+        for number, (size, life) in enumerate(turn):
+            block = ours(size * PAGE)
+            if life == 12:
+                lasting[number] = block
+            held = [(one, left - 1) for one, left in [*held, (block, life)] if left]
+            del block
+    assert not taken
+
+
+def test_an_array_that_is_a_little_larger_than_before_finds_its_place():
+    ours = heap()
+    block = ours(1001 * PAGE)
+    del block
+    before = ours.managed_bytes
+    assert before <= 1.07 * 1001 * PAGE
+    assert ours(1020 * PAGE).end == 1020 * PAGE
+    assert ours.managed_bytes == before
 
 
 def test_a_driver_without_memory_gets_back_what_is_kept():
