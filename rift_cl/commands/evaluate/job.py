@@ -211,7 +211,9 @@ def _lpips(weights: Path) -> Score:
         InputError: torch is missing, or the weights cannot be read.
     """
     if find_spec("torch") is None:
-        raise InputError("--lpips needs torch, which is not installed: pip install torch")
+        raise InputError(
+            "--lpips needs torch, which is not installed: pip install 'torch>=2.4,<2.14'"
+        )
     from rift_cl.interop.lpips import Lpips
 
     return Lpips(weights)
