@@ -17,7 +17,7 @@ import tyro
 
 from rift_cl import __version__
 from rift_cl.commands.console_table import print_table
-from rift_cl.commands.progress_bar import print_line
+from rift_cl.commands.progress_bar import print_any_text, print_line
 from rift_cl.commands.runner import (
     Output,
     Terminated,
@@ -58,6 +58,7 @@ class Command(NamedTuple):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
+    print_any_text()
     return exit_status(lambda: told(lambda: _run(arguments)))
 
 

@@ -37,6 +37,8 @@ Progress = Callable[[Report], None] | None
 S = TypeVar("S")
 # Options that have a meaning on a command line alone.
 _COMMAND_LINE = ("dry_run", "preview")
+# Commands that go on from what they kept, and can give back what an earlier run began.
+_RESUMED = ("reconstruct", "fit photos", "fit xray")
 
 
 def reconstruct_scan(
@@ -290,7 +292,8 @@ def _settings(given: dict[str, Any], job: str, settings: type[S]) -> S:
     Raises:
         InputError: there is no such setting, or a value is none that it takes.
     """
-    for name in _COMMAND_LINE:
+    alone = (*_COMMAND_LINE, *(() if job in _RESUMED else ("resume",)))
+    for name in alone:
         if given.get(name):
             raise InputError(f"{name} is for 'rift {job}' on a command line alone: leave it out")
     plain = {name: _plain(value) for name, value in given.items()}

@@ -77,6 +77,17 @@ class RepeatableRun(RunOptions):
     decided in that run, become the defaults of this one."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class ResumableRun(RepeatableRun):
+    """How the command runs."""
+
+    group: ClassVar[str] = "run"
+
+    resume: bool = False
+    """Continue an interrupted run in --out, with the same settings; a finished one stays as it
+    is."""
+
+
 S = TypeVar("S")
 
 

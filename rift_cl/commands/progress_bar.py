@@ -5,6 +5,7 @@ Kernels that are built between two steps are told as well, once that takes longe
 
 from __future__ import annotations
 
+import io
 import math
 import sys
 import threading
@@ -185,6 +186,16 @@ def _told(report: Report, rate: float, left: float) -> list[str]:
     """The rate and the time left, where there is a rate."""
     told = [f"{rate:.3g} {report.what}/s"] if rate else []
     return told + ([f"{left:.0f} s left"] if left and report.done < report.total else [])
+
+
+def print_any_text() -> None:
+    """Let a terminal without the signs of a text show their numbers, where Python would give up.
+
+    ASCII has no degree sign, and a file's name need not be UTF-8.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="backslashreplace")
 
 
 def print_line(line: str) -> None:

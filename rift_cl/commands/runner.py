@@ -175,9 +175,13 @@ def watch(reports: Iterable[Report], output: Output) -> None:
 
 
 def ran(job: Any, settings: Any, output: Output) -> bool:
-    """Run a job, or say what it would do; whether it was run."""
+    """Run a job, or say what it would do or that it is done; whether it was run."""
     if settings.dry_run:
         print_table(("what", "plan"), job.plan().items())
+        return False
+    folder = getattr(job, "folder", None)
+    if folder is not None and folder.finished:
+        print_line(f"rift: {settings.out}: this run is finished; --overwrite begins it anew")
         return False
     run_job(job, output)
     return True

@@ -51,9 +51,11 @@ class Fields:
         value = self.values[name]
         if not _is_number(value):
             raise self._wrong(name, "a number")
-        if not np.isfinite(value):
+        # As a float first: NumPy looks into no integer of more than 64 bits.
+        number = float(value)
+        if not np.isfinite(number):
             raise NonFiniteError(f"{self.where}: {name!r} is {value}, wanted a finite number")
-        return float(value)
+        return number
 
     def whole(self, name: str) -> int | None:
         """A positive whole number, or None; errors are those of ``number``."""

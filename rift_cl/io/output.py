@@ -21,7 +21,8 @@ import numpy as np
 from rift_cl.cl.budget import format_bytes
 from rift_cl.errors import InputError, OutputError, RiftError
 
-_PART = ".part"
+# What is being written has its name with this at the end.
+PART = ".part"
 _OLD = ".old"
 
 
@@ -42,13 +43,16 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write a text file in UTF-8.
+    r"""Write a text file in UTF-8.
+
+    A byte of a file's name that is not UTF-8 is written as ``\udc`` and its two hexadecimal
+    digits, which JSON reads as the same name.
 
     Raises:
         OutputError: it cannot be written.
     """
     with atomic_path(path) as part:
-        part.write_text(text, encoding="utf-8")
+        part.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def write_json(path: str | os.PathLike[str], value: Any) -> None:
@@ -105,7 +109,7 @@ def writing(path: Path) -> Iterator[None]:
 @contextmanager
 def staged_file(path: Path) -> Iterator[Path]:
     """As ``atomic_path``, with the exceptions of the block left as they are."""
-    part = path.with_name(path.name + _PART)
+    part = path.with_name(path.name + PART)
     with writing(path):
         if path.is_dir():
             raise OutputError(f"{path}: is a folder, a file is to be written; name another place")
@@ -134,7 +138,7 @@ def staged_folder(path: Path, strange: Callable[[list[str]], str | None]) -> Ite
     Raises:
         OutputError: the folder cannot be made, or ``path`` is something else already.
     """
-    part = path.with_name(path.name + _PART)
+    part = path.with_name(path.name + PART)
     old = path.with_name(path.name + _OLD)
     with writing(path):
         for folder in (path, part, old):

@@ -170,6 +170,38 @@ def test_missing_file_is_built_again(cache, python, name):
     _works(python(PROGRAM, RIFT_CACHE_DIR=str(cache)))
 
 
+def _folder_instead(path):
+    path.unlink()
+    (path / "inside").mkdir(parents=True)
+
+
+def _pipe_instead(path):
+    path.unlink()
+    os.mkfifo(path)
+
+
+OTHERS = {"folder": _folder_instead, "pipe": _pipe_instead}
+
+
+@pytest.mark.parametrize("name", [*FILES, "checksums.json", "build.lock"])
+@pytest.mark.parametrize("other", OTHERS)
+def test_what_is_no_file_is_removed_and_built_again(cache, python, name, other):
+    OTHERS[other](next(cache.rglob(name)) if name not in FILES else _one(cache, name))
+    _works(python(PROGRAM, RIFT_CACHE_DIR=str(cache)))
+    _works(python(PROGRAM, RIFT_CACHE_DIR=str(cache)))
+    assert _one(cache, "program.bc").is_file()
+
+
+def test_a_record_that_leads_out_of_the_cache_removes_nothing_there(folder):
+    outside = folder.parent / "AB" / "P" / "folder"
+    outside.mkdir(parents=True)
+    cache_check.record(folder)
+    record = '{"../AB/P/folder": 1, "AB/../../AB/P/folder": 1}'
+    (folder / "checksums.json").write_text(record, encoding="utf-8")
+    assert cache_check.remove_damaged(folder) == 0
+    assert outside.is_dir()
+
+
 def test_damage_to_kernels_and_record_together(cache, python):
     next(cache.rglob("checksums.json")).write_bytes(b"")
     for path in cache.rglob("program.bc"):

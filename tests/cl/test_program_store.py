@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import stat
 
 import numpy as np
@@ -60,6 +61,17 @@ def test_damaged_file_is_removed(folder, damage):
     path.write_bytes(damage(path.read_bytes()))
     assert load("name") is None
     assert not list(folder.iterdir())
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir])
+def test_what_is_no_file_is_removed(folder, make):
+    save("name", PROGRAM)
+    (path,) = folder.iterdir()
+    path.unlink()
+    make(path)
+    assert load("name") is None
+    save("name", PROGRAM)
+    assert load("name") == PROGRAM
 
 
 def test_file_of_another_name_is_not_taken(folder):

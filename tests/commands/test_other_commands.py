@@ -5,6 +5,7 @@ import os
 import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -120,6 +121,36 @@ def test_closed_and_full_streams_are_survived(how, tmp_path):
     assert done.returncode == (5 if how == "> /dev/full" else 0)
     assert "Traceback" not in done.stderr
     assert (tmp_path / "d" / "report.html").exists()
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "utf-8"])
+@pytest.mark.skipif(sys.platform != "linux", reason="names are bytes on Linux alone")
+def test_a_folder_whose_name_is_not_utf8(python, tmp_path, encoding):
+    folder = os.fsencode(tmp_path) + b"/caf\xe9"
+    done = python(
+        "import os, sys\n"
+        "from rift_cl.commands.cli import main\n"
+        f"folder = os.fsdecode({folder!r})\n"
+        "os.mkdir(folder)\n"
+        "sys.exit(main(['analyze', folder]))",
+        PYTHONIOENCODING=encoding,
+    )
+    assert done.returncode == 3, done.stderr
+    assert "Traceback" not in done.stderr and "udce9" in done.stderr
+
+
+def test_a_terminal_of_ascii_gets_a_sentence_and_a_table(python, scan, tmp_path):
+    out = os.fsencode(tmp_path) + b"/caf\xe9 \xc2\xb0"
+    done = python(
+        "import os, sys\n"
+        "from rift_cl.commands.cli import main\n"
+        f"words = ['reconstruct', {str(scan.integrals)!r}, '--center', '45', '--format', 'h5']\n"
+        f"sys.exit(main([*words, '--quiet', '--out', os.fsdecode({out!r})]))",
+        PYTHONIOENCODING="ascii",
+    )
+    assert done.returncode == 0, done.stderr
+    assert "udce9" in done.stdout and "\\xb0" in done.stdout
+    assert Path(os.fsdecode(out), "volume.h5").is_file()
 
 
 def test_center(scan, tmp_path, capsys):

@@ -202,7 +202,6 @@ def test_a_preview_and_a_plan(
     [
         (("--method", "levels"), "levels"),
         (("--error", "1e-3"), "--error"),
-        (("--resume",), "--resume"),
         (("--pad", "on"), "--pad"),
         (("--compensate", "exact"), "--compensate"),
         (("--rows", "3", "90"), "--rows"),

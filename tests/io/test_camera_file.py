@@ -40,6 +40,11 @@ def test_a_lens_lies_beside_the_file_whatever_path_leads_there(tmp_path: Path) -
     assert read_cameras(around) == read_cameras(path)
 
 
+def test_whole_numbers_of_more_than_64_bits_are_numbers(tmp_path: Path) -> None:
+    (read,) = read_cameras(save(tmp_path, {**CAMERA, "exposure": 10**30}))
+    assert read.kind.exposure == 1e30
+
+
 @pytest.mark.parametrize(
     ("change", "word"),
     [
@@ -48,6 +53,7 @@ def test_a_lens_lies_beside_the_file_whatever_path_leads_there(tmp_path: Path) -
         ({"size": [10**400, 4]}, "size"),
         ({"size": "60x40"}, "'size' is '60x40'"),
         ({"cost": -1}, "'cost' is -1"),
+        ({"focal_length": -(2**64)}, "focal"),
         ({"ranges": {"f_number": "ab"}}, "wanted two numbers"),
         ({"lens": "triplet.json"}, "comes with a 'lens'"),
         ({**dict.fromkeys(CAMERA), **BEHIND, "lens": "none.json"}, r"'none.json'"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -118,6 +119,12 @@ def test_what_json_cannot_say(tmp_path: Path, value: object) -> None:
     with pytest.raises(InputError, match="JSON"):
         write_json(tmp_path / "a.json", value)
     assert left(tmp_path) == []
+
+
+def test_a_name_that_is_not_utf8_comes_back(tmp_path: Path) -> None:
+    name = os.fsdecode(b"caf\xe9")
+    write_json(tmp_path / "a.json", {"name": name})
+    assert json.loads((tmp_path / "a.json").read_text(encoding="utf-8")) == {"name": name}
 
 
 def test_folders(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import contextlib
 import json
 import os
 import shutil
+import stat
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -34,16 +35,31 @@ def remove_damaged(folder: Path) -> int:
         The number of programs that were removed.
     """
     known = _read(folder)
+    found = dict(_files(folder))
     damaged = {
-        _program(name)
-        for name, path in _files(folder)
-        if known is None or known.get(name, _UNKNOWN) not in (_UNKNOWN, _checksum(path))
+        _program(name) for name, path in found.items() if not _is_as_recorded(known, name, path)
     }
+    # Where a folder stands in a file's place the driver could not put the file that it builds anew.
+    damaged |= {_program(name) for name in known or {} if _is_folder(folder, name)}
     for program in damaged:
         shutil.rmtree(folder / program, ignore_errors=True)
     kept = {name: value for name, value in (known or {}).items() if _program(name) not in damaged}
     _write(folder, kept)
     return len(damaged)
+
+
+def _is_as_recorded(known: dict[str, int] | None, name: str, path: str) -> bool:
+    if known is None:
+        return False
+    checksum = _checksum(path)
+    return checksum != _UNREADABLE and known.get(name, _UNKNOWN) in (_UNKNOWN, checksum)
+
+
+def _is_folder(folder: Path, name: str) -> bool:
+    parts = name.split("/")
+    # A record is read before it is known to be ours: nothing outside of the cache is removed.
+    inside = len(parts) > _PROGRAM_DEPTH and not {"", ".", ".."} & set(parts)
+    return inside and (folder / name).is_dir()
 
 
 def record(folder: Path) -> None:
@@ -52,6 +68,20 @@ def record(folder: Path) -> None:
     new = {name: _checksum(path) for name, path in _files(folder) if name not in known}
     if new:
         _write(folder, {**known, **new})
+
+
+def own_file(path: Path) -> Path:
+    """A path of the cache at which there is a file or nothing: what else is there is removed.
+
+    Whoever opens a pipe waits for ever, and a folder cannot be replaced by a file.
+    """
+    with contextlib.suppress(OSError):
+        mode = path.lstat().st_mode
+        if stat.S_ISDIR(mode):
+            shutil.rmtree(path, ignore_errors=True)
+        elif not stat.S_ISREG(mode):
+            path.unlink()
+    return path
 
 
 def files_kept(folder: Path) -> int:
@@ -84,6 +114,9 @@ def _program(name: str) -> str:
 
 def _checksum(path: str) -> int:
     try:
+        # Whoever reads a pipe waits for ever.
+        if not stat.S_ISREG(os.lstat(path).st_mode):
+            return _UNREADABLE
         return zlib.crc32(Path(path).read_bytes())
     except OSError:
         return _UNREADABLE
@@ -91,13 +124,13 @@ def _checksum(path: str) -> int:
 
 def _read(folder: Path) -> dict[str, int] | None:
     try:
-        known = json.loads((folder / _RECORD).read_text(encoding="utf-8"))
+        known = json.loads(own_file(folder / _RECORD).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     return known if isinstance(known, dict) else None
 
 
 def _write(folder: Path, known: dict[str, int]) -> None:
-    part = folder / f"{_RECORD}.part"
+    part = own_file(folder / f"{_RECORD}.part")
     part.write_text(json.dumps(known), encoding="utf-8")
     part.replace(folder / _RECORD)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from rift_cl import __version__
-from rift_cl.cl.build.cache_check import files_kept
+from rift_cl.cl.build.cache_check import files_kept, own_file
 from rift_cl.cl.build.kernel_cache import build_lock, cache_folder
 from rift_cl.cl.build.program_store import write_whole
 
@@ -39,7 +39,7 @@ def driver_identity(handle: Any) -> dict[str, str]:
 def read_record(driver: dict[str, str]) -> dict[str, Any]:
     """What is known of a driver; empty where nothing is, or what was kept cannot be read."""
     try:
-        record = json.loads(_path(driver).read_text(encoding="utf-8"))
+        record = json.loads(own_file(_path(driver)).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
     wanted = {"format": _FORMAT, "rift_cl": __version__, "driver": driver}

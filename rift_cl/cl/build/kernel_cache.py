@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import IO
 
 from rift_cl import __version__
-from rift_cl.cl.build.cache_check import record, remove_damaged
+from rift_cl.cl.build.cache_check import own_file, record, remove_damaged
 from rift_cl.errors import DeviceError
 
 try:
@@ -112,13 +112,14 @@ def build_lock(kernel: str = "", *, write_down: bool = True) -> Iterator[None]:
     with contextlib.ExitStack() as held:
         try:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            whole = held.enter_context((folder / _LOCK).open("w"))
+            whole = held.enter_context(own_file(folder / _LOCK).open("w"))
             # Whoever wants the whole cache keeps this one while he waits, lest others keep him out.
-            with (folder / _TURN).open("w") as turn:
+            with own_file(folder / _TURN).open("w") as turn:
                 _lock(turn)
                 _lock(whole, shared=bool(kernel))
             if kernel:
-                _lock(held.enter_context((folder / f"{kernel}{_LOCK_SUFFIX}").open("w")))
+                own = own_file(folder / f"{kernel}{_LOCK_SUFFIX}")
+                _lock(held.enter_context(own.open("w")))
         except OSError as error:
             raise DeviceError(
                 f"kernel cache {folder} cannot be used any more ({error.strerror}): make it "

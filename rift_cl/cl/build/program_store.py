@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rift_cl import __version__
+from rift_cl.cl.build.cache_check import own_file
 from rift_cl.cl.build.kernel_cache import cache_folder
 
 _FORMAT = b"RIFT-CL program 1\n"
@@ -52,7 +53,7 @@ def program_name(driver: dict[str, str], source: str, options: list[str]) -> str
 
 def load(name: str) -> Stored | None:
     """What is stored under a name, or None; a damaged file is removed."""
-    path = _path(name)
+    path = own_file(_path(name))
     try:
         data = path.read_bytes()
     except OSError:

@@ -47,7 +47,7 @@ class Analysis:
         views, self.decided = open_views(settings)
         self.sampled, self.points = _observed(views)
         self.device = settings.open_device()
-        self.folder = RunFolder(settings.out, "analyze", overwrite=settings.overwrite)
+        self.folder = RunFolder.of(settings, "analyze")
         self.metrics: dict[str, Any] = {}
         self.tables: list[Table] = []
         self.added: tuple[Camera, ...] = ()

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal
 from tyro.conf import Positional
 
 from rift_cl.commands.inputs.scan_input import ScanArrays
-from rift_cl.commands.options import RepeatableRun
+from rift_cl.commands.options import ResumableRun
 from rift_cl.errors import InputError
 from rift_cl.option_marks import Auto
 
@@ -68,7 +68,7 @@ class AnalyzeOutput:
 
 
 @dataclass(frozen=True)
-class AnalyzeSettings(RepeatableRun, AnalyzeOutput, AnalyzeTarget, AnalyzeInput):
+class AnalyzeSettings(ResumableRun, AnalyzeOutput, AnalyzeTarget, AnalyzeInput):
     """Analyze how views sample a target: coverage, resolution limits, and views to add.
 
     Example: rift analyze capture --out analysis --diameter 0.2 --unit 1000

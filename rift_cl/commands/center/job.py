@@ -45,7 +45,7 @@ class CenterJob:
         self.settings = settings
         self.device = settings.open_device(settings.memory_limit)
         self.scan = settings.open_scan(fan=True)
-        self.folder = RunFolder(settings.out, "center", overwrite=settings.overwrite)
+        self.folder = RunFolder.of(settings, "center")
         # Of a cone, only the row of the source's orbit is a fan.
         self._middle = (self.scan.shape[1] - 1) / 2
         if isinstance(self.scan.cone, Cone):

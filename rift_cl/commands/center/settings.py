@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from rift_cl.commands.inputs.scan_input import ScanInput
-from rift_cl.commands.options import RepeatableRun
+from rift_cl.commands.options import ResumableRun
 from rift_cl.option_marks import Auto
 
 
@@ -28,7 +28,7 @@ class CenterSearch:
 
 
 @dataclass(frozen=True)
-class CenterSettings(RepeatableRun, CenterSearch, ScanInput):
+class CenterSettings(ResumableRun, CenterSearch, ScanInput):
     """Find the rotation axis of a scan.
 
     Of fan and cone beams it finds the sense of rotation as well.

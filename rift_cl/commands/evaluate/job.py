@@ -58,7 +58,7 @@ class Evaluation:
         for view in [*self.training_views, *(v for views in self.groups.values() for v in views)]:
             camera_at(view, self.downscale)
         self.device = settings.open_device()
-        self.folder = RunFolder(settings.out, "eval", overwrite=settings.overwrite)
+        self.folder = RunFolder.of(settings, "eval")
         self.metrics: dict[str, Any] = {}
         self.scores: dict[str, list[ViewScore]] = {}
 

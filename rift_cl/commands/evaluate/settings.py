@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 from tyro.conf import Positional, arg
 
 from rift_cl.commands.inputs.scene_input import SceneInput
-from rift_cl.commands.options import RepeatableRun
+from rift_cl.commands.options import ResumableRun
 from rift_cl.option_marks import Auto
 
 
@@ -51,7 +51,7 @@ class EvalOutput:
 
 
 @dataclass(frozen=True)
-class EvalSettings(RepeatableRun, EvalOutput, EvalInput):
+class EvalSettings(ResumableRun, EvalOutput, EvalInput):
     """Score a scene on held-out photographs, or on other captures of it.
 
     Example: rift eval fit --out scores

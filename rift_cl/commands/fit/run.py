@@ -37,7 +37,11 @@ class FitRun(Generic[S]):
         # With a value for all that was left open, once it is decided.
         self.settled = settings
         self.folder = RunFolder(
-            settings.out, settings.job, overwrite=settings.overwrite, resume=settings.resume
+            settings.out,
+            settings.job,
+            overwrite=settings.overwrite,
+            resume=settings.resume,
+            settings=settings,
         )
         self.device = open_device(settings.device, settings.budget())
         self.checkpoints = FitCheckpoints(
@@ -81,7 +85,7 @@ class FitRun(Generic[S]):
 
     def _demand_a_beginning(self) -> None:
         """Refuse to replace a finished fit that kept no checkpoint by one that begins anew."""
-        if self.folder.is_complete:
+        if self.folder.is_complete and not self.folder.finished:
             raise CheckpointError(
                 f"{self.settings.out}: this fit is finished and kept no checkpoint, so that it "
                 "cannot be trained on: begin anew with --overwrite"

@@ -52,7 +52,7 @@ class Planning:
         # Cameras that cannot have the target in their picture are refused here, before any work.
         DesignSpace(self.given.target, self.given.constraints, self.given.types)
         self.device = settings.open_device()
-        self.folder = RunFolder(settings.out, "plan", overwrite=settings.overwrite)
+        self.folder = RunFolder.of(settings, "plan")
         self.metrics: dict[str, Any] = {}
         self.found: Plan | None = None
         self.verdict = ""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal
 
-from rift_cl.commands.options import RepeatableRun
+from rift_cl.commands.options import ResumableRun
 from rift_cl.errors import InputError
 from rift_cl.option_marks import Auto, AutoExpert, Expert, Several
 
@@ -119,7 +119,7 @@ class PlanOutput:
 
 
 @dataclass(frozen=True)
-class PlanSettings(RepeatableRun, PlanOutput, PlanCameras, PlanTarget, PlanMethod):
+class PlanSettings(ResumableRun, PlanOutput, PlanCameras, PlanTarget, PlanMethod):
     """Plan camera poses that minimize what remains uncertain about a target.
 
     Example: rift plan --views 64 --diameter 60 --elevation 0 70 --out plan

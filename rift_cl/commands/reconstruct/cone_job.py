@@ -87,8 +87,9 @@ class ConeReconstruction:
         self._check_parts()
         out = settings.out
         alone = out.is_dir() and {p.name for p in out.iterdir()} <= {PREVIEW_PICTURE, "config.json"}
-        overwrite = settings.overwrite or alone
-        self.folder = RunFolder(out, "reconstruct", overwrite=overwrite)
+        # A preview alone is there to be followed by the slices.
+        begun = dataclasses.replace(settings, overwrite=True, resume=False) if alone else settings
+        self.folder = RunFolder.of(begun, "reconstruct")
         self.metrics: dict[str, Any] = {}
         self.announce: Callable[[str], None] = lambda line: None
         self._values: tuple[float, float] | None = None

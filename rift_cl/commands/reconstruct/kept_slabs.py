@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from rift_cl.commands.reconstruct.report import PREVIEW_PICTURE
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.volume import volume_path
-from rift_cl.commands.run_folder.run_folder import RunFolder
+from rift_cl.commands.run_folder.run_folder import RunFolder, difference, is_unfinished
 from rift_cl.errors import CheckpointError, OutputError
 from rift_cl.io.output import atomic_path, check_space, make_folder, write_json, writing
 
@@ -153,13 +153,9 @@ def check_same(path: Path, what: str, before: Mapping[str, Any], run: Mapping[st
     Raises:
         CheckpointError: they do not; the sentence names what differs.
     """
-    differs = sorted(name for name in {*before, *run} if before.get(name) != run.get(name))
-    if differs:
-        name = differs[0]
-        raise CheckpointError(
-            f"{path}: {what} had {name} {before.get(name)}, this one has {run.get(name)}: repeat "
-            "its options, or begin anew with --overwrite"
-        )
+    differs = difference(before, run)
+    if differs is not None:
+        raise CheckpointError(f"{path}: {what} {differs}, or begin anew with --overwrite")
 
 
 def finished_run(settings: ReconstructSettings) -> dict[str, Any] | None:
@@ -189,5 +185,7 @@ def run_folder(settings: ReconstructSettings, kept: SlabFolder) -> RunFolder:
         )
     # A preview alone is there to be followed by the slices.
     alone = out.is_dir() and {p.name for p in out.iterdir()} <= {PREVIEW_PICTURE, "config.json"}
-    there = begun or (settings.resume and finished_run(settings) is not None)
+    # One that was killed before it kept anything is begun again.
+    unfinished = is_unfinished(out, "reconstruct")
+    there = begun or (settings.resume and (unfinished or finished_run(settings) is not None))
     return RunFolder(out, "reconstruct", overwrite=settings.overwrite or alone, resume=there)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from rift_cl.commands.inputs.scan_input import ScanInput
-from rift_cl.commands.options import RepeatableRun
+from rift_cl.commands.options import ResumableRun
 from rift_cl.errors import InputError
 from rift_cl.option_marks import Auto, AutoExpert, Expert
 
@@ -191,16 +191,6 @@ class VolumeOutput:
     of a few slices, with a margin."""
     preview: bool = False
     """Reconstruct only the middle slice, as preview.png, and estimate the time for all."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ResumableRun(RepeatableRun):
-    """How the command runs."""
-
-    group: ClassVar[str] = "run"
-
-    resume: bool = False
-    """Continue an interrupted reconstruction in the same folder."""
 
 
 @dataclass(frozen=True)

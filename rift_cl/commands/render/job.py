@@ -36,7 +36,7 @@ from rift_cl.geometry import Camera
 from rift_cl.io.captures.capture import Capture, open_capture
 from rift_cl.io.captures.transforms_record import transforms_of
 from rift_cl.io.images.film_file import film_writer, suffix_of
-from rift_cl.io.images.image import write_png
+from rift_cl.io.images.image import read_image, write_png
 from rift_cl.io.images.pixels import write_pixels
 from rift_cl.io.output import atomic_path, make_folder, write_json
 from rift_cl.progress import Report
@@ -76,7 +76,7 @@ class Render:
         if settings.focus is not None and not lenses:
             raise InputError("--focus needs a lens with an aperture: give --aperture as well")
         self._kind = chosen_film(settings.film, [camera.size for camera in self.cameras])
-        self.folder = RunFolder(settings.out, "render", overwrite=settings.overwrite)
+        self.folder = RunFolder.of(settings, "render")
         for name, read in (("path", settings.path), ("capture", settings.capture)):
             if read is not None:
                 self.folder.check_kept(name, read, *_LEFT)
@@ -208,8 +208,7 @@ class Render:
         """Do it; a report for each frame."""
         folder, total = self.settings.out, len(self.cameras)
         self.folder.make()
-        self.folder.mark()
-        self.folder.drop(*_LEFT)
+        self.folder.begin(*_LEFT)
         make_folder(folder / "frames")
         renderer = Renderer(self.scene.rendering, device=self.device)
         splats = self.scene.splats.upload(self.device)
@@ -218,21 +217,41 @@ class Render:
         if self.settings.depth:
             window = depth_window(renderer, splats, self.cameras)
         depth: DepthKind | None = "expected" if self.settings.depth else None
-        sheet, names = Sheet(total), []
+        sheet = Sheet(total)
         with self._film_file() as add:
             for number, camera in enumerate(self.cameras):
-                image, seen = renderer.picture(splats, camera, background=behind, depth=depth)
-                colors = in_display_light(image[..., :3], self.scene.light)
-                names.append(f"frames/{number:04}.png")
-                write_png(folder / names[-1], colors)
-                add(shrunk(colors, max(camera.size)))
-                pictures = [colors]
-                if self.settings.depth:
-                    alpha = np.clip(1 - seen, 0, 1)
-                    pictures.append(self._save_depth(number, image[..., -1], alpha, window))
+                pictures = self._kept(number)
+                if not pictures:
+                    image, seen = renderer.picture(splats, camera, background=behind, depth=depth)
+                    pictures = self._save(number, image, seen, window)
+                add(shrunk(pictures[0], max(camera.size)))
                 sheet.add(number, [shrunk(picture, _MOVING) for picture in pictures])
                 yield Report(number + 1, total, "frames")
-        self._finish(sheet, names, window)
+        self._finish(sheet, [_frame_file(number) for number in range(total)], window)
+
+    def _kept(self, number: int) -> list[NDArray[np.float32]]:
+        """A frame that the run left which is gone on with, and its depth; else nothing."""
+        names = [_frame_file(number)]
+        names += [f"depth/{number:04}.png"] if self.settings.depth else []
+        files = [self.settings.out / name for name in names]
+        if not (self.folder.unfinished and all(file.is_file() for file in files)):
+            return []
+        return [read_image(file) for file in files]
+
+    def _save(
+        self,
+        number: int,
+        image: NDArray[np.float32],
+        seen: NDArray[np.float32],
+        window: tuple[float, float],
+    ) -> list[NDArray[np.float32]]:
+        """Write a frame, and its depth if that is wanted; gives back their pictures."""
+        pictures = [in_display_light(image[..., :3], self.scene.light)]
+        write_png(self.settings.out / _frame_file(number), pictures[0])
+        if self.settings.depth:
+            alpha = np.clip(1 - seen, 0, 1)
+            pictures.append(self._save_depth(number, image[..., -1], alpha, window))
+        return pictures
 
     def _save_depth(
         self,
@@ -276,3 +295,7 @@ class Render:
         self.moving = None if self._kind is None else sheet.embedded(rate)
         page = render_page(self.scene.name, sheet, self.moving, self.metrics)
         self.folder.finish(self.decided, self.metrics, page, self.device, asked=self.settings)
+
+
+def _frame_file(number: int) -> str:
+    return f"frames/{number:04}.png"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 from rift_cl.commands.inputs.orbit_input import OrbitInput
-from rift_cl.commands.options import RepeatableRun
+from rift_cl.commands.options import ResumableRun
 from rift_cl.errors import InputError
 from rift_cl.option_marks import Auto
 
@@ -78,7 +78,7 @@ class FrameOutput:
 
 
 @dataclass(frozen=True)
-class RenderSettings(RepeatableRun, FrameOutput, CameraOptions, OrbitInput):
+class RenderSettings(ResumableRun, FrameOutput, CameraOptions, OrbitInput):
     """Render a film of a scene, or the views of a capture.
 
     The film follows the cameras of the photographs: an orbit if they surround the scene, else

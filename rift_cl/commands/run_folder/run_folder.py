@@ -11,7 +11,8 @@ import json
 import os
 import platform
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from datetime import datetime, timezone
 from fnmatch import fnmatch
 from importlib.metadata import version
@@ -21,11 +22,15 @@ from typing import Any
 from rift_cl import __version__
 from rift_cl.cl.device import Device
 from rift_cl.commands.run_folder.saved_settings import options_of, record_of
-from rift_cl.errors import InputError, OutputError
-from rift_cl.io.output import make_folder, write_json, write_text, writing
+from rift_cl.errors import CheckpointError, InputError, OutputError
+from rift_cl.io.output import PART, json_text, make_folder, write_json, write_text, writing
 from rift_cl.report.html_page import Page
 
 _CONFIG = "config.json"
+# Says of an unfinished run that nothing of an earlier one is left.
+_CLEARED = "cleared"
+# Settings that change nothing of what comes out.
+_FREE = ("config", "device", "dry_run", "out", "overwrite", "resume", "view")
 
 
 class RunFolder:
@@ -36,27 +41,92 @@ class RunFolder:
         job: the command's name.
         overwrite: whether an earlier run of the same command may be replaced.
         resume: whether one that is there is gone on with.
+        settings: those that were given, by which a run that is there is known for the same; None
+            where the command knows it otherwise.
+
+    ``finished`` says whether such a run is there and came to its end, ``unfinished`` whether it was
+    cut off, and whatever is there was made by it.
 
     Raises:
         OutputError: the folder cannot be made, or holds something that would be lost.
     """
 
     def __init__(
-        self, path: Path, job: str, *, overwrite: bool = False, resume: bool = False
+        self,
+        path: Path,
+        job: str,
+        *,
+        overwrite: bool = False,
+        resume: bool = False,
+        settings: Any = None,
     ) -> None:
         self.path = path
         self._job = job
+        self._asked = None if settings is None else _asked(settings)
+        self._overwrite = overwrite
         above = next(parent for parent in path.absolute().parents if parent.exists())
         if not above.is_dir():
             raise OutputError(f"{path}: {above} is no folder; name another place (--out)")
         with writing(path):
-            used = path.exists() and (not path.is_dir() or any(path.iterdir()))
+            used = path.exists() and (not path.is_dir() or any(map(_is_used, path.iterdir())))
         if used and _record_of(path).get("job") != job:
             raise OutputError(f"{path}: holds other things already; name another folder (--out)")
         if used and not (overwrite or resume):
             raise OutputError(
                 f"{path}: holds an earlier run; name another folder (--out) or add --overwrite"
             )
+        looks = used and resume and settings is not None
+        self._other = self._other_than(settings) if looks else None
+        there = looks and self._other is None
+        self.finished = there and self.is_complete
+        self.unfinished = there and _record_of(path).get(_CLEARED) is True
+
+    @classmethod
+    def of(cls, settings: Any, job: str) -> RunFolder:
+        """The folder of a run that its settings, and what they name, decide.
+
+        Args:
+            settings: those of the command, with ``out``, ``overwrite`` and ``resume``.
+            job: the command's name.
+
+        Raises:
+            InputError: a run is to be gone on with and to be replaced.
+            OutputError: the folder cannot be made, or holds something that would be lost.
+            CheckpointError: the run to go on with is another.
+        """
+        if settings.resume and settings.overwrite:
+            raise InputError("--resume continues what --overwrite discards: give one of them")
+        given = {"overwrite": settings.overwrite, "resume": settings.resume}
+        folder = cls(settings.out, job, **given, settings=settings)
+        if folder._other is not None:
+            raise CheckpointError(
+                f"{settings.out}: {folder._other}, or begin anew with --overwrite"
+            )
+        return folder
+
+    def _other_than(self, settings: Any) -> str | None:
+        """Why the run that is there is not that of the settings, in words; None where it may be."""
+        if not (self.path / _CONFIG).is_file():
+            return None
+        before = _record_of(self.path).get("asked")
+        if not isinstance(before, dict):
+            return "the run there does not say what it was asked for: name another --out"
+        differs = difference(_decisive(before), self._asked or {})
+        if differs is not None:
+            return f"the run there {differs}"
+        begun = (self.path / _CONFIG).stat().st_mtime
+        changed = next((read for read in _read_by(settings) if self._is_newer(read, begun)), None)
+        return None if changed is None else f"{changed} was changed since: name another --out"
+
+    def _is_newer(self, read: Path, moment: float) -> bool:
+        """Whether a file, or one in a folder, was changed since, but for this run's own."""
+        own = self.path.resolve()
+        for path in read.rglob("*") if read.is_dir() else [read]:
+            with suppress(OSError):
+                newer = path.is_file() and path.stat().st_mtime > moment
+                if newer and not path.resolve().is_relative_to(own):
+                    return True
+        return False
 
     @property
     def is_complete(self) -> bool:
@@ -66,7 +136,8 @@ class RunFolder:
     def make(self) -> None:
         """Make the folder, and mark it as ours if no earlier run did: the first thing written."""
         make_folder(self.path)
-        if not (self.path / _CONFIG).exists():
+        begun_by_other = self._overwrite and not self.is_complete
+        if begun_by_other or not (self.path / _CONFIG).exists():
             self.mark()
 
     def mark(self, **decided: Any) -> None:
@@ -75,7 +146,8 @@ class RunFolder:
         Args:
             **decided: what the configuration is to hold already, by name.
         """
-        write_json(self.path / _CONFIG, {"job": self._job, "complete": False, **decided})
+        asked = {} if self._asked is None else {"asked": self._asked}
+        write_json(self.path / _CONFIG, {"job": self._job, "complete": False, **asked, **decided})
 
     def discard(self) -> None:
         """Remove the folder if a failed run left nothing in it but the mark."""
@@ -89,6 +161,17 @@ class RunFolder:
             for entry in self.path.glob(pattern):
                 with writing(entry):
                     shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+
+    def begin(self, *patterns: str) -> None:
+        """Mark the folder and drop what an earlier run left, unless that is to be gone on with.
+
+        Args:
+            *patterns: names that this run writes, and finds as it left them if it is cut off.
+        """
+        if not self.unfinished:
+            self.mark()
+            self.drop(*patterns)
+            self.mark(**{_CLEARED: True})
 
     def check_kept(self, name: str, file: Path, *patterns: str) -> None:
         """Make sure that what is read is not what ``drop`` removes.
@@ -144,6 +227,8 @@ class RunFolder:
         _show_settings(page, settings, asked)
         with page.folded("Environment"):
             page.facts(environment(device))
+        # Whoever is cut off between these files leaves no run that looks finished.
+        self.mark(**decided)
         write_text(self.path / "report.html", page.html())
         write_json(self.path / "metrics.json", metrics)
         write_json(self.path / _CONFIG, config)
@@ -170,6 +255,44 @@ def _record_of(path: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         return {}
     return record if isinstance(record, dict) else {}
+
+
+def is_unfinished(path: Path, job: str) -> bool:
+    """Whether a folder holds a run of a command that did not come to its end."""
+    record = _record_of(path)
+    return record.get("job") == job and record.get("complete") is False
+
+
+def difference(before: Mapping[str, Any], run: Mapping[str, Any]) -> str | None:
+    """How a run differs from the one before by what decides it, the first of it, in words."""
+    for name in sorted({*before, *run}):
+        if before.get(name) != run.get(name):
+            had, has = before.get(name), run.get(name)
+            return f"had {name} {had}, this one has {has}: repeat its options"
+    return None
+
+
+def _is_used(entry: Path) -> bool:
+    """Whether an entry of a folder is more than what a run was killed over as it marked it."""
+    return entry.name != _CONFIG + PART
+
+
+def _asked(settings: Any) -> dict[str, Any]:
+    """The settings that differ from their defaults and decide what comes out, as JSON has them."""
+    return _decisive(json.loads(json_text(_changed(settings))))
+
+
+def _decisive(asked: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in asked.items() if name not in _FREE}
+
+
+def _read_by(settings: Any) -> Iterator[Path]:
+    """What a run reads, as far as its options name it."""
+    for option in options_of(settings):
+        if option.name in _FREE:
+            continue
+        several = option.value if isinstance(option.value, tuple) else (option.value,)
+        yield from (Path(value) for value in several if isinstance(value, os.PathLike))
 
 
 def _show_settings(page: Page, settings: Any, asked: Any = None) -> None:
