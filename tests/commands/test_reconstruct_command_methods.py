@@ -132,11 +132,14 @@ def test_a_full_turn_whose_axis_is_off_by_a_little_has_the_rim(tmp_path):
     assert np.sqrt(np.mean((volume[0][rim] - 1) ** 2)) < 0.02
 
 
-def test_slices_of_an_offset_axis_reach_to_the_farther_end(tmp_path):
+@pytest.mark.parametrize("beyond", [False, True])
+def test_slices_of_an_offset_axis_reach_to_the_farther_end(tmp_path, beyond):
+    """And it is said where the object does not end there."""
     path = tmp_path / "scan.npz"
-    save_phantom(path, FULL, 40, 6.4)
-    volume, _ = reconstruct(path, tmp_path / "out", "--rows", 0, 1)
+    save_phantom(path, FULL, 40, 6.4, size=90 if beyond else SIZE)
+    volume, said = reconstruct(path, tmp_path / "out", "--kind", "attenuation", "--center", 6.4)
     assert volume.shape[1:] == (67, 67)
+    assert ("beyond that end as well" in said) == beyond
 
 
 def test_an_object_wider_than_the_detector_is_continued(tmp_path):

@@ -188,6 +188,9 @@ def test_half_acquisitions_may_be_stitched(half_acquisition, tmp_path, options):
     assert max(errors) < 0.35
     assert errors[1] < errors[0] + 0.05
     assert "stitched into wider views" in notes(tmp_path / "stitched")
+    for way in ("weighted", "stitched"):
+        # What the shorter side misses the other has.
+        assert "wider than the detector" not in notes(tmp_path / way)
 
 
 def test_subsets_take_fewer_steps(half_acquisition, tmp_path):

@@ -217,27 +217,25 @@ class ConeReconstruction:
             InputError: no view shows what the shorter side of the detector does not.
         """
         integrals, scan = self.source.read(), self.source.geometry
-        if (
-            not isinstance(self._formula, FDK)
-            or not isinstance(scan, Cone)
-            or not is_truncated(integrals.projections)
-        ):
+        if not isinstance(self._formula, FDK) or not isinstance(scan, Cone):
             return integrals
         bin, turn = scan.center[1], is_full_turn(scan.angles)
         further = sees_further(bin, scan.bins)
+        if not is_truncated(integrals.projections, bin if further and turn else None):
+            return integrals
         if further and not turn:
             raise InputError(
                 f"{self.source.file.path}: the object reaches beyond a side of the detector, whose "
                 f"axis is at bin {bin:.1f} of {scan.bins}, and the views do not go all round, so "
                 f"that no view shows what is missing there; {ITERATE} (--method)"
             )
-        if not further:
-            note = (
-                "The object reaches beyond a side of the detector in most views: values near the "
-                "border of the field of view are too large (cgls, sirt and tv explain the rays)."
-            )
-            self.source.notes.append(note)
-            self.announce(note)
+        side = "the farther side" if further else "a side"
+        note = (
+            f"The object reaches beyond {side} of the detector in most views: values near the "
+            "border of the field of view are too large (cgls, sirt and tv explain the rays)."
+        )
+        self.source.notes.append(note)
+        self.announce(note)
         return integrals
 
     def _solve(self, projections: Floats, total: int) -> Generator[Report, None, Iterable[Floats]]:

@@ -107,6 +107,8 @@ class SliceInput:
         self.geometry = self._geometry()
         # Whether a full turn's axis is so far off the middle that slices reach beyond the detector.
         self.offset = self._sees_farther()
+        # Whether the object reaches beyond the farther end, too.
+        self.beyond = False
         length = length_unit(self.unit)
         pixel = None if length is None else self._pitch * length.metres
         self.clean = CleanRows(self.scan, settings, pixel, device)
@@ -171,10 +173,11 @@ class SliceInput:
             and isinstance(self.geometry, Parallel)
         ):
             self.stitched, self.offset = self.geometry, False
-            self.geometry = stitched(np.zeros((*row.shape[::2],), np.float32), self.stitched)[1]
+            row, self.geometry = stitched(row, self.stitched, device=self.device)
         # What one side of the detector misses is no truncation where the other side has it.
         measured = row if self.settings.iterative else self._both_sides(row)[0]
         wanted = self.settings.pad == "auto" and is_truncated(measured) and not self.offset
+        self.beyond = self.offset and is_truncated(row, self.geometry.center)
         if wanted or self.settings.pad == "on":
             self.pad = max(1, self.scan.shape[2] // _PAD_SHARE)
             self.geometry = self.geometry if self.fan is None else self._geometry()
@@ -434,7 +437,11 @@ def _offset_note(source: SliceInput) -> str:
     )
     # Iterative methods use every view as it is.
     joined = "" if source.settings.iterative else "opposite views were combined, and "
-    return f"{off}: {joined}slices extend to the farther end."
+    beyond = (
+        " The object reaches beyond that end as well: values near the border of the field of view "
+        "are too large."
+    )
+    return f"{off}: {joined}slices extend to the farther end.{beyond if source.beyond else ''}"
 
 
 def _wide_note(source: SliceInput) -> str:

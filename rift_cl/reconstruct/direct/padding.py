@@ -29,15 +29,19 @@ _TRUNCATED = 0.05
 _STRONG = 99.0
 
 
-def is_truncated(projections: Stack) -> bool:
+def is_truncated(projections: Stack, center: float | None = None) -> bool:
     """Whether most views end above zero on one side, as those of too wide an object do.
 
     Args:
         projections: line integrals, (angle, bin) or (angle, row, bin), air at 0.
+        center: bin of an axis that is near one side, in a full turn: what views miss beyond that
+            side others show, and the farther side alone counts. Both sides count if not given.
     """
     strong = float(np.percentile(projections, _STRONG))
-    ends = [np.median(end) for end in _ends(projections)]
-    return strong > 0 and float(max(ends)) > _TRUNCATED * strong
+    ends = [float(np.median(end)) for end in _ends(projections)]
+    if center is not None:
+        ends = [ends[int(center < (projections.shape[-1] - 1) / 2)]]
+    return strong > 0 and max(ends) > _TRUNCATED * strong
 
 
 def extended(projections: Stack, scan: Beam, *, bins: int | None = None) -> tuple[Stack, Beam]:
