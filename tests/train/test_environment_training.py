@@ -104,6 +104,17 @@ def test_normals_of_a_sphere_point_outward_whatever_is_behind_it():
     assert np.median(agree) > 0.995 and agree.min() > 0.8
 
 
+def test_normals_are_the_same_in_runs_of_any_length(monkeypatch):
+    random = np.random.default_rng(5)
+    raw = {
+        "means": random.normal(size=(90, 3)).astype(np.float32),
+        "logits": random.normal(size=90).astype(np.float32),
+    }
+    whole = neighbour_normals(raw)
+    monkeypatch.setattr("rift_cl.train.start.normals._RUN", 7)
+    np.testing.assert_allclose(neighbour_normals(raw), whole, atol=1e-9)
+
+
 @pytest.mark.parametrize("count", [0, 1, 2, 3])
 def test_few_splats_have_normals_as_well(count):
     means = np.zeros((count, 3), np.float32)
