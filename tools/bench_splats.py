@@ -2,6 +2,8 @@
 
     python tools/bench_splats.py --against ../checkout-of-79177a8
     python tools/bench_splats.py --scenes fitted:480x360 cube:1000000:1920x1080 --training
+    python tools/bench_splats.py --growth --no-lanes --json growth.json --markdown docs/growth.md \
+        --keep docs/benchmarks/splats
 
 Both versions work in one process and take turns, with the same splats and cameras. Times are
 processor time of all threads divided by the number of cores, the least of the rounds: what else
@@ -16,7 +18,6 @@ steps whose photographs are kept from steps whose photographs are read from the 
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import time
@@ -33,13 +34,12 @@ import tyro
 import rift_cl as rift
 from bench import photographs
 from bench.checkout import Checkout
-from bench.command import say
+from bench.command import report, say
 from bench.photographs import PhotographsCase
 from bench.splat_scenes import DrawnScene
 from bench.surroundings import surroundings
-from bench.table import NONE, Table, show
+from bench.table import NONE, Table, markdown_lines
 from bench.used_lanes import used_lanes
-from rift_cl.io import write_text
 
 _SCENES = ("fitted:480x360", "cube:100000:512x512", "needles:20000:512x512")
 _TRAINING = ("10000:160x120", "60000:224x168")
@@ -55,6 +55,8 @@ _STEPS, _WARM = 8, 8
 # Frames while memory is looked at.
 _FRAMES = 3
 _RASTER = ("raster", "raster gradient")
+_WHAT = ("draw", "draw and gradient", *_RASTER)
+_OURS = "this version"
 
 
 @dataclass(frozen=True)
@@ -65,11 +67,14 @@ class Options:
         scenes: what is drawn, any number.
         training: what is trained on, any number; none to leave training out.
         photographs: captures that are fitted, any number, such as 1000:480x360:128M.
-        growth: draw cubes of 10,000 to 2 million splats and the fitted scene up to 4K instead.
+        growth: draw cubes of 10,000 to 2 million splats and the fitted scene up to 4K instead, and
+            show a line for each.
         against: checkout of another version.
         rounds: how often each version has its turn.
         lanes: count used lanes, on the host.
         json: file for every figure.
+        markdown: file for the tables.
+        keep: folder for the result by date, DATE-DEVICE.json.
         device: which OpenCL device, as RIFT_DEVICE selects it.
     """
 
@@ -81,6 +86,8 @@ class Options:
     rounds: int = 5
     lanes: bool = True
     json: Path | None = None
+    markdown: Path | None = None
+    keep: Path | None = None
     device: str | None = None
 
 
@@ -241,13 +248,13 @@ def _steps(trainer: Any) -> None:
 def measure_all(options: Options) -> Iterator[dict[str, Any]]:
     """Run the benchmark; all that was measured so far, after each scene."""
     device = rift.open_device(options.device)
-    versions = [Version("this version", nullcontext, device)]
+    versions = [Version(_OURS, nullcontext, device)]
     if options.against is not None:
         other = Checkout(options.against, bench=True)
         with other.active() as package:
             theirs = package.open_device(device.selector)
         versions.append(Version("the other", other.active, theirs))
-    head = {**surroundings(device), "steps": _STEPS}
+    head = {**surroundings(device), "steps": _STEPS, "growth": options.growth}
     drawn, trained, read = (list[dict[str, Any]]() for _ in range(3))
     record = {**head, "scenes": drawn, "training": trained, "photographs": read}
     for text in _GROWTH if options.growth else options.scenes:
@@ -267,7 +274,10 @@ def measure_all(options: Options) -> Iterator[dict[str, Any]]:
 
 
 def tables(record: dict[str, Any]) -> Iterator[Table]:
-    """A table of the scenes, one of their memory, and one of training."""
+    """A table of the scenes, one of their memory, and one of training; or how scenes grow."""
+    if record["growth"]:
+        yield _growth_table(record)
+        return
     columns = ("scene", "operation", "ms", "other", "times", "ns per used lane", "other")
     notes = (
         "Processor time of all threads over the number of cores, least of the rounds.",
@@ -285,6 +295,47 @@ def tables(record: dict[str, Any]) -> Iterator[Table]:
         yield Table("Training", columns[:5], steps, texts=2)
     if record["photographs"]:
         yield photographs.table(record["photographs"])
+
+
+def _growth_table(record: dict[str, Any]) -> Table:
+    """What each scene takes of time and memory, this version alone."""
+    rows = []
+    for scene in record["scenes"]:
+        took = scene["cpu_s"][_OURS]
+        rows.append(
+            (
+                scene["name"],
+                str(scene["splats"]),
+                str(scene.get("entries", NONE)),
+                *(f"{1e3 * min(took[what]):.1f}" if what in took else NONE for what in _WHAT),
+                f"{scene['memory'][_OURS] / 1e6:.0f}",
+            )
+        )
+    notes = (
+        "Milliseconds of processor time of all threads over the number of cores, least of the "
+        f"rounds; {record['device']['compute_units']} compute units. Other programs ran on the "
+        "same machine; they can only have made a time longer.",
+        "Entries: pairs of a splat and a tile that it may touch. MB: the most that the device has "
+        "from its driver while the scene is drawn and differentiated, with splats and gradients.",
+    )
+    columns = ("scene", "splats", "entries", *_WHAT, "MB")
+    return Table("Splats drawn and differentiated, as scenes grow", columns, rows, notes)
+
+
+def page(record: dict[str, Any]) -> str:
+    """The tables as a page, with the device named."""
+    device, host = record["device"], record["host"]
+    lines = [
+        "<!-- Generated by tools/bench_splats.py; do not edit. -->",
+        "# Speed and memory of splats",
+        "",
+        f"rift_cl {record['version']} on **{device['name']}** ({device['platform']}, driver "
+        f"{device['driver']}); host {host['cpu']}, {host['cores']} cores. {record['date']}.",
+        "",
+        "`cube` is a cube of small Gaussians of random colours, `fitted` a scene that was fitted "
+        "to pictures, drawn at several sizes; both with harmonics of degree 3.",
+    ]
+    return "\n".join([*lines, *markdown_lines(tables(record))]) + "\n"
 
 
 def _rows(case: dict[str, Any], parts: int) -> Iterator[tuple[str, ...]]:
@@ -305,16 +356,16 @@ def _beside(both: list[float], digits: int) -> tuple[str, str, str]:
 def main() -> int:
     """Run with the command line's arguments; the exit status."""
     options = tyro.cli(Options)
-    record: dict[str, Any] = {}
-    try:
-        for record in measure_all(options):
-            if options.json is not None:
-                write_text(options.json, json.dumps(record, indent=1) + "\n")
-    except rift.RiftError as error:
-        say(f"bench_splats: {error}")
-        return error.exit_status
-    show(tables(record))
-    return 0
+    return report(
+        "bench_splats",
+        measure_all(options),
+        json_file=options.json,
+        markdown_file=options.markdown,
+        page=page,
+        tables=tables,
+        keep_in=options.keep,
+        kept=dict,
+    )
 
 
 if __name__ == "__main__":

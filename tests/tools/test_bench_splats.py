@@ -109,6 +109,22 @@ def test_two_versions_take_turns(tool, tmp_path, capsys, monkeypatch):
     assert all(words in printed for words in ("ns per used lane", "Memory", "Photographs"))
 
 
+def test_growth_has_a_line_for_each_scene(tool, tmp_path, monkeypatch):
+    bench = tool("bench_splats")
+    monkeypatch.setattr(bench, "_GROWTH", (SCENE, "cube:80:20x12"))
+    page = tmp_path / "growth.md"
+    arguments = ["--growth", "--rounds", "1", "--no-lanes", "--markdown", str(page)]
+    monkeypatch.setattr(sys, "argv", ["bench_splats", *arguments, "--keep", str(tmp_path)])
+    assert bench.main() == 0
+    (kept,) = tmp_path.glob("*.json")
+    record = json.loads(kept.read_text(encoding="utf-8"))
+    printed = page.read_text(encoding="utf-8").splitlines()
+    lines = [line.split(" | ") for line in printed if "cube:" in line]
+    assert [line[1] for line in lines] == ["40", "80"]
+    assert [int(line[2]) for line in lines] == [scene["entries"] for scene in record["scenes"]]
+    assert "–" not in "".join(map(str, lines))
+
+
 @pytest.mark.parametrize("text", ["10:480x360", "0:48x36:64M", "5:8x8:64M", "5:48x36:none", ""])
 def test_photographs_that_are_none_are_refused(tool, text):
     with pytest.raises(InputError, match="wanted"):

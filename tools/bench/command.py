@@ -23,7 +23,7 @@ def report(
     name: str,
     records: Iterable[Record],
     *,
-    json_file: Path,
+    json_file: Path | None,
     markdown_file: Path | None,
     page: Callable[[Record], str],
     tables: Callable[[Record], Iterable[Table]],
@@ -35,7 +35,7 @@ def report(
     Args:
         name: of the tool.
         records: all that was measured so far, after each case.
-        json_file: for the record.
+        json_file: for the record, if it is wanted.
         markdown_file: for the page, if there is to be one.
         page: of a record.
         tables: of a record.
@@ -45,7 +45,8 @@ def report(
     record: Record = {}
     try:
         for record in records:
-            write_text(json_file, json.dumps(record, indent=1) + "\n")
+            if json_file is not None:
+                write_text(json_file, json.dumps(record, indent=1) + "\n")
             if markdown_file is not None:
                 write_text(markdown_file, page(record))
     except (rift.RiftError, CoverageError) as error:
