@@ -33,6 +33,10 @@ class SettingError(InputError):
         super().__init__(f"{owner}: {name} {said}")
         self.settings, self.name, self.said = owner, name, said
 
+    def __reduce__(self) -> tuple[type[SettingError], tuple[str, str, str]]:
+        """Travel between processes as what was said."""
+        return SettingError, (self.settings, self.name, self.said)
+
 
 class ShapeError(InputError):
     """An array has the wrong shape."""
@@ -88,6 +92,12 @@ class DeviceLostError(DeviceError):
 
 class DeviceMemoryError(DeviceError, MemoryError):
     """The device has too little memory, whatever the chunk size."""
+
+
+class ClusterError(RiftError, RuntimeError):
+    """The workers that work was given to cannot do it."""
+
+    exit_status = 4
 
 
 class KernelArgumentError(RiftError, TypeError):

@@ -93,6 +93,18 @@ def open_device(selector: str | None = None, memory: int | None = None) -> Devic
     return Device(chosen._handle, chosen.selector, memory=memory)
 
 
+def alike_devices(device: Device, selector: str | None = None) -> list[Device]:
+    """The devices of one name and driver that a selector fits, such as the GPUs of a machine.
+
+    Args:
+        device: one of them, as ``open_device`` gives it.
+        selector: as ``open_device`` takes it.
+    """
+    selector = selector or os.environ.get("RIFT_DEVICE")
+    found = _fitting(devices(), selector) if selector else list(devices())
+    return [d for d in found if d.identity == device.identity]
+
+
 def by_rank() -> list[Device]:
     """The devices in the order in which they are preferred: GPUs, CPUs (PoCL's first), others.
 

@@ -88,6 +88,36 @@ class ResumableRun(RepeatableRun):
     is."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class ClusterOption:
+    """Where the work is done."""
+
+    group: ClassVar[str] = "run"
+
+    cluster: Auto[str] = None
+    """Spread the work over processes: local:N for N workers on this machine, which divide its
+    devices, cores and memory, or the address of a Dask scheduler, such as tcp://10.0.0.1:8786 (see
+    docs/scale_out.md). Default: this process does it."""
+
+    def check_cluster(self) -> None:
+        """Check what ``--cluster`` says.
+
+        Raises:
+            InputError: it is no address.
+        """
+        from rift_cl.cluster.address import ClusterAddress
+
+        if self.cluster is not None:
+            ClusterAddress.of(self.cluster)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpreadRun(ClusterOption, ResumableRun):
+    """How the command runs."""
+
+    group: ClassVar[str] = "run"
+
+
 S = TypeVar("S")
 
 

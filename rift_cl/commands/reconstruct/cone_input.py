@@ -31,6 +31,7 @@ _REFUSED: dict[str, Any] = {
     "error": None,
     "centers": None,
     "half_acquisition": "weighted",
+    "cluster": None,
 }
 # Volumes and stacks of projections that a method holds at a time, on host and device together.
 _HELD = {"fbp": (3, 5), "backproject": (3, 4), "sirt": (6, 6), "cgls": (6, 6), "tv": (16, 7)}

@@ -170,7 +170,7 @@ class Inversion:
 
     def figures(self) -> dict[str, float]:
         """What came out of the steps, over all slices."""
-        curves = [curve for curve in self.residuals.values() if curve]
+        curves = [curve for _, curve in sorted(self.residuals.items()) if curve]
         if not curves:
             return {}
         return {

@@ -8,7 +8,7 @@ cut off goes on where it was.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -69,8 +69,9 @@ class Reconstruction:
         self.source = SliceInput(settings, self.device, file)
         self.inversion = Inversion(settings, self.source, self.device)
         # Made now, so that a part that is not inside the slice is told before any work.
-        self._kept = SlabFolder(settings.out / "slabs", self.shape)
-        self.folder = run_folder(settings, self._kept)
+        self.kept = SlabFolder(settings.out / "slabs", self.shape)
+        """The slices that are done."""
+        self.folder = run_folder(settings, self.kept)
         self.metrics: dict[str, Any] = {}
         self.announce: Callable[[str], None] = lambda line: None
         # Whether the slabs that are there are this run's, and whether it found them there.
@@ -137,14 +138,14 @@ class Reconstruction:
             check_place(self.settings, self.source, self.inversion.window)
             if not self._gone_on:
                 self._ours = True
-                self._kept.begin(self._facts())
+                self.kept.begin(self._facts())
             yield from self._work()
         except BaseException as error:
             if not self._keep_what_is_done():
                 self.folder.discard()
             elif isinstance(error, KeyboardInterrupt):
                 raise StoppedError(
-                    f"interrupted; {self._kept.done} of {self.shape[0]} slices are kept: the same "
+                    f"interrupted; {self.kept.done} of {self.shape[0]} slices are kept: the same "
                     "command with --resume goes on"
                 ) from None
             raise
@@ -157,22 +158,41 @@ class Reconstruction:
             InputError: the axis cannot be found, or a part that is wanted is not in the slice.
             CheckpointError: what there is to go on with belongs to another run.
         """
-        going_on = self.settings.resume and self._kept.begun
-        axis = self._kept.axis() if going_on and self.settings.center is None else None
-        if axis is not None:
-            self.source.center, self.source.tilt, self.source.turned = axis
+        going_on = self.settings.resume and self.kept.begun
+        if going_on:
+            self._take_axis()
         self._locate()
         if going_on and not self.settings.preview:
-            self._kept.go_on(self._facts())
+            self.kept.go_on(self._facts())
             self._ours = self._gone_on = True
-        self._kept.shape = self.shape
+        self.kept.shape = self.shape
         if self._gone_on:
             self.source.notes.append(
-                f"Gone on after {self._kept.done} of {self.shape[0]} slices; steps, seconds and "
+                f"Gone on after {self.kept.done} of {self.shape[0]} slices; steps, seconds and "
                 "dead pixels are those of the rest."
             )
         for note in self.source.notes:
             self.announce(note)
+
+    def join(self, names: Mapping[str, str]) -> None:
+        """Get ready to do a part of a run that another process has begun, about the axis it found.
+
+        Args:
+            names: what that process calls the files of the run, by their paths here.
+
+        Raises:
+            CheckpointError: the run is not this one.
+        """
+        self._take_axis()
+        self._locate()
+        self.kept.go_on(self._facts(), names)
+        self.kept.shape = self.shape
+
+    def _take_axis(self) -> None:
+        """Take the axis that was found when the run began, unless it is said."""
+        axis = self.kept.axis() if self.settings.center is None else None
+        if axis is not None:
+            self.source.center, self.source.tilt, self.source.turned = axis
 
     def _locate(self) -> None:
         """Find the axis, and tell before any other work, this search too, that memory is short."""
@@ -188,7 +208,7 @@ class Reconstruction:
             CheckpointError: that run would have made other slices.
         """
         before = finished_run(self.settings) if self.settings.resume else None
-        if before is None or self._kept.begun:
+        if before is None or self.kept.begun:
             return False
         now = {**self._facts(), **{name: before.get(name) for name in _FOUND}}
         check_same(self.settings.out, "the finished run", before, now)
@@ -215,21 +235,34 @@ class Reconstruction:
         """Every slice that is missing; first, of a long run, the middle one to look at."""
         # Less those of the row that the axis was looked for in.
         self.source.clean.zingers = 0
-        if not self._gone_on and self._looks_first:
+        if not self._gone_on and self._looks_first and self.settings.cluster is None:
             yield from self._look()
-        done = self._kept.done
         if self._gone_on:
             # Where it goes on, so that nobody takes what was done before for this run's pace.
-            yield Report(done * self.settings.most_steps, self._total, self._what)
+            yield self.report(self.kept.done)
+        if self.settings.cluster is None:
+            yield from self.work_on(self.kept.missing())
+            return
+        # Imported when used: a worker imports this module.
+        from rift_cl.commands.reconstruct.spread import spread
+
+        yield from spread(self)
+
+    def work_on(self, runs: list[slice]) -> Iterator[Report]:
+        """Reconstruct and keep runs of slices, a slab at a time; a report after each."""
+        done = self.kept.done
         values = {} if self.source.center is None else {"center": self.source.center}
-        slabs = self.inversion.slabs(self._kept.missing())
-        with Behind() as behind, ahead(slabs, self._load) as load:
+        with Behind() as behind, ahead(self.inversion.slabs(runs), self._load) as load:
             for slab, loaded in load:
                 integrals = self.source.projections(loaded)
                 slices = yield from self._slab(slab, integrals, done)
-                behind.do(self._kept.save, slab.start, slices)
+                behind.do(self.kept.save, slab.start, slices)
                 done += slab.stop - slab.start
-                yield Report(done * self.settings.most_steps, self._total, self._what, values)
+                yield self.report(done, values)
+
+    def report(self, done: int, values: Mapping[str, float] | None = None) -> Report:
+        """Where it stands after so many slices."""
+        return Report(done * self.settings.most_steps, self._total, self._what, values or {})
 
     def _look(self) -> Iterator[Report]:
         """Reconstruct the middle slice and show it; alone, tell how long the others would take."""
@@ -238,7 +271,7 @@ class Reconstruction:
         image = yield from self._slab(slab, self.source.projections(self._load(slab)), 0)
         path = self._show(image[0])
         if not self.settings.preview:
-            self._kept.save(middle, image)
+            self.kept.save(middle, image)
             self.announce(f"{path} shows the middle slice")
             yield Report(self.settings.most_steps, self._total, self._what)
             return
@@ -263,8 +296,7 @@ class Reconstruction:
     def _slab(
         self, slab: slice, integrals: Attenuation, before: int
     ) -> Generator[Report, None, Floats]:
-        found = {"dead_pixels": integrals.dead, "starved_samples": integrals.starved}
-        self.metrics.update({name: self.metrics.get(name, 0) + n for name, n in found.items()})
+        self._count(dead_pixels=integrals.dead, starved_samples=integrals.starved)
         steps = self.inversion.slices(self.rows[0] + slab.start, integrals.projections)
         done = before * self.settings.most_steps
         while True:
@@ -275,13 +307,25 @@ class Reconstruction:
                 return slices
             yield Report(done + report.done, self._total, self._what, report.values)
 
+    def take(
+        self, figures: Mapping[str, int], zingers: int, residuals: Mapping[int, list[float]]
+    ) -> None:
+        """Take what a worker tells of the slices that it made."""
+        self._count(**figures)
+        self.source.clean.zingers += zingers
+        self.inversion.residuals.update(residuals)
+
+    def _count(self, **found: int) -> None:
+        """Add to the figures of the run."""
+        self.metrics.update({name: self.metrics.get(name, 0) + n for name, n in found.items()})
+
     def _finish(self) -> None:
         """Make the volume of the slabs, and the report."""
         preview = Preview(self.shape[0])
         self._values = self._value_window()
         window = self.inversion.window
         with open_slices(self.settings, self.source, window, self._values) as volume:
-            for start, slab in self._kept.slabs():
+            for start, slab in self.kept.slabs():
                 volume.write(start, slab)
                 preview.take(start, slab)
         if self._values is not None:
@@ -304,14 +348,14 @@ class Reconstruction:
         record = {**self.metrics, "assumed": self.source.notes}
         facts = {"axis": self.source.axis, "run": self._facts()}
         self.folder.finish(self.decided, record, page, self.device, asked=self.settings, **facts)
-        self._kept.drop()
+        self.kept.drop()
 
     def _value_window(self) -> tuple[float, float] | None:
         """What the integers of the volume stand for, from a few slices where it was not said."""
         if self.settings.dtype == "float32" or self.settings.window is not None:
             return self.settings.window
         wanted = Preview(self.shape[0]).panels
-        slabs = self._kept.slabs(wanted)
+        slabs = self.kept.slabs(wanted)
         images = [
             slab[n - start] for start, slab in slabs for n in wanted if 0 <= n - start < len(slab)
         ]
@@ -326,9 +370,9 @@ class Reconstruction:
         """After a failure: whether slices are kept; else the traces of the run are removed."""
         if not self._ours:
             return False
-        if self._gone_on or self._kept.done:
+        if self._gone_on or self.kept.done:
             return True
-        self._kept.drop()
+        self.kept.drop()
         return False
 
     def _seconds_per_slice(self) -> float:

@@ -70,15 +70,23 @@ class SlabFolder:
         except (KeyError, TypeError, ValueError):
             return None
 
-    def go_on(self, run: Mapping[str, Any]) -> None:
+    def go_on(self, run: Mapping[str, str], names: Mapping[str, str] | None = None) -> None:
         """Make sure that what is there belongs to this run.
 
         Reads nothing but the record, and changes nothing.
 
+        Args:
+            run: what decides the slices.
+            names: what the process that began the run calls files, by their paths.
+
         Raises:
             CheckpointError: it does not; the sentence names what differs.
         """
-        check_same(self.path, "the run that was cut off", self._recorded(), run)
+        before, now = (
+            {what: _renamed(str(fact), names or {}) for what, fact in facts.items()}
+            for facts in (self._recorded(), run)
+        )
+        check_same(self.path, "the run that was cut off", before, now)
 
     def _recorded(self) -> dict[str, Any]:
         try:
@@ -109,7 +117,9 @@ class SlabFolder:
             np.save(out, np.ascontiguousarray(slices, np.float32), allow_pickle=False)
 
     def slabs(self, numbers: Collection[int] | None = None) -> Iterator[tuple[int, Floats]]:
-        """Slabs and the numbers of their first slices, in order.
+        """Slabs and the numbers of their first slices, in order; no slice comes twice.
+
+        Workers of unequal memory, one of which was lost, may have kept the same slice in two slabs.
 
         Args:
             numbers: slices that are wanted; slabs without any of them are left out.
@@ -117,8 +127,11 @@ class SlabFolder:
         Raises:
             CheckpointError: one is damaged.
         """
+        given = 0
         for start, stop, path in self._files():
             if numbers is not None and not any(start <= number < stop for number in numbers):
+                continue
+            if stop <= given:
                 continue
             try:
                 slab = np.load(path, allow_pickle=False)
@@ -131,7 +144,8 @@ class SlabFolder:
                     f"{path}: holds {slab.dtype} {slab.shape}, wanted float32 "
                     f"{(stop - start, *self.shape[1:])}; remove it and go on with --resume"
                 )
-            yield start, slab
+            first, given = max(start, given), stop
+            yield first, slab[first - start :]
 
     def drop(self) -> None:
         """Remove the folder."""
@@ -142,9 +156,15 @@ class SlabFolder:
     def _files(self) -> list[tuple[int, int, Path]]:
         if not self.path.is_dir():
             return []
-        named = [(_SLAB.fullmatch(path.name), path) for path in sorted(self.path.iterdir())]
-        found = [(int(name[1]), int(name[2]), path) for name, path in named if name]
+        named = [(_SLAB.fullmatch(path.name), path) for path in self.path.iterdir()]
+        found = sorted((int(name[1]), int(name[2]), path) for name, path in named if name)
         return [entry for entry in found if 0 <= entry[0] < entry[1] <= self.shape[0]]
+
+
+def _renamed(fact: str, names: Mapping[str, str]) -> str:
+    for path, name in names.items():
+        fact = fact.replace(path, name)
+    return fact
 
 
 def check_same(path: Path, what: str, before: Mapping[str, Any], run: Mapping[str, Any]) -> None:

@@ -94,6 +94,7 @@ class Preview:
 def planned(job: Reconstruction, seconds: float) -> dict[str, str]:
     """What would be done, in words; ``seconds`` is what it would take."""
     scan, device = job.source.scan, job.device
+    spread = {} if job.settings.cluster is None else {"workers": job.settings.cluster}
     return {
         "scan": f"{scan.path} ({scan.source}, {scan.kind})",
         "projections": f"{scan.shape} (angle, row, bin)",
@@ -102,6 +103,7 @@ def planned(job: Reconstruction, seconds: float) -> dict[str, str]:
         "assumed": " ".join(job.source.notes) or "nothing",
         "slabs": f"{len(job.slabs)} of at most {max(s.stop - s.start for s in job.slabs)}",
         "device": f"{device.name}, budget {format_bytes(device.budget)}",
+        **spread,
         "output": str(volume_path(job.settings)),
         "time": f"about {seconds:.3g} s, from one slice",
     }

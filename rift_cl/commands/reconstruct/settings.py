@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from rift_cl.commands.inputs.scan_input import ScanInput
-from rift_cl.commands.options import ResumableRun
+from rift_cl.commands.options import SpreadRun
 from rift_cl.errors import InputError
 from rift_cl.option_marks import Auto, AutoExpert, Expert
 
@@ -44,7 +44,7 @@ _FEWEST_PASSES = 5
 # What may differ between a run and the one that resumes it: it changes no bit of the result.
 _FREE = (
     *("out", "device", "memory", "format", "dtype", "window"),
-    *("overwrite", "resume", "dry_run", "preview", "config"),
+    *("overwrite", "resume", "dry_run", "preview", "config", "cluster"),
 )
 
 
@@ -195,7 +195,7 @@ class VolumeOutput:
 
 @dataclass(frozen=True)
 class ReconstructSettings(
-    ResumableRun, VolumeOutput, CorrectionOptions, GeometryOptions, MethodOptions, ScanInput
+    SpreadRun, VolumeOutput, CorrectionOptions, GeometryOptions, MethodOptions, ScanInput
 ):
     """Reconstruct a scan of parallel, fan or cone beams.
 
@@ -242,6 +242,7 @@ class ReconstructSettings(
             raise InputError("--centers replaces --center and --tilt: leave those out")
         if self.subsets not in (None, 1) and self.precondition is not None:
             raise InputError("--subsets and --precondition cannot be combined: give one of them")
+        self.check_cluster()
         if self.resume and self.overwrite:
             raise InputError("--resume continues what --overwrite discards: give one of them")
 

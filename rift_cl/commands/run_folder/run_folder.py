@@ -30,7 +30,7 @@ _CONFIG = "config.json"
 # Says of an unfinished run that nothing of an earlier one is left.
 _CLEARED = "cleared"
 # Settings that change nothing of what comes out.
-_FREE = ("config", "device", "dry_run", "out", "overwrite", "resume", "view")
+_FREE = ("cluster", "config", "device", "dry_run", "out", "overwrite", "resume", "view")
 
 
 class RunFolder:

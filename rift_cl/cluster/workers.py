@@ -1,0 +1,343 @@
+"""The workers that a command's work is spread over, and what is done when one of them is lost.
+
+Tasks repeat without harm: each names a part of a run, whose result goes to a file of its own that
+appears whole or not at all. So the part of a worker that was killed goes to another, and so does
+that of a worker whose device failed or hangs, whose process is begun anew. Few tasks are handed out
+at a time, so that the scheduler knows of no more than these, however many there are.
+"""
+
+from __future__ import annotations
+
+import queue
+import time
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rift_cl import __version__
+from rift_cl.cl.device import Device
+from rift_cl.cluster.address import ClusterAddress
+from rift_cl.cluster.local import local_cluster, worker_environments
+from rift_cl.cluster.on_worker import do, look
+from rift_cl.errors import ClusterError, DeviceError, InputError
+
+# Seconds in which a scheduler must answer, and in which a worker must come where there is none.
+_ANSWER, _WORKER = 10.0, 60.0
+# Tasks that are handed out, for each worker.
+_AHEAD = 2
+# How often a task is given out that a device failed in.
+_TRIES = 3
+# Seconds between two looks at what has come, and at who is there.
+_LOOK, _WHO = 0.5, 2.0
+# A worker hangs when a task takes so many times as long as the slowest so far, and so many seconds.
+_HANGS, _HANGS_FROM = 20.0, 300.0
+
+
+class Task(NamedTuple):
+    """A part of a run.
+
+    Args:
+        name: what an error calls it, such as ``slices 16 to 32``.
+        arguments: of the function that does it.
+    """
+
+    name: str
+    arguments: tuple[Any, ...]
+
+
+@contextmanager
+def cluster_workers(address: str, device: Device, selector: str | None) -> Iterator[Workers]:
+    """The workers that ``--cluster`` names; those of this machine are started, and ended at last.
+
+    Args:
+        address: ``local:N``, or that of a scheduler.
+        device: the one that was chosen here, whose memory local workers divide.
+        selector: what it was chosen by; None where nothing was said.
+
+    Raises:
+        InputError: the address is none, or Dask is not installed.
+        ClusterError: no scheduler answers, or it has no workers.
+    """
+    where = ClusterAddress.of(address)
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise InputError(
+            f"--cluster needs Dask ({error}): pip install dask distributed"
+        ) from error
+    with ExitStack() as stack:
+        # Of versions we speak ourselves.
+        stack.enter_context(warnings.catch_warnings())
+        warnings.filterwarnings("ignore", module="distributed|tornado|asyncio")
+        target: Any = address
+        if where.workers:
+            environments = worker_environments(device, selector, where.workers)
+            target = stack.enter_context(local_cluster(environments))
+        try:
+            client = stack.enter_context(Client(target, timeout=_ANSWER, set_as_default=False))
+        except (OSError, ValueError) as error:
+            raise ClusterError(
+                f"--cluster {address}: no Dask scheduler answers there: start one with 'dask "
+                "scheduler', or mend the address"
+            ) from error
+        workers = Workers(client, where, None if where.workers else selector)
+        workers.wait()
+        yield workers
+
+
+class Workers:
+    """The workers of a scheduler.
+
+    Args:
+        client: a ``distributed.Client``.
+        address: what ``--cluster`` says.
+        selector: of the device on each worker; its own choice if None.
+    """
+
+    def __init__(self, client: Any, address: ClusterAddress, selector: str | None) -> None:
+        self._client, self._address, self._selector = client, address, selector
+        self.lost = 0
+        """How many workers were lost so far."""
+        self._there: set[str] = set()
+        self._asked = self._seen = time.monotonic()
+        self._look_for_workers()
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._there)
+
+    @property
+    def sentence(self) -> str:
+        """How many there are, and where to watch them."""
+        address = self._client.scheduler.address
+        page = self._client.dashboard_link if find_spec("bokeh") else "none (pip install bokeh)"
+        plural = "" if len(self) == 1 else "s"
+        return f"{len(self)} worker{plural} of {address}; dashboard: {page}"
+
+    def wait(self) -> None:
+        """Wait for the first worker, and where they are our own for all.
+
+        Raises:
+            ClusterError: none has come in a minute.
+        """
+        while len(self) < max(1, self._address.workers):
+            time.sleep(_LOOK / 5)
+            self._look_for_workers()
+
+    def check(self, paths: Sequence[Path]) -> set[str]:
+        """Make sure that every worker has what it takes.
+
+        Args:
+            paths: files and folders that each must see.
+
+        Returns:
+            The names of their devices.
+
+        Raises:
+            ClusterError: one has another version or no device, or does not see a file.
+        """
+        told = self._ask(self._client.run, look, self._selector, list(paths), on_error="return")
+        return {self._device_of(worker, seen) for worker, seen in told.items()}
+
+    def _device_of(self, worker: str, seen: Any) -> str:
+        version = seen.get("version") if isinstance(seen, dict) else f"none that answers ({seen})"
+        if version != __version__:
+            raise ClusterError(
+                f"worker {worker}: has the version {version} of rift_cl, wanted {__version__} as "
+                "here: install the same on all machines"
+            )
+        where = f"worker {worker} on {seen['host']}"
+        if "refusal" in seen:
+            raise ClusterError(f"{where}: {seen['refusal']}")
+        if "unseen" in seen:
+            raise ClusterError(
+                f"{where}: does not see {seen['unseen']}; what is read and --out must be on a disk "
+                "that all workers share, under the same path"
+            )
+        return str(seen["device"])
+
+    def each(
+        self, function: Callable[..., Any], tasks: Iterable[Task]
+    ) -> Iterator[tuple[Task, Any] | None]:
+        """Have tasks done; results in the order in which they come.
+
+        Args:
+            function: of an importable module; does one task, and may do it twice.
+            tasks: taken a few at a time.
+
+        Yields:
+            A task and its result, or None where a while has gone by without one.
+
+        Raises:
+            RiftError: what a task raised.
+            ClusterError: a task ended every worker that it was given to, which is told once all
+                others are done; or there are no workers any more, or no scheduler.
+        """
+        waiting, running = iter(tasks), _Running(self._client, function)
+        killers: list[str] = []
+        try:
+            while True:
+                running.fill(waiting, _AHEAD * max(1, len(self)))
+                if not len(running):
+                    break
+                self._look_around(running)
+                come = running.next(_LOOK)
+                done = None if come is None else self._result(come, running, killers)
+                yield done
+        finally:
+            running.cancel()
+        if killers:
+            raise ClusterError(
+                f"{killers[0]}: ended every worker that it was given to; all else is done"
+            )
+
+    def _result(
+        self, come: _Begun, running: _Running, killers: list[str]
+    ) -> tuple[Task, Any] | None:
+        """A task with what it gave; None where it is to be done again, or cannot be."""
+        from distributed import KilledWorker
+
+        if come.future.status == "finished":
+            return come.task, self._ask(come.future.result)
+        if come.future.status != "error":
+            raise self._gone()
+        error = come.future.exception()
+        if isinstance(error, KilledWorker):
+            killers.append(come.task.name)
+            return None
+        if isinstance(error, DeviceError) and come.tries < _TRIES:
+            # What the process had on the device is lost.
+            self._begin_anew(getattr(error, "worker", None))
+            running.begin(come.task, come.tries + 1)
+            return None
+        raise error
+
+    def _begin_anew(self, worker: str | None) -> None:
+        """Begin a worker's process anew; one that no nanny watches stays as it is."""
+        if worker is not None:
+            with suppress(Exception):
+                self._client.restart_workers([worker])
+
+    def _look_around(self, running: _Running) -> None:
+        """Now and then see who is there, and who hangs.
+
+        Raises:
+            ClusterError: nobody has been there for a minute, or the scheduler is gone.
+        """
+        if time.monotonic() - self._asked < _WHO:
+            return
+        self._look_for_workers()
+        hanging = running.hanging()
+        if not hanging:
+            return
+        doing: dict[str, Sequence[str]] = self._ask(self._client.processing)
+        for worker, keys in doing.items():
+            if not hanging.isdisjoint(keys):
+                running.forget_time(keys)
+                self._begin_anew(worker)
+
+    def _look_for_workers(self) -> None:
+        now = set(self._ask(self._client.nthreads))
+        self.lost += len(self._there - now)
+        self._there, self._asked = now, time.monotonic()
+        if now:
+            self._seen = self._asked
+        elif self._asked - self._seen > _WORKER:
+            raise ClusterError(
+                f"--cluster {self._address.text}: no worker has been there for {_WORKER:.0f} s: "
+                "start one, such as with 'dask worker ADDRESS --nthreads 1'"
+            )
+
+    def _ask(self, question: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+        """Ask the scheduler something.
+
+        Raises:
+            ClusterError: it does not answer any more.
+        """
+        from distributed import CancelledError
+
+        try:
+            return question(*arguments, **options)
+        except (OSError, TimeoutError, CancelledError) as error:
+            raise self._gone() from error
+
+    def _gone(self) -> ClusterError:
+        return ClusterError(
+            f"--cluster {self._address.text}: the scheduler does not answer any more"
+        )
+
+
+@dataclass
+class _Begun:
+    """A task that was handed out.
+
+    Args:
+        task: the task.
+        future: its result to be.
+        tries: how often it was handed out.
+        since: when, in seconds.
+    """
+
+    task: Task
+    future: Any
+    tries: int
+    since: float
+
+
+class _Running:
+    """The tasks that are handed out.
+
+    Args:
+        client: of the scheduler.
+        function: does a task.
+    """
+
+    def __init__(self, client: Any, function: Callable[..., Any]) -> None:
+        self._client, self._function = client, function
+        self._ended: queue.Queue[Any] = queue.Queue()
+        self._begun: dict[str, _Begun] = {}
+        self._slowest = 0.0
+
+    def __len__(self) -> int:
+        return len(self._begun)
+
+    def fill(self, waiting: Iterator[Task], most: int) -> None:
+        """Hand tasks out until there are so many."""
+        while len(self) < most and (task := next(waiting, None)) is not None:
+            self.begin(task)
+
+    def begin(self, task: Task, tries: int = 1) -> None:
+        """Hand a task out."""
+        future = self._client.submit(do, self._function, *task.arguments, pure=False)
+        self._begun[future.key] = _Begun(task, future, tries, time.monotonic())
+        future.add_done_callback(self._ended.put)
+
+    def next(self, seconds: float) -> _Begun | None:
+        """The next one that ended, if one does so soon."""
+        try:
+            ended = self._begun.pop(self._ended.get(timeout=seconds).key)
+        except queue.Empty:
+            return None
+        self._slowest = max(self._slowest, time.monotonic() - ended.since)
+        return ended
+
+    def hanging(self) -> set[str]:
+        """Keys of tasks that take too long, beside those that have ended."""
+        longest = max(_HANGS * self._slowest, _HANGS_FROM) if self._slowest else float("inf")
+        now = time.monotonic()
+        return {key for key, begun in self._begun.items() if now - begun.since > longest}
+
+    def forget_time(self, keys: Iterable[str]) -> None:
+        """Count the time of some tasks from now on."""
+        for key in keys:
+            if key in self._begun:
+                self._begun[key].since = time.monotonic()
+
+    def cancel(self) -> None:
+        """Take back what is not done."""
+        with suppress(Exception):
+            self._client.cancel([begun.future for begun in self._begun.values()], force=True)

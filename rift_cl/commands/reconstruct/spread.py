@@ -1,0 +1,153 @@
+"""A reconstruction on the workers of a cluster, who each do runs of slices of one begun run.
+
+A worker opens the scan by itself, takes the axis from the record of the run, cuts its slices into
+slabs that fit its own memory, and keeps these beside the others. What it does is what this process
+would do without a cluster, so that a run may be gone on with either way, to the same bits.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rift_cl.cluster.address import ClusterAddress
+from rift_cl.cluster.on_worker import token
+from rift_cl.cluster.workers import Task, Workers, cluster_workers
+from rift_cl.commands.options import absolute_paths
+from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.progress import Report
+
+if TYPE_CHECKING:
+    from rift_cl.commands.reconstruct.job import Reconstruction
+
+# Tasks that a worker gets at least, and slices of one at most: a lost worker loses no more.
+_SHARES, _MOST = 4, 64
+# Options that may name files, besides those that are paths.
+_MAY_BE_FILES = "theta", "flats", "darks"
+
+
+class Receipt(NamedTuple):
+    """What a worker tells of slices that it has kept.
+
+    Args:
+        figures: numbers that are added up over a run, by name.
+        zingers: values that were replaced.
+        residuals: root mean square of the residual after each step, by detector row.
+        device: what it was done on.
+    """
+
+    figures: dict[str, int]
+    zingers: int
+    residuals: dict[int, list[float]]
+    device: str
+
+
+def spread(job: Reconstruction) -> Iterator[Report]:
+    """Have the missing slices of a run that has begun made by workers; a report now and then.
+
+    Raises:
+        RiftError: a worker cannot do it; what is done is kept.
+    """
+    settings, kept = job.settings, job.kept
+    assert settings.cluster is not None
+    with cluster_workers(settings.cluster, job.device, settings.device) as workers:
+        job.announce(workers.sentence)
+        theirs, names = _of_workers(settings)
+        with token(kept.path) as seen:
+            workers.check([theirs.out, *_files(theirs), seen])
+        used: set[str] = set()
+        done, lost = -1, 0
+        for come in workers.each(make_slices, _tasks(kept.missing(), workers, theirs, names)):
+            if come is not None:
+                used.add(come[1].device)
+                job.take(*come[1][:3])
+            if workers.lost > lost:
+                lost = workers.lost
+                job.announce("a worker was lost: its slices go to another")
+            if kept.done > done:
+                done = kept.done
+                yield job.report(done, {"workers": len(workers)})
+    job.metrics["workers"] = len(workers)
+    if len(used) > 1:
+        job.source.notes.append(
+            f"Slices were made on {len(used)} kinds of devices, which may round differently: "
+            f"{'; '.join(sorted(used))}."
+        )
+
+
+def _tasks(
+    missing: list[slice], workers: Workers, settings: ReconstructSettings, names: Mapping[str, str]
+) -> Iterator[Task]:
+    """Runs of slices, as many as keep all workers busy to the end."""
+    count = sum(run.stop - run.start for run in missing)
+    each = max(1, min(_MOST, -(-count // (_SHARES * len(workers)))))
+    for run in missing:
+        for first in range(run.start, run.stop, each):
+            stop = min(first + each, run.stop)
+            yield Task(f"slices {first} to {stop}", (settings, tuple(names.items()), first, stop))
+
+
+def _of_workers(settings: ReconstructSettings) -> tuple[ReconstructSettings, dict[str, str]]:
+    """The settings as workers take them, and what this process calls the files that they name."""
+    theirs = absolute_paths(settings)
+    for name in _MAY_BE_FILES:
+        value = getattr(settings, name)
+        if value is not None and Path(value).exists():
+            theirs = dataclasses.replace(theirs, **{name: str(Path(value).absolute())})
+    names = {
+        str(getattr(theirs, field.name)): str(getattr(settings, field.name))
+        for field in dataclasses.fields(settings)
+        if getattr(theirs, field.name) != getattr(settings, field.name)
+    }
+    # Each worker of this machine has its share of memory, and its device, by its environment.
+    own: dict[str, Any] = {}
+    if ClusterAddress.of(settings.cluster or "").workers:
+        own = {"device": None, "memory": None}
+    begun: dict[str, Any] = {"resume": True, "overwrite": False, "cluster": None, "config": None}
+    return dataclasses.replace(theirs, **begun, **own), names
+
+
+def _files(settings: ReconstructSettings) -> list[Path]:
+    """The files and folders that are read."""
+    named = [settings.scan, settings.geometry, settings.centers]
+    return [path for path in named if path is not None]
+
+
+def make_slices(
+    settings: ReconstructSettings, names: tuple[tuple[str, str], ...], first: int, stop: int
+) -> Receipt:
+    """Make and keep some slices of a run that has begun; called on a worker.
+
+    Args:
+        settings: the run's.
+        names: files by their paths, and what the process that began the run calls them.
+        first: the first slice, counted from the first row that was asked for.
+        stop: the one after the last.
+
+    Raises:
+        RiftError: the worker cannot do it.
+    """
+    job = _joined(settings, names)
+    job.metrics, job.source.clean.zingers = {}, 0
+    job.inversion.residuals.clear()
+    for _ in job.work_on([slice(first, stop)]):
+        pass
+    device = f"{job.device.name} ({job.device.platform} {job.device.driver})"
+    residuals = dict(job.inversion.residuals)
+    return Receipt(dict(job.metrics), job.source.clean.zingers, residuals, device)
+
+
+@lru_cache(maxsize=1)
+def _joined(settings: ReconstructSettings, names: tuple[tuple[str, str], ...]) -> Reconstruction:
+    """The run, which this worker has joined; it stays open for its next slices."""
+    from rift_cl.commands.devices.driver_test import meet_driver
+    from rift_cl.commands.reconstruct.job import Reconstruction
+
+    job = Reconstruction(settings)
+    for _ in meet_driver(job.device):
+        pass
+    job.join(dict(names))
+    return job

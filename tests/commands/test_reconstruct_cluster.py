@@ -1,0 +1,106 @@
+"""``rift reconstruct --cluster``: other processes make the slices, to the same bits."""
+
+import json
+import os
+import signal
+
+import numpy as np
+import pytest
+
+from rift_cl.cluster import workers
+from rift_cl.commands.reconstruct.job import Reconstruction
+from rift_cl.commands.reconstruct.kept_slabs import SlabFolder
+from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.commands.reconstruct.spread import make_slices
+from rift_cl.errors import InputError
+from rift_cl.io import read_volume
+
+ROWS = 12
+
+
+@pytest.fixture(scope="module")
+def scan(tmp_path_factory):
+    """Counts, so that stripes are removed and dead pixels counted."""
+    path = tmp_path_factory.mktemp("cluster") / "scan.npz"
+    rng = np.random.default_rng(3)
+    counts = rng.integers(200, 900, (40, ROWS, 32)).astype(np.float32)
+    flats = np.full((2, ROWS, 32), 1000, np.float32)
+    flats[:, 5, 7] = 0
+    np.savez(path, projections=counts, flats=flats, darks=0 * flats, angles=np.arange(40) * 4.5)
+    return path
+
+
+def settings(scan, out, **options):
+    return ReconstructSettings(scan, out=out, center=15.5, angle_unit="degrees", **options)
+
+
+def made(job):
+    for _ in job.run():
+        pass
+    return read_volume(job.settings.out / "slices"), job.metrics
+
+
+@pytest.mark.full
+def test_a_killed_worker_changes_no_bit(scan, tmp_path, monkeypatch):
+    pytest.importorskip("distributed", reason="Dask is not installed (pip install dask distributed)")
+    psutil = pytest.importorskip("psutil")
+    begin, begun = workers._Running.begin, []
+
+    def killing(self, task, tries=1):
+        begin(self, task, tries)
+        begun.append(task)
+        if len(begun) == 3:
+            children = psutil.Process().children(recursive=True)
+            own = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+            os.kill(own[-1].pid, signal.SIGKILL)
+
+    monkeypatch.setattr(workers._Running, "begin", killing)
+    monkeypatch.chdir(scan.parent)
+    job = Reconstruction(settings(scan.relative_to(scan.parent), tmp_path / "a", cluster="local:2"))
+    told = []
+    job.announce = told.append
+    volume, figures = made(job)
+    assert len(begun) >= 6 and any("2 workers of tcp://127.0.0.1:" in line for line in told)
+    alone, wanted = made(Reconstruction(settings(scan, tmp_path / "b")))
+    assert volume.tobytes() == alone.tobytes()
+    assert wanted["dead_pixels"] > 0
+    for name in ("dead_pixels", "starved_samples", "mean"):
+        assert figures[name] == wanted[name]
+    assert figures["workers"] >= 1
+    assert not (tmp_path / "a" / "slabs").exists()
+
+
+def test_a_run_goes_on_with_a_part_that_a_worker_made(scan, tmp_path, monkeypatch):
+    """The function of a worker, here; then the rest without a cluster."""
+    out = tmp_path / "out"
+    begun = Reconstruction(settings(scan, out))
+    begun._settle()
+    begun.folder.make()
+    begun.kept.begin(begun._facts())
+    receipt = make_slices(settings(scan, out, resume=True), (), 2, 7)
+    assert receipt.figures["dead_pixels"] > 0 and receipt.device
+    assert begun.kept.missing() == [slice(0, 2), slice(7, ROWS)]
+    volume, _ = made(Reconstruction(settings(scan, out, resume=True)))
+    assert volume.tobytes() == made(Reconstruction(settings(scan, tmp_path / "b")))[0].tobytes()
+
+
+def test_a_slice_that_two_workers_kept_comes_once(tmp_path):
+    kept = SlabFolder(tmp_path / "slabs", (9, 2, 2))
+    volume = np.arange(36, dtype=np.float32).reshape(9, 2, 2)
+    kept.begin({})
+    for first, stop in ((0, 4), (0, 2), (2, 3), (3, 7), (7, 9)):
+        kept.save(first, volume[first:stop])
+    slabs = list(kept.slabs())
+    assert [start for start, _ in slabs] == [0, 2, 4, 7]
+    assert np.concatenate([slab for _, slab in slabs]).tobytes() == volume.tobytes()
+    assert not kept.missing()
+
+
+def test_the_option_is_checked_and_not_repeated(scan, tmp_path):
+    with pytest.raises(InputError, match="local:N"):
+        Reconstruction(settings(scan, tmp_path / "a", cluster="two"))
+    job = Reconstruction(settings(scan, tmp_path / "a", cluster="local:2"))
+    assert job.plan()["workers"] == "local:2"
+    assert "cluster" not in job._facts()
+    made(Reconstruction(settings(scan, tmp_path / "a")))
+    assert json.loads((tmp_path / "a" / "config.json").read_text())["complete"]
