@@ -66,9 +66,7 @@ def cluster_workers(address: str, device: Device, selector: str | None) -> Itera
     try:
         from distributed import Client
     except ImportError as error:
-        raise InputError(
-            f"--cluster needs Dask ({error}): pip install dask distributed"
-        ) from error
+        raise InputError(f"--cluster needs Dask ({error}): pip install dask distributed") from error
     with ExitStack() as stack:
         # Of versions we speak ourselves.
         stack.enter_context(warnings.catch_warnings())

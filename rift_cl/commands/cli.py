@@ -306,6 +306,19 @@ def _plan(settings: Any, output: Output) -> None:
     print(f"transforms.json, views.csv{more} and report.html are in {settings.out}")
 
 
+def _sweep(settings: Any, output: Output) -> None:
+    from rift_cl.commands.sweep.job import Sweep
+    from rift_cl.commands.sweep.report import score_table
+
+    job = Sweep(settings)
+    if not output.quiet:
+        job.announce = lambda note: print_line(f"rift: {note}")
+    if not ran(job, settings, output):
+        return
+    print_table(*score_table(job.rows))
+    print(f"report.html, sweep.csv and the folders of the runs are in {settings.out}")
+
+
 def _print_notes(notes: Sequence[str]) -> None:
     for note in notes:
         print_line(f"rift: {note}")
@@ -385,6 +398,12 @@ COMMANDS = {
         "plan.settings",
         "PlanSettings",
         "Plan camera poses that minimize what remains uncertain about a target.",
+    ),
+    "sweep": Command(
+        _sweep,
+        "sweep.settings",
+        "SweepSettings",
+        "Run a command with many settings or inputs, and compare the results in one table.",
     ),
     "demo": Command(
         _demo,

@@ -15,6 +15,8 @@ from rift_cl.commands.reconstruct.spread import make_slices
 from rift_cl.errors import InputError
 from rift_cl.io import read_volume
 
+WANTED = "Dask is not installed (pip install dask distributed)"
+
 ROWS = 12
 
 
@@ -42,7 +44,7 @@ def made(job):
 
 @pytest.mark.full
 def test_a_killed_worker_changes_no_bit(scan, tmp_path, monkeypatch):
-    pytest.importorskip("distributed", reason="Dask is not installed (pip install dask distributed)")
+    pytest.importorskip("distributed", reason=WANTED)
     psutil = pytest.importorskip("psutil")
     begin, begun = workers._Running.begin, []
 

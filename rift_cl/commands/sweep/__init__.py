@@ -1,0 +1,1 @@
+"""``rift sweep``: one command with many settings or inputs, side by side."""

@@ -1,0 +1,185 @@
+"""``rift sweep``: one command with many settings or inputs, side by side in one table.
+
+Every run has a folder of its own under ``runs`` and is what the command would make of its settings;
+what is there stays there, so that a sweep that was cut off goes on with the runs that are missing.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from rift_cl.cl.device import Device
+from rift_cl.commands.options import absolute_paths
+from rift_cl.commands.run_folder.run_folder import RunFolder
+from rift_cl.commands.sweep.one_run import is_done, run, steps
+from rift_cl.commands.sweep.report import Row, sweep_page, write_table
+from rift_cl.commands.sweep.settings import SweepSettings
+from rift_cl.commands.sweep.variations import Variation, variations
+from rift_cl.errors import CheckpointError, InputError, StoppedError
+from rift_cl.progress import Report
+
+_RUNS = "runs"
+
+
+class Sweep:
+    """A sweep that is planned: every run's settings are checked, nothing is written yet.
+
+    Args:
+        settings: what to run.
+
+    Raises:
+        RiftError: a setting, the device or the folder cannot be used.
+    """
+
+    def __init__(self, settings: SweepSettings) -> None:
+        settings.check()
+        self.settings = settings
+        self.runs = variations(settings)
+        self.device: Device = settings.open_device()
+        self.folder = RunFolder(
+            settings.out, "sweep", overwrite=settings.overwrite, resume=settings.resume
+        )
+        self.rows: list[Row] = []
+        self.metrics: dict[str, Any] = {}
+        self.announce: Callable[[str], None] = lambda line: None
+        # Why runs could not be done, by their names.
+        self._refused: dict[str, str] = {}
+
+    @property
+    def _job(self) -> str:
+        return self.runs[0].job
+
+    def plan(self) -> dict[str, str]:
+        """What would be done, for ``--dry-run``."""
+        done = sum(is_done(each.settings.out) for each in self.runs) if self.settings.resume else 0
+        return {
+            "command": f"rift {self._job}",
+            "runs": f"{len(self.runs)}, of which {done} are done",
+            **{f"run {n}": each.name for n, each in enumerate(self.runs, 1)},
+            "device": self.device.name,
+            **({} if self.settings.cluster is None else {"workers": self.settings.cluster}),
+        }
+
+    def run(self) -> Iterator[Report]:
+        """Do it; a report after every run, and within one where this process does it.
+
+        Raises:
+            StoppedError: it was broken off, and what was done is kept.
+            InputError: no run can be done.
+        """
+        begin = time.perf_counter()
+        self._check_same()
+        self.folder.make()
+        if not self.settings.resume:
+            self.folder.drop(_RUNS)
+        self.folder.mark(runs=self._record())
+        left = [each for each in self.runs if not is_done(each.settings.out)]
+        done = len(self.runs) - len(left)
+        yield self._report(done)
+        try:
+            yield from self._here(left) if self.settings.cluster is None else self._spread(left)
+        except KeyboardInterrupt:
+            raise StoppedError(
+                f"interrupted; {sum(is_done(each.settings.out) for each in self.runs)} of "
+                f"{len(self.runs)} runs are kept: the same command with --resume goes on"
+            ) from None
+        self._finish(time.perf_counter() - begin)
+
+    def _here(self, left: list[Variation]) -> Iterator[Report]:
+        """Do runs one after the other."""
+        before = len(self.runs) - len(left)
+        for done, each in enumerate(left, before):
+            try:
+                for report in steps(each.job, self._begun(each)):
+                    yield self._report(done, report.done / max(report.total, 1))
+            except InputError as error:
+                self._refuse(each, str(error))
+            yield self._report(done + 1)
+
+    def _spread(self, left: list[Variation]) -> Iterator[Report]:
+        """Do runs on the workers of a cluster, a whole one on each."""
+        from rift_cl.cluster.address import ClusterAddress
+        from rift_cl.cluster.on_worker import token
+        from rift_cl.cluster.workers import Task, cluster_workers
+
+        settings, done = self.settings, len(self.runs) - len(left)
+        local = ClusterAddress.of(settings.cluster or "").workers > 0
+        with cluster_workers(settings.cluster or "", self.device, settings.device) as workers:
+            self.announce(workers.sentence)
+            with token(settings.out.absolute() / _RUNS) as seen:
+                workers.check([*(path.absolute() for path in settings.inputs), seen])
+            tasks = []
+            for each in left:
+                own: dict[str, Any] = {"device": None, "memory": None} if local else {}
+                own = {name: value for name, value in own.items() if hasattr(each.settings, name)}
+                given = dataclasses.replace(absolute_paths(self._begun(each)), **own)
+                tasks.append(Task(f"run {each.name}", (each.job, given)))
+            by_name = {f"run {each.name}": each for each in left}
+            for come in workers.each(run, tasks):
+                if come is None:
+                    continue
+                if come[1]:
+                    self._refuse(by_name[come[0].name], come[1])
+                done += 1
+                yield self._report(done)
+
+    def _begun(self, each: Variation) -> Any:
+        """A run's settings; it goes on where it was begun before."""
+        return dataclasses.replace(each.settings, resume=each.settings.out.exists())
+
+    def _refuse(self, each: Variation, why: str) -> None:
+        self._refused[each.name] = why
+        self.announce(f"run {each.name}: {why}")
+
+    def _report(self, done: int, more: float = 0.0) -> Report:
+        count = len(self.runs)
+        return Report(done, count, "runs", work=(done + min(more, 1.0), count))
+
+    def _record(self) -> dict[str, Any]:
+        """What decides each run, by its name."""
+        return {
+            each.name: json.loads(json.dumps(each.settings.decisive(), default=str))
+            for each in self.runs
+        }
+
+    def _check_same(self) -> None:
+        """Make sure that runs which are there are of these settings.
+
+        Raises:
+            CheckpointError: one is not.
+        """
+        if not self.settings.resume:
+            return
+        try:
+            path = self.settings.out / "config.json"
+            before = dict(json.loads(path.read_text(encoding="utf-8"))["runs"])
+        except (OSError, ValueError, LookupError, TypeError):
+            return
+        for name, now in self._record().items():
+            if name in before and before[name] != now:
+                raise CheckpointError(
+                    f"{self.settings.out}: its run {name} had other settings: repeat the options, "
+                    "or begin anew with --overwrite"
+                )
+
+    def _finish(self, seconds: float) -> None:
+        """Write the table and the report."""
+        self.rows = [Row.of(each, self._refused.get(each.name, "")) for each in self.runs]
+        if len(self._refused) == len(self.runs):
+            name, why = next(iter(self._refused.items()))
+            raise InputError(f"no run can be done; {name}: {why}")
+        self.metrics = {
+            "runs": len(self.runs),
+            "refused": self._refused,
+            "seconds": seconds,
+            "figures": {row.run.name: row.figures for row in self.rows},
+        }
+        write_table(self.settings.out / "sweep.csv", self.rows)
+        page = sweep_page(self._job, self.rows)
+        self.folder.finish(
+            self.settings, self.metrics, page, self.device, asked=self.settings, runs=self._record()
+        )

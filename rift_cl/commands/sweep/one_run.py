@@ -1,0 +1,87 @@
+"""One run of a sweep, in this process or on a worker."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rift_cl.commands.fit_photos.scores import ViewScore
+from rift_cl.errors import ClusterError, DeviceError, InputError
+from rift_cl.io.output import atomic_path
+from rift_cl.progress import Report
+
+# A held-out view of a fit, beside the preview of a reconstruction.
+PICTURE = "view.jpg"
+
+
+def steps(job: str, settings: Any) -> Iterator[Report]:
+    """Do a run, or go on with it; a report after each of its steps.
+
+    Args:
+        job: the command.
+        settings: its settings.
+
+    Raises:
+        RiftError: it cannot be done.
+    """
+    if job == "reconstruct":
+        from rift_cl.commands.reconstruct.choice import reconstruction_of
+
+        yield from reconstruction_of(settings).run()
+        return
+    fit = _fit(job, settings)
+    yield from fit.run()
+    for scores in fit.scores.values():
+        _leave_picture(settings.out / PICTURE, scores)
+        return
+
+
+def run(job: str, settings: Any) -> str:
+    """The same without reports; called on a worker.
+
+    Returns:
+        Why the input or its settings do not allow it; empty where it is done.
+
+    Raises:
+        RiftError: it cannot be done here, whatever the settings.
+    """
+    try:
+        for _ in steps(job, settings):
+            pass
+    except (ClusterError, DeviceError):
+        raise
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def is_done(folder: Path) -> bool:
+    """Whether the run in a folder came to its end."""
+    try:
+        record = json.loads((folder / "config.json").read_text(encoding="utf-8"))
+        return bool(record["complete"])
+    except (OSError, ValueError, LookupError, TypeError):
+        return False
+
+
+def _fit(job: str, settings: Any) -> Any:
+    if job == "fit xray":
+        from rift_cl.commands.fit_xray.job import XrayFit
+
+        return XrayFit(settings)
+    from rift_cl.commands.fit_photos.job import Fit
+
+    return Fit(settings)
+
+
+def _leave_picture(path: Path, scores: list[ViewScore]) -> None:
+    """Leave the first picture that was scored, as it was drawn."""
+    from rift_cl.report.plot import jpeg
+
+    if scores:
+        image = scores[0].image
+        window = (0.0, 1.0) if image.ndim == 3 else (float(image.min()), float(image.max()) or 1.0)
+        with atomic_path(path) as part:
+            part.write_bytes(jpeg(image, window=window))

@@ -1,0 +1,133 @@
+"""``rift sweep``: one command with many settings, in one table."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from rift_cl.commands.cli import main
+from rift_cl.commands.sweep.job import Sweep
+from rift_cl.commands.sweep.settings import SweepSettings
+from rift_cl.commands.sweep.variations import variations
+from rift_cl.errors import CheckpointError, InputError
+from rift_cl.io import read_volume
+
+WANTED = "Dask is not installed (pip install dask distributed)"
+
+INPUT = 3
+
+
+def save_scan(path, seed):
+    projections = np.random.default_rng(seed).random((12, 2, 16), dtype=np.float32)
+    np.savez(path, projections=projections, angles=np.arange(12) * np.pi / 12)
+    return path
+
+
+@pytest.fixture(scope="module")
+def scans(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sweep")
+    return [save_scan(folder / f"{name}.npz", seed) for seed, name in enumerate("ab")]
+
+
+def run(*arguments):
+    return main([str(argument) for argument in arguments])
+
+
+def sweep(scans, out, vary=("method=fbp,cgls",), **options):
+    fixed = ("center=7.5", "kind=attenuation", "footprint=strip")
+    return SweepSettings("reconstruct", tuple(scans), vary=vary, fixed=fixed, out=out, **options)
+
+
+def done(settings):
+    job = Sweep(settings)
+    reports = list(job.run())
+    return job, reports
+
+
+def test_every_combination_is_a_run(scans, tmp_path):
+    runs = variations(sweep(scans, tmp_path, ("filter=hann,ram-lak", "rows=0 1,0 2")))
+    assert [run.name for run in runs][:3] == [
+        "a_filter=hann_rows=0-1",
+        "a_filter=hann_rows=0-2",
+        "a_filter=ram-lak_rows=0-1",
+    ]
+    assert len(runs) == 8 and len({run.settings.out for run in runs}) == 8
+    last = runs[-1]
+    assert last.varied == {"input": "b", "filter": "ram-lak", "rows": "0 2"}
+    assert (last.settings.scan, last.settings.rows) == (scans[1], (0, 2))
+    assert (last.settings.filter, last.settings.center) == ("ram-lak", 7.5)
+
+
+@pytest.mark.parametrize(
+    ("vary", "said"),
+    [
+        (("methods=fbp",), "did you mean 'method'"),
+        (("method=fbp,fpb",), "'fpb', wanted one of"),
+        (("steps=3",), "--steps does not apply to --method fbp"),
+        (("out=a",), "out cannot be"),
+        (("method",), "NAME=VALUE"),
+        (("center=1,2",), "center is given twice"),
+        (("size=4,4",), "two runs"),
+    ],
+)
+def test_what_is_refused_before_any_run(scans, tmp_path, vary, said):
+    with pytest.raises(InputError, match=said):
+        Sweep(sweep(scans[:1], tmp_path / "out", vary))
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.once
+def test_a_sweep_goes_on_and_each_run_is_what_the_command_makes(scans, tmp_path):
+    out = tmp_path / "out"
+    job = Sweep(sweep(scans[:1], out, ("method=fbp,cgls", "size=8")))
+    steps = job.run()
+    while not (out / "runs" / "method=fbp_size=8" / "config.json").exists():
+        next(steps)
+    for report in steps:
+        if report.done == 1:
+            steps.close()
+    first = (out / "runs" / "method=fbp_size=8" / "config.json").read_bytes()
+    with pytest.raises(CheckpointError, match="had other settings"):
+        done(sweep(scans[1:], out, ("method=fbp,cgls", "size=8"), resume=True))
+    job, reports = done(sweep(scans[:1], out, ("method=fbp,cgls", "size=8"), resume=True))
+    assert (reports[0].done, reports[-1].done) == (1, 2)
+    assert (out / "runs" / "method=fbp_size=8" / "config.json").read_bytes() == first
+    words = ("--center", 7.5, "--kind", "attenuation", "--footprint", "strip", "--size", 8)
+    alone = ("reconstruct", scans[0], "--method", "cgls", *words, "--out", tmp_path / "alone")
+    assert run(*alone) == 0
+    swept = read_volume(out / "runs" / "method=cgls_size=8" / "slices")
+    assert swept.tobytes() == read_volume(tmp_path / "alone" / "slices").tobytes()
+    rows = list(csv.DictReader((out / "sweep.csv").read_text(encoding="utf-8").splitlines()))
+    assert [row["method"] for row in rows] == ["fbp", "cgls"]
+    assert float(rows[1]["residual"]) > 0 and rows[0]["residual"] == ""
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image") >= 2 and "runs/method%3Dcgls_size%3D8/report.html" in page
+    figures = json.loads((out / "metrics.json").read_text())["figures"]
+    assert figures["method=cgls_size=8"]["mean"] == float(rows[1]["mean"])
+
+
+@pytest.mark.once
+def test_a_run_that_cannot_be_done_is_told_beside_the_others(scans, tmp_path, capsys):
+    words = ("--fixed", "kind=attenuation", "center=7.5", "--vary", "rows=0 1,0 9")
+    assert run("sweep", "reconstruct", scans[0], *words, "--out", tmp_path / "out") == 0
+    told = capsys.readouterr()
+    assert "--rows is 0 9" in told.err and "rows=0-1" in told.out
+    assert "--rows is 0 9" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    words = ("--fixed", "kind=attenuation", "center=7.5", "rows=0 9")
+    assert run("sweep", "reconstruct", scans[0], *words, "--out", tmp_path / "none") == INPUT
+    capsys.readouterr()
+    assert run("sweep", "reconstruct", scans[0], "--vary", "size=4,8", "--dry-run") == 0
+    assert "size=8" in capsys.readouterr().out
+
+
+@pytest.mark.full
+def test_runs_on_workers_have_the_same_bits(scans, tmp_path):
+    pytest.importorskip("distributed", reason=WANTED)
+    done(sweep(scans, tmp_path / "here"))
+    job, _ = done(sweep(scans, tmp_path / "there", cluster="local:2"))
+    assert len(job.rows) == 4
+    for row in job.rows:
+        slices = f"runs/{row.run.name}/slices"
+        here, there = (read_volume(tmp_path / place / slices) for place in ("here", "there"))
+        assert here.tobytes() == there.tobytes()
