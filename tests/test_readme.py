@@ -34,6 +34,7 @@ COMMANDS = [
     "view",
     "export",
     "analyze",
+    "sweep",
     "plan",
     "cache",
 ]

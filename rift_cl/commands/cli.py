@@ -31,6 +31,8 @@ from rift_cl.commands.runner import (
 )
 
 _USAGE = 2
+# Figures of a run that a line of a terminal has room for.
+_FIGURES = 4
 
 
 class Command(NamedTuple):
@@ -315,7 +317,7 @@ def _sweep(settings: Any, output: Output) -> None:
         job.announce = lambda note: print_line(f"rift: {note}")
     if not ran(job, settings, output):
         return
-    print_table(*score_table(job.rows))
+    print_table(*score_table(job.rows, most=_FIGURES))
     print(f"report.html, sweep.csv and the folders of the runs are in {settings.out}")
 
 

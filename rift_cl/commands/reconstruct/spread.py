@@ -92,11 +92,12 @@ def _tasks(
 
 def _of_workers(settings: ReconstructSettings) -> tuple[ReconstructSettings, dict[str, str]]:
     """The settings as workers take them, and what this process calls the files that they name."""
-    theirs = absolute_paths(settings)
+    files: dict[str, Any] = {}
     for name in _MAY_BE_FILES:
         value = getattr(settings, name)
         if value is not None and Path(value).exists():
-            theirs = dataclasses.replace(theirs, **{name: str(Path(value).absolute())})
+            files[name] = str(Path(value).absolute())
+    theirs = dataclasses.replace(absolute_paths(settings), **files)
     names = {
         str(getattr(theirs, field.name)): str(getattr(settings, field.name))
         for field in dataclasses.fields(settings)

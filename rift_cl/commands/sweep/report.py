@@ -48,7 +48,7 @@ class Row:
     def picture(self) -> bytes | None:
         """A slice or a view, if the run left one."""
         for name in (PREVIEW_PICTURE, PICTURE):
-            path = self.run.settings.out / name
+            path = Path(self.run.settings.out) / name
             if not self.refused and path.is_file():
                 return path.read_bytes()
         return None
@@ -66,31 +66,37 @@ def _numbers(record: Any, name: str = "") -> list[tuple[str, float]]:
     return [number for numbers in inner for number in numbers]
 
 
-def score_columns(rows: Sequence[Row]) -> list[str]:
-    """Names of the figures that tell the runs apart, as many as a table has room for.
+def _score_columns(rows: Sequence[Row], most: int) -> list[str]:
+    """Names of the figures that tell the runs apart.
 
     Scores of held-out views come first, then the others as the runs list them.
     """
-    names = list(dict.fromkeys(name for row in rows for name in row.figures))
-    differ = [name for name in names if len({row.figures.get(name) for row in rows}) > 1] or names
+    done = [row for row in rows if not row.refused]
+    names = list(dict.fromkeys(name for row in done for name in row.figures))
+    differ = [name for name in names if len({row.figures.get(name) for row in done}) > 1] or names
     plain = [name for name in differ if len(name.split()) <= 4 and not name.startswith("errors")]
     plain.sort(key=lambda name: not ("psnr" in name or "ssim" in name))
-    return plain[:_COLUMNS]
+    return plain[:most]
 
 
-def score_table(rows: Sequence[Row]) -> tuple[list[str], list[list[Any]]]:
-    """The columns and the rows of the table: what was varied, and what came out."""
+def score_table(rows: Sequence[Row], most: int = _COLUMNS) -> tuple[list[str], list[list[Any]]]:
+    """The columns and the rows of the table: what was varied, and what came out.
+
+    Args:
+        rows: the runs.
+        most: figures that there is room for.
+    """
     varied = list(dict.fromkeys(name for row in rows for name in row.run.varied))
-    columns = score_columns(rows)
+    columns = _score_columns(rows, most)
     body = [
         [
-            row.run.name,
+            *([] if varied else [row.run.name]),
             *(row.run.varied.get(name) for name in varied),
             *(row.figures.get(name) for name in columns),
         ]
         for row in rows
     ]
-    return ["run", *varied, *columns], body
+    return [*(varied or ["run"]), *columns], body
 
 
 def write_table(path: Path, rows: Sequence[Row]) -> None:

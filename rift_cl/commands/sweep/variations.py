@@ -60,7 +60,7 @@ def variations(sweep: SweepSettings) -> list[Variation]:
         raise InputError(f"--vary makes {count} runs, wanted {_MOST_RUNS} at most")
     several = len(sweep.inputs) > 1
     runs = []
-    for path, *values in itertools.product(sweep.inputs, *varied.values()):
+    for path, values in itertools.product(sweep.inputs, itertools.product(*varied.values())):
         texts = dict(zip(varied, values, strict=True))
         given = {
             name: _value(name, text, job, kind, earlier)
