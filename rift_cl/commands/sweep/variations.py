@@ -54,8 +54,8 @@ def variations(sweep: SweepSettings) -> list[Variation]:
         raise InputError(f"{name} is given twice: once in --vary or once in --fixed is enough")
     earlier = begun_settings(sweep.base, fixed.get("preset"), job, kind)
     count = len(sweep.inputs)
-    for values in varied.values():
-        count *= len(values)
+    for several_values in varied.values():
+        count *= len(several_values)
     if count > _MOST_RUNS:
         raise InputError(f"--vary makes {count} runs, wanted {_MOST_RUNS} at most")
     several = len(sweep.inputs) > 1
