@@ -89,8 +89,8 @@ class ResumableRun(RepeatableRun):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ClusterOption:
-    """Where the work is done."""
+class SpreadRun(ResumableRun):
+    """How the command runs."""
 
     group: ClassVar[str] = "run"
 
@@ -109,13 +109,6 @@ class ClusterOption:
 
         if self.cluster is not None:
             ClusterAddress.of(self.cluster)
-
-
-@dataclass(frozen=True, kw_only=True)
-class SpreadRun(ClusterOption, ResumableRun):
-    """How the command runs."""
-
-    group: ClassVar[str] = "run"
 
 
 S = TypeVar("S")

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 
 from tyro.conf import Positional
 
-from rift_cl.commands.options import ClusterOption, RepeatableRun
+from rift_cl.commands.options import SpreadRun
 from rift_cl.errors import InputError
 from rift_cl.option_marks import Auto, Several
 
@@ -45,19 +45,8 @@ class SweepOutput:
     each run has a folder of its own in it, under runs."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class SweepRun(ClusterOption, RepeatableRun):
-    """How the command runs."""
-
-    group: ClassVar[str] = "run"
-
-    resume: bool = False
-    """Continue an interrupted sweep in the same folder: finished runs stay, others go on; further
-    values may be added."""
-
-
 @dataclass(frozen=True)
-class SweepSettings(SweepRun, SweepOutput, SweepInput):
+class SweepSettings(SpreadRun, SweepOutput, SweepInput):
     """Run a command with many settings or inputs, and compare the results in one table.
 
     Example: rift sweep reconstruct scan.h5 --vary filter=ram-lak,hann cutoff=0.5,1 --out compared
