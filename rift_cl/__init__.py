@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         plan_views,
         reconstruct_scan,
         render,
+        view,
     )
     from rift_cl.errors import RiftError
     from rift_cl.geometry import (
@@ -77,6 +78,7 @@ if TYPE_CHECKING:
         sirt,
         tv,
     )
+    from rift_cl.report.shown import show
     from rift_cl.sampling import Constraints, Observations, Plan, Target, next_views, plan
     from rift_cl.sampling.coverage.device import coverage
     from rift_cl.sampling.criteria.merit import merit
@@ -142,8 +144,10 @@ __all__ = [
     "register_scan_reader",
     "render",
     "scan_of_arrays",
+    "show",
     "sirt",
     "tv",
+    "view",
 ]
 
 __getattr__, __dir__ = lazy_names(
@@ -159,6 +163,7 @@ __getattr__, __dir__ = lazy_names(
             "plan_views",
             "reconstruct_scan",
             "render",
+            "view",
         ),
         "errors": ("RiftError",),
         "geometry": (
@@ -203,6 +208,7 @@ __getattr__, __dir__ = lazy_names(
             "sirt",
             "tv",
         ),
+        "report.shown": ("show",),
         "sampling": ("Constraints", "Observations", "Plan", "Target", "next_views", "plan"),
         "sampling.coverage.device": ("coverage",),
         "sampling.criteria.merit": ("merit",),

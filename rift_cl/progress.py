@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from html import escape
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,13 @@ class Report:
     what: str
     values: Mapping[str, float] = field(default_factory=dict)
     work: tuple[float, float] | None = None
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: a bar, and the figures."""
+        named = [f"{name} {value:.6g}" for name, value in self.values.items()]
+        words = escape(", ".join([f"{self.done}/{self.total} {self.what}", *named]))
+        bar = f"<progress aria-label='Progress' value='{self.done}' max='{max(self.total, 1)}'>"
+        return f"<div>{bar}</progress> {words}</div>"
 
 
 class Builds:

@@ -2,9 +2,10 @@
 
 Each takes what its command takes, by the same names with underscores, checked by the same parser;
 runs the same job; and gives back a record of what came out. Nothing is printed: ``progress`` is
-called with each ``Report``. ``config="run/config.json"`` repeats an earlier run, whose settings
-other arguments override. Without ``out`` the files go to a temporary folder, which is removed with
-the record that is given back.
+called with each ``Report``, and ``progress=True`` shows the commands' bar, in a notebook below the
+cell. ``config="run/config.json"`` repeats an earlier run, whose settings other arguments override.
+Without ``out`` the files go to a temporary folder, which is removed with the record that is given
+back.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+import weakref
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +21,7 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
+from rift_cl.commands.progress_bar import show_progress
 from rift_cl.commands.results import (
     AnalyzedViews,
     FittedScene,
@@ -26,6 +29,7 @@ from rift_cl.commands.results import (
     ReconstructedScan,
     RenderedScene,
     Result,
+    ScenePage,
     Scored,
 )
 from rift_cl.commands.run_folder.saved_settings import begun_settings, parsed_settings
@@ -33,7 +37,7 @@ from rift_cl.errors import InputError
 from rift_cl.progress import Report
 
 PathLike = str | os.PathLike[str]
-Progress = Callable[[Report], None] | None
+Progress = Callable[[Report], None] | bool | None
 S = TypeVar("S")
 # Options that have a meaning on a command line alone.
 _COMMAND_LINE = ("dry_run", "preview")
@@ -264,6 +268,36 @@ def export(
     return job.path
 
 
+def view(scene: PathLike, out: PathLike | None = None, **settings: Any) -> ScenePage:
+    """The scene to turn and to walk through, in a notebook or in any browser.
+
+    Args:
+        scene: a fit, its folder, or a file of splats.
+        out: the page, which needs no network; a temporary one when not given.
+        **settings: those of ``export``.
+
+    Returns:
+        A record that a notebook shows as the page itself.
+
+    Raises:
+        InputError: viser, which draws it, is not installed; the sentence names the install.
+        RiftError: a setting or the scene cannot be used, or the file is there already.
+    """
+    folder = None if out is not None else Path(tempfile.mkdtemp(prefix="rift-"))
+    try:
+        page = export(
+            scene, out if folder is None else folder / "scene.html", to="html", **settings
+        )
+    except BaseException:
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+    made = ScenePage(page)
+    if folder is not None:
+        weakref.finalize(made, shutil.rmtree, folder, ignore_errors=True)
+    return made
+
+
 R = TypeVar("R", bound=Result)
 
 
@@ -313,6 +347,8 @@ def _plain(value: Any) -> Any:
 
 
 def _run(reports: Iterator[Report], progress: Progress) -> None:
+    if isinstance(progress, bool) or progress is None:
+        show_progress(reports, quiet=not progress)
+        return
     for report in reports:
-        if progress is not None:
-            progress(report)
+        progress(report)

@@ -1,4 +1,4 @@
-"""Progress on stderr: a bar with rate and time left on a terminal, plain lines elsewhere.
+"""Progress: a bar with rate and time left on a terminal or in a notebook, else lines on stderr.
 
 Kernels that are built between two steps are told as well, once that takes longer than a second.
 """
@@ -13,6 +13,8 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from html import escape
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
@@ -22,6 +24,8 @@ from rift_cl.progress import BUILDS, Report
 
 # Plain lines come no closer together than this, in seconds, except the last.
 _PAUSE = 5.0
+# Seconds between two pictures of a bar in a notebook.
+_REFRESH = 0.2
 # Seconds of building between two reports from which on it is told, and between two looks at it.
 _WORTH_TELLING, _LOOK = 1.0, 0.25
 # Share of the work so far that counts as later, of it the share that is taken for undisturbed, and
@@ -87,9 +91,12 @@ class Pace:
 
 def show_progress(reports: Iterable[Report], *, quiet: bool) -> None:
     """Run a generator of reports to its end, and show progress."""
+    display = _notebook_display()
     if quiet:
         for _ in reports:
             pass
+    elif display is not None:
+        _draw_in_notebook(reports, display)
     elif sys.stderr is not None and sys.stderr.isatty():
         _draw_bar(reports)
     else:
@@ -167,6 +174,38 @@ def _draw_bar(reports: Iterable[Report]) -> None:
                 description=f"{report.what}{_figures(report)}",
                 pace=", ".join(_told(report, *pace.after(report))),
             )
+
+
+def _notebook_display() -> Callable[..., Any] | None:
+    """IPython's ``display`` where the kernel of a notebook runs this; else None."""
+    ipython = sys.modules.get("IPython")
+    if ipython is None or not hasattr(ipython.get_ipython(), "kernel"):
+        return None
+    show: Callable[..., Any] = ipython.display.display
+    return show
+
+
+def _draw_in_notebook(reports: Iterable[Report], display: Callable[..., Any]) -> None:
+    """One bar below the cell, of HTML's own, with the same words as text for who sees none."""
+    pace, last, handle = (
+        Pace(),
+        -math.inf,
+        display(_notebook_bar(None, ""), raw=True, display_id=True),
+    )
+    for report in reports:
+        told, now = _told(report, *pace.after(report)), time.monotonic()
+        if now - last >= _REFRESH or report.done >= report.total:
+            last = now
+            words = ", ".join([f"{report.done}/{report.total} {report.what}", *told])
+            handle.update(_notebook_bar(report, words + _figures(report)), raw=True)
+
+
+def _notebook_bar(report: Report | None, words: str) -> dict[str, str]:
+    """What a notebook shows of a report; before the first, a bar that is at work."""
+    where = "" if report is None else f" value='{report.done}' max='{max(report.total, 1)}'"
+    said = escape(words or "begins")
+    bar = f"<progress aria-label='Progress'{where} style='width:20em;max-width:100%'></progress>"
+    return {"text/html": f"<div>{bar} {said}</div>", "text/plain": words or "begins"}
 
 
 def _print_lines(reports: Iterable[Report]) -> None:

@@ -7,6 +7,7 @@ import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +16,19 @@ from numpy.typing import NDArray
 
 from rift_cl.commands.fit_photos.scores import ViewScore
 from rift_cl.commands.pictures.evenly_spaced import evenly
+from rift_cl.errors import RiftError
 from rift_cl.geometry import Camera
 from rift_cl.io import read_image, read_volume
 from rift_cl.io.scenes.splat_scene import SplatScene
 from rift_cl.report.notebook import card
 from rift_cl.report.plot import jpeg
+from rift_cl.report.shown import show
 from rift_cl.sampling import Plan
 
 Floats = NDArray[np.float32]
 Shown = list[tuple[str, bytes]]
-# Views that a notebook shows, and slices.
-_FEW = 3
+# Views that a notebook shows, and bytes of a volume that is read to be shown.
+_FEW, _SHOWN_BYTES = 3, 1 << 29
 # Percentiles of the values that are shown black and white, in percent.
 _WINDOW = (0.5, 99.5)
 
@@ -108,6 +111,15 @@ class ReconstructedScan(Result):
 
     def _pictures(self) -> Shown:
         return [("middle slice", (self.folder / "preview.png").read_bytes())]
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the figures, and slices through the volume to go through."""
+        try:
+            volume = self.read(budget=_SHOWN_BYTES)
+        except RiftError:
+            # Large, or moved away: the preview tells of it.
+            return super()._repr_html_()
+        return card(type(self).__name__, self._facts(), more=show(volume)._repr_html_())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -230,6 +242,29 @@ class PlannedViews(Result):
 
     def _repr_html_(self) -> str:
         return self.plan._repr_html_()
+
+
+@dataclass(frozen=True, eq=False)
+class ScenePage:
+    """A page on which a scene can be turned and walked through.
+
+    Args:
+        path: the page, a file of its own that any browser opens without a network.
+    """
+
+    path: Path
+
+    def __fspath__(self) -> str:
+        """The file."""
+        return str(self.path)
+
+    def _repr_html_(self) -> str:
+        """The page itself, kept apart from the notebook's."""
+        page = escape(self.path.read_text(encoding="utf-8"))
+        return (
+            f"<iframe srcdoc='{page}' title='Scene of splats: drag to turn, scroll to come nearer' "
+            "sandbox='allow-scripts' style='width:100%;aspect-ratio:4/3;border:0'></iframe>"
+        )
 
 
 def _window(values: Floats) -> tuple[float, float]:

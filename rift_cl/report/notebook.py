@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from rift_cl.reconstruct.axis.estimate import AxisEstimate
+from rift_cl.reconstruct.calibration.calibrate import Calibration
 from rift_cl.report.html_page.pictures import data_address
 from rift_cl.report.html_page.text import cell, escape
 from rift_cl.report.plot import Stands, camera_plot, curves, figure_svg
@@ -24,6 +25,7 @@ def card(
     pictures: Sequence[tuple[str, bytes]] = (),
     *,
     width: int = _PICTURE,
+    more: str = "",
 ) -> str:
     """A result as HTML.
 
@@ -32,6 +34,7 @@ def card(
         facts: figures by name.
         pictures: a caption and the content of a PNG, JPEG or SVG file each.
         width: pixels across a picture, at most.
+        more: HTML that comes below.
     """
     rows = "".join(
         f"<tr><th style='text-align:left'>{escape(name)}</th><td>{escape(cell(value))}</td></tr>"
@@ -40,7 +43,7 @@ def card(
     shown = "".join(_figure(caption, content, width) for caption, content in pictures)
     return (
         f"<div><p><b>{escape(title)}</b></p><table>{rows}</table>"
-        f"<div style='display:flex;flex-wrap:wrap;gap:8px'>{shown}</div></div>"
+        f"<div style='display:flex;flex-wrap:wrap;gap:8px'>{shown}</div>{more}</div>"
     )
 
 
@@ -63,6 +66,12 @@ def axis_card(found: AxisEstimate) -> str:
     return card("Rotation axis", facts, [curve], width=_DRAWING)
 
 
+def calibration_card(found: Calibration) -> str:
+    """What the data say of a scan's geometry, a row for each quantity, and the axis."""
+    lines = "".join(f"<li>{escape(line)}</li>" for line in found.in_words().splitlines())
+    return f"<div><ul>{lines}</ul>{axis_card(found.axis)}</div>"
+
+
 def plan_card(plan: Plan) -> str:
     """What a plan is worth, and where its cameras stand."""
     design = plan.objective.design
@@ -81,8 +90,10 @@ def plan_card(plan: Plan) -> str:
 
 
 def _figure(caption: str, content: bytes, width: int) -> str:
+    # Drawings have dark ink and nothing behind it, which a dark notebook would hide.
     return (
         f"<figure style='margin:0;max-width:{width}px'>"
-        f"<img src='{data_address(content)}' alt='{escape(caption)}' style='width:100%'>"
+        f"<img src='{data_address(content)}' alt='{escape(caption)}' "
+        "style='width:100%;background:#fff'>"
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )

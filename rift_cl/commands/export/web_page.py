@@ -37,9 +37,10 @@ _POLICY = (
     "data:; style-src 'unsafe-inline'; img-src data: blob:; font-src data:; connect-src data: blob:"
 )
 # The client sorts splats in a worker made from a blob. Chromium starts no such worker, a module,
-# for a page that was opened from a disk; told that there are no blobs, the client takes a data URL.
+# for a page that was opened from a disk, or is in a frame that is kept apart from its notebook;
+# told that there are no blobs, the client takes a data URL.
 _WORKERS = (
-    '<script>if(location.protocol==="file:"){const make=URL.createObjectURL;'
+    '<script>if(location.protocol==="file:"||self.origin==="null"){const make=URL.createObjectURL;'
     "URL.createObjectURL=(blob)=>{if(/javascript/.test(blob.type))"
     'throw new Error("no workers from blobs here");return make.call(URL,blob);};}</script>'
 )

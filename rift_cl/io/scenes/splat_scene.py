@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import ClassVar
 
@@ -118,6 +119,11 @@ class SplatScene:
         more = [name for name in ("shape_modes", "color_modes") if getattr(self, name) is not None]
         facts = [f"{len(self)} splats", f"{self.sh.shape[1]} x {self.angular}", *more]
         return f"<{type(self).__name__}: {', '.join(facts)}>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: a picture, and what the splats are."""
+        html: str = import_module("rift_cl.commands.pictures.scene_card").scene_card(self)
+        return html
 
     def __len__(self) -> int:
         """Number of splats."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,11 @@ class Calibration:
     disagreement: tuple[float, float]
     row: Told = None
     asked: bool = False
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the curve of the axis, and what was found besides."""
+        html: str = import_module("rift_cl.report.notebook").calibration_card(self)
+        return html
 
     def in_words(self) -> str:
         """What was found, a line for each quantity, and what cannot be told."""
