@@ -1,4 +1,4 @@
-"""docs/neighbours.md: every block of code runs where the package that it shows is installed."""
+"""docs/how-to/neighbours.md: every block of code runs where its package is installed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-PAGE = Path(__file__).parents[1] / "docs" / "neighbours.md"
+PAGE = Path(__file__).parents[1] / "docs" / "how-to" / "neighbours.md"
 FIRST, *BLOCKS = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
 OTHERS = ("torch", "jax", "pylops", "odl")
 

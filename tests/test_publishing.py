@@ -26,7 +26,7 @@ MODULES = {
     "pyyaml": "yaml",
 }
 # Not imported: a driver, the programs of developers, and several nodes while there is no code.
-DRIVERS, DEVELOPMENT, PLANNED = ("intel",), ("all", "test", "dev"), ("distributed",)
+DRIVERS, DEVELOPMENT, PLANNED = ("intel",), ("all", "test", "dev", "docs"), ("distributed",)
 REQUIREMENT = re.compile(r"([\w-]+)(\[\w+\])?(.*)")
 
 

@@ -1,7 +1,7 @@
 """How fast the kernels are, how near to the device's limits, and how they compare with peers.
 
     python tools/bench_kernels.py --json bench.json
-    python tools/bench_kernels.py --peers --json bench.json --markdown docs/performance.md
+    python tools/bench_kernels.py --peers --json b.json --markdown docs/benchmarks/performance.md
     python tools/bench_kernels.py --json bench.json --keep docs/benchmarks
 
 Limits, kernels and whole operations are measured in one process on one device. A kernel that is

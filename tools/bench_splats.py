@@ -2,8 +2,8 @@
 
     python tools/bench_splats.py --against ../checkout-of-79177a8
     python tools/bench_splats.py --scenes fitted:480x360 cube:1000000:1920x1080 --training
-    python tools/bench_splats.py --growth --no-lanes --json growth.json --markdown docs/growth.md \
-        --keep docs/benchmarks/splats
+    python tools/bench_splats.py --growth --no-lanes --json growth.json \
+        --markdown docs/benchmarks/growth.md --keep docs/benchmarks/splats
 
 Both versions work in one process and take turns, with the same splats and cameras. Times are
 processor time of all threads divided by the number of cores, the least of the rounds: what else

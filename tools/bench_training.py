@@ -1,7 +1,7 @@
 """How fast a fit to pictures goes, where its time goes, and how it compares with one in torch.
 
     python tools/bench_training.py --json training.json
-    python tools/bench_training.py --peers --json training.json --markdown docs/training.md
+    python tools/bench_training.py --peers --json t.json --markdown docs/benchmarks/training.md
 
 Everything is measured in one process on one device, trainers in turns. A kernel that the trainer
 launches and that belongs to no stage makes the run fail.

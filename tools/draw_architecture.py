@@ -1,6 +1,6 @@
-"""The picture of the packages and of the imports between them, for docs/architecture.md.
+"""The picture of the packages and of their imports, for docs/explanation/architecture.md.
 
-    python tools/draw_architecture.py                 # writes docs/architecture.svg
+    python tools/draw_architecture.py                 # writes docs/explanation/architecture.svg
     python tools/draw_architecture.py --table         # prints all counts as a Markdown table
 
 Boxes are the packages of rift_cl, in the layers that the import contract of pyproject.toml names.
@@ -73,7 +73,7 @@ class Options:
         table: print the counts of all pairs as a Markdown table, and draw nothing.
     """
 
-    out: Path = _ROOT / "docs" / "architecture.svg"
+    out: Path = _ROOT / "docs" / "explanation" / "architecture.svg"
     least: int = 3
     table: bool = False
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -33,6 +33,8 @@ from rift_cl.commands.runner import (
 _USAGE = 2
 # Figures of a run that a line of a terminal has room for.
 _FIGURES = 4
+# Names and addresses are not broken.
+_WHOLE = {"break_long_words": False, "break_on_hyphens": False}
 
 
 class Command(NamedTuple):
@@ -156,17 +158,22 @@ def _devices(settings: Any, output: Output) -> None:
 
     watch(examine_drivers(again=settings.retest), output)
     for name, facts in device_facts():
-        print(name)
-        for what, value in facts.items():
-            lines = [part for line in value.splitlines() for part in _wrapped(line)]
-            for label, line in zip([what, *[""] * len(lines)], lines, strict=False):
-                print(f"     {label:<10} {line}")
+        _print_facts(name, facts)
+
+
+def _print_facts(name: str, facts: Mapping[str, str]) -> None:
+    """A name, and below it what is known of it."""
+    print(name)
+    for what, value in facts.items():
+        lines = [part for line in value.splitlines() for part in _wrapped(line)]
+        for label, line in zip([what, *[""] * len(lines)], lines, strict=False):
+            print(f"     {label:<10} {line}")
 
 
 def _wrapped(line: str) -> list[str]:
     """A line as lines that fit the terminal behind a column of names."""
     width = shutil.get_terminal_size().columns - 16
-    return textwrap.wrap(line, max(width, 40), break_long_words=False, subsequent_indent="  ")
+    return textwrap.wrap(line, max(width, 40), subsequent_indent="  ", **_WHOLE)
 
 
 def _demo(settings: Any, output: Output) -> None:
@@ -326,6 +333,16 @@ def _print_notes(notes: Sequence[str]) -> None:
         print_line(f"rift: {note}")
 
 
+def _samples(settings: Any, output: Output) -> None:
+    from rift_cl.commands.samples.job import put_sample, sample_facts
+
+    if settings.name:
+        print(put_sample(settings))
+        return
+    for name, facts in sample_facts():
+        _print_facts(name, facts)
+
+
 def _cache(settings: Any, output: Output) -> None:
     from rift_cl.commands.cache.job import run_cache
 
@@ -412,6 +429,12 @@ COMMANDS = {
         "demo.settings",
         "DemoSettings",
         "Reconstruct a phantom and fit splats to two small sample captures.",
+    ),
+    "samples": Command(
+        _samples,
+        "samples.settings",
+        "SamplesSettings",
+        "List sample captures and open data sets, or put one of them into a folder.",
     ),
     "devices": Command(
         _devices,

@@ -97,7 +97,7 @@ class SpreadRun(ResumableRun):
     cluster: Auto[str] = None
     """Spread the work over processes: local:N for N workers on this machine, which divide its
     devices, cores and memory, or the address of a Dask scheduler, such as tcp://10.0.0.1:8786 (see
-    docs/scale_out.md). Default: this process does it."""
+    docs/how-to/scale_out.md). Default: this process does it."""
 
     def check_cluster(self) -> None:
         """Check what ``--cluster`` says.

@@ -1,4 +1,4 @@
-"""docs/architecture.md holds: its places exist, and its picture shows the tree."""
+"""docs/explanation/architecture.md holds: its places exist, and its picture shows the tree."""
 
 import re
 import xml.etree.ElementTree as ET
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "architecture.md"
+PAGE = ROOT / "docs" / "explanation" / "architecture.md"
 SVG = "{http://www.w3.org/2000/svg}"
 
 

@@ -63,7 +63,7 @@ def markdown(record: dict[str, Any]) -> str:
         "Times are the shortest of several, in milliseconds, with the median in parentheses. "
         "Other programs ran on the same machine; they can only have made a time longer.",
         "",
-        "Results by date are in [benchmarks](benchmarks/README.md), where "
+        "Results by date are in [benchmarks](index.md), where "
         "`tools/compare_benchmarks.py` lists the kernels that became slower.",
     ]
     return "\n".join([*lines, *markdown_lines(tables(record))]) + "\n"

@@ -9,7 +9,7 @@ from bench.table import NONE, Table, markdown_lines, milliseconds, times
 
 COMMANDS = """\
     python tools/bench_training.py --json training.json
-    python tools/bench_training.py --peers --json training.json --markdown docs/training.md
+    python tools/bench_training.py --peers --json t.json --markdown docs/benchmarks/training.md
 """
 _RACE = (
     "A step: draw one view, L1 and D-SSIM, gradients, Adam on every parameter (harmonics of degree "

@@ -40,7 +40,7 @@ class ScanArrays:
     geometry: Auto[Path] = None
     """File with the positions of source and detector for fan and cone beams: Nikon .xtekct, SkyScan
     .log, RTK .xml, ASTRA vectors (.geom, .npy, .txt; 12 numbers per view), or .yaml or .json as in
-    docs/tomography.md. Default: that of the scan, otherwise parallel rays."""
+    docs/how-to/scans.md. Default: that of the scan, otherwise parallel rays."""
     reversed: Expert[bool] = False
     """Negate the angles, for an object that turned in the other sense than assumed; a wrong sense
     doubles edges in fan and cone beams."""

@@ -145,7 +145,7 @@ def open_scan(
             geometry alone, to whom ``ScanFile.kind`` means nothing.
         geometry: a file that says where source and detector stand, in place of what the scan says:
             Nikon's .xtekct, SkyScan's .log, RTK's .xml, ASTRA's twelve numbers a view (.geom,
-            .npy, .txt), or ours (.yaml, .json), whose names ``docs/tomography.md`` lists.
+            .npy, .txt), or ours (.yaml, .json), whose names ``docs/how-to/scans.md`` lists.
         reversed: the object turned the other way than the file is taken to say; the angles change
             their sign.
         repeat: for a sample that is symmetric about the axis: its one TIFF image is taken for as

@@ -38,7 +38,7 @@ Floats = NDArray[np.float64]
 WeightKind = Literal["ramp", "coverage"]
 
 # Exponent from so many photographs on, where none is given: with 8 to 36 the ramp never gained,
-# with 64 short fits did, and long ones lost nothing (docs/homogenisation.md).
+# with 64 short fits did, and long ones lost nothing (docs/explanation/homogenisation.md).
 USUAL_EXPONENT, ENOUGH_VIEWS = 0.5, 40
 _STEEPEST = 4.0
 # Immerkaer's mask, which leaves out what is linear along an edge; its norm is 6. Noise is read off

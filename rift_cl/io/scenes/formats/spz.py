@@ -9,7 +9,7 @@ What it rounds: places by half a unit of the last of 24 bits, which is chosen as
 farthest splat allows; logarithms of scales, kept from -10 to 5.9, by 1/32; a rotation's components
 by 7e-4; opacities by 1/510; the first harmonic, kept within 3.33, by 0.013; higher ones, kept
 within 1, by 1/64. (The format has levels 1/128 apart; Niantic's own program takes every eighth of
-degree 1 and every sixteenth above, we take every fourth: docs/export.md has what that is worth.)
+degree 1 and every sixteenth above, we take every fourth: docs/how-to/export.md says what for.)
 """
 
 from __future__ import annotations

@@ -1,16 +1,17 @@
-"""What README and docs promise: code runs, and commands, options and links are there."""
+"""What README and docs promise: code and tutorials run; commands, options and links are there."""
 
+import importlib
+import json
 import re
 import shlex
 from contextlib import redirect_stdout, suppress
-from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rift_cl.commands.cli import main
+from rift_cl.commands.cli import COMMANDS, main
 from rift_cl.io.scans.formats import SCAN_READERS
 from rift_cl.metrics import psnr
 from rift_cl.operators.filters.ramp_filters import FILTERS
@@ -18,41 +19,94 @@ from rift_cl.train.loss.pixel_loss import PIXEL_LOSSES
 from rift_cl.train.strategy import STRATEGIES
 
 ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
 SUFFIXES = (".py", ".md")
-PAGES = [
-    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md")),
-    *(ROOT / "docs").rglob("*.md"),
-]
-COMMANDS = [
-    "devices",
-    "demo",
-    "reconstruct",
-    "center",
-    "fit",
-    "eval",
-    "render",
-    "view",
-    "export",
-    "analyze",
-    "sweep",
-    "plan",
-    "cache",
-]
+PAGES = sorted(
+    [
+        *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "examples/README.md")),
+        *(page for page in DOCS.rglob("*.md") if page.parent.name != "generated"),
+    ]
+)
+# Tutorials with what makes them small enough for a test.
+TUTORIALS = {
+    "operators": {},
+    "scan": {"--method tv --nonnegative": "--method tv --nonnegative --steps 5"},
+    "own_parts": {"steps=60": "steps=10"},
+    "photographs": {
+        "--steps 1500 --splats 4000": "--steps 20 --splats 300 --downscale 4",
+        "--frames 24": "--frames 2",
+    },
+}
 # Options of programs other than ours.
 ELSEWHERE = {"--tyro-print-completion", "--extra", "--prefix", "--durations"}
 
 
-def test_code_runs(capsys):
-    code = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
-    assert len(code) == 5
-    names = {}
-    for block in code:
-        if "import torch" not in block or find_spec("torch"):
-            exec(block, names)
+@pytest.fixture
+def run_page(monkeypatch):
+    """Runs the blocks of a page as tools/run_page.py does."""
+    monkeypatch.syspath_prepend(ROOT / "tools")
+    return importlib.import_module("run_page").run_page
+
+
+def test_code_runs(run_page, tmp_path, capsys):
+    names = run_page(DOCS / "how-to/python.md", tmp_path)
     printed = capsys.readouterr().out
     assert float(printed.split()[0]) > 20
     assert psnr(names["volume"], names["head"], peak=1.0) > 20
     assert names["gradients"].splats.means.shape == (1000, 3)
+
+
+@pytest.mark.parametrize("name", TUTORIALS)
+def test_a_tutorial_runs_from_top_to_bottom(name, run_page, tmp_path):
+    try:
+        names = run_page(DOCS / f"tutorials/{name}.md", tmp_path, TUTORIALS[name])
+    finally:
+        for registry, added in ((FILTERS, "butterworth"), (PIXEL_LOSSES, "charbonnier")):
+            if added in registry:
+                registry.remove(added)
+    if name == "operators":
+        errors = [psnr(image, names["truth"], peak=1.0) for image in names["slices"].values()]
+        assert min(errors) > 20
+    if name == "scan":
+        assert (tmp_path / "again/report.html").exists()
+    if name == "photographs":
+        assert (tmp_path / "scene.ply").exists() and names["film"].read(0).shape[2] == 3
+
+
+def test_every_tutorial_is_run_by_a_test():
+    written = {page.stem for page in (DOCS / "tutorials").glob("*.md")}
+    assert written - {"index", "examples"} == set(TUTORIALS)
+
+
+def test_every_example_is_on_the_page_of_examples():
+    page = (DOCS / "tutorials/examples.md").read_text()
+    assert set(re.findall(r"literalinclude} \.\./\.\./examples/(\w+\.py)", page)) == {
+        path.name for path in (ROOT / "examples").glob("*.py")
+    }
+
+
+def test_every_page_is_in_the_contents_of_the_site():
+    """A page that no table of contents names cannot be found; Sphinx warns of it, as late."""
+    for folder in {page.parent for page in DOCS.rglob("*.md")} - {DOCS / "reference/generated"}:
+        trees = re.findall(r"```{toctree}\n(.*?)```", (folder / "index.md").read_text(), re.DOTALL)
+        named = {line for tree in trees for line in tree.splitlines() if line and line[0] != ":"}
+        found = {page.stem for page in folder.glob("*.md")} - {"index"}
+        assert found == {name for name in named if "/" not in name}, folder
+
+
+def test_pictures_are_small_have_a_text_and_say_what_drew_them():
+    drawn = json.loads((DOCS / "pictures/drawn.json").read_text())
+    shown = set()
+    for page in PAGES:
+        for text, path in re.findall(r"!\[(.*?)\]\((\S+?)\)", page.read_text(), re.DOTALL):
+            assert len(text) > 20, f"{page.name}: {path} needs a text that says what it shows"
+            shown.add((page.parent / path).resolve())
+    kept = {path for path in (DOCS / "pictures").iterdir() if path.suffix != ".json"}
+    assert kept <= shown
+    assert {path.stem for path in kept} <= set(drawn)
+    for path in kept:
+        assert path.stat().st_size <= (1_000_000 if path.suffix == ".webp" else 150_000), path
+    assert sum(path.stat().st_size for path in kept) <= 4_000_000
 
 
 def test_what_contributors_are_shown_runs(tmp_path):
@@ -118,7 +172,7 @@ def test_extras_that_are_named_exist():
 def helps():
     """The help text of every command, by its name; of ``fit``, that of both kinds."""
     found = {}
-    for name in (*COMMANDS, "fit photos", "fit xray"):
+    for name in (*COMMANDS, "fit"):
         with redirect_stdout(StringIO()) as printed, suppress(SystemExit):
             main([*name.split(), "--help"])
         found[name] = printed.getvalue()
@@ -129,8 +183,11 @@ def helps():
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_every_command_on_a_page_has_only_options_that_there_are(page, helps):
-    """The blocks of commands, up to their comments."""
-    lines = re.findall(r"^    (rift [^-].*?)(?:\s{2,}#.*)?$", page.read_text(), re.MULTILINE)
+    """Blocks that are indented, or fenced as bash or text, up to their comments."""
+    text = page.read_text().replace("\\\n", " ")
+    fenced = re.findall(r"^```(?:bash|text)\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    shown = [*re.findall(r"^    (.*)$", text, re.MULTILINE), *"\n".join(fenced).splitlines()]
+    lines = [re.split(r"\s{2,}#", line)[0] for line in shown if re.match(r"rift [^-\s]", line)]
     for line in lines:
         _, command, *words = shlex.split(line.rstrip("\\"))
         kind = " ".join([command, *words[:1]])

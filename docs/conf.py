@@ -1,0 +1,55 @@
+"""How these pages become a site: ``pip install '.[docs]' && sphinx-build -W docs site``.
+
+Everything that a page needs is in the site itself: no font, script or picture comes from another
+server, and it can be read and searched from disk. Reference pages are written before each build, by
+``tools/write_reference.py``, from the settings of the commands and the public names of the package.
+"""
+
+import re
+import sys
+from pathlib import Path
+
+_ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(_ROOT), str(_ROOT / "tools")]
+
+from rift_cl import __version__  # noqa: E402
+from write_reference import write_reference  # noqa: E402
+
+project = "RiFT-CL"
+author = "The RiFT-CL authors"
+project_copyright = author
+version = release = __version__
+root_doc = "index"
+exclude_patterns = ["_build"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+
+# Links to headings, as they are on other pages of the repository.
+myst_heading_anchors = 4
+myst_enable_extensions = ["deflist"]
+# Blocks that are indented are commands, not Python.
+highlight_language = "none"
+autodoc_typehints = "signature"
+autodoc_member_order = "bysource"
+napoleon_numpy_docstring = False
+
+# Settings of one name belong to several commands; a type of that name is none of them.
+suppress_warnings = ["ref.python"]
+
+html_theme = "furo"
+html_title = f"RiFT-CL {version}"
+html_static_path = ["site.css"]
+html_css_files = ["site.css"]
+html_show_sphinx = False
+html_copy_source = False
+html_theme_options = {"navigation_with_keys": True, "top_of_page_buttons": []}
+
+write_reference(Path(__file__).parent / "reference" / "generated")
+
+
+def setup(app):
+    """Bars are absolute values in our docstrings, and substitutions to Sphinx."""
+
+    def escape_bars(app, what, name, of, options, lines):
+        lines[:] = [re.sub(r"(``.*?``)|[|]", lambda m: m[1] or r"\|", line) for line in lines]
+
+    app.connect("autodoc-process-docstring", escape_bars)

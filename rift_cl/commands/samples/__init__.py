@@ -1,0 +1,1 @@
+"""``rift samples``: captures of the package, and open data sets of other people."""
