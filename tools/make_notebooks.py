@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -104,25 +105,26 @@ def executed(book: Any) -> str:
     """Run a notebook, which keeps the outputs; the fault that ended it, or nothing."""
     import nbclient
 
-    with tempfile.TemporaryDirectory(prefix="rift-notebook-") as folder:
-        # Commands are those of this Python, and modules those of this checkout.
-        path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-        modules = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
+    with tempfile.TemporaryDirectory(prefix="rift-notebook-") as name:
+        commands, folder = Path(name, "commands"), Path(name, "work")
+        for each in (commands, folder):
+            each.mkdir()
+        rift = commands / "rift"
+        rift.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m rift_cl "$@"\n')
+        rift.chmod(0o755)
+        # The command is that of this checkout, installed or not, and so are modules.
+        added = {"PATH": str(commands), "PYTHONPATH": str(ROOT)}
+        environment = {
+            **os.environ,
+            **{k: os.pathsep.join(filter(None, [v, os.environ.get(k)])) for k, v in added.items()},
+        }
         client = nbclient.NotebookClient(
-            book, timeout=_PATIENCE, resources={"metadata": {"path": folder}}
+            book, timeout=_PATIENCE, resources={"metadata": {"path": str(folder)}}
         )
-        before = {name: os.environ.get(name) for name in ("PATH", "PYTHONPATH")}
-        os.environ.update(PATH=path, PYTHONPATH=modules)
         try:
-            client.execute()
+            client.execute(env=environment)
         except nbclient.exceptions.CellExecutionError as error:
             return f"{error.ename}: {error.evalue}"
-        finally:
-            for name, value in before.items():
-                if value is None:
-                    del os.environ[name]
-                else:
-                    os.environ[name] = value
     return ""
 
 

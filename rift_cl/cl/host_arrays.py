@@ -273,6 +273,11 @@ def is_tensor(value: Any) -> bool:
     return hasattr(type(value), "__torch_function__")
 
 
+def is_jax_array(value: Any) -> bool:
+    """Whether a value is an array of JAX's or stands for one (asked without importing JAX)."""
+    return type(value).__module__.partition(".")[0] in ("jax", "jaxlib")
+
+
 def check_output(out: Any, shape: tuple[int, ...], dtype: DTypeLike = np.float32) -> NDArray[Any]:
     """Check a host array that a result is to be written into.
 

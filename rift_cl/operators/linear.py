@@ -2,8 +2,8 @@
 
 An operator maps arrays of shape ``domain`` to arrays of shape ``range``, both of type ``dtype``.
 NumPy in gives NumPy out; a device array in gives a device array out, without a copy; a torch
-tensor, or a batch of them, gives a tensor that passes gradients on. The adjoint is an operator like
-any other, ``A.T.T is A``, and solvers need nothing else.
+tensor or a JAX array, or a batch of them, gives another one, which passes gradients on. The adjoint
+is an operator like any other, ``A.T.T is A``, and solvers need nothing else.
 
 Operators do not change once they are made. They are pickled and copied as the arguments that make
 them again, the device as its selector, so that no device memory travels and the copy gives the
@@ -35,6 +35,7 @@ from rift_cl.cl.host_arrays import (
     check_output,
     download,
     is_device_array,
+    is_jax_array,
     is_tensor,
     share,
 )
@@ -44,9 +45,9 @@ from rift_cl.geometry import Grid, Scan
 
 Shape = tuple[int, ...]
 _HALVINGS = 6
-# What applies an operator to tensors; loaded when the first one comes, by its name, since an
-# operator knows nothing of torch.
-_TENSOR_BRIDGE = "rift_cl.interop.linear_torch"
+# What applies an operator to arrays of torch and of JAX; loaded when the first one comes, by its
+# name, since an operator knows nothing of either.
+_BRIDGES = {"torch tensor": "rift_cl.interop.linear_torch", "JAX array": "rift_cl.interop.jax"}
 
 
 class Chunk(NamedTuple):
@@ -133,9 +134,10 @@ class LinearOperator(ABC):
 
         Args:
             x: array of shape ``domain``; a device array, or anything NumPy takes for an array of
-                real numbers; or a torch tensor of shape (..., *domain) and type ``dtype``.
+                real numbers; or a torch tensor or JAX array of shape (..., *domain) and type
+                ``dtype``.
             out: where to put the result, of the same kind as ``x`` and not ``x`` itself; a new
-                array if not given. Not for tensors.
+                array if not given. Not for torch and JAX.
             name: the caller's name for ``x``, for error messages.
 
         Returns:
@@ -146,10 +148,11 @@ class LinearOperator(ABC):
                 holds NaN or infinity; device arrays are not searched for these.
             DeviceMemoryError: not even the smallest chunk fits the device.
         """
-        if is_tensor(x):
+        kind = "torch tensor" if is_tensor(x) else "JAX array" if is_jax_array(x) else None
+        if kind is not None:
             if out is not None:
-                raise InputError(f"out is given and {name} a torch tensor: use what is returned")
-            return import_module(_TENSOR_BRIDGE).apply(self, x, name=name)
+                raise InputError(f"out is given and {name} is a {kind}: use what is returned")
+            return import_module(_BRIDGES[kind]).apply(self, x, name=name)
         if is_device_array(x):
             x = as_device_array(self.device, x, self.domain, name=name, dtype=self.dtype)
             y = self.device.empty(self.range, self.dtype) if out is None else out

@@ -28,7 +28,16 @@ def test_the_values_are_the_operators_own_compiled_or_not(device):
     A, x = projector(device), white(6, 7)
     assert np.array_equal(apply(A, x), A(np.asarray(x)))
     assert np.array_equal(jax.jit(lambda x: apply(A, x))(x), A(np.asarray(x)))
-    assert np.array_equal(A(x), A(np.asarray(x))), "an operator takes a JAX array as any other"
+
+
+def test_an_operator_takes_a_jax_array_as_it_takes_any_other(device):
+    A, x, y = projector(device), white(6, 7), white(5, 9)
+    assert isinstance(A(x), jax.Array)
+    assert np.array_equal(A(x), apply(A, x))
+    assert np.array_equal(jax.jit(A)(x), A(x))
+    assert np.array_equal(jax.jit(lambda y: rift.fbp(A, y))(y), rift.fbp(A, np.asarray(y)))
+    with pytest.raises(InputError, match="out is given"):
+        A(x, out=np.empty((5, 9), np.float32))
 
 
 def test_leading_dimensions_and_vmap_are_batches(device):

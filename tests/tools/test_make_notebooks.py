@@ -6,6 +6,8 @@ from importlib.util import find_spec
 
 import pytest
 
+import rift_cl as rift
+
 pytest.importorskip("jupytext", reason="jupytext is not installed")
 
 PAGE = """# A page
@@ -24,7 +26,7 @@ print(6 * 7)
 # a remark
 echo one \\
   two
-echo three
+rift --version
 ```
 
 - a list
@@ -43,7 +45,7 @@ def test_text_code_and_commands_are_cells(tool, page, monkeypatch):
     book = module.notebook(page)
     code = [cell.source for cell in book.cells if cell.cell_type == "code"]
     assert code[0] == "import sys\n\nprint(6 * 7)"
-    assert code[1] == "%%script bash -e\n# a remark\necho one \\\n  two\necho three"
+    assert code[1] == "%%script bash -e\n# a remark\necho one \\\n  two\nrift --version"
     text = "\n".join(cell.source for cell in book.cells if cell.cell_type == "markdown")
     assert "# A page" in text
     assert "- a list" in text
@@ -77,7 +79,7 @@ def test_a_notebook_runs_and_keeps_its_outputs(tool, page):
     assert module.executed(book) == ""
     code = (cell for cell in book.cells if cell.cell_type == "code")
     outputs = ["".join(output.text for output in cell.outputs) for cell in code]
-    assert outputs == ["42\n", "one two\nthree\n"]
+    assert outputs == ["42\n", f"one two\nrift {rift.__version__}\n"]
 
 
 @needs_kernel
