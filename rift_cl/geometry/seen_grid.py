@@ -80,6 +80,25 @@ def seen_grid(scan: Fan | Cone | Vectors, spacing: float | None = None) -> Grid:
     return Grid((along, across, across), edge, ((low + high) / 2, 0, 0))
 
 
+def slices_beyond(scan: Cone | Vectors, grid: Grid) -> tuple[int, int]:
+    """Slices below a grid and above it that rays to the first and to the last rows pass through.
+
+    Rays that leave the middle plane go on to do so behind the axis, as far as the grid reaches.
+
+    Args:
+        scan: source and detector.
+        grid: of the volume, as high as rows are seen at the axis.
+    """
+    lengths = scan_lengths(scan)
+    row, _ = lengths.pixel
+    first = scan.center[0] + 0.5 if isinstance(scan, Cone) else scan.rows / 2
+    heights = first * row, (scan.rows - first) * row
+    radius = max(n * d / 2 for n, d in zip(grid.shape[1:], grid.spacing[1:], strict=True))
+    share = radius / (lengths.source_to_axis * grid.spacing[0])
+    below, above = (max(0, _whole(height * share)) for height in heights)
+    return below, above
+
+
 def _rows_of_cone(scan: Cone, row: float) -> tuple[float, float]:
     """The lowest and the highest place that rows show at the axis."""
     first = (-0.5 - scan.center[0]) * row + float(scan.heights.min())

@@ -134,6 +134,27 @@ def test_methods_that_take_steps(ball: Path, tmp_path: Path, method: str) -> Non
     assert middle_of(found.read()) == pytest.approx(0.02, rel=0.12)
 
 
+@pytest.mark.parametrize("method", ["cgls", "fbp"])
+def test_an_object_longer_than_the_detector_is_told(tmp_path: Path, method: str) -> None:
+    """Rays through the first row leave a volume that is as high as rows are at the axis."""
+    angles = 2 * np.pi * np.arange(40) / 40
+    cone = Cone(angles, 12, 32, 2.0, R, S)
+    rod = [Ellipsoid((0, 0, 0), (5000.0, 9.0, 9.0), 0.0, 0.02)]
+    path = tmp_path / "rod.npz"
+    lengths = {"source_to_axis": R, "source_to_detector": S, "pitch": 2.0}
+    np.savez(path, projections=project(rod, Grid((2, 2, 2)), cone), angles=angles, **lengths)
+    given: dict[str, Any] = {"center": 15.5, "kind": "attenuation", "method": method}
+    given |= {"steps": 12, "rows": (0, 9)} if method == "cgls" else {}
+    found = rift.reconstruct_scan(path, tmp_path / "out", **given)
+    assert "not all views see 2 slices at the lower end" in " ".join(found.notes)
+    volume = found.read()
+    if method == "cgls":
+        # 1.49 times the density without the slices beyond.
+        assert volume.shape[0] == 9
+        levels = volume[:, 12:20, 12:20].mean(axis=(1, 2))
+        assert levels.max() < 1.25 * 0.02 and levels[-1] == pytest.approx(0.02, rel=0.02)
+
+
 @pytest.mark.full
 def test_binning_keeps_the_density(ball: Path, tmp_path: Path) -> None:
     found = rift.reconstruct_scan(ball, tmp_path / "a", center=CENTER, binning=2, pixel=1.0)

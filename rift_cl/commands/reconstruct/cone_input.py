@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,9 +20,10 @@ from rift_cl.commands.reconstruct.slice_input import tilt_worth_turning
 from rift_cl.commands.reconstruct.slice_window import check_window
 from rift_cl.errors import InputError, ResourceLimitError
 from rift_cl.geometry import Cone, Grid, Vectors
-from rift_cl.geometry.seen_grid import scan_lengths, seen_grid
+from rift_cl.geometry.seen_grid import scan_lengths, seen_grid, slices_beyond
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.reconstruct import Attenuation
+from rift_cl.reconstruct.direct.padding import goes_on
 from rift_cl.reconstruct.preprocess import binned_center, binning_note
 
 # Options that do not apply to cones, with what they are where they are not used.
@@ -144,6 +144,8 @@ class ConeInput:
         # Made now, so that what does not fit is told before any work.
         self.geometry = self._geometry()
         self.window = VolumeWindow.of(settings, self.geometry)
+        # Slices below the volume and above it that rays meet, where the object goes on there.
+        self.beyond = 0, 0
         self._check_memory()
 
     @property
@@ -154,7 +156,13 @@ class ConeInput:
     @property
     def solved(self) -> Grid:
         """The voxels that a method needs: all that rays meet, where it explains every ray."""
-        return self.window.whole if self.settings.iterative else self.grid
+        if not self.settings.iterative:
+            return self.grid
+        whole, (below, above) = self.window.whole, self.beyond
+        z, y, x = whole.center
+        middle = z + (above - below) / 2 * whole.spacing[0]
+        shape = whole.shape[0] + below + above, *whole.shape[1:]
+        return Grid(shape, whole.spacing, (middle, y, x))
 
     @property
     def part(self) -> tuple[slice, ...]:
@@ -162,7 +170,8 @@ class ConeInput:
         if not self.settings.iterative:
             return (slice(None),) * 3
         left, right, top, bottom = self.window.roi
-        return slice(*self.window.slices), slice(top, bottom), slice(left, right)
+        first, stop = (number + self.beyond[0] for number in self.window.slices)
+        return slice(first, stop), slice(top, bottom), slice(left, right)
 
     def read(self) -> Attenuation:
         """Line integrals of all rows, corrected."""
@@ -180,7 +189,20 @@ class ConeInput:
         if self.tilt and isinstance(self.geometry, Cone):
             row, bin = self.geometry.center
             self.clean.alignment = Alignment(bin, row, math.radians(self.tilt))
+        self.beyond = self._slices_beyond()
+        self._check_memory()
         self._say()
+
+    def _slices_beyond(self) -> tuple[int, int]:
+        rows, scan = self.scan.shape[1], self.geometry
+        if not self.settings.iterative and (isinstance(scan, Vectors) or np.ptp(scan.heights)):
+            # The formula of a helix says itself which slices it knows.
+            return 0, 0
+        first, middle, last = (
+            self.clean.read(row, row + 1).projections[:, 0] for row in (0, rows // 2, rows - 1)
+        )
+        below, above = slices_beyond(scan, self.window.whole)
+        return below * goes_on(first, middle), above * goes_on(last, middle)
 
     def _say(self) -> None:
         n, (_, rows, bins) = self.settings.binning, self.file.shape
@@ -190,11 +212,26 @@ class ConeInput:
             averaged = f"Blocks of {block} x {n} (rows x bins) detector pixels were averaged."
             self.notes.append(f"{averaged} {lost}".rstrip())
         self.notes += self.clean.notes()
+        if any(self.beyond):
+            self.notes.append(self._beyond_note())
         if self.scan.background:
             self.notes.append(
                 f"The mean of the outermost {self.scan.background} bins at each end (air) was "
                 "subtracted."
             )
+
+    def _beyond_note(self) -> str:
+        below, above = self.beyond
+        further = (
+            f" {below} more slices below and {above} above were solved for and are left out."
+            if self.settings.iterative
+            else ""
+        )
+        return (
+            "The object reaches beyond the first or the last row, so that not all views see "
+            f"{below} slices at the lower end of the volume and {above} at the upper: their values "
+            f"are less certain.{further}"
+        )
 
     def _found_axis(self) -> dict[str, Any]:
         """Bin of the axis on the detector as the file has it, and how it is known."""
@@ -250,7 +287,7 @@ class ConeInput:
             volumes * int(np.prod(self.solved.shape)) + stacks * int(np.prod(self.scan.shape))
         )
 
-    @cached_property
+    @property
     def part_budget(self) -> int | None:
         """Bytes for parts of the volume, where it is worked on in such; None where all fits."""
         budget, method = self.device.budget, self.settings.method

@@ -44,6 +44,17 @@ def is_truncated(projections: Stack, center: float | None = None) -> bool:
     return strong > 0 and max(ends) > _TRUNCATED * strong
 
 
+def goes_on(row: Stack, middle: Stack) -> bool:
+    """Whether the object is as long as to be seen in a row, in most views.
+
+    Args:
+        row: line integrals (angle, bin) of the first or the last row, air at 0.
+        middle: those of a row in the middle.
+    """
+    levels = [float(np.median(each.mean(axis=-1, dtype=np.float64))) for each in (row, middle)]
+    return levels[1] > 0 and levels[0] > _TRUNCATED * levels[1]
+
+
 def extended(projections: Stack, scan: Beam, *, bins: int | None = None) -> tuple[Stack, Beam]:
     """Continue every view on both sides by its last value, which falls off to zero.
 
