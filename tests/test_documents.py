@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import rift_cl as rift
 from rift_cl.commands.cli import COMMANDS, main
 from rift_cl.io.scans.formats import SCAN_READERS
 from rift_cl.metrics import psnr
@@ -76,6 +77,29 @@ def test_a_tutorial_runs_from_top_to_bottom(name, run_page, tmp_path):
         assert (tmp_path / "again/report.html").exists()
     if name == "photographs":
         assert (tmp_path / "scene.ply").exists() and names["film"].read(0).shape[2] == 3
+
+
+def test_python_on_a_page_of_prose_runs(run_page, tmp_path):
+    """With what the page takes as there: an operator, a sinogram, a stack of slices."""
+    grid = rift.Grid((32, 32))
+    A = rift.Projector(grid, rift.Parallel(np.arange(24) * np.pi / 24, bins=48))
+    y = A(rift.phantom.shepp_logan(grid))
+    given = {"A": A, "sinogram": y, "line_integrals": y, "flat_counts": 20_000.0}
+    made = run_page(DOCS / "explanation/reconstruction.md", tmp_path, given=given)
+    assert made["image"].shape == grid.shape and made["weights"].shape == y.shape
+    made = run_page(DOCS / "explanation/bases.md", tmp_path)
+    assert np.isclose(np.linalg.norm(made["same"]), np.linalg.norm(made["c"]))
+    slices = np.random.default_rng(0).normal(size=(20, 24, 24))
+    made = run_page(DOCS / "how-to/scans.md", tmp_path, given={"slices": slices})
+    assert made["attenuation"].shape == slices.shape
+
+
+def test_every_page_with_python_is_run_by_a_test():
+    """One of a scheduler's cluster is not, which no test has."""
+    shown = {str(p.relative_to(DOCS)) for p in DOCS.rglob("*.md") if "```python" in p.read_text()}
+    prose = {f"explanation/{name}.md" for name in ("reconstruction", "bases")}
+    how_to = {f"how-to/{name}.md" for name in ("scans", "python", "neighbours", "scale_out")}
+    assert shown == {f"tutorials/{name}.md" for name in TUTORIALS} | prose | how_to
 
 
 def test_every_tutorial_is_run_by_a_test():
@@ -200,19 +224,31 @@ def helps():
     return found
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_every_command_on_a_page_has_only_options_that_there_are(page, helps):
-    """Blocks that are indented, or fenced as bash or text, up to their comments."""
+def commands_on(page):
+    """Lines of ours in blocks that are indented, or fenced as bash or text, without comments."""
     text = page.read_text().replace("\\\n", " ")
     fenced = re.findall(r"^```(?:bash|text)\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
     shown = [*re.findall(r"^    (.*)$", text, re.MULTILINE), *"\n".join(fenced).splitlines()]
-    lines = [re.split(r"\s{2,}#", line)[0] for line in shown if re.match(r"rift [^-\s]", line)]
-    for line in lines:
-        _, command, *words = shlex.split(line.rstrip("\\"))
+    return [re.split(r"\s{2,}#", line)[0] for line in shown if re.match(r"rift [^-\s]", line)]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_the_command_line_takes_every_command_on_a_page(page, helps, monkeypatch, capsys):
+    """Its options and their values are read as they are for a run, which is not begun."""
+    taken = []
+    for name, entry in COMMANDS.items():
+        monkeypatch.setitem(COMMANDS, name, entry._replace(run=lambda made, _: taken.append(made)))
+    for line in commands_on(page):
+        _, command, *words = shlex.split(line)
         kind = " ".join([command, *words[:1]])
-        command = kind if kind in helps else command
         options = [word for word in words if word.startswith("--")]
-        assert [word for word in options if word not in helps[command]] == [], line
+        listed = helps[kind if kind in helps else command]
+        assert [word for word in options if word not in listed] == [], line
+        # Settings of an earlier run are read from its file, and a usage is no command.
+        if "--config" not in words and "OPTIONS" not in line and "..." not in line:
+            before = len(taken)
+            status = main([command, *words])
+            assert (status, len(taken)) == (0, before + 1), (line, capsys.readouterr().err)
 
 
 def test_every_option_that_a_text_names_is_one_of_a_command_or_a_tool(helps):

@@ -75,8 +75,19 @@ def blocks(page: Path, changes: Mapping[str, str] | None = None) -> Iterator[Blo
             yield Block(found[1], found[2], text.count("\n", 0, found.start()) + 2)
 
 
-def run_page(page: Path, folder: Path, changes: Mapping[str, str] | None = None) -> dict[str, Any]:
+def run_page(
+    page: Path,
+    folder: Path,
+    changes: Mapping[str, str] | None = None,
+    given: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
     """Run the blocks of a page in a folder.
+
+    Args:
+        page: Markdown file.
+        folder: is made where there is none.
+        changes: as for ``blocks``.
+        given: names that the page's Python takes as there.
 
     Returns:
         The names that its Python left.
@@ -84,7 +95,7 @@ def run_page(page: Path, folder: Path, changes: Mapping[str, str] | None = None)
     Raises:
         RuntimeError: a command ended with another status than 0.
     """
-    names: dict[str, Any] = {"__name__": page.stem}
+    names: dict[str, Any] = {"__name__": page.stem, **(given or {})}
     with _inside(folder):
         for block in blocks(page.absolute(), changes):
             where = f"{page}:{block.line}"

@@ -73,7 +73,7 @@ def command_page(name: str) -> str:
     lines = [f"# rift {name}", "", *_plain(cleandoc(settings.__doc__ or "")), ""]
     for title, options in sorted(groups.items(), key=lambda group: group[0] == EXPERT.title):
         lines += [f"## {title.capitalize()} options", "", about[title], ""]
-        lines += [line for option in options for line in _option(option)]
+        lines += [line for option in sorted(options, key=_later) for line in _option(option)]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -87,8 +87,13 @@ def _plain(text: str) -> Iterator[str]:
             yield line.replace("``", "`")
 
 
+def _later(option: ShownOption) -> bool:
+    """Whether an option is given by its name, and not by its place alone."""
+    return "Positional" not in repr(getattr(option.kind, "__metadata__", ()))
+
+
 def _option(option: ShownOption) -> list[str]:
-    positional = "Positional" in repr(getattr(option.kind, "__metadata__", ()))
+    positional = not _later(option)
     name = option.name.replace("_", "-")
     shown = name.upper() if positional else f"--{name}"
     values = _values(option.kind)
