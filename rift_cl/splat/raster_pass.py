@@ -103,6 +103,8 @@ def draw(
         raster = rasterize(
             device, screen, band, size, settings=settings, background=background, into=raster
         )
+        # Gone before the next one is made.
+        del band
     assert raster is not None
     return RasterPass(screen, boxes, depths, size, settings, background, memory, None, raster)
 
@@ -166,6 +168,8 @@ def draw_grad(
             background=done.background,
         )
         sums = sum_slots(device, lists, records, onto=sums)
+        # Gone before the next ones are made.
+        del lists, records
     assert sums is not None
     return sums
 

@@ -10,6 +10,7 @@ import dataclasses
 import hashlib
 import importlib
 import json
+import weakref
 from functools import cache
 from pathlib import Path
 
@@ -145,6 +146,27 @@ def test_lists_are_cut_again_where_records_do_not_fit(device, monkeypatch):
     assert frame.lists is not None
     assert digest(renderer, frame) == whole
     assert len(plans) == 1 and len(plans[0]) > 1
+
+
+def test_one_band_at_a_time_has_lists_and_records(device, monkeypatch):
+    least = needs(device, drawn(device)[1], gradient=True)[1]
+    made, most = [], []
+
+    def counted(make):
+        def noted(*given, **more):
+            most.append(sum(one() is not None for one in made))
+            found = make(*given, **more)
+            made.append(weakref.ref(found))
+            return found
+
+        return noted
+
+    for name in ("tile_lists", "raster_grad"):
+        monkeypatch.setattr(RASTER_PASS, name, counted(getattr(RASTER_PASS, name)))
+    monkeypatch.setattr(rift.Device, "budget", least)
+    gradient(*drawn(device))
+    # Where records are made, the band's lists are there.
+    assert len(most) > 4 and max(most) == 1
 
 
 def test_records_of_what_is_seen_alone_give_the_same_bits(device, monkeypatch):
