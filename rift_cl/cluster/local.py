@@ -39,8 +39,12 @@ def worker_environments(device: Device, selector: str | None, workers: int) -> l
 
 def local_cluster(environments: list[dict[str, str]]) -> Any:
     """Start a scheduler and a worker for each environment, which this machine alone can reach."""
+    import dask
     from distributed import Nanny, Scheduler, SpecCluster
 
+    # Dask looks at every thread a hundred times a second: a processor's time, and memory that grows
+    # with the run.
+    watched = {"distributed.worker.profile.enabled": False}
     scheduler = {
         "cls": Scheduler,
         "options": {"host": LOOPBACK, "port": 0, "dashboard_address": f"{LOOPBACK}:0"},
@@ -60,7 +64,8 @@ def local_cluster(environments: list[dict[str, str]]) -> Any:
         }
         for number, environment in enumerate(environments)
     }
-    return SpecCluster(workers=workers, scheduler=scheduler, silence_logs="CRITICAL")
+    with dask.config.set(watched):
+        return SpecCluster(workers=workers, scheduler=scheduler, silence_logs="CRITICAL")
 
 
 def _cores() -> int:
