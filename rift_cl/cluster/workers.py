@@ -74,7 +74,7 @@ def cluster_workers(address: str, device: Device, selector: str | None) -> Itera
         target: Any = address
         if where.workers:
             environments = worker_environments(device, selector, where.workers)
-            target = stack.enter_context(local_cluster(environments))
+            target = stack.enter_context(_started(environments))
         try:
             client = stack.enter_context(Client(target, timeout=_ANSWER, set_as_default=False))
         except (OSError, ValueError) as error:
@@ -85,6 +85,21 @@ def cluster_workers(address: str, device: Device, selector: str | None) -> Itera
         workers = Workers(client, where, None if where.workers else selector)
         workers.wait()
         yield workers
+
+
+def _started(environments: list[dict[str, str]]) -> Any:
+    """Workers of this machine.
+
+    Raises:
+        ClusterError: they do not start.
+    """
+    try:
+        return local_cluster(environments)
+    except (OSError, RuntimeError) as error:
+        raise ClusterError(
+            f"the worker processes do not start ({error}); a script wants "
+            "'if __name__ == \"__main__\":' before its first call, since each worker imports it"
+        ) from error
 
 
 class Workers:

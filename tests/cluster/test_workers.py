@@ -105,6 +105,20 @@ def test_no_scheduler_answers(monkeypatch):
             pass
 
 
+def test_workers_that_do_not_start(monkeypatch):
+    pytest.importorskip("distributed", reason=WANTED)
+
+    def fail(environments):
+        raise RuntimeError("Nanny failed to start.")
+
+    monkeypatch.setattr(workers, "local_cluster", fail)
+    with (
+        pytest.raises(ClusterError, match=r"the worker processes do not start.*__main__"),
+        workers.cluster_workers("local:1", rift.open_device(), None),
+    ):
+        pass
+
+
 def test_dask_that_is_not_there(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with (
