@@ -6,6 +6,8 @@ the package is a defect of the package.
 
 from __future__ import annotations
 
+import reprlib
+
 
 class RiftError(Exception):
     """Every error that RiFT-CL raises on purpose."""
@@ -44,6 +46,10 @@ class ShapeError(InputError):
 
 class DTypeError(InputError, TypeError):
     """An array has a type that has no meaning here."""
+
+
+class WrongTypeError(InputError, TypeError):
+    """An argument is of a type that has no meaning there."""
 
 
 class BasisSpanError(InputError):
@@ -116,3 +122,22 @@ class OutputError(RiftError, OSError):
     """A result could not be written; nothing half-written was left behind."""
 
     exit_status = 5
+
+
+def check_type(where: str, name: str, value: object, wanted: type) -> None:
+    """Refuse an argument of another type by name, before something looks for its parts.
+
+    Args:
+        where: what takes it.
+        name: of the argument.
+        value: what was given.
+        wanted: its type.
+
+    Raises:
+        WrongTypeError: it is of another.
+    """
+    if not isinstance(value, wanted):
+        raise WrongTypeError(
+            f"{where}: {name} is {reprlib.repr(value)}, a {type(value).__name__}; wanted: "
+            f"{wanted.__name__}"
+        )

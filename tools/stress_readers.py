@@ -1,16 +1,17 @@
-"""Does any damaged scan end the process, hang it, or escape without an error that has a name?
+"""Does any damaged file end the process, hang it, or escape without an error that has a name?
 
     python tools/stress_readers.py --files 2000 --seed 0 --keep found
 
-Valid TIFF, MAT (versions 5 and 7.3), HDF5 (Data Exchange, NXtomo), NPZ and MRC files are damaged by
-chance: bits flipped, the end cut off, sizes forged, blocks of one file put into another. Each is
-opened and one row of it read in a child process with a limit of time and of memory. Prints what
-became of them; ends with status 1 if one crashed, hung, or raised anything but one of the package's
-errors.
+Valid files of every kind that is read (scans as TIFF, MAT, HDF5, NPZ and MRC; pictures, splats,
+points, cameras, lenses, volumes, checkpoints and settings) are damaged by chance: bits flipped, the
+end cut off, sizes forged, blocks of one file put into another. Each is read in a child process with
+a limit of time and of memory. Prints what became of them; ends with status 1 if one crashed, hung,
+or raised anything but one of the package's errors.
 """
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import resource
@@ -21,26 +22,29 @@ import sys
 import tempfile
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tyro
 
 from stress.damage import damaged
-from stress.valid_scans import KINDS
+from stress.valid_files import OTHERS
+from stress.valid_scans import SCANS
 
+KINDS = {**SCANS, **OTHERS}
 _BUDGET = 1 << 28
 _FAILURES = ("crash", "hang", "unnamed error")
 
 
 @dataclass(frozen=True)
 class Options:
-    """Damage scans and see what reading them does.
+    """Damage files and see what reading them does.
 
     Args:
-        files: how many.
+        files: how many, dealt to all kinds.
         seed: of the damage; file i depends on the seed and on i alone.
         first: number of the first file, to repeat one that was found.
         seconds: after which a file counts as a hang.
@@ -63,9 +67,9 @@ def main(options: Options) -> int:
     with tempfile.TemporaryDirectory(prefix="rift-cl-readers-") as folder:
         reader = Reader(options.memory, options.seconds)
         for index, name, content in damaged_files(options):
-            path = Path(folder, f"scan{KINDS[name].suffix}")
+            path = Path(folder, f"file{KINDS[name].suffix}")
             path.write_bytes(content)
-            outcome, reason = reader.read(path)
+            outcome, reason = reader.read(path, KINDS[name].read)
             tally[name][outcome] += 1
             if outcome in _FAILURES:
                 print(f"file {index} ({name}): {outcome}, {reason}")
@@ -118,13 +122,13 @@ class Reader:
         self._seconds = seconds
         self._child: subprocess.Popen[str] | None = None
 
-    def read(self, path: Path) -> tuple[str, str]:
+    def read(self, path: Path, how: str = "scan") -> tuple[str, str]:
         """What became of a file: "read", the name of an error, or a failure; and the reason."""
         if self._child is None:
             self._child = self._started()
         child = self._child
         assert child.stdin is not None and child.stdout is not None
-        child.stdin.write(f"{path}\n")
+        child.stdin.write(f"{how} {path}\n")
         child.stdin.flush()
         with selectors.DefaultSelector() as selector:
             selector.register(child.stdout, selectors.EVENT_READ)
@@ -163,22 +167,16 @@ def serve(memory: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     warnings.simplefilter("error")
     for line in sys.stdin:
-        print(json.dumps(_outcome(Path(line.rstrip("\n")))), flush=True)
+        how, _, path = line.rstrip("\n").partition(" ")
+        print(json.dumps(_outcome(how, Path(path))), flush=True)
 
 
-def _outcome(path: Path) -> tuple[str, str]:
+def _outcome(how: str, path: Path) -> tuple[str, str]:
     from rift_cl import RiftError
-    from rift_cl.io import open_scan
 
     try:
-        # Files without flats hold counts, which are refused where nothing is said of them.
-        kind = "attenuation" if path.suffix in (".tif", ".mrc") else None
-        scan = open_scan(path, kind=kind, budget=_BUDGET)
-        scan.read(scan.shape[1] - 1, scan.shape[1])
-        rows = scan.read(0, 1).projections
-        if rows.shape != (scan.shape[0], 1, scan.shape[2]) or not np.isfinite(scan.angles).all():
-            return "unnamed error", f"rows of shape {rows.shape} from a scan of {scan.shape}"
-        return "read", ""
+        wrong = _READ[how](path)
+        return ("unnamed error", wrong) if wrong else ("read", "")
     except RiftError as error:
         named = str(path.parent) in str(error)
         return (
@@ -186,6 +184,55 @@ def _outcome(path: Path) -> tuple[str, str]:
         )
     except Exception as error:
         return "unnamed error", repr(error)
+
+
+def _read_scan(path: Path) -> str:
+    """Open a scan and read its last row and its first; what is wrong with these, if anything is."""
+    from rift_cl.io import open_scan
+
+    # Files without flats hold counts, which are refused where nothing is said of them.
+    kind = "attenuation" if path.suffix in (".tif", ".mrc") else None
+    scan = open_scan(path, kind=kind, budget=_BUDGET)
+    scan.read(scan.shape[1] - 1, scan.shape[1])
+    rows = scan.read(0, 1).projections
+    if rows.shape != (scan.shape[0], 1, scan.shape[2]) or not np.isfinite(scan.angles).all():
+        return f"rows of shape {rows.shape} from a scan of {scan.shape}"
+    return ""
+
+
+def _read_other(module: str, function: str, **options: Any) -> Callable[[Path], str]:
+    """A function of the package that reads a file, taken from its module when it is used."""
+
+    def read(path: Path) -> str:
+        found: Any = importlib.import_module(f"rift_cl.{module}")
+        for name in function.split("."):
+            found = getattr(found, name)
+        found(path, **options)
+        return ""
+
+    return read
+
+
+def _read_config(path: Path) -> str:
+    from rift_cl.commands.plan.settings import PlanSettings
+    from rift_cl.commands.run_folder.saved_settings import saved_settings
+
+    saved_settings(path, "plan", PlanSettings).check()
+    return ""
+
+
+_READ: dict[str, Callable[[Path], str]] = {
+    "scan": _read_scan,
+    "image": _read_other("io", "read_image", budget=_BUDGET),
+    "splats": _read_other("io", "SplatScene.load", budget=_BUDGET),
+    "points": _read_other("io.captures.point_cloud", "read_point_cloud"),
+    "capture": _read_other("io", "open_capture", photographs=False),
+    "cameras": _read_other("io.captures.camera_file", "read_cameras"),
+    "lens": _read_other("io", "open_lens"),
+    "volume": _read_other("io", "read_volume", budget=_BUDGET),
+    "checkpoint": _read_other("io.checkpoint", "load_checkpoint"),
+    "config": _read_config,
+}
 
 
 if __name__ == "__main__":

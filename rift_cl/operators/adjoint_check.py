@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.errors import check_type
 from rift_cl.operators.linear import LinearOperator, Shape
 
 
@@ -21,6 +22,7 @@ def dot_test(A: LinearOperator, seed: int = 0) -> float:
         The largest of ``|<Ax, y> - <x, A'y>| / (|Ax| |y|)`` over three pairs: white x with
         y = Ax, white with white, positive with positive. Inner products are taken in float64.
     """
+    check_type("dot_test", "A", A, LinearOperator)
     random = np.random.default_rng(seed)
 
     def white(shape: Shape) -> NDArray[Any]:

@@ -40,7 +40,7 @@ from rift_cl.cl.host_arrays import (
     share,
 )
 from rift_cl.cl.real_type import real_type
-from rift_cl.errors import DeviceMemoryError, InputError, ResourceLimitError
+from rift_cl.errors import DeviceMemoryError, InputError, ResourceLimitError, check_type
 from rift_cl.geometry import Grid, Scan
 
 Shape = tuple[int, ...]
@@ -99,6 +99,7 @@ class LinearOperator(ABC):
     def __init__(
         self, domain: Shape, range: Shape, device: Device, dtype: DTypeLike = np.float32
     ) -> None:
+        check_type(type(self).__name__, "device", device, Device)
         self.domain = domain
         self.range = range
         self.device = device

@@ -21,7 +21,7 @@ from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.cl.host_arrays import as_device_array, download
-from rift_cl.errors import InputError, ResourceLimitError
+from rift_cl.errors import InputError, ResourceLimitError, check_type
 from rift_cl.geometry import Camera
 from rift_cl.splat.bands import FrameMemory, PictureMemory, check_fixed
 from rift_cl.splat.environment import shade_environment_grad
@@ -176,6 +176,8 @@ class Renderer:
     ) -> None:
         self.settings = settings or SplatSettings()
         self.device = device or default_device()
+        check_type("Renderer", "settings", self.settings, SplatSettings)
+        check_type("Renderer", "device", self.device, Device)
 
     def forward(
         self,

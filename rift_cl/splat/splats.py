@@ -19,7 +19,7 @@ from rift_cl.basis.angular.environment import MOST_LOBES, REFLECTANCE
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.host_arrays import as_plain, as_real_array, upload
-from rift_cl.errors import DTypeError, InputError, ShapeError
+from rift_cl.errors import DTypeError, InputError, ShapeError, WrongTypeError
 from rift_cl.splat.orders import count_of, order_of
 
 # Numbers of spherical harmonics of degree 0 to 4.
@@ -83,7 +83,10 @@ class Splats:
         if given not in ([True, True, False], [False, False, True]):
             raise InputError("Splats: give either quats and scales, or covars alone")
         for name, array in vars(self).items():
-            if array is not None:
+            if array is not None or name == "means":
+                if not hasattr(array, "shape"):
+                    kind = type(array).__name__
+                    raise WrongTypeError(f"Splats: {name} is a {kind}, wanted an array")
                 count = self.means.shape[0] if self.means.shape else 0
                 _check_shape(name, array.shape, count, lobed=self.lobes is not None)
                 if array.dtype != np.float32:

@@ -30,7 +30,7 @@ def test_undamaged_files_are_read(stress, tmp_path):
     for name, kind in stress.KINDS.items():
         path = tmp_path / f"a{kind.suffix}"
         path.write_bytes(kind.pack(kind.make()))
-        assert reader.read(path) == ("read", ""), name
+        assert reader.read(path, kind.read) == ("read", ""), name
     child = reader._child.pid
     assert reader.read(tmp_path / "gone.h5")[0] == "InputError" and reader._child.pid == child
     reader.close()

@@ -29,11 +29,13 @@ class Kind:
         suffix: how its name ends.
         make: gives a valid one.
         pack: what is done to it after the damage.
+        read: what reads it; see ``stress_readers``.
     """
 
     suffix: str
     make: Callable[[], bytes]
     pack: Callable[[bytes], bytes] = bytes
+    read: str = "scan"
 
 
 def _frames(count: int = _VIEWS, dtype: str = "u2") -> np.ndarray:
@@ -147,7 +149,7 @@ def _mrc() -> bytes:
         return bytes(content)
 
 
-KINDS = {
+SCANS = {
     "TIFF strips": Kind(".tif", lambda: _tiff("u2", compression="none")),
     "TIFF deflate": Kind(".tif", lambda: _tiff("f4", compression="zip")),
     "TIFF tiles, LZW": Kind(".tif", lambda: _tiff("u1", 16, compression="lzw")),

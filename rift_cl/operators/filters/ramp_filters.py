@@ -15,6 +15,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
+from numbers import Real
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -25,7 +26,7 @@ from rift_cl.cl.budget import check_array, cut_evenly, plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.cl.host_arrays import check_finite
-from rift_cl.errors import InputError, ResourceLimitError, ShapeError
+from rift_cl.errors import InputError, ResourceLimitError, ShapeError, check_type
 from rift_cl.geometry import Parallel
 from rift_cl.operators.filters.row_convolution import SHORT_ROW, RowConvolution
 from rift_cl.operators.fourier.row_transform import RowTransform
@@ -76,6 +77,8 @@ class Ramp:
 
     def __post_init__(self) -> None:
         """Check the window's name and cutoff."""
+        check_type("Ramp", "window", self.window, str)
+        check_type("Ramp", "cutoff", self.cutoff, Real)
         if self.window not in WINDOWS:
             raise InputError(f"window is {self.window!r}, wanted one of {', '.join(WINDOWS)}")
         if not 0 < self.cutoff <= 1:
@@ -108,6 +111,7 @@ class HighPass:
 
     def __post_init__(self) -> None:
         """Check the exponent."""
+        check_type("HighPass", "exponent", self.exponent, Real)
         if not 0 <= self.exponent < np.inf:
             raise InputError(f"exponent is {self.exponent}, wanted a number >= 0")
 

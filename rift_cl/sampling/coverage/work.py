@@ -13,7 +13,7 @@ from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
-from rift_cl.errors import InputError, NonFiniteError, ShapeError
+from rift_cl.errors import InputError, NonFiniteError, ShapeError, check_type
 from rift_cl.geometry import Camera, Cone, Fan, Parallel, Scan, Vectors
 from rift_cl.geometry.numbers import real_numbers
 from rift_cl.geometry.scan_cameras import scan_cameras
@@ -39,6 +39,7 @@ def looks_at(views: Views, target: Target, weights: ArrayLike | None = None) -> 
             have another shape.
         InputError: a weight is given for what is no camera, or is no weight.
     """
+    check_type("coverage", "target", target, Target)
     if isinstance(views, (Fan, Cone, Vectors)):
         views = scan_cameras(views).cameras
     if not isinstance(views, (Observations, Parallel)):
@@ -86,7 +87,9 @@ class CoverageWork:
         device: Device | None,
     ) -> CoverageWork:
         """Take up what ``coverage`` was given, which says what may be wrong with it."""
-        observations, device = looks_at(views, target, weights), device or default_device()
+        device = device or default_device()
+        check_type("coverage", "device", device, Device)
+        observations = looks_at(views, target, weights)
         cycles = _cycles(target.k if k is None else k, target.diameter)
         lanes = int(device.traits.macros["LANES"])
         padded = np.concatenate([cycles, np.repeat(cycles[-1:], -len(cycles) % lanes, axis=0)])

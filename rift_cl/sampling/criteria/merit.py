@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rift_cl.errors import InputError, NonFiniteError, ShapeError
+from rift_cl.errors import InputError, NonFiniteError, ShapeError, check_type
 from rift_cl.geometry import Camera
 from rift_cl.geometry.numbers import real_numbers
 from rift_cl.sampling.coverage.host import host_coverage, host_coverage_grad
@@ -80,6 +80,10 @@ def merit(
         raise InputError(
             f"merit: kind is {kind!r}, wanted one of {', '.join(get_args(CriterionKind))}"
         )
+    # Imported when used: a target names the criteria that it takes.
+    from rift_cl.sampling.targets.target import Target
+
+    check_type("merit", "target", target, Target)
     unweighted = Observations.of(cameras, target.points)
     observations = unweighted.weighted(weights)
     if kind == "kriging" or kind == "exact":  # noqa: PLR1714 - what is narrowed by its type

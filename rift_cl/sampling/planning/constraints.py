@@ -7,14 +7,14 @@ round ``up``, both in radians; lengths are in the unit of the world.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, check_type
 from rift_cl.geometry.numbers import one_number, real_numbers
 from rift_cl.sampling.planning.keep_out import KeepOut
 from rift_cl.sampling.planning.paths import Free, Path, Ring, Spline, TiltedRings
@@ -151,6 +151,8 @@ class Constraints:
             )
         self._set("azimuth", (first, min(last, first + 2 * math.pi)))
         _ = self.distances
+        check_type("Constraints", "keepouts", self.keepouts, Iterable)
+        check_type("Constraints", "ranges", self.ranges, Mapping)
         self._set("keepouts", tuple(self.keepouts))
         self._check_kinds()
         if not 0 < one_number(self.cover) <= 1:

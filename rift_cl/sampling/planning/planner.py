@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from numbers import Integral
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, check_type
 from rift_cl.geometry import Camera
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.numbers import one_number
@@ -89,6 +90,10 @@ def plan(
         if value not in get_args(known):
             raise InputError(f"plan: {name} is {value!r}, wanted one of {get_args(known)}")
     limits = Constraints() if constraints is None else constraints
+    check_type("plan", "target", target, Target)
+    check_type("plan", "constraints", limits, Constraints)
+    check_type("plan", "cameras", cameras, Sequence)
+    check_type("plan", "seed", seed, Integral)
     target = looked_at(target, limits)
     fine = for_planning(target, most_candidates(int(views)))
     design = DesignSpace(fine, limits, tuple(cameras) or default_types(target))
@@ -136,6 +141,8 @@ def next_views(
     Raises:
         InputError: nothing was taken, or as for ``plan``.
     """
+    if not isinstance(taken, Plan):
+        check_type("next_views", "taken", taken, Sequence)
     if not isinstance(taken, Plan) and not len(taken):
         raise InputError("next_views: no view was taken, wanted a plan or cameras; see plan")
     if isinstance(taken, Plan):

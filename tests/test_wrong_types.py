@@ -1,0 +1,50 @@
+"""What is of a type that makes no sense is refused by its name, not found out by chance."""
+
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.errors import WrongTypeError, check_type
+
+GRID = rift.Grid((8, 8))
+SCAN = rift.Parallel(np.arange(6) * np.pi / 6, 12)
+ZEROS = np.zeros((3, 3))
+CALLS = {
+    "device": lambda wrong: rift.Projector(GRID, SCAN, device=wrong),
+    "grid": lambda wrong: rift.cheapest_projector(wrong, SCAN),
+    "A": rift.dot_test,
+    "settings": rift.Renderer,
+    "means": lambda wrong: rift.Splats(wrong, wrong, wrong, wrong),
+    "target": lambda wrong: rift.plan(wrong, 1),
+    "constraints": lambda wrong: rift.plan(target(), 1, wrong),
+    "cameras": lambda wrong: rift.plan(target(), 1, cameras=wrong),
+    "taken": lambda wrong: rift.next_views(wrong, target(), 1),
+    "ranges": lambda wrong: rift.Constraints(ranges=wrong),
+    "keepouts": lambda wrong: rift.Constraints(keepouts=wrong),
+    "cutoff": lambda wrong: rift.Ramp(cutoff=wrong),
+    "exponent": rift.HighPass,
+}
+
+
+def target():
+    return rift.Target((0.0, 0.0, 0.0), 1.0)
+
+
+@pytest.mark.each
+@pytest.mark.parametrize("name", CALLS)
+def test_an_argument_of_a_wrong_type_is_named(name):
+    with pytest.raises(WrongTypeError, match=rf"\b{name}\b"):
+        CALLS[name](object())
+
+
+def test_other_targets_than_targets_are_named():
+    with pytest.raises(WrongTypeError, match="target"):
+        rift.merit([], ZEROS)
+    with pytest.raises(WrongTypeError, match="target"):
+        rift.coverage([], ZEROS)
+
+
+def test_the_sentence_says_what_was_given_and_what_is_wanted():
+    with pytest.raises(WrongTypeError, match="f: x is 'a', a str; wanted: int"):
+        check_type("f", "x", "a", int)
+    check_type("f", "x", True, int)

@@ -1,0 +1,114 @@
+"""Small valid files that are no scans: pictures, splats, points, cameras, lenses, volumes, runs."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from rift_cl.io import open_volume, write_json
+from rift_cl.io.captures.point_cloud import write_point_cloud
+from rift_cl.io.checkpoint import Checkpoint, save_checkpoint
+from rift_cl.io.images.image import write_png
+from rift_cl.io.images.pixels import write_pixels
+from rift_cl.io.scenes.splat_scene import SplatScene
+from rift_cl.sample.stock_lenses import stock_lens
+from stress.valid_scans import Kind
+
+_SPLATS = 40
+
+
+def _written(name: str, write: Callable[[Path], object]) -> bytes:
+    """What a function writes under a name."""
+    with tempfile.TemporaryDirectory() as folder:
+        write(Path(folder, name))
+        return Path(folder, name).read_bytes()
+
+
+def _picture() -> np.ndarray:
+    return (np.arange(12 * 16 * 3).reshape(12, 16, 3) % 251 / 250).astype(np.float32)
+
+
+def _save_png(path: Path) -> None:
+    write_png(path, _picture())
+
+
+def _pixels(format: str, name: str) -> bytes:
+    return _written(name, lambda path: write_pixels(path, _picture(), format=format, attributes={}))
+
+
+def _splats(name: str) -> bytes:
+    random = np.random.default_rng(0)
+    scene = SplatScene(
+        means=random.normal(size=(_SPLATS, 3)),
+        log_scales=np.full((_SPLATS, 3), -2.0),
+        quats=np.tile([1.0, 0, 0, 0], (_SPLATS, 1)),
+        logit_opacities=np.full(_SPLATS, 1.0),
+        sh=random.normal(size=(_SPLATS, 1, 3)),
+    )
+    return _written(name, scene.save)
+
+
+def _points() -> bytes:
+    points = np.arange(60.0).reshape(20, 3)
+    return _written("a.ply", lambda path: write_point_cloud(path, points, points / 60))
+
+
+def _transforms() -> bytes:
+    pose = np.eye(4).tolist()
+    frames = [{"file_path": f"{n}.png", "transform_matrix": pose} for n in range(4)]
+    lens = {"fl_x": 50.0, "fl_y": 50, "cx": 8, "cy": 6, "w": 16, "h": 12, "k1": 0.01}
+    return json.dumps({**lens, "frames": frames}).encode()
+
+
+def _camera() -> bytes:
+    ranges = {"f_number": [4, 22]}
+    camera = {"name": "a", "focal_length": 50, "f_number": 8, "pixel_um": 5, "size": [60, 40]}
+    return json.dumps({"cameras": [{**camera, "cost": 2, "ranges": ranges}]}).encode()
+
+
+def _volume(format: str, name: str) -> bytes:
+    def write(path: Path) -> None:
+        values = np.arange(4 * 6 * 8, dtype=np.float32).reshape(4, 6, 8)
+        with open_volume(path, values.shape, format=format, spacing=0.5, unit="mm") as volume:
+            volume.write(0, values)
+
+    return _written(name, write)
+
+
+def _checkpoint() -> bytes:
+    arrays = {"raw.means": np.ones((9, 3), np.float32), "step": np.int64(5)}
+    with tempfile.TemporaryDirectory() as folder:
+        made = Checkpoint(5, arrays, {"settings": {"steps": 9}})
+        return save_checkpoint(Path(folder), made).read_bytes()
+
+
+def _config() -> bytes:
+    settings = {"views": 3, "seed": 2, "elevation": [-10, 40], "mode": "volume"}
+    return _written(
+        "config.json",
+        lambda path: write_json(path, {"job": "plan", "complete": True, "settings": settings}),
+    )
+
+
+OTHERS = {
+    "PNG": Kind(
+        ".png", lambda: _written("a.png", lambda p: write_png(p, _picture())), read="image"
+    ),
+    "OpenEXR": Kind(".exr", partial(_pixels, "openexr", "a.exr"), read="image"),
+    "splats PLY": Kind(".ply", partial(_splats, "a.ply"), read="splats"),
+    "splats .splat": Kind(".splat", partial(_splats, "a.splat"), read="splats"),
+    "points PLY": Kind(".ply", _points, read="points"),
+    "transforms JSON": Kind(".json", _transforms, read="capture"),
+    "cameras JSON": Kind(".json", _camera, read="cameras"),
+    "lens JSON": Kind(".json", lambda: stock_lens("cooke_triplet").read_bytes(), read="lens"),
+    "volume HDF5": Kind(".h5", partial(_volume, "h5", "a.h5"), read="volume"),
+    "volume TIFF": Kind(".tif", partial(_volume, "tiff-stack", "a.tif"), read="volume"),
+    "volume MRC": Kind(".mrc", partial(_volume, "mrc", "a.mrc"), read="volume"),
+    "checkpoint": Kind(".npz", _checkpoint, read="checkpoint"),
+    "config.json": Kind(".json", _config, read="config"),
+}
