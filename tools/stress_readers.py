@@ -76,6 +76,7 @@ def main(options: Options) -> int:
                 _keep(options.keep, f"{options.seed}-{index}-{path.name}", content)
         reader.close()
     print(table(tally))
+    print(summary(tally))
     return int(any(counts[failure] for counts in tally.values() for failure in _FAILURES))
 
 
@@ -101,6 +102,17 @@ def table(tally: dict[str, Counter[str]]) -> str:
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     lines = [[cell.rjust(width) for cell, width in zip(row, widths, strict=True)] for row in rows]
     return "\n".join("  ".join(line) for line in lines)
+
+
+def summary(tally: dict[str, Counter[str]]) -> str:
+    """What became of all files, in a sentence."""
+    total = sum(tally.values(), Counter())
+    failures = ", ".join(f"{total[failure]} x {failure}" for failure in _FAILURES)
+    refused = sum(total.values()) - total["read"] - sum(total[each] for each in _FAILURES)
+    return (
+        f"{sum(total.values())} damaged files of {len(tally)} kinds: {total['read']} read, "
+        f"{refused} refused by name; {failures}"
+    )
 
 
 def _keep(folder: Path | None, name: str, content: bytes) -> None:
@@ -153,19 +165,26 @@ class Reader:
     def _started(self) -> subprocess.Popen[str]:
         here = Path(__file__).absolute()
         places = os.pathsep.join((str(here.parents[1]), str(here.parent)))
-        return subprocess.Popen(
+        child = subprocess.Popen(
             [sys.executable, "-c", f"import stress_readers as s; s.serve({self._memory})"],
             env={**os.environ, "PYTHONPATH": places},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
         )
+        # What the libraries take to load is no file's time.
+        assert child.stdout is not None
+        child.stdout.readline()
+        return child
 
 
 def serve(memory: int) -> None:
     """Read the files that are named on standard input, and answer on standard output."""
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     warnings.simplefilter("error")
+    for module in ("rift_cl.io", "rift_cl.io.captures.camera_file", "rift_cl.io.checkpoint"):
+        importlib.import_module(module)
+    print("ready", flush=True)
     for line in sys.stdin:
         how, _, path = line.rstrip("\n").partition(" ")
         print(json.dumps(_outcome(how, Path(path))), flush=True)

@@ -199,3 +199,11 @@ def test_links_that_go_round(tmp_path: Path) -> None:
         file["h/h"] = file["h"] if "h" in file else file.create_group("h")
     with pytest.raises(FileFormatError, match=r"it holds 't'"):
         open_scan(path)
+
+
+def test_a_text_of_complex_codes_is_no_text(tmp_path: Path) -> None:
+    path = write_mat(tmp_path / "a.mat", {"CtDataFull": challenge()}, "5")
+    flags = struct.pack("<4I", 6, 8, 4, 0)
+    # Every array of class char claims to be complex.
+    path.write_bytes(path.read_bytes().replace(flags, struct.pack("<4I", 6, 8, 0x800 | 4, 0)))
+    assert open_scan(path).shape[0] == len(DEGREES)

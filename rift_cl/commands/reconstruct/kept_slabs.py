@@ -134,18 +134,21 @@ class SlabFolder:
             if stop <= given:
                 continue
             try:
-                slab = np.load(path, allow_pickle=False)
+                # Mapped first, so that nothing is allocated for a size that is only claimed.
+                slab = np.load(path, mmap_mode="r", allow_pickle=False)
             except (OSError, ValueError, EOFError) as error:
                 raise CheckpointError(
                     f"{path}: is damaged ({error}); remove it and go on with --resume"
                 ) from error
+            if not isinstance(slab, np.ndarray):
+                raise CheckpointError(f"{path}: holds no array; remove it and go on with --resume")
             if slab.shape != (stop - start, *self.shape[1:]) or slab.dtype != np.float32:
                 raise CheckpointError(
                     f"{path}: holds {slab.dtype} {slab.shape}, wanted float32 "
                     f"{(stop - start, *self.shape[1:])}; remove it and go on with --resume"
                 )
             first, given = max(start, given), stop
-            yield first, slab[first - start :]
+            yield first, np.array(slab[first - start :])
 
     def drop(self) -> None:
         """Remove the folder."""
@@ -157,7 +160,9 @@ class SlabFolder:
         if not self.path.is_dir():
             return []
         named = [(_SLAB.fullmatch(path.name), path) for path in self.path.iterdir()]
-        found = sorted((int(name[1]), int(name[2]), path) for name, path in named if name)
+        found = sorted(
+            (int(name[1]), int(name[2]), path) for name, path in named if name and path.is_file()
+        )
         return [entry for entry in found if 0 <= entry[0] < entry[1] <= self.shape[0]]
 
 

@@ -128,7 +128,7 @@ class Mat5File:
     def text(self, name: str) -> str:
         """A short text, or nothing where the array is none."""
         array = self.arrays.get(name)
-        if array is None or not array.text or not 0 < array.size < _LONGEST_TEXT:
+        if array is None or not (array.text and array.dtype and 0 < array.size < _LONGEST_TEXT):
             return ""
         with reading(self.path, "the MAT file"), self._element(array.element) as (source, _):
             source.skip(array.offset - source.place)

@@ -1,0 +1,128 @@
+"""Run the stress tools and print docs/reliability.md: each promise, its test, the figure, its date.
+
+    python tools/report_reliability.py --only "damaged files" --page docs/reliability.md
+    python tools/report_reliability.py --share 0.1
+
+Counts are those of a full run; ``--share`` makes them smaller. Figures of promises that are not run
+are kept as the page has them. Ends with status 1 if a tool found a promise broken.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import NamedTuple
+
+import tyro
+
+_HERE = Path(__file__).resolve().parent
+_NOT_RUN = "not run yet"
+_HEAD = """# Reliability
+
+What holds when files are damaged, processes are killed and builds collide. Each row is a promise,
+the tool that tries it, what the tool printed last, and when; the numbers of tries are what stands
+in the figure. `python tools/report_reliability.py` runs them all and prints this page.
+
+| promise | tried by | found | on |
+| :-- | :-- | :-- | :-- |
+"""
+_ROW = re.compile(r"^\| (.+?) \| `(.+?)` \| (.+?) \| (.*?) \|$", re.MULTILINE)
+
+
+class Promise(NamedTuple):
+    """What is promised, and what tries it.
+
+    Args:
+        name: what holds.
+        tool: file in this folder; the last line that it prints is the figure.
+        count: option of the tool that says how often it tries.
+        full: that often in a full run.
+    """
+
+    name: str
+    tool: str
+    count: str
+    full: int
+
+
+PROMISES = (
+    Promise(
+        "damaged files of every kind that is read end in a named error",
+        "stress_readers.py",
+        "--files",
+        50_000,
+    ),
+    Promise(
+        "a command that is killed at any moment and resumed leaves the same bytes",
+        "stress_resumes.py",
+        "--kills",
+        100,
+    ),
+    Promise(
+        "processes that build the same kernels at once all succeed",
+        "stress_builds.py",
+        "--rounds",
+        50,
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Options:
+    """Run the stress tools and write the page.
+
+    Args:
+        page: the page to write; its figures are kept for what is not run.
+        only: promises to run, by a part of their names; all if not given.
+        share: of the full counts.
+    """
+
+    page: Path = _HERE.parent / "docs" / "reliability.md"
+    only: str = ""
+    share: float = 1.0
+
+
+def main(options: Options) -> int:
+    """Run the tools, write the page, and return the exit status."""
+    text = options.page.read_text(encoding="utf-8") if options.page.exists() else ""
+    known = {row[0]: (row[2], row[3]) for row in _ROW.findall(text)}
+    broken = 0
+    for promise in PROMISES:
+        if options.only in promise.name:
+            figure, status = found(promise, options.share)
+            broken |= status
+            known[promise.name] = figure, datetime.now(timezone.utc).date().isoformat()
+    options.page.write_text(page(known), encoding="utf-8")
+    return broken
+
+
+def found(
+    promise: Promise,
+    share: float,
+    run: Callable[..., subprocess.CompletedProcess[str]] = subprocess.run,
+) -> tuple[str, int]:
+    """What a tool printed last, and whether it found the promise broken (1) or not (0)."""
+    count = max(1, round(share * promise.full))
+    command = [sys.executable, str(_HERE / promise.tool), promise.count, str(count)]
+    done = run(command, stdout=subprocess.PIPE, text=True, check=False)
+    lines = done.stdout.strip().splitlines() or [f"ended with status {done.returncode}"]
+    return ("" if done.returncode == 0 else "BROKEN: ") + lines[-1], int(done.returncode != 0)
+
+
+def page(known: dict[str, tuple[str, str]]) -> str:
+    """The page of all promises, with the figures that are known and their dates."""
+    rows = []
+    for promise in PROMISES:
+        figure, date = known.get(promise.name, (_NOT_RUN, ""))
+        tool = f"{promise.tool} {promise.count} {promise.full}"
+        rows.append(f"| {promise.name} | `{tool}` | {figure} | {date} |\n")
+    return _HEAD + "".join(rows)
+
+
+if __name__ == "__main__":
+    sys.exit(main(tyro.cli(Options)))
