@@ -33,8 +33,6 @@ from rift_cl.commands.runner import (
 _USAGE = 2
 # Figures of a run that a line of a terminal has room for.
 _FIGURES = 4
-# Names and addresses are not broken.
-_WHOLE = {"break_long_words": False, "break_on_hyphens": False}
 
 
 class Command(NamedTuple):
@@ -173,7 +171,11 @@ def _print_facts(name: str, facts: Mapping[str, str]) -> None:
 def _wrapped(line: str) -> list[str]:
     """A line as lines that fit the terminal behind a column of names."""
     width = shutil.get_terminal_size().columns - 16
-    return textwrap.wrap(line, max(width, 40), subsequent_indent="  ", **_WHOLE)
+    # Names and addresses are not broken.
+    whole = textwrap.TextWrapper(
+        max(width, 40), subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+    )
+    return whole.wrap(line)
 
 
 def _demo(settings: Any, output: Output) -> None:
