@@ -32,6 +32,15 @@ def test_the_axis_is_found(kind, turn):
     assert found.sense.sign == 1
 
 
+def test_parts_of_views_tell_the_axis_of_a_noisy_short_scan():
+    scan = fan(SHORT)
+    y = sinogram(KINDS["wider than the detector"], scan, noise=0.03)
+    found = rift.find_center(y, _unknown(scan))
+    assert found.by == "opposite views"
+    assert found.center == pytest.approx(83.7, abs=0.15)
+    assert found.interval[0] < 83.7 < found.interval[1]
+
+
 def test_the_sense_is_told():
     scan = fan()
     y = sinogram(KINDS["porous"], scan)
@@ -82,6 +91,9 @@ def test_what_cannot_be_told_is_refused():
         rift.find_center(np.ones((scan.views, scan.bins), np.float32), scan)
     with pytest.raises(InputError, match="span"):
         rift.find_center(sinogram(KINDS["parts"], fan(FULL[:10])), fan(FULL[:10]))
+    few = fan(FULL[::7])
+    with pytest.raises(InputError, match=r"11\.[23] degrees apart.* 7 degrees"):
+        rift.find_center(sinogram(KINDS["parts"], few), few)
     with pytest.raises(ShapeError):
         rift.find_center(np.ones((3, 3), np.float32), scan)
     helix = cone(heights=np.arange(FULL.size // 2))

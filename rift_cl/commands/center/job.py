@@ -100,12 +100,10 @@ class CenterJob:
             fan = scan if isinstance(scan, Fan) else scan.fan()
             angles = -fan.angles if turned else fan.angles
             rows = sinogram[:, None]
-            views, directions, places = parallel_views(
-                rows, replace(fan, angles=angles, center=center)
-            )
-            sinogram = np.ascontiguousarray(views[:, 0], np.float32)
-            middle = float(np.interp(center, places, np.arange(places.size)))
-            geometry = Parallel(directions, places.size, center=middle)
+            read = parallel_views(rows, replace(fan, angles=angles, center=center)).whole()
+            sinogram = np.ascontiguousarray(read.views[:, 0], np.float32)
+            middle = float(np.interp(center, read.bins, np.arange(read.bins.size)))
+            geometry = Parallel(read.directions, read.bins.size, center=middle)
         else:
             geometry = Parallel(self.scan.angles, bins, center=center)
         A = Projector(Grid((bins, bins)), geometry, device=self.device)

@@ -21,7 +21,8 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Fan, Scan
 from rift_cl.reconstruct.axis.estimate import AxisEstimate
 from rift_cl.reconstruct.axis.fan_doubt import fan_doubt
-from rift_cl.reconstruct.axis.fan_rays import parallel_views
+from rift_cl.reconstruct.axis.fan_rays import ParallelViews, parallel_views
+from rift_cl.reconstruct.axis.opposite_views import enough_pairs, shared_views
 from rift_cl.reconstruct.axis.search import searched_axis, searched_rows
 from rift_cl.reconstruct.axis.sense import sense_of
 from rift_cl.reconstruct.axis.views import Views
@@ -33,6 +34,8 @@ _GROUPS, _PARTED = 5, 2.0
 # The widest half interval that is still an answer, in bins: rays read by wrong angles or lengths
 # may agree on an axis as vaguely as noisy ones.
 _WIDEST = 0.5
+# Parts of views are compared if they make pairs so many times as many.
+_MORE = 1.5
 # Most readings, and the change of the centre that ends them, in bins.
 _READINGS, _SETTLED = 6, 0.01
 
@@ -152,7 +155,8 @@ def _settled(
 ) -> AxisEstimate:
     """The axis about which the reading that assumes it turns."""
     for _ in range(_READINGS):
-        views, directions, bins = parallel_views(rows, fan)
+        read, seen = _compared(parallel_views(rows, fan))
+        views, bins = read.views, read.bins
         within = None
         if span is not None:
             low, high = np.interp(span, bins, np.arange(bins.size)).tolist()
@@ -160,13 +164,30 @@ def _settled(
         sinograms = (views[:, row] for row in range(views.shape[1]))
         # Rows counted from the one that the estimate is for.
         offsets = list(places - middle)
-        read = searched_axis(sinograms, offsets, 1, directions, within, _WIDEST)
-        found = _on_detector(read, bins, middle)
+        told = searched_axis(sinograms, offsets, 1, read.directions, within, _WIDEST, seen)
+        found = _on_detector(told, bins, middle)
         change = found.center - fan.center
         fan = replace(fan, center=found.center)
         if abs(change) < _SETTLED:
             break
     return found
+
+
+def _compared(read: ParallelViews) -> tuple[ParallelViews, Floats | None]:
+    """The views to compare, and where each ends, if they do not hold all rays.
+
+    Scans of half a turn and the fan's angle have hardly a whole view's opposite, but that of a part
+    of many: without these, half a turn would have to do, which tells the axis much less surely.
+    """
+    whole = read.whole()
+    parts = enough_pairs(read.directions, read.seen)
+    pairs = enough_pairs(whole.directions)
+    if parts is None:
+        return whole, None
+    wholly = 0.0 if pairs is None else shared_views(pairs, whole.directions, None)
+    if shared_views(parts, read.directions, read.seen) < _MORE * wholly:
+        return whole, None
+    return read, read.seen
 
 
 def _on_detector(read: AxisEstimate, bins: Floats, middle: float) -> AxisEstimate:

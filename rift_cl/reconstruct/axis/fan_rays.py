@@ -12,6 +12,8 @@ The same line is measured once more at ``a + pi - 2 gamma`` by the ray at ``-gam
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,11 +34,38 @@ Floats = NDArray[np.float64]
 _GAP = np.deg2rad(7.0)
 # The same for opposite rays, which are compared one by one; or so many steps.
 _NEAR, _STEPS = np.deg2rad(2.0), 2.5
+# Least share of its rays that a parallel view holds.
+_HELD = 0.25
 # Rays beyond the ends of the scan, or of a row, by this share of a step still count.
 _SLACK = 1e-6
 
 
-def parallel_views(rows: Views, fan: Fan) -> tuple[Views, Floats, Floats]:
+class ParallelViews(NamedTuple):
+    """A fan's rays as parallel views.
+
+    Args:
+        views: (direction, row, bin).
+        directions: in radians.
+        bins: the fan's bin that each of their own bins comes from, increasing, as far apart as the
+            fan's at the centre.
+        seen: (direction, 2) the first and the last of their own bins that rays were taken for;
+            what views hold beyond means nothing.
+    """
+
+    views: Views
+    directions: Floats
+    bins: Floats
+    seen: Floats
+
+    def whole(self) -> ParallelViews:
+        """Those that hold all rays."""
+        kept = np.ptp(self.seen, axis=1) == self.bins.size - 1
+        return self._replace(
+            views=self.views[kept], directions=self.directions[kept], seen=self.seen[kept]
+        )
+
+
+def parallel_views(rows: Views, fan: Fan) -> ParallelViews:
     """Parallel views of the rays as they were taken.
 
     Args:
@@ -44,12 +73,11 @@ def parallel_views(rows: Views, fan: Fan) -> tuple[Views, Floats, Floats]:
         fan: their geometry as far as it is known.
 
     Returns:
-        (direction, row, bin) the views that are covered as a whole; their directions in radians;
-        and the fan's bin that each of their own bins comes from, increasing, as far apart as the
-        fan's at the centre.
+        The views that are covered as a whole, one at least, and those that are in part: a scan
+        of half a turn and the fan's angle holds all of some rays' opposites, but no whole view's.
 
     Raises:
-        InputError: no parallel view is covered.
+        InputError: no parallel view is covered: the span is too short, or views are too far apart.
     """
     turned, group = in_one_turn(fan.angles)
     views = turn_views(turned)
@@ -58,25 +86,38 @@ def parallel_views(rows: Views, fan: Fan) -> tuple[Views, Floats, Floats]:
     low, high = (reach * np.sin(gamma[[0, -1]]) / step).tolist()
     t = np.arange(np.ceil(low - _SLACK), np.floor(high + _SLACK) + 1) * step
     leaves = np.arcsin(t / reach)
+    # Views in steps of which half a turn is a whole number have others exactly opposite.
+    apart = np.pi / max(1, round(np.pi / views.step))
     if views.turn:
-        # An even number, so that every view has one exactly opposite.
-        count = 2 * max(1, round(np.pi / views.step))
-        theta = views.first + np.arange(count) * 2 * np.pi / count
+        theta = views.first + np.arange(round(2 * np.pi / apart)) * apart
     else:
-        begin, end = views.first - leaves.min(), views.last - leaves.max()
-        theta = np.arange(begin, end + _SLACK, views.step)
-    ray = theta[:, None] + leaves
-    covered = _between(views, ray, _GAP).all(axis=1)
-    if not covered.any():
+        first, last = views.first - float(leaves.max()), views.last - float(leaves.min())
+        # One of them begins where whole views do.
+        begin = views.first - float(leaves.min())
+        begin -= (begin - first) // apart * apart
+        theta = np.arange(begin, last + _SLACK, apart)
+    ray = np.asarray(theta[:, None] + leaves, np.float64)
+    covered = _between(views, ray, _GAP)
+    if not covered.all(axis=1).any():
+        if _between(views, ray, np.inf).all(axis=1).any():
+            raise InputError(
+                f"views are up to {np.rad2deg(np.diff(views.angles).max()):.3g} degrees apart, and "
+                "parallel views are read between views that are at most "
+                f"{np.rad2deg(_GAP):.3g} degrees apart"
+            )
         raise InputError(
             f"the views span {np.rad2deg(views.last - views.first):.3g} degrees, the fan "
             f"{np.rad2deg(np.ptp(gamma)):.3g}: there is no direction of which every ray was taken"
         )
+    held = covered.sum(axis=1)
+    ends = covered.argmax(axis=1), t.size - 1 - covered[:, ::-1].argmax(axis=1)
+    kept = (held >= _HELD * t.size) & (held == ends[1] - ends[0] + 1)
     stack = means(rows, group)[views.order]
     bins = bins_of(fan, leaves)
-    places = _places(views, ray[covered], bins)
+    places = _places(views, ray[kept], bins)
     parallel = [resampled(stack[:, row], [places], 3) for row in range(stack.shape[1])]
-    return np.stack(parallel, axis=1), theta[covered], bins
+    seen = np.stack(ends, axis=1)[kept].astype(np.float64)
+    return ParallelViews(np.stack(parallel, axis=1), theta[kept], bins, seen)
 
 
 def bins_of(fan: Fan, gamma: Floats) -> Floats:

@@ -21,8 +21,8 @@ from rift_cl.reconstruct.axis.evidence import Evidence
 from rift_cl.reconstruct.axis.moments import MassCenter, mass_center
 from rift_cl.reconstruct.axis.opposite_views import (
     Pairs,
+    enough_pairs,
     mirror_scores,
-    opposite_pairs,
     pair_evidence,
 )
 from rift_cl.reconstruct.axis.views import Row, Views, binned, evenly, is_cut
@@ -36,8 +36,6 @@ _LIMITED = np.deg2rad(60.0)
 # Where the axis of a half turn is looked for: from this share of the detector to as far from its
 # other end. The least overlap of opposite views, as a share of the detector and in bins.
 _HALF, _OVERLAP, _OVERLAP_BINS = 0.2, 0.03, 8
-# Pairs of opposite views decide from so many on, or from this share of the views on.
-_PAIRS, _PAIR_SHARE = 24, 0.1
 # Bins that the coarse and the fine search work with, about, and views for each of them.
 _COARSE, _FINE, _VIEWS = 256, 512, 1.4
 # Distance of windows about trial centres, as a share of the detector.
@@ -100,10 +98,13 @@ class OppositeViews:
     Args:
         pairs: which views are opposite.
         span: where to search, in bins of the detector; all of it but the ends if None.
+        seen: (view, 2) the first and the last bin that each view holds; all of them if None.
     """
 
-    def __init__(self, pairs: Pairs, span: tuple[float, float] | None) -> None:
-        self._pairs, self._span = pairs, span
+    def __init__(
+        self, pairs: Pairs, span: tuple[float, float] | None, seen: Floats | None = None
+    ) -> None:
+        self._pairs, self._span, self._seen = pairs, span, seen
 
     def find(self, views: Views) -> RowAxis | None:
         """The axis of a row."""
@@ -112,6 +113,8 @@ class OppositeViews:
         low, high = self._span or (least, bins - 1 - least)
         count = _binning(bins, _FINE)
         row = Row(binned(views, count), count, is_cut(views))
+        if self._seen is not None:
+            row = replace(row, seen=row.place(self._seen))
         centers, scores = mirror_scores(row, self._pairs, row.place(low), row.place(high))
         starts = _peaks(row.detector(centers), scores, _APART * bins)
         best = _best([self._settled(row, start) for start in starts], bins)
@@ -221,16 +224,20 @@ class CentreOfMass:
         return RowAxis(told.center, told.error, np.inf, 0.0, 1.0, None, _MASS, told)
 
 
-def chosen_measure(angles: Floats, span: tuple[float, float] | None) -> Measure:
+def chosen_measure(
+    angles: Floats, span: tuple[float, float] | None, seen: Floats | None = None
+) -> Measure:
     """The measure that the directions of views allow.
 
     Args:
         angles: in radians.
         span: where to search, in bins.
+        seen: (view, 2) the first and the last bin that each view holds, if there are enough pairs
+            of such views; None where each holds all of them.
     """
-    pairs = opposite_pairs(angles)
-    if pairs is not None and pairs.first.size >= min(_PAIRS, _PAIR_SHARE * angles.size):
-        return OppositeViews(pairs, span)
+    pairs = enough_pairs(angles, seen)
+    if pairs is not None:
+        return OppositeViews(pairs, span, seen)
     circle = np.sort(np.mod(angles, 2 * np.pi))
     gaps = np.diff(circle, append=circle[0] + 2 * np.pi)
     widest = int(gaps.argmax())

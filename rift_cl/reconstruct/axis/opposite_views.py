@@ -28,6 +28,8 @@ _GAP, _STEPS = np.deg2rad(2.0), 2.5
 _FEWEST, _MOST, _GUESS = 6, 400, 90
 # Angles closer than this are the same, in radians.
 _SAME = 1e-6
+# Opposite views decide from so many whole ones on, or from this share of all views on.
+_ENOUGH, _ENOUGH_SHARE = 12, 0.05
 # Bins over which slopes are taken for the first guess.
 _SLOPE = 2.0
 # How far a guess may be off, in bins of the row; frequencies over which noise is averaged.
@@ -65,6 +67,15 @@ class Pairs:
         opposite = views[self.before] * (1 - share) + views[self.after] * share
         return views[self.first], opposite
 
+    def seen(self, row: Row) -> tuple[Floats, Floats]:
+        """The first and last place that the views hold, and their opposites, (n, 2) each."""
+        ends = row.seen
+        if ends is None:
+            ends = np.tile([0.0, row.views.shape[1] - 1.0], (len(row.views), 1))
+        before, after = ends[self.before], ends[self.after]
+        both = [np.maximum(before[:, 0], after[:, 0]), np.minimum(before[:, 1], after[:, 1])]
+        return ends[self.first], np.stack(both, axis=1)
+
 
 def opposite_pairs(angles: Floats) -> Pairs | None:
     """Pairs of opposite views, or None where there are too few."""
@@ -90,6 +101,37 @@ def opposite_pairs(angles: Floats) -> Pairs | None:
     return Pairs(*(part[once] for part in (found.first, found.before, found.after, found.share)))
 
 
+def enough_pairs(angles: Floats, seen: Floats | None = None) -> Pairs | None:
+    """Pairs of opposite views, if there are so many that they decide.
+
+    Args:
+        angles: directions of views, in radians.
+        seen: (view, 2) the first and the last bin that each view holds; all of them if None.
+    """
+    pairs = opposite_pairs(angles)
+    if pairs is None:
+        return None
+    wanted = min(_ENOUGH, _ENOUGH_SHARE * _held(angles, seen).sum())
+    return pairs if shared_views(pairs, angles, seen) >= wanted else None
+
+
+def shared_views(pairs: Pairs, angles: Floats, seen: Floats | None) -> float:
+    """How many whole views were taken from opposite sides as well.
+
+    Pairs count by what the shorter of both views holds, and half where an opposite is interpolated:
+    each of these views is then the first of another pair.
+    """
+    held = _held(angles, seen)
+    once = np.where(pairs.before == pairs.after, 1.0, 0.5)
+    return float(once @ np.minimum(held[pairs.first], held[pairs.before]))
+
+
+def _held(angles: Floats, seen: Floats | None) -> Floats:
+    """The share of a whole view that each one holds."""
+    shares: Floats = np.ones(angles.size) if seen is None else np.ptp(seen, axis=1) / np.ptp(seen)
+    return shares
+
+
 def mirror_scores(row: Row, pairs: Pairs, low: float, high: float) -> tuple[Floats, Floats]:
     """How well slopes of opposite views correlate, turned round about trial centres.
 
@@ -106,21 +148,46 @@ def mirror_scores(row: Row, pairs: Pairs, low: float, high: float) -> tuple[Floa
     from scipy.ndimage import gaussian_filter1d
 
     slopes = gaussian_filter1d(row.views, _SLOPE, axis=1, order=1, mode="nearest")
-    first, opposite = pairs.thinned(_GUESS).of(slopes)
-    bins = slopes.shape[1]
-    length = next_fast_len(2 * bins, real=True)
-    # Sums over products of one view and another turned round about half of each number.
-    products = rfft(first, length, axis=1) * rfft(opposite, length, axis=1)
-    both = -irfft(products.sum(axis=0), length)[: 2 * bins - 1]
-    squares = [
-        np.concatenate([[0], np.cumsum((part**2).sum(axis=0, dtype=float))])
-        for part in (first, opposite)
+    chosen = pairs.thinned(_GUESS)
+    places = np.arange(slopes.shape[1])
+    masks = [
+        ((places >= ends[:, :1]) & (places <= ends[:, 1:])).astype(np.float64)
+        for ends in chosen.seen(row)
     ]
-    turn = np.arange(2 * bins - 1)
-    start, stop = np.maximum(0, turn - bins + 1), np.minimum(bins - 1, turn) + 1
-    power = np.prod([part[stop] - part[start] for part in squares], axis=0)
+    first, opposite = (part * mask for part, mask in zip(chosen.of(slopes), masks, strict=True))
+    count = 2 * places.size - 1
+    length = next_fast_len(count + 1, real=True)
+
+    def over_turns(one: Floats, other: Floats) -> Floats:
+        """Sums over products of one view and another turned round about half of each number."""
+        products = rfft(one, length, axis=1) * rfft(other, length, axis=1)
+        sums: Floats = irfft(products.sum(axis=0), length)[:count]
+        return sums
+
+    both = -over_turns(first, opposite)
+    squares = [over_turns(first**2, masks[1]), over_turns(masks[0], opposite**2)]
+    power = np.prod([np.maximum(part, 1e-9 * part.max()) for part in squares], axis=0)
+    turn = np.arange(count)
     inside = (turn / 2 >= low) & (turn / 2 <= high) & (power > 0)
     return turn[inside] / 2, both[inside] / np.sqrt(power[inside])
+
+
+def _shared(first: Floats, opposite: Floats, center: float) -> Floats:
+    """What of views and of their opposites the others hold too, mirrored about a centre.
+
+    Args:
+        first: (n, 2) the first and the last place that each view holds.
+        opposite: the same of their opposites.
+        center: the place of the axis.
+
+    Returns:
+        (2 n, 2) the same of the parts that both hold, of the views and then of their opposites;
+        first and last place are one where nothing is shared.
+    """
+    low = np.maximum(first[:, 0], 2 * center - opposite[:, 1])
+    high = np.maximum(np.minimum(first[:, 1], 2 * center - opposite[:, 0]), low)
+    forth = np.stack([low, high], axis=1)
+    return np.concatenate([forth, 2 * center - forth[:, ::-1]])
 
 
 def pair_evidence(row: Row, pairs: Pairs, window: float, near: float) -> Evidence:
@@ -134,8 +201,9 @@ def pair_evidence(row: Row, pairs: Pairs, window: float, near: float) -> Evidenc
     """
     from scipy.ndimage import uniform_filter1d
 
-    first, opposite = pairs.thinned(_MOST).of(row.views)
-    ones = spectra(replace(row, views=np.concatenate([first, opposite])), window)
+    chosen = pairs.thinned(_MOST)
+    seen = None if row.seen is None else _shared(*chosen.seen(row), window)
+    ones = spectra(replace(row, views=np.concatenate(chosen.of(row.views)), seen=seen), window)
     one, other = np.split(ones.values, 2)
     ends = np.linspace(0, len(one), min(_GROUPS, len(one)) + 1).astype(int)[:-1]
     groups = -np.add.reduceat((one * other).astype(np.complex128), ends, axis=0)

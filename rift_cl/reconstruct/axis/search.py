@@ -94,12 +94,14 @@ def searched_axis(
     angles: Floats,
     span: tuple[float, float] | None = None,
     widest: float = _WIDEST,
+    seen: Floats | None = None,
 ) -> AxisEstimate:
     """The axis of ``axis_of_rows``, the angles taken as they are.
 
-    ``widest`` is the half interval, in bins, from which on no answer is given.
+    ``widest`` is the half interval, in bins, from which on no answer is given; ``seen`` is as for
+    ``chosen_measure``.
     """
-    measure = chosen_measure(angles, span)
+    measure = chosen_measure(angles, span, seen)
     places, found, why = [], [], ""
     for row, sinogram in zip(rows, sinograms, strict=True):
         views = np.ascontiguousarray(sinogram, np.float32)

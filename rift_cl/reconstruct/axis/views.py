@@ -37,6 +37,7 @@ class Row:
         views: (angle, bin).
         bin: how many of the detector's bins one of them holds.
         cut: whether the object reaches beyond the detector, or air is not at zero.
+        seen: (angle, 2) the first and the last place that each view holds; None where all hold all.
         level: whether the mean of a view in a window is subtracted where it is cut.
     """
 
@@ -44,12 +45,13 @@ class Row:
     bin: int
     cut: bool
     level: bool = True
+    seen: Floats | None = None
 
     def detector(self, place: Place) -> Place:
         """A place in these bins, in bins of the detector."""
         return place * self.bin + (self.bin - 1) / 2
 
-    def place(self, detector: float) -> float:
+    def place(self, detector: Place) -> Place:
         """A place in bins of the detector, in these bins."""
         return (detector - (self.bin - 1) / 2) / self.bin
 
@@ -170,26 +172,45 @@ def spectra(row: Row, center: float) -> Spectra:
     Views that end in air are taken whole, with zeros beyond, since nothing is missing. Others are
     cut by a window that is symmetric about the centre, after their mean in it is subtracted, so
     that a step at the end of the window is not taken for a feature that turns with the object.
+    Of rows whose views end at places of their own (``seen``), a window ends there, and its views
+    are scaled so that their noise is that of the others.
     """
     from scipy.fft import next_fast_len
 
     bins = row.views.shape[1]
     last = bins - 1
+    if row.seen is not None:
+        windows = _window(np.arange(bins), row.seen.mean(axis=1), np.ptp(row.seen, axis=1) / 2)
+        part = row.views - (row.views * windows).sum(axis=1, keepdims=True) / _sums(windows)
+        part = part * windows / np.sqrt(_sums(windows**2))
+        return _transformed(part, next_fast_len(bins, real=True), 0)
     if not row.cut:
         length = next_fast_len(int(2 * max(center, last - center)) + 2, real=True)
         return _transformed(row.views, length, 0)
     half = max(min(center, last - center), 4.0)
     first, end = max(0, int(np.ceil(center - half))), min(bins, int(center + half) + 1)
-    away = np.abs(np.arange(first, end) - center) / half
-    taper = min(1.0, max(_TAPER, _TAPER_BINS / half))
-    window = np.sin(np.pi / 2 * np.clip((1 - away) / taper, 0, 1)) ** 2
-    window = window.astype(np.float32)
+    window = _window(np.arange(first, end), np.array([center]), np.array([half]))[0]
     part = row.views[:, first:end]
     if row.level:
         part = part - (part @ window / window.sum())[:, None]
     part = part * window
     length = next_fast_len(end - first, real=True)
     return _transformed(part, length, first)
+
+
+def _window(places: NDArray[np.int64], middle: Floats, half: Floats) -> Views:
+    """Windows, (middle, place), that fall off towards their ends; 0 where they are empty."""
+    half = np.maximum(half, 1e-6)[:, None]
+    away = np.abs(places - middle[:, None]) / half
+    taper = np.clip(_TAPER_BINS / half, _TAPER, 1.0)
+    windows: Views = (np.sin(np.pi / 2 * np.clip((1 - away) / taper, 0, 1)) ** 2).astype(np.float32)
+    return windows
+
+
+def _sums(windows: Views) -> Views:
+    """Their sums, (window, 1); never 0."""
+    sums: Views = np.maximum(windows.sum(axis=1, keepdims=True), np.float32(1e-6))
+    return sums
 
 
 def _transformed(part: Views, length: int, first: int) -> Spectra:
