@@ -1,13 +1,14 @@
 """Which settings of ``rift fit photos`` serve: one change at a time, several captures and seeds.
 
     python tools/search_defaults.py capture/ornament capture/lego --steps 500 --out search
-    python tools/search_defaults.py capture/ornament --variants shipped found --seeds 0 1 2
+    python tools/search_defaults.py capture/ornament --variants 0.1 defaults --seeds 0 1 2
+    python tools/search_defaults.py --out search --markdown docs/benchmarks/defaults.md
 
 Every eighth view of a capture is held out and scored; views that a final judgement is to be made on
 must not be among them, so give captures without those. Each fit leaves its scores in --out, and
-a search that is stopped goes on where it was. The tables give the mean PSNR of the held-out views
-of each capture, its spread over the seeds, and the gain over the first variant, of all variants
-that were tried, the losing ones too. Seconds are processor time.
+a search that is stopped goes on where it was; without captures nothing is fitted. The tables are of
+all fits in --out: the mean PSNR of the held-out views, its spread over the seeds, the gain over the
+defaults of 0.1.0, and processor seconds, of all variants that were tried, the losing ones too.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import mean
 from typing import Annotated, Any
@@ -26,73 +27,64 @@ from tyro.conf import Positional
 
 import rift_cl as rift
 from bench.command import say
-from bench.table import Table, show
+from bench.surroundings import surroundings
+from bench.table import NONE, Table, markdown_lines, show
 from rift_cl.commands.fit_photos.presets import PRESETS
+from rift_cl.commands.fit_photos.settings import FitPhotosSettings
+from rift_cl.commands.run_folder.saved_settings import options_of
 from rift_cl.io import write_text
 
-Settings = dict[str, Any]
-# The defaults of 0.1.0, whatever the package's are now.
-SHIPPED: Settings = {
-    "angular": "sh",
-    "sh_every": 1 / 6,
-    "learning_rates.means": 1.6e-4,
-    "learning_rates.log_scales": 5e-3,
-    "learning_rates.quats": 1e-3,
-    "learning_rates.sh_rest": 0.2,
-    "strategy.noise": 5e5,
-    "strategy.first": 500,
-    "cooldown": 0.12,
+Settings = Mapping[str, Any]
+# What all gains are over.
+BASE = "0.1"
+_USUAL = {
+    option.name: option.value for option in options_of(FitPhotosSettings.of(Path("x"), Path("y")))
 }
-FOUND: Settings = dict(PRESETS["fast"])
-
-# Rates of the default settings that a preset leaves as they are.
-_RATES: Settings = {
-    **FOUND,
-    "learning_rates.logits": 5e-2,
-    "learning_rates.sh": 2.5e-3,
-    "learning_rates.lobes": 1e-2,
-    "strategy.opacity_penalty": 0.01,
-    "strategy.scale_penalty": 0.01,
-}
-
-
-def times(factor: float, *names: str, of: Settings = FOUND) -> Settings:
-    """Settings in which some values are larger by a factor than those that were found."""
-    return {**of, **{name: factor * {**_RATES, **of}[name] for name in names}}
-
-
 _MEANS = "learning_rates.means"
 _SHAPES = ("learning_rates.log_scales", "learning_rates.quats")
 _PENALTIES = ("strategy.opacity_penalty", "strategy.scale_penalty")
-_HARMONICS: Settings = dict(PRESETS["harmonics"])
 
+
+def times(factor: float, *names: str, of: Settings | None = None) -> Settings:
+    """Settings in which some values are larger by a factor than in others, or by default."""
+    begun = {} if of is None else dict(of)
+    return {**begun, **{name: factor * begun.get(name, _USUAL[name]) for name in names}}
+
+
+_MOVES = (_MEANS, *_SHAPES)
+_LOBES = PRESETS["lobes"]
 VARIANTS: dict[str, Settings] = {
-    "shipped": SHIPPED,
-    "found": FOUND,
-    "harmonics": _HARMONICS,
-    "all x 2": times(2, _MEANS, *_SHAPES),
-    "all / 2": times(0.5, _MEANS, *_SHAPES),
-    "harmonics, all x 2": times(2, _MEANS, *_SHAPES, of=_HARMONICS),
-    "harmonics, all / 2": times(0.5, _MEANS, *_SHAPES, of=_HARMONICS),
-    "scales x 2": times(2, _SHAPES[0]),
-    "scales and quaternions x 2": times(2, *_SHAPES),
-    "scales and quaternions / 2": times(0.5, *_SHAPES),
+    BASE: PRESETS["0.1"],
+    "defaults": {},
+    "moves x 2": times(2, *_MOVES),
+    "moves / 2": times(0.5, *_MOVES),
+    "scales and rotations x 2": times(2, *_SHAPES),
+    "scales and rotations / 2": times(0.5, *_SHAPES),
     "positions x 2": times(2, _MEANS),
     "positions / 2": times(0.5, _MEANS),
-    "logits x 2": times(2, "learning_rates.logits"),
-    "logits / 2": times(0.5, "learning_rates.logits"),
+    "shapes fall": {"learning_rates.shapes_last": 0.25},
+    "no ramp": {"homogenise": 0.0},
+    "walk": {"strategy.noise": 5e5},
+    "walk / 10": {"strategy.noise": 5e4},
+    "harmonics as in 0.1": {"sh_every": 1 / 6, "learning_rates.sh_rest": 0.2},
     "colours x 2": times(2, "learning_rates.sh"),
     "colours / 2": times(0.5, "learning_rates.sh"),
-    "lobes x 2": times(2, "learning_rates.lobes"),
-    "lobes / 2": times(0.5, "learning_rates.lobes"),
-    "4 lobes": {**FOUND, "modes": 4},
-    "walk / 10": {**FOUND, "strategy.noise": 5e4},
-    "cooldown 0.25": {**FOUND, "cooldown": 0.25},
-    "cooldown 0.5": {**FOUND, "cooldown": 0.5},
-    "penalties / 2": times(0.5, *_PENALTIES),
+    "logits x 2": times(2, "learning_rates.logits"),
+    "logits / 2": times(0.5, "learning_rates.logits"),
     "penalties x 2": times(2, *_PENALTIES),
-    "relocation from 200": {**FOUND, "strategy.first": 200},
-    "relocation every 50": {**FOUND, "strategy.first": 200, "strategy.every": 50},
+    "penalties / 2": times(0.5, *_PENALTIES),
+    "cooldown 0.25": {"cooldown": 0.25},
+    "relocation from 200": {"strategy.first": 200},
+    "relocation every 50": {"strategy.first": 200, "strategy.every": 50},
+    "lobes": _LOBES,
+    "lobes, moves x 2": times(2, *_MOVES, of=_LOBES),
+    "lobes, moves / 2": times(0.5, *_MOVES, of=_LOBES),
+    "lobes, scales and rotations / 2": times(0.5, *_SHAPES, of=_LOBES),
+    "lobes, positions / 2": times(0.5, _MEANS, of=_LOBES),
+    "lobes, shapes fall": {**_LOBES, "learning_rates.shapes_last": 0.25},
+    "lobes, learned x 2": times(2, "learning_rates.lobes", of=_LOBES),
+    "lobes, learned / 2": times(0.5, "learning_rates.lobes", of=_LOBES),
+    "4 lobes": {**_LOBES, "modes": 4},
 }
 
 
@@ -101,7 +93,7 @@ class Options:
     """Compare settings of fits to photographs.
 
     Args:
-        captures: what is fitted, as ``rift fit photos`` takes it.
+        captures: what is fitted, as ``rift fit photos`` takes it; nothing if not given.
         steps: of each fit.
         splats: of each fit.
         downscale: of the photographs.
@@ -109,10 +101,11 @@ class Options:
         seeds: of each variant.
         variants: by name; all if not given.
         out: folder for the scores.
+        markdown: file for the tables.
         device: which OpenCL device, as RIFT_DEVICE selects it.
     """
 
-    captures: Annotated[tuple[Path, ...], Positional]
+    captures: Annotated[tuple[Path, ...], Positional] = ()
     steps: int = 500
     splats: int = 8000
     downscale: int = 1
@@ -120,89 +113,155 @@ class Options:
     seeds: tuple[int, ...] = (0,)
     variants: tuple[str, ...] = tuple(VARIANTS)
     out: Path = Path("rift-search")
+    markdown: Path | None = None
     device: str | None = None
 
 
 @dataclass(frozen=True)
-class Fit:
-    """A fit of the search.
+class Size:
+    """How large fits are that compare.
+
+    Args:
+        steps: of a fit.
+        splats: of a fit.
+        downscale: of the photographs.
+        eps2d: variance that the rasterizer adds, in square pixels.
+    """
+
+    steps: int
+    splats: int
+    downscale: int
+    eps2d: float
+
+    @property
+    def title(self) -> str:
+        """How tables call it."""
+        smaller = f", photographs / {self.downscale}" if self.downscale > 1 else ""
+        return f"{self.steps} steps, {self.splats} splats{smaller}"
+
+
+@dataclass(frozen=True)
+class Scores:
+    """A fit of the search, and what it gave.
 
     Args:
         variant: name of its settings.
-        capture: what is fitted.
+        capture: name of what was fitted.
         seed: its seed.
+        size: how large it is.
+        psnr: mean of the held-out views, dB.
+        ssim: mean of the held-out views.
+        cpu_s: processor seconds of all threads.
     """
 
     variant: str
-    capture: Path
+    capture: str
     seed: int
+    size: Size
+    psnr: float
+    ssim: float
+    cpu_s: float
 
-    def scores(self, options: Options) -> dict[str, float]:
-        """PSNR, SSIM and processor seconds; from the folder, if it was done before."""
-        size = f"{options.steps}-{options.splats}-{options.downscale}-{options.eps2d:g}"
-        name = f"{self.capture.name}-{size}-{self.variant}-{self.seed}".replace(" ", "_")
-        path = options.out / f"{name.replace('/', 'over')}.json"
-        if path.is_file():
-            return dict(json.loads(path.read_text(encoding="utf-8")))
-        say(name)
-        found = self._fit(options)
-        write_text(path, json.dumps(found, indent=1) + "\n")
-        return found
-
-    def _fit(self, options: Options) -> dict[str, float]:
-        began = time.process_time()
-        fitted = rift.fit(
-            self.capture,
-            kind="photos",
-            hold_out=8,
-            steps=options.steps,
-            splats=options.splats,
-            downscale=options.downscale,
-            seed=self.seed,
-            eps2d=options.eps2d,
-            device=options.device,
-            **VARIANTS[self.variant],
-        )
-        took = time.process_time() - began
-        scores = fitted.metrics["scores"]["held out"]
-        return {"psnr": scores["fit_psnr"], "ssim": scores["fit_ssim"], "cpu_s": took}
+    @classmethod
+    def read(cls, path: Path) -> Scores:
+        """From a file of the search's folder."""
+        record = json.loads(path.read_text(encoding="utf-8"))
+        return cls(**{**record, "size": Size(**record["size"])})
 
 
-def fits(options: Options) -> Iterator[Fit]:
-    """All fits, so that a search that is stopped has tried every variant as often."""
+def search(options: Options) -> None:
+    """Fit what was not fitted before: every variant once, before any has another seed."""
+    size = Size(options.steps, options.splats, options.downscale, options.eps2d)
+    options.out.mkdir(parents=True, exist_ok=True)
     for seed in options.seeds:
         for capture in options.captures:
             for variant in options.variants:
-                yield Fit(variant, capture, seed)
+                given = f"{size.steps}-{size.splats}-{size.downscale}-{size.eps2d:g}"
+                name = f"{capture.name}-{given}-{variant}-{seed}".replace(" ", "_")
+                path = options.out / f"{name.replace('/', 'over')}.json"
+                if not path.is_file():
+                    say(name)
+                    found = _fitted(capture, variant, seed, size, options.device)
+                    write_text(path, json.dumps(asdict(found), indent=1) + "\n")
 
 
-def table(found: dict[Fit, dict[str, float]], options: Options) -> Table:
-    """A row for each variant: mean, spread and gain by capture."""
-    names = [capture.name for capture in options.captures]
-    rows = []
-    for variant in options.variants:
-        cells = [variant]
-        for capture in options.captures:
-            ours = _psnr(found, variant, capture)
-            first = _psnr(found, options.variants[0], capture)
-            cells.append(_cell(ours, first))
-        seconds = [score["cpu_s"] for fit, score in found.items() if fit.variant == variant]
-        rows.append((*cells, f"{mean(seconds):.0f}" if seconds else ""))
-    title = f"{options.steps} steps, {options.splats} splats, photographs / {options.downscale}"
-    return Table(title, ("variant", *names, "CPU s"), rows)
+def _fitted(capture: Path, variant: str, seed: int, size: Size, device: str | None) -> Scores:
+    began = time.process_time()
+    fitted = rift.fit(
+        capture,
+        kind="photos",
+        hold_out=8,
+        seed=seed,
+        device=device,
+        **asdict(size),
+        **VARIANTS[variant],
+    )
+    took = time.process_time() - began
+    scores = fitted.metrics["scores"]["held out"]
+    name = capture.name
+    return Scores(variant, name, seed, size, scores["fit_psnr"], scores["fit_ssim"], took)
 
 
-def _psnr(found: dict[Fit, dict[str, float]], variant: str, capture: Path) -> list[float]:
-    ours = [fit for fit in found if (fit.variant, fit.capture) == (variant, capture)]
-    return [found[fit]["psnr"] for fit in ours]
+def tables(found: Sequence[Scores]) -> Iterator[Table]:
+    """A table for each size, with a row for each variant, and one of what the variants are."""
+    names = [name for name in VARIANTS if any(fit.variant == name for fit in found)]
+    for size in sorted({fit.size for fit in found}, key=lambda size: (size.splats, size.steps)):
+        fits = [fit for fit in found if fit.size == size]
+        captures = sorted({fit.capture for fit in fits})
+        rows = [
+            (name, *(_cell(fits, name, capture) for capture in captures))
+            for name in names
+            if any(fit.variant == name for fit in fits)
+        ]
+        yield Table(size.title, ("variant", *captures), rows, (_NOTE,))
+    rows = [(name, _words(VARIANTS[name])) for name in names]
+    yield Table("What the variants change", ("variant", "in place of the defaults"), rows, texts=2)
 
 
-def _cell(ours: Sequence[float], first: Sequence[float]) -> str:
+_NOTE = (
+    "Mean PSNR of held-out views in dB (and half the spread over seeds, if there are several); its "
+    f"gain over {BASE} with the same seeds; processor seconds."
+)
+
+
+def _cell(fits: Sequence[Scores], variant: str, capture: str) -> str:
+    ours = {fit.seed: fit for fit in fits if (fit.variant, fit.capture) == (variant, capture)}
+    base = {fit.seed: fit for fit in fits if (fit.variant, fit.capture) == (BASE, capture)}
     if not ours:
-        return ""
-    spread = f" ± {(max(ours) - min(ours)) / 2:.2f}" if len(ours) > 1 else ""
-    both = min(len(ours), len(first))
-    return f"{mean(ours):.2f}{spread} ({mean(ours[:both]) - mean(first[:both]):+.2f})"
+        return NONE
+    psnr = [fit.psnr for fit in ours.values()]
+    spread = f" ± {(max(psnr) - min(psnr)) / 2:.2f}" if len(psnr) > 1 else ""
+    gains = [fit.psnr - base[seed].psnr for seed, fit in ours.items() if seed in base]
+    gain = f" ({mean(gains):+.2f})" if gains and variant != BASE else ""
+    return f"{mean(psnr):.2f}{spread}{gain}, {mean(fit.cpu_s for fit in ours.values()):.0f} s"
+
+
+def _words(settings: Settings) -> str:
+    """Options as a command line takes them."""
+    return " ".join(
+        f"`--{name.replace('_', '-')} {value:.4g}`"
+        if isinstance(value, float)
+        else f"`--{name.replace('_', '-')} {value}`"
+        for name, value in settings.items()
+    )
+
+
+def page(found: Sequence[Scores], device: rift.Device) -> str:
+    """The tables as a page, with the device named."""
+    where = surroundings(device)
+    lines = [
+        "<!-- Generated by tools/search_defaults.py; do not edit. -->",
+        "# Defaults of `rift fit photos`",
+        "",
+        "    python tools/search_defaults.py CAPTURES --steps 3000 --splats 20000 --out search",
+        "    python tools/search_defaults.py --out search --markdown docs/benchmarks/defaults.md",
+        "",
+        f"rift_cl {where['version']} on **{device.name}** ({device.platform}, driver "
+        f"{device.driver}); host {where['host']['cpu']}, {where['host']['cores']} cores. "
+        f"{where['date']}. Other programs ran on the same machine: processor seconds say less than "
+        "scores.",
+    ]
+    return "\n".join([*lines, *markdown_lines(tables(found))]) + "\n"
 
 
 def main() -> int:
@@ -212,16 +271,17 @@ def main() -> int:
     if unknown:
         say(f"search_defaults: there is no variant {unknown[0]!r}; there are {', '.join(VARIANTS)}")
         return 2
-    found: dict[Fit, dict[str, float]] = {}
     try:
-        for fit in fits(options):
-            found[fit] = fit.scores(options)
+        search(options)
     except rift.RiftError as error:
         say(f"search_defaults: {error}")
         return error.exit_status
     finally:
+        found = [Scores.read(path) for path in sorted(options.out.glob("*.json"))]
         if found:
-            show([table(found, options)])
+            show(tables(found))
+    if options.markdown is not None:
+        write_text(options.markdown, page(found, rift.open_device(options.device)))
     return 0
 
 

@@ -114,7 +114,7 @@ class AngularSettings:
     (rift_cl.basis.register_angular_basis)."""
     modes: Short[int] = 8
     """Number of lobe modes or spherical Gaussians besides the constant, 1 to 35; not for sh."""
-    first: Expert[float] = 0.15
+    first: Expert[float] = 0.05
     """Fraction of the run after which lobes or spherical Gaussians are added, with coefficients of
     zero; not for sh."""
 

@@ -49,14 +49,14 @@ class LearningRateSchedule:
         """Adam's learning rates at a step, by group; of positions in units of the scene."""
         rates, settings = self.settings.learning_rates, self.settings
         way = min(step / max(self.cooldown, 1), 1.0)
-        falling, fade = rates.means_last**way, 1.0
+        falling, shapes, fade = rates.means_last**way, rates.shapes_last**way, 1.0
         if step >= self.cooldown:
             into = (step - self.cooldown) / max(settings.steps - self.cooldown, 1)
             fade = _LAST_SHARE**into
         return {
             "means": fade * self.extent * rates.means * falling,
-            "quats": fade * rates.quats,
-            "log_scales": fade * rates.log_scales,
+            "quats": fade * rates.quats * shapes,
+            "log_scales": fade * rates.log_scales * shapes,
             "logits": fade * rates.logits,
             "sh": fade * rates.sh,
             "shape_modes": fade * rates.shape_modes,

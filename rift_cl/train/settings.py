@@ -40,20 +40,23 @@ class LearningRates:
         InputError: a number is out of its range.
     """
 
-    means: float = 1.6e-4
+    means: float = 1.28e-3
     """Learning rate of positions, as a fraction of the scene's extent."""
     means_last: float = 0.01
     """Learning rate of positions at the cooldown, as a fraction of the first; it falls
     exponentially until then."""
-    quats: float = 1e-3
+    quats: float = 4e-3
     """Learning rate of quaternions."""
-    log_scales: float = 5e-3
+    log_scales: float = 2e-2
     """Learning rate of the logarithms of scales."""
+    shapes_last: float = 1.0
+    """Learning rates of quaternions and scales at the cooldown, as a fraction of the first; they
+    fall exponentially until then."""
     logits: float = 5e-2
     """Learning rate of the logits of opacities, or of the logarithms of X-ray densities."""
     sh: float = 2.5e-3
     """Learning rate of the constant colour (spherical harmonic of degree 0)."""
-    sh_rest: float = 0.2
+    sh_rest: float = 1.0
     """Learning rate of harmonics of degree 1 and above, as a fraction of --learning-rates.sh."""
     poses: float = 1e-3
     """Learning rate of camera poses, if they are refined: of rotations in radians, of positions as
@@ -82,9 +85,10 @@ class LearningRates:
     def __post_init__(self) -> None:
         """Check every number's range."""
         for item in fields(self):
-            if item.name != "means_last":
+            if item.name in ("means_last", "shapes_last"):
+                check_number(self, item.name, most=1, above=True)
+            else:
                 check_number(self, item.name)
-        check_number(self, "means_last", most=1, above=True)
 
 
 @dataclass(frozen=True)
@@ -103,7 +107,7 @@ class TrainSettings:
     """Random seed; the same seed gives the same splats, bit by bit."""
     sh_degree: ShortSplats[int] = 3
     """Highest degree of the spherical harmonics of colours, 0 to 4."""
-    sh_every: ShortExpert[float] = 1 / 6
+    sh_every: ShortExpert[float] = 1 / 14
     """Fraction of the run between one degree of the harmonics and the next; 0 = all from the first
     step on."""
     loss: Short[str] = "l1"

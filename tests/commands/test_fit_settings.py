@@ -45,7 +45,7 @@ OTHERS = {
     "rendering.far": 5.0,
     "rendering.tile": 8,
     "homogenise": 0.75,
-    "preset": "harmonics",
+    "preset": "lobes",
     "environment": "shared",
 }
 
@@ -121,7 +121,7 @@ def test_options_override_a_preset_on_the_command_line_and_in_python(monkeypatch
 
 
 def test_a_preset_that_contradicts_an_option_is_refused():
-    settings = FitPhotosSettings.of(Path("x"), Path("y"), preset="fast", sh_degree=2)
+    settings = FitPhotosSettings.of(Path("x"), Path("y"), preset="lobes", sh_degree=2)
     with pytest.raises(InputError, match="--sh-degree"):
         settings.check()
 
@@ -129,7 +129,7 @@ def test_a_preset_that_contradicts_an_option_is_refused():
 def test_a_preset_and_a_run_to_repeat_are_refused_together(tmp_path, capsys):
     config = tmp_path / "config.json"
     config.write_text("{}", encoding="utf-8")
-    assert main(["fit", "photos", "x", "--preset", "fast", "--config", str(config)]) == 3
+    assert main(["fit", "photos", "x", "--preset", "lobes", "--config", str(config)]) == 3
     assert "--preset" in capsys.readouterr().err
 
 

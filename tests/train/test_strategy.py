@@ -20,7 +20,9 @@ from rift_cl.train.strategy import DefaultSettings, DefaultStrategy, McmcSetting
 pytestmark = pytest.mark.once
 
 RATES = {"means": 1e-3, "quats": 1e-3, "log_scales": 5e-3, "logits": 5e-2, "sh": 2.5e-3}
-MCMC = TrainSettings(steps=40, splats=90, cooldown=0.25, strategy=McmcSettings(first=10, every=5))
+MCMC = TrainSettings(
+    steps=40, splats=90, cooldown=0.25, strategy=McmcSettings(first=10, every=5, noise=5e5)
+)
 # The scene is as large as its extent and its splats are few, so that size prunes none.
 HOW = DefaultSettings(
     every=5, first=0.2, last=0.8, reset=0.1, min_reset=12, grow_gradient=3e-5, prune_scale=1

@@ -13,7 +13,7 @@ from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import GROUPS, Parameters
 from rift_cl.train.schedules import LearningRateSchedule
-from rift_cl.train.settings import TrainSettings
+from rift_cl.train.settings import LearningRates, TrainSettings
 from rift_cl.train.start.points import hull_points, random_points, start_splats
 from rift_cl.train.strategy import McmcSettings, Strategy, StrategySettings
 from rift_cl.train.trainer import Trainer
@@ -27,7 +27,7 @@ SETTINGS = TrainSettings(
     sh_degree=1,
     sh_every=1 / 3,
     seed=3,
-    strategy=McmcSettings(first=40, every=20),
+    strategy=McmcSettings(first=40, every=20, noise=5e5),
 )
 
 
@@ -129,11 +129,15 @@ def test_every_picture_is_looked_at_once_before_any_is_again(device):
 
 
 def test_learning_rates_fall_and_fall_further_in_the_cooldown():
-    schedule = LearningRateSchedule(TrainSettings(steps=1000, cooldown=0.2), extent=2.0)
+    rates = LearningRates(means=1e-3, means_last=0.01, shapes_last=0.5)
+    settings = TrainSettings(steps=1000, cooldown=0.2, learning_rates=rates)
+    schedule = LearningRateSchedule(settings, extent=2.0)
     assert schedule.cooldown == 800
     first, middle, last = (schedule.learning_rates(step) for step in (0, 800, 1000))
-    assert first["means"] == pytest.approx(2 * 1.6e-4)
+    assert first["means"] == pytest.approx(2 * 1e-3)
     assert middle["means"] == pytest.approx(0.01 * first["means"])
+    assert middle["quats"] == pytest.approx(0.5 * first["quats"])
+    assert middle["log_scales"] == pytest.approx(0.5 * first["log_scales"])
     assert middle["logits"] == first["logits"]
     for name in GROUPS:
         assert last[name] == pytest.approx(0.05 * middle[name]), name

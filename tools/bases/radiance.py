@@ -131,6 +131,8 @@ def _settings(
 ) -> FitPhotosSettings:
     given: dict[str, Any] = {
         "capture": ornament(),
+        # The tables of docs/bases.md are of these.
+        "preset": "0.1",
         "out": folder / kind.replace(" ", "_").replace(",", ""),
         "steps": steps,
         "seed": seed,

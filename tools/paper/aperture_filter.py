@@ -26,7 +26,7 @@ from paper.aperture_pictures import (
 )
 from paper.aperture_spectra import spectra
 from paper.images import decode, encode
-from paper.plan import EPS2D, Plan
+from paper.plan import EPS2D, PRESET, Plan
 from rift_cl import Device
 from rift_cl.commands.fit_photos.job import Fit
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
@@ -108,6 +108,7 @@ def _fit_scores(plan: Plan, seen: Path, unseen: Path, place: Path, way: str) -> 
     (steps, splats), sharp = _length(plan), plan.captures.test or plan.captures.off_path
     job = FitPhotosSettings.of(
         capture=seen,
+        preset=PRESET,
         test=(unseen, sharp, seen),
         out=place / f"aperture_{way.replace(' ', '_')}_{steps}_steps_{splats}_splats",
         steps=steps,

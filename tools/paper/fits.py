@@ -7,7 +7,7 @@ import sys
 from dataclasses import dataclass
 from typing import Any
 
-from paper.plan import EPS2D, Plan
+from paper.plan import EPS2D, PRESET, Plan
 from paper.view_choice import choose_views, fixed_views, write_capture
 from rift_cl.commands.fit_photos.job import Fit
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
@@ -66,6 +66,7 @@ def fit_settings(
     name = f"fit_{plan.steps}_steps_{plan.splats}_splats_ramp_{exponent:g}_seed_{seed}{noisy}"
     return FitPhotosSettings.of(
         capture=write_capture(ring, choice.trained, place / f"trained{noisy}", noise=noise),
+        preset=PRESET,
         test=(held_out, test, captures.off_path),
         out=place / name,
         steps=plan.steps,

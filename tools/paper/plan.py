@@ -11,6 +11,8 @@ from rift_cl.sample import ornament, ornament_off_path
 
 # Splats gain this variance on the screen, in square pixels: all cameras keep about one distance.
 EPS2D = 0.05
+# The settings that all figures of the documents were made with.
+PRESET = "0.1"
 _HOW = (
     "make it with 'python tools/render_ornament.py --views 570 --out DIR/orbit' and "
     "'python tools/render_ornament.py --off-path --views 24 --samples 768 --out DIR/off_path'"

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ornament.cameras import TARGET, Shot, around, off_path, ring, shots_at, transforms
 from ornament.capture_folder import render_capture
 from ornament.tracer import BACKGROUND, Tracer, choose_variant
-from paper.plan import EPS2D, Plan
+from paper.plan import EPS2D, PRESET, Plan
 from rift_cl import Device, merit
 from rift_cl.commands.fit_photos.job import Fit
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
@@ -226,6 +226,7 @@ def _fitted(plan: Plan, name: str, capture: Path) -> dict[str, dict[str, float]]
     seed = plan.seeds[0]
     asked = FitPhotosSettings.of(
         capture=capture,
+        preset=PRESET,
         test=(_rendered(plan, ON_RING), _rendered(plan, OFF_RING)),
         out=_folder(plan) / f"{name}_{plan.steps}_steps_{plan.splats}_splats_seed_{seed}",
         steps=plan.steps,

@@ -65,10 +65,10 @@ class PhotosTraining:
 
     group: ClassVar[str] = "training"
 
-    preset: Auto[Literal["fast", "harmonics"]] = None
-    """Named set of values in place of the defaults, for short fits; other options override them.
-    Higher learning rates and no random walk, with eight spherical Gaussians for colours (fast) or
-    with spherical harmonics, which every viewer shows (harmonics). Default: none."""
+    preset: Auto[Literal["lobes", "0.1"]] = None
+    """Named set of values in place of the defaults; other options override them. Eight spherical
+    Gaussians in place of the harmonics of each colour, which score higher and take longer (lobes),
+    or the defaults of version 0.1.0 (0.1). Default: none."""
     training: Short[TrainSettings] = field(default_factory=_training)
     """The optimization."""
     rendering: ShortSplats[SplatSettings] = field(default_factory=_rendering)

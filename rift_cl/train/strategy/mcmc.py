@@ -1,4 +1,4 @@
-"""MCMC strategy: transparent splats are relocated, faint ones walk at random, the set grows.
+"""MCMC strategy: transparent splats are relocated, faint ones may walk at random, the set grows.
 
 3D Gaussian Splatting as Markov Chain Monte Carlo (Kheradmand et al. 2024): a transparent splat is
 put on top of one that is drawn by chance, in proportion to its opacity. The picture must not jump,
@@ -45,7 +45,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class McmcSettings(StrategySettings):
-    """Relocate transparent splats, with random walks and penalties (3DGS as MCMC).
+    """Relocate transparent splats, with penalties and, if asked for, random walks (3DGS as MCMC).
 
     Raises:
         InputError: a number is out of its range.
@@ -64,8 +64,9 @@ class McmcSettings(StrategySettings):
     """Fraction of the run after which the most splats that there may be should be there."""
     min_opacity: float = 0.005
     """Opacity up to which a splat counts as transparent and is relocated."""
-    noise: float = 5e5
-    """Step of the random walk of faint splats, as a multiple of the positions' learning rate."""
+    noise: float = 0.0
+    """Step of the random walk of faint splats, as a multiple of the positions' learning rate; 5e5
+    in Kheradmand et al. 2024 (0 = none)."""
     opacity_penalty: float = 0.01
     """Weight of the mean opacity in the loss."""
     scale_penalty: float = 0.01
@@ -92,7 +93,7 @@ class McmcSettings(StrategySettings):
 
 
 class McmcStrategy(Strategy):
-    """Relocates transparent splats and moves faint ones at random.
+    """Relocates transparent splats, and moves faint ones at random if that is asked for.
 
     Args:
         settings: when, and what counts as transparent.
@@ -117,7 +118,7 @@ class McmcStrategy(Strategy):
         gradients: FrameGradients,
         learning_rate: float,
     ) -> Parameters:
-        """Relocated every few steps, and moved at random until the cooldown."""
+        """Relocated every few steps, and moved at random until the cooldown if that is wanted."""
         settings, run, step = self.settings, self.run, parameters.step
         if step >= settings.first and step % settings.every == 0 and step < run.steps:
             parameters = relocate(
@@ -127,7 +128,7 @@ class McmcStrategy(Strategy):
                 seed=run.seed,
                 growth=self._growth(step, len(parameters)),
             )
-        if step <= run.cooldown:
+        if settings.noise and step <= run.cooldown:
             parameters.shake(settings.noise * learning_rate, run.seed)
         return parameters
 
