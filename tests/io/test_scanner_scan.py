@@ -185,7 +185,7 @@ def test_what_our_own_file_may_not_say(
 @pytest.mark.parametrize(
     ("fields", "error", "words"),
     [
-        ({"views": 3142}, ShapeError, r"3142 projections .* 12 images.*--theta"),
+        ({"views": 3142}, ShapeError, r"3142 projections .* images found: 12.*--theta"),
         ({"rows": 10, "bins": 6}, ShapeError, "rows and bins are swapped"),
         ({"rows": 7}, ShapeError, "another scan"),
         ({"bins": "x"}, FileFormatError, "DetectorPixelsX"),

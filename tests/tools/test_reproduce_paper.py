@@ -22,7 +22,7 @@ FITTED = ("figure_11", "figure_12", "spectral_bias")
 
 def run(*arguments):
     command = [sys.executable, str(TOOL), *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=280, check=False)
 
 
 def result_of(folder, name):
