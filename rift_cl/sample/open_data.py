@@ -20,7 +20,7 @@ class OpenData(NamedTuple):
         licence: under which it may be used, as its source says.
         page: where it is described.
         url: address of the file; None where it has no address of its own.
-        example: a command that reads it.
+        example: a command that reads it where ``rift samples NAME`` has put it.
     """
 
     about: str
@@ -43,7 +43,7 @@ OPEN_DATA = {
         page="https://github.com/tomopy/tomopy",
         url="https://raw.githubusercontent.com/tomopy/tomopy/"
         "9e5f8617e614732d3dd3d22eb4c8fbca7b9dd40b/tomopy/data/tooth.h5",
-        example="rift reconstruct tooth.h5 --out slices",
+        example="rift reconstruct tooth/tooth.h5 --out slices",
     ),
     "dendrites": OpenData(
         about="synchrotron sinogram of a magnesium alloy, with strong stripes: 360 angles, one row",
@@ -54,7 +54,8 @@ OPEN_DATA = {
         page="https://github.com/dkazanc/ToMoBAR",
         url="https://raw.githubusercontent.com/dkazanc/ToMoBAR/"
         "885afb46d7ce0490c38d0d5bfa9d39a7f1f81958/data/RealDataDend.mat",
-        example="rift reconstruct RealDataDend.mat --background 100 --center 629.5 --out slices",
+        example="rift reconstruct dendrites/RealDataDend.mat --background 100 --center 629.5 "
+        "--out slices",
     ),
     "disc": OpenData(
         about="fan-beam sinogram of an acrylic disc with holes over 30 degrees (Helsinki "
@@ -66,7 +67,7 @@ OPEN_DATA = {
         page="https://github.com/robert-abc/HTC2022-Sparse-DIP",
         url="https://raw.githubusercontent.com/robert-abc/HTC2022-Sparse-DIP/"
         "1fbd3472659d0d7bfa7bdfe8e361162fbcd772e1/example/input/tb_category7.mat",
-        example="rift reconstruct tb_category7.mat --out slices",
+        example="rift reconstruct disc/tb_category7.mat --out slices",
     ),
     "walnut": OpenData(
         about="line integrals of a walnut, cone beam, 241 views of 256 x 256 bins, binned and "
@@ -78,6 +79,6 @@ OPEN_DATA = {
         licence="CC-BY 4.0",
         page="https://pypi.org/project/diffct/1.3.1/",
         url=None,
-        example="rift reconstruct walnut_cone.npz --out volume",
+        example="rift reconstruct walnut/walnut_cone.npz --out volume",
     ),
 }

@@ -214,6 +214,10 @@ def test_a_preview_and_a_plan(
     assert run("reconstruct", ball, "--out", tmp_path / "a", "--dry-run") == 0
     printed = capsys.readouterr().out
     assert "Feldkamp" in printed and not (tmp_path / "a").exists()
+    words = ("--center", CENTER, "--out", tmp_path / "a", "--dry-run", "--pitch")
+    for pitch, said in ((1, True), (PITCH, False)):
+        assert run("reconstruct", ball, *words, pitch) == 0
+        assert ("takes the place of 2" in " ".join(capsys.readouterr().out.split())) == said
     assert run("reconstruct", ball, "--out", tmp_path / "a", "--preview", "--quiet") == 0
     assert (tmp_path / "a" / "preview.png").exists() and not (tmp_path / "a" / "slices").exists()
 

@@ -211,7 +211,7 @@ class ConeInput:
             lost = binning_note(rows, bins, rows=block, bins=n)
             averaged = f"Blocks of {block} x {n} (rows x bins) detector pixels were averaged."
             self.notes.append(f"{averaged} {lost}".rstrip())
-        self.notes += self.clean.notes()
+        self.notes += self.clean.notes() + self._pitch_note()
         if any(self.beyond):
             self.notes.append(self._beyond_note())
         if self.scan.background:
@@ -219,6 +219,16 @@ class ConeInput:
                 f"The mean of the outermost {self.scan.background} bins at each end (air) was "
                 "subtracted."
             )
+
+    def _pitch_note(self) -> list[str]:
+        """What takes the place of the file's pitch, which is seldom meant."""
+        given, cone = self.settings.pitch, self.file.cone
+        if given is None or not isinstance(cone, Cone) or math.isclose(given, cone.pitch[1]):
+            return []
+        return [
+            f"--pitch {given:g} takes the place of {cone.pitch[1]:g}, the distance between bins in "
+            "the file; distances of the source stay those of the file."
+        ]
 
     def _beyond_note(self) -> str:
         below, above = self.beyond

@@ -85,7 +85,8 @@ class MethodOptions:
     """sirt, cgls, tv: standard deviation of the noise of a line integral; iterations stop when the
     residual reaches it (discrepancy principle). Default: all --steps are taken."""
     weight: Auto[float] = None
-    """tv, levels: weight of the total variation; larger is smoother. tv needs it."""
+    """tv, levels: weight of the total variation; larger is smoother. Default: chosen
+    from the values and the number of the projections."""
     nonnegative: bool = False
     """sirt, tv: constrain the slice to be non-negative."""
     weights: AutoExpert[Literal["counts"]] = None
@@ -116,9 +117,11 @@ class GeometryOptions:
     """For full turns with the axis off the middle of the detector: weight opposite views, or stitch
     them into wider views over 180 degrees."""
     rows: Auto[tuple[int, int]] = None
-    """First detector row and the one after the last. Default: all."""
+    """First detector row and the one after the last; of cone beams, slices of the volume. Default:
+    all."""
     pitch: Auto[float] = None
-    """Distance between detector bins. Default: that of the file, or 1."""
+    """Distance between detector bins; of cone beams that between rows is scaled alike. Default:
+    that of the file, or 1."""
     unit: Auto[str] = None
     """Unit of the pitch, such as mm. Default: that of the file, or bin."""
     pixel: Auto[float] = None
@@ -190,7 +193,8 @@ class VolumeOutput:
     """For integer samples: attenuation of the smallest and the largest integer. Default: the range
     of a few slices, with a margin."""
     preview: bool = False
-    """Reconstruct only the middle slice, as preview.png, and estimate the time for all."""
+    """Reconstruct only the middle slice, as preview.png, and estimate the time for all. Of cone
+    beams, for fbp and backproject only."""
 
 
 @dataclass(frozen=True)
