@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
+from rift_cl.basis.angular import ANGULAR_BASES
 from rift_cl.commands.cli import COMMANDS, main
 from rift_cl.io.scans.formats import SCAN_READERS
 from rift_cl.metrics import psnr
@@ -37,7 +38,10 @@ UNTOLD = {
 TUTORIALS = {
     "operators": {},
     "scan": {"--method tv --nonnegative": "--method tv --nonnegative --steps 5"},
-    "own_parts": {"steps=60": "steps=10"},
+    "own_parts": {
+        "steps=60": "steps=10",
+        "steps=200, splats=1000, downscale=4": "steps=2, splats=100, downscale=8",
+    },
     "photographs": {
         "--steps 1500 --splats 4000": "--steps 20 --splats 300 --downscale 4",
         "--frames 24": "--frames 2",
@@ -67,7 +71,11 @@ def test_a_tutorial_runs_from_top_to_bottom(name, run_page, tmp_path):
     try:
         names = run_page(DOCS / f"tutorials/{name}.md", tmp_path, TUTORIALS[name])
     finally:
-        for registry, added in ((FILTERS, "butterworth"), (PIXEL_LOSSES, "charbonnier")):
+        for registry, added in (
+            (FILTERS, "butterworth"),
+            (PIXEL_LOSSES, "charbonnier"),
+            (ANGULAR_BASES, "cosine"),
+        ):
             if added in registry:
                 registry.remove(added)
     if name == "operators":

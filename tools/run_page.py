@@ -4,7 +4,7 @@
 
 Blocks of Python share their names; lines of a block of commands run one after the other. All run in
 the folder, so that a page finds what it wrote. Blocks of other languages are shown, not run, and so
-are those that import torch where there is none.
+are those that import torch or JAX where there is none.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import tyro
 
 from rift_cl.commands.cli import main as rift
 
-_TORCH = find_spec("torch") is not None
+_MISSING = [f"import {name}" for name in ("torch", "jax") if find_spec(name) is None]
 _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -71,7 +71,8 @@ def blocks(page: Path, changes: Mapping[str, str] | None = None) -> Iterator[Blo
             raise ValueError(f"{page} does not say {old!r}")
         text = text.replace(old, new)
     for found in _BLOCK.finditer(text):
-        if found[1] in ("python", "bash") and ("import torch" not in found[2] or _TORCH):
+        skipped = any(line in found[2] for line in _MISSING)
+        if found[1] in ("python", "bash") and not skipped:
             yield Block(found[1], found[2], text.count("\n", 0, found.start()) + 2)
 
 
