@@ -3,8 +3,9 @@
     python tools/report_reliability.py --only "damaged files" --page docs/reliability.md
     python tools/report_reliability.py --share 0.1
 
-Counts are those of a full run; ``--share`` makes them smaller. Figures of promises that are not run
-are kept as the page has them. Ends with status 1 if a tool found a promise broken.
+Counts are those of a full run; ``--share`` makes them smaller. The page shows the commands that
+were run. Commands and figures of promises that are not run are kept as the page has them. Ends with
+status 1 if a tool found a promise broken.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ _NOT_RUN = "not run yet"
 _HEAD = """# Reliability
 
 What holds when files are damaged, processes are killed and builds collide. Each row is a promise,
-the tool that tries it, what the tool printed last, and when; the numbers of tries are what stands
-in the figure. `python tools/report_reliability.py` runs them all and prints this page.
+the command that was run, what it printed last, and when. `python tools/report_reliability.py` runs
+them all and prints this page.
 
 | promise | tried by | found | on |
 | :-- | :-- | :-- | :-- |
@@ -48,6 +49,24 @@ class Promise(NamedTuple):
     tool: str
     count: str
     full: int
+
+    def command(self, tries: int) -> str:
+        """The tool with a number of tries, as the page shows it."""
+        return f"{self.tool} {self.count} {tries}"
+
+
+class Found(NamedTuple):
+    """A row of the page.
+
+    Args:
+        command: the tool and how often it tried.
+        figure: the last line that it printed.
+        date: day of the run.
+    """
+
+    command: str
+    figure: str
+    date: str
 
 
 PROMISES = (
@@ -90,37 +109,37 @@ class Options:
 def main(options: Options) -> int:
     """Run the tools, write the page, and return the exit status."""
     text = options.page.read_text(encoding="utf-8") if options.page.exists() else ""
-    known = {row[0]: (row[2], row[3]) for row in _ROW.findall(text)}
+    known = {name: Found(*rest) for name, *rest in _ROW.findall(text)}
     broken = 0
     for promise in PROMISES:
         if options.only in promise.name:
-            figure, status = found(promise, options.share)
+            count = max(1, round(options.share * promise.full))
+            figure, status = found(promise, count)
             broken |= status
-            known[promise.name] = figure, datetime.now(timezone.utc).date().isoformat()
+            today = datetime.now(timezone.utc).date().isoformat()
+            known[promise.name] = Found(promise.command(count), figure, today)
     options.page.write_text(page(known), encoding="utf-8")
     return broken
 
 
 def found(
     promise: Promise,
-    share: float,
+    tries: int,
     run: Callable[..., subprocess.CompletedProcess[str]] = subprocess.run,
 ) -> tuple[str, int]:
     """What a tool printed last, and whether it found the promise broken (1) or not (0)."""
-    count = max(1, round(share * promise.full))
-    command = [sys.executable, str(_HERE / promise.tool), promise.count, str(count)]
+    command = [sys.executable, str(_HERE / promise.tool), promise.count, str(tries)]
     done = run(command, stdout=subprocess.PIPE, text=True, check=False)
     lines = done.stdout.strip().splitlines() or [f"ended with status {done.returncode}"]
     return ("" if done.returncode == 0 else "BROKEN: ") + lines[-1], int(done.returncode != 0)
 
 
-def page(known: dict[str, tuple[str, str]]) -> str:
-    """The page of all promises, with the figures that are known and their dates."""
+def page(known: dict[str, Found]) -> str:
+    """The page of all promises, with what is known of them."""
     rows = []
     for promise in PROMISES:
-        figure, date = known.get(promise.name, (_NOT_RUN, ""))
-        tool = f"{promise.tool} {promise.count} {promise.full}"
-        rows.append(f"| {promise.name} | `{tool}` | {figure} | {date} |\n")
+        last = known.get(promise.name, Found(promise.command(promise.full), _NOT_RUN, ""))
+        rows.append(f"| {promise.name} | `{last.command}` | {last.figure} | {last.date} |\n")
     return _HEAD + "".join(rows)
 
 

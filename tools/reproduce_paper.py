@@ -1,4 +1,4 @@
-"""Reproduce the figures of the paper "RiFT, Radiance Field Tomography".
+"""Reproduce the figures of the paper "RiFT - Radiance Field Tomography".
 
     python tools/reproduce_paper.py --quick --out paper
     python tools/reproduce_paper.py --full --ornament ornament --out paper
