@@ -5,8 +5,8 @@
 
 Pictures of tutorials come from running the tutorials; the others from the commands that their
 functions name. Real data are looked for in the folder ``--data`` by the names that ``rift samples``
-gives them (tooth/tooth.h5, ...). ``drawn.json`` beside the pictures keeps what was run, when and on
-which device; ``docs/gallery.md`` shows it between marks.
+gives them (tooth/tooth.h5, ...), and commands name them so. ``drawn.json`` beside the pictures
+keeps what was run, when and on which device; ``docs/gallery.md`` shows it between marks.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import io
 import json
 import os
 import re
+import shutil
 import sys
 import tempfile
 import time
@@ -32,7 +33,7 @@ from PIL import Image
 import rift_cl as rift
 from rift_cl.io import read_image, read_volume
 from rift_cl.report.plot import figure_png, image_grid
-from rift_cl.report.plot.figure import new_figure
+from rift_cl.report.plot.figure import add_panel, new_figure
 from run_page import run_commands, run_page
 
 _ROOT = Path(__file__).parents[1]
@@ -41,6 +42,9 @@ _TUTORIALS = _ROOT / "docs" / "tutorials"
 # Bytes of a still picture and of a film, at most.
 _STILL, _FILM = 150_000, 1_000_000
 _BLUE = "#1f4e8c"
+_LETTERS = 9
+# Views of each panel of coverage, and how far the ring's stand above its plane, in radians.
+_VIEWS, _ABOVE = 96, np.radians(30)
 
 
 @dataclass(frozen=True)
@@ -62,13 +66,12 @@ class Picture(NamedTuple):
     """A picture that can be drawn.
 
     Args:
-        draw: draws it in the current folder; what it returns is written. It is given the folder
-            of real data.
+        draw: draws it in the current folder, which holds the data; what it returns is written.
         commands: what a reader types to get the same.
         needs: the data that it reads, relative to the folder of real data; empty if none.
     """
 
-    draw: Callable[[Path], bytes]
+    draw: Callable[[], bytes]
     commands: str
     needs: str = ""
 
@@ -85,53 +88,65 @@ def _pair(images: list[Any], titles: list[str], window: Any = None, **how: Any) 
 
 
 def _small(png: bytes) -> bytes:
-    """The picture with as many colours as let it stay small."""
+    """The picture with as many colours, or greys, as let it stay small."""
     picture = Image.open(io.BytesIO(png)).convert("RGB")
+    samples = np.asarray(picture, np.uint8)
+    grey = (samples == samples[..., :1]).all()
     found = png
     for colours in (256, 128, 64, 32):
         buffer = io.BytesIO()
-        picture.quantize(colours, dither=Image.Dither.NONE).save(buffer, "PNG", optimize=True)
+        if grey:
+            step = 255 / (colours - 1)
+            few = Image.fromarray(np.rint(np.rint(samples[..., 0] / step) * step).astype(np.uint8))
+        else:
+            few = picture.quantize(colours, dither=Image.Dither.NONE)
+        few.save(buffer, "PNG", optimize=True)
         found = buffer.getvalue()
         if len(found) <= _STILL:
             break
     return found
 
 
-def _commands(text: str, data: Path) -> None:
-    """Run what a reader types, with the paths of the real data."""
-    place = re.sub(r"(?<![\w/])(tooth\.h5|RealDataDend\.mat|walnut_cone\.npz)", _found(data), text)
-    run_commands(place, "draw_gallery")
-
-
-def _found(data: Path) -> Callable[[re.Match[str]], str]:
-    folders = {"tooth.h5": "tooth", "RealDataDend.mat": "dendrites", "walnut_cone.npz": "walnut"}
-    return lambda match: str(data / folders[match[1]] / match[1])
-
-
 _TOOTH = """\
-rift reconstruct tooth.h5 --method backproject --rings off --out unfiltered
-rift reconstruct tooth.h5 --out slices
+rift reconstruct tooth/tooth.h5 --method backproject --rings off --out unfiltered
+rift reconstruct tooth/tooth.h5 --out slices
 """
 _DENDRITES = """\
-rift reconstruct RealDataDend.mat --background 100 --center 629.5 --rings off --out striped
-rift reconstruct RealDataDend.mat --background 100 --center 629.5 --rings vo --out slices
+rift reconstruct dendrites/RealDataDend.mat --background 100 --center 629.5 --rings off \\
+    --out striped
+rift reconstruct dendrites/RealDataDend.mat --background 100 --center 629.5 --rings vo \\
+    --out slices
 """
-_WALNUT = "rift reconstruct walnut_cone.npz --out volume\n"
+_ORNAMENT = """\
+rift samples ornament --out capture
+rift fit capture --out fit --steps 5000 --splats 8000
+rift render fit --out film --frames 36 --size 320 240
+"""
+_WALNUT = "rift reconstruct walnut/walnut_cone.npz --out volume\n"
 _PLAN = "rift plan --views 24 --diameter 60 --elevation 0 60 --azimuth -60 60 --out plan\n"
 
 
-def _tooth(data: Path) -> bytes:
-    _commands(_TOOTH, data)
-    before, after = _slices(Path("unfiltered/slices"))[0], _slices(Path("slices/slices"))[0]
-    return _pair(
-        [_stretched(before), _stretched(after)],
-        ["backprojected", "filtered, rings removed"],
-        (0, 1),
-    )
+def _tooth() -> bytes:
+    run_commands(_TOOTH, "draw_gallery")
+    slices = [_slices(Path(f"{name}/slices"))[0] for name in ("unfiltered", "slices")]
+    # Only the filtered slice has a unit: each has a window of its own.
+    windows = [tuple(np.percentile(image, [0.5, 99.5])) for image in slices]
+    names = ["without the filter", "with it, rings removed"]
+    titles = [
+        f"{name}\nwindow {low:.2g} to {high:.2g}".replace("-", "\N{MINUS SIGN}")
+        for name, (low, high) in zip(names, windows, strict=True)
+    ]
+    images = [_grey(image, *window) for image, window in zip(slices, windows, strict=True)]
+    return _pair(images, titles)
 
 
-def _dendrites(data: Path) -> bytes:
-    _commands(_DENDRITES, data)
+def _grey(image: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Equal red, green and blue, black at ``low`` and white at ``high``."""
+    return np.repeat(np.clip((image - low) / (high - low), 0, 1)[..., None], 3, -1)
+
+
+def _dendrites() -> bytes:
+    run_commands(_DENDRITES, "draw_gallery")
     before, after = _slices(Path("striped/slices"))[0], _slices(Path("slices/slices"))[0]
     quarter = len(after) // 4
     cut = slice(quarter, 3 * quarter)
@@ -146,30 +161,28 @@ def _averaged(image: np.ndarray) -> np.ndarray:
     return image[: 3 * side, : 3 * side].reshape(side, 3, side, 3).mean((1, 3))
 
 
-def _walnut(data: Path) -> bytes:
-    _commands(_WALNUT, data)
+def _walnut() -> bytes:
+    run_commands(_WALNUT, "draw_gallery")
     volume = _slices(Path("volume/slices"))
     z, y, x = (side // 2 for side in volume.shape)
     high = float(np.percentile(volume, 99.8))
     views = [volume[z], volume[:, y], volume[:, :, x]]
-    return _pair(views, ["across the axis", "along it", "along it, turned"], (0, high))
+    titles = ["across the axis", "along it", "along it, turned"]
+    return _pair(views, titles, (0, high), unit="per mm")
 
 
-def _stretched(image: np.ndarray) -> np.ndarray:
-    low, high = np.percentile(image, [0.5, 99.5])
-    return np.clip((image - low) / (high - low), 0, 1)
-
-
-def _turning(_: dict[str, Any]) -> bytes:
+def _ornament() -> bytes:
+    run_commands(_ORNAMENT, "draw_gallery")
     frames = sorted(Path("film/frames").glob("*.png"))
     _film(frames)
-    return _pair([read_image(frame)[..., :3] for frame in frames[:24:6]], [""] * 4)
+    quarters = frames[:: len(frames) // 4]
+    return _pair([read_image(frame)[..., :3] for frame in quarters], [""] * 4)
 
 
 def _film(frames: list[Path]) -> None:
     """An animated picture of the frames, which stops after two turns."""
     pictures = [Image.open(frame).convert("RGB") for frame in frames]
-    for quality in (80, 70, 60, 50, 40):
+    for quality in (90, 80, 70, 60, 50, 40):
         pictures[0].save(
             "film.webp",
             save_all=True,
@@ -179,11 +192,11 @@ def _film(frames: list[Path]) -> None:
             quality=quality,
             method=6,
         )
-        if Path("film.webp").stat().st_size <= _FILM // 2:
+        if Path("film.webp").stat().st_size <= _FILM:
             return
 
 
-def _plan(_: Path) -> bytes:
+def _plan() -> bytes:
     run_commands(_PLAN, "draw_gallery")
     frames = json.loads(Path("plan/transforms.json").read_text())["frames"]
     places = np.array([np.array(frame["transform_matrix"])[:3, 3] for frame in frames])
@@ -198,24 +211,55 @@ def _plan(_: Path) -> bytes:
     return _small(figure_png(figure))
 
 
-def _coverage(_: Path) -> bytes:
-    """How densely 24 views on a ring and 24 even ones sample a plane that holds the ring's axis."""
+def _coverage() -> bytes:
+    """How densely 96 views on a ring, and 96 all around, sample a plane that holds the axis."""
     target = rift.Target(center=np.zeros(3), diameter=1.0, snr=1000.0)
-    line = np.linspace(-24, 24, 193)
-    up, along = np.meshgrid(line[::-1], line, indexing="ij")
+    edge = 24.0
+    line = np.linspace(-edge, edge, 193)
+    up, along = np.meshgrid(line, line, indexing="ij")
     k = np.stack([along, np.zeros_like(up), up], -1).reshape(-1, 3)
-    turn = np.arange(24) * 2 * np.pi / 24
-    golden = np.arange(24) * np.pi * (3 - np.sqrt(5))
-    height = 1 - (2 * np.arange(24) + 1) / 24
+    turn = np.arange(_VIEWS) * 2 * np.pi / _VIEWS
+    golden = np.arange(_VIEWS) * np.pi * (3 - np.sqrt(5))
+    height = 1 - (2 * np.arange(_VIEWS) + 1) / _VIEWS
     places = {
-        "ring of 24 views": _from(turn, np.full(24, 0.2)),
-        "24 views all around": _from(golden, np.arcsin(height)),
+        f"a ring of {_VIEWS} views, {np.degrees(_ABOVE):.0f}° up": _from(
+            turn, np.full(_VIEWS, _ABOVE)
+        ),
+        f"{_VIEWS} views all around": _from(golden, np.arcsin(height)),
     }
-    maps = []
-    for views in places.values():
+    figure = new_figure(1190, 560)
+    for place, (title, views) in enumerate(places.items()):
         found = rift.coverage(views, target, k)[0].reshape(up.shape)
-        maps.append(np.log10(np.clip(found, 1e-2, None)))
-    return _pair(maps, list(places), (-2, 1.4))
+        axes = add_panel(figure, 92 + 500 * place, 40, 440, 440)
+        shown = axes.imshow(
+            np.log10(np.clip(found, 1e-3, None)),
+            cmap="gray",
+            vmin=-1,
+            vmax=2,
+            extent=(-edge, edge, -edge, edge),
+            origin="lower",
+        )
+        axes.set_title(title, fontsize=_LETTERS)
+        axes.set_xlabel("kx, cycles per diameter", fontsize=_LETTERS)
+        axes.tick_params(labelsize=_LETTERS - 1)
+        axes.axvline(0, color="white", linewidth=0.8, linestyle=":")
+        axes.text(0.8, -edge + 1, "axis", color="white", fontsize=_LETTERS)
+        if not place:
+            axes.set_ylabel("kz", fontsize=_LETTERS)
+            _mark_cone(axes, edge)
+    bar = figure.colorbar(shown, cax=add_panel(figure, 1052, 40, 18, 440), extend="min")
+    bar.set_label("log10 density", fontsize=_LETTERS)
+    bar.ax.tick_params(labelsize=_LETTERS - 1)
+    return _small(figure_png(figure))
+
+
+def _mark_cone(axes: Any, edge: float) -> None:
+    """Mark the frequencies within the ring's elevation of its axis, which no view samples."""
+    side = edge * np.tan(_ABOVE)
+    for x in (-side, side):
+        axes.plot([-x, x], [-edge, edge], color="white", linewidth=1.2, linestyle="--")
+    axes.text(0, 0.72 * edge, "missed", color="white", fontsize=_LETTERS, ha="center", va="center")
+    axes.set_xlim(-edge, edge)
 
 
 def _from(azimuth: np.ndarray, elevation: np.ndarray) -> list[rift.Camera]:
@@ -231,32 +275,37 @@ def _from(azimuth: np.ndarray, elevation: np.ndarray) -> list[rift.Camera]:
     return cameras
 
 
-def _bases(_: Path) -> bytes:
+def _bases() -> bytes:
     line = np.linspace(-4, 4, 97)
     y, x = np.meshgrid(line[::-1], line, indexing="ij")
     points = np.stack([x, y], -1)
     images, titles = [], []
-    for name, basis in (
-        ("Hermite", rift.basis.Hermite(2, 2)),
-        ("Laguerre", rift.basis.Laguerre(2)),
-    ):
-        for number, coefficients in enumerate(np.eye(basis.n_coeff)):
-            images.append(basis.evaluate(coefficients, points))
-            titles.append(f"{name} {number + 1}")
-    return _pair(images, titles, (-1, 1), columns=6, size=1.2)
+    hermite, laguerre = rift.basis.Hermite(2, 2), rift.basis.Laguerre(2)
+    for basis in (hermite, laguerre):
+        images += [basis.evaluate(one, points) for one in np.eye(basis.n_coeff)]
+    titles += [f"m = {m}, n = {n}" for m, n in hermite.indices()]
+    titles += [_polar(*index) for index in laguerre.indices()]
+    rows = ["Hermite", "Laguerre"]
+    return _pair(images, titles, (-1, 1), columns=6, size=1.2, row_labels=rows)
 
 
-def _tutorial(name: str, draw: Callable[[dict[str, Any]], bytes]) -> Callable[[Path], bytes]:
-    return lambda _: draw(run_page(_TUTORIALS / f"{name}.md", Path()))
+def _polar(p: int, turns: int, sine: int) -> str:
+    part = ("\ncosine", "\nsine")[sine] if turns else "\n"
+    return f"p = {p}, l = {turns}{part}"
+
+
+def _tutorial(name: str, draw: Callable[[dict[str, Any]], bytes]) -> Callable[[], bytes]:
+    return lambda: draw(run_page(_TUTORIALS / f"{name}.md", Path()))
 
 
 def _scan_slice(names: dict[str, Any]) -> bytes:
-    return _pair([names["middle"], names["truth"]], ["reconstructed", "truth"], (0, 1))
+    titles = ["reconstructed,\nwith 5,000 photons' noise", "the phantom itself"]
+    return _pair([names["middle"], names["truth"]], titles, (0, 1), unit="per mm")
 
 
 def _few_views(_: dict[str, Any]) -> bytes:
     images = [_slices(Path(f"few-{name}/slices"))[2] for name in ("fbp", "tv")]
-    return _pair(images, ["30 views, fbp", "30 views, tv"], (0, 1))
+    return _pair(images, ["30 views, fbp", "30 views, tv"], (0, 1), unit="per mm")
 
 
 def _held_out(_: dict[str, Any]) -> bytes:
@@ -288,7 +337,7 @@ PICTURES = {
     "tutorial-scan": Picture(_tutorial("scan", _scan_slice), _page("scan")),
     "tutorial-scan-few": Picture(_tutorial("scan", _few_views), _page("scan")),
     "tutorial-photographs": Picture(_tutorial("photographs", _held_out), _page("photographs")),
-    "ornament": Picture(_tutorial("photographs", _turning), _page("photographs")),
+    "ornament": Picture(_ornament, _ORNAMENT),
     "tutorial-operators": Picture(_tutorial("operators", _operator_slices), _page("operators")),
     "tutorial-own-filter": Picture(_tutorial("own_parts", _filter_slices), _page("own_parts")),
 }
@@ -311,8 +360,11 @@ def draw(options: Options) -> Iterator[str]:
             yield f"{name}: {data / picture.needs} is absent"
             continue
         with _scratch(), redirect_stdout(io.StringIO()):
+            if picture.needs:
+                Path(picture.needs).parent.mkdir()
+                shutil.copy(data / picture.needs, picture.needs)
             begun = time.process_time()
-            png = picture.draw(data)
+            png = picture.draw()
             seconds = time.process_time() - begun
             if Path("film.webp").exists():
                 (out / f"{name}.webp").write_bytes(Path("film.webp").read_bytes())

@@ -197,11 +197,12 @@ def _show_orbit(page: Page, part: dict[str, Any]) -> None:
 def _show_density(page: Page, part: dict[str, Any]) -> None:
     k, slopes = np.array(part["k"]), part["slopes"]
     fine = np.geomspace(k[0], k[-1], 100)
+    # Lines last, to lie above the dots.
     series = {
-        "K / (pi k)": (fine, VIEWS / (np.pi * fine)),
-        "K / (2 k)": (fine, VIEWS / (2 * fine)),
         f"plane, {VIEWS} angles": (k, part["plane"]),
         f"space, {VIEWS} directions": (k, part["sphere"]),
+        "K / (pi k)": (fine, VIEWS / (np.pi * fine)),
+        "K / (2 k)": (fine, VIEWS / (2 * fine)),
     }
     drawn = curves(
         series,

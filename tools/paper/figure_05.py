@@ -41,7 +41,7 @@ def show(page: Page, result: dict[str, Any]) -> None:
     )
     counts = ", ".join(str(score.views) for score in scores)
     page.figure(
-        figure_png(study_panels(scores)),
+        figure_png(study_panels(scores, size=1.4)),
         caption="Above: backprojection without a filter, after an affine fit. Below: with the "
         "ramp filter.",
         alt=f"Slices from {counts} projections, unfiltered above, filtered below",

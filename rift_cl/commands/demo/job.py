@@ -165,14 +165,15 @@ def study_row(score: ViewScore) -> tuple[float, ...]:
     return (score.views, *(score.scores[key] for key in SCORES))
 
 
-def study_panels(scores: list[ViewScore]) -> Any:
-    """The slices of a study: unfiltered above, filtered below."""
+def study_panels(scores: list[ViewScore], size: float = 2.4) -> Any:
+    """The slices of a study, ``size`` inches each: unfiltered above, filtered below."""
     return image_grid(
         [s.unfiltered for s in scores] + [s.filtered for s in scores],
         titles=[f"{s.views} views" for s in scores] + [""] * len(scores),
         columns=len(scores),
         window=(0.0, 0.5),
         row_labels=["unfiltered", "filtered"],
+        size=size,
     )
 
 

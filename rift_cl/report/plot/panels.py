@@ -46,6 +46,7 @@ def image_grid(
     window: _Window | Sequence[_Window] | None = None,
     row_labels: Sequence[str] | None = None,
     size: float = 2.4,
+    unit: str = "",
 ) -> Figure:
     """Panels side by side, with the display window of grey ones stated below them.
 
@@ -58,6 +59,7 @@ def image_grid(
             the darkest to the brightest sample of all images.
         row_labels: a text left of each row.
         size: longer side of a panel in inches, up to the rounding that keeps samples square.
+        unit: of grey samples, such as per mm; stated with their window.
 
     Raises:
         ShapeError: no image, one of other axes, or titles, labels or windows do not match.
@@ -78,12 +80,13 @@ def image_grid(
     windows = _windows(pixels, window, rows)
     stated = [f"{a:.3g} to {b:.3g}".replace("-", "\N{MINUS SIGN}") for a, b in windows]
     footer = stated[0] if len(set(stated)) == 1 else "by row: " + "; ".join(stated)
+    footer = f"Display window {footer} {unit}".rstrip()
     grey = any(image.ndim == 2 for image in pixels)
     panels = []
     for k, (image, title) in enumerate(zip(pixels, titles, strict=True)):
         high, wide = _drawn_size(image, round(size * DPI))
         panels.append(_Panel(image, _wrapped(title, wide), windows[k // columns], high, wide))
-    return _draw_grid(panels, columns, labels, f"Display window {footer}" if grey else "")
+    return _draw_grid(panels, columns, labels, footer if grey else "")
 
 
 def _pixels(name: str, image: ArrayLike) -> Reals:
