@@ -32,6 +32,7 @@ RUNS = {
 WANTS = {"register_camera": ("torch", "kornia")}
 
 
+@pytest.mark.timeout(1000)
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_runs(path, tmp_path, tmp_path_factory):
     for name in WANTS.get(path.stem, ()):
@@ -46,7 +47,7 @@ def test_an_example_runs(path, tmp_path, tmp_path_factory):
         env={**os.environ, **torch, "PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path)},
         capture_output=True,
         text=True,
-        timeout=280,
+        timeout=900,
         check=False,
     )
     assert (done.returncode, done.stderr) == (0, "")

@@ -15,11 +15,12 @@ NAMED = {
     # MIT, with parts of its library under the LGPL, which its metadata does not say.
     "": {"nlopt"},
     "heic": {"pi-heif"},
-    "peers": {"astra-toolbox", "gratopy"},
+    "neighbours": {"pylops"},
+    "peers": {"astra-toolbox", "gratopy", "pylops"},
 }
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"
-# What people who work on the package install.
-WITHOUT = {"dev", "test"}
+# What people who work on the package install, and what draws its pages.
+WITHOUT = {"dev", "docs", "test"}
 GPL = re.compile(r"\bL?GPL|General Public License", re.IGNORECASE)
 
 

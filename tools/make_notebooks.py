@@ -119,7 +119,10 @@ def executed(book: Any) -> str:
             **{k: os.pathsep.join(filter(None, [v, os.environ.get(k)])) for k, v in added.items()},
         }
         client = nbclient.NotebookClient(
-            book, timeout=_PATIENCE, resources={"metadata": {"path": str(folder)}}
+            book,
+            timeout=_PATIENCE,
+            startup_timeout=_PATIENCE,
+            resources={"metadata": {"path": str(folder)}},
         )
         try:
             client.execute(env=environment)

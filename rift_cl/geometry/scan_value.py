@@ -5,6 +5,7 @@ Every check names the class and the argument, says what came and what was wanted
 
 from __future__ import annotations
 
+import hashlib
 import math
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -39,6 +40,11 @@ class ScanValue:
     def __hash__(self) -> int:
         """Equal scans hash equally."""
         return hash(self._key())
+
+    @property
+    def digest(self) -> str:
+        """Sixteen hexadecimal digits that equal scans have in common, in every process."""
+        return hashlib.sha256(repr(self._key()).encode()).hexdigest()[:16]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies are made by the constructor, so that their arrays are read-only as well."""

@@ -83,7 +83,8 @@ def seen_grid(scan: Fan | Cone | Vectors, spacing: float | None = None) -> Grid:
 def slices_beyond(scan: Cone | Vectors, grid: Grid) -> tuple[int, int]:
     """Slices below a grid and above it that rays to the first and to the last rows pass through.
 
-    Rays that leave the middle plane go on to do so behind the axis, as far as the grid reaches.
+    Rays that leave the plane of the source go on to do so behind the axis, as far as the grid
+    reaches. Rows that are all on one side of that plane have rays beyond the grid in front of it.
 
     Args:
         scan: source and detector.
@@ -95,7 +96,7 @@ def slices_beyond(scan: Cone | Vectors, grid: Grid) -> tuple[int, int]:
     heights = first * row, (scan.rows - first) * row
     radius = max(n * d / 2 for n, d in zip(grid.shape[1:], grid.spacing[1:], strict=True))
     share = radius / (lengths.source_to_axis * grid.spacing[0])
-    below, above = (max(0, _whole(height * share)) for height in heights)
+    below, above = (_whole(abs(height) * share) for height in heights)
     return below, above
 
 

@@ -56,11 +56,15 @@ def test_all_are_listed_with_licence_and_address(capsys):
 @pytest.mark.parametrize(("name", "views"), [("wall", 24), ("ornament-off-path", 8)])
 def test_a_capture_of_the_package_is_copied_once(name, views, tmp_path, capsys):
     out = tmp_path / "capture"
+    # Of a name that a copy in the making might have.
+    (tmp_path / "capture.part").mkdir()
+    (tmp_path / "capture.part" / "mine").touch()
     assert main(["samples", name, "--out", str(out)]) == 0
     assert len(open_capture(out).views) == views
     assert main(["samples", name, "--out", str(out)]) != 0
     assert "is there already" in capsys.readouterr().err
-    assert [path.name for path in tmp_path.iterdir()] == ["capture"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["capture", "capture.part"]
+    assert (tmp_path / "capture.part" / "mine").exists()
 
 
 def test_a_file_by_path_is_checked_and_copied(tmp_path, monkeypatch, capsys):

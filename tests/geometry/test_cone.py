@@ -93,7 +93,7 @@ def test_normal_form():
     assert not cone().circular
     for value in (scan, cone(), scan.fan(), scan.vectors()):
         again = pickle.loads(pickle.dumps(value))
-        assert again == value and hash(again) == hash(value)
+        assert again == value and hash(again) == hash(value) and again.digest == value.digest
     assert scan != cone() and scan.fan() == rift.Fan([0.0, 1.0], 6, 0.5, 10, 20)
     with pytest.raises(ValueError, match="read-only"):
         scan.heights[0] = 1

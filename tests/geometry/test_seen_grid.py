@@ -7,7 +7,7 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.errors import InputError
-from rift_cl.geometry.seen_grid import scan_lengths, seen_grid
+from rift_cl.geometry.seen_grid import scan_lengths, seen_grid, slices_beyond
 
 ANGLES = np.linspace(0, 6, 7)
 CONE = rift.Cone(ANGLES, 10, 16, (0.4, 0.8), 50, 100, (4.5, 7.5))
@@ -45,3 +45,18 @@ def test_a_fan_sees_a_slice():
     assert grid.shape == (16, 16) and grid.spacing == pytest.approx((0.4, 0.4))
     with pytest.raises(InputError, match="spacing"):
         seen_grid(CONE, -1)
+
+
+def test_slices_beyond_are_those_that_rays_of_the_first_and_last_rows_meet():
+    """By the rays themselves: from the source through a row's edge, on both sides of the axis."""
+    for row in (7.5, -20.0, 40.0):
+        cone = rift.Cone(ANGLES, 16, 32, 2.0, 60.0, 120.0, (row, 15.5))
+        grid = seen_grid(cone)
+        below, above = slices_beyond(cone, grid)
+        radius, (dz, *_) = grid.shape[1] * grid.spacing[1] / 2, grid.spacing
+        ends = (
+            (np.array([-0.5, 15.5]) - row)[:, None] * 2.0 * (60 + radius * np.array([-1, 1])) / 120
+        )
+        low = grid.center[0] - (grid.shape[0] / 2 + below) * dz
+        high = grid.center[0] + (grid.shape[0] / 2 + above) * dz
+        assert low - 1e-9 <= ends.min() <= low + dz and high - dz <= ends.max() <= high + 1e-9

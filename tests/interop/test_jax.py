@@ -149,7 +149,7 @@ def test_gradients_of_an_image_agree_with_finite_differences(device):
         step = jnp.asarray(np.random.default_rng(5).standard_normal(values.shape), jnp.float32)
         ends = [loss({**given, name: values + h * step}) for h in (2e-3, -2e-3)]
         slope, expected = float((found[name] * step).sum()), float(ends[0] - ends[1]) / 4e-3
-        assert abs(slope - expected) < 2e-2 * max(1.0, abs(expected)), name
+        assert abs(slope - expected) < 5e-2 * max(1.0, abs(expected)), name
 
 
 def test_gradients_go_to_covariances_and_colours_too(device):

@@ -93,6 +93,7 @@ def test_a_command_that_fails_ends_a_notebook(tool, page):
 
 @needs_kernel
 @pytest.mark.full
+@pytest.mark.timeout(1200)
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", TUTORIALS)
 def test_a_tutorial_runs_as_a_notebook(tool, tmp_path, name):

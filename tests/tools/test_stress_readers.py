@@ -17,7 +17,8 @@ def stress(tool):
 
 
 def test_two_hundred_damaged_files(stress, capsys):
-    options = stress.Options(files=200, seed=7)
+    # A reader may load much before it reads its first file.
+    options = stress.Options(files=200, seed=7, seconds=120)
     assert stress.main(options) == 0, capsys.readouterr().out
     printed = capsys.readouterr().out
     total = [int(word) for word in printed.splitlines()[-2].split()[1:]]

@@ -27,6 +27,8 @@ SETTINGS = TrainSettings(
     sh_degree=1,
     sh_every=1 / 3,
     seed=3,
+    # The walk goes with the rate of positions.
+    learning_rates=LearningRates(means=1.6e-4, quats=1e-3, log_scales=5e-3),
     strategy=McmcSettings(first=40, every=20, noise=5e5),
 )
 

@@ -179,7 +179,7 @@ class ConeInput:
 
     def identity(self) -> dict[str, str]:
         """The file and the geometry, which decide the volume besides the settings."""
-        return {**scan_identity(self.file), "geometry": repr(hash(self.geometry))}
+        return {**scan_identity(self.file), "geometry": self.geometry.digest}
 
     def locate(self) -> None:
         """Find the axis and the sense of rotation, unless they are said, and say what is done."""

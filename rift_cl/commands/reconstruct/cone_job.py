@@ -159,6 +159,7 @@ class ConeReconstruction:
         self.source.locate()
         self.inversion.window = self.source.window
         self.projector, self._formula = self._operators()
+        self._check_parts()
         if self._formula is not None and not isinstance(self._formula, Backprojection):
             self.source.notes.append(f"{self._formula.method}: {self._formula.sentence}.")
         if self.source.part_budget is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -65,22 +66,25 @@ def put_sample(settings: SamplesSettings) -> Path:
 def _copied_capture(source: Path, folder: Path) -> Path:
     if folder.exists():
         raise OutputError(f"{folder}: is there already; name another folder by --out")
-    part = folder.with_name(folder.name + ".part")
-    try:
-        with writing(folder):
+    with writing(folder):
+        # Beside it and of a name of its own, so that nothing that is there is touched.
+        own = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f"{folder.name}."))
+        try:
+            part = own / folder.name
             shutil.copytree(source, part, ignore=shutil.ignore_patterns("off_path", "__pycache__"))
             part.rename(folder)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+        finally:
+            shutil.rmtree(own, ignore_errors=True)
     return folder
 
 
 def _put_data(name: str, data: OpenData, folder: Path, given: Path | None) -> Path:
-    target = make_folder(folder) / data.file
+    target = folder / data.file
     if target.exists():
         raise OutputError(f"{target}: is there already; name another folder by --out")
     if given is not None:
         checked(given, data.size, data.sha256)
+        make_folder(folder)
         with atomic_path(target) as part:
             shutil.copyfile(given, part)
         return target
@@ -89,6 +93,7 @@ def _put_data(name: str, data: OpenData, folder: Path, given: Path | None) -> Pa
             f"{name} has no address of its own: fetch {data.file} from {data.page}, then run "
             f"'rift samples {name} --file {data.file}'"
         )
+    make_folder(folder)
     try:
         download(data.url, target, data.size, data.sha256)
     except OutputError as failure:
