@@ -113,6 +113,9 @@ class SpreadRun(ResumableRun):
 
 S = TypeVar("S")
 
+# Options that take a file or a text, besides those that are paths.
+_MAY_BE_FILES = "theta", "flats", "darks"
+
 
 def absolute_paths(settings: S) -> S:
     """The same settings with every path from the root, for a file that is read elsewhere."""
@@ -124,6 +127,16 @@ def absolute_paths(settings: S) -> S:
         elif isinstance(value, tuple) and any(isinstance(entry, Path) for entry in value):
             changed[field.name] = tuple(entry.absolute() for entry in value)
     return replace(settings, **changed)  # type: ignore[type-var]
+
+
+def absolute_files(settings: S) -> S:
+    """As ``absolute_paths``, and of options that take a file or a text too, where it is a file."""
+    changed = {
+        name: str(Path(value).absolute())
+        for name in _MAY_BE_FILES
+        if (value := getattr(settings, name, None)) is not None and Path(value).exists()
+    }
+    return replace(absolute_paths(settings), **changed)  # type: ignore[type-var]
 
 
 class ShownOption(NamedTuple):

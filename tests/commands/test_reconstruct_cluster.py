@@ -13,7 +13,7 @@ from rift_cl.commands.reconstruct.job import Reconstruction
 from rift_cl.commands.reconstruct.kept_slabs import SlabFolder
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.spread import make_slices
-from rift_cl.errors import InputError
+from rift_cl.errors import CheckpointError, InputError
 from rift_cl.io import read_volume
 
 WANTED = "Dask is not installed (pip install dask distributed)"
@@ -86,11 +86,49 @@ def test_a_run_goes_on_with_a_part_that_a_worker_made(scan, tmp_path, monkeypatc
     begun._settle()
     begun.folder.make()
     begun.kept.begin(begun._facts())
-    receipt = make_slices(settings(scan, out, resume=True), (), 2, 7)
+    receipt = make_slices(settings(scan, out, resume=True), (), begun.kept.mark(), 2, 7)
     assert receipt.figures["dead_pixels"] > 0 and receipt.device
     assert begun.kept.missing() == [slice(0, 2), slice(7, ROWS)]
     volume, _ = made(Reconstruction(settings(scan, out, resume=True)))
     assert volume.tobytes() == made(Reconstruction(settings(scan, tmp_path / "b")))[0].tobytes()
+
+
+def begin_anew(given):
+    """What a command does before it hands out slices, and the token of its run."""
+    begun = Reconstruction(given)
+    begun._settle()
+    begun.folder.make()
+    begun.kept.begin(begun._facts())
+    return begun.kept, begun.kept.mark()
+
+
+def test_a_worker_that_stays_joins_the_later_run_too(scan, tmp_path):
+    """Angles that were mended in their file are read again."""
+    angles, out = tmp_path / "angles.txt", tmp_path / "out"
+    np.savetxt(angles, np.arange(40) * 4.0)
+    theirs = settings(scan, out, theta=str(angles), resume=True)
+    kept, token = begin_anew(settings(scan, out, theta=str(angles)))
+    make_slices(theirs, (), token, 2, 4)
+    np.savetxt(angles, np.arange(40) * 4.5)
+    kept, token = begin_anew(settings(scan, out, theta=str(angles), overwrite=True))
+    make_slices(theirs, (), token, 2, 4)
+    ((_, slices),) = kept.slabs()
+    alone, _ = made(Reconstruction(settings(scan, tmp_path / "b")))
+    assert slices.tobytes() == alone[2:4].tobytes()
+
+
+def test_a_worker_of_an_earlier_run_keeps_nothing_in_the_later_one(tmp_path):
+    early, late = (SlabFolder(tmp_path / "slabs", (4, 2, 2)) for _ in range(2))
+    early.begin({})
+    early.token = early.mark()
+    early.save(0, np.zeros((1, 2, 2), np.float32))
+    late.begin({})
+    late.token = late.mark()
+    late.save(0, np.ones((2, 2, 2), np.float32))
+    with pytest.raises(CheckpointError, match="begun anew"):
+        early.save(0, np.zeros((1, 2, 2), np.float32))
+    assert {path.name for path in late.path.iterdir()} == {"run.json", "00000-00002.npy"}
+    late.go_on({})
 
 
 def test_a_slice_that_two_workers_kept_comes_once(tmp_path):

@@ -2,12 +2,17 @@
 
 import csv
 import json
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rift_cl.commands.cli import main
+from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.commands.sweep.job import Sweep
+from rift_cl.commands.sweep.one_run import is_done
+from rift_cl.commands.sweep.one_run import run as one_run
 from rift_cl.commands.sweep.settings import SweepSettings
 from rift_cl.commands.sweep.variations import variations
 from rift_cl.errors import CheckpointError, InputError
@@ -69,12 +74,19 @@ def test_every_combination_is_a_run(scans, tmp_path):
         (("method",), "NAME=VALUE"),
         (("center=1,2",), "center is given twice"),
         (("size=4,4",), "two runs"),
+        (("size=4", "size=8"), "size is given twice"),
     ],
 )
 def test_what_is_refused_before_any_run(scans, tmp_path, vary, said):
     with pytest.raises(InputError, match=said):
         Sweep(sweep(scans[:1], tmp_path / "out", vary))
     assert not (tmp_path / "out").exists()
+
+
+def test_a_setting_of_all_runs_is_given_once(scans, tmp_path):
+    given = sweep(scans[:1], tmp_path / "out", ("size=4",))
+    with pytest.raises(InputError, match="center is given twice"):
+        variations(replace(given, fixed=(*given.fixed, "center=8")))
 
 
 @pytest.mark.once
@@ -119,6 +131,44 @@ def test_a_run_that_cannot_be_done_is_told_beside_the_others(scans, tmp_path, ca
     capsys.readouterr()
     assert run("sweep", "reconstruct", scans[0], "--vary", "size=4,8", "--dry-run") == 0
     assert "size=8" in capsys.readouterr().out
+
+
+@pytest.mark.once
+def test_the_second_try_of_a_run_goes_on_with_the_first(scans, tmp_path):
+    """A worker that is killed leaves the folder that it began."""
+    (each,) = variations(sweep(scans[:1], tmp_path, ("size=8",)))
+    RunFolder(each.settings.out, each.job).make()
+    assert one_run(each.job, each.settings) == "" and is_done(each.settings.out)
+
+
+@pytest.mark.once
+def test_a_run_of_an_older_sweep_with_other_settings_is_not_done(scans, tmp_path):
+    out = tmp_path / "out"
+    done(sweep(scans[:1], out, ("size=8",)))
+    done(sweep(scans[:1], out, ("size=4",), resume=True))
+    other = sweep(scans[1:], out, ("size=8",), resume=True)
+    with pytest.raises(CheckpointError, match="size=8 had other settings"):
+        done(other)
+
+
+def test_paths_of_runs_are_whole(scans, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    np.savetxt("angles.txt", np.arange(12))
+    given = SweepSettings("reconstruct", (Path("a.npz"),), fixed=("theta=angles.txt",))
+    (each,) = variations(given)
+    assert each.settings.scan == tmp_path / "a.npz"
+    assert each.settings.theta == str(tmp_path / "angles.txt")
+    assert each.settings.out == tmp_path / "rift-sweep" / "runs" / "run"
+
+
+def test_an_input_among_the_runs_is_not_replaced(scans, tmp_path):
+    out = tmp_path / "out"
+    (out / "runs").mkdir(parents=True)
+    inner = save_scan(out / "runs" / "c.npz", 3)
+    (out / "config.json").write_text('{"job": "sweep"}')
+    with pytest.raises(InputError, match="--inputs"):
+        done(sweep([inner], out, overwrite=True))
+    assert inner.exists()
 
 
 @pytest.mark.full

@@ -8,9 +8,13 @@ by the slices and not by the slabs, which differ with the memory that is free.
 from __future__ import annotations
 
 import json
+import os
 import re
+import secrets
 import shutil
+import socket
 from collections.abc import Collection, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +31,8 @@ from rift_cl.io.output import atomic_path, check_space, make_folder, write_json,
 Floats = NDArray[np.float32]
 _SLAB = re.compile(r"(\d{5,})-(\d{5,})\.npy")
 _RUN = "run.json"
+# Which process spreads the run over workers; decides no slice.
+_TOKEN = "token"
 
 
 class SlabFolder:
@@ -39,6 +45,8 @@ class SlabFolder:
 
     def __init__(self, path: Path, shape: tuple[int, int, int]) -> None:
         self.path, self.shape = path, shape
+        self.token: str | None = None
+        """Slabs are kept only while the run is marked with it; None: without a look."""
 
     @property
     def begun(self) -> bool:
@@ -56,6 +64,16 @@ class SlabFolder:
         # The slabs stay until the volume that is made of them is complete.
         check_space(self.path / _RUN, 2 * 4 * int(np.prod(self.shape)))
         write_json(self.path / _RUN, dict(run))
+
+    def mark(self) -> str:
+        """Mark the run anew, so that workers of an earlier one keep nothing in it any more.
+
+        Returns:
+            The token of its workers.
+        """
+        token = secrets.token_hex(16)
+        write_json(self.path / _RUN, {**self._recorded(), _TOKEN: token})
+        return token
 
     def axis(self) -> tuple[float, float, bool] | None:
         """The rotation axis of the run that was cut off, if it had one.
@@ -83,7 +101,11 @@ class SlabFolder:
             CheckpointError: it does not; the sentence names what differs.
         """
         before, now = (
-            {what: _renamed(str(fact), names or {}) for what, fact in facts.items()}
+            {
+                what: _renamed(str(fact), names or {})
+                for what, fact in facts.items()
+                if what != _TOKEN
+            }
             for facts in (self._recorded(), run)
         )
         check_same(self.path, "the run that was cut off", before, now)
@@ -111,10 +133,25 @@ class SlabFolder:
         return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
     def save(self, start: int, slices: Floats) -> None:
-        """Keep a slab."""
-        stop = start + len(slices)
-        with atomic_path(self.path / f"{start:05d}-{stop:05d}.npy") as part, part.open("wb") as out:
-            np.save(out, np.ascontiguousarray(slices, np.float32), allow_pickle=False)
+        """Keep a slab.
+
+        Raises:
+            CheckpointError: the run in the folder is not that of ``token`` any more.
+        """
+        path = self.path / f"{start:05d}-{start + len(slices):05d}.npy"
+        # Two workers may make the same slab at a time, where one was given up too early.
+        own = path.with_name(f"{path.stem}-{socket.gethostname()}-{os.getpid()}.npy")
+        try:
+            with atomic_path(own) as part, part.open("wb") as out:
+                np.save(out, np.ascontiguousarray(slices, np.float32), allow_pickle=False)
+            if self.token is not None and self._recorded().get(_TOKEN) != self.token:
+                raise CheckpointError(f"{self.path}: the run was begun anew; this slab is dropped")
+            with writing(path):
+                own.replace(path)
+        except BaseException:
+            with suppress(OSError):
+                own.unlink(missing_ok=True)
+            raise
 
     def slabs(self, numbers: Collection[int] | None = None) -> Iterator[tuple[int, Floats]]:
         """Slabs and the numbers of their first slices, in order; no slice comes twice.

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rift_cl.cluster.address import ClusterAddress
 from rift_cl.cluster.on_worker import token
 from rift_cl.cluster.workers import Task, Workers, cluster_workers
-from rift_cl.commands.options import absolute_paths
+from rift_cl.commands.options import absolute_files
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.progress import Report
 
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
 # Tasks that a worker gets at least, and slices of one at most: a lost worker loses no more.
 _SHARES, _MOST = 4, 64
-# Options that may name files, besides those that are paths.
-_MAY_BE_FILES = "theta", "flats", "darks"
 
 
 class Receipt(NamedTuple):
@@ -56,11 +54,12 @@ def spread(job: Reconstruction) -> Iterator[Report]:
     with cluster_workers(settings.cluster, job.device, settings.device) as workers:
         job.announce(workers.sentence)
         theirs, names = _of_workers(settings)
+        run = kept.mark()
         with token(kept.path) as seen:
             workers.check([theirs.out, *_files(theirs), seen])
         used: set[str] = set()
         done, lost = -1, 0
-        for come in workers.each(make_slices, _tasks(kept.missing(), workers, theirs, names)):
+        for come in workers.each(make_slices, _tasks(kept.missing(), workers, theirs, names, run)):
             if come is not None:
                 used.add(come[1].device)
                 job.take(*come[1][:3])
@@ -79,25 +78,25 @@ def spread(job: Reconstruction) -> Iterator[Report]:
 
 
 def _tasks(
-    missing: list[slice], workers: Workers, settings: ReconstructSettings, names: Mapping[str, str]
+    missing: list[slice],
+    workers: Workers,
+    settings: ReconstructSettings,
+    names: Mapping[str, str],
+    run: str,
 ) -> Iterator[Task]:
     """Runs of slices, as many as keep all workers busy to the end."""
-    count = sum(run.stop - run.start for run in missing)
+    count = sum(wanted.stop - wanted.start for wanted in missing)
     each = max(1, min(_MOST, -(-count // (_SHARES * len(workers)))))
-    for run in missing:
-        for first in range(run.start, run.stop, each):
-            stop = min(first + each, run.stop)
-            yield Task(f"slices {first} to {stop}", (settings, tuple(names.items()), first, stop))
+    for wanted in missing:
+        for first in range(wanted.start, wanted.stop, each):
+            stop = min(first + each, wanted.stop)
+            given = settings, tuple(names.items()), run, first, stop
+            yield Task(f"slices {first} to {stop}", given)
 
 
 def _of_workers(settings: ReconstructSettings) -> tuple[ReconstructSettings, dict[str, str]]:
     """The settings as workers take them, and what this process calls the files that they name."""
-    files: dict[str, Any] = {}
-    for name in _MAY_BE_FILES:
-        value = getattr(settings, name)
-        if value is not None and Path(value).exists():
-            files[name] = str(Path(value).absolute())
-    theirs = dataclasses.replace(absolute_paths(settings), **files)
+    theirs = absolute_files(settings)
     names = {
         str(getattr(theirs, field.name)): str(getattr(settings, field.name))
         for field in dataclasses.fields(settings)
@@ -118,20 +117,25 @@ def _files(settings: ReconstructSettings) -> list[Path]:
 
 
 def make_slices(
-    settings: ReconstructSettings, names: tuple[tuple[str, str], ...], first: int, stop: int
+    settings: ReconstructSettings,
+    names: tuple[tuple[str, str], ...],
+    run: str,
+    first: int,
+    stop: int,
 ) -> Receipt:
     """Make and keep some slices of a run that has begun; called on a worker.
 
     Args:
         settings: the run's.
         names: files by their paths, and what the process that began the run calls them.
+        run: the token of the run, without which nothing is kept.
         first: the first slice, counted from the first row that was asked for.
         stop: the one after the last.
 
     Raises:
         RiftError: the worker cannot do it.
     """
-    job = _joined(settings, names)
+    job = _joined(settings, names, run)
     job.metrics, job.source.clean.zingers = {}, 0
     job.inversion.residuals.clear()
     for _ in job.work_on([slice(first, stop)]):
@@ -142,8 +146,14 @@ def make_slices(
 
 
 @lru_cache(maxsize=1)
-def _joined(settings: ReconstructSettings, names: tuple[tuple[str, str], ...]) -> Reconstruction:
-    """The run, which this worker has joined; it stays open for its next slices."""
+def _joined(
+    settings: ReconstructSettings, names: tuple[tuple[str, str], ...], run: str
+) -> Reconstruction:
+    """The run, which this worker has joined; it stays open for its next slices.
+
+    A later run of the same settings has another token: files of the same names may hold else by
+    then, such as angles that were mended.
+    """
     from rift_cl.commands.devices.driver_test import meet_driver
     from rift_cl.commands.reconstruct.job import Reconstruction
 
@@ -151,4 +161,5 @@ def _joined(settings: ReconstructSettings, names: tuple[tuple[str, str], ...]) -
     for _ in meet_driver(job.device):
         pass
     job.join(dict(names))
+    job.kept.token = run
     return job

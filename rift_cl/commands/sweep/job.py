@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from rift_cl.cl.device import Device
-from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.commands.sweep.one_run import is_done, run, steps
 from rift_cl.commands.sweep.report import Row, sweep_page, write_table
@@ -43,9 +42,14 @@ class Sweep:
         self.folder = RunFolder(
             settings.out, "sweep", overwrite=settings.overwrite, resume=settings.resume
         )
+        if not settings.resume:
+            for path in settings.inputs:
+                self.folder.check_kept("inputs", path, _RUNS)
         self.rows: list[Row] = []
         self.metrics: dict[str, Any] = {}
         self.announce: Callable[[str], None] = lambda line: None
+        # What decided the runs of earlier sweeps in the folder, by their names.
+        self._before: dict[str, Any] = {}
         # Why runs could not be done, by their names.
         self._refused: dict[str, str] = {}
 
@@ -94,7 +98,7 @@ class Sweep:
         before = len(self.runs) - len(left)
         for done, each in enumerate(left, before):
             try:
-                for report in steps(each.job, self._begun(each)):
+                for report in steps(each.job, each.settings):
                     yield self._report(done, report.done / max(report.total, 1))
             except InputError as error:
                 self._refuse(each, str(error))
@@ -116,7 +120,7 @@ class Sweep:
             for each in left:
                 own: dict[str, Any] = {"device": None, "memory": None} if local else {}
                 own = {name: value for name, value in own.items() if hasattr(each.settings, name)}
-                given = dataclasses.replace(absolute_paths(self._begun(each)), **own)
+                given = dataclasses.replace(each.settings, **own)
                 tasks.append(Task(f"run {each.name}", (each.job, given)))
             by_name = {f"run {each.name}": each for each in left}
             for come in workers.each(run, tasks):
@@ -127,10 +131,6 @@ class Sweep:
                 done += 1
                 yield self._report(done)
 
-    def _begun(self, each: Variation) -> Any:
-        """A run's settings; it goes on where it was begun before."""
-        return dataclasses.replace(each.settings, resume=each.settings.out.exists())
-
     def _refuse(self, each: Variation, why: str) -> None:
         self._refused[each.name] = why
         self.announce(f"run {each.name}: {why}")
@@ -140,7 +140,11 @@ class Sweep:
         return Report(done, count, "runs", work=(done + min(more, 1.0), count))
 
     def _record(self) -> dict[str, Any]:
-        """What decides each run, by its name."""
+        """What decides each run that is there or will be, by its name."""
+        return {**self._before, **self._decisive()}
+
+    def _decisive(self) -> dict[str, Any]:
+        """What decides each run of this sweep, by its name."""
         return {
             each.name: json.loads(json.dumps(each.settings.decisive(), default=str))
             for each in self.runs
@@ -156,11 +160,11 @@ class Sweep:
             return
         try:
             path = self.settings.out / "config.json"
-            before = dict(json.loads(path.read_text(encoding="utf-8"))["runs"])
+            self._before = dict(json.loads(path.read_text(encoding="utf-8"))["runs"])
         except (OSError, ValueError, LookupError, TypeError):
             return
-        for name, now in self._record().items():
-            if name in before and before[name] != now:
+        for name, now in self._decisive().items():
+            if self._before.get(name, now) != now:
                 raise CheckpointError(
                     f"{self.settings.out}: its run {name} had other settings: repeat the options, "
                     "or begin anew with --overwrite"

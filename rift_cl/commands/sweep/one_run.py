@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ PICTURE = "view.jpg"
 
 
 def steps(job: str, settings: Any) -> Iterator[Report]:
-    """Do a run, or go on with it; a report after each of its steps.
+    """Do a run, or go on with it where it was begun; a report after each of its steps.
 
     Args:
         job: the command.
@@ -26,6 +27,8 @@ def steps(job: str, settings: Any) -> Iterator[Report]:
     Raises:
         RiftError: it cannot be done.
     """
+    # Seen here and now: a worker that was lost may have begun it.
+    settings = replace(settings, resume=settings.out.exists())
     if job == "reconstruct":
         from rift_cl.commands.reconstruct.choice import reconstruction_of
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rift_cl.commands.fit.kind import kind_of_fit
+from rift_cl.commands.options import absolute_files
 from rift_cl.commands.run_folder.saved_settings import begun_settings, parsed_settings
 from rift_cl.commands.sweep.settings import SweepSettings
 from rift_cl.errors import InputError
@@ -46,12 +47,13 @@ def variations(sweep: SweepSettings) -> list[Variation]:
         InputError: a name or a value is none of the command's, or two runs are the same.
     """
     job, kind = _job(sweep)
-    fixed = {name: _one(name, values) for name, values in map(_named, sweep.fixed)}
-    varied = dict(map(_named, sweep.vary))
-    twice = sorted({*fixed} & {*varied})
-    if twice or len(varied) < len(sweep.vary):
-        name = twice[0] if twice else "a name"
-        raise InputError(f"{name} is given twice: once in --vary or once in --fixed is enough")
+    named = [_named(text) for text in (*sweep.fixed, *sweep.vary)]
+    names = [name for name, _ in named]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"{twice} is given twice: once in --vary or once in --fixed is enough")
+    fixed = {name: _one(name, values) for name, values in named[: len(sweep.fixed)]}
+    varied = dict(named[len(sweep.fixed) :])
     earlier = begun_settings(sweep.base, fixed.get("preset"), job, kind)
     count = len(sweep.inputs)
     for several_values in varied.values():
@@ -71,7 +73,8 @@ def variations(sweep: SweepSettings) -> list[Variation]:
         first = "scan" if job == "reconstruct" else "capture"
         given |= {first: str(path), "out": str(sweep.out / "runs" / name)}
         settings = parsed_settings(given, job, kind, earlier=earlier)
-        settings = replace(settings, device=sweep.device)
+        # Whole paths, for a worker in another folder; and so that a sweep goes on anywhere.
+        settings = absolute_files(replace(settings, device=sweep.device))
         settings.check()
         runs.append(Variation(name, job, shown, settings))
     _check_names(runs)
