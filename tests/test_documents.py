@@ -40,6 +40,7 @@ TUTORIALS = {
     "scan": {"--method tv --nonnegative": "--method tv --nonnegative --steps 5"},
     "own_parts": {
         "steps=60": "steps=10",
+        "sample.ornament()": "sample.ornament_off_path()",
         "steps=200, splats=1000, downscale=4": "steps=2, splats=100, downscale=8",
     },
     "photographs": {
