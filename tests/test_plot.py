@@ -67,6 +67,7 @@ def test_the_window_is_stated():
     images = [np.array([[-0.5, 2.0]]), np.array([[0.0, 3.25]])]
     assert "Display window −0.5 to 3.25" in texts(grid(images))
     assert "Display window 0 to 2" in texts(grid(images, window=(0, 2)))
+    assert "Display window 0 to 2 per mm" in texts(grid(images, window=(0, 2), unit="per mm"))
     assert "Display window 7 to 8" in texts(grid([np.full((3, 3), 7)]))
     assert not any("Display" in text for text in texts(grid([np.zeros((3, 3, 3))])))
 
