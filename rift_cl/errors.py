@@ -6,7 +6,27 @@ the package is a defect of the package.
 
 from __future__ import annotations
 
+import numbers
 import reprlib
+import typing
+from collections import abc
+
+_NUMBERS = (numbers.Real, numbers.Integral)
+# What is of a type by Python's reckoning and not by anybody else's.
+_NOT_MEANT: dict[type, type | tuple[type, ...]] = {
+    numbers.Real: bool,
+    numbers.Integral: bool,
+    abc.Sequence: (str, bytes),
+    abc.Iterable: (str, bytes),
+}
+_IN_WORDS: dict[type, str] = {
+    numbers.Real: "a number",
+    numbers.Integral: "a whole number",
+    abc.Sequence: "a list",
+    abc.Iterable: "a list",
+    abc.Mapping: "values by name (a dict)",
+    str: "a text",
+}
 
 
 class RiftError(Exception):
@@ -136,8 +156,13 @@ def check_type(where: str, name: str, value: object, wanted: type) -> None:
     Raises:
         WrongTypeError: it is of another.
     """
-    if not isinstance(value, wanted):
+    one: typing.Any = value
+    if wanted in _NUMBERS and getattr(one, "shape", None) == ():
+        # An array without axes is a number.
+        one = one.item()
+    passes_by_chance = isinstance(one, _NOT_MEANT.get(wanted, ()))
+    if passes_by_chance or not isinstance(one, wanted):
         raise WrongTypeError(
-            f"{where}: {name} is {reprlib.repr(value)}, a {type(value).__name__}; wanted: "
-            f"{wanted.__name__}"
+            f"{where}: {name} is {reprlib.repr(value)} (type {type(value).__name__}), wanted "
+            f"{_IN_WORDS.get(wanted, wanted.__name__)}"
         )

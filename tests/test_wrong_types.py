@@ -1,5 +1,8 @@
 """What is of a type that makes no sense is refused by its name, not found out by chance."""
 
+from collections.abc import Iterable, Mapping, Sequence
+from numbers import Integral, Real
+
 import numpy as np
 import pytest
 
@@ -45,6 +48,29 @@ def test_other_targets_than_targets_are_named():
 
 
 def test_the_sentence_says_what_was_given_and_what_is_wanted():
-    with pytest.raises(WrongTypeError, match="f: x is 'a', a str; wanted: int"):
+    with pytest.raises(WrongTypeError, match=r"f: x is 'a'.*str.*wanted int"):
         check_type("f", "x", "a", int)
     check_type("f", "x", True, int)
+
+
+@pytest.mark.parametrize(
+    ("value", "wanted", "words"),
+    [
+        (np.ones(2), Real, "a number"),
+        (True, Real, "a number"),
+        (True, Integral, "a whole number"),
+        (np.array(0.5), Integral, "a whole number"),
+        ("views", Sequence, "a list"),
+        ("balls", Iterable, "a list"),
+        (3, Mapping, "a dict"),
+    ],
+)
+def test_what_is_wanted_is_said_in_plain_words(value, wanted, words):
+    with pytest.raises(WrongTypeError, match=words):
+        check_type("f", "x", value, wanted)
+
+
+def test_an_array_without_axes_is_a_number():
+    assert rift.Ramp(cutoff=np.array(0.5)) == rift.Ramp(cutoff=0.5)
+    assert rift.HighPass(np.array(2)) == rift.HighPass(2)
+    check_type("f", "x", np.array(3), Integral)

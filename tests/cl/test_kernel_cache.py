@@ -238,7 +238,11 @@ def test_rebuilt_program_may_differ_from_the_one_before(folder):
     assert path.read_bytes() == b"another"
 
 
-@pytest.mark.parametrize("content", [None, b"", b"[1]", b"\xff\xfe", b"null", b'{"AB/P/program'])
+@pytest.mark.parametrize(
+    "content",
+    [None, b"", b"[1]", b"\xff\xfe", b"null", b'{"AB/P/program', b"[" * 200_000, b" " * (1 << 25)],
+    ids=["none", "empty", "list", "no text", "null", "cut", "nested", "large"],
+)
 def test_without_a_readable_record_nothing_is_trusted(folder, content):
     path = _program(folder, "AB/P", b"from a run that never ended")
     if content is not None:

@@ -31,6 +31,8 @@ FORGED = {
     "objects": header((2, 3, 4), "|O") + bytes(192),
     "an archive": archive(),
     "nothing": b"",
+    "a header of brackets": b"\x93NUMPY\x01\x00\x06\x00(((((\n",
+    "a header without an end": b"\x93NUMPY\x01\x00\x06\x00''''''",
     "cut short": header((2, 3, 4)) + bytes(95),
 }
 

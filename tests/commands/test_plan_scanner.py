@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -64,6 +65,14 @@ def test_vectors_are_those_of_the_scanner_at_these_places(on_orbit):
     wanted = Cone(azimuths + np.pi / 2, ROWS, BINS, PITCH, R, S).vectors()
     for name in ("source", "middle", "across", "down"):
         np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), atol=1e-3)
+
+
+def test_a_plan_of_no_scanner_keeps_no_vectors_of_an_earlier_one(on_orbit, tmp_path):
+    out = tmp_path / "out"
+    shutil.copytree(on_orbit, out)
+    words = ["plan", "--views", 2, "--band", 0.03, "--out", out, "--overwrite", "--quiet"]
+    assert main([str(word) for word in words]) == 0
+    assert (out / "transforms.json").exists() and not (out / "vectors.txt").exists()
 
 
 def test_tilts_cross_planes_that_the_orbit_does_not(cone, on_orbit, tmp_path, capsys):

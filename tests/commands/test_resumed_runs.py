@@ -2,11 +2,19 @@
 
 import json
 import os
+import shutil
 
 import numpy as np
 import pytest
 
+import rift_cl
 from rift_cl.commands.cli import main
+from rift_cl.commands.reconstruct.kept_slabs import SlabFolder
+from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.commands.run_folder import run_folder
+from rift_cl.commands.run_folder.run_folder import RunFolder
+from rift_cl.commands.run_folder.saved_settings import saved_settings
+from rift_cl.errors import CheckpointError, InputError, OutputError
 from rift_cl.io import output
 from rift_cl.io.scenes.splat_scene import SplatScene
 
@@ -41,7 +49,10 @@ FULL = pytest.mark.full
 )
 def words(request):
     """A command and its options, small."""
-    name = request.param
+    return words_of(request.param, request)
+
+
+def words_of(name, request):
     if name == "render":
         more = ["--frames", 3, "--size", 16, 12, "--film", "apng", "--depth"]
         return [name, request.getfixturevalue("scene"), *more]
@@ -124,15 +135,103 @@ def test_a_plan_that_is_finished_says_so(tmp_path, capsys):
     assert str(out) in capsys.readouterr().err
 
 
-def test_a_run_whose_input_has_changed_is_not_finished(scene, tmp_path, capsys):
+def test_a_run_whose_input_has_changed_is_not_finished(scene, tmp_path, monkeypatch, capsys):
     copy, out = tmp_path / "copy.ply", tmp_path / "out"
     copy.write_bytes(scene.read_bytes())
     words = ["render", copy, "--frames", 1, "--size", 8, 8]
     assert run(words, out) == 0
-    later = (out / "config.json").stat().st_mtime_ns + 1_000_000
-    os.utime(copy, ns=(later, later))
+    moment = copy.stat().st_mtime_ns
+    for other in (moment - 10**9, moment + 10**9):
+        os.utime(copy, ns=(other, other))
+        assert run(words, out, "--resume") == INPUT
+        assert "copy.ply" in capsys.readouterr().err
+    os.utime(copy, ns=(moment, moment))
+    monkeypatch.chdir(tmp_path)
+    assert run(["render", "copy.ply", *words[2:]], out, "--resume") == 0
+    (tmp_path / "other").mkdir()
+    shutil.copy2(copy, tmp_path / "other")
+    monkeypatch.chdir(tmp_path / "other")
+    assert run(["render", "copy.ply", *words[2:]], out, "--resume") == INPUT
+
+
+def test_an_input_that_changes_during_the_run_is_told(scene, tmp_path, monkeypatch, capsys):
+    from rift_cl.commands.render.job import Render
+
+    copy, out, finish = tmp_path / "copy.ply", tmp_path / "out", Render._finish
+    copy.write_bytes(scene.read_bytes())
+
+    def late(*given):
+        os.utime(copy, ns=(10**18, 10**18))
+        finish(*given)
+
+    words = ["render", copy, "--frames", 1, "--size", 8, 8]
+    with monkeypatch.context() as patch:
+        patch.setattr(Render, "_finish", late)
+        assert run(words, out) == 0
     assert run(words, out, "--resume") == INPUT
     assert "copy.ply" in capsys.readouterr().err
+
+
+def test_files_that_are_named_by_texts_and_in_folders_are_inputs(tmp_path):
+    (tmp_path / "flats").mkdir()
+    files = [tmp_path / "angles.txt", tmp_path / "flats" / "0.tif"]
+    for file in files:
+        file.write_text("1")
+    out = tmp_path / "flats" / "out"
+    scan = {"flats": str(tmp_path / "flats"), "darks": "exchange/dark"}
+    settings = ReconstructSettings(tmp_path / "scan", theta=str(files[0]), out=out, **scan)
+    RunFolder(out, "reconstruct", settings=settings).make()
+    assert difference_of(settings) is None
+    for file in files:
+        moment = file.stat().st_mtime_ns
+        os.utime(file, ns=(moment, moment - 10**9))
+        assert "was changed" in difference_of(settings)
+        os.utime(file, ns=(moment, moment))
+
+
+def difference_of(settings):
+    return RunFolder(settings.out, "reconstruct", settings=settings, resume=True)._other
+
+
+@pytest.mark.parametrize("name", ["render", "reconstruct"])
+def test_a_run_of_another_version_is_not_gone_on_with(name, request, tmp_path, capsys):
+    words, out = words_of(name, request), tmp_path / "out"
+    assert run(words, out) == 0
+    text = (out / "config.json").read_text()
+    (out / "config.json").write_text(text.replace(rift_cl.__version__, "0.0.1"))
+    assert run(words, out, "--resume") == INPUT
+    assert "0.0.1" in capsys.readouterr().err
+
+
+def test_a_run_killed_in_its_last_write_keeps_its_frames(scene, tmp_path, monkeypatch):
+    words, out = ["render", scene, "--frames", 2, "--size", 8, 8], tmp_path / "out"
+    write = run_folder.write_json
+
+    def killed(path, value):
+        if value.get("complete"):
+            raise KilledError
+        write(path, value)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(run_folder, "write_json", killed)
+        with pytest.raises(KilledError):
+            run(words, out)
+    frames = {path: path.stat().st_mtime_ns for path in (out / "frames").iterdir()}
+    assert run(words, out, "--resume") == 0
+    assert {path: path.stat().st_mtime_ns for path in frames} == frames
+
+
+@pytest.mark.parametrize("content", [b"[" * 200_000, b'{"job": 1'])
+def test_a_forged_record_holds_no_run(tmp_path, content):
+    config = tmp_path / "config.json"
+    config.write_bytes(content)
+    with pytest.raises(OutputError, match="other things"):
+        RunFolder(tmp_path, "render", overwrite=True)
+    with pytest.raises(InputError, match=r"config\.json"):
+        saved_settings(config, "reconstruct", ReconstructSettings)
+    (tmp_path / "run.json").write_bytes(content)
+    with pytest.raises(CheckpointError, match=r"run\.json"):
+        SlabFolder(tmp_path, (1, 1, 1)).axis()
 
 
 def test_frames_that_are_there_are_not_drawn_again(scene, tmp_path, monkeypatch):
@@ -141,8 +240,7 @@ def test_frames_that_are_there_are_not_drawn_again(scene, tmp_path, monkeypatch)
     words, out = ["render", scene, "--frames", 3, "--size", 8, 8], tmp_path / "out"
     assert run(words, out) == 0
     record = json.loads((out / "config.json").read_text())
-    unfinished = {"job": "render", "complete": False, "cleared": True, "asked": record["asked"]}
-    (out / "config.json").write_text(json.dumps(unfinished))
+    (out / "config.json").write_text(json.dumps({**record, "complete": False, "cleared": True}))
     (out / "frames" / "0001.png").unlink()
     drawn, picture = [], Renderer.picture
     monkeypatch.setattr(

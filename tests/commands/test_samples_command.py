@@ -3,6 +3,7 @@
 import hashlib
 import io
 import urllib.request
+from pathlib import Path
 from urllib.error import URLError
 
 import pytest
@@ -103,6 +104,26 @@ def test_a_download_that_broke_off_goes_on(tmp_path):
     assert server.asked == ["bytes=1000-"]
     assert path.read_bytes() == DATA
     assert list(tmp_path.iterdir()) == [path]
+
+
+class Broken(Answer):
+    """An answer whose connection breaks."""
+
+    def read(self, _):
+        raise ConnectionResetError("reset by peer")
+
+
+def test_a_broken_connection_is_no_fault_of_the_disk(tmp_path):
+    with pytest.raises(OutputError, match=r"example\.org.*reset by peer"):
+        download(URL, tmp_path / "a", len(DATA), SHA, open_url=lambda _: Broken(b"", 200))
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a full disk, on Linux")
+def test_a_full_disk_is_no_fault_of_the_connection(tmp_path):
+    (tmp_path / "a.part").symlink_to("/dev/full")
+    with pytest.raises(OutputError, match=r"a\.part: cannot be written") as told:
+        download(URL, tmp_path / "a", len(DATA), SHA, open_url=Server())
+    assert "example.org" not in str(told.value)
 
 
 def test_a_server_without_ranges_begins_anew(tmp_path):

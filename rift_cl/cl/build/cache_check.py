@@ -23,6 +23,8 @@ _TOUCHED = "last_accessed"
 # Folders down to a program's own: PoCL names it by a hash that is cut in two.
 _PROGRAM_DEPTH = 2
 _UNKNOWN, _UNREADABLE = -1, -2
+# A hundred bytes for each of some hundred thousand files.
+_MOST_BYTES = 1 << 24
 
 
 def remove_damaged(folder: Path) -> int:
@@ -124,8 +126,11 @@ def _checksum(path: str) -> int:
 
 def _read(folder: Path) -> dict[str, int] | None:
     try:
-        known = json.loads(own_file(folder / _RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        path = own_file(folder / _RECORD)
+        if path.stat().st_size > _MOST_BYTES:
+            return None
+        known = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
         return None
     return known if isinstance(known, dict) else None
 

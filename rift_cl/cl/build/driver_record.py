@@ -40,7 +40,7 @@ def read_record(driver: dict[str, str]) -> dict[str, Any]:
     """What is known of a driver; empty where nothing is, or what was kept cannot be read."""
     try:
         record = json.loads(own_file(_path(driver)).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return {}
     wanted = {"format": _FORMAT, "rift_cl": __version__, "driver": driver}
     known = isinstance(record, dict) and wanted.items() <= record.items()

@@ -170,6 +170,7 @@ class Planning:
         out, order = self.settings.out, found.order
         self.folder.make()
         self.folder.mark()
+        self.folder.drop("vectors.txt")
         names = [f"images/{number:04d}.jpg" for number in range(len(found))]
         cameras = [found.cameras[place] for place in order]
         types = [found.types[place] for place in order]

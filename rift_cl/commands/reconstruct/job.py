@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl import __version__
 from rift_cl.cl.device import Device
 from rift_cl.commands.reconstruct.clean_rows import LoadedRows
 from rift_cl.commands.reconstruct.decided import decided_settings
@@ -216,7 +217,12 @@ class Reconstruction:
 
     def _facts(self) -> dict[str, str]:
         """What decides the slices."""
-        return {**self.settings.decisive(), **self.source.identity(), "volume": str(self.shape)}
+        return {
+            "rift_cl": __version__,
+            **self.settings.decisive(),
+            **self.source.identity(),
+            "volume": str(self.shape),
+        }
 
     @property
     def _what(self) -> str:

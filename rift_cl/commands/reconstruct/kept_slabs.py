@@ -7,7 +7,6 @@ by the slices and not by the slabs, which differ with the memory that is free.
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import secrets
@@ -25,7 +24,9 @@ from rift_cl.commands.reconstruct.report import PREVIEW_PICTURE
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.volume import volume_path
 from rift_cl.commands.run_folder.run_folder import RunFolder, difference, is_unfinished
-from rift_cl.errors import CheckpointError, OutputError
+from rift_cl.errors import CheckpointError, InputError, OutputError
+from rift_cl.io.boundary import reading
+from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import atomic_path, check_space, make_folder, write_json, writing
 
 Floats = NDArray[np.float32]
@@ -112,12 +113,9 @@ class SlabFolder:
 
     def _recorded(self) -> dict[str, Any]:
         try:
-            record = json.loads((self.path / _RUN).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise CheckpointError(
-                f"{self.path}: its {_RUN} cannot be read ({error}): begin anew with --overwrite"
-            ) from error
-        return record if isinstance(record, dict) else {}
+            return dict(read_json_object(self.path / _RUN).values)
+        except InputError as error:
+            raise CheckpointError(f"{error}: begin anew with --overwrite") from error
 
     @property
     def done(self) -> int:
@@ -172,11 +170,10 @@ class SlabFolder:
                 continue
             try:
                 # Mapped first, so that nothing is allocated for a size that is only claimed.
-                slab = np.load(path, mmap_mode="r", allow_pickle=False)
-            except (OSError, ValueError, EOFError) as error:
-                raise CheckpointError(
-                    f"{path}: is damaged ({error}); remove it and go on with --resume"
-                ) from error
+                with reading(path, "the slab"):
+                    slab = np.load(path, mmap_mode="r", allow_pickle=False)
+            except InputError as error:
+                raise CheckpointError(f"{error}; remove it and go on with --resume") from error
             if not isinstance(slab, np.ndarray):
                 raise CheckpointError(f"{path}: holds no array; remove it and go on with --resume")
             if slab.shape != (stop - start, *self.shape[1:]) or slab.dtype != np.float32:
@@ -226,10 +223,10 @@ def finished_run(settings: ReconstructSettings) -> dict[str, Any] | None:
     One whose volume is not there in the settings' format does not count.
     """
     try:
-        config = json.loads((settings.out / "config.json").read_text(encoding="utf-8"))
+        config = read_json_object(settings.out / "config.json").values
         finished = config["complete"] and volume_path(settings).exists()
         return dict(config["run"]) if finished else None
-    except (OSError, ValueError, LookupError, TypeError):
+    except (ValueError, LookupError, TypeError):
         return None
 
 

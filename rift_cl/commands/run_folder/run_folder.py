@@ -7,6 +7,7 @@ with settings at their defaults folded away.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import platform
@@ -23,12 +24,15 @@ from rift_cl import __version__
 from rift_cl.cl.device import Device
 from rift_cl.commands.run_folder.saved_settings import options_of, record_of
 from rift_cl.errors import CheckpointError, InputError, OutputError
+from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import PART, json_text, make_folder, write_json, write_text, writing
 from rift_cl.report.html_page import Page
 
 _CONFIG = "config.json"
 # Says of an unfinished run that nothing of an earlier one is left.
 _CLEARED = "cleared"
+# Texts that name a file or a folder, or a part of the scan.
+_MAY_BE_FILES = ("theta", "flats", "darks")
 # Settings that change nothing of what comes out.
 _FREE = ("cluster", "config", "device", "dry_run", "out", "overwrite", "resume", "view")
 
@@ -63,6 +67,8 @@ class RunFolder:
         self.path = path
         self._job = job
         self._asked = None if settings is None else _asked(settings)
+        # As it is when the run begins: what changes meanwhile is found by the next one.
+        self._read = None if settings is None else _stamps(settings, path)
         self._overwrite = overwrite
         above = next(parent for parent in path.absolute().parents if parent.exists())
         if not above.is_dir():
@@ -76,10 +82,11 @@ class RunFolder:
                 f"{path}: holds an earlier run; name another folder (--out) or add --overwrite"
             )
         looks = used and resume and settings is not None
-        self._other = self._other_than(settings) if looks else None
+        self._other = self._difference() if looks else None
         there = looks and self._other is None
         self.finished = there and self.is_complete
         self.unfinished = there and _record_of(path).get(_CLEARED) is True
+        self._cleared = self.unfinished
 
     @classmethod
     def of(cls, settings: Any, job: str) -> RunFolder:
@@ -104,29 +111,21 @@ class RunFolder:
             )
         return folder
 
-    def _other_than(self, settings: Any) -> str | None:
+    def _difference(self) -> str | None:
         """Why the run that is there is not that of the settings, in words; None where it may be."""
         if not (self.path / _CONFIG).is_file():
             return None
-        before = _record_of(self.path).get("asked")
+        record = _record_of(self.path)
+        before, read = record.get("asked"), record.get("read")
         if not isinstance(before, dict):
             return "the run there does not say what it was asked for: name another --out"
-        differs = difference(_decisive(before), self._asked or {})
+        run = {"rift_cl": record.get("rift_cl"), **_decisive(before)}
+        differs = difference(run, {"rift_cl": __version__, **(self._asked or {})})
         if differs is not None:
             return f"the run there {differs}"
-        begun = (self.path / _CONFIG).stat().st_mtime
-        changed = next((read for read in _read_by(settings) if self._is_newer(read, begun)), None)
-        return None if changed is None else f"{changed} was changed since: name another --out"
-
-    def _is_newer(self, read: Path, moment: float) -> bool:
-        """Whether a file, or one in a folder, was changed since, but for this run's own."""
-        own = self.path.resolve()
-        for path in read.rglob("*") if read.is_dir() else [read]:
-            with suppress(OSError):
-                newer = path.is_file() and path.stat().st_mtime > moment
-                if newer and not path.resolve().is_relative_to(own):
-                    return True
-        return False
+        was, now = read if isinstance(read, dict) else {}, self._read or {}
+        changed = sorted(name for name in {*was, *now} if was.get(name) != now.get(name))
+        return f"{changed[0]} was changed since: name another --out" if changed else None
 
     @property
     def is_complete(self) -> bool:
@@ -146,8 +145,10 @@ class RunFolder:
         Args:
             **decided: what the configuration is to hold already, by name.
         """
-        asked = {} if self._asked is None else {"asked": self._asked}
-        write_json(self.path / _CONFIG, {"job": self._job, "complete": False, **asked, **decided})
+        mark = {"job": self._job, "complete": False, "rift_cl": __version__}
+        asked = {} if self._asked is None else {"asked": self._asked, "read": self._read}
+        cleared = {_CLEARED: True} if self._cleared else {}
+        write_json(self.path / _CONFIG, {**mark, **asked, **cleared, **decided})
 
     def discard(self) -> None:
         """Remove the folder if a failed run left nothing in it but the mark."""
@@ -171,7 +172,8 @@ class RunFolder:
         if not self.unfinished:
             self.mark()
             self.drop(*patterns)
-            self.mark(**{_CLEARED: True})
+            self._cleared = True
+            self.mark()
 
     def check_kept(self, name: str, file: Path, *patterns: str) -> None:
         """Make sure that what is read is not what ``drop`` removes.
@@ -215,6 +217,7 @@ class RunFolder:
             **decided: what else the configuration is to hold, by name.
         """
         given = {} if asked is None else {"asked": _changed(asked)}
+        given |= {} if self._read is None else {"read": self._read}
         config = {
             "job": self._job,
             "complete": True,
@@ -251,10 +254,9 @@ def environment(device: Device) -> dict[str, str]:
 def _record_of(path: Path) -> dict[str, Any]:
     """What a folder says of the run that it holds; nothing where it holds none."""
     try:
-        record = json.loads((path / _CONFIG).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return dict(read_json_object(path / _CONFIG).values)
+    except InputError:
         return {}
-    return record if isinstance(record, dict) else {}
 
 
 def is_unfinished(path: Path, job: str) -> bool:
@@ -265,6 +267,9 @@ def is_unfinished(path: Path, job: str) -> bool:
 
 def difference(before: Mapping[str, Any], run: Mapping[str, Any]) -> str | None:
     """How a run differs from the one before by what decides it, the first of it, in words."""
+    made, now = before.get("rift_cl"), run.get("rift_cl")
+    if made != now:
+        return f"was made by version {made or 'unknown'}, this is {now}: install that one"
     for name in sorted({*before, *run}):
         if before.get(name) != run.get(name):
             had, has = before.get(name), run.get(name)
@@ -292,7 +297,32 @@ def _read_by(settings: Any) -> Iterator[Path]:
         if option.name in _FREE:
             continue
         several = option.value if isinstance(option.value, tuple) else (option.value,)
-        yield from (Path(value) for value in several if isinstance(value, os.PathLike))
+        kinds: Any = (str, os.PathLike) if option.name in _MAY_BE_FILES else os.PathLike
+        yield from (Path(value) for value in several if isinstance(value, kinds))
+
+
+def _stamps(settings: Any, out: Path) -> dict[str, str]:
+    """Sizes and times of change of what a run reads, but for its own, by whole paths."""
+    own, stamps = Path(os.path.realpath(out)), {}
+    for named in _read_by(settings):
+        # A text that names a part of the scan may be no path at all.
+        with suppress(OSError, ValueError):
+            read = Path(os.path.realpath(named))
+            if read.is_dir():
+                inner = (path for path in sorted(read.rglob("*")) if not path.is_relative_to(own))
+                found = [
+                    f"{path.relative_to(read)}: {_stamp(path)}" for path in inner if path.is_file()
+                ]
+                digest = hashlib.sha256("\n".join(found).encode(errors="surrogateescape"))
+                stamps[str(read)] = f"{len(found)} files with the hash {digest.hexdigest()}"
+            elif read.exists():
+                stamps[str(read)] = _stamp(read)
+    return stamps
+
+
+def _stamp(path: Path) -> str:
+    state = path.stat()
+    return f"{state.st_size} bytes of {state.st_mtime_ns} ns"
 
 
 def _show_settings(page: Page, settings: Any, asked: Any = None) -> None:
@@ -326,10 +356,17 @@ def _show_settings(page: Page, settings: Any, asked: Any = None) -> None:
 def _changed(settings: Any) -> dict[str, Any]:
     """The settings that differ from their defaults, by name."""
     return {
-        option.name: option.value
+        option.name: _whole(option.value)
         for option in options_of(settings)
         if option.value != option.default
     }
+
+
+def _whole(value: Any) -> Any:
+    """A value with every path from the root, since a run is gone on with from anywhere."""
+    if isinstance(value, Path):
+        return value.absolute()
+    return tuple(map(_whole, value)) if isinstance(value, tuple) else value
 
 
 def _alike(one: Any, other: Any) -> bool:

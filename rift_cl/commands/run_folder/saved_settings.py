@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import json
 import types
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -21,11 +20,11 @@ import tyro
 from rift_cl import __version__
 from rift_cl.commands.options import KIND, MISSING, default_of, kinds_of, option_name
 from rift_cl.errors import InputError, SettingError
+from rift_cl.io.json_fields import read_json_object
 
 S = TypeVar("S")
 # Options that say how a command runs, not what comes out: they are not repeated.
 _NOT_REPEATED = ("cluster", "config", "dry_run", "overwrite", "preview", "resume", "view")
-_MOST_BYTES = 1 << 24
 
 
 class Option(NamedTuple):
@@ -114,11 +113,9 @@ def saved_settings(path: Path, job: str, settings: type[S]) -> S:
             setting that this version does not have or a value that it does not take.
     """
     try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise ValueError("it is too large")
-        record = json.loads(path.read_text(encoding="utf-8"))
+        record = read_json_object(path).values
         name, values = record["job"], dict(record["settings"])
-    except (OSError, ValueError, LookupError, TypeError) as error:
+    except (ValueError, LookupError, TypeError) as error:
         raise InputError(
             f"--config {path}: cannot be read as the config.json of an earlier run ({error})"
         ) from error

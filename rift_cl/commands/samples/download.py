@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import urllib.request
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from http.client import HTTPException
 from pathlib import Path
 from typing import IO, Any
 
-from rift_cl.errors import InputError, OutputError
+from rift_cl.errors import InputError, OutputError, RiftError
 from rift_cl.io.output import sync, writing
 
 # Seconds in which a server must answer, and bytes that are read at a time.
 _PATIENCE = 30
 _BLOCK = 1 << 20
 _PART_IS_THERE = 206
+_AGAIN = "it is another file, or a part of it is missing or damaged: fetch it again"
 Opener = Callable[[urllib.request.Request], Any]
 
 
@@ -74,7 +76,7 @@ def checked(path: Path, size: int, sha256: str, *, source: str = "") -> None:
     try:
         found = path.stat().st_size
         if found != size:
-            raise InputError(f"{named}: has {found} bytes, wanted {size}: it is another file")
+            raise InputError(f"{named}: has {found} bytes, wanted {size}: {_AGAIN}")
         with path.open("rb") as file:
             digest = hashlib.sha256()
             while block := file.read(_BLOCK):
@@ -82,7 +84,7 @@ def checked(path: Path, size: int, sha256: str, *, source: str = "") -> None:
     except OSError as failure:
         raise InputError(f"{named}: cannot be read ({failure.strerror})") from failure
     if digest.hexdigest() != sha256:
-        raise InputError(f"{named}: its SHA-256 is {digest.hexdigest()}, wanted {sha256}")
+        raise InputError(f"{named}: its SHA-256 is {digest.hexdigest()}, wanted {sha256}: {_AGAIN}")
 
 
 def _open_url(request: urllib.request.Request) -> Any:
@@ -94,20 +96,34 @@ def _demand_https(url: str) -> None:
         raise InputError(f"{url}: is not an https address, and nothing else is fetched")
 
 
+@contextmanager
+def _fetching(url: str) -> Iterator[None]:
+    """Turn what a broken connection raises into an ``OutputError`` that names the address."""
+    try:
+        yield
+    except RiftError:
+        raise
+    except (OSError, HTTPException) as failure:
+        raise OutputError(f"{url}: cannot be fetched ({failure}); run it again") from failure
+
+
+def _block(url: str, answer: Any, most: int) -> bytes:
+    """Some of what a server sends: told apart from a disk that does not take it."""
+    with _fetching(url):
+        return bytes(answer.read(most))
+
+
 def _fetch(open_url: Opener, url: str, part: Path, have: int, size: int) -> None:
     """Append what is missing to the part, or begin anew where the server does not skip."""
     asked = {"Range": f"bytes={have}-"} if have else {}
-    try:
-        with open_url(urllib.request.Request(url, headers=asked)) as answer:
-            go_on = have > 0 and answer.status == _PART_IS_THERE
-            left = size - have if go_on else size
-            with writing(part), part.open("ab" if go_on else "wb") as file:
-                while block := answer.read(min(_BLOCK, left + 1)):
-                    left -= len(block)
-                    file.write(block)
-                    if left < 0:
-                        return
-    except (OSError, HTTPException) as failure:
-        raise OutputError(f"{url}: cannot be fetched ({failure})") from failure
+    with _fetching(url), open_url(urllib.request.Request(url, headers=asked)) as answer:
+        go_on = have > 0 and answer.status == _PART_IS_THERE
+        left = size - have if go_on else size
+        with writing(part), part.open("ab" if go_on else "wb") as file:
+            while block := _block(url, answer, min(_BLOCK, left + 1)):
+                left -= len(block)
+                file.write(block)
+                if left < 0:
+                    return
     if left > 0:
         raise OutputError(f"{url}: the connection ended {left} bytes early; run it again")

@@ -79,6 +79,7 @@ class Ramp:
         """Check the window's name and cutoff."""
         check_type("Ramp", "window", self.window, str)
         check_type("Ramp", "cutoff", self.cutoff, Real)
+        object.__setattr__(self, "cutoff", float(self.cutoff))
         if self.window not in WINDOWS:
             raise InputError(f"window is {self.window!r}, wanted one of {', '.join(WINDOWS)}")
         if not 0 < self.cutoff <= 1:
@@ -112,6 +113,7 @@ class HighPass:
     def __post_init__(self) -> None:
         """Check the exponent."""
         check_type("HighPass", "exponent", self.exponent, Real)
+        object.__setattr__(self, "exponent", float(self.exponent))
         if not 0 <= self.exponent < np.inf:
             raise InputError(f"exponent is {self.exponent}, wanted a number >= 0")
 
