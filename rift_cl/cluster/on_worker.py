@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import secrets
 import socket
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from rift_cl import __version__
-from rift_cl.errors import DeviceError
+from rift_cl.errors import ClusterError, DeviceError
 from rift_cl.io.output import make_folder, writing
 
 
@@ -37,12 +38,31 @@ def look(device: str | None, paths: Sequence[Path]) -> dict[str, str]:
     return seen if unseen is None else {**seen, "unseen": unseen}
 
 
-def do(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Do a task; the error of a device says on which worker it came up."""
+def do(version: str, function: Callable[..., Any], *arguments: Any) -> tuple[float, Any]:
+    """Do a task; the error of a device says on which worker it came up.
+
+    Args:
+        version: of the process that hands it out; a worker may have come after ``look``.
+        function: does it.
+        *arguments: of the function.
+
+    Returns:
+        The seconds that it took, and what the function gave.
+
+    Raises:
+        ClusterError: this process has another version.
+    """
     from distributed import get_worker
 
+    if version != __version__:
+        raise ClusterError(
+            f"worker {get_worker().address}: has the version {__version__} of rift_cl, wanted "
+            f"{version}: install the same on all machines; --resume goes on"
+        )
+    begin = time.perf_counter()
     try:
-        return function(*arguments)
+        result = function(*arguments)
+        return time.perf_counter() - begin, result
     except DeviceError as error:
         error.worker = get_worker().address  # type: ignore[attr-defined]
         raise

@@ -11,7 +11,7 @@ from __future__ import annotations
 import queue
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -33,7 +33,8 @@ _AHEAD = 2
 _TRIES = 3
 # Seconds between two looks at what has come, and at who is there.
 _LOOK, _WHO = 0.5, 2.0
-# A worker hangs when a task takes so many times as long as the slowest so far, and so many seconds.
+# A worker hangs when it ends nothing for so many times as long as a task of the size of its own
+# took at most so far, and for so many seconds.
 _HANGS, _HANGS_FROM = 20.0, 300.0
 
 
@@ -43,10 +44,13 @@ class Task(NamedTuple):
     Args:
         name: what an error calls it, such as ``slices 16 to 32``.
         arguments: of the function that does it.
+        size: how many equal parts it has, such as slices; 0 where nobody knows how long it takes,
+            so that no worker counts as hanging over it.
     """
 
     name: str
     arguments: tuple[Any, ...]
+    size: int = 0
 
 
 @contextmanager
@@ -81,6 +85,14 @@ def cluster_workers(address: str, device: Device, selector: str | None) -> Itera
             raise ClusterError(
                 f"--cluster {address}: no Dask scheduler answers there: start one with 'dask "
                 "scheduler', or mend the address"
+            ) from error
+        except (TypeError, RuntimeError) as error:
+            # What Dask raises where certificates are missing, or its packages for them.
+            if not address.startswith("tls://"):
+                raise
+            raise ClusterError(
+                f"--cluster {address}: no connection by TLS ({error}); name the certificates in "
+                "Dask's configuration, distributed.comm.tls.ca-file and client.cert and client.key"
             ) from error
         workers = Workers(client, where, None if where.workers else selector)
         workers.wait()
@@ -187,8 +199,8 @@ class Workers:
 
         Raises:
             RiftError: what a task raised.
-            ClusterError: a task ended every worker that it was given to, which is told once all
-                others are done; or there are no workers any more, or no scheduler.
+            ClusterError: tasks ended every worker that they were given to, which is told once
+                no others are left; or there are no workers any more, or no scheduler.
         """
         waiting, running = iter(tasks), _Running(self._client, function)
         killers: list[str] = []
@@ -205,7 +217,8 @@ class Workers:
             running.cancel()
         if killers:
             raise ClusterError(
-                f"{killers[0]}: ended every worker that it was given to; all else is done"
+                f"not done: {', '.join(killers)}; every worker that these were given to ended, "
+                "by one of them or by itself; --resume tries them again"
             )
 
     def _result(
@@ -215,7 +228,9 @@ class Workers:
         from distributed import KilledWorker
 
         if come.future.status == "finished":
-            return come.task, self._ask(come.future.result)
+            seconds, result = self._ask(come.future.result)
+            running.took(come.task, seconds)
+            return come.task, result
         if come.future.status != "error":
             raise self._gone()
         error = come.future.exception()
@@ -239,22 +254,34 @@ class Workers:
         """Now and then see who is there, and who hangs.
 
         Raises:
-            ClusterError: nobody has been there for a minute, or the scheduler is gone.
+            ClusterError: nobody has been there for a minute, or the scheduler is gone, or a worker
+                hangs that cannot be begun anew.
         """
         if time.monotonic() - self._asked < _WHO:
             return
         self._look_for_workers()
-        hanging = running.hanging()
-        if not hanging:
-            return
-        doing: dict[str, Sequence[str]] = self._ask(self._client.processing)
-        for worker, keys in doing.items():
-            if not hanging.isdisjoint(keys):
-                running.forget_time(keys)
-                self._begin_anew(worker)
+        doing = self._ask(self._client.processing)
+        for worker in running.hanging(doing, time.monotonic()):
+            try:
+                self._client.restart_workers([worker])
+            except ValueError as error:
+                raise ClusterError(
+                    f"worker {worker}: hangs, and no Dask nanny watches it: end it by hand; "
+                    "--resume goes on"
+                ) from error
+            except (OSError, TimeoutError):
+                # Then the scheduler has let it go.
+                continue
 
     def _look_for_workers(self) -> None:
-        now = set(self._ask(self._client.nthreads))
+        threads: dict[str, int] = self._ask(self._client.nthreads)
+        for worker, count in threads.items():
+            if count > 1:
+                raise ClusterError(
+                    f"worker {worker}: has {count} threads, wanted one, since tasks share what a "
+                    "process has on its device: start it with 'dask worker ADDRESS --nthreads 1'"
+                )
+        now = set(threads)
         self.lost += len(self._there - now)
         self._there, self._asked = now, time.monotonic()
         if now:
@@ -280,7 +307,8 @@ class Workers:
 
     def _gone(self) -> ClusterError:
         return ClusterError(
-            f"--cluster {self._address.text}: the scheduler does not answer any more"
+            f"--cluster {self._address.text}: the scheduler does not answer any more: start it "
+            "and its workers again; --resume goes on"
         )
 
 
@@ -292,13 +320,11 @@ class _Begun:
         task: the task.
         future: its result to be.
         tries: how often it was handed out.
-        since: when, in seconds.
     """
 
     task: Task
     future: Any
     tries: int
-    since: float
 
 
 class _Running:
@@ -313,7 +339,10 @@ class _Running:
         self._client, self._function = client, function
         self._ended: queue.Queue[Any] = queue.Queue()
         self._begun: dict[str, _Begun] = {}
+        # Seconds of the slowest so far, for each of its parts.
         self._slowest = 0.0
+        # What each worker has, and since when it has ended none of it.
+        self._has: dict[str, tuple[frozenset[str], float]] = {}
 
     def __len__(self) -> int:
         return len(self._begun)
@@ -325,30 +354,47 @@ class _Running:
 
     def begin(self, task: Task, tries: int = 1) -> None:
         """Hand a task out."""
-        future = self._client.submit(do, self._function, *task.arguments, pure=False)
-        self._begun[future.key] = _Begun(task, future, tries, time.monotonic())
+        given = __version__, self._function, *task.arguments
+        future = self._client.submit(do, *given, pure=False)
+        self._begun[future.key] = _Begun(task, future, tries)
         future.add_done_callback(self._ended.put)
 
     def next(self, seconds: float) -> _Begun | None:
         """The next one that ended, if one does so soon."""
         try:
-            ended = self._begun.pop(self._ended.get(timeout=seconds).key)
+            return self._begun.pop(self._ended.get(timeout=seconds).key)
         except queue.Empty:
             return None
-        self._slowest = max(self._slowest, time.monotonic() - ended.since)
-        return ended
 
-    def hanging(self) -> set[str]:
-        """Keys of tasks that take too long, beside those that have ended."""
-        longest = max(_HANGS * self._slowest, _HANGS_FROM) if self._slowest else float("inf")
-        now = time.monotonic()
-        return {key for key, begun in self._begun.items() if now - begun.since > longest}
+    def took(self, task: Task, seconds: float) -> None:
+        """Learn from a task that was done."""
+        if task.size:
+            self._slowest = max(self._slowest, seconds / task.size)
 
-    def forget_time(self, keys: Iterable[str]) -> None:
-        """Count the time of some tasks from now on."""
-        for key in keys:
-            if key in self._begun:
-                self._begun[key].since = time.monotonic()
+    def hanging(self, doing: Mapping[str, Iterable[str]], now: float) -> list[str]:
+        """Workers that have ended nothing for too long; each is told once, then begins again.
+
+        A worker does one task at a time: what it does began when it ended the last one, or came.
+
+        Args:
+            doing: keys of the tasks that each worker has.
+            now: seconds of a clock.
+        """
+        found: dict[str, tuple[frozenset[str], float]] = {}
+        for worker, keys in doing.items():
+            has = frozenset(keys) & self._begun.keys()
+            before, since = self._has.get(worker, (frozenset(), now))
+            found[worker] = has, since if before and before <= has else now
+        hang = [w for w, (has, since) in found.items() if now - since > self._longest(has)]
+        self._has = {worker: had for worker, had in found.items() if worker not in hang}
+        return hang
+
+    def _longest(self, keys: Iterable[str]) -> float:
+        """Seconds that a worker with these tasks may take for one of them."""
+        sizes = [self._begun[key].task.size for key in keys]
+        if not (self._slowest and sizes and all(sizes)):
+            return float("inf")
+        return max(_HANGS * self._slowest * max(sizes), _HANGS_FROM)
 
     def cancel(self) -> None:
         """Take back what is not done."""

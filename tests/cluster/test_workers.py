@@ -2,6 +2,7 @@
 
 import socket
 import sys
+import types
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,9 @@ def test_addresses(text, count):
     assert ClusterAddress.of(text) == (text, count)
 
 
-@pytest.mark.parametrize("text", ["local:0", "local", "local:", "10.0.0.1", "http://a:1", "a b:1"])
+@pytest.mark.parametrize(
+    "text", ["local:0", "local:10000", "local", "local:", "10.0.0.1", "http://a:1", "a b:1"]
+)
 def test_what_is_no_address(text):
     with pytest.raises(InputError, match=r"--cluster is .*local:N"):
         ClusterAddress.of(text)
@@ -177,6 +180,96 @@ def test_few_tasks_are_handed_out_at_a_time(in_process):
         done += come is not None
         assert len(taken) - done <= 5
     assert done == 100
+
+
+def test_a_worker_of_another_version_that_comes_late(in_process, monkeypatch):
+    monkeypatch.setattr(workers, "__version__", "0.0.1")
+    with pytest.raises(ClusterError, match=r"worker .*wanted 0\.0\.1"):
+        list(in_process.each(task, [workers.Task("slice 0", ("late", 0))]))
+
+
+def test_all_tasks_that_ended_their_workers_are_named(in_process, monkeypatch):
+    killed = lambda come, running, killers: killers.append(come.task.name)  # noqa: E731
+    monkeypatch.setattr(in_process, "_result", killed)
+    wanted = [workers.Task(f"slice {n}", (f"killed {n}", 0)) for n in range(2)]
+    with pytest.raises(ClusterError, match=r"(?=.*slice 0)(?=.*slice 1).*--resume"):
+        list(in_process.each(task, wanted))
+
+
+class Scheduled:
+    """A client that does nothing with what it is given."""
+
+    def __init__(self):
+        self.keys = []
+
+    def submit(self, *given, pure):
+        self.keys.append(f"{len(self.keys)}")
+        return types.SimpleNamespace(key=self.keys[-1], add_done_callback=lambda put: None)
+
+    def nthreads(self):
+        return {"a": 1}
+
+    def processing(self):
+        return {"a": self.keys}
+
+    def restart_workers(self, them):
+        raise ValueError("Restarting workers requires a nanny to be used")
+
+
+def running(*sizes):
+    """Tasks of these sizes that are handed out."""
+    handed = workers._Running(Scheduled(), task)
+    handed.fill((workers.Task("", (), size) for size in sizes), len(sizes))
+    return handed
+
+
+def test_a_worker_hangs_by_the_size_of_its_tasks():
+    handed = running(1, 8, 8)
+    assert handed.hanging({"a": ["0", "1"], "b": ["2"]}, 0) == []
+    assert handed.hanging({"a": ["0", "1"], "b": ["2"]}, 9000) == []
+    handed.took(workers.Task("", (), 2), 20.0)
+    handed.took(workers.Task("", (), 0), 9e9)
+    # The first of its two is done: the second begins.
+    assert handed.hanging({"a": ["1"], "b": []}, 9000) == []
+    assert handed.hanging({"a": ["1"], "b": ["2"]}, 9000 + 20 * 10 * 8) == []
+    assert handed.hanging({"a": ["1"], "b": ["2"]}, 9001 + 20 * 10 * 8) == ["a"]
+    # That was told; the other began when it had something.
+    assert handed.hanging({"a": ["1"], "b": ["2"]}, 9002 + 20 * 10 * 8) == []
+    assert handed.hanging({"a": ["1"], "b": ["2"]}, 9001 + 2 * 20 * 10 * 8) == ["b"]
+
+
+def test_nobody_hangs_over_a_run_of_a_sweep():
+    handed = running(0)
+    handed.took(workers.Task("", (), 1), 1.0)
+    assert handed.hanging({"a": ["0"]}, 0) == handed.hanging({"a": ["0"]}, 1e9) == []
+
+
+def test_a_worker_that_hangs_without_a_nanny_ends_the_command(monkeypatch):
+    handed = running(1)
+    handed.took(workers.Task("", (), 1), 1e-3)
+    found = workers.Workers(handed._client, ClusterAddress("tcp://s:1", 0), None)
+    monkeypatch.setattr(workers, "_WHO", -1.0)
+    found._look_around(handed)
+    monkeypatch.setattr(workers, "_HANGS_FROM", -1.0)
+    monkeypatch.setattr(workers, "_HANGS", -1.0)
+    with pytest.raises(ClusterError, match=r"worker a: hangs.*nanny"):
+        found._look_around(handed)
+
+
+def test_a_worker_of_several_threads(monkeypatch):
+    client = Told(GOOD)
+    monkeypatch.setattr(client, "nthreads", lambda: {"tcp://w:1": 4})
+    with pytest.raises(ClusterError, match=r"worker tcp://w:1: has 4 threads.*--nthreads 1"):
+        workers.Workers(client, ClusterAddress("tcp://s:1", 0), None)
+
+
+def test_tls_without_certificates():
+    pytest.importorskip("distributed", reason=WANTED)
+    with (
+        pytest.raises(ClusterError, match=r"distributed\.comm\.tls"),
+        workers.cluster_workers("tls://127.0.0.1:9", rift.open_device(), None),
+    ):
+        pass
 
 
 def test_errors_travel():

@@ -13,9 +13,10 @@ from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.commands.sweep.job import Sweep
 from rift_cl.commands.sweep.one_run import is_done
 from rift_cl.commands.sweep.one_run import run as one_run
+from rift_cl.commands.sweep.report import Row, score_table, write_table
 from rift_cl.commands.sweep.settings import SweepSettings
 from rift_cl.commands.sweep.variations import variations
-from rift_cl.errors import CheckpointError, InputError
+from rift_cl.errors import CheckpointError, InputError, OutputError
 from rift_cl.io import read_volume
 
 WANTED = "Dask is not installed (pip install dask distributed)"
@@ -169,6 +170,24 @@ def test_an_input_among_the_runs_is_not_replaced(scans, tmp_path):
     with pytest.raises(InputError, match="--inputs"):
         done(sweep([inner], out, overwrite=True))
     assert inner.exists()
+
+
+def test_figures_of_a_varied_name_have_another_column(scans, tmp_path):
+    each = variations(sweep(scans[:1], tmp_path, ("size=4",)))[0]
+    rows = [Row(each, {"size": 8.0})]
+    assert score_table(rows)[0] == ["size", "found size"]
+    write_table(tmp_path / "sweep.csv", rows)
+    assert (tmp_path / "sweep.csv").read_text().startswith("run,size,found size,refused\n")
+
+
+@pytest.mark.parametrize("text", [None, "{"])
+def test_figures_that_are_lost_are_named(scans, tmp_path, text):
+    each = variations(sweep(scans[:1], tmp_path, ("size=4",)))[0]
+    each.settings.out.mkdir(parents=True)
+    if text is not None:
+        (each.settings.out / "metrics.json").write_text(text)
+    with pytest.raises(OutputError, match=r"metrics\.json"):
+        Row.of(each, "")
 
 
 @pytest.mark.full

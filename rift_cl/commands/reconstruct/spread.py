@@ -91,7 +91,7 @@ def _tasks(
         for first in range(wanted.start, wanted.stop, each):
             stop = min(first + each, wanted.stop)
             given = settings, tuple(names.items()), run, first, stop
-            yield Task(f"slices {first} to {stop}", given)
+            yield Task(f"slices {first} to {stop}", given, stop - first)
 
 
 def _of_workers(settings: ReconstructSettings) -> tuple[ReconstructSettings, dict[str, str]]:

@@ -175,7 +175,9 @@ class Sweep:
         self.rows = [Row.of(each, self._refused.get(each.name, "")) for each in self.runs]
         if len(self._refused) == len(self.runs):
             name, why = next(iter(self._refused.items()))
-            raise InputError(f"no run can be done; {name}: {why}")
+            raise InputError(
+                f"no run can be done; {name}: {why}; mend --vary or --fixed, or the inputs"
+            )
         self.metrics = {
             "runs": len(self.runs),
             "refused": self._refused,

@@ -14,6 +14,7 @@ from typing import Any
 from rift_cl.commands.reconstruct.report import PREVIEW_PICTURE
 from rift_cl.commands.sweep.one_run import PICTURE
 from rift_cl.commands.sweep.variations import Variation
+from rift_cl.errors import OutputError
 from rift_cl.io.output import write_text
 from rift_cl.report.html_page import Page
 
@@ -38,11 +39,20 @@ class Row:
 
     @classmethod
     def of(cls, run: Variation, refused: str) -> Row:
-        """The row of a run by what it left in its folder."""
+        """The row of a run by what it left in its folder.
+
+        Raises:
+            OutputError: its figures are not there, or cannot be read.
+        """
         if refused:
             return cls(run, {}, refused)
-        text = (run.settings.out / "metrics.json").read_text(encoding="utf-8")
-        return cls(run, dict(_numbers(json.loads(text))))
+        path = run.settings.out / "metrics.json"
+        try:
+            return cls(run, dict(_numbers(json.loads(path.read_text(encoding="utf-8")))))
+        except (OSError, ValueError) as error:
+            raise OutputError(
+                f"{path}: cannot be read ({error}): remove {path.parent} and go on with --resume"
+            ) from error
 
     @property
     def picture(self) -> bytes | None:
@@ -96,7 +106,12 @@ def score_table(rows: Sequence[Row], most: int = _COLUMNS) -> tuple[list[str], l
         ]
         for row in rows
     ]
-    return [*(varied or ["run"]), *columns], body
+    return [*(varied or ["run"]), *_headings(columns, varied)], body
+
+
+def _headings(figures: Sequence[str], varied: Sequence[str]) -> list[str]:
+    """What columns of figures are called: a center that was found is not the one that was given."""
+    return [f"found {name}" if name in varied else name for name in figures]
 
 
 def write_table(path: Path, rows: Sequence[Row]) -> None:
@@ -105,7 +120,7 @@ def write_table(path: Path, rows: Sequence[Row]) -> None:
     names = list(dict.fromkeys(name for row in rows for name in row.figures))
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["run", *varied, *names, "refused"])
+    writer.writerow(["run", *varied, *_headings(names, varied), "refused"])
     for row in rows:
         given = [row.run.varied.get(name, "") for name in varied]
         figures = [row.figures.get(name, "") for name in names]
