@@ -32,6 +32,11 @@ them all and prints this page.
 | promise | tried by | found | on |
 | :-- | :-- | :-- | :-- |
 """
+_FOOT = """
+The kinds of files are those of `KINDS` in `tools/stress_readers.py`. Not among them: Zarr, TXRM,
+scanners' texts and geometries, SPZ, SOG, COLMAP models, JPEG, HEIC, video, lenses of Zemax, kept
+slabs.
+"""
 _ROW = re.compile(r"^\| (.+?) \| `(.+?)` \| (.+?) \| (.*?) \|$", re.MULTILINE)
 
 
@@ -71,7 +76,7 @@ class Found(NamedTuple):
 
 PROMISES = (
     Promise(
-        "damaged files of every kind that is read end in a named error",
+        "damaged files of the kinds that are tried end in a named error",
         "stress_readers.py",
         "--files",
         50_000,
@@ -140,7 +145,7 @@ def page(known: dict[str, Found]) -> str:
     for promise in PROMISES:
         last = known.get(promise.name, Found(promise.command(promise.full), _NOT_RUN, ""))
         rows.append(f"| {promise.name} | `{last.command}` | {last.figure} | {last.date} |\n")
-    return _HEAD + "".join(rows)
+    return _HEAD + "".join(rows) + _FOOT
 
 
 if __name__ == "__main__":

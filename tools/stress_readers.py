@@ -2,7 +2,7 @@
 
     python tools/stress_readers.py --files 2000 --seed 0 --keep found
 
-Valid files of every kind that is read (scans as TIFF, MAT, HDF5, NPZ and MRC; pictures, splats,
+Valid files of the kinds in ``KINDS`` (scans as TIFF, MAT, HDF5, NPZ and MRC; pictures, splats,
 points, cameras, lenses, volumes, checkpoints and settings) are damaged by chance: bits flipped, the
 end cut off, sizes forged, blocks of one file put into another. Each is read in a child process with
 a limit of time and of memory. Prints what became of them; ends with status 1 if one crashed, hung,
