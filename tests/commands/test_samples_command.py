@@ -114,8 +114,9 @@ class Broken(Answer):
 
 
 def test_a_broken_connection_is_no_fault_of_the_disk(tmp_path):
-    with pytest.raises(OutputError, match=r"example\.org.*reset by peer"):
+    with pytest.raises(OutputError, match=r"example\.org.*reset by peer") as told:
         download(URL, tmp_path / "a", len(DATA), SHA, open_url=lambda _: Broken(b"", 200))
+    assert "a.part" not in str(told.value)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a full disk, on Linux")
