@@ -279,7 +279,7 @@ def test_an_object_beyond_a_side_is_said_or_refused(
     if views == VIEWS:
         assert code == 0
         said = " ".join(json.loads((out / "metrics.json").read_text())["assumed"])
-        assert ("beyond" in said) == bool(side) and side in said
+        assert ("side of the detector" in said) == bool(side) and side in said
     else:
         assert code == 3 and "beyond a side" in capsys.readouterr().err
         assert not out.exists()
