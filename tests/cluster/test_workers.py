@@ -245,6 +245,7 @@ def test_nobody_hangs_over_a_run_of_a_sweep():
 
 
 def test_a_worker_that_hangs_without_a_nanny_ends_the_command(monkeypatch):
+    pytest.importorskip("distributed", reason=WANTED)
     handed = running(1)
     handed.took(workers.Task("", (), 1), 1e-3)
     found = workers.Workers(handed._client, ClusterAddress("tcp://s:1", 0), None)
@@ -257,6 +258,7 @@ def test_a_worker_that_hangs_without_a_nanny_ends_the_command(monkeypatch):
 
 
 def test_a_worker_of_several_threads(monkeypatch):
+    pytest.importorskip("distributed", reason=WANTED)
     client = Told(GOOD)
     monkeypatch.setattr(client, "nthreads", lambda: {"tcp://w:1": 4})
     with pytest.raises(ClusterError, match=r"worker tcp://w:1: has 4 threads.*--nthreads 1"):

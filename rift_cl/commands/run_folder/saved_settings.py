@@ -20,7 +20,6 @@ import tyro
 from rift_cl import __version__
 from rift_cl.commands.options import KIND, MISSING, default_of, kinds_of, option_name
 from rift_cl.errors import InputError, SettingError
-from rift_cl.io.json_fields import read_json_object
 
 S = TypeVar("S")
 # Options that say how a command runs, not what comes out: they are not repeated.
@@ -112,6 +111,9 @@ def saved_settings(path: Path, job: str, settings: type[S]) -> S:
         InputError: the file cannot be read, is another command's or another version's, or holds a
             setting that this version does not have or a value that it does not take.
     """
+    # Imported when a file is named, so that a command's help loads no device layer.
+    from rift_cl.io.json_fields import read_json_object
+
     try:
         record = read_json_object(path).values
         name, values = record["job"], dict(record["settings"])
