@@ -13,14 +13,13 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import re
 import shutil
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
@@ -34,7 +33,7 @@ import rift_cl as rift
 from rift_cl.io import read_image, read_volume
 from rift_cl.report.plot import figure_png, image_grid
 from rift_cl.report.plot.figure import add_panel, new_figure
-from run_page import run_commands, run_page
+from run_page import inside, run_commands, run_page
 
 _ROOT = Path(__file__).parents[1]
 _GALLERY = _ROOT / "docs" / "gallery.md"
@@ -359,7 +358,11 @@ def draw(options: Options) -> Iterator[str]:
         if not (data / picture.needs).exists() and picture.needs:
             yield f"{name}: {data / picture.needs} is absent"
             continue
-        with _scratch(), redirect_stdout(io.StringIO()):
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            inside(Path(folder)),
+            redirect_stdout(io.StringIO()),
+        ):
             if picture.needs:
                 Path(picture.needs).parent.mkdir()
                 shutil.copy(data / picture.needs, picture.needs)
@@ -398,17 +401,6 @@ def with_facts(page: str, drawn: dict[str, Any]) -> str:
         )
 
     return re.sub(r"<!-- drawn: (\S+) -->.*?<!-- end -->", facts, page, flags=re.DOTALL)
-
-
-@contextmanager
-def _scratch() -> Iterator[None]:
-    before = Path.cwd()
-    with tempfile.TemporaryDirectory() as folder:
-        os.chdir(folder)
-        try:
-            yield
-        finally:
-            os.chdir(before)
 
 
 def main() -> int:

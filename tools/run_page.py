@@ -97,7 +97,7 @@ def run_page(
         RuntimeError: a command ended with another status than 0.
     """
     names: dict[str, Any] = {"__name__": page.stem, **(given or {})}
-    with _inside(folder):
+    with inside(folder):
         for block in blocks(page.absolute(), changes):
             where = f"{page}:{block.line}"
             if block.language == "python":
@@ -122,7 +122,7 @@ def run_commands(text: str, where: str) -> None:
 
 
 @contextmanager
-def _inside(folder: Path) -> Iterator[None]:
+def inside(folder: Path) -> Iterator[None]:
     """Work in a folder, and come back (contextlib.chdir is of Python 3.11)."""
     before = Path.cwd()
     folder.mkdir(parents=True, exist_ok=True)

@@ -8,6 +8,7 @@ at a time, so that the scheduler knows of no more than these, however many there
 
 from __future__ import annotations
 
+import asyncio
 import queue
 import time
 import warnings
@@ -81,7 +82,8 @@ def cluster_workers(address: str, device: Device, selector: str | None) -> Itera
             target = stack.enter_context(_started(environments))
         try:
             client = stack.enter_context(Client(target, timeout=_ANSWER, set_as_default=False))
-        except (OSError, ValueError) as error:
+        # The timeout of asyncio is an OSError from Python 3.11 on.
+        except (OSError, ValueError, asyncio.TimeoutError) as error:
             raise ClusterError(
                 f"--cluster {address}: no Dask scheduler answers there: start one with 'dask "
                 "scheduler', or mend the address"
