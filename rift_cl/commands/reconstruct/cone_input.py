@@ -233,14 +233,15 @@ class ConeInput:
     def _beyond_note(self) -> str:
         below, above = self.beyond
         further = (
-            f" {below} more slices below and {above} above were solved for and are left out."
+            f" Beyond them, {_slices(below)} below and {_slices(above)} above were solved for and "
+            "are left out."
             if self.settings.iterative
             else ""
         )
         return (
             "The object reaches beyond the first or the last row, so that not all views see "
-            f"{below} slices at the lower end of the volume and {above} at the upper: their values "
-            f"are less certain.{further}"
+            f"{_slices(below)} at the lower end of the volume and {_slices(above)} at the upper: "
+            f"their values are less certain.{further}"
         )
 
     def _found_axis(self) -> dict[str, Any]:
@@ -321,6 +322,10 @@ class ConeInput:
                 f"{format_bytes(self.device.budget)}: average pixels (--binning 2), take larger "
                 "voxels (--pixel), or reconstruct a part (--rows, --roi)"
             )
+
+
+def _slices(count: int) -> str:
+    return f"{count} slice{'' if count == 1 else 's'}"
 
 
 def check_options(settings: ReconstructSettings) -> None:
