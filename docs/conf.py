@@ -46,10 +46,36 @@ html_theme_options = {"navigation_with_keys": True, "top_of_page_buttons": []}
 write_reference(Path(__file__).parent / "reference" / "generated")
 
 
+# Types of signatures as Python spells them out, and as the source does.
+_TYPES = (
+    (r"~?[\w.]*_Buffer \| .*?_NestedSequence\[~?[\w.]*complex \| .*?\]", "ArrayLike"),
+    (r"~?[\w.]*ndarray\[tuple\[~?[\w.]*Any, \.\.\.\], ~?[\w.]*dtype\[(.*?)\]\]", r"NDArray[\1]"),
+)
+
+
+def _plain(types):
+    """Types of a signature without the marks that the command line reads."""
+    for long, short in _TYPES:
+        types = re.sub(long, short, types)
+    while marked := re.search(r"~?(?:typing\.)?Annotated\[", types):
+        depth, first, at = 0, None, marked.end()
+        while depth >= 0:
+            depth += {"[": 1, "(": 1, "]": -1, ")": -1}.get(types[at], 0)
+            if types[at] == "," and depth == 0 and first is None:
+                first = types[marked.end() : at]
+            at += 1
+        types = types[: marked.start()] + first + types[at:]
+    return types
+
+
 def setup(app):
     """Bars are absolute values in our docstrings, and substitutions to Sphinx."""
+
+    def shorten_types(app, what, name, of, options, signature, returns):
+        return signature and _plain(signature), returns and _plain(returns)
 
     def escape_bars(app, what, name, of, options, lines):
         lines[:] = [re.sub(r"(``.*?``)|[|]", lambda m: m[1] or r"\|", line) for line in lines]
 
     app.connect("autodoc-process-docstring", escape_bars)
+    app.connect("autodoc-process-signature", shorten_types)

@@ -92,6 +92,10 @@ class ResourceLimitError(InputError):
     """A file or request claims more than the budget allows; nothing was allocated."""
 
 
+class GivenUpError(InputError, AttributeError):
+    """A part of something is asked for that was given up to save memory."""
+
+
 class CheckpointError(InputError):
     """A checkpoint is damaged or belongs to another run."""
 

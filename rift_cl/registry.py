@@ -36,7 +36,8 @@ class Registry(Generic[T]):
             raise InputError(f"the name of a {self.kind} is {name!r}, wanted a text")
         if name in self._entries:
             raise InputError(
-                f"a {self.kind} named {name!r} is registered already: choose another name"
+                f"a {self.kind} named {name!r} is registered already: choose another name, or "
+                "remove that one first (.remove of its registry)"
             )
         self._entries[name] = entry
 

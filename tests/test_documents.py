@@ -101,7 +101,7 @@ def test_python_on_a_page_of_prose_runs(run_page, tmp_path):
     made = run_page(DOCS / "explanation/bases.md", tmp_path)
     assert np.isclose(np.linalg.norm(made["same"]), np.linalg.norm(made["c"]))
     slices = np.random.default_rng(0).normal(size=(20, 24, 24))
-    made = run_page(DOCS / "how-to/scans.md", tmp_path, given={"slices": slices})
+    made = run_page(DOCS / "how-to/scan_output.md", tmp_path, given={"slices": slices})
     assert made["attenuation"].shape == slices.shape
 
 
@@ -109,7 +109,7 @@ def test_every_page_with_python_is_run_by_a_test():
     """One of a scheduler's cluster is not, which no test has."""
     shown = {str(p.relative_to(DOCS)) for p in DOCS.rglob("*.md") if "```python" in p.read_text()}
     prose = {f"explanation/{name}.md" for name in ("reconstruction", "bases")}
-    how_to = {f"how-to/{name}.md" for name in ("scans", "python", "neighbours", "scale_out")}
+    how_to = {f"how-to/{name}.md" for name in ("scan_output", "python", "neighbours", "scale_out")}
     assert shown == {f"tutorials/{name}.md" for name in TUTORIALS} | prose | how_to
 
 

@@ -176,6 +176,17 @@ def test_hostile_masks_are_named(score):
         score(good[:0], good[:0])
 
 
+@pytest.mark.parametrize("score", [metrics.psnr, metrics.ssim])
+def test_pictures_of_whole_numbers_need_their_full_scale(score):
+    image = np.arange(144, dtype=np.uint8).reshape(12, 12)
+    for pair in ((image, image / 255), (image / 255, image)):
+        with pytest.raises(InputError, match="peak=255"):
+            score(*pair)
+    halves = (image + 1) // 2
+    assert score(halves, image, peak=255) == pytest.approx(score(halves / 255, image / 255))
+    assert score(image // 100, image > 99) == score(image // 100, image > 99, peak=1)
+
+
 @pytest.mark.parametrize("peak", [0, -1, math.nan, math.inf])
 @pytest.mark.parametrize("score", SCORES[:2])
 def test_a_useless_peak_is_refused(score, peak):

@@ -72,6 +72,7 @@ def installs():
             yield from ((path.relative_to(ROOT), each.strip("'")) for each in named)
 
 
+@pytest.mark.full
 def test_every_install_that_a_message_names_is_one_that_works():
     """It is declared here, with the same limits where there is an upper one."""
     known = {name: limits for group in declared().values() for name, limits in group.items()}

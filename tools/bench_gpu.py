@@ -4,23 +4,26 @@
 
 It compares 22 families of kernels with PoCL (``tools/compare_drivers.py``), runs the tests that use
 a device, and measures the kernels beside other packages as far as those are installed
-(``tools/bench_kernels.py --peers``). OUT.json holds every figure, OUT.md the tables, both with the
-device's name; a part that fails is told there and does not stop the others. Ends with status 1 if
-one did.
+(``tools/bench_kernels.py --peers``). What they say is shown meanwhile. OUT.json holds every
+figure, OUT.md the tables, both with the device's name; a part that fails or hangs is told there and
+does not stop the others. Ends with status 1 if one did.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import queue
 import subprocess
 import sys
 import tempfile
+import threading
 import time
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import tyro
 
@@ -45,12 +48,14 @@ class Options:
         device: which OpenCL device, as RIFT_DEVICE selects it; the default one if not given.
         quick: small families, one case of each test, one size and few repeats.
         against: reference of the families: a device, or an NPZ file of compare_drivers.py --save.
+        limit: seconds without a line from a part, after which it is given up.
     """
 
     out: Path
     device: str | None = None
     quick: bool = False
     against: str = "pocl"
+    limit: float = 3600.0
 
 
 def main(options: Options) -> int:
@@ -65,7 +70,8 @@ def main(options: Options) -> int:
     with tempfile.TemporaryDirectory() as folder:
         for name, arguments in _parts(options, device.selector, Path(folder)):
             say(f"{name}: {' '.join(arguments)}")
-            record["parts"][name] = _run(arguments, Path(folder, f"{name}.json"), device.selector)
+            found = Path(folder, f"{name}.json")
+            record["parts"][name] = _run(arguments, found, device.selector, options.limit)
             write_text(options.out.with_suffix(".json"), json.dumps(record, indent=1) + "\n")
             write_text(options.out.with_suffix(".md"), _page(record))
     failed = [name for name, part in record["parts"].items() if part["status"]]
@@ -89,30 +95,49 @@ def _parts(options: Options, device: str, folder: Path) -> Iterator[tuple[str, l
     yield "kernels", [sys.executable, *kernels, *(["--quick"] if quick else [])]
 
 
-def _run(arguments: list[str], path: Path, device: str) -> dict[str, Any]:
-    """Run a part: its exit status, seconds, last lines, and what it wrote."""
+def _run(arguments: list[str], path: Path, device: str, limit: float) -> dict[str, Any]:
+    """Run a part and show what it says: its exit status, seconds, last lines, and what it wrote."""
     start = time.perf_counter()
     paths = [str(_TOOLS.parent), os.environ.get("PYTHONPATH", "")]
-    done = subprocess.run(
+    own = {"RIFT_DEVICE": device, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    process = subprocess.Popen(
         arguments,
         cwd=_TOOLS.parent,
-        env={
-            **os.environ,
-            "RIFT_DEVICE": device,
-            "PYTHONPATH": os.pathsep.join(filter(None, paths)),
-        },
+        env={**os.environ, **own, "PYTHONUNBUFFERED": "1"},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        check=False,
+        errors="replace",
     )
+    assert process.stdout is not None
+    lines: queue.Queue[str] = queue.Queue()
+    threading.Thread(target=_pump, args=(process.stdout, lines), daemon=True).start()
+    said: deque[str] = deque(maxlen=_LINES)
+    try:
+        while line := lines.get(timeout=limit):
+            said.append(line.rstrip("\n"))
+            say(said[-1])
+        process.wait()
+    except queue.Empty:
+        said.append(f"no line in {limit:.3g} s: given up")
+    finally:
+        process.kill()
+        process.wait()
     return {
         "command": " ".join(arguments),
-        "status": done.returncode,
+        "status": process.returncode,
         "seconds": round(time.perf_counter() - start, 1),
-        "said": done.stdout.splitlines()[-_LINES:],
+        "said": list(said),
         "found": json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None,
     }
+
+
+def _pump(stream: IO[str], lines: queue.Queue[str]) -> None:
+    """Hand lines on until there are no more, which an empty one tells."""
+    with stream:
+        for line in stream:
+            lines.put(line)
+    lines.put("")
 
 
 def _page(record: dict[str, Any]) -> str:

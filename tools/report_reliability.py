@@ -25,9 +25,9 @@ _HERE = Path(__file__).resolve().parent
 _NOT_RUN = "not run yet"
 _HEAD = """# Reliability
 
-What holds when files are damaged, processes are killed and builds collide. Each row is a promise,
-the command that was run, what it printed last, and when. `python tools/report_reliability.py` runs
-them all and prints this page.
+What holds when files are damaged, processes are killed, builds collide and viewers are attacked.
+Each row is a promise, the command that was run, what it printed last, and when.
+`python tools/report_reliability.py` runs them all and prints this page.
 
 | promise | tried by | found | on |
 | :-- | :-- | :-- | :-- |
@@ -92,6 +92,12 @@ PROMISES = (
         "stress_builds.py",
         "--rounds",
         50,
+    ),
+    Promise(
+        "nothing that a page sends ends the viewer or is printed, and strangers see nothing of it",
+        "stress_viewer.py",
+        "--messages",
+        20_000,
     ),
 )
 

@@ -21,7 +21,12 @@
  * 4, rows asked for ahead, whole rows in lanes and a transposition of 8 x 8.
  *
  * Lines lie `line_stride` apart in the volume, slabs `slab_stride`; z is padded to whole runs, and
- * what is written there means nothing. */
+ * what is written there means nothing.
+ *
+ * Buffers: table[count, rows, columns],
+ * volume[(slabs - 1) * slab_stride + (lines - 1) * line_stride + depth], places[count, slabs, padded_lines],
+ * shares[count, slabs, TAPS - 1, padded_lines], row_places[count, slabs, depth],
+ * row_shares[count, slabs, ROW_TAPS - 1, depth], amplitudes[first + count, slabs]. */
 
 #include "include/portable.h"
 #include "include/cone/slab_table.h"

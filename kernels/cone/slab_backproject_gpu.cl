@@ -6,7 +6,13 @@
  * before = volume[slab][line][z] if `add` is set, else 0.
  *
  * Index space: (z, lines, slabs). Items of a group are neighbours in z: they share the weights of
- * columns, and read neighbouring rows of the table, which are contiguous here. */
+ * columns, and read neighbouring rows of the table, which are contiguous here.
+ *
+ * Buffers: table[count, rows, columns],
+ * volume[(slabs - 1) * slab_stride + (along1 - 1) * line_stride + depth],
+ * places[count, slabs, padded_lines], shares[count, slabs, TAPS - 1, padded_lines],
+ * row_places[count, slabs, depth], row_shares[count, slabs, ROW_TAPS - 1, depth],
+ * amplitudes[first + count, slabs]. */
 
 #include "include/portable.h"
 #include "include/cone/slab_table.h"

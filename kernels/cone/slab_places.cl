@@ -13,7 +13,10 @@
  *
  * forms[view] = n0 n1 n2 d0 d1 d2 origin radius.
  *
- * Index space: (runs of RUN samples, slabs, views of this run). Samples are padded to whole lanes. */
+ * Index space: (runs of RUN samples, slabs, views of this run). Samples are padded to whole lanes.
+ *
+ * Buffers: places[along2, slabs, samples], shares[along2, slabs, TAPS - 1, samples],
+ * forms[first + along2, 8]. */
 
 #include "include/portable.h"
 #include "include/cone/slab_table.h"

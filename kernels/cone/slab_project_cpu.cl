@@ -15,7 +15,12 @@
  * whether a row is done. Tried, and slower: lines without the third column where its share is zero,
  * and rows of 16 columns at a time.
  *
- * The volume is that of slab_backproject_cpu; its z behind the last are zeros. */
+ * The volume is that of slab_backproject_cpu; its z behind the last are zeros.
+ *
+ * Buffers: table[count, rows, columns],
+ * volume[(slabs - 1) * slab_stride + (lines - 1) * line_stride + depth], places[count, slabs, padded_lines],
+ * shares[count, slabs, TAPS - 1, padded_lines], row_places[count, slabs, depth],
+ * row_shares[count, slabs, ROW_TAPS - 1, depth], amplitudes[first + count, slabs]. */
 
 #include "include/portable.h"
 #include "include/cone/slab_table.h"

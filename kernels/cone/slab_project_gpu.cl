@@ -6,7 +6,12 @@
  * Index space: (rows of the table, columns, views of this run). Each item gathers, slab after slab,
  * the lines that reach its column and the z that reach its row. Both follow each other in the order
  * of their places, so that the first of a slab is found near that of the slab before. Items of a
- * group are neighbours in rows: they take the same lines, and z beside each other. */
+ * group are neighbours in rows: they take the same lines, and z beside each other.
+ *
+ * Buffers: table[count, rows, columns],
+ * volume[(slabs - 1) * slab_stride + (lines - 1) * line_stride + depth], places[count, slabs, padded_lines],
+ * shares[count, slabs, TAPS - 1, padded_lines], row_places[count, slabs, depth],
+ * row_shares[count, slabs, ROW_TAPS - 1, depth], amplitudes[first + count, slabs]. */
 
 #include "include/portable.h"
 #include "include/cone/slab_table.h"

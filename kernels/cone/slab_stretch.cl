@@ -8,7 +8,10 @@
  *
  * Index space: (runs of columns, rows of the table, views of this run). A CPU takes all columns of a
  * row, LANES at a time, a GPU one. `views` tells which view of the data each is, `firsts` which
- * row of the stretched view stands first in its table. */
+ * row of the stretched view stands first in its table.
+ *
+ * Buffers: data[along2, detector_rows, bins], lengths[detector_rows, bins], table[along2, rows, columns],
+ * views, firsts[first + along2], steps, gains[first + along2, columns]. */
 
 #include "include/portable.h"
 #include "include/cone/slab_table.h"

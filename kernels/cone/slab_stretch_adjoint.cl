@@ -4,7 +4,10 @@
  *         weight(step (r + first) + center - i) gain table[view][r][pad + u].
  *
  * Index space: (runs of columns, rows of the detector, views of this run). Each item gathers, for
- * its bins, the table's rows that reach them: no two write the same bin. */
+ * its bins, the table's rows that reach them: no two write the same bin.
+ *
+ * Buffers: data[along2, detector_rows, bins], lengths[detector_rows, bins], table[along2, rows, columns],
+ * views, firsts[first + along2], steps, gains[first + along2, columns]. */
 
 #include "include/portable.h"
 #include "include/cone/slab_table.h"

@@ -6,7 +6,9 @@
  * image's ends being zero. The sum ends where z^|n| is 1e-8. It is symmetric, and so its own
  * transpose. With DOWN 1 the axis runs down the columns, with 0 along the rows.
  *
- * Index space: (runs of LANES columns, rows, images). */
+ * Index space: (runs of LANES columns, rows, images).
+ *
+ * Buffers: factors, samples[along2, rows, columns]. */
 
 #include "include/portable.h"
 

@@ -3,9 +3,12 @@
  *     data[view][i][k] = sum over r, c of cubic(v - r) cubic(u - c) upright[view][r][c].
  *
  * With SLOPE 1 it is the derivative by u, with SLOPE 2 that by v. Pixels whose four rows and columns
- * are not all there are zero. `first` is the first view of the
- * run, `views` tells which view of the data each is. Index space: (runs of LANES columns, rows of
- * the tilted detector, views of the run). */
+ * are not all there are zero; with SPLINE 1, of four columns at least, those beside the upright view.
+ * `first` is the first view of the run, `views` tells which view of the data each is. Index space:
+ * (runs of LANES columns, rows of the tilted detector, views of the run).
+ *
+ * Buffers: data[along2, rows, bins], upright[along2, upright_rows, upright_bins],
+ * forms[first + along2, VIEW_FORMS], views[first + along2]. */
 
 #include "include/portable.h"
 #include "include/lane_quads.h"
@@ -14,8 +17,13 @@
 #ifndef SLOPE
 #define SLOPE 0
 #endif
-#define BY_COLUMN(d) (SLOPE == 1 ? keys_slope(d) : cubic(d))
-#define BY_ROW(d) (SLOPE == 2 ? keys_slope(d) : cubic(d))
+#if SPLINE
+#define BY_COLUMN(n) share(u, TO_FLOAT(c + (n)), upright_bins)
+#define BY_ROW(n) share(v, TO_FLOAT(r + (n)), upright_rows)
+#else
+#define BY_COLUMN(n) (SLOPE == 1 ? keys_slope(x - (real)(n)) : keys(x - (real)(n)))
+#define BY_ROW(n) (SLOPE == 2 ? keys_slope(y - (real)(n)) : keys(y - (real)(n)))
+#endif
 
 KERNEL void upright_read(
     __global real *restrict data, __global const real *restrict upright,
@@ -32,21 +40,29 @@ KERNEL void upright_read(
       &depth);
   u = u + (real)0.5f * (upright_bins - 1);
   v = v + (real)0.5f * (upright_rows - 1);
-  const lanes_int inside =
-      depth > 0 && u >= 1.0f && u < (real)(upright_bins - 2) && v >= 1.0f && v < (real)(upright_rows - 2);
+  const lanes_int inside = depth > 0 && within(u, upright_bins) && within(v, upright_rows);
   u = inside ? u : 1.0f;
   v = inside ? v : 1.0f;
-  const lanes_int c = floor_int(u) - 1, r = floor_int(v) - 1;
+  lanes_int c = floor_int(u) - 1, r = floor_int(v) - 1;
+#if SPLINE
+  const int taps = upright_rows < 4 ? upright_rows : 4;
+  c = c < upright_bins - 4 ? c : upright_bins - 4;
+  r = r < upright_rows - taps ? r : upright_rows - taps;
+  c = c > 0 ? c : 0;
+  r = r > 0 ? r : 0;
+#else
+  const int taps = 4;
+#endif
   int at[LANES] __attribute__((aligned(sizeof(int) * LANES)));
   KEEP_INTS(at, r * upright_bins + c);
   __global const real *seen = upright + (long)view * upright_rows * upright_bins;
   const lanes x = u - TO_FLOAT(c), y = v - TO_FLOAT(r);
   lanes sum = 0;
-  for (int n = 0; n < 4; n++) {
+  for (int n = 0; n < taps; n++) {
     const lane_quad q = quads_at(seen + (long)n * upright_bins, at);
-    const lanes row = BY_COLUMN(x) * q.s0 + BY_COLUMN(x - 1.0f) * q.s1 +
-        BY_COLUMN(x - 2.0f) * q.s2 + BY_COLUMN(x - 3.0f) * q.s3;
-    sum = sum + BY_ROW(y - (real)n) * row;
+    const lanes row = BY_COLUMN(0) * q.s0 + BY_COLUMN(1) * q.s1 + BY_COLUMN(2) * q.s2 +
+        BY_COLUMN(3) * q.s3;
+    sum = sum + BY_ROW(n) * row;
   }
   sum = inside ? sum : 0;
   __global real *out = data + ((long)views[first + view] * rows + i) * bins + k0;

@@ -5,7 +5,10 @@
  * over the pixels that see a place within two rows and columns of (r, c). They lie within the
  * rectangle about the four corners of that square, taken the way back; where the way back has no
  * end, all pixels are tried. Index space: (runs of LANES columns, rows of the upright detector, views of
- * the run). */
+ * the run).
+ *
+ * Buffers: data[along2, rows, bins], upright[along2, upright_rows, upright_bins],
+ * forms[first + along2, VIEW_FORMS], views[first + along2]. */
 
 #include "include/portable.h"
 #include "include/lane_quads.h"
@@ -58,10 +61,11 @@ KERNEL void upright_spread(
           h, TO_FLOAT(k) - middle_k, (lanes)(i - middle_i), &u, &v, &depth);
       u = u + middle_u;
       v = v + middle_v;
-      const lanes_int inside = k < bins && depth > 0 && u >= 1.0f &&
-          u < (real)(upright_bins - 2) && v >= 1.0f && v < (real)(upright_rows - 2);
+      const lanes_int inside =
+          k < bins && depth > 0 && within(u, upright_bins) && within(v, upright_rows);
       const lanes_int there = k < bins ? k : bins - 1;
-      const lanes weight = cubic(u - column) * cubic(v - (real)r);
+      const lanes weight =
+          share(u, column, upright_bins) * share(v, (lanes)(real)r, upright_rows);
       sum = sum + (inside ? weight : 0) * GATHER(pixels + (long)i * bins, there);
     }
   __global real *out = upright + ((long)view * upright_rows + r) * upright_bins + c0;

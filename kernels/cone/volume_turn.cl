@@ -6,7 +6,10 @@
  * and with BACK 1 the other way round. slabs[i][j] lies at i slab_stride + j line_stride.
  *
  * Index space: (tiles of j, tiles of k, i). Each item copies one tile of TILE x TILE, so that both
- * sides use whole cache lines. */
+ * sides use whole cache lines.
+ *
+ * Buffers: volume[(along2 - 1) * volume_i + (lines - 1) * volume_j + (depth - 1) * volume_k + 1],
+ * slabs[(along2 - 1) * slab_stride + (lines - 1) * line_stride + padded_depth]. */
 
 #include "include/portable.h"
 

@@ -5,7 +5,9 @@
  * Beyond the image, and behind the last channel, there are zeros. `squares` gets the sum of the
  * squares of each row, for whoever wants to keep the norm.
  *
- * Index space: rows of the padded plane. */
+ * Index space: rows of the padded plane.
+ *
+ * Buffers: image[height, width, depth], fields[2 * FIELDS, rows, columns], squares[height]. */
 
 #include "include/portable.h"
 

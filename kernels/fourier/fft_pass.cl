@@ -15,7 +15,10 @@
  * pairs. With WEIGHTED what is read is multiplied by `weights`, a plane for all fields. Columns are a
  * multiple of LANES.
  *
- * Index space: (runs of RUN columns, butterflies, fields). */
+ * Index space: (runs of RUN columns, butterflies, fields).
+ *
+ * Buffers: source, out[max(re, im) + along2 * length * columns], turns[length, 2],
+ * weights[WEIGHTED ? length * columns : 0]. */
 
 #include "include/portable.h"
 #include "include/fourier/butterfly.h"

@@ -3,7 +3,9 @@
  *     out[plane][x][y] = source[plane][y][x]
  *
  * Edges are multiples of LANES. Index space: (blocks of LANES columns, blocks of LANES rows, planes),
- * each block transposed in registers. */
+ * each block transposed in registers.
+ *
+ * Buffers: source, out[along2, rows, columns]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

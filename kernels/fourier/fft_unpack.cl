@@ -2,7 +2,10 @@
  *
  * Values are multiplied by `scale`, one over the number of samples of a plane, and by the mask if
  * MASKED; channels behind the last are zero. `squares` gets the sum of the squares of each row.
- * Index space: rows of the image. */
+ * Index space: rows of the image.
+ *
+ * Buffers: fields[2 * FIELDS, rows, columns], mask[MASKED ? height * width : 0],
+ * image[height, width, depth], squares[height]. */
 
 #include "include/portable.h"
 

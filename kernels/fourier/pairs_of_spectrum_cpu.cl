@@ -5,7 +5,10 @@
  * leave in blocks of BLOCK as well, each with its real parts and then its imaginary ones, (edge,
  * BLOCK).
  *
- * Index space: items, each of which takes every so many-th block. */
+ * Index space: items, each of which takes every so many-th block.
+ *
+ * Buffers: grid[blocks, 2, length, BLOCK], fields[(pairs + BLOCK - 1) / BLOCK, 2, edge, BLOCK],
+ * scratch[items, 4, length, BLOCK], turns[length, 2]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

@@ -2,7 +2,11 @@
  *
  * What a GPU does by rays_pack_gpu, fft_pass and rays_weigh_gpu, all in the caches of a core (see
  * include/fourier/view_columns.h). Index space: items, each of which takes every so many-th
- * block. */
+ * block.
+ *
+ * Buffers: views[count, slices, bins], rays[2, count, samples], order, starts[count], offsets[2 * columns],
+ * shadows[2, 2 * columns], signs[2 * columns], bin_response[samples], ends[count],
+ * scratch[items, 4, length, BLOCK], turns[length, 2]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

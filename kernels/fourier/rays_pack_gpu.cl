@@ -2,7 +2,9 @@
  * include/fourier/view_columns.h).
  *
  * Index space: (blocks of LANES columns, blocks of LANES rows, parts). Length and columns are
- * multiples of LANES. */
+ * multiples of LANES.
+ *
+ * Buffers: views[rays, slices, bins], fields[along2, length, columns], order, starts[rays]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

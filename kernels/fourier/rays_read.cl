@@ -8,7 +8,10 @@
  *
  * Index space: runs of RUN samples and rays. Neighbouring items of a GPU take neighbouring samples, so
  * that their stores are one; a CPU takes one run of all rays in turn, which lie in the same part of
- * the grid. */
+ * the grid.
+ *
+ * Buffers: grid[2, rows, columns], rays[2, count, samples], table[(1 << LOG2_ROWS) + 1, TABLE_PITCH],
+ * steps[count, 2], ends[count]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

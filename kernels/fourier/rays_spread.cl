@@ -10,7 +10,12 @@
  * their angle. No two items write the same cell: no atomics, and one order of summation.
  *
  * Index space: tiles. A CPU sums in an array of its own, whose rows have room for a kernel that
- * overhangs the tile. */
+ * overhangs the tile.
+ *
+ * Buffers: rays[2, count, samples],
+ * grid[2, rows, LANES == 8 ? (width + 2 * LANES - 1) / (2 * LANES) * (2 * LANES) : columns],
+ * table[(1 << LOG2_ROWS) + 1, TABLE_PITCH], steps, inverses[count, 2], ends[count], visits[*],
+ * starts[tiles + 1]. */
 
 #include "include/portable.h"
 #include "include/fourier/fourier_rays.h"

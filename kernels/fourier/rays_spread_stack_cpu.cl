@@ -5,7 +5,15 @@
  * multiplied and added in the same order as for a slice alone, which gets the same bits. With fewer
  * than four SLICES the pointers behind them may be any, and what is there stays as it is.
  *
- * Index space: tiles. */
+ * Index space: tiles.
+ *
+ * Buffers: rays0, rays1, rays2, rays3[2, count, samples],
+ * grid0[2, rows, (width + BLOCK - 1) / BLOCK * BLOCK],
+ * grid1[SLICES > 1 ? 2 : 0, rows, (width + BLOCK - 1) / BLOCK * BLOCK],
+ * grid2[SLICES > 2 ? 2 : 0, rows, (width + BLOCK - 1) / BLOCK * BLOCK],
+ * grid3[SLICES > 3 ? 2 : 0, rows, (width + BLOCK - 1) / BLOCK * BLOCK],
+ * table[(1 << LOG2_ROWS) + 1, TABLE_PITCH], steps, inverses[count, 2], ends[count], visits[*],
+ * starts[tiles + 1]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

@@ -2,7 +2,9 @@
  *
  * Bins that the image's shadow does not reach become zero. Index space: (blocks of LANES columns,
  * runs of RUN rows of the window, parts); the first run and the last also clear what lies before
- * and behind the window. */
+ * and behind the window.
+ *
+ * Buffers: fields[along2, length, columns], views[rays, slices, bins], order, starts[rays]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

@@ -6,7 +6,10 @@
  *     a[l] = sum over j >= 0 of ray[l + j length] + sum over j >= 1 of conj ray[j length - l],
  *     Z[l] = a[l] + i b[l],    Z[-l] = conj a[l] + i conj b[l],      l = 0 .. length / 2,
  *
- * a and b being the views of a pair. Index space: (blocks of LANES columns, runs of RUN places). */
+ * a and b being the views of a pair. Index space: (blocks of LANES columns, runs of RUN places).
+ *
+ * Buffers: rays[2, count, samples], fields[2, length, columns], turns[2 * columns], shadows[2, 2 * columns],
+ * signs[2 * columns], bins[samples]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

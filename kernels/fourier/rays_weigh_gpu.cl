@@ -1,7 +1,10 @@
 /* Transforms of pairs of views become rays of the spectrum, for GPUs (see
  * include/fourier/view_columns.h).
  *
- * Index space: (blocks of LANES columns, blocks of LANES samples, parts). */
+ * Index space: (blocks of LANES columns, blocks of LANES samples, parts).
+ *
+ * Buffers: fields[2, length, columns], rays[2, count, samples], turns[2 * columns], shadows[2, 2 * columns],
+ * signs[2 * columns], bins[samples], ends[count]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

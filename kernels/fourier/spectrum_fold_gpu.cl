@@ -1,6 +1,8 @@
 /* Between the two halves of the inverse transform, for GPUs (see include/fourier/row_pairs.h).
  *
- * Index space: (blocks of LANES pairs, blocks of LANES frequencies 0 .. edge / 2). */
+ * Index space: (blocks of LANES pairs, blocks of LANES frequencies 0 .. edge / 2).
+ *
+ * Buffers: grid[2, rows, columns], fields[2, edge, pairs]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

@@ -3,7 +3,9 @@
  *     grid[y][-k] = conj grid[-y][k],      grid[y][edge/2 + k] = conj grid[-y][edge/2 - k],
  *
  * k = 1 .. WIDTH, so that a kernel about a sample near either end need not leave its row. Index
- * space: (rows, columns to fill). */
+ * space: (rows, columns to fill).
+ *
+ * Buffers: grid[2, rows, columns]. */
 
 #include "include/portable.h"
 #include "include/fourier/fourier_rays.h"

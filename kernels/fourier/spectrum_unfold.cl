@@ -5,7 +5,9 @@
  * which is the transpose of spectrum_fold_gpu for spectra of real rows. Rows of the grid that no image
  * row stands in, and columns before zero and behind the last frequency, become zero.
  *
- * Index space: (blocks of LANES columns of the grid, blocks of LANES rows). */
+ * Index space: (blocks of LANES columns of the grid, blocks of LANES rows).
+ *
+ * Buffers: fields[2, edge, pairs], grid[2, rows, columns]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

@@ -7,7 +7,10 @@
  *
  * Index space: (strips of STRIP j, strips of STRIP i, slices), in groups of GROUP along the first.
  * A CPU moves blocks of LANES x LANES through registers; a group of a GPU moves a tile of
- * GROUP x DEEP through local memory, so that it reads and writes runs of neighbours. */
+ * GROUP x DEEP through local memory, so that it reads and writes runs of neighbours.
+ *
+ * Buffers: source[(along2 - 1) * in_slice + (ni - 1) * in_pitch + nj],
+ * out[(along2 - 1) * out_slice + (nj - 1) * out_pitch + ni]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

@@ -47,19 +47,30 @@ static lane_quad quads_at(__global const real *p, const int *at) {
 }
 #endif
 
-/* Writes a whole number for each lane, as quads_at reads them, and reads them all again. */
+/* Writes a whole number for each lane, as quads_at reads them, and reads them all again; NEXT_INTS
+ * reads those of the lanes after them. */
+#if LANES == 8 && RIFT_POCL
+typedef int8 ints_at __attribute__((aligned(sizeof(int))));
+#define INTS_AT(at) (*(const ints_at *)(at))
+#elif LANES == 8
+#define INTS_AT(at) vload8(0, at)
+#endif
 #if LANES == 8 && DOUBLE && RIFT_POCL
 #define KEEP_INTS(at, v) (*(int8 *)(at) = __builtin_convertvector(v, int8))
 #define KEPT_INTS(at) __builtin_convertvector(*(const int8 *)(at), long8)
+#define NEXT_INTS(at) __builtin_convertvector(INTS_AT((at) + 1), long8)
 #elif LANES == 8 && DOUBLE
 #define KEEP_INTS(at, v) (*(int8 *)(at) = convert_int8(v))
 #define KEPT_INTS(at) convert_long8(*(const int8 *)(at))
+#define NEXT_INTS(at) convert_long8(INTS_AT((at) + 1))
 #elif LANES == 8
 #define KEEP_INTS(at, v) (*(int8 *)(at) = (v))
 #define KEPT_INTS(at) (*(const int8 *)(at))
+#define NEXT_INTS(at) INTS_AT((at) + 1)
 #else
 #define KEEP_INTS(at, v) (*(at) = (int)(v))
 #define KEPT_INTS(at) (*(at))
+#define NEXT_INTS(at) ((at)[1])
 #endif
 
 #if LANES == 8

@@ -5,7 +5,10 @@
  * in the units of include/sampling/coverage.h, where a view that is far from a block of frequencies
  * is skipped. `count` is a whole number of LANES. Views are summed in their order.
  *
- * Index space: (blocks of LANES frequencies, points). */
+ * Index space: (blocks of LANES frequencies, points).
+ *
+ * Buffers: frequencies[3, count], boxes[count / LANES, 6], views[along1, view_count, ROW],
+ * covered[along1, count]. */
 
 #include "include/portable.h"
 #include "include/sampling/coverage.h"

@@ -6,7 +6,10 @@
  *
  *     dE/du = 2 w rho^2 M (-8 u M - M' u / |k_perp|) dE/dL,    M' = dM / d|k_perp|.
  *
- * Index space: (views, points, parts of RUN frequencies). */
+ * Index space: (views, points, parts of RUN frequencies).
+ *
+ * Buffers: frequencies[3, count], boxes[count / LANES, 6], views[point_count, view_count, ROW],
+ * upstream[point_count, count], parts[along2, point_count, view_count, ROW]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

@@ -4,7 +4,9 @@
  * pixels here); each lane keeps its own sum to the end of the run. sum_columns adds the runs in a
  * fixed order.
  *
- * Index space: (runs of RUN pixels). */
+ * Index space: (runs of RUN pixels).
+ *
+ * Buffers: grad_image[pixels, CHANNELS], transmittance[pixels], parts[(pixels + RUN - 1) / RUN, CHANNELS]. */
 
 #include "include/portable.h"
 #include "include/splat/splat_rows.h"

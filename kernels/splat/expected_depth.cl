@@ -2,7 +2,9 @@
  *
  *     E = D / alpha,   alpha = max(1 - transmittance, LEAST_ALPHA)
  *
- * Index space: (pixels). */
+ * Index space: (pixels).
+ *
+ * Buffers: image[pixels, channels], transmittance[pixels]. */
 
 #include "include/portable.h"
 #include "include/splat/expected_depth.h"

@@ -2,7 +2,10 @@
  *
  *     dL/dD = g / alpha,      dL/dT += g E / alpha   (T = 1 - alpha; zero where alpha was held)
  *
- * Other channels pass through. Index space: (pixels). */
+ * Other channels pass through. Index space: (pixels).
+ *
+ * Buffers: image, grad_image, by_image[pixels, channels], transmittance, grad_transmittance,
+ * by_transmittance[pixels]. */
 
 #include "include/portable.h"
 #include "include/splat/expected_depth.h"

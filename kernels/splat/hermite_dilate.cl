@@ -24,7 +24,10 @@
  * extents[i] = half the sides of the box that the splat fills, in voxels: HERMITE_EDGE standard deviations;
  * negative where there is nothing to draw (as in splat_project.cl: degenerate or not finite).
  *
- * Index space: splats. */
+ * Index space: splats.
+ *
+ * Buffers: quats[count, 4], scales[count, 3], covars[count, 6], opacities[count],
+ * shape_modes[count, MODES - 1], places[count, 6], table[count, WIDTH], extents[count, 3]. */
 
 /* One splat at a time: the modes of eight would fill more registers than there are. */
 #undef LANES

@@ -6,7 +6,11 @@
  * c2). Channels pass by the same map as the shape, each for itself; the constants, 1 and the
  * features, stay as they are and are not in the table. Splats that are not drawn get zeros.
  *
- * Index space: (runs of RUN splats), LANES of them at a time. */
+ * Index space: (runs of RUN splats), LANES of them at a time.
+ *
+ * Buffers: means[count, 3], quats[count, 4], scales[count, 3], covars[count, 6],
+ * shape_modes[count, SHAPE_MODES], color_modes[count, COLOR_MODES, COLOR_CHANNELS], culled[count],
+ * screen_modes[count, TABLE_LENGTH]. */
 
 #include "include/portable.h"
 #include "include/projection/camera.h"

@@ -31,7 +31,12 @@
  * dT2_m/dA_ai = m_a T2' where T2' has N - 1 indices contracted and i left, and dL/dc runs through the
  * contractions backwards. Splats that are not drawn get zeros.
  *
- * Index space: (runs of RUN splats), LANES of them at a time. */
+ * Index space: (runs of RUN splats), LANES of them at a time.
+ *
+ * Buffers: means[count, 3], quats[count, 4], scales[count, 3], covars[count, 6], shape_modes,
+ * grad_shape_modes[count, SHAPE_MODES], color_modes, grad_color_modes[count, COLOR_MODES, COLOR_CHANNELS],
+ * culled[count], screen_modes[count, TABLE_LENGTH], moments[count, MOMENTS], sums[count, 6 + CHANNELS],
+ * view_parts[count, 6]. */
 
 #include "include/portable.h"
 #include "include/projection/camera.h"

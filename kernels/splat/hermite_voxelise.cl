@@ -17,7 +17,9 @@
  *
  * Index space: items of bricks. An item owns a block of BLOCK_X strips of LANES voxels, BLOCK_Y
  * rows and BLOCK_Z slices: a whole brick on a CPU, some voxels in a row on a GPU, where the items
- * of a brick walk its list together. */
+ * of a brick walk its list together.
+ *
+ * Buffers: volume[nz, ny, nx], table, chosen, entries[*], starts[bricks + 1]. */
 
 #include "include/portable.h"
 #include "include/exponential.h"

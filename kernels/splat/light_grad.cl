@@ -5,7 +5,9 @@
  * channel by channel, from the rows that light_shade_grad.cl leaves of each splat. The sum over
  * CHUNK splats goes in their order to a row of parts, 3 numbers for each lobe; sum_columns adds the
  * rows, so that equal splats give equal bits. The lanes are lobes here: a splat's numbers are the
- * same for all of them, and nothing is exchanged. Index space: (lobes by LANES, chunks). */
+ * same for all of them, and nothing is exchanged. Index space: (lobes by LANES, chunks).
+ *
+ * Buffers: arrivals[count, ARRIVAL], lobes[lobe_count, LIGHT_ROW], parts[along1, lobe_count, 3]. */
 
 #include "include/portable.h"
 #include "include/shading/reflection.h"

@@ -1,7 +1,9 @@
 /* The lobes of a light that splats share, as the kernels that reflect it read them: rows of an axis,
  * a gap, exp of the logarithm of the radiance of three channels, a gap (include/shading/reflection.h).
  *
- * Index space: (runs of RUN lobes), LANES of them at a time. */
+ * Index space: (runs of RUN lobes), LANES of them at a time.
+ *
+ * Buffers: axes, light[count, 3], lobes[count, LIGHT_ROW]. */
 
 #include "include/portable.h"
 #include "include/shading/reflection.h"

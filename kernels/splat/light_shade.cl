@@ -3,7 +3,10 @@
  * It is written to the first three of STRIDE features, to which the kernels of the splats' own
  * colours (splat_shade, lobe_shade with LIT 1) add theirs. Splats that are not drawn reflect nothing.
  *
- * Index space: (runs of RUN splats), LANES of them at a time. */
+ * Index space: (runs of RUN splats), LANES of them at a time.
+ *
+ * Buffers: means, normals[count, 3], reflectance[count, REFLECTANCE], culled[count],
+ * lobes[lobe_count, LIGHT_ROW], features[count, STRIDE]. */
 
 #include "include/portable.h"
 #include "include/shading/reflection.h"

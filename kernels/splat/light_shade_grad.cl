@@ -13,7 +13,12 @@
  * For the light's gradient (light_grad.cl) a row of ARRIVAL numbers of each splat is written: r,
  * s in powers of two, w times incoming times tint, a gap; zeros where there is none.
  *
- * Index space: (runs of RUN splats), LANES of them at a time. */
+ * Index space: (runs of RUN splats), LANES of them at a time.
+ *
+ * Buffers: means, normals, grad_means, grad_normals[count, 3], reflectance,
+ * grad_reflectance[count, REFLECTANCE], features, grad_features[count, STRIDE],
+ * lobes[lobe_count, LIGHT_ROW], arrivals[count, ARRIVAL],
+ * camera_parts[CAMERA_GRADIENT ? 16 : 0, (count + RUN - 1) / RUN]. */
 
 #include "include/portable.h"
 #include "include/shading/reflection.h"

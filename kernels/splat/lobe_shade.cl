@@ -12,7 +12,10 @@
  * sum above.
  *
  * Index space: (runs of RUN splats), LANES of them at a time. Each splat has 3 FUNCTIONS + GEOMETRY + 3
- * numbers that are read and 3 that are written. */
+ * numbers that are read and 3 that are written.
+ *
+ * Buffers: means[count, 3], linear[count, FUNCTIONS, 3], lobes[count, GEOMETRY], culled[count],
+ * features[count, STRIDE]. */
 
 #include "include/portable.h"
 #include "include/shading/seen_color.h"

@@ -8,7 +8,11 @@
  * coefficients take a step here and now (include/train/adam_step.h), in place of grad_linear.
  *
  * Index space: (runs of RUN splats), LANES of them at a time. Each splat has 3 FUNCTIONS + GEOMETRY + 9
- * numbers that are read, 3 FUNCTIONS + GEOMETRY that are written, and 3 of its mean that are both. */
+ * numbers that are read, 3 FUNCTIONS + GEOMETRY that are written, and 3 of its mean that are both.
+ *
+ * Buffers: means, grad_means[count, 3], linear, grad_linear, m, v[count, FUNCTIONS, 3],
+ * shares[period + LANES - 1], lobes, grad_lobes[count, GEOMETRY], features, grad_features[count, STRIDE],
+ * camera_parts[CAMERA_GRADIENT ? 16 : 0, (count + RUN - 1) / RUN]. */
 
 #include "include/portable.h"
 #include "include/shading/seen_color.h"

@@ -2,7 +2,9 @@
  *
  *     numbers[i * STRIDE + STRIDE - 1] = before[that number]
  *
- * `before` is how many slots before each are seen. Index space: runs of `run` numbers. */
+ * `before` is how many slots before each are seen. Index space: runs of `run` numbers.
+ *
+ * Buffers: numbers[count, STRIDE], before[*]. */
 
 #include "include/portable.h"
 

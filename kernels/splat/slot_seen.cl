@@ -3,7 +3,10 @@
  *     seen[slot] = 1 for the entries of a tile that come before all its pixels were left behind
  *
  * `last` is what the rasterizer kept of each pixel: how many of its tile's entries the gradient looks
- * at. Index space: tiles. */
+ * at. Index space: tiles.
+ *
+ * Buffers: entries[*], starts[tiles], last[min(height, (first_tile_row + tiles / tiles_x) * TILE), width],
+ * seen[*]. */
 
 #include "include/portable.h"
 

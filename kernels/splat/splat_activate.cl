@@ -10,7 +10,9 @@
  *
  *     scale' = sqrt(scale^2 + b^2),    opacity' = opacity prod scale / scale'.
  *
- * Index space: (runs of RUN splats), LANES of them at a time. */
+ * Index space: (runs of RUN splats), LANES of them at a time.
+ *
+ * Buffers: log_scales, scales[count, 3], logits, opacities[count], band[BAND ? count : 0]. */
 
 #include "include/portable.h"
 #include "include/splat/activation.h"

@@ -2,7 +2,9 @@
  *
  * MODAL splats give their whitening, the first three of the ROW numbers that each has in `modes`;
  * Gaussians have it from their conic. Splats that are not drawn get a record that is never read.
- * Index space: (runs of RUN splats), LANES of them at a time. */
+ * Index space: (runs of RUN splats), LANES of them at a time.
+ *
+ * Buffers: screen[count, 8], features[count, CHANNELS], packed[count, RECORD_NUMBERS], modes[count, row]. */
 
 #include "include/portable.h"
 #include "include/logarithm.h"

@@ -17,7 +17,11 @@
  * Splats that are not drawn get zeros and the reason in `culled`, the first of: not finite or
  * degenerate in what was given (2), out of depth (1), too large to tell (2), too faint (3),
  * clipped for its radius (5), off the screen (4). Index space: (runs of RUN splats), LANES of them at
- * a time. */
+ * a time.
+ *
+ * Buffers: means[count, 3], quats[count, 4], scales[count, 3], covars[count, 6], opacities[count],
+ * screen[count, 8], depths[count], boxes[count, 4], culled[count], shape_modes[count, SHAPE_MODES],
+ * color_modes[count, COLOR_MODES, COLOR_CHANNELS]. */
 
 #include "include/portable.h"
 #include "include/raster/alpha_threshold.h"

@@ -18,7 +18,13 @@
  * dL/d(view, rows of 4), dL/d(fx, fy, cx, cy) in its row of camera_parts, and with DEFOCUS as well of
  * dL/d(radius, focus) in aperture_parts: these are summed over the run's splats in their order, lane by
  * lane, and then over the lanes. Nothing flows through extents and culls; splats that are not drawn
- * get zeros. Index space: (runs of RUN splats), LANES of them at a time. */
+ * get zeros. Index space: (runs of RUN splats), LANES of them at a time.
+ *
+ * Buffers: means, grad_means[count, 3], quats, grad_quats[count, 4], scales, grad_scales[count, 3], covars,
+ * grad_covars[count, 6], opacities, grad_opacities[count], culled[count], sums[count, RECORD],
+ * grad_features[count, CHANNELS], grad_means2d[count, 2], grad_means2d_abs[ABSGRAD ? count : 0, 2],
+ * camera_parts[CAMERA_GRADIENT ? 16 : 0, (count + RUN - 1) / RUN],
+ * aperture_parts[CAMERA_GRADIENT ? 2 : 0, (count + RUN - 1) / RUN], view_parts[count, 6]. */
 
 #include "include/portable.h"
 #include "include/projection/camera.h"

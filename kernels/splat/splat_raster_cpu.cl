@@ -17,7 +17,11 @@
  * A pixel and a splat have `stride` channels, of which this launch does CHANNELS from `first`; with
  * PACKED they are in the splats' records. Written for each pixel: image (CHANNELS numbers), the
  * final transmittance, and one past the last of the tile's entries that may have changed it, where
- * the gradient begins its way back. These arrays begin with row `above` of the image. */
+ * the gradient begins its way back. These arrays begin with row `above` of the image.
+ *
+ * Buffers: image[min(height, (first_tile_row + along0 / tiles_x) * TILE) - above, width, stride],
+ * transmittance, last[min(height, (first_tile_row + along0 / tiles_x) * TILE) - above, width], packed,
+ * modes, features[*], background[stride], entries[*], starts[along0 + 1]. */
 
 #include "include/portable.h"
 #include "include/exponential.h"

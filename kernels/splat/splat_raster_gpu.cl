@@ -14,7 +14,11 @@
  * `above` of the image.
  *
  * Index space: (pixels), tile after tile of the rows of tiles from first_tile_row on, in tiles part
- * after part. */
+ * after part.
+ *
+ * Buffers: image[min(height, (first_tile_row + tiles / tiles_x) * TILE) - above, width, stride],
+ * transmittance, last[min(height, (first_tile_row + tiles / tiles_x) * TILE) - above, width], packed, modes,
+ * features[*], background[stride], entries[*], starts[tiles + 1]. */
 
 #include "include/portable.h"
 #include "include/exponential.h"

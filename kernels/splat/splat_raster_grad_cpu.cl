@@ -17,7 +17,12 @@
  * which is written once, in a fixed order of sums; a pair that touches no pixel, or lies behind all
  * that is seen, writes nothing: `live` says which slots hold something, and is zero before.
  *
- * Index space: (tiles), of the rows of tiles from first_tile_row on. */
+ * Index space: (tiles), of the rows of tiles from first_tile_row on.
+ *
+ * Buffers: slots, live[*],
+ * grad_image[min(height, (first_tile_row + along0 / tiles_x) * TILE), width, stride], grad_transmittance,
+ * transmittance, last[min(height, (first_tile_row + along0 / tiles_x) * TILE), width], packed, modes,
+ * features[*], background[stride], entries[*], starts[along0 + 1]. */
 
 #include "include/portable.h"
 #include "include/exponential.h"

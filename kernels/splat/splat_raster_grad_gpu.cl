@@ -25,7 +25,12 @@
  * Entries that no block sees before its pixels were finished leave nothing: their `live` stays 0.
  * Where a tile has several parts, a slot is cleared first, and every part adds to it.
  *
- * Index space: (tiles x GROUP), of the rows of tiles from first_tile_row on. */
+ * Index space: (tiles x GROUP), of the rows of tiles from first_tile_row on.
+ *
+ * Buffers: slots, live[*],
+ * grad_image[min(height, (first_tile_row + tiles / tiles_x) * TILE), width, stride], grad_transmittance,
+ * transmittance, last[min(height, (first_tile_row + tiles / tiles_x) * TILE), width], packed, modes,
+ * features[*], background[stride], entries[*], starts[tiles + 1]. */
 
 #include "include/portable.h"
 #include "include/exponential.h"

@@ -7,7 +7,9 @@
  * first three of STRIDE features. With LIT 1 these hold the light that a splat reflects already
  * (light_shade.cl), which is added to the sum above.
  *
- * Index space: (runs of RUN splats), LANES of them at a time. */
+ * Index space: (runs of RUN splats), LANES of them at a time.
+ *
+ * Buffers: means[count, 3], sh[count, COEFFICIENTS, 3], culled[count], features[count, STRIDE]. */
 
 #include "include/portable.h"
 #include "include/shading/seen_color.h"

@@ -7,7 +7,11 @@
  * With ADAM the coefficients take a step here and now (include/train/adam_step.h), in place of grad_sh: also
  * those of splats that nothing comes in for, which go on by their moments.
  *
- * Index space: (runs of RUN splats), LANES of them at a time. */
+ * Index space: (runs of RUN splats), LANES of them at a time.
+ *
+ * Buffers: means, grad_means[count, 3], sh, grad_sh, m, v[count, COEFFICIENTS, 3],
+ * shares[period + LANES - 1], features, grad_features[count, STRIDE],
+ * camera_parts[CAMERA_GRADIENT ? 16 : 0, (count + RUN - 1) / RUN]. */
 
 #include "include/portable.h"
 #include "include/shading/seen_color.h"

@@ -5,7 +5,9 @@
  * What is not live holds nothing, not even zeros, and is not read. A splat's slots are contiguous
  * and in the order of its tiles, row by row. With CONTINUED the sums go on from what is there:
  * bands of an image, one after the other, add up to the same bits as the whole. Index space:
- * splats. */
+ * splats.
+ *
+ * Buffers: slots[count + 1], records, live[*], sums[count, RECORD]. */
 
 #include "include/portable.h"
 

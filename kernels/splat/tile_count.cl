@@ -8,7 +8,9 @@
  * device may take the smallest numbers for zero.
  *
  * Index space: runs of `run` splats. Where one run is all there is (WHOLE 1), counts become the sums
- * of those before, and total[0] the sum of all. */
+ * of those before, and total[0] the sum of all.
+ *
+ * Buffers: boxes[splats, 4], depths, keys[splats], counts[splats + 1], total[1]. */
 
 #include "include/portable.h"
 #include "include/splat/tile_box.h"

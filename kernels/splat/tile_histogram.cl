@@ -2,7 +2,9 @@
  *
  *     table[chunk][tile] = (splat, tile) pairs of the chunk
  *
- * Index space: chunks of the walk of include/splat/tile_walk.h. */
+ * Index space: chunks of the walk of include/splat/tile_walk.h.
+ *
+ * Buffers: ranks[splats, 4], offsets[splats + 1], table[chunks, tiles]. */
 
 #include "include/portable.h"
 #include "include/splat/tile_walk.h"

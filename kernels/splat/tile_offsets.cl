@@ -4,7 +4,9 @@
  *     counts[tile]       = entries of the tile;  counts[tiles] = 0
  *
  * Index space: runs of `run` tiles; a run is done chunk after chunk, which reads whole rows.
- * Where one run is all there is (WHOLE 1), counts become the sums of those before. */
+ * Where one run is all there is (WHOLE 1), counts become the sums of those before.
+ *
+ * Buffers: table[chunks, tiles], counts[tiles + 1]. */
 
 #include "include/portable.h"
 

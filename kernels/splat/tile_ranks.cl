@@ -7,7 +7,9 @@
  *
  * Index space: runs of `run` ranks, the last of which closes the list. SORTED 0: the splats are
  * taken in index order, and neither `order` nor `visible` is read. Where one run is all there is
- * (WHOLE 1), counts become the sums of those before. */
+ * (WHOLE 1), counts become the sums of those before.
+ *
+ * Buffers: boxes, ranks[splats, 4], slots, counts[splats + 1], order[SORTED ? splats : 0], visible[SORTED]. */
 
 #include "include/portable.h"
 #include "include/splat/tile_box.h"

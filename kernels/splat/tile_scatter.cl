@@ -6,7 +6,9 @@
  * has, and a splat's own are side by side. `table` holds how many entries of the tile come from
  * the chunks before.
  *
- * Index space: chunks of the walk of include/splat/tile_walk.h. */
+ * Index space: chunks of the walk of include/splat/tile_walk.h.
+ *
+ * Buffers: ranks[splats, 4], offsets[splats + 1], table[chunks, tiles], starts[tiles], entries[pairs, 2]. */
 
 #include "include/portable.h"
 #include "include/splat/tile_walk.h"

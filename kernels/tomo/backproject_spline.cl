@@ -6,7 +6,9 @@
  * outside the first and the last bin's centres. `lines` holds offset, row, step of each view, in
  * bins; a view of `coefficients` has one more before its bins and two more after them.
  *
- * Index space: (runs of LANES pixels of a row, rows). Each item goes through all views. */
+ * Index space: (runs of LANES pixels of a row, rows). Each item goes through all views.
+ *
+ * Buffers: coefficients[views, bins + BEFORE + AFTER], lines[views, 3], image[along1, nx]. */
 
 #include "include/portable.h"
 

@@ -5,7 +5,9 @@
  * No hole is another's neighbour. The products are rounded before they are added, on every device,
  * so that columns that are sorted stay sorted.
  *
- * Index space: (runs of RUN views, holes). `table` holds hole, left and right of each. */
+ * Index space: (runs of RUN views, holes). `table` holds hole, left and right of each.
+ *
+ * Buffers: x[*], table[along1, 3], shares[along1]. */
 
 #include "include/portable.h"
 

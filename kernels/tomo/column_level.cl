@@ -2,7 +2,9 @@
  *
  *     level[c] = mean of ranked[c][dropped .. views - dropped - 1]
  *
- * Index space: columns. */
+ * Index space: columns.
+ *
+ * Buffers: ranked[columns, views], level[columns]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

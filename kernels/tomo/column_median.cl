@@ -7,7 +7,9 @@
  * pass without branches, in all lanes alike. So any window costs four operations a value.
  *
  * Index space: (runs of LANES ranks, segments of SEGMENT bins, rows). At least LANES ranks; the last
- * run begins early enough to be whole. WINDOW is odd. */
+ * run begins early enough to be whole. WINDOW is odd.
+ *
+ * Buffers: source, out[along2, bins, ranks]. */
 
 #include "include/portable.h"
 

@@ -5,7 +5,9 @@
  * with the first and the last view repeated beyond the ends. A bin that answers to no view is much
  * smoother than its neighbours, one that fluctuates much rougher.
  *
- * Index space: columns. At least SPAN views. */
+ * Index space: columns. At least SPAN views.
+ *
+ * Buffers: values[columns, views], rough[columns]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

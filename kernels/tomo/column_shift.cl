@@ -2,7 +2,9 @@
  *
  *     x[c][v] -= shift[c]
  *
- * Index space: (runs of RUN views, bins, rows): a grid's further axes end at 65,535 on some GPUs. */
+ * Index space: (runs of RUN views, bins, rows): a grid's further axes end at 65,535 on some GPUs.
+ *
+ * Buffers: x[along2, bins, views], shift[along2, bins]. */
 
 #include "include/portable.h"
 

@@ -8,7 +8,9 @@
  * (`spare`, two times `views` pairs of key and view); a column of some thousand views stays in a
  * CPU's first cache meanwhile. `ranked` may be `values` itself.
  *
- * Index space: runs of columns. */
+ * Index space: runs of columns.
+ *
+ * Buffers: values, ranked, order[columns, views], spare[(columns + RUN - 1) / RUN, 2, views, 2]. */
 
 #include "include/portable.h"
 #include "include/tomo/sort_key.h"

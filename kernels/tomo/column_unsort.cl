@@ -2,7 +2,9 @@
  *
  *     values[c][order[c][k]] = ranked[c][k]
  *
- * Index space: (runs of RUN ranks, bins, rows): a grid's further axes end at 65,535 on some GPUs. */
+ * Index space: (runs of RUN ranks, bins, rows): a grid's further axes end at 65,535 on some GPUs.
+ *
+ * Buffers: ranked, order, values[along2, bins, views]. */
 
 #include "include/portable.h"
 

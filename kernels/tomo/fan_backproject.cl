@@ -12,7 +12,9 @@
  *
  *     sum over bins of y (G[after] - G[before]) = y[last] + sum over edges of (y[before] - y[after]) G.
  *
- * Index space: (runs of LANES pixels of a row, runs of ROWS rows). */
+ * Index space: (runs of LANES pixels of a row, runs of ROWS rows).
+ *
+ * Buffers: image[height, width], records[count, stride, 4], numbers[first + count, VIEW_NUMBERS]. */
 
 #include "include/portable.h"
 #include "include/tomo/fan_footprint.h"

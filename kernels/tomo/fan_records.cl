@@ -6,7 +6,10 @@
  * what it is less than that of the bin before; of hats, whose rays are those of bins: value, and
  * for step the bin's width in lines. Rays beyond the last bin have the value 0.
  *
- * `first` is the first view of this run. Index space: (runs of RUN rays, views of the run). */
+ * `first` is the first view of this run. Index space: (runs of RUN rays, views of the run).
+ *
+ * Buffers: records[along1, stride, 4], sinogram[along1, bins], starts, slopes, widths,
+ * factors[first + along1, stride], numbers[first + along1, VIEW_NUMBERS], views[first + along1]. */
 
 #include "include/portable.h"
 #include "include/tomo/fan_footprint.h"

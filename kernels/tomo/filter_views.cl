@@ -7,7 +7,10 @@
  *
  * Index space: (segments of bins, runs of ROWS rows). Each item keeps ROWS x SEGMENT sums in
  * registers; for each b' it loads SEGMENT taps once for all rows and one number of each row. A
- * CPU is bound by its multiply-adds: ROWS * BLOCKS of them to ROWS + BLOCKS loads. */
+ * CPU is bound by its multiply-adds: ROWS * BLOCKS of them to ROWS + BLOCKS loads.
+ *
+ * Buffers: sinogram, filtered[rows, bins], taps[bins - 1 + (bins + SEGMENT - 1) / SEGMENT * SEGMENT],
+ * gains[(rows + rows_per_view - 1) / rows_per_view]. */
 
 #include "include/portable.h"
 

@@ -1,7 +1,9 @@
 /* Give an array the norm that another one had: x *= sqrt(wanted / found), from sums of squares.
  *
  * The sums stay on the device, so that nobody waits for them. An array of zeros stays one.
- * Index space: (runs of RUN samples). */
+ * Index space: (runs of RUN samples).
+ *
+ * Buffers: x[size], wanted, found[1]. */
 
 #include "include/portable.h"
 

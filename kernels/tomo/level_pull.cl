@@ -2,7 +2,9 @@
  *
  * The gradient of strength/2 (x - low)(high - x), which is zero at each level and bulges up between
  * them. Beyond the first and the last level the outermost two count. Index space: (runs of RUN
- * samples). */
+ * samples).
+ *
+ * Buffers: levels[count], x, y[size]. */
 
 #include "include/portable.h"
 

@@ -4,7 +4,9 @@
  *
  * Beyond the stack's ends pixels are mirrored. Values are sorted as they come, in registers.
  *
- * Index space: (runs of RUN bins, rows, views). */
+ * Index space: (runs of RUN bins, rows, views).
+ *
+ * Buffers: x, out[views, rows, bins]. */
 
 #include "include/portable.h"
 #include "include/tomo/neighbours.h"

@@ -4,7 +4,10 @@
  *
  * Index space: (tiles of x, tiles of y, slices). Each item owns one tile of TILE x TILE, so that
  * the transposed read uses whole cache lines. The planes' rows are padded to `row_pitch` and
- * `column_pitch`. */
+ * `column_pitch`.
+ *
+ * Buffers: by_rows[along2, ny, row_pitch], by_columns[along2, nx, column_pitch],
+ * image[slice0 + along2, ny, nx]. */
 
 #include "include/portable.h"
 

@@ -4,7 +4,9 @@
  *
  * Index space: (tiles of columns, tiles of rows, slices of the plane). Each item copies one tile
  * of TILE x TILE, so that a transposed read uses whole cache lines. The margins stay as they
- * are: the caller clears the plane once. */
+ * are: the caller clears the plane once.
+ *
+ * Buffers: image[slice0 + along2, rows, width], plane[along2, rows, width + 2 * margin]. */
 
 #include "include/portable.h"
 

@@ -9,7 +9,9 @@
  * the pieces of their tables that a run of rows touches stay in the first-level cache. Per LANES
  * pixels and view: two loads, two multiply-adds.
  *
- * Columns of the plane are padded to whole segments, rows are not. */
+ * Columns of the plane are padded to whole segments, rows are not.
+ *
+ * Buffers: table[along2, count, PHASES, columns], plane[along2, rows, width], geometry[first + count, 4]. */
 
 #include "include/portable.h"
 #include "include/tomo/phase_table.h"

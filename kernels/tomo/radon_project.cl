@@ -11,7 +11,11 @@
  * column by column (phases together), which is how radon_resample_adjoint reads it.
  *
  * The plane has SEGMENT zeros before and after every row, so that a segment that overhangs the
- * row needs no bounds test. */
+ * row needs no bounds test.
+ *
+ * Buffers: table[along2, count, columns, PHASES], plane[along2, rows, width + 2 * SEGMENT],
+ * geometry[first + count, 4], orders[first + count, rows], all_starts[first + count, PHASES + 1],
+ * views[first + count, 2]. */
 
 #include "include/portable.h"
 #include "include/tomo/phase_table.h"

@@ -10,7 +10,10 @@
  * branch that a CPU guesses wrongly, they take the `usual` number, of which the footprints of those
  * out of reach are zero. Bins outside the detector count as zero. `views` holds, for each view of
  * the table, which view of the scan it is and how many columns it needs; the sinogram has `slices`
- * slices, of which the table takes those from slice0. */
+ * slices, of which the table takes those from slice0.
+ *
+ * Buffers: sinogram[count, slices, bins], table[along2, count, PHASES, columns], geometry[first + count, 4],
+ * footprints[first + count, 8], views[first + count, 2]. */
 
 #include "include/portable.h"
 #include "include/tomo/phase_table.h"

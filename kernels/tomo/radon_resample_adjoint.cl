@@ -5,7 +5,10 @@
  *
  * Index space: (bins, views of this run, slices). Each item gathers, for its bins, the
  * columns whose footprints can touch them; the phases of a column lie together in memory and are
- * taken LANES at a time. No two items write the same bin: no atomics, and one order of summation. */
+ * taken LANES at a time. No two items write the same bin: no atomics, and one order of summation.
+ *
+ * Buffers: sinogram[count, slices, bins], table[along2, count, PHASES, columns], geometry[first + count, 4],
+ * footprints[first + count, 8], views[first + count, 2]. */
 
 #include "include/portable.h"
 #include "include/tomo/phase_table.h"

@@ -12,7 +12,10 @@
  * share is half of the arithmetic of a bin's area, so this costs hardly more than interpolation.
  *
  * Index space and layout are those of radon_resample: (runs of LANES columns, views of this run,
- * slices); a CPU takes the phases of a column as lanes and transposes at the end. */
+ * slices); a CPU takes the phases of a column as lanes and transposes at the end.
+ *
+ * Buffers: sinogram[count, slices, bins], table[along2, count, PHASES, columns], geometry[first + count, 4],
+ * footprints[first + count, 8], views[first + count, 2]. */
 
 #include "include/portable.h"
 #include "include/tomo/phase_table.h"

@@ -14,7 +14,10 @@
  * they cancel exactly.
  *
  * Index space: (runs of BINS bins, views of this run, slices). No two items write the same bin: no
- * atomics, and one order of summation, whatever BINS is. */
+ * atomics, and one order of summation, whatever BINS is.
+ *
+ * Buffers: sinogram[count, slices, bins], table[along2, count, PHASES, columns], geometry[first + count, 4],
+ * footprints[first + count, 8], views[first + count, 2]. */
 
 #include "include/portable.h"
 #include "include/tomo/phase_table.h"

@@ -8,7 +8,11 @@
  * transpose has n for both. A stride of 0 means that all rows, or all views, have the same factors.
  * `x` may be `out` where the detector stays as it is.
  *
- * Index space: (blocks of BINS bins, runs of RUN rows of all views). */
+ * Index space: (blocks of BINS bins, runs of RUN rows of all views).
+ *
+ * Buffers: x[lines, x_bins], out[lines, bins],
+ * pixels[(min(lines, rows) - 1) * pixel_stride + weight_shift + min(bins, x_bins - shift)],
+ * views[(lines - 1) / rows * view_stride + weight_shift + min(bins, x_bins - shift)]. */
 
 #include "include/portable.h"
 

@@ -7,7 +7,10 @@
  * (ALONG_ROWS 1), with `start` shared by each block of eight bins; weights have room for that and
  * for whole blocks, `stride` to a line. Beyond the detector its last sample goes on.
  *
- * Index space: (runs of RUN bins, views, rows of the result). */
+ * Index space: (runs of RUN bins, views, rows of the result).
+ *
+ * Buffers: stack[along1, rows_in, bins], out[along1, rows, bins], weights[along2, TAPS, stride],
+ * starts[along2, stride / 8]. */
 
 #include "include/portable.h"
 

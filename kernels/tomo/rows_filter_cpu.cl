@@ -2,7 +2,11 @@
  *
  * What a GPU does by rows_pack_gpu, fft_pass, rows_weigh_gpu, fft_pass and rows_unpack_gpu, all in the caches of a
  * core (see include/tomo/row_columns.h). Index space: items, each of which takes every so many-th
- * block. */
+ * block.
+ *
+ * Buffers: rows, out[count, bins], gains[(count + rows_per_view - 1) / rows_per_view], sums,
+ * differences[length / 2 + 1, filters], half_turns[length / 2 + 1, 2], scratch[items, 4, length, BLOCK],
+ * turns[length, 2]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

@@ -2,7 +2,9 @@
  * include/tomo/row_columns.h).
  *
  * `planes` holds the real parts, (length, columns), then the imaginary ones. Rows begin at `first`;
- * what stands past the last repeats it and is never read. Index space: (bins of 2 length, columns). */
+ * what stands past the last repeats it and is never read. Index space: (bins of 2 length, columns).
+ *
+ * Buffers: rows[first + count, bins], planes[2, length, columns]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

@@ -1,6 +1,9 @@
 /* The columns of a Fourier transform become rows of a detector again, for GPUs: rows_pack_gpu.cl backwards.
  *
- * Index space: (blocks of LANES bins, blocks of LANES rows). */
+ * Index space: (blocks of LANES bins, blocks of LANES rows).
+ *
+ * Buffers: planes[2, length, columns], rows[first + count, bins],
+ * gains[(first + count + rows_per_view - 1) / rows_per_view]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

@@ -1,6 +1,9 @@
 /* Multiply the spectra of real rows by responses, for GPUs (see include/tomo/row_columns.h).
  *
- * Each filter serves `rows_per_filter` rows. Index space: (blocks of LANES columns, length / 2 + 1). */
+ * Each filter serves `rows_per_filter` rows. Index space: (blocks of LANES columns, length / 2 + 1).
+ *
+ * Buffers: planes[2, length, columns], sums, differences[length / 2 + 1, filters],
+ * half_turns[length / 2 + 1, 2]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

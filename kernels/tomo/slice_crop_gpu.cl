@@ -1,6 +1,8 @@
 /* Pairs of rows become an image: the last step of the inverse transform, for GPUs.
  *
- * Index space: (blocks of LANES pixels of a row, blocks of LANES pairs, parts). */
+ * Index space: (blocks of LANES pixels of a row, blocks of LANES pairs, parts).
+ *
+ * Buffers: fields[along2, edge, pairs], image[slice + 1, height, width], down[height], across[width]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

@@ -4,7 +4,10 @@
  * include/fourier/row_pairs.h). Pairs come as pairs_of_spectrum_cpu leaves them, and are
  * overwritten.
  *
- * Index space: items, each of which takes every so many-th block. */
+ * Index space: items, each of which takes every so many-th block.
+ *
+ * Buffers: fields[blocks, 2, length, BLOCK], image[slice + 1, height, width], down[height], across[width],
+ * scratch[items, 4, length, BLOCK], turns[length, 2]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

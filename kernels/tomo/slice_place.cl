@@ -1,7 +1,9 @@
 /* An image becomes pairs of rows: the transpose of slice_crop_gpu, and the transform's first step.
  *
  * Beyond the image there are zeros. Index space: (blocks of LANES pairs, blocks of LANES columns of
- * the padded image, parts). */
+ * the padded image, parts).
+ *
+ * Buffers: image[slice + 1, height, width], fields[along2, edge, pairs], down[height], across[width]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

@@ -1,7 +1,9 @@
 /* out = a x + D' u, where D' is scaled along each axis; without negative values if NONNEGATIVE.
  *
  * If DIRECTIONAL, u is weighed by its direction first (see differences.h).
- * `out` may be x itself. Index space: (runs of RUN samples along x, y, z). */
+ * `out` may be x itself. Index space: (runs of RUN samples along x, y, z).
+ *
+ * Buffers: image, out[nz, ny, nx], u[AXES, nz, ny, nx]. */
 
 #include "include/portable.h"
 #include "include/tomo/differences.h"

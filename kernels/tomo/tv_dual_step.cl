@@ -6,7 +6,9 @@
  * direction first (see differences.h). `moved` may be u itself.
  * From u = 0 with step 1 and no bound on the radius it is the gradient D x.
  *
- * Index space: (runs of RUN samples along x, y, z). */
+ * Index space: (runs of RUN samples along x, y, z).
+ *
+ * Buffers: image[nz, ny, nx], u, moved[AXES, nz, ny, nx]. */
 
 #include "include/portable.h"
 #include "include/tomo/differences.h"

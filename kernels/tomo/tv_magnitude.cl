@@ -1,7 +1,9 @@
 /* |D x| at every sample: its sum is the total variation.
  *
  * If DIRECTIONAL, D x is weighed by its direction first (see differences.h).
- * Index space: (runs of RUN samples along x, y, z). */
+ * Index space: (runs of RUN samples along x, y, z).
+ *
+ * Buffers: image, magnitude[nz, ny, nx]. */
 
 #include "include/portable.h"
 #include "include/tomo/differences.h"

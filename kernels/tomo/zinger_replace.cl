@@ -9,7 +9,9 @@
  * Near are a row on either side, and BINS_BESIDE bins, by as many as the object may move between
  * views. `levels` holds least and floor of each row.
  *
- * Index space: (runs of RUN bins, rows, views). */
+ * Index space: (runs of RUN bins, rows, views).
+ *
+ * Buffers: x, medians, out[views, rows, bins], limits[rows, bins], levels[rows, 2]. */
 
 #include "include/portable.h"
 #include "include/tomo/neighbours.h"

@@ -7,7 +7,9 @@
  * the period has its own share of the rate: `shares` holds two periods and LANES more, so that a run
  * of LANES parameters reads its shares from wherever it begins.
  *
- * Index space: (runs of RUN parameters). */
+ * Index space: (runs of RUN parameters).
+ *
+ * Buffers: x, g, m, v[size], shares[period + LANES - 1]. */
 
 #include "include/portable.h"
 #include "include/train/adam_step.h"

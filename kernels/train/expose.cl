@@ -1,6 +1,8 @@
 /* An image of three colours as a photograph with its own exposure: y = gain x + offset, by colour.
  *
- * Index space: pixels. */
+ * Index space: pixels.
+ *
+ * Buffers: image, exposed[pixels, 3]. */
 
 #include "include/portable.h"
 

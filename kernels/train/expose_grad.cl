@@ -1,6 +1,8 @@
 /* Gradient of expose.cl: dL/dx = gain dL/dy; parts[pixel] are dL/dgain, dL/doffset by colour.
  *
- * The parts are summed afterwards, in a fixed order. Index space: pixels. */
+ * The parts are summed afterwards, in a fixed order. Index space: pixels.
+ *
+ * Buffers: image, by_exposed, by_image[pixels, 3], parts[pixels, 6]. */
 
 #include "include/portable.h"
 

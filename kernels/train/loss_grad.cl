@@ -12,7 +12,11 @@
  *
  * `parts` gets the sum of the first part over each item's floats, one number for each item from
  * `first_part` on. Index space: (strips of floats, runs of rows from `first_run` on), a group for each
- * tile. The maps hold `map_rows` rows of the image, from `map_first` on, and all that these tiles read. */
+ * tile. The maps hold `map_rows` rows of the image, from `map_first` on, and all that these tiles read.
+ *
+ * Buffers: image, grad[height, width / CHANNELS, IMAGE_CHANNELS], target[height, width],
+ * weights[WEIGHTED ? height : 0, width / CHANNELS], maps[SSIM ? MAPS : 0, map_rows, pitch],
+ * parts[first_part + (first_run + along1) * ((width + STRIP - 1) / STRIP) * GROUP]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

@@ -7,7 +7,9 @@
  * the principal point, width and height; of its aperture the radius, one over the distance in focus
  * and the wavelength, which are not looked at here.
  *
- * Index space: splats. */
+ * Index space: splats.
+ *
+ * Buffers: means[count, 3], cameras[views, NUMBERS], band[count]. */
 
 #include "include/portable.h"
 #include "include/small_matrix.h"

@@ -10,7 +10,9 @@
  * which is splat_band's for the k of half a cycle per pixel of the finest camera: where views are many
  * and clean, both agree. Cameras are numbers as splat_band has them.
  *
- * Index space: (runs of LANES splats). */
+ * Index space: (runs of LANES splats).
+ *
+ * Buffers: means[count, 3], cameras[views, NUMBERS], band[count]. */
 
 #include "include/portable.h"
 #include "include/sampling/optical_transfer.h"

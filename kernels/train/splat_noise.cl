@@ -5,11 +5,14 @@
  * with xi standard normal (3DGS as MCMC, Kheradmand et al. 2024; constants of gsplat). Numbers are
  * made from (splat, step, seed) alone by a hash (PCG4D, Jarzynski and Olano 2020) and Box and
  * Muller's transform, so that a run can be repeated and taken up again, whatever the number of lanes
- * that hash at a time. Index space: (runs of RUN splats), LANES of them at a time. */
+ * that hash at a time. Index space: (runs of RUN splats), LANES of them at a time.
+ *
+ * Buffers: means, scales[count, 3], quats[count, 4], opacities[count]. */
 
 #include "include/portable.h"
 #include "include/splat/splat_rows.h"
 #include "include/logarithm.h"
+#include "include/rotated.h"
 #include "include/turn.h"
 
 #define STEEPNESS 100.0f
@@ -61,12 +64,6 @@ static lanes3 normal3(whole4 bits) {
 static lanes gate_of(lanes x) {
   const lanes e = power_of_two(-1.44269504f * absolute(x));
   return (x > 0 ? e : 1) / (1 + e);
-}
-
-/* Turned by the unit quaternion (w, v): x + 2 (w v x x + v x (v x x)). */
-static lanes3 rotated(lanes3 x, lanes w, lanes3 v) {
-  const lanes3 once = cross_of(v, x), more = plus(times(w, once), cross_of(v, once));
-  return plus(x, plus(more, more));
 }
 
 KERNEL void splat_noise(

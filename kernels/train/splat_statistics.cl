@@ -8,7 +8,9 @@
  * the rectangle round all that is drawn of the splat, not rounded to pixels.
  *
  * A splat that is not drawn in this frame, or whose gradient is not finite, keeps what it has: one
- * broken frame must neither grow it nor hide it. Index space: splats. */
+ * broken frame must neither grow it nor hide it. Index space: splats.
+ *
+ * Buffers: grad_means2d[count, 2], screen[count, 8], culled[count], statistics[count, 3]. */
 
 #include "include/portable.h"
 #include "include/small_matrix.h"

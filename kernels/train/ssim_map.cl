@@ -21,7 +21,11 @@
  * with P and p of the shifted sum alike in the last line. Those three maps are written, planes of
  * `pitch` floats a row, and the sum of scale m e of the items, one number each. m is one where
  * there are no weights. Index space: (strips of floats, runs of rows from `first_run` on), a group
- * for each tile. The maps hold `map_rows` rows of the image, from `map_first` on. */
+ * for each tile. The maps hold `map_rows` rows of the image, from `map_first` on.
+ *
+ * Buffers: image[height, width / CHANNELS, IMAGE_CHANNELS], target[height, width],
+ * weights[WEIGHTED ? height : 0, width / CHANNELS], maps[3, map_rows, pitch],
+ * parts[first_run + along1, (width + STRIP - 1) / STRIP, GROUP]. */
 
 #include "include/portable.h"
 #include "include/transpose.h"

@@ -1,6 +1,8 @@
 /* y = a x + b y, sample by sample: what sums and multiples of operators are made of.
  *
- * Index space: (runs of RUN samples). */
+ * Index space: (runs of RUN samples).
+ *
+ * Buffers: x, y[size]. */
 
 #include "include/portable.h"
 

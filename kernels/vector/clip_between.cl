@@ -1,6 +1,8 @@
 /* y = min(max(y, low), high), sample by sample: the nearest image between two others.
  *
- * NaN stays NaN, so that it shows. Index space: (runs of RUN samples). */
+ * NaN stays NaN, so that it shows. Index space: (runs of RUN samples).
+ *
+ * Buffers: low, high, y[size]. */
 
 #include "include/portable.h"
 

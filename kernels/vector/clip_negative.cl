@@ -1,6 +1,8 @@
 /* y = max(y, 0), sample by sample: the nearest image without negative values.
  *
- * NaN stays NaN, so that it shows. Index space: (runs of RUN samples). */
+ * NaN stays NaN, so that it shows. Index space: (runs of RUN samples).
+ *
+ * Buffers: y[size]. */
 
 #include "include/portable.h"
 

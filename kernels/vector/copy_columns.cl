@@ -2,7 +2,10 @@
  *
  *     target[row][target_first + k] = source[row][source_first + k]   for k < columns
  *
- * Index space: (rows). Tables are (rows, source_width) and (rows, target_width). */
+ * Index space: (rows). Tables are (rows, source_width) and (rows, target_width).
+ *
+ * Buffers: source[(rows - 1) * source_width + source_first + columns],
+ * target[(rows - 1) * target_width + target_first + columns]. */
 
 #include "include/portable.h"
 

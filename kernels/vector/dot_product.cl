@@ -9,7 +9,9 @@
  * summed apart, so that a sum of millions is as good as its products. Which sample goes to which
  * item and lane depends on the size and the device alone, and with it every bit of the result.
  *
- * Index space: (items). */
+ * Index space: (items).
+ *
+ * Buffers: x[size], y[PRODUCT ? size : 0], sums[2, count]. */
 
 #include "include/portable.h"
 

@@ -1,6 +1,8 @@
 /* y = w y, sample by sample: the weights of rays and pixels.
  *
- * Index space: (runs of RUN samples). */
+ * Index space: (runs of RUN samples).
+ *
+ * Buffers: w, y[size]. */
 
 #include "include/portable.h"
 

@@ -4,7 +4,9 @@
  *
  * The prefix sum of the table tells radix_scatter where each chunk's keys of each digit begin.
  *
- * Index space: chunks. See include/vector/radix.h for FIRST and the counters. */
+ * Index space: chunks. See include/vector/radix.h for FIRST and the counters.
+ *
+ * Buffers: keys[splats], slots[FIRST ? splats + 1 : 0], visible[FIRST ? 0 : 1], table[DIGITS, chunks]. */
 
 #include "include/portable.h"
 #include "include/vector/chunk.h"

@@ -4,7 +4,10 @@
  * keys within one, so that equal digits stay in the order of the list.
  *
  * Index space: chunks. See include/vector/radix.h for FIRST and the counters; in the first pass a
- * splat is its own place in the list, and `order` is not read. */
+ * splat is its own place in the list, and `order` is not read.
+ *
+ * Buffers: keys, moved_keys, moved_order[splats], order[FIRST ? 0 : splats], slots[FIRST ? splats + 1 : 0],
+ * visible[FIRST ? 0 : 1], table[DIGITS, chunks]. */
 
 #include "include/portable.h"
 #include "include/vector/chunk.h"

@@ -7,7 +7,9 @@
  * `other_order` are written over: every pass moves keys and order from one pair of arrays to the
  * other, and the last one, an even number of them, ends where the first began.
  *
- * Index space: one item. */
+ * Index space: one item.
+ *
+ * Buffers: keys, other_keys, order, other_order[splats], slots[splats + 1], visible[1]. */
 
 #include "include/portable.h"
 

@@ -5,7 +5,9 @@
  * Each item goes through one run, from the sum of all runs before it: sums[run's number]. Where
  * one run is all there is (WHOLE 1), it starts from zero and leaves the total in sums[0].
  *
- * Index space: runs. WIDE 1: the values have 64 bits. */
+ * Index space: runs. WIDE 1: the values have 64 bits.
+ *
+ * Buffers: values[count], sums[WHOLE ? 1 : (count + run - 1) / run]. */
 
 #include "include/portable.h"
 

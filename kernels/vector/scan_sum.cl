@@ -4,7 +4,9 @@
  *
  * The sums have 64 bits, so that the last of them tells a total that 32 bits cannot hold.
  *
- * Index space: runs. WIDE 1: the values are themselves such sums. */
+ * Index space: runs. WIDE 1: the values are themselves such sums.
+ *
+ * Buffers: values[count], sums[(count + run - 1) / run]. */
 
 #include "include/portable.h"
 

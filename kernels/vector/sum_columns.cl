@@ -4,7 +4,9 @@
  *
  * Applied until one row is left, this is a tree whose shape depends on the number of rows alone,
  * so that the result has the same bits every time. Within a run eight partial sums take turns:
- * they do not wait for each other, and round less. Index space: runs x columns, as one axis. */
+ * they do not wait for each other, and round less. Index space: runs x columns, as one axis.
+ *
+ * Buffers: table[rows, columns], sums[(rows + RUN - 1) / RUN, columns]. */
 
 #include "include/portable.h"
 

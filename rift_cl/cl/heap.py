@@ -27,7 +27,7 @@ from rift_cl.cl.failures import driver_errors
 _STEP = 4096
 # A block lies in no segment of more than so many times its size: a small array would keep a large
 # one from the place that was made for it, and that one would get a second place.
-_LARGER = 6
+_LARGER = 5
 # Segments are made a little larger than what is asked for, by up to a sixteenth: the next array of
 # the kind may need a few more bytes, where one has as many as some splats are seen.
 _FINENESS = 4
@@ -81,15 +81,16 @@ class Heap:
             self._sweep()
             self._most = max(self._most, self._in_use + size)
             self._requests += 1
+            # Beside others first: segments that stay empty serve large arrays, or are given back.
             holes = [
-                (length, number, begin)
+                (not segment.blocks, length, number, begin)
                 for number, segment in enumerate(self._segments)
                 if segment.size <= _LARGER * size
                 for begin, length in segment.holes()
                 if length >= size
             ]
             if holes:
-                _, number, begin = min(holes)
+                *_, number, begin = min(holes)
                 return self._segments[number].cut(begin, size, self._requests)
             return self._new_segment(size).cut(0, size, self._requests)
 

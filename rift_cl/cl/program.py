@@ -2,7 +2,7 @@
 
 A ``cl.Kernel`` object holds its arguments, so two threads that share one silently compute with each
 other's; each thread keeps its own. Arguments are named, and checked against what the kernel's
-source says that it takes.
+source says that it takes, and how long its buffers are.
 
 A step of a fit is some fifty launches. So what can be known of a launch from the names that it
 gives and from its compile-time constants is found out once (``_Launch``) and then looked up.
@@ -18,6 +18,7 @@ import numpy as np
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.build.builder import Builder, Key, building
+from rift_cl.cl.build.first_launch import told_launch
 from rift_cl.cl.build.kernel_cache import build_lock
 from rift_cl.cl.build.kernel_features import feature_of
 from rift_cl.cl.build.source import kernel_source
@@ -25,7 +26,7 @@ from rift_cl.cl.failures import driver_errors, named_error, named_errors
 from rift_cl.cl.grid_parts import GridPart, Size, grid_parts
 from rift_cl.cl.launch_times import LaunchTimes
 from rift_cl.cl.process import claim_process
-from rift_cl.cl.signature import Arguments, Parameter, check_numbers, parameters
+from rift_cl.cl.signature import Arguments, Signature, check_numbers, signature
 from rift_cl.errors import DeviceError
 from rift_cl.progress import BUILDS
 
@@ -49,14 +50,14 @@ class _Kernel(NamedTuple):
     Args:
         key: the kernel and its macros.
         handle: the ``pyopencl.Kernel``.
-        parameters: what it takes.
+        signature: what it takes.
         group: work-items of a group.
         started: ways in which any thread has launched it before.
     """
 
     key: Key
     handle: Any
-    parameters: tuple[Parameter, ...]
+    signature: Signature
     group: int
     started: set[_Way]
 
@@ -131,8 +132,8 @@ class Programs:
                 argument that this variant does not take.
 
         Raises:
-            KernelArgumentError: an argument is missing, unknown, or of another type than the
-                kernel wants.
+            KernelArgumentError: an argument is missing, unknown, of another type than the kernel
+                wants, or an array that is shorter than the kernel goes through.
             DeviceError: ``DOUBLE`` is 1 and the device has no doubles, the kernel needs larger
                 groups or more local memory than the device has, or the driver failed.
         """
@@ -140,7 +141,7 @@ class Programs:
         if 0 in size:
             return
         kernel, arguments = self._launch_of(name, given)
-        values = arguments.in_order(given)
+        values = arguments.in_order(given, size)
         group = kernel.group
         rounded = (-(-size[0] // group) * group, *size[1:])
         local = (group,) + (1,) * (len(size) - 1)
@@ -148,14 +149,14 @@ class Programs:
             try:
                 kernel.handle.set_args(*values)
             except RuntimeError:
-                check_numbers(name, kernel.parameters, values)
+                check_numbers(name, kernel.signature.parameters, values)
                 raise
             if max(rounded) <= self._longest:
-                self._enqueue(kernel, rounded, local)
+                self._enqueue(kernel, values, rounded, local)
                 return
 
             def start(part: GridPart) -> None:
-                self._enqueue(kernel, part.size, local, part.offset)
+                self._enqueue(kernel, values, part.size, local, part.offset)
 
             for part in grid_parts(rounded, self._device.traits.items, group):
                 if self._times is None:
@@ -178,12 +179,17 @@ class Programs:
         if launch is None:
             macros = zip(place.macros, map(literal, constants), strict=True)
             kernel = self._kernel((name, tuple(macros)))
-            launch = _Launch(kernel, Arguments(name, kernel.parameters, given))
+            launch = _Launch(kernel, Arguments(kernel.signature, given))
             place.launches[values] = launch
         return launch
 
     def _enqueue(
-        self, kernel: _Kernel, size: Size, local: Size, offset: Size | None = None
+        self,
+        kernel: _Kernel,
+        values: list[Any],
+        size: Size,
+        local: Size,
+        offset: Size | None = None,
     ) -> None:
         import pyopencl as cl
 
@@ -192,9 +198,12 @@ class Programs:
         if way in kernel.started:
             cl.enqueue_nd_range_kernel(queue, kernel.handle, size, local, offset)
             return
-        # PoCL compiles again for the first launch, into the same cache.
+        # PoCL compiles again for the first launch, into the same cache, and may die of it.
         name = kernel.key[0]
-        with building, build_lock(name), BUILDS.of(name):
+        taken = [each.dtype if each.lanes else None for each in kernel.signature.parameters]
+        launch = told_launch(size, local, offset, zip(taken, values, strict=True))
+        begun = self._builder.first_launch(kernel.key, launch)
+        with building, build_lock(name), BUILDS.of(name), begun:
             cl.enqueue_nd_range_kernel(queue, kernel.handle, size, local, offset)
             queue.finish()
             kernel.started.add(way)
@@ -219,10 +228,10 @@ class Programs:
         program = self._builder.program(key)
         with building, named_errors(f"loading kernel {name}", self._device.name):
             handle = cl.Kernel(program, name)
-            found = parameters(name, kernel_source(name), self._builder.defines(macros))
+            found = signature(name, kernel_source(name), self._builder.defines(macros))
             # Numbers whose types are known beforehand are set many times faster.
             handle.set_scalar_arg_dtypes(
-                [each.dtype.type if each.lanes == 1 else None for each in found]
+                [each.dtype.type if each.lanes == 1 else None for each in found.parameters]
             )
             needs = kernel_needs(handle, self._device._handle)
         fault = self._fault(needs, group)

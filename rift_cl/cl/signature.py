@@ -3,17 +3,22 @@
 Launches name their arguments, so somebody has to know in which order a kernel takes them and what
 they must be. A driver knows too, but forgets where it loads a program that was built before. So
 the parameter list is read from the expanded source, as the preprocessor leaves it for the macros
-that this variant of the kernel is built with.
+that this variant of the kernel is built with. What the source says of the buffers' lengths is read
+with it (``bounds``), and compared at each launch: a kernel that goes beyond the end of a buffer
+writes into another's memory, in silence.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
+from operator import itemgetter
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
+from rift_cl.cl.bounds import AXES, Bound, bounds, declared
+from rift_cl.cl.preprocessor import Macros
 from rift_cl.errors import KernelArgumentError
 
 _TYPES = {
@@ -27,9 +32,9 @@ _TYPES = {
     "double": np.float64,
 }
 _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
-_DIRECTIVE = re.compile(r"#\s*(\w+)\s*(.*)")
-_DEFINITION = re.compile(r"(\w+)(?!\()\s*(.*)")
 _ALIAS = re.compile(r"typedef\s+(\w+)\s+(\w+)\s*;")
+# Launches of one place that are remembered: what is seen of a scene differs from view to view.
+_REMEMBERED = 256
 _PARAMETER = re.compile(
     r"(?P<buffer>__global\s+)?(?:const\s+)?(?P<type>[a-z]+)(?P<lanes>\d*)\s*"
     r"(?:\*\s*(?:restrict\s+)?)?(?P<name>\w+)"
@@ -56,19 +61,34 @@ class Parameter(NamedTuple):
         return f"a number of type {self.dtype}" if self.lanes else f"a {self.dtype} device array"
 
 
-def parameters(name: str, source: str, macros: Mapping[str, str]) -> tuple[Parameter, ...]:
+class Signature(NamedTuple):
+    """What a kernel takes.
+
+    Args:
+        name: the kernel.
+        parameters: its arguments, in order.
+        bounds: how long its buffers must be.
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    bounds: tuple[Bound, ...]
+
+
+def signature(name: str, source: str, given: Mapping[str, str]) -> Signature:
     """What a kernel takes.
 
     Args:
         name: the kernel.
         source: its source, with the includes in line.
-        macros: those that it is built with.
+        given: the macros that it is built with.
 
     Raises:
-        ValueError: the source has no such kernel, or a parameter cannot be read.
+        ValueError: the source has no such kernel, or a parameter or the shape of a buffer cannot
+            be read.
     """
-    defined, aliases, lines = dict(macros), dict[str, str](), list[str]()
-    for line in _active(_COMMENT.sub(" ", source).replace("\\\n", " "), defined):
+    macros, aliases, lines = Macros(given), dict[str, str](), list[str]()
+    for line in macros.active(_COMMENT.sub(" ", source)):
         alias = _ALIAS.match(line)
         if alias:
             aliases[alias[2]] = alias[1]
@@ -76,16 +96,18 @@ def parameters(name: str, source: str, macros: Mapping[str, str]) -> tuple[Param
     match = re.search(rf"\b(?:KERNEL|__kernel)\s+void\s+{name}\s*\(([^)]*)\)", "\n".join(lines))
     if match is None:
         raise ValueError(f"no kernel {name} in its source")
-    listed = _expanded(match[1], defined).split(",")
-    return tuple(_parameter(text.strip(), aliases) for text in listed)
+    listed = macros.expanded(match[1]).split(",")
+    parameters = tuple(_parameter(text.strip(), aliases) for text in listed)
+    names = [parameter.name for parameter in parameters]
+    buffers = [place for place, parameter in enumerate(parameters) if parameter.lanes == 0]
+    return Signature(name, parameters, tuple(bounds(names, buffers, declared(source), macros)))
 
 
 class Arguments:
-    """Arguments of one place that launches a kernel: names are checked once, types each time.
+    """Arguments of one place that launches a kernel: names are checked once, the others each time.
 
     Args:
-        name: the kernel.
-        wanted: what it takes.
+        kernel: what the kernel takes.
         given: what that place gives, by name, and macros in capitals; other launches from there
             have the same names.
 
@@ -93,38 +115,88 @@ class Arguments:
         KernelArgumentError: an argument is missing or unknown.
     """
 
-    def __init__(self, name: str, wanted: tuple[Parameter, ...], given: Mapping[str, Any]) -> None:
-        check_names(name, wanted, given)
-        self._name, self._wanted = name, wanted
+    def __init__(self, kernel: Signature, given: Mapping[str, Any]) -> None:
+        wanted = kernel.parameters
+        check_names(kernel.name, wanted, given)
+        self._kernel, self._name, self._wanted = kernel, kernel.name, wanted
         self._takes = [parameter.name for parameter in wanted]
         takes = set(self._takes)
         self._spare = [key for key in given if key not in takes and not key.isupper()]
         self._arrays = [(k, each.dtype) for k, each in enumerate(wanted) if each.lanes == 0]
         self._vectors = [k for k, each in enumerate(wanted) if each.lanes > 1]
+        used = {place for bound in kernel.bounds for place in bound.uses}
+        # What lengths of buffers depend on, and with what of it they were found long enough.
+        self._counts = sorted(place for place in used if place < len(wanted))
+        self._counted = itemgetter(*self._counts) if self._counts else lambda values: None
+        self._fitting = set[tuple[Any, ...]]()
 
-    def in_order(self, given: Mapping[str, Any]) -> list[Any]:
+    def in_order(self, given: Mapping[str, Any], items: tuple[int, ...]) -> list[Any]:
         """The arguments as the driver takes them, in the kernel's own order.
 
+        Args:
+            given: by name.
+            items: work-items along each axis.
+
         Raises:
-            KernelArgumentError: one that the kernel does not take is not None, or an array or a
-                vector is of another type.
+            KernelArgumentError: one that the kernel does not take is not None, an array or a
+                vector is of another type, or an array is shorter than the kernel goes through.
         """
         for key in self._spare:
             if given[key] is not None:
                 check_names(self._name, self._wanted, given)
         values = list(map(given.__getitem__, self._takes))
+        sizes: list[int | None] = []
         for k, dtype in self._arrays:
             value = values[k]
-            if value is not None:
-                # Kernels see buffers and know nothing of views into them.
-                if getattr(value, "offset", -1) != 0 or value.dtype != dtype:
-                    _refuse(self._name, self._wanted[k], value)
-                values[k] = value.base_data
+            if value is None:
+                sizes.append(None)
+                continue
+            # Kernels see buffers and know nothing of views into them.
+            if getattr(value, "offset", -1) != 0 or value.dtype != dtype:
+                _refuse(self._name, self._wanted[k], value)
+            sizes.append(value.size)
+            values[k] = value.base_data
         for k in self._vectors:
             value, wanted = values[k], self._wanted[k]
             if getattr(value, "dtype", None) != wanted.dtype or value.shape != (wanted.lanes,):
                 _refuse(self._name, wanted, value)
+        launch = tuple(sizes), items, self._counted(values)
+        try:
+            fits = launch in self._fitting
+        except TypeError:  # An array in the place of a number, which is named below.
+            fits = False
+        if not fits:
+            self._check_lengths(values, sizes, items)
+            if len(self._fitting) == _REMEMBERED:
+                self._fitting.clear()
+            self._fitting.add(launch)
         return values
+
+    def _check_lengths(
+        self, values: list[Any], sizes: list[int | None], items: tuple[int, ...]
+    ) -> None:
+        """See that no buffer is shorter than the kernel goes through.
+
+        Raises:
+            KernelArgumentError: one is, or what that depends on is no whole number.
+        """
+        counts = [self._wanted[k] for k in self._counts]
+        check_numbers(self._name, counts, [values[k] for k in self._counts])
+        numbers = [*values, *items, *[1] * (len(AXES) - len(items))]
+        found = {k: size for (k, _), size in zip(self._arrays, sizes, strict=True)}
+        for bound in self._kernel.bounds:
+            size, least = found[bound.buffer], bound.least(numbers)
+            if size is not None and size < least:
+                name = self._takes[bound.buffer]
+                raise KernelArgumentError(
+                    f"kernel {self._name}: argument {name} has {size} numbers, wanted at least "
+                    f"{least} [{bound.shape}]{self._said(bound, numbers)}"
+                )
+
+    def _said(self, bound: Bound, numbers: list[Any]) -> str:
+        """What the numbers are that a length depends on."""
+        names = (*self._takes, *AXES)
+        return "".join(f", {names[k]} = {numbers[k]}" for k in dict.fromkeys(bound.uses))
 
 
 def check_names(name: str, wanted: tuple[Parameter, ...], given: Mapping[str, Any]) -> None:
@@ -147,8 +219,8 @@ def check_names(name: str, wanted: tuple[Parameter, ...], given: Mapping[str, An
         )
 
 
-def check_numbers(name: str, wanted: tuple[Parameter, ...], values: list[Any]) -> None:
-    """Find the number that a driver refused; launches ask only then.
+def check_numbers(name: str, wanted: Sequence[Parameter], values: Sequence[Any]) -> None:
+    """See that numbers are what a kernel wants; arguments of other kinds are passed over.
 
     Raises:
         KernelArgumentError: an argument is no number, no whole one, or out of its type's range.
@@ -184,74 +256,3 @@ def _parameter(text: str, aliases: Mapping[str, str]) -> Parameter:
     kind = match["type"]
     dtype = np.dtype(_TYPES[aliases.get(kind, kind)])
     return Parameter(match["name"], dtype, 0 if match["buffer"] else int(match["lanes"] or 1))
-
-
-def _active(text: str, defined: dict[str, str]) -> Iterator[str]:
-    """The lines that conditions leave; what they define is added to ``defined``."""
-    # For each open condition: whether this branch is compiled, and whether one was already.
-    open_: list[tuple[bool, bool]] = []
-    for line in text.splitlines():
-        found = _DIRECTIVE.match(line)
-        active = all(branch for branch, _ in open_)
-        if found is None:
-            if active:
-                yield line
-        elif found[1] in ("if", "ifdef", "ifndef"):
-            holds = active and _holds(found[1], found[2], defined)
-            open_.append((holds, holds))
-        elif found[1] in ("elif", "else"):
-            _, taken = open_.pop()
-            outside = all(branch for branch, _ in open_)
-            holds = outside and not taken and _holds(found[1], found[2], defined)
-            open_.append((holds, taken or holds))
-        elif found[1] == "endif":
-            open_.pop()
-        elif found[1] == "define" and active:
-            definition = _DEFINITION.fullmatch(found[2].strip())
-            if definition:
-                defined[definition[1]] = definition[2]
-
-
-def _holds(directive: str, condition: str, defined: Mapping[str, str]) -> bool:
-    """Whether a branch is compiled; conditions have no brackets in our kernels."""
-    if directive == "else":
-        return True
-    if directive in ("ifdef", "ifndef"):
-        return (condition.strip() in defined) == (directive == "ifdef")
-    either = (option.split("&&") for option in condition.split("||"))
-    return any(all(_term(term.strip(), defined) for term in terms) for terms in either)
-
-
-def _term(term: str, defined: Mapping[str, str]) -> bool:
-    if term.startswith("!"):
-        return not _number(term[1:], defined)
-    match = re.fullmatch(r"(\w+)(?:\s*(==|!=|<=|>=|<|>)\s*(\w+))?", term)
-    if match is None:
-        raise ValueError(f"a condition reads {term!r}")
-    left = _number(match[1], defined)
-    if match[2] is None:
-        return left != 0
-    right = _number(match[3], defined)
-    return {
-        "==": left == right,
-        "!=": left != right,
-        "<=": left <= right,
-        ">=": left >= right,
-        "<": left < right,
-        ">": left > right,
-    }[match[2]]
-
-
-def _number(name: str, defined: Mapping[str, str]) -> int:
-    """A whole number, or the one that a name stands for; 0 for a name that is not defined."""
-    value = _expanded(name.strip(), defined).strip()
-    return int(value) if value.isdigit() else 0
-
-
-def _expanded(text: str, defined: Mapping[str, str]) -> str:
-    """Text with every macro replaced by what it stands for."""
-    while True:
-        replaced = re.sub(r"\b[A-Za-z_]\w*\b", lambda word: defined.get(word[0], word[0]), text)
-        if replaced == text:
-            return text
-        text = replaced

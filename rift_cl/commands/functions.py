@@ -32,7 +32,11 @@ from rift_cl.commands.results import (
     ScenePage,
     Scored,
 )
-from rift_cl.commands.run_folder.saved_settings import begun_settings, parsed_settings
+from rift_cl.commands.run_folder.saved_settings import (
+    begun_settings,
+    parsed_settings,
+    saved_settings,
+)
 from rift_cl.errors import InputError
 from rift_cl.progress import Report
 
@@ -49,6 +53,8 @@ def reconstruct_scan(
     scan: PathLike, out: PathLike | None = None, *, progress: Progress = None, **settings: Any
 ) -> ReconstructedScan:
     """Reconstruct a scan, slice by slice, as ``rift reconstruct`` does.
+
+    With ``resume`` a run that is finished is given back as it is.
 
     Args:
         scan: the scan's file or folder; see ``open_scan``.
@@ -68,9 +74,12 @@ def reconstruct_scan(
     with _folder(out) as (folder, keep):
         given = {"scan": scan, "out": folder, **settings}
         job = reconstruction_of(_settings(given, "reconstruct", ReconstructSettings))
+        path = volume_path(job.settings)
+        if job.finished:
+            return ReconstructedScan(*_finished_run(folder, ReconstructSettings), path=path)
         _run(job.run(), progress)
         record = (folder, job.decided, dict(job.metrics), tuple(job.source.notes))
-        return keep(ReconstructedScan(*record, path=volume_path(job.settings)))
+        return keep(ReconstructedScan(*record, path=path))
 
 
 def fit(
@@ -88,8 +97,8 @@ def fit(
             see ``open_scan``.
         out: folder for scene.ply, the cameras, report.html, config.json, metrics.json and
             checkpoints; a temporary one when not given.
-        kind: which of the two; an X-ray scan where ``capture`` is a scan file, else photographs,
-            when not given.
+        kind: which of the two; an X-ray scan where ``capture`` is a scan file or describes one,
+            else photographs, when not given.
         progress: is called with a report now and then.
         **settings: the command's options by their names in Python, such as ``steps=3000`` or
             ``splats=20_000``; see ``FitPhotosSettings`` and ``FitXraySettings``.
@@ -318,6 +327,22 @@ def _folder(out: PathLike | None) -> Iterator[tuple[Path, Callable[[R], R]]]:
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
+
+
+def _finished_run(
+    folder: Path, settings: type[S]
+) -> tuple[Path, S, dict[str, Any], tuple[str, ...]]:
+    """What a reconstruction left in its folder, as ``ReconstructedScan`` has it.
+
+    Raises:
+        InputError: its files are damaged.
+    """
+    from rift_cl.io.json_fields import read_json_object
+
+    metrics = dict(read_json_object(folder / "metrics.json").values)
+    notes = (*metrics.pop("assumed", ()), f"{folder}: the reconstruction is complete already")
+    decided = saved_settings(folder / "config.json", "reconstruct", settings)
+    return folder, decided, metrics, notes
 
 
 def _settings(given: dict[str, Any], job: str, settings: type[S]) -> S:

@@ -94,7 +94,7 @@ class Cone(ScanValue):
     ) -> None:
         """Check the arguments and bring them into their normal form."""
         object.__setattr__(self, "angles", checked_angles("Cone", angles))
-        refuse_degrees("Cone", self.angles)
+        refuse_degrees("Cone", self.angles, helix=heights is not None)
         object.__setattr__(self, "rows", checked_count("Cone", "rows", rows))
         object.__setattr__(self, "bins", checked_count("Cone", "bins", bins))
         object.__setattr__(self, "pitch", _pitch(pitch))

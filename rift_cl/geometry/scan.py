@@ -19,6 +19,7 @@ from rift_cl.geometry.scan_value import (
     checked_center,
     checked_count,
     checked_length,
+    refuse_degrees,
 )
 
 
@@ -34,7 +35,8 @@ class Parallel(ScanValue):
 
     Raises:
         ShapeError: ``angles`` is empty or not one-dimensional, or ``bins`` is not positive.
-        InputError: an angle, the pitch or the centre is not a usable number.
+        InputError: an angle, the pitch or the centre is not a usable number, or the angles look
+            like degrees.
     """
 
     _lengths: ClassVar[tuple[str, ...]] = ("pitch",)
@@ -49,6 +51,7 @@ class Parallel(ScanValue):
     ) -> None:
         """Check the arguments and bring them into their normal form."""
         object.__setattr__(self, "angles", checked_angles("Parallel", angles))
+        refuse_degrees("Parallel", self.angles)
         object.__setattr__(self, "bins", checked_count("Parallel", "bins", bins))
         object.__setattr__(self, "pitch", checked_length("Parallel", "pitch", pitch))
         middle = (self.bins - 1) / 2

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 # Whole turns in degrees. Evenly spaced angles that fill one of them to rounding are degrees.
 _TURNS_IN_DEGREES = (180.0, 360.0, 720.0)
 _TURN_TOLERANCE = 1e-5
+# Beyond two turns in radians, lists of round numbers are degrees: a turn is no such number.
+_ROUND_BEYOND = 4 * np.pi
+_ROUND_STEP = 0.25
+_FEWEST_ROUND = 8
 
 
 class ScanValue:
@@ -112,25 +116,40 @@ def checked_angles(owner: str, angles: ArrayLike) -> NDArray[np.float64]:
     return values
 
 
-def refuse_degrees(owner: str, angles: NDArray[np.float64]) -> None:
-    """Refuse evenly spaced angles that fill half a turn, a turn or two in degrees.
+def refuse_degrees(owner: str, angles: NDArray[np.float64], *, helix: bool = False) -> None:
+    """Refuse angles that are degrees by all appearance.
+
+    Even steps that fill half a turn, a turn or two in degrees; and eight and more angles that would
+    fill more than two turns as radians, and are multiples of a quarter or lead in even steps from
+    one whole number to another. A helix has many turns: of it, only the first is refused.
 
     Raises:
-        InputError: they do; radians that do so by chance would be 28 turns or more.
+        InputError: they do; the message names the remedy.
     """
     if len(angles) < 3:
         return
     steps = np.diff(angles)
-    span = abs(float(angles[-1] - angles[0]))
-    if np.ptp(steps) > _TURN_TOLERANCE * span:
+    span = float(np.ptp(angles))
+    even = bool(np.ptp(steps) <= _TURN_TOLERANCE * span)
+    wholes = (span, span + abs(float(steps[0])))
+    for turn in _TURNS_IN_DEGREES if even else ():
+        if any(abs(whole - turn) < _TURN_TOLERANCE * turn for whole in wholes):
+            _refuse(owner, f"fill {turn:g} in even steps")
+    if helix or len(angles) < _FEWEST_ROUND or span <= _ROUND_BEYOND:
         return
-    for whole in (span, span + abs(float(steps[0]))):
-        for turn in _TURNS_IN_DEGREES:
-            if abs(whole - turn) < _TURN_TOLERANCE * turn:
-                raise InputError(
-                    f"{owner}: angles fill {turn:g} in even steps, which looks like degrees; "
-                    "wanted radians: numpy.deg2rad(angles)"
-                )
+    if _are_round(angles, _ROUND_STEP) or (even and _are_round(angles[[0, -1]], 1.0)):
+        _refuse(owner, f"go in round numbers from {angles.min():g} to {angles.max():g}")
+
+
+def _are_round(values: NDArray[np.float64], step: float) -> bool:
+    return bool((np.abs(values / step - np.round(values / step)) < _TURN_TOLERANCE).all())
+
+
+def _refuse(owner: str, why: str) -> NoReturn:
+    raise InputError(
+        f"{owner}: angles {why}, which looks like degrees; wanted radians: numpy.deg2rad(angles), "
+        "or numpy.mod(angles, 2 * numpy.pi) where they are radians of many turns"
+    )
 
 
 def checked_count(owner: str, name: str, value: Any) -> int:

@@ -187,6 +187,7 @@ class _Drawing:
             device.array(np.asarray(image), np.float32),
             device.array(-np.asarray(alpha)[..., 0], np.float32),
             with_background=False,
+            retain=False,
         )
         by_name: Arrays = {name: getattr(found, name, None) for name in ("sh", "colors")}
         by_name |= {name: getattr(found.splats, name, None) for name in _PARAMETERS[:4]}

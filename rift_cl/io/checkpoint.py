@@ -23,6 +23,7 @@ from rift_cl.errors import CheckpointError, RiftError
 from rift_cl.io.boundary import reading
 from rift_cl.io.npz_archive import NpzArchive
 from rift_cl.io.output import atomic_path, check_space, make_folder, writing
+from rift_cl.json_parsing import parse_json
 
 _FORMAT = 1
 _FACTS = "facts.json"
@@ -133,7 +134,7 @@ def _facts(archive: zipfile.ZipFile) -> dict[str, Any]:
     member = archive.getinfo(_FACTS)
     if member.file_size > _MOST_FACTS:
         raise ValueError(f"{_FACTS} has {member.file_size} bytes")
-    facts = json.loads(archive.read(member))
+    facts = parse_json(archive.read(member))
     if facts["format"] != _FORMAT:
         raise ValueError(f"its format is {facts['format']!r}, wanted {_FORMAT}")
     if not isinstance(facts["sha256"], dict) or not isinstance(facts["facts"], dict):

@@ -6,7 +6,6 @@ where a number belongs is reported with its place, not found out by the arithmet
 
 from __future__ import annotations
 
-import json
 import reprlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.budget import format_bytes
 from rift_cl.errors import FileFormatError, InputError, NonFiniteError, ResourceLimitError
 from rift_cl.io.boundary import reading
+from rift_cl.json_parsing import parse_json
 
 # Sixty thousand frames with all their digits.
 _LARGEST_FILE = 64 << 20
@@ -139,7 +139,7 @@ def read_json_object(path: Path) -> Fields:
             raise ResourceLimitError(
                 f"{path}: is larger than {format_bytes(_LARGEST_FILE)}, no list of views is"
             )
-        value = json.loads(content.decode("utf-8-sig"))
+        value = parse_json(content.decode("utf-8-sig"))
     if not isinstance(value, dict):
         raise FileFormatError(f"{path}: holds {reprlib.repr(value)}, wanted a JSON object")
     return Fields(str(path), value)

@@ -21,14 +21,15 @@ _Mask = NDArray[np.bool_]
 
 
 def psnr(
-    image: ArrayLike, truth: ArrayLike, *, peak: float = 1.0, mask: ArrayLike | None = None
+    image: ArrayLike, truth: ArrayLike, *, peak: float | None = None, mask: ArrayLike | None = None
 ) -> float:
     """Peak signal-to-noise ratio, ``10 log10(peak^2 / mean squared error)``.
 
     Args:
         image: what is scored, any shape.
         truth: what it should be, of the same shape.
-        peak: the value that counts as full scale.
+        peak: the value that counts as full scale; 1 when not given, which whole numbers above 1,
+            as in pictures of 8 bits, do not allow.
         mask: samples that count, boolean and of the same shape; all when not given.
 
     Returns:
@@ -38,16 +39,17 @@ def psnr(
         ShapeError: the shapes differ or nothing is left to score.
         DTypeError: an array is not real, or the mask not boolean.
         NonFiniteError: ``image`` or ``truth`` holds NaN or infinity, masked or not.
-        InputError: ``peak`` is not a positive number.
+        InputError: ``peak`` is not a positive number, or not given and an array has an integer
+            type and values above 1.
     """
     found, wanted, counts = _checked(image, truth, mask)
-    _check_peak("psnr", peak)
+    scale = _full_scale("psnr", peak, image, truth)
     error = float(np.mean((found - wanted)[counts] ** 2))
-    return 10 * math.log10(peak**2 / error) if error > 0 else math.inf
+    return 10 * math.log10(scale**2 / error) if error > 0 else math.inf
 
 
 def ssim(
-    image: ArrayLike, truth: ArrayLike, *, peak: float = 1.0, mask: ArrayLike | None = None
+    image: ArrayLike, truth: ArrayLike, *, peak: float | None = None, mask: ArrayLike | None = None
 ) -> float:
     """Structural similarity of Wang et al. (IEEE Trans. Image Process. 13, 2004).
 
@@ -58,7 +60,8 @@ def ssim(
     Args:
         image: what is scored: (y, x), or (z, y, x) with a three-dimensional window.
         truth: what it should be, of the same shape.
-        peak: the range of values that the data could have.
+        peak: the range of values that the data could have; 1 when not given, which whole numbers
+            above 1, as in pictures of 8 bits, do not allow.
         mask: samples that count, boolean and of the same shape; all when not given.
 
     Returns:
@@ -68,12 +71,13 @@ def ssim(
         ShapeError: the shapes differ, nothing is left to score, or a side is shorter than 11.
         DTypeError: an array is not real, or the mask not boolean.
         NonFiniteError: ``image`` or ``truth`` holds NaN or infinity, masked or not.
-        InputError: ``peak`` is not a positive number.
+        InputError: ``peak`` is not a positive number, or not given and an array has an integer
+            type and values above 1.
     """
     from skimage.metrics import structural_similarity
 
     found, wanted, counts = _checked(image, truth, mask)
-    _check_peak("ssim", peak)
+    scale = _full_scale("ssim", peak, image, truth)
     if found.ndim not in (2, 3) or min(found.shape) < _WINDOW:
         raise ShapeError(
             f"ssim: image has shape {found.shape}, wanted (y, x) or (z, y, x) with every side "
@@ -82,7 +86,7 @@ def ssim(
     _, similarity = structural_similarity(
         found,
         wanted,
-        data_range=peak,
+        data_range=scale,
         gaussian_weights=True,
         sigma=1.5,
         use_sample_covariance=False,
@@ -185,6 +189,15 @@ def finite_values(name: str, array: ArrayLike) -> _Reals:
     return values
 
 
-def _check_peak(function: str, peak: float) -> None:
+def _full_scale(function: str, peak: float | None, *arrays: ArrayLike) -> float:
+    if peak is None:
+        for array in map(np.asarray, arrays):
+            if array.dtype.kind in "iu" and array.max() > 1:
+                raise InputError(
+                    f"{function}: values of type {array.dtype} reach {array.max()}; give the full "
+                    f"scale, for example peak={np.iinfo(array.dtype).max}"
+                )
+        return 1.0
     if not (math.isfinite(peak) and peak > 0):
         raise InputError(f"{function}: peak is {peak!r}, wanted a positive number")
+    return float(peak)

@@ -28,6 +28,7 @@ from rift_cl.reconstruct.solvers.pdhg import Pdhg
 from rift_cl.reconstruct.solvers.poisson_weights import RayWeights, poisson_weights
 from rift_cl.reconstruct.solvers.simultaneous_iteration import Sirt, sirt
 from rift_cl.reconstruct.solvers.tv import tv
+from rift_cl.reconstruct.solvers.variation_weight import variation_weight
 
 __all__ = [
     "FDK",
@@ -61,5 +62,6 @@ __all__ = [
     "remove_rings",
     "sirt",
     "tv",
+    "variation_weight",
     "widened",
 ]

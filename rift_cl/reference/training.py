@@ -6,6 +6,8 @@ splat_statistics.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,6 +54,28 @@ def activate(
     if amplitude:
         opacities = np.logaddexp(0, logits)
     return scales, opacities * np.prod(trained / scales, axis=1)
+
+
+def surface_loss(
+    quats: Floats, log_scales: Floats, logits: Floats, normals: Floats, weights: Sequence[float]
+) -> float:
+    """The priors for surfaces, by ``SurfacePenalties``; splat_update adds the gradient of this.
+
+    Args:
+        quats: (N, 4), of any length.
+        log_scales: (N, 3).
+        logits: (N,).
+        normals: (N, 3) of the sheets that splats lie in.
+        weights: of the smallest scale, of the entropy of opacities, and of the squared sine between
+            the axis of the smallest scale and the normal; each of the mean over splats.
+    """
+    opacities = 1 / (1 + np.exp(-logits))
+    entropy = -opacities * np.log(opacities) - (1 - opacities) * np.log(1 - opacities)
+    turns = quats / np.linalg.norm(quats, axis=1, keepdims=True)
+    axes = _turned(np.eye(3)[log_scales.argmin(axis=1)], turns[:, :1], turns[:, 1:])
+    aside = 1 - (axes * normals).sum(axis=1) ** 2
+    parts = np.exp(log_scales).min(axis=1), entropy, aside
+    return float(np.dot(weights, [part.mean() for part in parts]))
 
 
 def finest_seen(means: Floats, cameras: Floats, *, near: float, unseen: float) -> Floats:

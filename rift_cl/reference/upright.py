@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+# Samples beyond the outer ones that are read as these are by the spline, with a rounding.
+_BEYOND = 0.51
+
 
 def reading_matrix(places: Floats, rows: int, bins: int, *, spline: bool = False) -> Any:
     """The matrix from an upright view to the pixels that see these places.
@@ -25,16 +28,20 @@ def reading_matrix(places: Floats, rows: int, bins: int, *, spline: bool = False
         spline: interpolate by the cubic spline in the place of Keys' cubic.
 
     Returns:
-        (pixels, rows * bins) float64; pixels that are not wholly inside read nothing.
+        (pixels, rows * bins) float64; pixels that are not wholly inside read nothing. Of the
+        spline those within half a sample of the outer ones read these.
     """
     size = np.array([rows, bins])
-    inside = np.asarray(((places >= 1) & (places < size - 2)).all(axis=1))
-    by_row, by_column = (
-        (cubic_b_spline if spline else keys)(places[:, axis, None] - np.arange(size[axis]))
-        for axis in (0, 1)
-    )
     if spline:
-        by_row, by_column = by_row @ spline_factors(rows), by_column @ spline_factors(bins)
+        inside = np.asarray(((places >= -_BEYOND) & (places <= size - 1 + _BEYOND)).all(axis=1))
+        by_row, by_column = (
+            cubic_b_spline(np.clip(places[:, axis, None], 0, n - 1) - np.arange(-2, n + 2))
+            @ spline_factors(n)
+            for axis, n in enumerate(size.tolist())
+        )
+    else:
+        inside = np.asarray(((places >= 1) & (places < size - 2)).all(axis=1))
+        by_row, by_column = (keys(places[:, n, None] - np.arange(size[n])) for n in (0, 1))
     weights = by_row[:, :, None] * by_column[:, None, :] * inside[:, None, None]
     return weights.reshape(len(places), -1)
 
@@ -57,9 +64,12 @@ def cubic_b_spline(distance: Floats) -> Floats:
 
 
 def spline_factors(count: int) -> Floats:
-    """The matrix from samples, zero beyond their ends, to the factors of the B-splines there."""
-    places = np.arange(count)
-    away = np.abs(places[:, None] - places)
+    """The matrix from samples, zero beyond their ends, to the factors of the B-splines.
+
+    Args:
+        count: of samples; the factors are theirs, and those of two places beyond either end.
+    """
+    away = np.abs(np.arange(-2, count + 2)[:, None] - np.arange(count))
     factors: Floats = np.sqrt(3) * (np.sqrt(3) - 2.0) ** away
     return factors
 

@@ -171,6 +171,8 @@ def check_fixed(memory: FrameMemory, budget: int, largest: int) -> None:
         drawn, fewer = f"{memory.splats} splats", "fewer splats"
         if memory.pixels:
             drawn, fewer = f"{drawn} and {what}", f"{fewer} or a smaller image"
+        if memory.gradient:
+            drawn += ", with the gradient,"
         raise ResourceLimitError(
             f"{drawn} need {format_bytes(memory.fixed)}, the memory budget is "
             f"{format_bytes(budget)}: raise the budget (RIFT_MEMORY or --memory), use a device "
@@ -209,6 +211,7 @@ def plan_bands(
 
 def _refuse(memory: FrameMemory, entries: int, tiles: int, budget: int, largest: int) -> NoReturn:
     """Say why one row of tiles does not fit."""
+    check_fixed(memory, budget, largest)
     what = f"one row of tiles ({entries} splat and tile pairs)"
     check_array(memory.longest(entries), largest, what=f"a list of {what}")
     if isinstance(memory, PictureMemory):

@@ -292,9 +292,9 @@ def raster_grad(
         InputError: magnitudes of gradients are asked for splats with modes.
     """
     splats = packed(device, splats)
-    height, width, channels = raster.image.shape
+    (height, width), channels = raster.transmittance.shape, splats.features.shape[1]
     settings = settings.for_image((height, width), cpu=device.traits.is_cpu)
-    as_device_array(device, grad_image, raster.image.shape, name="grad_image")
+    as_device_array(device, grad_image, (height, width, channels), name="grad_image")
     if grad_transmittance is None:
         grad_transmittance = device.zeros((height, width))
     as_device_array(device, grad_transmittance, (height, width), name="grad_transmittance")
@@ -324,22 +324,22 @@ def raster_grad(
 
 
 def sum_slots(
-    device: Device, lists: TileLists, records: SlotRecords, *, onto: DeviceArray | None = None
+    device: Device, slots: DeviceArray, records: SlotRecords, *, onto: DeviceArray | None = None
 ) -> DeviceArray:
     """Sum each splat's records over its tiles: (N, 6 + D [+ 2]), or (N, P) with modes.
 
     Args:
         device: where the arrays are.
-        lists: the lists whose slots the records fill.
+        slots: (N + 1,) int32, those of the lists that the records are of.
         records: what ``raster_grad`` returned for them.
         onto: sums of the rows of tiles above, which these are added to; zero if not given.
     """
-    count, record = lists.slots.size - 1, records.numbers.shape[1]
+    count, record = slots.size - 1, records.numbers.shape[1]
     sums = device.empty((count, record)) if onto is None else onto
     device.launch(
         "splat_sum_slots",
         (count,),
-        slots=lists.slots,
+        slots=slots,
         records=records.numbers,
         live=records.live,
         sums=sums,

@@ -15,7 +15,16 @@ from numpy.typing import NDArray
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.splat.bands import FrameMemory, PictureMemory, plan_bands
-from rift_cl.splat.raster import Raster, ScreenSplats, packed, raster_grad, rasterize, sum_slots
+from rift_cl.splat.given_up import give_up
+from rift_cl.splat.raster import (
+    Raster,
+    ScreenSplats,
+    packed,
+    raster_grad,
+    rasterize,
+    sum_slots,
+    unpack,
+)
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.tile_lists import (
     TileLists,
@@ -96,6 +105,7 @@ def draw(
     lists, raster = None, None
     if memory.fits(counts.n_entries, tiles.count, device.budget, device.traits.allocation):
         lists = list_tiles(device, counts)
+        del counts
         raster = rasterize(device, screen, lists, size, settings=settings, background=background)
         return RasterPass(screen, boxes, depths, size, settings, background, memory, lists, raster)
     del counts
@@ -143,6 +153,8 @@ def draw_grad(
     done: RasterPass,
     grad_image: DeviceArray,
     grad_transmittance: DeviceArray | None = None,
+    *,
+    last: bool = False,
 ) -> DeviceArray:
     """Each splat's sums over its tiles of what the raster's gradient leaves.
 
@@ -153,6 +165,8 @@ def draw_grad(
         done: what ``draw`` returned.
         grad_image: dL/d image, (height, width, D) device array.
         grad_transmittance: dL/d transmittance, (height, width); zero if not given.
+        last: whether ``done`` is not wanted any more: all but features and transmittance is given
+            up as soon as it is not needed.
 
     Raises:
         ShapeError: a gradient does not fit the image.
@@ -160,16 +174,24 @@ def draw_grad(
     """
     sums: DeviceArray | None = None
     screen = packed(device, done.screen)
-    for lists in _lists_again(device, done):
+    if last:
+        give_up(done.raster, "image")
+        give_up(done.screen, "screen")
+    for lists in _lists_again(device, done, last=last):
         records = raster_grad(
             device,
             *(screen, lists, done.raster, grad_image, grad_transmittance),
             settings=done.settings,
             background=done.background,
         )
-        sums = sum_slots(device, lists, records, onto=sums)
-        # Gone before the next ones are made.
-        del lists, records
+        slots, whole = lists.slots, lists.tiles == done.tiles
+        # Gone before the sums and the next ones are made.
+        del lists
+        if last and whole:
+            unpack(screen)
+            give_up(done.raster, "last")
+        sums = sum_slots(device, slots, records, onto=sums)
+        del slots, records
     assert sums is not None
     return sums
 
@@ -215,17 +237,24 @@ def _bands_of(device: Device, done: RasterPass, memory: FrameMemory) -> Iterator
     return _bands(device, *where, memory, sort=done.settings.mode == "light")
 
 
-def _lists_again(device: Device, done: RasterPass) -> Iterator[TileLists]:
+def _lists_again(device: Device, done: RasterPass, *, last: bool) -> Iterator[TileLists]:
     """The lists that were kept, or of one band after the other, as the records fit."""
     memory = replace(done.memory, gradient=True)
     kept = done.lists
     room = device.budget, device.traits.allocation
     if kept is not None and memory.fits(kept.n_entries, done.tiles.count, *room):
-        if _mostly_hidden(device, done, memory):
+        hidden = _mostly_hidden(device, done, memory)
+        if last or hidden:
             # Another gradient of this frame would make the lists again.
             object.__setattr__(done, "lists", None)
+        if last:
+            give_up(done, "boxes", "depths")
+        if hidden:
             kept = seen_slots(device, kept, done.raster.last, done.size, done.settings.edge)
-        yield kept
+        handed = [kept]
+        # The one who gets them says when they go.
+        del kept
+        yield handed.pop()
         return
     yield from _bands_of(device, done, memory)
 

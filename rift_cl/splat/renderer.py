@@ -9,7 +9,8 @@ to the host, images too that the device does not hold.
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -26,6 +27,7 @@ from rift_cl.geometry import Camera
 from rift_cl.splat.bands import FrameMemory, PictureMemory, check_fixed
 from rift_cl.splat.environment import shade_environment_grad
 from rift_cl.splat.features import Channels, gather_features, own_columns, shade_grad
+from rift_cl.splat.given_up import MayBeGivenUp, give_up
 from rift_cl.splat.projection import (
     CULL_REASONS,
     Projection,
@@ -47,7 +49,7 @@ DepthKind = Literal["accumulated", "expected"]
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class Frame(MayBeGivenUp):
     """A rendered image with what its gradient needs.
 
     Args:
@@ -94,6 +96,14 @@ class Frame:
     def raster(self) -> Raster:
         """The image, and what the raster left for its gradient."""
         return self.raster_pass.raster
+
+    def taken_over(self) -> Frame:
+        """A frame with all that this one has, which has nothing any more."""
+        done = self.raster_pass
+        done = replace(done, raster=copy(done.raster), screen=copy(done.screen))
+        found = Frame(copy(self.projection), self.depth, self.channels, done)
+        give_up(self, "projection", "raster_pass")
+        return found
 
 
 class Picture(NamedTuple):
@@ -286,6 +296,7 @@ class Renderer:
         with_camera: bool = False,
         with_background: bool = True,
         sh_step: AdamStep | None = None,
+        retain: bool = True,
     ) -> FrameGradients:
         """The gradient of a loss by everything that made a frame.
 
@@ -298,6 +309,9 @@ class Renderer:
             sh_step: a step of Adam that the splats' ``sh`` take in place as soon as their gradient
                 is known, which then is not kept: ``FrameGradients.sh`` is None, and the frame's
                 splats are others. Lobes evaluated on the host take no step and have a gradient.
+            retain: keep the frame. Otherwise it holds nothing afterwards, no image either: its
+                arrays, a sixth of what a large scene takes with its gradients, are given up one
+                after the other, each as soon as it is not needed.
 
         Raises:
             ShapeError: a gradient does not fit the frame.
@@ -305,11 +319,17 @@ class Renderer:
         """
         device = self.device
         as_device_array(device, grad_image, frame.image.shape, name="grad_image")
+        if grad_transmittance is not None:
+            size = frame.transmittance.shape
+            as_device_array(device, grad_transmittance, size, name="grad_transmittance")
+        if not retain:
+            frame = frame.taken_over()
+            give_up(frame.projection, "screen", "depths", "boxes")
         if frame.depth == "expected":
             grad_image, grad_transmittance = _expected_depth_grad(
                 device, frame.raster, grad_image, grad_transmittance
             )
-        sums = draw_grad(device, frame.raster_pass, grad_image, grad_transmittance)
+        sums = draw_grad(device, frame.raster_pass, grad_image, grad_transmittance, last=not retain)
         # Before the gradients are there; a second gradient of the frame packs again.
         unpack(frame.raster_pass.screen)
         gradients = project_grad(
@@ -391,7 +411,7 @@ class Renderer:
     def _background_grad(self, frame: Frame, grad_image: DeviceArray) -> DeviceArray | None:
         if frame.raster_pass.background is None:
             return None
-        height, width, channels = frame.image.shape
+        height, width, channels = grad_image.shape
         pixels = height * width
         run = _PIXEL_RUN if self.device.traits.is_cpu else 1
         runs = -(-pixels // run)
@@ -459,7 +479,6 @@ def _expected_depth_grad(
     height, width, channels = raster.image.shape
     if grad_transmittance is None:
         grad_transmittance = device.zeros((height, width))
-    as_device_array(device, grad_transmittance, (height, width), name="grad_transmittance")
     by_image, by_transmittance = device.empty(raster.image.shape), device.empty((height, width))
     device.launch(
         "expected_depth_grad",

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rift_cl.basis.angular.environment import MOST_LOBES, REFLECTANCE
 from rift_cl.cl.array import DeviceArray
+from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.host_arrays import as_plain, as_real_array, upload
 from rift_cl.errors import DTypeError, InputError, ShapeError, WrongTypeError
@@ -137,6 +138,7 @@ class Splats:
             DTypeError: an array does not hold real numbers.
             InputError: a covariance is not symmetric, a splat's shape is given twice or not at
                 all, covariances have modes, or a number of modes belongs to no order.
+            ResourceLimitError: they do not fit the device's memory budget.
         """
         hosts = {"means": means, "quats": quats, "scales": scales, "opacities": opacities}
         hosts |= {"colors": colors, "sh": sh, "covars": covars, "lobes": lobes}
@@ -150,7 +152,9 @@ class Splats:
                     array = _upper_triangles(array)
                 ready[name] = as_plain(array, np.float32)
         # Arrays that do not fit are refused before anything is allocated.
-        cls(**ready)
+        count = len(cls(**ready))
+        need = sum(host.nbytes for host in ready.values() if host is not None)
+        plan_chunks(1, need, 0, device.budget, what=f"scene of {count} splats")
         return cls(**{name: _sent(device, host) for name, host in ready.items()})
 
 

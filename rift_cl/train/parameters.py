@@ -25,6 +25,7 @@ from rift_cl.splat.projection import SplatGradients
 from rift_cl.splat.renderer import FrameGradients
 from rift_cl.splat.splats import Splats
 from rift_cl.train.band_limit import Detail
+from rift_cl.train.surface_settings import SurfacePenalties
 
 # What a splat is without what it shows, what all splats have, and what some have as well.
 _GEOMETRY = ("means", "quats", "log_scales", "logits")
@@ -79,6 +80,8 @@ class Parameters:
         amplitude: whether optical depths are drawn, those that hide sigmoid(logit).
         band: (N,) lengths below which splats have no detail, or None; see ``limit_band``.
         environment: the light that all splats share, or None.
+        sheet: (N, 3) normals of the sheets that splats lie in, or None; see
+            ``SurfaceSettings.normal_consistency``.
         free: by group, of its shape, 1 where a mode is trained and 0 where it stays as it is.
     """
 
@@ -92,6 +95,7 @@ class Parameters:
     amplitude: bool = False
     band: DeviceArray | None = None
     environment: Environment | None = None
+    sheet: DeviceArray | None = None
     free: dict[str, DeviceArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -111,6 +115,7 @@ class Parameters:
         amplitude: bool = False,
         band: NDArray[np.float32] | None = None,
         environment: Environment | None = None,
+        sheet: NDArray[np.float32] | None = None,
     ) -> Parameters:
         """Send host arrays to a device; moments are zero if not given."""
         names = [*GROUPS, *(name for name in MORE if name in raw)]
@@ -126,6 +131,7 @@ class Parameters:
             amplitude,
             None if band is None else device.array(band),
             environment,
+            None if sheet is None else device.array(sheet),
         )
         parameters.activate()
         return parameters
@@ -147,7 +153,10 @@ class Parameters:
         )
 
     def replaced(self, raw: Arrays, first: Arrays, second: Arrays) -> Parameters:
-        """Other splats in the place of these, at the same step; their band is still to be set."""
+        """Other splats in the place of these, at the same step.
+
+        Their band and their sheets are still to be set.
+        """
         return Parameters.of(
             self.device,
             raw,
@@ -173,6 +182,7 @@ class Parameters:
         opacity_penalty: float,
         scale_penalty: float,
         ridge: float = 0.0,
+        surface: SurfacePenalties | None = None,
     ) -> None:
         """One step of Adam.
 
@@ -184,6 +194,8 @@ class Parameters:
             opacity_penalty: weight of the mean opacity in the loss.
             scale_penalty: weight of the mean scale in the loss.
             ridge: weight in the loss of the mean over splats of their modes' squares.
+            surface: weights of the priors for surfaces; none of them if not given. That on normals
+                counts where there is a ``sheet``.
         """
         count = len(self)
         self.step += 1
@@ -202,7 +214,8 @@ class Parameters:
                 *moments, rate=rates["environment"], rest=1.0, number=self.step
             )
             self._adam.take(step, raw, gradients.environment)
-        self._update_geometry(gradients.splats, rates, opacity_penalty, scale_penalty)
+        prior = surface or SurfacePenalties()
+        self._update_geometry(gradients.splats, rates, opacity_penalty, scale_penalty, prior)
 
     def _update_geometry(
         self,
@@ -210,9 +223,11 @@ class Parameters:
         rates: Mapping[str, float],
         opacity_penalty: float,
         scale_penalty: float,
+        surface: SurfacePenalties,
     ) -> None:
         """Step along places, turns, scales and opacities, and compute what is drawn of them."""
         count = len(self)
+        turned = self.sheet is not None and surface.normal_consistency > 0
         self.device.launch(
             "splat_update",
             (self.device.traits.runs(count),),
@@ -225,16 +240,21 @@ class Parameters:
             by_quats=by.quats,
             by_scales=by.scales,
             by_opacities=by.opacities,
+            sheet=self.sheet if turned else self.raw["logits"],
             scales=self.drawn.scales,
             opacities=self.drawn.opacities,
             shares=self._adam.shares(),
             each_scale=scale_penalty / (3 * count),
+            each_flat=surface.flatness / count,
             each_opacity=opacity_penalty / count,
+            each_entropy=surface.opacity_entropy / count,
+            each_turn=2 * surface.normal_consistency / count,
             rates=np.array([rates[name] for name in _GEOMETRY], np.float32),
             **constants(self.step),
             count=count,
             RUN=self.device.traits.run,
             **self._kind(),
+            **({"SHEET": True} if turned else {}),
         )
 
     def sh_step(self, rates: Mapping[str, float], *, sh_rest: float) -> AdamStep:

@@ -110,6 +110,8 @@ class CoefficientSchedule:
             self._add_lobes(parameters)
         if settings.environment.shared and parameters.environment is None:
             self._add_environment(parameters)
+        if parameters.sheet is None and self.wants_sheet(step):
+            self.renew_normals(parameters)
         self._add_orders(parameters)
 
     def hold(self, parameters: Parameters) -> None:
@@ -136,11 +138,23 @@ class CoefficientSchedule:
             self.hold(parameters)
 
     def renew_normals(self, parameters: Parameters) -> None:
-        """Take normals from the places of neighbours as they are now; nothing without a light."""
-        if "normals" in parameters.raw:
-            normals = neighbour_normals(parameters.host()[0]).astype(np.float32)
+        """Take normals from the places of neighbours as they are now.
+
+        Nothing is done unless splats share a light, or the prior on normals has begun.
+        """
+        lit, sheet = "normals" in parameters.raw, self.wants_sheet(parameters.step)
+        if not (lit or sheet):
+            return
+        normals = neighbour_normals(parameters.host()[0]).astype(np.float32)
+        if sheet:
+            parameters.sheet = parameters.device.array(normals)
+        if lit:
             parameters.raw["normals"] = parameters.device.array(normals)
             parameters.redraw()
+
+    def wants_sheet(self, step: int) -> bool:
+        """Whether the prior on normals has begun after some steps."""
+        return bool(self.settings.surface.at(step / self.settings.steps).normal_consistency)
 
     def _add_environment(self, parameters: Parameters) -> None:
         device, raw = parameters.device, parameters.host()[0]

@@ -19,6 +19,7 @@ from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.loss.pixel_loss import PIXEL_LOSSES
 from rift_cl.train.ranges import check_choice, check_number, check_whole
 from rift_cl.train.strategy import STRATEGIES, DefaultSettings, McmcSettings, StrategySettings
+from rift_cl.train.surface_settings import SurfaceSettings
 from rift_cl.train.xray.solve_settings import SolveSettings
 
 BandLimit = Literal["pixels", "coverage"]
@@ -135,6 +136,8 @@ class TrainSettings:
     place of all harmonics but the constant one."""
     environment: ShortSplats[EnvironmentSettings] = field(default_factory=EnvironmentSettings)
     """A light that all splats share and reflect."""
+    surface: ShortSplats[SurfaceSettings] = field(default_factory=SurfaceSettings)
+    """Priors that make splats lie on surfaces."""
     strategy: ShortExpert[StrategySettings] = field(
         default_factory=McmcSettings,
         metadata={"registry": STRATEGIES, "without": ("xray",), "help": _STRATEGY_HELP},

@@ -96,6 +96,8 @@ def _schema(state: Arrays, views: int) -> dict[str, Field]:
         fields[f"environment.{part}"] = _trained(("lobes of light", 3), least)
     if "band.lengths" in state:
         fields["band.lengths"] = _trained(("splats",), 0)
+    if "sheet.normals" in state:
+        fields["sheet.normals"] = _trained(("splats", 3), -np.inf)
     for name, shapes in _PER_VIEW.items():
         if any(key.startswith(f"{name}.") for key in state):
             fields[f"{name}.counts"] = Field((views,), "f8", 0)

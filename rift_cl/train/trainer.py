@@ -38,6 +38,7 @@ from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import scene_extent
 from rift_cl.train.state_schema import check_state
 from rift_cl.train.strategy import TrainingRun
+from rift_cl.train.surface_settings import SurfacePenalties
 
 # Steps between two reports; the loss comes to the host for each.
 REPORT_EVERY = 25
@@ -192,6 +193,7 @@ class Trainer:
             with_camera=self.poses is not None,
             with_background=False,
             sh_step=None if kept else parameters.sh_step(rates, sh_rest=sh_rest),
+            retain=self.strategy.wants_frame,
         )
         if self.poses is not None and gradients.camera is not None:
             by_view = self.device.get(gradients.camera)[:12].reshape(3, 4).astype(float)
@@ -204,6 +206,7 @@ class Trainer:
             opacity_penalty=penalties.opacity,
             scale_penalty=penalties.scale,
             ridge=settings.basis.ridge,
+            surface=self._surface_penalties(step),
         )
         self._add_coefficients()
         self.parameters = self.strategy.after_step(parameters, frame, gradients, rates["means"])
@@ -217,6 +220,11 @@ class Trainer:
         if self._band is not None and (relocated or self.parameters.step % _BAND_EVERY == 0):
             self._limit_band()
         return value
+
+    def _surface_penalties(self, step: int) -> SurfacePenalties:
+        if step >= self.schedule.cooldown:
+            return SurfacePenalties()
+        return self.settings.surface.at(step / self.settings.steps)
 
     def _work(self, step: int, splats: int, steps: int = 1) -> float:
         """Cost of steps, in units of one step with all splats of one color each."""
@@ -259,6 +267,8 @@ class Trainer:
         }
         if parameters.environment is not None:
             groups["environment"] = parameters.environment.state(self.device)
+        if parameters.sheet is not None:
+            groups["sheet"] = {"normals": self.device.get(parameters.sheet)}
         if parameters.band is not None:
             groups["band"] = {"lengths": self.device.get(parameters.band)}
         for name, refined in (("poses", self.poses), ("exposures", self.exposures)):
@@ -286,6 +296,7 @@ class Trainer:
                 amplitude=self.parameters.amplitude,
                 band=groups.get("band", {}).get("lengths"),
                 environment=self._restored_environment(groups),
+                sheet=self._restored_sheet(groups, int(state["step"])),
             )
             self.coefficient_schedule.hold(self.parameters)
             self._update_renderer()
@@ -296,6 +307,12 @@ class Trainer:
                     refined.restore(groups[name])
         except (KeyError, ShapeError) as error:
             raise CheckpointError(f"the checkpoint is of another run ({error})") from error
+
+    def _restored_sheet(self, groups: Mapping[str, Group], step: int) -> NDArray[np.float32] | None:
+        wanted = self.coefficient_schedule.wants_sheet(step)
+        if wanted != ("sheet" in groups):
+            raise CheckpointError("the checkpoint is of another run: one has a prior on normals")
+        return groups["sheet"]["normals"] if wanted else None
 
     def _restored_environment(self, groups: Mapping[str, Group]) -> Environment | None:
         if (self.parameters.environment is None) == ("environment" in groups):

@@ -16,6 +16,7 @@ from rift_cl.cl.build.cache_check import remove_damaged
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.mark.full
 def test_concurrent_first_builds_all_succeed():
     # The tool does more rounds by itself; here it is enough to see that the lock is there.
     done = subprocess.run(

@@ -218,9 +218,9 @@ def offsets_of(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, ...]]:
     """Where the parts of grids begin, as they are launched on a device."""
     seen, enqueue = [], Programs._enqueue
 
-    def noted(programs, kernel, size, local, offset=None):
+    def noted(programs, kernel, values, size, local, offset=None):
         seen.append(offset)
-        enqueue(programs, kernel, size, local, offset)
+        enqueue(programs, kernel, values, size, local, offset)
 
     monkeypatch.setattr(Programs, "_enqueue", noted)
     return seen

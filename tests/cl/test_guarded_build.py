@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import sys
 
+import numpy as np
 import pytest
 
 import rift_cl as rift
+from rift_cl.cl.build.first_launch import told_launch
 from rift_cl.cl.build.guarded_build import Request, Worker, guarded_build
 from rift_cl.errors import DeviceError
 
@@ -46,6 +49,28 @@ def test_compiler_that_dies_is_asked_in_another_way(worker):
     assert built == (b"binary", "noinline", "its compiler died (SIGSEGV)", "")
 
 
+LAUNCH = {"size": [1], "local": [1], "offset": None, "arguments": [4, "0800", None]}
+
+
+def test_launch_that_no_way_survives_refuses_a_kernel_only_when_processes_died_twice(worker):
+    dies = worker(f"request['launches'] and {DIES}")
+    assert guarded_build(REQUEST._replace(launches=[LAUNCH]), dies) == (b"binary", "", "", "")
+    twice = guarded_build(REQUEST._replace(launches=[LAUNCH, LAUNCH]), dies)
+    assert twice == (None, "", "its compiler died (SIGSEGV)", "")
+
+
+def test_launch_whose_child_somebody_ends_refuses_no_kernel(worker):
+    ends = worker("request['launches'] and os.kill(os.getpid(), signal.SIGKILL)")
+    twice = REQUEST._replace(launches=[LAUNCH, LAUNCH])
+    assert guarded_build(twice, ends) == (b"binary", "", "", "")
+
+
+def test_launch_that_dies_of_its_numbers_alone_is_no_fault_of_the_compiler(worker):
+    fate = f"request['launches'][0]['arguments'] != [4, '0000', None] and {DIES}"
+    built = guarded_build(REQUEST._replace(launches=[LAUNCH]), worker(fate))
+    assert built == (b"binary", "", "", "")
+
+
 def test_compiler_that_hangs_is_ended(worker):
     fault, answer, _ = worker("time.sleep(600)", limit=0.2).ask(REQUEST._asdict())
     assert fault == "its compiler hung for 0.2 s"
@@ -69,6 +94,34 @@ def test_child_that_talks_nonsense_is_no_answer(worker, noise):
 def test_child_that_cannot_be_started_is_a_named_error():
     with pytest.raises(DeviceError, match="cannot be started"):
         guarded_build(REQUEST, Worker(["/there/is/no/such/program"]))
+
+
+# Crashes when it is launched, unless it is built with the workaround that redefines "static".
+LATE = """
+#ifdef static
+#define PLACE p
+#else
+#define PLACE (__global int *)where
+#endif
+__kernel void probe(__global int *p, ulong where) { *PLACE = 1; }
+"""
+
+
+@pytest.mark.parametrize(("offset", "died"), [(None, True), ([4], True), (None, False)])
+def test_our_own_child_repeats_a_launch_that_a_process_died_of(offset, died):
+    device = rift.default_device()
+    launch = told_launch(
+        [np.int64(8)], [4], offset, [(None, device.zeros((4,)).base_data), (np.uint64, 8)]
+    )
+    launches = [json.loads(json.dumps(launch))] if died else []
+    child = Worker()
+    request = Request(device.selector, device.name, "probe", LATE, ["-cl-std=CL1.2"], launches)
+    try:
+        built = guarded_build(request, child)
+    finally:
+        child.close()
+    assert (built.way, "died" in built.fault) == (("noinline", True) if died else ("", False))
+    assert built.binary
 
 
 def test_our_own_child_compiles_and_tells_what_does_not():

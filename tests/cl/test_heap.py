@@ -65,6 +65,18 @@ def test_a_small_array_is_no_lodger_of_a_large_segment():
     assert ours.managed_bytes == 101 * PAGE
 
 
+def test_arrays_lie_beside_others_rather_than_in_segments_of_their_own():
+    """The smaller segment stays whole for an array of its size."""
+    ours = heap()
+    large, small = ours(90 * PAGE), ours(30 * PAGE)
+    before = ours.managed_bytes
+    del large, small
+    lodgers = [ours(size * PAGE) for size in (40, 25)]
+    assert len({id(one.segment) for one in lodgers}) == 1
+    assert ours(30 * PAGE).begin == 0
+    assert ours.managed_bytes == before
+
+
 def test_a_segment_takes_the_place_of_empty_ones():
     """As much is held as was in use at a time, whatever the sizes were."""
     ours = heap()

@@ -125,6 +125,7 @@ def test_clearing_frees_what_it_says_and_spares_the_rest(folder):
     assert (root / "mine.txt").exists()
 
 
+@pytest.mark.full
 def test_next_run_after_clearing_works_in_the_same_process_and_in_another(cache, python):
     again = (
         "from rift_cl.cl.build.kernel_cache import cache_size, clear_cache\n"
@@ -202,6 +203,7 @@ def test_a_record_that_leads_out_of_the_cache_removes_nothing_there(folder):
     assert outside.is_dir()
 
 
+@pytest.mark.full
 def test_damage_to_kernels_and_record_together(cache, python):
     next(cache.rglob("checksums.json")).write_bytes(b"")
     for path in cache.rglob("program.bc"):

@@ -143,10 +143,21 @@ def test_kernel_that_a_process_died_of_is_left_to_a_child(device, folder, monkey
     monkeypatch.setattr(builder, "keeps_programs", lambda *_: True)
     seen = []
     real = program_store.begun
-    monkeypatch.setattr(builder, "begun", lambda name: (seen.append(name), real(name))[1])
+    monkeypatch.setattr(builder, "begun", lambda *what: (seen.append(what), real(*what))[1])
     wanted = _sum(fresh)
     assert not list(folder.iterdir())
-    (folder / f"{seen[0]}.begun").touch()
-    again = Device(device._handle, device.selector, traits=device.traits)
-    assert np.array_equal(_sum(again), wanted)
-    assert load(seen[0]).about["kernel"] == "axpby"
+    assert len(seen) == 2
+    # Of the build, and of the first launch.
+    for what in list(seen):
+        with real(*what):
+            mark = (folder / f"{what[0]}.begun").read_bytes()
+        (folder / f"{what[0]}.begun").write_bytes(mark)
+        again = Device(device._handle, device.selector, traits=device.traits)
+        assert np.array_equal(_sum(again), wanted)
+        about = load(what[0]).about
+        assert (about["kernel"], about["fault"]) == ("axpby", "")
+        assert about["launches"] == ([what[1]] if len(what) == 2 else [])
+        assert len(list(folder.iterdir())) == 1
+    assert len(about["launches"][0]["arguments"]) > 4
+    monkeypatch.setattr(builder, "guarded_build", _no_build)
+    assert np.array_equal(_sum(Device(device._handle, "", traits=device.traits)), wanted)

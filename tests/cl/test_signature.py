@@ -7,7 +7,7 @@ import pytest
 
 from rift_cl.cl.build import source
 from rift_cl.cl.build.builder import OPTIONS
-from rift_cl.cl.signature import parameters
+from rift_cl.cl.signature import signature
 from rift_cl.errors import KernelArgumentError
 
 _NAMES = {
@@ -45,7 +45,7 @@ def test_the_compiler_reads_the_same_signature(device, name, macros):
     defines = device._programs._builder.defines(tuple((key, str(macros[key])) for key in macros))
     options = [*OPTIONS, "-cl-kernel-arg-info", *(f"-D{key}={defines[key]}" for key in defines)]
     kernel = cl.Kernel(cl.Program(device.context, text).build(options), name)
-    ours = parameters(name, text, defines)
+    ours = signature(name, text, defines).parameters
     assert len(ours) == kernel.num_args
     info = cl.kernel_arg_info
     for number, parameter in enumerate(ours):
@@ -64,7 +64,8 @@ def test_the_compiler_reads_the_same_signature(device, name, macros):
 def test_types_that_a_macro_chooses():
     text = source.kernel_source("axpby")
     for double, wanted in (("0", np.float32), ("1", np.float64)):
-        types = {each.dtype for each in parameters("axpby", text, {"DOUBLE": double})[:4]}
+        found = signature("axpby", text, {"DOUBLE": double}).parameters
+        types = {each.dtype for each in found[:4]}
         assert types == {np.dtype(wanted)}
 
 

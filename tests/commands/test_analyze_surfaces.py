@@ -80,6 +80,7 @@ def test_no_camera_is_suggested_behind_a_wall_that_sparse_points_show(walled, tm
     assert "farthest from all views" in page and "a pixel of parallax is" not in page
 
 
+@pytest.mark.full
 def test_fitted_splats_tell_what_is_in_the_way_as_well(tmp_path):
     folder = capture(tmp_path / "fit", arc())
     splats_of(points_before_a_wall()).save(folder / "scene.ply")

@@ -149,6 +149,7 @@ def test_a_fit_looks_through_the_captures_lens_unless_it_is_told_not_to(through_
     assert config["settings"]["pinhole"]
 
 
+@pytest.mark.full
 def test_a_fit_that_took_lenses_for_pinholes_is_scored_like_that(through_lens, tmp_path):
     assert fit(through_lens, tmp_path / "fit", "--pinhole", "--test", str(through_lens)) == 0
     arguments = ["eval", str(tmp_path / "fit"), str(through_lens), "--quiet"]

@@ -188,11 +188,25 @@ def test_child_that_ends_early_is_a_finding_and_the_rest_is_tried(monkeypatch, f
         return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
 
     monkeypatch.setattr(driver_test, "_start", start)
-    limit = 3.0 if said == "hung" else 60.0
+    limit = 15.0 if said == "hung" else 60.0
     found = list(in_child("0:0", ["good", "bad", "better"], limit))
     assert [each["family"] for each in found] == ["good", "bad", "better"]
     assert said in found[1]["error"]
     assert "error" not in found[0] and "error" not in found[2]
+
+
+def test_family_that_kills_its_child_once_is_tried_again(monkeypatch, tmp_path):
+    mark = str(tmp_path / "died")
+    fate = f"os.path.exists({mark!r}) or (os.mkdir({mark!r}), os.kill(os.getpid(), signal.SIGSEGV))"
+
+    def start(arguments):
+        code = CHILD.format(names=arguments[1:], fate=fate)
+        return subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+
+    monkeypatch.setattr(driver_test, "_start", start)
+    found = list(in_child("0:0", ["good", "bad", "better"], 60.0))
+    assert [each["family"] for each in found] == ["good", "bad", "better"]
+    assert not any("error" in each for each in found)
 
 
 def test_what_another_release_or_driver_left_is_not_taken(tested, monkeypatch):

@@ -150,6 +150,7 @@ def test_what_makes_no_sense_is_named_and_leaves_nothing(capture, tmp_path, caps
     assert not (tmp_path / "fit").exists()
 
 
+@pytest.mark.full
 def test_a_dry_run_says_what_splats_would_be(capture, tmp_path, capsys):
     assert fit(capture, tmp_path / "fit", "--basis", "hermite", "--dry-run") == 0
     printed = " ".join(capsys.readouterr().out.replace("│", " ").split())

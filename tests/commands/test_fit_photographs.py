@@ -115,6 +115,7 @@ def test_the_size_that_is_fitted_is_said():
     )
 
 
+@pytest.mark.full
 def test_a_size_that_is_asked_for_is_kept(capture, tmp_path, monkeypatch):
     monkeypatch.setattr(
         "rift_cl.commands.fit_photos.photograph_size.MOST_PIXELS", {True: 400, False: 400}

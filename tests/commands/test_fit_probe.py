@@ -35,6 +35,7 @@ def test_time_grows_evenly_between_both_and_beyond():
     assert Probe((300, 300), (0.2, 0.2), 2.0).step(600) == pytest.approx(0.4)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "more",
     [{"basis": "hermite", "order": 2}, {"angular": "sg", "modes": 2}, {"strategy": "default"}],

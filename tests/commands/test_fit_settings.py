@@ -143,6 +143,7 @@ def test_a_record_gives_the_settings_back(tmp_path, job):
     assert found == given == found.decided(50)
 
 
+@pytest.mark.full
 def test_a_config_repeats_a_fit_and_is_repeated_by_it(capture, tmp_path):
     def run(out, *words):
         options = ("--out", str(out), "--quiet")

@@ -86,6 +86,7 @@ def test_one_row_stays_in_its_slice(scans, tmp_path):
     assert (scene.quats[:, 3] != 0).any()
 
 
+@pytest.mark.full
 def test_the_unit_of_line_integrals_changes_nothing_but_the_unit(scans, tmp_path):
     path, _ = scans[1]
     scan = open_scan(path)
@@ -180,11 +181,18 @@ def test_the_command_follows_from_what_it_is_given(scans, capture, tmp_path):
     assert kind_of_fit(["--out", scan, folder]) == kind_of_fit(["--steps", "3"]) == "photos"
     (tmp_path / "config.json").write_text('{"job": "fit xray"}')
     assert kind_of_fit(["--config", str(tmp_path / "config.json")]) == "xray"
+    described = tmp_path / "described.yaml"
+    described.write_text("projections: frames\nsource_to_axis: 2\n")
+    assert kind_of_fit([str(described)]) == "xray"
+    (tmp_path / "described.json").write_text('{"geometry": "a.geom"}')
+    assert kind_of_fit([str(tmp_path / "described.json")]) == "xray"
+    assert kind_of_fit([str(capture / "transforms.json")]) == "photos"
     out = tmp_path / "fit"
     assert main(["fit", scan, "--out", str(out), "--steps", "2", "--splats", "9", "--quiet"]) == 0
     assert json.loads((out / "config.json").read_text())["job"] == "fit xray"
 
 
+@pytest.mark.full
 def test_the_real_tooth_from_one_command(shared_data, tmp_path):
     path = shared_data / "tooth" / "tooth.h5"
     if not path.is_file():

@@ -128,6 +128,7 @@ def test_the_same_seed_gives_the_same_plan_and_replaces_one_only_on_demand(
     assert [(planned / name).read_bytes() for name in names] == before
 
 
+@pytest.mark.full
 def test_further_views_are_planned_besides_those_that_were_taken(tmp_path, capsys):
     (tmp_path / "ring").mkdir()
     taken = transforms_of(ring(6), [f"{k}.png" for k in range(6)])

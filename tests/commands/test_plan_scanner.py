@@ -70,7 +70,8 @@ def test_vectors_are_those_of_the_scanner_at_these_places(on_orbit):
 def test_a_plan_of_no_scanner_keeps_no_vectors_of_an_earlier_one(on_orbit, tmp_path):
     out = tmp_path / "out"
     shutil.copytree(on_orbit, out)
-    words = ["plan", "--views", 2, "--band", 0.03, "--out", out, "--overwrite", "--quiet"]
+    words = ["plan", "--mode", "volume", "--views", 2, "--band", 0.03, "--out", out]
+    words += ["--overwrite", "--quiet"]
     assert main([str(word) for word in words]) == 0
     assert (out / "transforms.json").exists() and not (out / "vectors.txt").exists()
 

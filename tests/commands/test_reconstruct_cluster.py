@@ -93,6 +93,35 @@ def test_a_run_goes_on_with_a_part_that_a_worker_made(scan, tmp_path, monkeypatc
     assert volume.tobytes() == made(Reconstruction(settings(scan, tmp_path / "b")))[0].tobytes()
 
 
+def test_a_part_is_projected_as_the_run_began(scan, tmp_path):
+    """By costs these slices take a projector in real space."""
+    out = tmp_path / "out"
+    begun = Reconstruction(settings(scan, out, error=1e-2))
+    begun._settle()
+    begun.folder.make()
+    asked = Reconstruction(settings(scan, tmp_path / "asked"))
+    asked._settle()
+    assert asked.inversion.projection == {"footprint": "strip"}
+    begun.kept.begin(asked._facts(), begun.inversion.projection)
+    make_slices(settings(scan, out, resume=True), (), begun.kept.mark(), 2, 7)
+    ((_, slices),) = begun.kept.slabs()
+    alone, _ = made(Reconstruction(settings(scan, tmp_path / "b", error=1e-2)))
+    assert slices.tobytes() == alone[2:7].tobytes()
+    again = Reconstruction(settings(scan, out, resume=True))
+    again._settle()
+    assert again.inversion.projection == {"error": 1e-2}
+
+
+def test_a_forged_projector_is_refused(tmp_path):
+    kept = SlabFolder(tmp_path / "slabs", (4, 2, 2))
+    kept.begin({}, {"error": 1e-3})
+    assert kept.projection() == {"error": 1e-3}
+    for forged in ({"error": "x"}, {"device": "y"}):
+        kept.begin({}, forged)
+        with pytest.raises(CheckpointError, match="projection"):
+            kept.projection()
+
+
 def begin_anew(given):
     """What a command does before it hands out slices, and the token of its run."""
     begun = Reconstruction(given)

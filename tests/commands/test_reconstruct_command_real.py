@@ -14,6 +14,7 @@ def run(*arguments):
     return main([str(argument) for argument in arguments])
 
 
+@pytest.mark.full
 def test_real_tooth(shared_data, tmp_path):
     tooth = shared_data / "tooth" / "tooth.h5"
     assert run("reconstruct", tooth, "--out", tmp_path / "out") == 0
@@ -61,6 +62,7 @@ def test_rings_of_the_tooth_go_and_its_edges_stay(shared_data, tmp_path):
     assert np.corrcoef(images["on"].ravel(), images["off"].ravel())[0, 1] > 0.98
 
 
+@pytest.mark.full
 def test_real_dendrites(shared_data, tmp_path):
     path = shared_data / "dendrites" / "RealDataDend.mat"
     out = tmp_path / "out"
@@ -72,6 +74,7 @@ def test_real_dendrites(shared_data, tmp_path):
     assert abs(air) < 0.15 * alloy
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("scan", ["ta", "tb"])
 def test_the_wedge_of_the_helsinki_challenge(shared_data, tmp_path, scan):
     folder, scores = shared_data / "htc2022", {}

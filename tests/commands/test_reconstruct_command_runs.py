@@ -174,6 +174,7 @@ def test_a_failed_overwrite_loses_nothing(scan, tmp_path):
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
 
+@pytest.mark.full
 def test_another_format_replaces_the_first(scan, tmp_path):
     arguments = ("reconstruct", scan.counts, "--center", 45, "--out", tmp_path / "out")
     assert run(*arguments) == 0

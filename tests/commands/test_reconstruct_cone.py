@@ -97,7 +97,8 @@ def test_axis_and_sense_are_found(ball: Path, tmp_path: Path) -> None:
     assert middle_of(found.read()) == pytest.approx(0.02, rel=0.03)
 
 
-@pytest.mark.parametrize("said", ["lean", pytest.param("tilt", marks=pytest.mark.full)])
+@pytest.mark.full
+@pytest.mark.parametrize("said", ["lean", "tilt"])
 def test_an_axis_that_leans_is_turned(tmp_path: Path, said: str) -> None:
     """A detector that is turned by 4 degrees gives the volume of the upright one, once told so."""
     parts = [Ellipsoid.ball(3.0, 0.02, (z, 1.0, -2.0)) for z in (-5.0, 5.0)]
@@ -134,6 +135,7 @@ def test_methods_that_take_steps(ball: Path, tmp_path: Path, method: str) -> Non
     assert middle_of(found.read()) == pytest.approx(0.02, rel=0.12)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("method", ["cgls", "fbp"])
 def test_an_object_longer_than_the_detector_is_told(tmp_path: Path, method: str) -> None:
     """Rays through the first row leave a volume that is as high as rows are at the axis."""
@@ -173,7 +175,8 @@ def tall(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.parametrize("method", ["fbp", pytest.param("backproject", marks=pytest.mark.full)])
+@pytest.mark.full
+@pytest.mark.parametrize("method", ["fbp", "backproject"])
 def test_a_volume_larger_than_the_memory_is_made_in_slabs(
     tall: Path, tmp_path: Path, method: str
 ) -> None:

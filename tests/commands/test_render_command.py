@@ -105,6 +105,37 @@ def test_depth_is_that_of_the_renderer_in_scene_units(scene, tmp_path):
         assert picture.shape == (32, 48, 3) and picture[16, 24].sum() > 0.5
 
 
+def test_normals_are_the_shortest_axes_on_the_side_that_is_seen(tmp_path):
+    """A flat splat, turned: all of its pixels have its normal, from both sides."""
+    normal = np.array([0.6, 0.0, 0.8])
+    half = np.arccos(normal[2]) / 2
+    flat = SplatScene(
+        means=np.zeros((1, 3)),
+        log_scales=np.log([[0.5, 0.5, 0.01]]),
+        quats=[[np.cos(half), 0, np.sin(half), 0]],
+        logit_opacities=[4.0],
+        sh=np.zeros((1, 1, 3)),
+    )
+    flat.save(tmp_path / "flat.ply")
+    out = tmp_path / "film"
+    assert render(tmp_path / "flat.ply", out, *small("--normals", "--depth")) == 0
+    views, sides = open_capture(out).views, []
+    for number, view in enumerate(views):
+        found = read_image(out / "normals" / f"{number:04}.exr")
+        side = np.sign(view.camera.center @ normal)
+        sides.append(side)
+        np.testing.assert_allclose(found[16, 24], side * normal, atol=1e-5)
+        assert (found[0, 0] == 0).all()
+        picture = read_image(out / "normals" / f"{number:04}.png")
+        shares = picture[16, 24] / picture[16, 24].sum()
+        np.testing.assert_allclose(
+            shares, (side * normal + 1) / (side * normal + 1).sum(), atol=0.03
+        )
+    assert set(sides) == {-1, 1}
+    page = (out / "report.html").read_text()
+    assert page.count("<img") == 1 + 3 * 3 and "normals" in page
+
+
 def test_a_capture_gives_the_orbit_its_distance_and_elevation(scene, tmp_path):
     cameras = ring(5)
     names = [f"{k}.png" for k in range(len(cameras))]

@@ -28,6 +28,7 @@ def figures(out, *but):
     return {name: value for name, value in metrics.items() if name not in ("assumed", *but)}
 
 
+@pytest.mark.full
 def test_plan(tmp_path, capsys):
     out, again = tmp_path / "a", tmp_path / "b"
     options = ("--views", 3, "--seed", 2, "--elevation", -10, 40, "--mode", "volume")

@@ -108,6 +108,14 @@ def test_messages_without_sense_end_nothing_and_say_nothing(viewer, capfd):
     assert capfd.readouterr() == ("", "")
 
 
+def test_a_page_that_viser_fails_to_wake_ends_nothing(viewer, monkeypatch):
+    def fail(facts):
+        raise RuntimeError("deque mutated during iteration")
+
+    monkeypatch.setattr(viewer._page.view, "tell", fail)
+    viewer._page.tell("2 splats")
+
+
 def test_a_viser_that_does_not_ask_the_guard_is_not_used(monkeypatch):
     closed = []
 

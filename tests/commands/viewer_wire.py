@@ -68,7 +68,7 @@ class Wire:
         import zstandard
 
         while not (found := [message for message in self.got if wanted(message)]):
-            frame = self.socket.recv(timeout=10)
+            frame = self.socket.recv(timeout=60)
             length = int.from_bytes(frame[8:16], "little")
             inner = zstandard.ZstdDecompressor().decompress(frame[16 : 16 + length])
             self.got += msgspec.msgpack.decode(inner)["messages"]

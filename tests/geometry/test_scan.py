@@ -14,7 +14,9 @@ from hypothesis.extra import numpy as arrays
 from rift_cl import Parallel
 from rift_cl.errors import InputError, ShapeError
 
-angle_lists = arrays.arrays(np.float64, st.integers(1, 20), elements=st.floats(-100, 100))
+# Anything but round numbers, which look like degrees.
+any_angle = st.floats(-100, 100).map(lambda angle: angle + 1e-3)
+angle_lists = arrays.arrays(np.float64, st.integers(1, 20), elements=any_angle)
 
 
 def test_normal_form():
@@ -49,6 +51,37 @@ def test_axis_is_seen_at_the_center(angles, bins, pitch, center):
 @given(angle_lists)
 def test_any_order_and_range_of_angles_is_kept(angles):
     assert Parallel(angles, 3).angles.tolist() == angles.tolist()
+
+
+@pytest.mark.parametrize(
+    "angles",
+    [
+        np.arange(180),
+        np.linspace(0, 180, 91),
+        np.linspace(0, 360, 77, endpoint=False).astype(np.float32),
+        np.arange(-60, 61, 3),
+        np.linspace(0, 120, 77),
+        np.r_[0:40, 50:200:0.5],
+        np.r_[0, 137.5, 275, 52.5, 190, 327.5, 105, 242.5],
+    ],
+)
+def test_degrees_are_refused(angles):
+    with pytest.raises(InputError, match="degrees"):
+        Parallel(angles, 3)
+
+
+@pytest.mark.parametrize(
+    "angles",
+    [
+        np.deg2rad(np.arange(720)),
+        np.arange(90) * np.pi * (3 - np.sqrt(5)),
+        np.arange(0, 13),
+        [0, 45, 90],
+        np.deg2rad(np.r_[0:40, 50:200:0.5]) + 40 * np.pi,
+    ],
+)
+def test_radians_of_many_turns_are_no_degrees(angles):
+    assert len(Parallel(angles, 3).angles) == len(angles)
 
 
 @pytest.mark.parametrize("angles", [np.zeros((2, 2)), 1.0, [[1.0]], np.zeros((1, 3)), [], ()])

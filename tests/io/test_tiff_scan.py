@@ -198,6 +198,30 @@ def test_flats_and_darks_by_their_names(tmp_path: Path, way: str) -> None:
         check_calibrated(open_scan(folder.parent))
 
 
+@pytest.mark.parametrize(
+    ("names", "times"),
+    [
+        (("before", "after"), [0, 0, made.VIEWS, made.VIEWS]),
+        (("flats_pre", "flats_post"), [0, 0, made.VIEWS, made.VIEWS]),
+        (("1", "2"), None),
+        (("before", "2"), None),
+    ],
+    ids=str,
+)
+def test_flats_in_folders_of_a_folder(tmp_path: Path, names, times) -> None:
+    """All of them are flats, found or named; of when they were taken names may tell."""
+    made.write_series(tmp_path / "scan", "p{}.tif", made.frames())
+    for name in names:
+        made.write_series(tmp_path / "scan" / "flats" / name, "f{}.tif", calibration("flats"))
+    for scan in (open_scan(tmp_path / "scan"), open_scan(tmp_path / "scan", flats="flats")):
+        rows = scan.read(2, 9)
+        np.testing.assert_array_equal(rows.flats, np.tile(calibration("flats"), (2, 1, 1))[:, 2:9])
+        at = None if scan.flats_at is None else sorted(scan.flats_at)
+        assert at == times
+        if times:
+            assert (scan.flats_at[0] == 0) == (names[0] < names[1])
+
+
 def test_stacks_beside_each_other(tmp_path: Path) -> None:
     made.write_pages(tmp_path / "flats.tif", calibration("flats"))
     made.write_pages(tmp_path / "dark.tif", calibration("darks"))

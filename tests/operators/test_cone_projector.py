@@ -95,6 +95,7 @@ def test_the_adjoint_is_exact_and_bits_repeat(device):
         assert abs(forward - backward) <= 1e-8 * scale
 
 
+@pytest.mark.full
 def test_doubles(device):
     grid, scan = SCANS["all at once"]
     A, twin = Projector(grid, scan, device=device, dtype="float64"), ConeProjector(grid, scan)

@@ -64,6 +64,15 @@ def test_both_halves_equal_the_matrix(device, geometry, footprint):
     assert relative(A.T(y), matrix.backproject(y)) <= ROUNDING
 
 
+@pytest.mark.parametrize("bins", [1, 2])
+def test_strips_wider_than_the_image_equal_the_matrix(device, bins):
+    geometry = Grid((20, 30)), Fan(TURN, bins, 100.0, 60.0, 100.0)
+    A, matrix = Projector(*geometry, device=device), fan(*geometry)
+    x, y = white(A, 1)
+    assert relative(A(x), matrix.project(x)) <= ROUNDING
+    assert relative(A.T(y), matrix.backproject(y)) <= ROUNDING
+
+
 @pytest.mark.parametrize("curved", [False, True])
 def test_weights_of_the_inverse_square_equal_the_matrix(device, curved):
     grid, scan = Grid((33, 31)), Fan(TURN, 49, 1.4, 60.0, 90.0, curved=curved)

@@ -63,6 +63,7 @@ def test_it_is_linear_to_rounding(device, footprint):
     assert relative(A.T(A(X)) / 7, A.T(A(X) / 7)) <= 1e-15
 
 
+@pytest.mark.full
 def test_float32_is_the_same_operator(A, single):
     assert relative(single(X), A(X)) <= 3e-7
     assert relative(single.T(A(X)), A.T(A(X))) <= 3e-7

@@ -151,6 +151,7 @@ def test_a_rolled_detector_has_its_image_turned(device):
     assert relative(turned[:, :, ::-1].transpose(0, 2, 1), y) <= 1e-2
 
 
+@pytest.mark.full
 def test_doubles(device):
     A = Projector(Grid((8, 9, 10)), tilted(circle(10).vectors(), 3), device=device, dtype="float64")
     assert dot_test(A) <= 1e-13

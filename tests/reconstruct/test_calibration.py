@@ -9,12 +9,12 @@ from fan_scenes import AXIS, DETECTOR, FULL, KINDS, body, cone, fan, noisy, proj
 import rift_cl as rift
 from rift_cl.errors import ShapeError
 from rift_cl.phantom import project
-from rift_cl.reconstruct.calibration import rolled
+from rift_cl.reconstruct.calibration import turned
 
 
 def test_centre_sense_and_roll_of_a_cone():
     true = cone(rows=40, center=(19.5, 83.7))
-    vectors = rolled(true, np.deg2rad(0.8))
+    vectors = turned(true, np.deg2rad(0.8))
     y = noisy(project(body(), rift.Grid((4, 4, 4)), vectors, dtype=np.float64), 0.01, 0)
     found = rift.calibrate(y, replace(true, angles=-true.angles, center=(19.5, 82.0)))
     assert found.axis.sense.sign == -1
@@ -27,6 +27,36 @@ def test_centre_sense_and_roll_of_a_cone():
     assert found.disagreement[1] < found.disagreement[0]
 
 
+def test_a_detector_slanted_about_its_columns():
+    taken = cone(rows=24, center=(11.5, 79.5))
+    vectors = turned(replace(taken, center=(11.5, 79.8)), np.deg2rad(-0.3), np.deg2rad(2.5))
+    y = noisy(project(body(height=9.0), rift.Grid((4, 4, 4)), vectors, dtype=np.float64), 0.01, 0)
+    found = rift.calibrate(y, taken)
+    slant, half = np.rad2deg(found.slant)
+    assert abs(slant - 2.5) < half < 1.0
+    assert "slant" in found.in_words() and found.record()["slant"][1] == found.slant[1]
+    # As far as pixels move for it, at the corners too.
+    assert np.abs(found.scan.middle - vectors.middle).max() < 0.3
+    assert np.abs(found.scan.across - vectors.across).max() < 0.01
+
+
+def test_a_slant_moves_pixels_ahead_and_not_the_foot():
+    scan = cone(rows=24, center=(3.0, 60.0))
+    upright, slanted = scan.vectors(), turned(scan, 0.0, 0.1)
+    ahead = np.stack([-np.sin(scan.angles), np.cos(scan.angles)], axis=1)
+
+    def place(vectors, row, bin):
+        steps = (row - 11.5) * vectors.down + (bin - (scan.bins - 1) / 2) * vectors.across
+        return vectors.middle + steps - vectors.source
+
+    np.testing.assert_allclose(place(slanted, 3.0, 60.0), place(upright, 3.0, 60.0), atol=1e-9)
+    np.testing.assert_allclose(slanted.down, upright.down, atol=1e-12)
+    for bin in (0.0, 159.0):
+        moved = place(slanted, 9.0, bin) - place(upright, 9.0, bin)
+        want = (bin - 60.0) * scan.pitch[1] * np.sin(0.1)
+        np.testing.assert_allclose((moved[:, :2] * ahead).sum(axis=1), want, atol=1e-9)
+
+
 @pytest.mark.full
 def test_an_upright_detector_stays_a_cone():
     scan = cone(rows=40, center=(19.5, 83.7))
@@ -36,6 +66,7 @@ def test_an_upright_detector_stays_a_cone():
     assert found.scan.source_to_detector == scan.source_to_detector
 
 
+@pytest.mark.full
 def test_the_distance_of_the_detector():
     scan = fan(FULL)
     y = sinogram(KINDS["porous"], scan)
@@ -49,7 +80,7 @@ def test_the_distance_of_the_detector():
 
 def test_a_rolled_detector_shows_the_axis_along_a_slope():
     scan = cone(rows=40, center=(10.0, 83.7))
-    vectors = rolled(scan, np.deg2rad(10.0))
+    vectors = turned(scan, np.deg2rad(10.0))
     row, bin = 30.0, 83.7 + 20 * np.tan(np.deg2rad(10.0))
     place = vectors.middle + (row - 19.5) * vectors.down
     place = place + (bin - (scan.bins - 1) / 2) * vectors.across
@@ -67,7 +98,7 @@ def test_planes_tell_the_row_of_the_orbit(fault):
     center, row, roll = fault
     taken = rift.Cone(FULL[::4], 40, 80, 2.0, AXIS, DETECTOR, (19.5, 41.6))
     true = replace(taken, center=(19.5 + row, 41.6 + center))
-    vectors = rolled(true, np.deg2rad(roll))
+    vectors = turned(true, np.deg2rad(roll))
     y = project(body(height=18.0), rift.Grid((4, 4, 4)), vectors, dtype=np.float64)
     found = rift.calibrate(noisy(y, 0.01, 0), taken, orbit=True)
     assert found.row[0] == pytest.approx(19.5 + row, abs=0.4)

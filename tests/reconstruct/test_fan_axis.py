@@ -32,6 +32,7 @@ def test_the_axis_is_found(kind, turn):
     assert found.sense.sign == 1
 
 
+@pytest.mark.full
 def test_parts_of_views_tell_the_axis_of_a_noisy_short_scan():
     scan = fan(SHORT)
     y = sinogram(KINDS["wider than the detector"], scan, noise=0.03)
@@ -54,6 +55,7 @@ def test_the_sense_is_told():
     assert both.sense.sign == 1
 
 
+@pytest.mark.full
 def test_a_narrow_fan_does_not_tell_the_sense():
     scan = replace(fan(), source_to_axis=1e6, source_to_detector=1.5e6)
     found = rift.find_center(sinogram(KINDS["porous"], scan), _unknown(scan))
@@ -61,12 +63,14 @@ def test_a_narrow_fan_does_not_tell_the_sense():
     assert found.center == pytest.approx(83.7, abs=0.1)
 
 
+@pytest.mark.full
 def test_a_detector_moved_aside():
     scan = fan(center=118.0)
     found = rift.find_center(sinogram(KINDS["wider than the detector"], scan), _unknown(scan))
     assert found.center == pytest.approx(118.0, abs=0.1)
 
 
+@pytest.mark.full
 def test_a_curved_detector():
     scan = replace(fan(), curved=True)
     y = sinogram(KINDS["porous"], scan)

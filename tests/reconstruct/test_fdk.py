@@ -19,6 +19,7 @@ from rift_cl import Cone, Grid, Projector, backproject, fbp, phantom
 from rift_cl.errors import InputError
 from rift_cl.operators import as_filter
 from rift_cl.reconstruct import FDK, extended
+from rift_cl.reconstruct.calibration import turned
 from rift_cl.reference import filter_rows
 
 pytestmark = pytest.mark.once
@@ -212,6 +213,43 @@ def test_circular_vectors_are_reconstructed_as_their_cone(device):
     there = fbp(Projector(GRID, scan, device=device), y)
     here = fbp(Projector(GRID, scan.vectors(), device=device), y)
     np.testing.assert_allclose(here, there, atol=1e-4)
+
+
+@pytest.mark.parametrize("across", [1, -1])
+def test_detectors_whose_axes_run_backwards_give_the_same_volume(device, across):
+    # The head leaves the detector at a side and at an end.
+    scan = circle(FULL[::3], center=(12.0, 17.1))
+    vectors, y = scan.vectors(), phantom.project(HEAD, GRID, scan)
+    back = replace(vectors, across=across * vectors.across, down=-vectors.down)
+    there = fbp(Projector(GRID, scan, device=device), y)
+    here = fbp(Projector(GRID, back, device=device), y[:, ::-1, ::across].copy())
+    np.testing.assert_allclose(here, there, atol=1e-4)
+
+
+def test_a_tilted_detector_of_one_row_is_a_fan(device):
+    scan = replace(circle(FULL), rows=1, center=(0.0, 15.5))
+    slanted, grid = turned(scan, 0.0, np.deg2rad(3)), Grid((1, N, N))
+    ball = [phantom.Ellipsoid.ball(0.35 * N, 1.7, (0.0, 1.0, 2.0))]
+    volumes = [
+        fbp(Projector(grid, each, device=device), phantom.project(ball, grid, each))
+        for each in (scan, slanted)
+    ]
+    within = np.hypot(AWAY[:, None] - 1, AWAY - 2) < 0.25 * N
+    assert volumes[1][0][within].mean() == pytest.approx(volumes[0][0][within].mean(), rel=2e-3)
+    few = replace(slanted, bins=3)
+    with pytest.raises(InputError, match=r"bins.*cgls"):
+        fbp(Projector(grid, few, device=device), np.zeros((90, 1, 3)))
+
+
+def test_the_first_row_of_a_rolled_detector_is_read(device):
+    """Of a long rod; half a sample beyond the outer ones is read as they are."""
+    scan = circle(FULL[::3])
+    rod = [phantom.Ellipsoid((0.0, 0.0, 0.0), (4000.0, 8.0, 8.0), 0.0, 1.7)]
+    A = Projector(GRID, turned(scan, np.deg2rad(1)), device=device)
+    volume = fbp(A, phantom.project(rod, GRID, A.scan))
+    within = np.hypot(AWAY[:, None], AWAY) < 5
+    np.testing.assert_allclose(volume[:, within].mean(axis=1), 1.7, rtol=0.02)
+    assert rift.dot_test(FDK(A)) < 1e-7
 
 
 def test_vectors_that_are_no_circle_are_refused_with_the_methods_that_take_them(device):

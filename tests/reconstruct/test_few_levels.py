@@ -124,6 +124,7 @@ def test_clipping_shows_nan(device):
     np.testing.assert_array_equal(device.get(y), [np.nan, 1.0])
 
 
+@pytest.mark.full
 def test_bounds_give_the_bounded_least_squares_solution(device):
     from scipy.optimize import lsq_linear
 

@@ -98,6 +98,9 @@ def test_only_full_turns_with_an_axis_off_the_middle_are_offset():
     assert is_full_turn(np.arange(720) * 2 * np.pi / 360)
     assert is_full_turn(np.delete(np.deg2rad(np.arange(360)), [100, 101]))
     assert not is_full_turn(np.delete(np.deg2rad(np.arange(360)), range(100, 110)))
+    assert is_full_turn(np.random.default_rng(0).uniform(0, 2 * np.pi, 160))
+    two_holes = [*range(100, 120), *range(200, 220)]
+    assert not is_full_turn(np.delete(np.deg2rad(np.arange(360)), two_holes))
     assert not is_full_turn(half)
 
 

@@ -112,6 +112,21 @@ def test_a_detector_to_one_side_is_completed(center):
     assert "Wang" in counted.sentence
 
 
+def test_a_detector_to_one_side_is_completed_where_angles_are_as_chance_has_them():
+    angles = np.random.default_rng(0).uniform(0, 2 * np.pi, 160)
+    counted = redundancy(fan(angles, center=12.0))
+    np.testing.assert_array_equal(counted.rays, redundancy(fan(TURN, center=12.0)).rays)
+    assert counted.views.sum() == pytest.approx(np.pi)
+    place = np.argsort(angles)
+    gaps = (angles[place[2:]] - angles[place[:-2]]) / 4
+    np.testing.assert_allclose(counted.views[place[1:-1]], gaps, rtol=1e-9)
+
+
+def test_a_short_scan_says_how_far_an_object_may_reach_on_a_detector_to_one_side():
+    assert "12 bins" in redundancy(fan(arc(5.5), center=12.0)).sentence
+    assert "axis" not in redundancy(fan(arc(5.5))).sentence
+
+
 @pytest.mark.parametrize("center", [31.0, 33.0, 35.5])
 def test_lines_beyond_the_shorter_side_count_twice_where_the_axis_is_off_by_a_little(center):
     counted = redundancy(fan(TURN, center=center))

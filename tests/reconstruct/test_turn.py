@@ -101,6 +101,7 @@ def test_two_views_of_a_fan_say_nothing():
     assert fan_doubt(np.ones((2, 64), np.float32), scan) == ""
 
 
+@pytest.mark.full
 def test_the_search_doubts_a_fan():
     scan = fan(SHORT)
     wrong = replace(scan, angles=1.75 * scan.angles, center=None)

@@ -12,6 +12,8 @@ from rift_cl.geometry.leaning import leaning
 from rift_cl.reconstruct import Cgls, Fista, Pdhg, Sirt
 from rift_cl.reconstruct.solvers.few_levels import FewLevels
 
+pytestmark = pytest.mark.dealt
+
 GRID = Grid((192, 32, 30), (0.5, 1, 1))
 CONE = Cone([0.2, 2.0], 60, 20, 2.6, 100, 150)
 # Bytes of a quarter of the volume.
@@ -72,14 +74,15 @@ def test_where_no_sum_is_cut_parts_have_the_same_bits(device, problem, method):
     assert METHODS[method](A, y).tobytes() == METHODS[method](whole, y).tobytes()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "make",
     [
         Cgls,
-        pytest.param(Sirt, marks=pytest.mark.full),
-        pytest.param(lambda A, y: Fista(A, y, 0.02), marks=pytest.mark.full),
-        pytest.param(lambda A, y: Pdhg(A, y, 0.02), marks=pytest.mark.full),
-        pytest.param(lambda A, y: FewLevels(A, y, 0.02), marks=pytest.mark.full),
+        Sirt,
+        lambda A, y: Fista(A, y, 0.02),
+        lambda A, y: Pdhg(A, y, 0.02),
+        lambda A, y: FewLevels(A, y, 0.02),
     ],
 )
 def test_a_run_in_parts_goes_on_from_its_state(device, problem, make):

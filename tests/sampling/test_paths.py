@@ -132,6 +132,7 @@ def test_a_path_goes_round_keep_outs_or_says_that_none_does():
         plan(TARGET, 9, Constraints(path=Ring(), elevation=(-0.5, 0.5), keepouts=(wall,)))
 
 
+@pytest.mark.full
 def test_a_spline_finds_its_way_beside_a_wall_that_cuts_every_full_turn():
     wall = KeepOut(Cone((0, 0, 0), (1, 0, 0), 1.3))
     limits = Constraints(elevation=(0, 0.6), keepouts=(wall,))

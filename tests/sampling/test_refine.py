@@ -19,6 +19,7 @@ TARGET = Target(np.zeros(3), 60.0, snr=1000.0, frequencies=half_ball(16 / 60, 30
 BAND = Constraints(elevation=(0, math.radians(75)))
 
 
+@pytest.mark.full
 def test_a_small_step_does_not_end_the_polish():
     # The first step of these brings a two-thousandth, eleven more 3 %.
     design = DesignSpace(TARGET, BAND, default_types(TARGET))

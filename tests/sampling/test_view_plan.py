@@ -52,6 +52,7 @@ def test_the_verdict_and_what_it_counts_are_one():
     assert "Nothing to compare with" in replace(found, baselines={}).verdict()
 
 
+@pytest.mark.full
 def test_a_plan_is_written_in_one_line():
     found = plan(TARGET, 3, Constraints(distance=(100, 600)), (WIDE, LONG), method="greedy")
     assert str(found) == repr(found)

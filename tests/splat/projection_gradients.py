@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import torch
 import twin_projection as twin
@@ -37,9 +35,8 @@ def random_records(counts, covars, channels, *, seed=1, absgrad=False):
 
 def sums_of(device, slots, records):
     """The records of each splat, summed on the device."""
-    lists = SimpleNamespace(slots=device.array(slots))
     live = device.array(np.ones(len(records), np.uint8))
-    return sum_slots(device, lists, SlotRecords(device.array(records), live))
+    return sum_slots(device, device.array(slots), SlotRecords(device.array(records), live))
 
 
 def run(device, values, kind, *, channels=3, depth_channel=False, shaded=True, one_tile=False):

@@ -108,6 +108,7 @@ def test_what_the_bound_is_made_of_is_the_same_in_every_direction(order):
     np.testing.assert_allclose(turned, squares, rtol=1e-9)
 
 
+@pytest.mark.full
 def test_no_order_is_amplified(device):
     """A A^T <= I: on the screen an order is never longer than it was in space."""
     modal = MODALS["orders 3 and 4, fisheye"]

@@ -83,6 +83,7 @@ def quaternions(matrices):
     return np.linalg.eigh(K)[1][:, :, -1]
 
 
+@pytest.mark.full
 def test_modes_of_a_ball_may_be_written_in_any_frame(device):
     """Turning a ball's frame and its coefficients the other way leaves the density as it was."""
     values, turn = few(20, shape=3, color=0), turned(7)
@@ -149,6 +150,7 @@ def polynomial(x, modes):
     return value
 
 
+@pytest.mark.full
 def test_modes_add_no_mass_to_a_picture_of_line_integrals(device):
     values = few(6, shape=4, color=0)
     values["means"] *= 0.3
@@ -161,6 +163,7 @@ def test_modes_add_no_mass_to_a_picture_of_line_integrals(device):
     np.testing.assert_allclose(found.sum((0, 1)), right.sum((0, 1)), rtol=1e-4)
 
 
+@pytest.mark.full
 def test_what_lies_beyond_a_splats_rectangle_is_not_seen(device):
     """With extents at six standard deviations the picture is the same: the bound is one."""
     values = few(60, shape=4, color=0, strength=1.0)

@@ -33,6 +33,7 @@ def test_splats_whose_modes_are_no_numbers_are_left_out(device, name, number):
         assert np.isfinite(host).all() and not host[[3, 17]].any()
 
 
+@pytest.mark.full
 def test_a_splat_whose_modes_outshine_it_is_drawn(device):
     """Its own peak is under 1/255, what its modes make of it is not."""
     values = {

@@ -28,6 +28,7 @@ def lobed(kind):
     return values
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", FUNCTIONS)
 def test_gradients_of_lobes_are_differences(device, kind):
     values, random = lobed(kind), np.random.default_rng(7)

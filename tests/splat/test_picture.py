@@ -44,6 +44,7 @@ def drawn(device: rift.Device, values: dict, settings: SplatSettings = SETTINGS,
     return list(Renderer(settings, device=device).picture(splats, camera, **how))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("settings", "how"),
     [

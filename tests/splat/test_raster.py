@@ -191,6 +191,7 @@ def test_absgrad_sums_magnitudes(device):
     assert (more[:, 9:] > 1.5 * means).mean() > 0.5
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["light", "xray"])
 def test_two_runs_give_the_same_bits(device, kind):
     scene = random_scene(400, SIZE, channels=35)

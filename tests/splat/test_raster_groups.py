@@ -24,7 +24,7 @@ def drawn(device, scene, settings=None):
     random = np.random.default_rng(3)
     coming = (device.array(random.normal(size=raster.image.shape).astype(np.float32)),)
     records = raster_grad(device, splats, lists, raster, *coming, settings=settings)
-    sums = sum_slots(device, lists, records)
+    sums = sum_slots(device, lists.slots, records)
     return [device.get(each) for each in (raster.image, raster.transmittance, sums)]
 
 
@@ -41,6 +41,7 @@ def groups_of(device):
     }
 
 
+@pytest.mark.full
 @pytest.mark.once
 @pytest.mark.parametrize(
     ("group", "channels"),

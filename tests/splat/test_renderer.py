@@ -176,6 +176,7 @@ def test_splats_without_colour_are_refused(device):
         draw(device, "light", values)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("channels", [1, 4, 7])
 def test_background_gradient_takes_any_channels_and_odd_sizes(device, channels):
     values = random_splats(40) | {"sh": None}

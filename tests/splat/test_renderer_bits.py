@@ -21,10 +21,10 @@ from hypothesis import strategies as st
 from projection_scenes import camera_of, random_splats
 
 import rift_cl as rift
-from rift_cl.errors import ResourceLimitError
+from rift_cl.errors import GivenUpError, ResourceLimitError
 from rift_cl.splat import Renderer, Splats, SplatSettings
 from rift_cl.splat.bands import FrameMemory, check_fixed, entries_per_row, plan_bands
-from rift_cl.splat.raster import raster_grad
+from rift_cl.splat.raster import raster_grad, sum_slots
 from rift_cl.splat.tile_lists import Tiles
 
 pytestmark = pytest.mark.dealt
@@ -43,16 +43,17 @@ def drawn(device):
     return renderer, renderer.forward(splats, camera, background=background, depth="expected")
 
 
-def gradient(renderer, frame):
+def gradient(renderer, frame, **more):
     random, device = np.random.default_rng(1), renderer.device
     coming = [random.normal(size=array.shape) for array in (frame.image, frame.transmittance)]
-    return renderer.backward(frame, *map(device.array, coming), with_camera=True)
+    return renderer.backward(frame, *map(device.array, coming), with_camera=True, **more)
 
 
-def digest(renderer, frame):
+def digest(renderer, frame, **more):
     """SHA-256 of the image and of every gradient."""
-    found = gradient(renderer, frame)
-    arrays = [frame.image, frame.transmittance, *vars(found.splats).values()]
+    pictures = [frame.image, frame.transmittance]
+    found = gradient(renderer, frame, **more)
+    arrays = [*pictures, *vars(found.splats).values()]
     arrays += [found.sh, found.camera, found.background]
     hosts = [renderer.device.get(array) for array in arrays if array is not None]
     assert len(hosts) == 13 and all(np.isfinite(host).all() and host.any() for host in hosts)
@@ -186,6 +187,46 @@ def test_records_of_what_is_seen_alone_give_the_same_bits(device, monkeypatch):
     assert (frame.lists is None) == device.traits.is_cpu
 
 
+@pytest.mark.parametrize("bands", [False, True])
+def test_a_frame_that_is_not_retained_has_the_same_gradient_and_nothing_after_it(
+    device, monkeypatch, bands
+):
+    renderer, frame = drawn(device)
+    whole, least = digest(renderer, frame), needs(device, frame, gradient=True)[1]
+    if bands:
+        monkeypatch.setattr(rift.Device, "budget", least)
+    renderer, frame = drawn(device)
+    assert (frame.lists is None) == bands
+    assert digest(renderer, frame, retain=False) == whole
+    for name in ("image", "lists", "projection"):
+        with pytest.raises(GivenUpError, match=f"no {name} any more"):
+            getattr(frame, name)
+    with pytest.raises(GivenUpError, match="retain"):
+        gradient(renderer, frame)
+    assert not hasattr(frame, "pictures")
+
+
+def test_what_is_not_retained_is_gone_before_the_sums_are_made(device, monkeypatch):
+    renderer, frame = drawn(device)
+    raster_pass, projection = frame.raster_pass, frame.projection
+    arrays = {
+        **{name: getattr(projection, name) for name in ("screen", "boxes", "depths")},
+        **{name: getattr(raster_pass.raster, name) for name in ("image", "last")},
+        **{name: getattr(raster_pass.lists, name) for name in ("entries", "slots")},
+        "records": raster_pass.screen.records,
+    }
+    known, left = {name: weakref.ref(array) for name, array in arrays.items()}, []
+    del arrays, raster_pass, projection
+
+    def noted(*given, **more):
+        left.append([name for name, one in known.items() if one() is not None])
+        return sum_slots(*given, **more)
+
+    monkeypatch.setattr(RASTER_PASS, "sum_slots", noted)
+    gradient(renderer, frame, retain=False)
+    assert left == [["slots"]]
+
+
 @pytest.mark.full
 def test_device_with_little_memory_gives_the_same_bits(device):
     renderer, frame = drawn(device)
@@ -251,6 +292,12 @@ def test_what_fits_no_bands_is_refused_in_one_sentence():
     )
     with pytest.raises(ResourceLimitError, match=words):
         check_fixed(memory, 1024, 1 << 40)
+    words = (
+        "^100 splats and an image of 15360 .*, with the gradient, need .* budget is 1 KiB: raise"
+    )
+    with_gradient = dataclasses.replace(memory, gradient=True)
+    with pytest.raises(ResourceLimitError, match=words):
+        plan_bands(boxes, Tiles(30, 1), with_gradient, 1024, 1 << 40)
     words = "^an image of 15360 pixels with 3 channels takes 180 KiB, .* takes is 100 KiB.*smaller"
     with pytest.raises(ResourceLimitError, match=words):
         check_fixed(memory, 1 << 40, 100 << 10)

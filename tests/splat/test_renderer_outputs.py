@@ -88,6 +88,7 @@ def test_depth_of_one_splat_is_its_own(device):
     assert not depth[alpha == 0].any()
 
 
+@pytest.mark.full
 def test_gradient_of_expected_depth_is_the_quotients(device):
     """dL/dD = g / alpha and dL/dT = g E / alpha: with them the accumulated depth's gradient."""
     renderer, camera = Renderer(device=device), camera_of("pinhole")

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from projection_scenes import Kind, camera_of, plain, random_splats, shaped, upload
 
-from rift_cl.errors import DTypeError, InputError, ShapeError
+import rift_cl as rift
+from rift_cl.errors import DTypeError, InputError, ResourceLimitError, ShapeError
 from rift_cl.splat.projection import project
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
@@ -23,6 +24,17 @@ def test_camera_and_settings_must_agree(device):
     with pytest.raises(InputError, match=r"near is -1.*positive"):
         project(device, splats, camera_of("pinhole"), SplatSettings(near=-1))
     project(device, splats, camera_of("ortho"), SplatSettings(near=-1e6))
+
+
+def test_splats_beyond_the_budget_are_refused_before_any_is_sent(device):
+    values = random_splats(20_000)
+    need = 4 * sum(array.size for array in values.values())
+    small = rift.Device(device._handle, device.selector, traits=device.traits, memory=need - 1)
+    with pytest.raises(ResourceLimitError, match=r"scene of 20000 splats needs .*budget"):
+        Splats.upload(small, **values)
+    assert small.taken == 0
+    roomy = rift.Device(device._handle, device.selector, traits=device.traits, memory=need)
+    assert len(Splats.upload(roomy, **values)) == 20_000
 
 
 @pytest.mark.parametrize(

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 
 from rift_cl.splat.raster import SlotRecords, sum_slots
 
 
 def sums_of(device, slots, records, onto=None):
-    lists = SimpleNamespace(slots=device.array(slots))
     live = device.array(np.isfinite(records[:, 0]).astype(np.uint8))
-    return sum_slots(device, lists, SlotRecords(device.array(records), live), onto=onto)
+    sent = device.array(slots)
+    return sum_slots(device, sent, SlotRecords(device.array(records), live), onto=onto)
 
 
 def test_records_are_summed_in_bands_to_the_same_bits(device):

@@ -42,6 +42,15 @@ def test_every_part_is_told_with_the_device(bench, tmp_path):
     assert "| fbp | = |" in page and "`python tools/bench_gpu.py --out x`" in page
 
 
+def test_part_that_says_nothing_is_given_up_and_told(bench, tmp_path, monkeypatch):
+    silent = [sys.executable, "-c", "import time; time.sleep(600)"]
+    monkeypatch.setattr(bench, "_parts", lambda *_: iter([("tests", silent)]))
+    assert bench.main(bench.Options(tmp_path / "new", limit=0.2)) == 1
+    (found,) = json.loads((tmp_path / "new.json").read_text())["parts"].values()
+    assert found["said"] == ["no line in 0.2 s: given up"]
+    assert found["status"] != 0
+
+
 def test_no_such_device_is_told(bench, tmp_path):
     assert bench.main(bench.Options(tmp_path / "new", device="no such device"))
     assert not list(tmp_path.iterdir())

@@ -81,3 +81,18 @@ def test_a_page_of_the_paper_gets_tables_and_their_origin(tool, tmp_path, monkey
     monkeypatch.setattr(figure, "show", lambda shown, result: shown.table(*rows))
     text = figures.print_page(figures.Options(tmp_path, page, tmp_path))
     assert "| 2 | 13.89 |" in text and "a device, 2026-01-02" in text
+
+
+def test_the_summary_of_benchmarks_holds_what_their_pages_say(tool, tmp_path):
+    summary, text = tool("print_benchmark_summary"), (DOCS / "benchmarks/index.md").read_text()
+    assert summary.with_table(text, DOCS / "benchmarks") == text
+    for name in ("performance", "training", "defaults"):
+        (tmp_path / f"{name}.md").write_text((DOCS / f"benchmarks/{name}.md").read_text())
+    slower = "| backward | rift_cl, NumPy | silx | 0.5× | 0.4× |"
+    page = (DOCS / "benchmarks/performance.md").read_text()
+    page = re.sub(r"^\| backward \| rift_cl, NumPy .*$", slower, page, flags=re.MULTILINE)
+    (tmp_path / "performance.md").write_text(page)
+    assert "| silx, the fastest of all peers | 0.5 times as fast |" in summary.table(tmp_path)
+    (tmp_path / "defaults.md").write_text("on **x** (y, driver z) 2026-01-02T03:04")
+    with pytest.raises(ValueError, match=r"defaults\.md"):
+        summary.table(tmp_path)

@@ -7,7 +7,7 @@ import subprocess
 
 def test_the_page_keeps_figures_and_says_what_was_broken(tool, tmp_path, monkeypatch):
     report = tool("report_reliability")
-    first, second, third = report.PROMISES
+    first, second, third = report.PROMISES[:3]
     answers = {first.tool: (0, "many\n7 of 7"), second.tool: (1, "6 of 7"), third.tool: (3, "")}
 
     def run(command, **_):

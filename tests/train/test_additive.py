@@ -54,6 +54,7 @@ def test_the_adjoint_is_the_transpose(device, order, rows):
     assert np.vdot(c, additive.T(other)) == wanted
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kept", [0, 1])
 def test_what_is_not_kept_is_drawn_anew_to_the_same_bits(device, monkeypatch, kept):
     additive, parameters = additive_of(device, 1)

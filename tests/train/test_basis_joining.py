@@ -87,6 +87,7 @@ def test_orders_join_at_their_steps(device):
     assert trainer.parameters.host()[0]["shape_modes"].any()
 
 
+@pytest.mark.full
 def test_what_joins_changes_no_picture(device):
     trainer = trainer_of(device, "exp")
     run_to(trainer, 5)
@@ -128,6 +129,7 @@ def test_a_state_of_splats_without_modes_is_one_to_begin_with(device):
         trainer.restore(damaged)
 
 
+@pytest.mark.full
 def test_flat_scans_have_no_modes_across_their_slice(device):
     pictures = Row(device)
     random = np.random.default_rng(0)

@@ -50,6 +50,7 @@ def test_known_densities_and_modes_are_found_where_splats_are_known(device, orde
         assert found[name].tobytes() == raw[name].tobytes()
 
 
+@pytest.mark.full
 def test_a_band_that_widens_splats_is_heeded(device):
     raw = scene(1)
     band = np.full(COUNT, 0.8, np.float32)

@@ -1,6 +1,7 @@
 """L1 and SSIM with their gradient: against a float64 twin, scikit-image and kornia's autograd."""
 
 import dataclasses
+import importlib
 import itertools
 
 import numpy as np
@@ -13,6 +14,8 @@ from rift_cl.reference import image_loss as twin
 from rift_cl.train.loss.image_loss import ImageLoss
 
 pytestmark = pytest.mark.dealt
+
+IMAGE_LOSS = importlib.import_module("rift_cl.train.loss.image_loss")
 
 # Of the second, a strip of 256 floats leaves two.
 SIZES = [(11, 11), (12, 86), (13, 200), (97, 143)]
@@ -174,6 +177,27 @@ def test_every_run_has_the_same_bits(device):
     for value, gradient in runs[1:]:
         assert value == runs[0][0]
         assert np.array_equal(gradient, runs[0][1])
+
+
+def test_maps_of_a_large_image_are_made_in_bands_to_the_same_bits(device, monkeypatch):
+    image, target = map(device.array, pair((61, 90)))
+    weights, sizes, make = device.array(mask((61, 90))), [], device.empty
+
+    def noted(*given):
+        found = make(*given)
+        sizes.append(found.nbytes)
+        return found
+
+    def most():
+        sizes.clear()
+        found = map(device.get, ImageLoss()(device, image, target, weights=weights))
+        return max(sizes), [array.tobytes() for array in found]
+
+    monkeypatch.setattr(device, "empty", noted)
+    whole, wanted = most()
+    monkeypatch.setattr(IMAGE_LOSS, "_MAPS_ROOM", 0)
+    banded, found = most()
+    assert banded < whole / 2 and found == wanted
 
 
 @pytest.mark.parametrize("size", [(1, 1), (3, 2), (1, 300)])

@@ -7,8 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rift_cl.reference.training import activate, adam_step, noise
+from rift_cl.reference.training import activate, adam_step, noise, surface_loss
 from rift_cl.train.parameters import GROUPS, Parameters
+from rift_cl.train.surface_settings import SurfacePenalties
 
 pytestmark = pytest.mark.dealt
 
@@ -86,18 +87,72 @@ def test_what_is_drawn_follows_what_is_trained(device):
 
 def test_penalties_are_those_of_the_means(device):
     parameters = Parameters.of(device, raw_values())
-    host, found = gradients(device)
-    zero = {name: device.zeros(array.shape) for name, array in vars(found.splats).items()}
-    still = SimpleNamespace(splats=SimpleNamespace(**zero), sh=zero["sh"])
     options = FREE | {"opacity_penalty": 0.3, "scale_penalty": 0.7}
     scales, opacities = (device.get(getattr(parameters.drawn, n)) for n in ("scales", "opacities"))
-    parameters.update(still, RATES, **options)
+    parameters.update(still(device), RATES, **options)
     _, first, _ = parameters.host()
     count = len(parameters)
     by_logit = 0.3 / count * opacities * (1 - opacities)
     np.testing.assert_allclose(first["logits"], 0.1 * by_logit, rtol=1e-4)
     np.testing.assert_allclose(first["log_scales"], 0.1 * 0.7 / (3 * count) * scales, rtol=1e-4)
-    assert not first["means"].any() and host["means"].any()
+    assert not first["means"].any()
+
+
+@pytest.mark.parametrize("amplitude", [False, True])
+def test_priors_for_surfaces_are_the_gradient_of_the_twins(device, amplitude):
+    raw = raw_values()
+    sheet = np.random.default_rng(5).normal(size=(37, 3))
+    sheet /= np.linalg.norm(sheet, axis=1, keepdims=True)
+    weights = SurfacePenalties(0.7, 0.3, 0.5)
+    parameters = Parameters.of(device, raw, amplitude=amplitude, sheet=sheet.astype(np.float32))
+    found = still(device)
+    parameters.update(found, RATES, **FREE, surface=weights)
+    first = parameters.host()[1]
+    at = {name: raw[name].astype(float) for name in ("quats", "log_scales", "logits")}
+    for name, values in at.items():
+        wanted = differences(
+            lambda x, n=name: surface_loss(**at | {n: x}, normals=sheet, weights=weights), values
+        )
+        np.testing.assert_allclose(first[name], 0.1 * wanted, rtol=2e-3, atol=2e-7, err_msg=name)
+        assert np.abs(wanted).max() > 1e-4
+    assert not device.get(found.splats.quats).any()
+
+
+def test_turns_have_a_prior_where_there_are_sheets_alone(device):
+    moved = []
+    for sheet in (None, np.tile(np.float32([0, 0, 1]), (37, 1))):
+        parameters = Parameters.of(device, raw_values(), sheet=sheet)
+        surface = SurfacePenalties(normal_consistency=0.5)
+        parameters.update(still(device), RATES, **FREE, surface=surface)
+        moved.append(parameters.host()[1]["quats"].any())
+    assert moved == [False, True]
+
+
+def test_turns_that_are_none_have_no_prior(device):
+    raw = raw_values()
+    raw["quats"][3], raw["quats"][5] = 0, 1e25
+    parameters = Parameters.of(device, raw, sheet=np.tile(np.float32([0, 0, 1]), (37, 1)))
+    parameters.update(still(device), RATES, **FREE, surface=SurfacePenalties(0.0, 0.0, 0.5))
+    found = parameters.host()[0]["quats"]
+    np.testing.assert_array_equal(found[[3, 5]], raw["quats"][[3, 5]])
+    assert np.isfinite(found).all()
+
+
+def still(device):
+    """A loss that nothing changes, so that what moves are penalties."""
+    by = vars(gradients(device)[1].splats)
+    zero = {name: device.zeros(array.shape) for name, array in by.items()}
+    return SimpleNamespace(splats=SimpleNamespace(**zero), sh=zero["sh"])
+
+
+def differences(loss, at, step=1e-5):
+    """The gradient of a function of an array, by central differences."""
+    found = np.empty(at.shape)
+    for place in np.ndindex(at.shape):
+        aside = np.zeros(at.shape)
+        aside[place] = step
+        found[place] = (loss(at + aside) - loss(at - aside)) / (2 * step)
+    return found
 
 
 def test_random_walks_are_the_twins(device):

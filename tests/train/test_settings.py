@@ -10,6 +10,7 @@ from rift_cl.errors import InputError, SettingError
 from rift_cl.train.environment_settings import EnvironmentSettings
 from rift_cl.train.settings import LearningRates, TrainSettings
 from rift_cl.train.strategy import DefaultSettings, McmcSettings, XraySettings
+from rift_cl.train.surface_settings import SurfaceSettings
 from rift_cl.train.xray.settings import XrayTrainSettings
 
 NAN, INF = float("nan"), float("inf")
@@ -50,7 +51,9 @@ def test_a_number_out_of_its_range_is_named(kind, changes, words):
         kind(**changes)
 
 
-@pytest.mark.parametrize("kind", [LearningRates, McmcSettings, DefaultSettings, XraySettings])
+@pytest.mark.parametrize(
+    "kind", [LearningRates, McmcSettings, DefaultSettings, XraySettings, SurfaceSettings]
+)
 @pytest.mark.parametrize("value", [NAN, INF, -INF, "1", [1, 2]])
 def test_what_is_no_number_is_refused_everywhere(kind, value):
     for item in fields(kind):
@@ -62,6 +65,11 @@ def test_what_is_no_number_is_refused_everywhere(kind, value):
 def test_xrays_have_no_light_to_reflect():
     with pytest.raises(SettingError, match="kind is 'shared'"):
         XrayTrainSettings(environment=EnvironmentSettings("shared"))
+
+
+def test_xrays_have_no_surfaces():
+    with pytest.raises(SettingError, match="surface"):
+        XrayTrainSettings(surface=SurfaceSettings(flatness=1.0))
 
 
 def test_zero_switches_off_what_can_be_switched_off():

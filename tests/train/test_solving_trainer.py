@@ -72,6 +72,7 @@ def test_a_fit_goes_on_from_any_state_to_the_same_bits(device, rows):
     assert modes[:, ~across].any() and modes[:, across].any() == (rows > 1)
 
 
+@pytest.mark.full
 def test_between_solves_densities_stay_and_the_last_one_ends_the_fit(device):
     pictures = pictures_of(device, scene(0))
     trainer = trainer_of(device, pictures, rows=SIZE, every=10, first=STEPS)
@@ -88,6 +89,7 @@ def test_between_solves_densities_stay_and_the_last_one_ends_the_fit(device):
     assert changed == [1, 11, 21, STEPS]
 
 
+@pytest.mark.full
 def test_solves_serve_short_fits(device):
     pictures, losses = pictures_of(device, scene(1), views=9), []
     for every in (0, 6):

@@ -243,7 +243,7 @@ class Placed(LinearOperator):
             *(screen, self._lists, self._raster, sent),
             settings=self.renderer.settings,
         )
-        return sum_slots(self.device, self._lists, records)
+        return sum_slots(self.device, self._lists.slots, records)
 
     def pairs_per_pixel(self) -> float:
         """How many splats' boxes a pixel lies in, on average over the views."""

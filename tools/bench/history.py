@@ -52,10 +52,11 @@ def keep(record: Record, folder: Path = FOLDER, kept: Callable[[Record], Record]
 
     Args:
         record: of a benchmark.
-        folder: where results of this benchmark are kept.
+        folder: where results of this benchmark are kept; made where it is not there.
         kept: what is kept of a record.
     """
     device = re.sub(r"[^a-z0-9]+", "-", record["device"]["name"].lower()).strip("-")
+    folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{record['date'][:10]}-{device}.json"
     write_text(path, json.dumps(kept(record), indent=1) + "\n")
     return path

@@ -6,6 +6,7 @@ import os
 import platform
 import subprocess
 import sys
+from collections.abc import Mapping
 from datetime import datetime, timezone
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -40,6 +41,15 @@ def surroundings(device: rift.Device) -> dict[str, Any]:
         "import_s": import_seconds(),
         "packages": {name: found for name in _PACKAGES if (found := _installed(name))},
     }
+
+
+def in_words(where: Mapping[str, Any]) -> str:
+    """The sentences of a page that name version, device, host and date, from ``surroundings``."""
+    device, host = where["device"], where["host"]
+    return (
+        f"rift_cl {where['version']} on **{device['name']}** ({device['platform']}, driver "
+        f"{device['driver']}); host {host['cpu']}, {host['cores']} cores. {where['date']}."
+    )
 
 
 def import_seconds() -> float:

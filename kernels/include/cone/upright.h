@@ -33,7 +33,31 @@ static lanes spline(lanes d) {
   return a < 1.0f ? near : (a < 2.0f ? far : zero);
 }
 
-static lanes cubic(lanes d) { return SPLINE ? spline(d) : keys(d); }
+#if SPLINE
+/* Factors beyond an image's ends, whose samples are zero, are the end's times powers of the pole:
+ * their shares are the end's own. */
+#define POLE_BEYOND ((real)-0.26794919243112270647)
+static lanes share(lanes u, lanes at, int samples) {
+  const real last = samples - 1;
+  u = u > 0 ? u : 0;
+  u = u < last ? u : last;
+  const lanes left = POLE_BEYOND * (spline(u + 1.0f) + POLE_BEYOND * spline(u + 2.0f));
+  const lanes d = u - (last + 1.0f);
+  const lanes right = POLE_BEYOND * (spline(d) + POLE_BEYOND * spline(d - 1.0f));
+  return spline(u - at) + (at == 0.0f ? left : 0) + (at == last ? right : 0);
+}
+
+/* Half a sample beyond the outer ones, and a rounding, is theirs. */
+#define BEYOND 0.51f
+static lanes_int within(lanes u, int samples) {
+  return u >= -BEYOND && u <= (real)(samples - 1) + BEYOND;
+}
+#else
+static lanes share(lanes u, lanes at, int samples) { return keys(u - at); }
+
+/* Four samples stand about u. */
+static lanes_int within(lanes u, int samples) { return u >= 1.0f && u < (real)(samples - 2); }
+#endif
 
 /* The derivative of keys. */
 static lanes keys_slope(lanes d) {

@@ -17,7 +17,7 @@
  * A bin's share of the pixel is the difference between its two edges, exactly the area of the
  * pixel between them. With u and l what z and z - 1 are when clamped to 0 .. c, the part before an
  * edge is (u - l) (u + l) / (2 c), and z - c clamped to 0 .. 1 added to it: that is 0 and 1 to the
- * bit beside the pixel, so that both halves leave the same bins out.
+ * bit beside the pixel, which fan_backproject.cl needs for rays that are not in reach.
  *
  * FOOTPRINT 1, joseph, and 2, linear: the rays are those of the bins' centres, and pixel i counts by
  * the hat max(0, 1 - |a - i| / h) / h; h is one line, or for `linear` the bin's width in lines if

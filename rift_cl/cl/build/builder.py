@@ -3,7 +3,8 @@
 A program is built once per device, kernel and macros. A driver that keeps what it compiles in our
 cache folder, as PoCL does, compiles in this process, but for kernels that it died of before. For
 any other the binaries are kept by us (``program_store``), and a child process compiles them
-(``guarded_build``): a compiler that dies or hangs does not take this process with it.
+(``guarded_build``): a compiler that dies or hangs does not take this process with it. Where a
+process died of a first launch, which drivers compile for as well, the child repeats that launch.
 """
 
 from __future__ import annotations
@@ -13,16 +14,26 @@ import re
 import threading
 import time
 import warnings
+from contextlib import AbstractContextManager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rift_cl.cl.build.driver_record import OTHER_KIND, keeps_programs, read_record
+from rift_cl.cl.build.first_launch import FirstLaunch
 from rift_cl.cl.build.guarded_build import Request, guarded_build, way_to_build
 from rift_cl.cl.build.kernel_cache import build_lock
 from rift_cl.cl.build.kernel_features import feature_of
-from rift_cl.cl.build.program_store import Stored, begun, load, program_name, remove, save
+from rift_cl.cl.build.program_store import (
+    Stored,
+    begun,
+    load,
+    program_name,
+    remove,
+    save,
+    unfinished,
+)
 from rift_cl.cl.build.source import fault_place, kernel_source
 from rift_cl.cl.failures import named_errors
 from rift_cl.cl.real_type import real_type
@@ -53,6 +64,7 @@ class Builder:
         warnings.filterwarnings("ignore", message="Non-empty compiler output")
         self._device = device
         self._programs: dict[Key, Any] = {}
+        self._entries: dict[Key, str] = {}
 
     def defines(self, macros: tuple[tuple[str, str], ...]) -> dict[str, str]:
         """Every macro that a program is built with."""
@@ -79,6 +91,13 @@ class Builder:
                     self._programs[key] = self._build(key)
             return self._programs[key]
 
+    def first_launch(self, key: Key, launch: FirstLaunch) -> AbstractContextManager[None]:
+        """Mark a built program while it is first launched, which some drivers compile for.
+
+        The next process leaves it to a child if this one dies of it; hold the build lock.
+        """
+        return begun(self._entries[key], launch)
+
     def _build(self, key: Key) -> Any:
         name, macros = key
         if _DOUBLE in macros:
@@ -86,11 +105,12 @@ class Builder:
         defines = self.defines(macros).items()
         options = [*OPTIONS, *(f"-D{macro}={value}" for macro, value in defines)]
         source, options = way_to_build(self._known.get("way", ""), kernel_source(name), options)
+        entry = self._entries[key] = program_name(self._driver, source, options)
         if self.keeps_programs:
-            program = self._compiled(name, source, options)
+            program = self._compiled(entry, name, source, options)
             if program is not None:
                 return program
-        return self._stored(key, source, options)
+        return self._stored(entry, key, source, options)
 
     @cached_property
     def _driver(self) -> dict[str, str]:
@@ -122,23 +142,23 @@ class Builder:
                 "or another version of the driver ('rift devices --retest' tests it again)"
             )
 
-    def _compiled(self, name: str, source: str, options: list[str]) -> Any:
+    def _compiled(self, entry: str, name: str, source: str, options: list[str]) -> Any:
         """A program that the driver compiles in this process, or takes from a cache of its own.
 
-        None where a process once began with it and never came to an end.
+        None where a process once died of it: a child compiles it, or did so.
         """
         import pyopencl as cl
 
-        entry = program_name(self._driver, source, options)
         failure = ""
         for pause in _PAUSES:
             time.sleep(pause)
             try:
                 # Its first launch, which compiles as well, writes down what both left.
-                with build_lock(name, write_down=False), begun(entry) as first:
-                    if not first:
+                with build_lock(name, write_down=False):
+                    if unfinished(entry) is not None or load(entry) is not None:
                         return None
-                    return cl.Program(self._device.context, source).build(options)
+                    with begun(entry):
+                        return cl.Program(self._device.context, source).build(options)
             except cl.Error as error:
                 failure = str(error)
             # An empty log is PoCL's way to lose a race for its cache; a real error has one.
@@ -146,22 +166,25 @@ class Builder:
                 break
         raise _build_error(name, failure, options, self._device.name)
 
-    def _stored(self, key: Key, source: str, options: list[str]) -> Any:
+    def _stored(self, entry: str, key: Key, source: str, options: list[str]) -> Any:
         """A program of our own store, which a child process compiles where it is not there yet."""
         import pyopencl as cl
 
         name, macros = key
-        entry = program_name(self._driver, source, options)
+        with build_lock(name, write_down=False):
+            died_of = unfinished(entry) or []
         stored = load(entry)
-        if stored is not None:
+        launches = [*(stored.about.get("launches", []) if stored else []), *died_of]
+        if stored is not None and not died_of:
             # A driver need not take what it gave; then it compiles again.
             with contextlib.suppress(cl.Error):
                 return self._loaded(name, stored, source, options)
             remove(entry)
         device = self._device
-        built = guarded_build(Request(device.selector, device.name, name, source, options))
+        request = Request(device.selector, device.name, name, source, options, launches)
+        built = guarded_build(request)
         about = {"kernel": name, "macros": dict(macros), "driver": self._driver}
-        about |= {"way": built.way, "fault": built.fault}
+        about |= {"way": built.way, "fault": built.fault, "launches": launches}
         if built.binary is None and built.log:
             raise _build_error(name, built.log, options, device.name)
         stored = Stored({**about, "built": built.binary is not None}, built.binary or b"")
@@ -203,7 +226,8 @@ def _build_error(name: str, text: str, options: list[str], device: str) -> Kerne
     log = _log(text)
     where = fault_place(name, log)
     return KernelBuildError(
-        f"kernel {name} did not compile for {device}, at {where}; this is a defect of rift-cl or "
-        f"of the driver, please report it with this log (options {' '.join(options)}):\n"
+        f"kernel {name} did not compile for {device}, at {where}; if neither the kernel nor "
+        "an expression in it, such as a loss, is yours, this is a defect of rift-cl or of the "
+        f"driver: please report it with this log (options {' '.join(options)}):\n"
         f"{log or text}"
     )

@@ -17,6 +17,8 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
+from rift_cl.json_parsing import parse_json
+
 _RECORD = "checksums.json"
 # A driver touches this file to say when it used a program; it holds nothing.
 _TOUCHED = "last_accessed"
@@ -129,8 +131,8 @@ def _read(folder: Path) -> dict[str, int] | None:
         path = own_file(folder / _RECORD)
         if path.stat().st_size > _MOST_BYTES:
             return None
-        known = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        known = parse_json(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
         return None
     return known if isinstance(known, dict) else None
 

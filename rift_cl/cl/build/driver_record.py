@@ -17,6 +17,7 @@ from rift_cl import __version__
 from rift_cl.cl.build.cache_check import files_kept, own_file
 from rift_cl.cl.build.kernel_cache import build_lock, cache_folder
 from rift_cl.cl.build.program_store import write_whole
+from rift_cl.json_parsing import parse_json
 
 # The way of a driver that is right with kernels for GPUs on a CPU alone, or the reverse.
 OTHER_KIND = "kernels of the other kind of device"
@@ -39,8 +40,8 @@ def driver_identity(handle: Any) -> dict[str, str]:
 def read_record(driver: dict[str, str]) -> dict[str, Any]:
     """What is known of a driver; empty where nothing is, or what was kept cannot be read."""
     try:
-        record = json.loads(own_file(_path(driver)).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        record = parse_json(own_file(_path(driver)).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
         return {}
     wanted = {"format": _FORMAT, "rift_cl": __version__, "driver": driver}
     known = isinstance(record, dict) and wanted.items() <= record.items()

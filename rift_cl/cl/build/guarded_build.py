@@ -13,9 +13,11 @@ import signal
 import subprocess
 import sys
 import threading
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from rift_cl.cl.build.first_launch import FirstLaunch, without_numbers
 from rift_cl.cl.build.worker import read_message, write_message
 from rift_cl.errors import DeviceError
 
@@ -23,6 +25,8 @@ from rift_cl.errors import DeviceError
 LIMIT = 300.0
 # Seconds that a child whose pipe broke is given to be gone.
 _DYING = 20.0
+# No compiler ends in this way by itself.
+_KILLED = "SIGKILL"
 # How a kernel is built: what stands before its source, and further options.
 WAYS = {
     "": ("", ()),
@@ -56,6 +60,7 @@ class Request(NamedTuple):
         kernel: its entry point.
         source: its source, with the includes in line.
         options: what the compiler is given.
+        launches: first launches that a process died of; the child tries them as well.
     """
 
     selector: str
@@ -63,6 +68,7 @@ class Request(NamedTuple):
     kernel: str
     source: str
     options: list[str]
+    launches: Sequence[FirstLaunch] = ()
 
 
 def way_to_build(way: str, source: str, options: list[str]) -> tuple[str, list[str]]:
@@ -83,12 +89,35 @@ def guarded_build(request: Request, worker: Worker | None = None) -> Built:
     for way in WAYS:
         source, options = way_to_build(way, request.source, request.options)
         asked = request._replace(source=source, options=options)
-        fault, answer, binary = worker.ask(asked._asdict())
+        fault, answer, binary = _answer(asked, worker)
         if answer is not None and "error" not in answer:
             return Built(binary, way, first, log)
         said = "" if answer is None else answer["error"]
         first, log = first or fault or "its compiler refused it", log or said
+    if len(request.launches) == 1 or (request.launches and _KILLED in first):
+        # One process may have been ended for another reason, and a launch on zeros die of those;
+        # a child that somebody ends, as the system does where memory runs out, tells nothing.
+        return guarded_build(request._replace(launches=()), worker)
     return Built(None, "", first, log)
+
+
+def _answer(request: Request, worker: Worker) -> tuple[str, dict[str, Any] | None, bytes]:
+    """What a child makes of a request; see ``Worker.ask``.
+
+    A compiler dies of a launch whatever its numbers are. The kernel itself may die of what does not
+    fit together, as numbers and the zeros of its buffers do, or of numbers that are all zero; so
+    that a launch which passes in one of these ways has been compiled.
+    """
+    if not request.launches:
+        return worker.ask(request._asdict())
+    found: tuple[str, dict[str, Any] | None, bytes] = ("", None, b"")
+    for launches in (request.launches, list(map(without_numbers, request.launches))):
+        found = worker.ask(request._replace(launches=launches)._asdict())
+        # Nobody knows what it overwrote.
+        worker.close()
+        if not found[0]:
+            break
+    return found
 
 
 class Worker:

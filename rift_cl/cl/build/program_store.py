@@ -20,7 +20,9 @@ from typing import Any, NamedTuple
 
 from rift_cl import __version__
 from rift_cl.cl.build.cache_check import own_file
+from rift_cl.cl.build.first_launch import FirstLaunch
 from rift_cl.cl.build.kernel_cache import cache_folder
+from rift_cl.json_parsing import parse_json
 
 _FORMAT = b"RIFT-CL program 1\n"
 _HASH = 64
@@ -65,7 +67,10 @@ def load(name: str) -> Stored | None:
 
 
 def save(name: str, stored: Stored) -> None:
-    """Store a program; where there is no room for it, it is kept for this run only, and said so."""
+    """Store a program, which nobody then dies of any more.
+
+    Where there is no room for it, it is kept for this run only, and said so.
+    """
     body = json.dumps(stored.about, sort_keys=True).encode() + b"\n" + stored.binary
     path = _path(name)
     try:
@@ -77,6 +82,8 @@ def save(name: str, stored: Stored) -> None:
             "folder that you own",
             stacklevel=2,
         )
+    else:
+        forget_begun(name)
 
 
 def remove(name: str) -> None:
@@ -86,28 +93,45 @@ def remove(name: str) -> None:
 
 
 @contextlib.contextmanager
-def begun(name: str) -> Iterator[bool]:
-    """Mark a program while this process compiles it; hold the build lock meanwhile.
+def begun(name: str, launch: FirstLaunch | None = None) -> Iterator[None]:
+    """Mark a program while this process compiles or first launches it; hold the build lock then.
 
-    Whether nobody began before without an end: a mark that is found is of a process that died of
-    it, or was ended meanwhile. It stays, and the program is left to a child from then on.
+    A mark that is found (``unfinished``) is of a process that died of it, or was ended meanwhile.
+
+    Args:
+        name: of the program.
+        launch: the launch, which some drivers compile for; None while it is built.
     """
     path = _path(name).with_suffix(_BEGUN)
-    first = True
-    with contextlib.suppress(OSError):
-        first = not path.exists()
-    if not first:
-        yield False
-        return
     # Where no mark can be made the program is compiled without one.
     with contextlib.suppress(OSError):
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        path.touch()
+        own_file(path).write_text(json.dumps(launch), encoding="utf-8")
     try:
-        yield True
+        yield
     finally:
-        with contextlib.suppress(OSError):
-            path.unlink(missing_ok=True)
+        forget_begun(name)
+
+
+def unfinished(name: str) -> list[FirstLaunch] | None:
+    """What a process began with a program without coming to an end: a launch, or none but to build.
+
+    None where nobody did. Hold the build lock, or the mark may be of one who is still at it.
+    """
+    path = own_file(_path(name).with_suffix(_BEGUN))
+    try:
+        launch = parse_json(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError):
+        return []
+    return [launch] if isinstance(launch, dict) else []
+
+
+def forget_begun(name: str) -> None:
+    """Forget that anybody began with a program."""
+    with contextlib.suppress(OSError):
+        _path(name).with_suffix(_BEGUN).unlink(missing_ok=True)
 
 
 def write_whole(path: Path, data: bytes) -> None:
@@ -141,7 +165,7 @@ def forget(driver: dict[str, str]) -> None:
         stored = load(path.stem)
         if stored is not None and stored.about.get("driver") == driver:
             remove(path.stem)
-            path.with_suffix(_BEGUN).unlink(missing_ok=True)
+            forget_begun(path.stem)
 
 
 def _path(name: str) -> Path:
@@ -157,5 +181,9 @@ def _parsed(name: str, data: bytes) -> Stored | None:
     body = data[head + 1 :]
     if not data.startswith(_FORMAT) or data[len(_FORMAT) : head] != _checksum(name, body):
         return None
-    about, _, binary = body.partition(b"\n")
-    return Stored(json.loads(about), binary)
+    text, _, binary = body.partition(b"\n")
+    try:
+        about = parse_json(text)
+    except ValueError:
+        return None
+    return Stored(about, binary) if isinstance(about, dict) else None

@@ -17,6 +17,9 @@ import sys
 from functools import cache
 from typing import IO, Any
 
+from rift_cl.cl.build.first_launch import repeat_launch
+from rift_cl.json_parsing import parse_json
+
 LENGTH = struct.Struct(">I")
 # The most bytes that are read at once: a source is some 100 KB, a compiler's log may be longer.
 _LONGEST = 1 << 26
@@ -35,7 +38,7 @@ def read_message(stream: IO[bytes]) -> tuple[dict[str, Any], bytes] | None:
     if len(head) < LENGTH.size or LENGTH.unpack(head)[0] > _LONGEST:
         return None
     try:
-        message = json.loads(stream.read(LENGTH.unpack(head)[0]))
+        message = parse_json(stream.read(LENGTH.unpack(head)[0]))
         size = int(message["size"])
     except (ValueError, TypeError, LookupError):
         return None
@@ -67,9 +70,11 @@ def _answer(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
         binary = program.get_info(cl.program_info.BINARIES)[0]
         if binary:
             # Whoever asked will load it in a process that must not die of it.
-            loaded = cl.Program(context, context.devices, [binary]).build()
-            cl.Kernel(loaded, request["kernel"])
-    except (cl.Error, LookupError) as error:
+            program = cl.Program(context, context.devices, [binary]).build()
+        kernel = cl.Kernel(program, request["kernel"])
+        for launch in request["launches"]:
+            repeat_launch(kernel, context, launch)
+    except (cl.Error, LookupError, TypeError, ValueError) as error:
         return {"error": str(error)}, b""
     return {}, binary
 

@@ -10,12 +10,12 @@ on, kernel by kernel.
 from __future__ import annotations
 
 import datetime
-import json
 import os
 import queue
 import subprocess
 import sys
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, Any
@@ -30,6 +30,7 @@ from rift_cl.cl.build.guarded_build import WAYS, death_of
 from rift_cl.cl.build.kernel_features import feature_of
 from rift_cl.cl.build.program_store import forget, stored_programs
 from rift_cl.cl.device import Device
+from rift_cl.json_parsing import parse_json
 from rift_cl.progress import Report
 
 # Relative deviation (L2) from the known results beyond which numbers are wrong: the worst gradient
@@ -37,6 +38,8 @@ from rift_cl.progress import Report
 RIGHT = 3e-4
 # Seconds that one family may take, with everything that is compiled for it.
 LIMIT = 600.0
+# How often a family may kill its child and be tried again: each time another kernel.
+_DEATHS = 3
 
 Found = dict[str, Any]
 Try = Callable[[str, Sequence[str]], Iterator[Found]]
@@ -96,8 +99,11 @@ def examine_driver(
 
 
 def in_child(selector: str, families: Sequence[str], limit: float = LIMIT) -> Iterator[Found]:
-    """Try families in a child process, and go on behind one that kills it or hangs in it."""
-    left = list(families)
+    """Try families in a child process, and go on behind one that kills it or hangs in it.
+
+    A family that kills it is tried again: kernels that it died of are now built in another way.
+    """
+    left, deaths = list(families), Counter[str]()
     while left:
         lines: queue.Queue[str] = queue.Queue()
         process = _start([selector, *left])
@@ -105,11 +111,13 @@ def in_child(selector: str, families: Sequence[str], limit: float = LIMIT) -> It
         threading.Thread(target=_pump, args=(process.stdout, lines), daemon=True).start()
         try:
             while left and (line := lines.get(timeout=limit)):
-                yield json.loads(line)
+                yield parse_json(line)
                 left.pop(0)
             if left:
                 fault = death_of("it", process.wait())
-                yield {"family": left.pop(0), "error": fault, "kernels": []}
+                deaths[left[0]] += 1
+                if deaths[left[0]] > _DEATHS:
+                    yield {"family": left.pop(0), "error": fault, "kernels": []}
         except queue.Empty:
             yield {"family": left.pop(0), "error": f"it hung for {limit:.3g} s", "kernels": []}
         finally:

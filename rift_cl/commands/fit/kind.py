@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Literal
 
 from rift_cl.commands.run_folder.saved_settings import named_config
 from rift_cl.io.scans.formats import is_scan_file
+from rift_cl.json_parsing import parse_json
 
 
 def kind_of_fit(arguments: Sequence[str]) -> Literal["photos", "xray"]:
@@ -21,7 +21,7 @@ def kind_of_fit(arguments: Sequence[str]) -> Literal["photos", "xray"]:
     config = named_config(arguments)
     if config is not None:
         with suppress(OSError, ValueError, LookupError, TypeError):
-            record = json.loads(config.read_text(encoding="utf-8"))
+            record = parse_json(config.read_text(encoding="utf-8"))
             return "xray" if record["job"] == "fit xray" else "photos"
     # What follows an option may be its value, so that the others are looked at first.
     words = [word for word in arguments if not word.startswith("-")]

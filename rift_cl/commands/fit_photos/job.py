@@ -15,7 +15,12 @@ from rift_cl.commands.fit.run import FitRun
 from rift_cl.commands.fit_photos.bare_input import BareInput
 from rift_cl.commands.fit_photos.photograph_size import fitting_downscale, size_words
 from rift_cl.commands.fit_photos.pictures import CapturePictures
-from rift_cl.commands.fit_photos.report import fit_page, history_notes, ramp_notes
+from rift_cl.commands.fit_photos.report import (
+    brightness_notes,
+    fit_page,
+    history_notes,
+    ramp_notes,
+)
 from rift_cl.commands.fit_photos.scores import error_record, score_record, score_views
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.fit_photos.start import first_splats
@@ -166,6 +171,11 @@ class Fit(FitRun[FitPhotosSettings]):
                 "--refine-exposures wants photographs of a whole scene: these are cut out, and "
                 "what stands behind them was never exposed"
             )
+        if pictures.nothing_in_front():
+            self.announce(
+                "rift: the photographs show nothing but their background: what is fitted will be "
+                "empty. Check that these are the right pictures, and their alpha"
+            )
         trainer = self._trainer(capture, pictures)
         yield from self._read_ahead(trainer, pictures)
         self.settled = dataclasses.replace(
@@ -209,7 +219,10 @@ class Fit(FitRun[FitPhotosSettings]):
             **error_record(self.scores),
         }
         ramp = ramp_notes(settings, len(self.training_views))
-        notes = [*self._notes(), *ramp, *history_notes(self._history)]
+        brightness = brightness_notes(settings, self.scores.get("held out", []))
+        for note in brightness:
+            self.announce(f"rift: {note}")
+        notes = [*self._notes(), *ramp, *history_notes(self._history), *brightness]
         scene = leave_page(settings.out, pictures, self.announce)
         name = capture_name(settings.capture)
         page = fit_page(name, self.scores, self.losses, self.metrics, notes, scene)

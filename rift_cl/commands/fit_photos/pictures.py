@@ -200,6 +200,11 @@ class CapturePictures:
         front = np.abs(image[..., :3] - self.behind).max(axis=2) > _FOREGROUND
         return np.asarray(front if counted is None else front & counted)
 
+    def nothing_in_front(self) -> bool:
+        """Whether a few pictures, evenly chosen, are known to show their background alone."""
+        fronts = [self.foreground(number) for number in evenly(len(self.views), 8)]
+        return all(front is not None and not front.any() for front in fronts)
+
     def _common_border(self) -> Floats | None:
         """The colour that all borders of a few pictures have; None if they have none."""
         few = evenly(len(self.views), 8)

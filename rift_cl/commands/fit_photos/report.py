@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rift_cl.commands.fit_photos.error_places_report import show_error_places
-from rift_cl.commands.fit_photos.scores import ViewScore
+from rift_cl.commands.fit_photos.scores import ViewScore, brightness_spread
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.report.html_page import Compared, Page
@@ -17,6 +17,8 @@ from rift_cl.report.plot import curves, figure_svgs, jpeg
 from rift_cl.train.loss.homogenisation import ENOUGH_VIEWS, USUAL_EXPONENT
 
 _SHOWN = 3
+# A fit of photographs of one exposure is off by a percent or so in brightness from one to the next.
+_STEADY = 0.04
 # Errors are shown this much brighter.
 ERROR_GAIN = 5.0
 
@@ -83,6 +85,18 @@ def history_notes(history: Sequence[tuple[int, int]]) -> list[str]:
         return []
     stages = [f"to step {until} by the schedules of a fit of {steps}" for until, steps in history]
     return [f"It was trained {', then '.join(stages)}."]
+
+
+def brightness_notes(settings: FitPhotosSettings, scores: Sequence[ViewScore]) -> list[str]:
+    """A sentence about exposures that change, where they were not fitted."""
+    spread = brightness_spread(scores)
+    if settings.training.refine_exposures or spread < _STEADY:
+        return []
+    return [
+        f"The held-out photographs are brighter or darker than the fit by {100 * spread:.0f} % "
+        "(standard deviation): exposures seem to change from one to the next. --refine-exposures "
+        "fits a gain and an offset of each photograph."
+    ]
 
 
 def ramp_notes(settings: FitPhotosSettings, views: int) -> list[str]:

@@ -134,6 +134,21 @@ def mean_scores(scores: Sequence[ViewScore]) -> dict[str, float]:
     }
 
 
+def brightness_spread(scores: Sequence[ViewScore]) -> float:
+    """Standard deviation of how much brighter pictures are than they were drawn, as a fraction.
+
+    Each picture's factor is that of least squares. Photographs of one exposure have a spread of a
+    percent or so; what a fit could not explain by the scene alone is in it.
+    """
+    factors = []
+    for score in scores:
+        square = float((score.image.astype(np.float64) ** 2).sum())
+        product = float((score.image.astype(np.float64) * score.truth).sum())
+        if square > 0 and product > 0:
+            factors.append(product / square)
+    return float(np.std(np.log(factors))) if len(factors) > 1 else 0.0
+
+
 def score_record(groups: Mapping[str, Sequence[ViewScore]]) -> dict[str, Any]:
     """The mean scores of each group of pictures, and those of every picture; JSON."""
     return {

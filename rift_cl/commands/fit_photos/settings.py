@@ -65,10 +65,11 @@ class PhotosTraining:
 
     group: ClassVar[str] = "training"
 
-    preset: Auto[Literal["lobes", "0.1"]] = None
+    preset: Auto[Literal["lobes", "surface", "0.1"]] = None
     """Named set of values in place of the defaults; other options override them. Eight spherical
     Gaussians in place of the harmonics of each colour, which score higher and take longer (lobes),
-    or the defaults of version 0.1.0 (0.1). Default: none."""
+    priors for depth and normals nearer to the surface (surface), or the defaults of version 0.1.0
+    (0.1). Default: none."""
     training: Short[TrainSettings] = field(default_factory=_training)
     """The optimization."""
     rendering: ShortSplats[SplatSettings] = field(default_factory=_rendering)
@@ -102,6 +103,7 @@ class FitPhotosSettings(RepeatableRun, FitOutput, PhotosTraining, PhotosInput, F
                 "--modes, or leave it out"
             )
         self._check_environment()
+        self._check_surface()
         self._check_least("downscale", 1)
         self._check_least("frames", 3)
         if not (self.first_splats is None or 0 < self.first_splats <= 1):
@@ -125,6 +127,14 @@ class FitPhotosSettings(RepeatableRun, FitOutput, PhotosTraining, PhotosInput, F
             raise InputError(
                 "--environment-lobes and --own-degree are about a light that splats share: add "
                 "--environment shared, or leave them out"
+            )
+
+    def _check_surface(self) -> None:
+        surface = self.training.surface
+        if surface.first != TrainSettings().surface.first and not surface.wanted:
+            raise InputError(
+                "--surface.first says when priors for surfaces begin, and there is none: add "
+                "--surface.normal-consistency 0.03, say, or leave it out"
             )
 
     @property

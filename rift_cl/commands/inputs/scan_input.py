@@ -40,7 +40,7 @@ class ScanArrays:
     geometry: Auto[Path] = None
     """File with the positions of source and detector for fan and cone beams: Nikon .xtekct, SkyScan
     .log, RTK .xml, ASTRA vectors (.geom, .npy, .txt; 12 numbers per view), or .yaml or .json as in
-    docs/how-to/scans.md. Default: that of the scan, otherwise parallel rays."""
+    docs/how-to/scan_cones.md. Default: that of the scan, otherwise parallel rays."""
     reversed: Expert[bool] = False
     """Negate the angles, for an object that turned in the other sense than assumed; a wrong sense
     doubles edges in fan and cone beams."""
@@ -57,7 +57,8 @@ class ScanInput(ScanArrays):
 
     scan: Annotated[Path, Positional]
     """HDF5 (Data Exchange, NXtomo, or any named dataset), NPZ, MAT, MRC, TXRM or TIFF file, folder
-    of TIFF files, or a scanner's .xtekct or .log file."""
+    of TIFF files, or a file that describes one: a scanner's .xtekct or .log, or .yaml or .json as
+    in docs/how-to/scan_cones.md."""
     flats: Auto[str] = None
     """Flat fields (beam without sample): their name in the file; for TIFF, their folder or file.
     For counts without flat fields, 'air' estimates the incident beam of each view from the

@@ -44,6 +44,7 @@ from rift_cl.reconstruct.direct.katsevich import cone_inversion
 from rift_cl.reconstruct.direct.offset_axis import is_full_turn, sees_further
 from rift_cl.reconstruct.direct.padding import is_truncated
 from rift_cl.reconstruct.direct.redundancy import ITERATE
+from rift_cl.reconstruct.solvers.tv_problem import VariationSolver
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_png, image_grid
 
@@ -94,6 +95,11 @@ class ConeReconstruction:
         self.announce: Callable[[str], None] = lambda line: None
         self._values: tuple[float, float] | None = None
         self._begin = time.perf_counter()
+
+    @property
+    def finished(self) -> bool:
+        """Whether ``--resume`` met a run that had come to its end."""
+        return self.folder.finished
 
     @property
     def rows(self) -> tuple[int, int]:
@@ -189,6 +195,9 @@ class ConeReconstruction:
     def run(self) -> Iterator[Report]:
         """Do it; a report after every step."""
         self._begin = time.perf_counter()
+        if self.finished:
+            self.announce(f"{self.settings.out}: the reconstruction is complete already")
+            return
         total = 1 + self.settings.most_steps
         yield Report(0, total, "steps")
         self._locate()
@@ -255,6 +264,8 @@ class ConeReconstruction:
             curve.append(report.values["residual"])
             yield Report(1 + report.done, total, "steps", report.values)
         volume = solver.data.home.host(solver.image)
+        if isinstance(solver, VariationSolver):
+            self.metrics["weight"] = solver.weight
         self.metrics |= {"steps": len(curve), "residual": curve[-1] if curve else 0.0}
         return [volume[self.source.part]]
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
-from rift_cl.operators import FastProjector, ParallelProjector, Projector
+from rift_cl.operators import ParallelProjector
 from rift_cl.reconstruct.direct.view_weights import view_weights
 
 if TYPE_CHECKING:
@@ -49,10 +49,7 @@ def decided_settings(
         "window": values,
     }
     A = inversion.projector(1)
-    if isinstance(A, FastProjector):
-        decided["error"] = A.error
-    elif isinstance(A, Projector):
-        decided["footprint"] = A.footprint
+    decided |= inversion.projection
     if settings.centers is not None:
         decided |= {"center": None, "tilt": None, "centers": settings.centers.absolute()}
     if settings.iterative:

@@ -30,13 +30,22 @@ from rift_cl.operators import (
 from rift_cl.operators.projector.fan.fan_slices_projector import FanSlicesProjector
 from rift_cl.operators.projector.parallel.phase_projector import PhaseProjector
 from rift_cl.progress import Report
-from rift_cl.reconstruct import Cgls, Pdhg, Sirt, backproject, fbp, poisson_weights
+from rift_cl.reconstruct import (
+    Cgls,
+    Pdhg,
+    Sirt,
+    backproject,
+    fbp,
+    poisson_weights,
+    variation_weight,
+)
 from rift_cl.reconstruct.solvers.direction_weights import DirectionWeights
 from rift_cl.reconstruct.solvers.disc_prior import find_disc, material_lengths
 from rift_cl.reconstruct.solvers.few_levels import FewLevels
 from rift_cl.reconstruct.solvers.measured_rays import MeasuredRays
 from rift_cl.reconstruct.solvers.ordered_subsets import OrderedSubsets
 from rift_cl.reconstruct.solvers.solver import Solver
+from rift_cl.reconstruct.solvers.tv_problem import VariationSolver
 
 Floats = NDArray[np.float32]
 AnyProjector = ParallelProjector | Projector
@@ -61,7 +70,7 @@ _READ = 2
 _SLAB, _ITERATIVE_SLAB = 16, 4
 # Steps that are timed, after a first one that builds the kernels.
 _TIMED_STEPS = 3
-# The usual weight of the total variation, as a share of what would level features of a few bins.
+# The weight of the total variation for levels, as a share of what would level small features.
 _VARIATION = 0.1
 
 
@@ -74,12 +83,14 @@ class Inversion:
         source: the scan; located.
         device: where to work.
         residuals: root mean square of the residual after each step, by detector row.
+        weights: of the total variation, by detector row.
     """
 
     settings: ReconstructSettings
     source: SliceInput
     device: Device
     residuals: dict[int, list[float]] = field(default_factory=dict)
+    weights: dict[int, float] = field(default_factory=dict)
     _projectors: dict[int, AnyProjector] = field(default_factory=dict)
 
     @property
@@ -106,6 +117,12 @@ class Inversion:
         if count not in self._projectors:
             self._projectors[count] = self._projector(slices)
         return self._projectors[count]
+
+    @property
+    def projection(self) -> dict[str, Any]:
+        """The setting that decides the projector, which costs and memory may have decided."""
+        A: Any = self.projector(1)
+        return {"error": A.error} if isinstance(A, FastProjector) else {"footprint": A.footprint}
 
     def check_memory(self) -> None:
         """Make sure that a slice fits the budget, before the axis is known.
@@ -162,6 +179,8 @@ class Inversion:
         for row in range(projections.shape[1]):
             solver, level = self._solver(np.ascontiguousarray(projections[:, row]))
             curve = self.residuals.setdefault(first + row, [])
+            if isinstance(solver, VariationSolver):
+                self.weights[first + row] = solver.weight
             for report in solver.run(self.settings.most_steps):
                 curve.append(report.values["residual"])
                 yield Report(report.done, self.settings.most_steps, "steps", report.values)
@@ -173,7 +192,9 @@ class Inversion:
         curves = [curve for _, curve in sorted(self.residuals.items()) if curve]
         if not curves:
             return {}
+        found = [self.weights[row] for row in sorted(self.weights)]
         return {
+            **({"weight": float(np.mean(found))} if found else {}),
             "steps": float(np.mean([len(curve) for curve in curves])),
             "residual": float(np.sqrt(np.mean([curve[-1] ** 2 for curve in curves]))),
         }
@@ -222,7 +243,7 @@ class Inversion:
         solver = FewLevels(
             A,
             lengths,
-            usual_weight(lengths) if weight is None else weight,
+            levels_weight(lengths) if weight is None else weight,
             support=disc.coverage(A.grid),
             weights=None if seen is None else seen.astype(np.float32),
             direction_weights=_direction_weights(scan.angles),
@@ -295,7 +316,9 @@ def least_squares(
     options["nonnegative"] = settings.nonnegative
     if settings.method == "sirt":
         return Sirt(A, data, **options)
-    weight = usual_weight(data) if settings.weight is None else settings.weight
+    weight = settings.weight
+    if weight is None:
+        weight = variation_weight(A, data, weights=options.get("weights"))
     return Pdhg(A, data, weight, **options)
 
 
@@ -306,8 +329,8 @@ def _direction_weights(angles: NDArray[np.float64]) -> DirectionWeights | None:
     return DirectionWeights.of(angles) if gap > _LIMITED else None
 
 
-def usual_weight(sinogram: Floats) -> float:
-    """A weight of the total variation that suits most slices, in the solver's unit.
+def levels_weight(sinogram: Floats) -> float:
+    """A weight of the total variation for ``levels``, in the solver's unit.
 
     A disc of radius R and value u adds ``2 pi R u`` to the variation and, lowered by d,
     ``views * 4/3 * 2 R * (d R)^2`` or so to the data term: the weight that lowers features of a

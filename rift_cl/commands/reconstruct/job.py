@@ -7,6 +7,7 @@ cut off goes on where it was.
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping
 from functools import cached_property
@@ -125,7 +126,7 @@ class Reconstruction:
             StoppedError: it was broken off, and what was done is kept.
         """
         self._begin = time.perf_counter()
-        if self._finished_before():
+        if self.finished:
             self.announce(f"{self.settings.out}: the reconstruction is complete already")
             return
         if not self.settings.resume:
@@ -139,7 +140,7 @@ class Reconstruction:
             check_place(self.settings, self.source, self.inversion.window)
             if not self._gone_on:
                 self._ours = True
-                self.kept.begin(self._facts())
+                self.kept.begin(self._facts(), self.inversion.projection)
             yield from self._work()
         except BaseException as error:
             if not self._keep_what_is_done():
@@ -161,7 +162,7 @@ class Reconstruction:
         """
         going_on = self.settings.resume and self.kept.begun
         if going_on:
-            self._take_axis()
+            self._take_found()
         self._locate()
         if going_on and not self.settings.preview:
             self.kept.go_on(self._facts())
@@ -184,13 +185,17 @@ class Reconstruction:
         Raises:
             CheckpointError: the run is not this one.
         """
-        self._take_axis()
+        self._take_found()
         self._locate()
         self.kept.go_on(self._facts(), names)
         self.kept.shape = self.shape
 
-    def _take_axis(self) -> None:
-        """Take the axis that was found when the run began, unless it is said."""
+    def _take_found(self) -> None:
+        """Take what was found when the run began: the axis, unless it is said, and the projector.
+
+        What is made with more or less memory than there was is then made in the same way.
+        """
+        self.inversion.settings = dataclasses.replace(self.settings, **self.kept.projection())
         axis = self.kept.axis() if self.settings.center is None else None
         if axis is not None:
             self.source.center, self.source.tilt, self.source.turned = axis
@@ -202,7 +207,8 @@ class Reconstruction:
         self.source.locate()
         self.inversion.slabs([slice(0, 1)])
 
-    def _finished_before(self) -> bool:
+    @cached_property
+    def finished(self) -> bool:
         """Whether ``--resume`` met a run that had come to its end.
 
         Raises:

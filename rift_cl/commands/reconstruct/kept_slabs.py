@@ -32,8 +32,9 @@ from rift_cl.io.output import atomic_path, check_space, make_folder, write_json,
 Floats = NDArray[np.float32]
 _SLAB = re.compile(r"(\d{5,})-(\d{5,})\.npy")
 _RUN = "run.json"
-# Which process spreads the run over workers; decides no slice.
-_TOKEN = "token"
+# Beside what decides the slices: which process spreads the run over workers, and the projector,
+# which is not compared but taken.
+_TOKEN, _PROJECTION = "token", "projection"
 
 
 class SlabFolder:
@@ -54,17 +55,20 @@ class SlabFolder:
         """Whether an earlier run left something to go on with."""
         return (self.path / _RUN).is_file()
 
-    def begin(self, run: Mapping[str, Any]) -> None:
+    def begin(
+        self, run: Mapping[str, Any], projection: Mapping[str, float | str] | None = None
+    ) -> None:
         """Begin anew: drop what an earlier run left.
 
         Args:
             run: what decides the slices; text by name.
+            projection: the setting that decides the projector, by name.
         """
         self.drop()
         make_folder(self.path)
         # The slabs stay until the volume that is made of them is complete.
         check_space(self.path / _RUN, 2 * 4 * int(np.prod(self.shape)))
-        write_json(self.path / _RUN, dict(run))
+        write_json(self.path / _RUN, {**run, _PROJECTION: dict(projection or {})})
 
     def mark(self) -> str:
         """Mark the run anew, so that workers of an earlier one keep nothing in it any more.
@@ -89,6 +93,23 @@ class SlabFolder:
         except (KeyError, TypeError, ValueError):
             return None
 
+    def projection(self) -> dict[str, Any]:
+        """The setting that decided the projector when the run began; none if it is not recorded.
+
+        Raises:
+            CheckpointError: the record is damaged.
+        """
+        found = self._recorded().get(_PROJECTION, {})
+        kinds = {"error": float, "footprint": str}
+        if isinstance(found, dict) and all(
+            name in kinds and isinstance(value, kinds[name]) for name, value in found.items()
+        ):
+            return dict(found)
+        raise CheckpointError(
+            f"{self.path / _RUN}: {_PROJECTION} is {found!r}, wanted an error or a footprint: "
+            "begin anew with --overwrite"
+        )
+
     def go_on(self, run: Mapping[str, str], names: Mapping[str, str] | None = None) -> None:
         """Make sure that what is there belongs to this run.
 
@@ -105,7 +126,7 @@ class SlabFolder:
             {
                 what: _renamed(str(fact), names or {})
                 for what, fact in facts.items()
-                if what != _TOKEN
+                if what not in (_TOKEN, _PROJECTION)
             }
             for facts in (self._recorded(), run)
         )

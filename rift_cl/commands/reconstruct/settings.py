@@ -85,8 +85,9 @@ class MethodOptions:
     """sirt, cgls, tv: standard deviation of the noise of a line integral; iterations stop when the
     residual reaches it (discrepancy principle). Default: all --steps are taken."""
     weight: Auto[float] = None
-    """tv, levels: weight of the total variation; larger is smoother. Default: chosen
-    from the values and the number of the projections."""
+    """tv, levels: weight of the total variation; larger is smoother. Default: chosen from the noise
+    and the number of the projections (levels: from their values), and printed; try half and twice
+    of it."""
     nonnegative: bool = False
     """sirt, tv: constrain the slice to be non-negative."""
     weights: AutoExpert[Literal["counts"]] = None

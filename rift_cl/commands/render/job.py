@@ -27,6 +27,7 @@ from rift_cl.commands.inputs.scene_depth import depth_maps
 from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.pictures.depth_picture import LEAST_ALPHA, depth_picture, depth_window
 from rift_cl.commands.pictures.evenly_spaced import evenly
+from rift_cl.commands.pictures.normal_picture import NormalPictures, normal_picture
 from rift_cl.commands.render.animation import chosen_film, shrunk
 from rift_cl.commands.render.report import Sheet, render_page, write_bytes
 from rift_cl.commands.render.settings import LIMITS, MOST_FRAMES, RenderSettings
@@ -44,7 +45,7 @@ from rift_cl.splat.bands import FrameMemory
 from rift_cl.splat.renderer import DepthKind, Renderer
 
 # What an earlier rendering leaves.
-_LEFT = ("frames", "depth", "*.png", "transforms.json", "key_frames.json", "film.*")
+_LEFT = ("frames", "depth", "normals", "*.png", "transforms.json", "key_frames.json", "film.*")
 # Frames of a film when nothing is said, and those that it is made again from.
 _FRAMES, _KEYS = 96, 13
 # Longer edge of the animation in pixels.
@@ -217,26 +218,35 @@ class Render:
         if self.settings.depth:
             window = depth_window(renderer, splats, self.cameras)
         depth: DepthKind | None = "expected" if self.settings.depth else None
-        sheet = Sheet(total)
+        normals = None
+        if self.settings.normals:
+            normals = NormalPictures(renderer, self.scene.splats, splats)
+        sheet = Sheet(total, self._maps)
         with self._film_file() as add:
             for number, camera in enumerate(self.cameras):
                 pictures = self._kept(number)
                 if not pictures:
                     image, seen = renderer.picture(splats, camera, background=behind, depth=depth)
                     pictures = self._save(number, image, seen, window)
+                    if normals is not None:
+                        pictures.append(self._save_normals(number, *normals.seen(camera)))
                 add(shrunk(pictures[0], max(camera.size)))
                 sheet.add(number, [shrunk(picture, _MOVING) for picture in pictures])
                 yield Report(number + 1, total, "frames")
         self._finish(sheet, [_frame_file(number) for number in range(total)], window)
 
     def _kept(self, number: int) -> list[NDArray[np.float32]]:
-        """A frame that the run left which is gone on with, and its depth; else nothing."""
-        names = [_frame_file(number)]
-        names += [f"depth/{number:04}.png"] if self.settings.depth else []
+        """A frame that the run left which is gone on with, and its maps; else nothing."""
+        names = [_frame_file(number), *(f"{name}/{number:04}.png" for name in self._maps)]
         files = [self.settings.out / name for name in names]
         if not (self.folder.unfinished and all(file.is_file() for file in files)):
             return []
         return [read_image(file) for file in files]
+
+    @property
+    def _maps(self) -> tuple[str, ...]:
+        """What is written of a frame beside its colours; names of folders."""
+        return tuple(name for name in ("depth", "normals") if getattr(self.settings, name))
 
     def _save(
         self,
@@ -260,12 +270,23 @@ class Render:
         alpha: NDArray[np.float32],
         window: tuple[float, float],
     ) -> NDArray[np.float32]:
-        """Depth as an OpenEXR of float32, 0 where nothing is; gives back its picture."""
-        folder = make_folder(self.settings.out / "depth")
+        """Depth, 0 where nothing is; gives back its picture."""
         kept = np.where(alpha > LEAST_ALPHA, depth, 0).astype(np.float32)
+        return self._save_map("depth", number, kept[..., None], depth_picture(kept, alpha, window))
+
+    def _save_normals(
+        self, number: int, normals: NDArray[np.float32], alpha: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """Normals, 0 where nothing is; gives back their picture."""
+        return self._save_map("normals", number, normals, normal_picture(normals, alpha))
+
+    def _save_map(
+        self, name: str, number: int, values: NDArray[np.float32], picture: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """Values as an OpenEXR of float32, and a picture of them, which is given back."""
+        folder = make_folder(self.settings.out / name)
         with atomic_path(folder / f"{number:04}.exr") as part:
-            write_pixels(part, kept[..., None], format="openexr", attributes={})
-        picture = depth_picture(kept, alpha, window)
+            write_pixels(part, values, format="openexr", attributes={})
         write_png(folder / f"{number:04}.png", picture)
         return picture
 

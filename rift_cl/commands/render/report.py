@@ -29,9 +29,11 @@ class Sheet:
 
     Args:
         total: how many frames there will be.
+        maps: what is shown of a frame beside its colours, by name.
     """
 
-    def __init__(self, total: int) -> None:
+    def __init__(self, total: int, maps: Sequence[str] = ()) -> None:
+        self.maps = tuple(maps)
         self._shown = _even(total, _SHOWN)
         self._moving = _even(total, _MOVING)
         self._share = len(self._moving) / total
@@ -39,18 +41,18 @@ class Sheet:
         self._film: list[Codes] = []
 
     def add(self, number: int, pictures: Sequence[Codes]) -> None:
-        """Take a frame: its colours, and its depth if there is one."""
+        """Take a frame: its colours, and its maps."""
         if number in self._shown:
             self._stills.append((f"{number:04}", list(pictures)))
         if number in self._moving:
             self._film.append(pictures[0])
 
     def contact(self) -> bytes:
-        """The contact sheet as the content of a PNG file; depth below its frame."""
+        """The contact sheet as the content of a PNG file; maps below their frame."""
         images, titles = [], []
         for first in range(0, len(self._stills), _ROW):
             row = self._stills[first : first + _ROW]
-            # A short last row is filled up, so that depth stays below its frame.
+            # A short last row is filled up, so that maps stay below their frame.
             blank = [np.ones((1, 1, 3))] * (min(_ROW, len(self._stills)) - len(row))
             for kind in range(len(row[0][1])):
                 images += [pictures[kind] / 255 for _, pictures in row] + blank
@@ -59,11 +61,11 @@ class Sheet:
         return figure_png(image_grid(images, titles=titles, columns=columns, window=(0.0, 1.0)))
 
     def panels(self) -> tuple[list[bytes], list[str]]:
-        """The frames that are shown as JPEG files, each with its depth after it, and titles."""
+        """The frames that are shown as JPEG files, each with its maps after it, and titles."""
         cells, titles = [], []
         for name, pictures in self._stills:
             cells += [jpeg(picture / 255, side=_PANEL) for picture in pictures]
-            titles += [name, f"{name}, depth"][: len(pictures)]
+            titles += [name, *(f"{name}, {shown}" for shown in self.maps)]
         return cells, titles
 
     def moving(self, rate: float) -> bytes:
@@ -85,6 +87,8 @@ def render_page(name: str, sheet: Sheet, moving: bytes | None, metrics: Mapping[
     caption = "Some of the frames, by number."
     if depth is not None:
         caption += f" Depth beside: bright at {depth[0]:.4g}, dark at {depth[1]:.4g} scene units."
+    if "normals" in sheet.maps:
+        caption += " Normals beside: red, green, blue are x, y, z from -1 to 1."
     cells, titles = sheet.panels()
     page.panels(cells, titles=titles, columns=_ROW, caption=caption, alt="Frame")
     facts = {"centre": metrics["center"], "up": metrics["up"]}
@@ -97,6 +101,11 @@ def render_page(name: str, sheet: Sheet, moving: bytes | None, metrics: Mapping[
         page.paragraph(
             "depth/*.exr hold the expected depth along the camera's axis in scene units as "
             "float32, 0 where there is nothing; depth/*.png show it in colour."
+        )
+    if "normals" in sheet.maps:
+        page.paragraph(
+            "normals/*.exr hold unit normals x, y, z in the scene's axes as float32, 0 where there "
+            "is nothing: the mean of the splats' shortest axes; normals/*.png show them in colour."
         )
     return page
 

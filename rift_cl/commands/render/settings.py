@@ -75,6 +75,9 @@ class FrameOutput:
     where it is installed, otherwise apng."""
     depth: bool = False
     """Also write the expected depth along the camera's axis, in scene units."""
+    normals: bool = False
+    """Also write normals, in the scene's axes: the splats' shortest axes on the side that is seen,
+    which tell of a surface where splats are flat (rift fit photos --surface.normal-consistency)."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ with settings at their defaults folded away.
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import platform
 import shutil
@@ -26,6 +25,7 @@ from rift_cl.commands.run_folder.saved_settings import options_of, record_of
 from rift_cl.errors import CheckpointError, InputError, OutputError
 from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import PART, json_text, make_folder, write_json, write_text, writing
+from rift_cl.json_parsing import parse_json
 from rift_cl.report.html_page import Page
 
 _CONFIG = "config.json"
@@ -284,7 +284,7 @@ def _is_used(entry: Path) -> bool:
 
 def _asked(settings: Any) -> dict[str, Any]:
     """The settings that differ from their defaults and decide what comes out, as JSON has them."""
-    return _decisive(json.loads(json_text(_changed(settings))))
+    return _decisive(parse_json(json_text(_changed(settings))))
 
 
 def _decisive(asked: Mapping[str, Any]) -> dict[str, Any]:

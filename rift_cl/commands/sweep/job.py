@@ -19,6 +19,7 @@ from rift_cl.commands.sweep.report import Row, sweep_page, write_table
 from rift_cl.commands.sweep.settings import SweepSettings
 from rift_cl.commands.sweep.variations import Variation, variations
 from rift_cl.errors import CheckpointError, InputError, StoppedError
+from rift_cl.json_parsing import parse_json
 from rift_cl.progress import Report
 
 _RUNS = "runs"
@@ -146,7 +147,7 @@ class Sweep:
     def _decisive(self) -> dict[str, Any]:
         """What decides each run of this sweep, by its name."""
         return {
-            each.name: json.loads(json.dumps(each.settings.decisive(), default=str))
+            each.name: parse_json(json.dumps(each.settings.decisive(), default=str))
             for each in self.runs
         }
 
@@ -160,7 +161,7 @@ class Sweep:
             return
         try:
             path = self.settings.out / "config.json"
-            self._before = dict(json.loads(path.read_text(encoding="utf-8"))["runs"])
+            self._before = dict(parse_json(path.read_text(encoding="utf-8"))["runs"])
         except (OSError, ValueError, LookupError, TypeError):
             return
         for name, now in self._decisive().items():

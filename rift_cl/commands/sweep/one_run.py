@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 from rift_cl.commands.fit_photos.scores import ViewScore
 from rift_cl.errors import ClusterError, DeviceError, InputError
 from rift_cl.io.output import atomic_path
+from rift_cl.json_parsing import parse_json
 from rift_cl.progress import Report
 
 # A held-out view of a fit, beside the preview of a reconstruction.
@@ -63,7 +63,7 @@ def run(job: str, settings: Any) -> str:
 def is_done(folder: Path) -> bool:
     """Whether the run in a folder came to its end."""
     try:
-        record = json.loads((folder / "config.json").read_text(encoding="utf-8"))
+        record = parse_json((folder / "config.json").read_text(encoding="utf-8"))
         return bool(record["complete"])
     except (OSError, ValueError, LookupError, TypeError):
         return False

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from rift_cl.commands.sweep.one_run import PICTURE
 from rift_cl.commands.sweep.variations import Variation
 from rift_cl.errors import OutputError
 from rift_cl.io.output import write_text
+from rift_cl.json_parsing import parse_json
 from rift_cl.report.html_page import Page
 
 # Figures that a table on a page has room for.
@@ -48,8 +48,8 @@ class Row:
             return cls(run, {}, refused)
         path = run.settings.out / "metrics.json"
         try:
-            return cls(run, dict(_numbers(json.loads(path.read_text(encoding="utf-8")))))
-        except (OSError, ValueError) as error:
+            return cls(run, dict(_numbers(parse_json(path.read_text(encoding="utf-8")))))
+        except (OSError, ValueError, RecursionError) as error:
             raise OutputError(
                 f"{path}: cannot be read ({error}): remove {path.parent} and go on with --resume"
             ) from error

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from rift_cl.commands.options import absolute_files
 from rift_cl.commands.run_folder.saved_settings import begun_settings, parsed_settings
 from rift_cl.commands.sweep.settings import SweepSettings
 from rift_cl.errors import InputError
+from rift_cl.json_parsing import parse_json
 
 # What differs between the runs in any case, or is the sweep's own.
 _OWN = ("scan", "capture", "out", "resume", "overwrite", "dry_run", "preview", "config", "cluster")
@@ -143,7 +143,7 @@ def _value(name: str, text: str, job: str, kind: type[Any], earlier: Any) -> Any
 
 def _plain(word: str) -> Any:
     try:
-        value = json.loads(word)
+        value = parse_json(word)
     except ValueError:
         return word
     return value if isinstance(value, (bool, int, float)) else word

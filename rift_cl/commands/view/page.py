@@ -10,6 +10,7 @@ import contextlib
 import importlib
 import io
 import socket
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -84,8 +85,12 @@ class ViewerPage:
         self.url = f"http://{_HOST}:{self._server.get_port()}/{guard.token}"
         # What a page sends may make viser's callbacks fail: its own loss, and nobody's concern.
         self._server.get_event_loop().set_exception_handler(lambda *_: None)
+        # viser warns of it in words that the page has chosen: these belong on no terminal.
+        warnings.filterwarnings("ignore", module="viser")
+        warnings.filterwarnings("ignore", message=r"\[viser\]|Queued a \w+ on a closed connection")
         # A page may ask for a tunnel through a server on the internet, whatever it shows.
         self._server.request_share_url = lambda *_, **__: None
+        self._server.disconnect_share_url = lambda *_, **__: None
         self._server.gui.configure_theme(
             show_logo=False, show_share_button=False, control_width="small"
         )
@@ -160,12 +165,13 @@ class ViewerPage:
     def show(self, client: Any, picture: NDArray[np.float32], quality: int) -> None:
         """Send a (height, width, 3) picture in display light to one page."""
         codes = np.rint(np.clip(picture, 0, 1) * 255).astype(np.uint8)
-        client.scene.set_background_image(codes, format="jpeg", jpeg_quality=quality)
-        client.flush()
+        with sending():
+            client.scene.set_background_image(codes, format="jpeg", jpeg_quality=quality)
+            client.flush()
 
     def hand_over(self, client: Any, splats: Any, background: NDArray[np.float32]) -> None:
         """Let a page draw splats by itself, before a (3,) background in display light."""
-        with client.atomic():
+        with sending(), client.atomic():
             splats.visible = True
             codes = np.rint(np.tile(255 * background, (2, 2, 1))).astype(np.uint8)
             client.scene.set_background_image(codes, format="png")
@@ -173,7 +179,8 @@ class ViewerPage:
 
     def tell(self, facts: str) -> None:
         """What the panel says about the last picture."""
-        self.view.tell(facts)
+        with sending():
+            self.view.tell(facts)
 
     def close(self) -> None:
         """Stop serving, and playing first, for which the end of this program would wait."""
@@ -183,6 +190,15 @@ class ViewerPage:
     def _end(self) -> None:
         with contextlib.redirect_stdout(io.StringIO()):
             self._server.stop()
+
+
+def sending() -> contextlib.AbstractContextManager[None]:
+    """Let nothing end the owner of the splats that viser meets while it wakes its pages.
+
+    It does so from whichever thread sends, while other pages come and go, and now and then fails
+    by that; what was to be sent is queued by then, and goes with the next.
+    """
+    return contextlib.suppress(RuntimeError)
 
 
 def _viser() -> Any:

@@ -25,7 +25,7 @@ from rift_cl.commands.fit_photos.pictures import Light
 from rift_cl.commands.inputs.scene_bounds import SceneBounds
 from rift_cl.commands.view.browser_splats import MovingSplats
 from rift_cl.commands.view.crop import Crop
-from rift_cl.commands.view.page import ViewerPage
+from rift_cl.commands.view.page import ViewerPage, sending
 from rift_cl.commands.view.photographs import Photograph, nearest_one
 from rift_cl.commands.view.picture import Painter
 from rift_cl.commands.view.pose import NARROWEST, Pose
@@ -256,10 +256,11 @@ class SplatViewer:
         """Give a page the splats that it draws by itself, or hide them once our picture is seen."""
         if self._moving is None:
             return
-        if client.splats is None or client.splats[1] != crop:
-            client.splats, client.alone = (self._moving.give(client.handle, crop), crop), False
-        with self._lock:
-            if client.alone and now >= client.ends:
+        with sending():
+            if client.splats is None or client.splats[1] != crop:
+                client.splats, client.alone = (self._moving.give(client.handle, crop), crop), False
+        with self._lock, sending():
+            if client.splats is not None and client.alone and now >= client.ends:
                 client.splats[0].visible = client.alone = False
 
     def _facts(self, splats: Splats, camera: Camera, seconds: float) -> str:

@@ -19,6 +19,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from rift_cl.json_parsing import parse_json
+
 
 def pose(job_path: str) -> None:
     """Find poses.
@@ -30,7 +32,7 @@ def pose(job_path: str) -> None:
             photographs up to which all pairs are matched; "part", a folder to work in, which
             receives the model's files and ``result.json``.
     """
-    job = json.loads(Path(job_path).read_text(encoding="utf-8"))
+    job = parse_json(Path(job_path).read_text(encoding="utf-8"))
     pycolmap: Any = importlib.import_module("pycolmap")
     part = Path(job["part"])
     models = _models(pycolmap, job, part)

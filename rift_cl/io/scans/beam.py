@@ -251,7 +251,7 @@ def beam_words(geometry: Geometry, unit: str) -> str:
     """A phrase about source and detector."""
     of = f" {unit}" if unit else ""
     if isinstance(geometry, Vectors):
-        return f"cone beam by vectors, {geometry.views} views on no circle"
+        return f"cone beam by vectors, {geometry.views} views, which are those of no upright cone"
     to_axis, to_detector = geometry.source_to_axis, geometry.source_to_detector
     lengths = (
         f"source {to_axis:.5g}{of} from the axis, detector {to_detector:.5g}{of} from the source, "

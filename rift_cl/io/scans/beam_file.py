@@ -9,7 +9,7 @@ from rift_cl.errors import FileFormatError, InputError, PathEscapeError
 from rift_cl.io.boundary import reading
 from rift_cl.io.scans.beam import AnyBeam
 from rift_cl.io.scans.geometries.astra_vectors import read_vectors
-from rift_cl.io.scans.geometries.described import read_described
+from rift_cl.io.scans.geometries.described import DESCRIBED, read_described
 from rift_cl.io.scans.geometries.nikon import read_nikon
 from rift_cl.io.scans.geometries.rtk_xml import read_rtk
 from rift_cl.io.scans.geometries.skyscan import read_skyscan
@@ -19,9 +19,7 @@ from rift_cl.io.scans.scan_file import ScanRequest
 _READERS: dict[str, Callable[[Path], AnyBeam]] = {
     ".xtekct": read_nikon,
     ".log": read_skyscan,
-    ".json": read_described,
-    ".yaml": read_described,
-    ".yml": read_described,
+    **dict.fromkeys(DESCRIBED, read_described),
     ".geom": read_vectors,
 }
 DESCRIPTIONS = (*_READERS, ".xml")

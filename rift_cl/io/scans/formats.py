@@ -16,6 +16,7 @@ from typing import Any, get_args
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.boundary import reading
 from rift_cl.io.scans.beam_file import DESCRIPTIONS, projections_of
+from rift_cl.io.scans.geometries.described import DESCRIBED, is_described
 from rift_cl.io.scans.hdf5_scan import open_hdf5_scan
 from rift_cl.io.scans.literals import AngleUnit, Kind
 from rift_cl.io.scans.mat_scan import open_mat5_scan, open_mat73_scan
@@ -78,10 +79,15 @@ def register_scan_reader(extension: str, reader: Reader) -> None:
 
 
 def is_scan_file(path: Path) -> bool:
-    """Whether a path is a file of a kind that holds scans, by its extension."""
+    """Whether a path is a file of a kind that holds or describes scans.
+
+    Its extension tells, but for .json, .yaml and .yml, which may hold anything, such as the poses
+    of photographs.
+    """
     suffix = path.suffix.lower()
-    known = suffix in _READERS or suffix in SCAN_READERS or suffix in (".xtekct", ".log")
-    return known and path.is_file()
+    if not (suffix in _READERS or suffix in SCAN_READERS or suffix in DESCRIPTIONS):
+        return False
+    return path.is_file() and (suffix not in DESCRIBED or is_described(path))
 
 
 def open_scan(
@@ -119,9 +125,9 @@ def open_scan(
     tilt series about the y axis, its angles in the extended header or in a .tlt or .rawtlt file.
 
     Fans and cones are told by what the scanner wrote: Nikon's .xtekct and SkyScan's .log, opened
-    themselves or lying in the folder of their images; Zeiss' .txrm; distances in NXtomo, Data
-    Exchange and NPZ (``source_to_axis``, ``source_to_detector`` and the like beside ``pitch``); or
-    a file of ``geometry``.
+    themselves or lying in the folder of their images, as our own .yaml or .json; Zeiss' .txrm;
+    distances in NXtomo, Data Exchange and NPZ (``source_to_axis``, ``source_to_detector`` and the
+    like beside ``pitch``); or a file of ``geometry``.
 
     Args:
         path: the file or the folder.
@@ -145,7 +151,7 @@ def open_scan(
             geometry alone, to whom ``ScanFile.kind`` means nothing.
         geometry: a file that says where source and detector stand, in place of what the scan says:
             Nikon's .xtekct, SkyScan's .log, RTK's .xml, ASTRA's twelve numbers a view (.geom,
-            .npy, .txt), or ours (.yaml, .json), whose names ``docs/how-to/scans.md`` lists.
+            .npy, .txt), or ours (.yaml, .json), whose names ``docs/how-to/scan_cones.md`` lists.
         reversed: the object turned the other way than the file is taken to say; the angles change
             their sign.
         repeat: for a sample that is symmetric about the axis: its one TIFF image is taken for as

@@ -7,12 +7,14 @@ settle is not guessed.
 
 from __future__ import annotations
 
+import operator
 import os
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, PathEscapeError
 from rift_cl.io.boundary import reading
@@ -20,6 +22,7 @@ from rift_cl.io.captures.capture_paths import CaptureFolder
 from rift_cl.io.scans.frame_words import CALIBRATION, FILLERS, WORDS, FrameKind, words_of
 
 SUFFIXES = (".tif", ".tiff")
+_BEFORE, _AFTER = frozenset(("before", "pre")), frozenset(("after", "post"))
 _LISTED = 4
 
 
@@ -32,6 +35,37 @@ def tiff_names(folder: Path) -> list[str]:
     with reading(folder, "the folder"):
         names = [entry.name for entry in folder.iterdir() if entry.suffix.lower() in SUFFIXES]
     return sorted((name for name in names if not name.startswith(".")), key=_natural)
+
+
+def grouped_names(folder: Path) -> list[str]:
+    """Names of the TIFF files of a folder; where it holds none, of those one folder deeper.
+
+    Flats that were taken at several times often lie so, in ``flats/before`` and ``flats/after``.
+
+    Raises:
+        InputError: a folder may not be read.
+    """
+    names = tiff_names(folder)
+    if names:
+        return names
+    with reading(folder, "the folder"):
+        groups = [entry.name for entry in folder.iterdir() if entry.is_dir()]
+    groups = sorted((name for name in groups if not name.startswith(".")), key=_natural)
+    return [f"{group}/{name}" for group in groups for name in tiff_names(folder / group)]
+
+
+def times_of(files: Sequence[Path], views: int) -> NDArray[np.float64] | None:
+    """For each flat the views that were taken before it, where folders say before and after.
+
+    Args:
+        files: the flats, one frame each.
+        views: number of projections.
+    """
+    said = [words_of(path.parent.name) for path in files]
+    before, after = ([bool(words & each) for words in said] for each in (_BEFORE, _AFTER))
+    if len({path.parent for path in files}) < 2 or any(map(operator.eq, before, after)):
+        return None
+    return np.where(after, float(views), 0.0)
 
 
 def sorted_kinds(folder: Path, names: Iterable[str]) -> dict[FrameKind, list[str]]:
@@ -85,7 +119,8 @@ def folder_of(kind: FrameKind, place: Path) -> Path | None:
         return None
     with reading(place, "the folder"):
         entries = sorted(place.iterdir())
-        found = [entry for entry in entries if _says(kind, entry) and _holds_frames(entry)]
+        said = [entry for entry in entries if _says(kind, entry) and os.access(entry, os.R_OK)]
+        found = [e for e in said if _holds_frames(e) or (e.is_dir() and grouped_names(e))]
     if len(found) > 1:
         names = " and ".join(repr(entry.name) for entry in found[:_LISTED])
         raise FileFormatError(

@@ -25,11 +25,13 @@ from rift_cl.io.scans.scan_file import ScanFile, ScanRequest
 from rift_cl.io.scans.tiff_folder import (
     folder_of,
     gap,
+    grouped_names,
     inside,
     lone_series,
     projection_folder,
     sorted_kinds,
     tiff_names,
+    times_of,
 )
 from rift_cl.io.scans.tiff_frames import TiffRows, TiffStack, tiff_stack
 
@@ -101,6 +103,7 @@ def open_tiff_scan(path: Path, request: ScanRequest, *, budget: int | None) -> S
         flats=flats.stack.frames if flats else 0,
         darks=darks.stack.frames if darks else 0,
         evidence=(place.files[0].stem,),
+        flats_at=times_of(flats.files, frames.frames) if flats else None,
         notes=(*place.notes, *notes, *doubts),
         beam=beam,
     )
@@ -258,7 +261,7 @@ def _calibration_files(
 def _frames_in(path: Path) -> tuple[Path, ...]:
     if not path.is_dir():
         return (path,)
-    names = tiff_names(path)
+    names = grouped_names(path)
     if not names:
         raise FileFormatError(f"{path}: holds no TIFF files (.tif, .tiff)")
     return inside(path, names)

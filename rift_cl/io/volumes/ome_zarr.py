@@ -31,6 +31,7 @@ from rift_cl.io.output import staged_folder, writing
 from rift_cl.io.volumes.layout import Floats, VolumeLayout, VolumePlace, WriteSlab
 from rift_cl.io.volumes.sample_window import restored, suggested_window
 from rift_cl.io.volumes.slice_statistics import SliceStatistics
+from rift_cl.json_parsing import parse_json
 
 _CHUNK = (16, 256, 256)
 # Packing of chunks: nearly as fast as none, and every reader of Zarr has it.
@@ -211,7 +212,7 @@ def _write_json(path: Path, value: dict[str, Any]) -> None:
 def _read_json(path: Path) -> dict[str, Any]:
     if path.stat().st_size > _LARGEST_HEADER:
         raise FileFormatError(f"{path}: is too long for the header of a Zarr store")
-    value = json.loads(path.read_text(encoding="utf-8"))
+    value = parse_json(path.read_text(encoding="utf-8"))
     if not isinstance(value, dict):
         raise FileFormatError(f"{path}: is no header of a Zarr store")
     return value

@@ -15,12 +15,13 @@ from rift_cl.geometry import Cone, Fan, Vectors
 from rift_cl.reconstruct.axis import AxisEstimate, axis_of_scan
 from rift_cl.reconstruct.calibration.opposite_fit import fit_opposite_rays
 from rift_cl.reconstruct.calibration.orbit_row import orbit_row
+from rift_cl.reconstruct.calibration.turned_detector import turned
 from rift_cl.reconstruct.direct.padding import is_truncated
 
 # Half a 95 % interval in standard errors, as for the axis.
 _HALF_INTERVAL = 2.3
 # The widest half intervals that are still an answer: radians, and a share of the distance.
-_WIDEST_ROLL, _WIDEST_DISTANCE = np.deg2rad(1.0), 0.1
+_WIDEST_ROLL, _WIDEST_SLANT, _WIDEST_DISTANCE = np.deg2rad(1.0), np.deg2rad(2.0), 0.1
 # A value and half its 95 % interval; None where the data do not tell.
 Told = tuple[float, float] | None
 # Fewest rows of a detector on which the orbit's row is looked for.
@@ -33,8 +34,8 @@ class Calibration:
 
     Args:
         scan: the scan with what was found put right: sense and centre; the orbit's row where it is
-            surely another; a roll that is surely there makes a flat ``Cone`` a ``Vectors``; the
-            distance only where that was asked for.
+            surely another; a roll or a slant that is surely there makes a flat ``Cone`` a
+            ``Vectors``; the distance only where that was asked for.
         axis: bin of the axis, its interval, and the sense of rotation.
         roll: of the detector in its plane, in radians, and half its 95 % interval; positive where
             the axis is seen at greater bins in greater rows; None where the data do not tell.
@@ -45,6 +46,9 @@ class Calibration:
         row: of the source's orbit, and half its 95 % interval; None where the data do not tell, or
             were not asked (``orbit``).
         asked: whether the row was looked for.
+        slant: of a flat detector about its columns, out of its plane, in radians, and half its 95 %
+            interval; positive where greater bins are farther from the source; None where the data
+            do not tell. A ``Fan`` cannot hold it.
     """
 
     scan: Fan | Cone | Vectors
@@ -54,6 +58,7 @@ class Calibration:
     disagreement: tuple[float, float]
     row: Told = None
     asked: bool = False
+    slant: Told = None
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the curve of the axis, and what was found besides."""
@@ -64,6 +69,9 @@ class Calibration:
         """What was found, a line for each quantity, and what cannot be told."""
         lines = [f"rotation axis {self.axis.in_words()}"]
         lines.append(f"roll of the detector: {_degrees(self.roll)}")
+        lines.append(f"slant of the detector about its columns: {_degrees(self.slant)}")
+        if isinstance(self.scan, Fan) and _is_sure(self.slant):
+            lines[-1] += "; a Fan has no slant: make it a Cone of one row and turn its vectors()"
         if self.distance is None:
             lines.append("source to detector: the data do not tell")
         else:
@@ -76,7 +84,7 @@ class Calibration:
             lines.append(f"row of the source's orbit: {told}")
         left = "" if self.asked else ", the orbit's row (orbit=True looks for it)"
         lines.append(
-            f"source to axis{left} and tilts of the detector out of its plane are taken as given: "
+            f"source to axis{left} and a tilt of the detector about its rows are taken as given: "
             "the data hardly tell them"
         )
         return "\n".join(lines)
@@ -88,6 +96,7 @@ class Calibration:
             "roll": None if self.roll is None else list(self.roll),
             "distance": None if self.distance is None else list(self.distance),
             "row": None if self.row is None else list(self.row),
+            "slant": None if self.slant is None else list(self.slant),
             "in_words": self.in_words(),
         }
 
@@ -100,15 +109,16 @@ def calibrate(
     orbit: bool = False,
     device: Device | None = None,
 ) -> Calibration:
-    """Find centre, sense of rotation, roll and detector distance of a scan from its data.
+    """Find centre, sense of rotation, roll, slant and distance of the detector from a scan's data.
 
     Rays that measure the same line from both sides must agree. They tell the bin of the axis and
-    the sense of rotation (as ``find_center`` does), the detector's roll in its plane, and the
-    distance of the detector in bins, which is the scale of the fan angle. They do not tell the
-    distance of the axis, since everything twice as large makes the same pictures, nor the orbit's
-    row or tilts out of the detector's plane. The row is told, with ``orbit``, by planes through two
-    places of the source, of which both views must measure the same integral: of a flat ``Cone``
-    whose object leaves the detector at neither side.
+    the sense of rotation (as ``find_center`` does), the detector's roll in its plane, its slant
+    about its columns, where the fan is wide enough, and the distance of the detector in bins, which
+    is the scale of the fan angle. They do not tell the distance of the axis, since everything twice
+    as large makes the same pictures, nor the orbit's row. A tilt about the detector's rows
+    magnifies slices by their height, which an object could do as well: data hardly tell it. The row
+    is told, with ``orbit``, by planes through two places of the source, of which both views must
+    measure the same integral: of a flat ``Cone`` whose object leaves the detector at neither side.
 
     Args:
         projections: line integrals, (view, bin) or (view, row, bin).
@@ -143,6 +153,10 @@ def calibrate(
     else:
         fit = fit_opposite_rays(stack, right)
     roll = _told(fit.roll, fit.errors[1], _WIDEST_ROLL)
+    slant = _told(fit.slant, fit.errors[3], _WIDEST_SLANT)
+    if isinstance(right, Cone) and _is_sure(slant):
+        # The axis was found as if there were none, which moves it a little.
+        right = replace(right, center=(right.center[0], fit.center))
     share = _told(fit.distance, fit.errors[2], _WIDEST_DISTANCE)
     if distance and share is not None:
         right = replace(right, source_to_detector=right.source_to_detector * share[0])
@@ -152,32 +166,20 @@ def calibrate(
         if row is not None and abs(row[0] - right.center[0]) > row[1]:
             right = replace(right, center=(row[0], right.center[1]))
     corrected: Fan | Cone | Vectors = right
-    if isinstance(right, Cone) and not right.curved and roll is not None and abs(roll[0]) > roll[1]:
-        corrected = rolled(right, roll[0])
-    return Calibration(corrected, axis, roll, share, fit.disagreement, row, orbit)
-
-
-def rolled(scan: Cone, angle: float) -> Vectors:
-    """A flat cone whose detector is turned in its plane about the foot of the source.
-
-    Args:
-        scan: the cone with an upright detector.
-        angle: in radians; positive where the axis is then seen at greater bins in greater rows.
-    """
-    upright = scan.vectors()
-    cosine, sine = np.cos(angle), np.sin(angle)
-    turn = scan.pitch[1] / scan.pitch[0]
-    across = cosine * upright.across + sine * turn * upright.down
-    down = cosine * upright.down - sine / turn * upright.across
-    off = (np.array([scan.rows, scan.bins]) - 1) / 2 - scan.center
-    foot = upright.middle - off[0] * upright.down - off[1] * upright.across
-    middle = foot + off[0] * down + off[1] * across
-    return Vectors(upright.source, middle, across, down, scan.rows, scan.bins)
+    sure = [told[0] if told is not None and _is_sure(told) else 0.0 for told in (roll, slant)]
+    if isinstance(right, Cone) and not right.curved and any(sure):
+        corrected = turned(right, *sure)
+    return Calibration(corrected, axis, roll, share, fit.disagreement, row, orbit, slant)
 
 
 def _tells_planes(stack: NDArray[np.float32], scan: Cone) -> bool:
     """Whether views may be compared on planes: flat detectors that no side of the object leaves."""
     return not scan.curved and scan.rows >= _FEWEST_ROWS and not is_truncated(stack)
+
+
+def _is_sure(told: Told) -> bool:
+    """Whether a value differs from 0 by more than its interval."""
+    return told is not None and abs(told[0]) > told[1]
 
 
 def _degrees(told: Told) -> str:

@@ -1,10 +1,12 @@
-"""Centre, roll and fan angle at which opposite rays of a scan agree best.
+"""Centre, roll, slant and fan angle at which opposite rays of a scan agree best.
 
 The pixel at (u, v) from the foot of the source, and the one at (-u, v) in the view
 ``pi - 2 gamma(u)`` further round, measure the same line in the plane of the source's orbit, and
 lines that cross halfway between the sources elsewhere. Where the detector is rolled, or seen from
-another distance, other pixels are compared, and differ. Least squares over these differences, by
-the method of Gauss and Newton from few wide pixels to more narrow ones, gives the three numbers.
+another distance, other pixels are compared, and differ; so they are where it is slanted, turned
+about its columns, so that bins on one side of the foot stand farther from the source than those on
+the other. Least squares over these differences, by the method of Gauss and Newton from few wide
+pixels to more narrow ones, gives the four numbers.
 Only rows so near the orbit enter that the lines hardly part; they count by how well they agree.
 
 The distance of the axis does not enter: an object, and a source at the axis' distance, twice as
@@ -28,10 +30,11 @@ Views = NDArray[np.float32]
 _SIZES, _ROWS, _VIEWS = (40, 128), 13, 60
 # Most steps at each size, and what ends them, in standard errors.
 _STEPS, _SETTLED = 6, 0.1
-# Steps of the derivatives: bins, radians, and the share of the distance.
-_SMALL = np.array([0.05, 1e-3, 2e-3])
-# The longest steps in one iteration.
-_LONGEST = np.array([2.0, 0.03, 0.1])
+# Steps of the derivatives: bins, radians of the roll, share of the distance, radians of the slant.
+_SMALL = np.array([0.05, 1e-3, 2e-3, 5e-3])
+# The longest steps in one iteration, and the greatest slant.
+_LONGEST = np.array([2.0, 0.03, 0.1, 0.06])
+_MOST_SLANTED = 0.3
 # By how many rows opposite rays may part at the edge of the field of view, and the fewest rows.
 _PARTED, _FEWEST = 0.5, 3.0
 # Fewest pairs of rays that are fitted.
@@ -54,7 +57,9 @@ class OppositeFit:
         roll: of the detector in its plane, in radians; positive where the axis is seen at greater
             bins in greater rows.
         distance: from source to detector as a share of the scan's.
-        errors: (3,) their standard errors, in the same units; infinite where data do not tell.
+        slant: of a flat detector about its columns, in radians; positive where greater bins are
+            farther from the source.
+        errors: (4,) their standard errors, in the same units; infinite where data do not tell.
         disagreement: root mean square difference of opposite rays, as a share of the contrast,
             before the fit and after.
     """
@@ -62,12 +67,13 @@ class OppositeFit:
     center: float
     roll: float
     distance: float
+    slant: float
     errors: Floats
     disagreement: tuple[float, float]
 
 
 def fit_opposite_rays(stack: Views, scan: Cone) -> OppositeFit:
-    """Fit centre, roll and distance of the detector.
+    """Fit centre, roll, distance and slant of the detector.
 
     Args:
         stack: line integrals, (view, row, bin).
@@ -76,16 +82,14 @@ def fit_opposite_rays(stack: Views, scan: Cone) -> OppositeFit:
     """
     turned, group = in_one_turn(scan.angles)
     merged = means(stack, group)
-    found = np.array([scan.center[1], 0.0, 0.0])
+    found = start = np.array([scan.center[1], 0.0, 0.0, 0.0])
     for size in _SIZES:
         rays = _Rays(merged, turned, scan, max(1, round(scan.bins / size)))
         found, errors = rays.fitted(found)
-    before = rays.disagreement(np.array([scan.center[1], 0.0, 0.0]))
-    after = rays.disagreement(found)
+    before, after = rays.disagreement(start), rays.disagreement(found)
     errors[2] *= np.exp(found[2])
-    return OppositeFit(
-        float(found[0]), float(found[1]), float(np.exp(found[2])), errors, (before, after)
-    )
+    center, roll, stretch, slant = found.tolist()
+    return OppositeFit(center, roll, float(np.exp(stretch)), slant, errors, (before, after))
 
 
 class _Rays:
@@ -120,16 +124,16 @@ class _Rays:
 
     def fitted(self, start: Floats) -> tuple[Floats, Floats]:
         """The best parameters next to some, and their standard errors."""
-        found, errors = start.copy(), np.full(3, np.inf)
-        free = np.array([True, self._rows.size > 2, True])
+        found, errors = start.copy(), np.full(start.size, np.inf)
+        free = np.array([True, self._rows.size > 2, True, not self._scan.curved])
         for _ in range(_STEPS):
             here = self._differences(found)
             if np.count_nonzero(np.isfinite(here)) < _FEWEST_RAYS or not self._contrast > 0:
-                return start.copy(), np.full(3, np.inf)
+                return start.copy(), np.full(start.size, np.inf)
             differ, weights = self._weighed(here)
             slopes = []
             for index in np.flatnonzero(free):
-                step = np.zeros(3)
+                step = np.zeros(start.size)
                 step[index] = _SMALL[index]
                 slope = (self._differences(found + step) - here) / _SMALL[index]
                 slopes.append(np.where(np.isfinite(slope), slope, 0.0))
@@ -144,6 +148,7 @@ class _Rays:
             errors[free] = _INFLATED * np.sqrt(np.diag(inverse @ scatter @ inverse))
             step = np.clip(change, -_LONGEST[free], _LONGEST[free])
             found[free] += step
+            found[3] = np.clip(found[3], -_MOST_SLANTED, _MOST_SLANTED)
             if (np.abs(step) < _SETTLED * errors[free]).all():
                 break
         return found, errors
@@ -169,17 +174,24 @@ class _Rays:
         """Rays less those from the other side, (view, row, bin); NaN where there are none."""
         from scipy.ndimage import map_coordinates
 
-        center, roll, stretch = parameters.tolist()
+        center, roll, stretch, slant = parameters.tolist()
         scan = self._scan
         distance = scan.source_to_detector * np.exp(stretch)
         across = (self._bins - center)[None, :] * scan.pitch[1]
         along = (self._rows - scan.center[0])[:, None] * scan.pitch[0]
         cosine, sine = np.cos(roll), np.sin(roll)
         u, v = cosine * across - sine * along, sine * across + cosine * along
-        gamma = u / distance if scan.curved else np.arctan2(u, distance)
-        # The pixel at (-u, v), in the detector's own axes.
-        other_bin = center + (-cosine * u + sine * v) / scan.pitch[1]
-        other_row = scan.center[0] + (sine * u + cosine * v) / scan.pitch[0]
+        if scan.curved:
+            gamma, u = u / distance, -u
+        else:
+            # Ahead of the foot, a place is as far as the slant takes it; so is the opposite one.
+            depth = distance + np.sin(slant) * u
+            gamma = np.arctan2(np.cos(slant) * u, depth)
+            u = -distance * np.tan(gamma) / (np.cos(slant) + np.sin(slant) * np.tan(gamma))
+            v = v * (distance + np.sin(slant) * u) / depth
+        # The opposite pixel, in the detector's own axes.
+        other_bin = center + (cosine * u + sine * v) / scan.pitch[1]
+        other_row = scan.center[0] + (cosine * v - sine * u) / scan.pitch[0]
         views = self._views
         angle = self._angles[:, None, None] + np.pi - 2 * gamma
         angle = views.first + np.mod(angle - views.first, 2 * np.pi)

@@ -48,6 +48,8 @@ Floats = NDArray[np.float64]
 
 # Heights that vary by less than this share of the source's distance are one orbit.
 _LEVEL = 1e-6
+# Bins that a cubic spline is read from (kernels/cone/upright_read.cl).
+_FEWEST_BINS = 4
 
 
 class FDK(Composite):
@@ -366,6 +368,11 @@ def _circle(A: Projector) -> tuple[Fan | Cone, Rectification | None]:
 
 
 def _untilted(A: Projector, scan: Vectors) -> tuple[Cone, Rectification]:
+    if scan.bins < _FEWEST_BINS:
+        raise InputError(
+            f"scan: tilted detectors of {scan.bins} bins cannot be read as upright ones, which "
+            f"takes {_FEWEST_BINS}; {ITERATE}"
+        )
     try:
         cone, forms = upright_cone(scan)
     except InputError as failure:

@@ -30,6 +30,9 @@ _EVEN, _SHARE, _FEWEST_BINS = 0.5, 0.2, 12.0
 # A full turn may lack as much of it as this many steps between views, or this angle: a view or
 # two that were lost, and the jitter of a turntable, leave it what it is.
 _SLACK, _HOLE = 1.5, np.pi / 36
+# A wider gap is no end of a span where another is at least this share of it, as between angles
+# that are uneven all round; up to this angle.
+_ALIKE, _WIDEST = 0.5, np.pi / 12
 # Angles closer than this are the same, in radians.
 _SAME = 1e-6
 
@@ -40,7 +43,12 @@ def is_full_turn(angles: Floats) -> bool:
     gaps = np.diff(circle, append=circle[0] + 2 * np.pi)
     # Turns that repeat each other differ by rounding.
     distinct = max(int(np.count_nonzero(gaps > _SAME)), 1)
-    return angles.size > 2 and bool(gaps.max() <= max(_SLACK * 2 * np.pi / distinct, _HOLE))
+    if angles.size <= 2:
+        return False
+    second, widest = np.partition(gaps, -2)[-2:]
+    if second >= _ALIKE * widest:
+        return bool(widest <= max(_SLACK * 2 * np.pi / distinct, _WIDEST))
+    return bool(widest <= max(_SLACK * 2 * np.pi / distinct, _HOLE))
 
 
 def is_offset(scan: Parallel | Fan) -> bool:

@@ -32,6 +32,7 @@ from rift_cl.reconstruct.direct.offset_axis import (
     displaced_detector,
     is_full_turn,
     is_uneven,
+    sees_further,
     weighed_share,
 )
 from rift_cl.reconstruct.direct.view_weights import view_weights
@@ -69,8 +70,7 @@ def redundancy(scan: Fan | Cone, compensate: str | None = None) -> Redundancy:
     Args:
         scan: the scan.
         compensate: ``voronoi``: each view stands for half the gaps to its neighbours. ``uniform``:
-            every view for the same angle. None: as ``voronoi``, on a full turn with holes as
-            ``uniform``.
+            every view for the same angle. None: as ``voronoi``.
 
     Raises:
         InputError: the views span less than half a turn and the fan or leave a hole in it, a
@@ -83,12 +83,13 @@ def redundancy(scan: Fan | Cone, compensate: str | None = None) -> Redundancy:
             "point"
         )
     gamma, degrees = scan.fan_angles(), np.rad2deg
+    center = scan.center[1] if isinstance(scan, Cone) else scan.center
+    left, right = center, scan.bins - 1 - center
     if is_full_turn(scan.angles):
         # Twice around for halves of angles is once around: what counts is the whole circle.
-        views, rays, missing = view_weights(scan.angles / 2, compensate), np.ones((1, scan.bins)), 0
+        views = view_weights(scan.angles / 2, compensate or "voronoi")
+        rays, missing = np.ones((1, scan.bins)), 0
         sentence = f"full turn of {scan.views} views, every line measured twice"
-        center = scan.center[1] if isinstance(scan, Cone) else scan.center
-        left, right = center, scan.bins - 1 - center
         if is_uneven(center, scan.bins):
             short, share = min(left, right), weighed_share(center, scan.bins)
             rays = displaced_detector(gamma, share)[None]
@@ -122,6 +123,11 @@ def redundancy(scan: Fan | Cone, compensate: str | None = None) -> Redundancy:
         f"short scan of {degrees(span):.4g} degrees: Parker's weights, half-angle "
         f"{degrees(excess):.3g} degrees"
     )
+    if sees_further(center, scan.bins):
+        sentence += (
+            f"; the axis is at bin {center:g} of {scan.bins}, and the views do not go all round: "
+            f"objects that reach further from the axis than {min(left, right):g} bins are not right"
+        )
     return Redundancy(cells, short_scan(beta, gamma, excess), (0, 0), sentence)
 
 

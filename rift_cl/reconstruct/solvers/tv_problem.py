@@ -66,6 +66,11 @@ class VariationSolver(Solver):
         spacing = (1.0,) * len(A.domain) if A.grid is None else A.grid.spacing
         self.variation = TotalVariation(data.home, A.domain, spacing, direction_weights)
 
+    @property
+    def weight(self) -> float:
+        """Weight of the total variation."""
+        return self._weight
+
     def _begin(self, start: Any) -> dict[str, Any]:
         """What both methods keep, for the image to begin from."""
         data = self.data

@@ -2,8 +2,8 @@
 
 Two kernels, each of which blurs down and along at once: ``kernels/train/ssim_map.cl`` derives the
 gradient, ``kernels/train/loss_grad.cl`` finishes it. Nothing waits for the device. Between the two
-are maps, three times as large as the image: where one buffer cannot hold them, the image is gone
-through in bands of rows, whose maps reach as far as the window does, to the same bits.
+are maps, three times as large as the image: a large image is gone through in bands of rows, whose
+maps reach as far as the window does, to the same bits.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ _ROWS, _STRIP, _MAPS = 4, 256, 3
 # Runs of rows on either side of a band that its gradient reads the maps of: half a window, and the
 # rows that a run may have beyond the image.
 _BESIDE = 2
+# Bytes of the maps of a band: little memory, and what is gone through twice beside it little time.
+_MAPS_ROOM = 1 << 24
 
 
 @dataclass(frozen=True)
@@ -137,16 +139,18 @@ class ImageLoss:
 
 
 def _bands(device: Device, runs: int, pitch: int) -> list[slice]:
-    """Runs of rows whose maps a buffer of the device holds, with those beside them.
+    """Runs of rows whose maps, with those beside them, are small beside a large image.
 
     Raises:
-        ResourceLimitError: it does not hold those of one run.
+        ResourceLimitError: a buffer of the device does not hold those of one run.
     """
-    largest, each = device.traits.allocation, 4 * _MAPS * _ROWS * pitch
-    if runs * each <= largest:
+    each = 4 * _MAPS * _ROWS * pitch
+    least = (1 + 2 * _BESIDE) * each
+    room = min(max(_MAPS_ROOM, least), device.traits.allocation)
+    if runs * each <= room:
         return [slice(0, runs)]
-    check_array((1 + 2 * _BESIDE) * each, largest, what="the map of SSIM of a few rows")
-    return cut_evenly(runs, largest // each - 2 * _BESIDE)
+    check_array(least, room, what="the map of SSIM of a few rows")
+    return cut_evenly(runs, room // each - 2 * _BESIDE)
 
 
 def _rows_beside(band: slice, height: int) -> tuple[int, int]:

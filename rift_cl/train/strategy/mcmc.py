@@ -100,6 +100,8 @@ class McmcStrategy(Strategy):
         run: the run that it serves.
     """
 
+    wants_frame = False
+
     def __init__(self, settings: McmcSettings, run: TrainingRun) -> None:
         super().__init__(run)
         self.settings = settings

@@ -87,6 +87,8 @@ class Strategy:
 
     # Whether ``after_step`` reads ``gradients.sh``, for which memory and time are spent then.
     wants_sh_gradient = False
+    # Whether ``after_step`` reads ``frame``; what that holds is given up earlier otherwise.
+    wants_frame = True
 
     def __init__(self, run: TrainingRun) -> None:
         self.run = run
@@ -110,7 +112,8 @@ class Strategy:
 
         Args:
             parameters: the splats after the step, in the same order as in the frame.
-            frame: what was rendered in the step.
+            frame: what was rendered in the step; it holds nothing where the class clears
+                ``wants_frame``.
             gradients: of its loss, without the penalties, by what was drawn: scales and opacities,
                 not their logarithms and logits. ``gradients.sh`` is None unless the class sets
                 ``wants_sh_gradient``: coefficients take their step of Adam as it is made.

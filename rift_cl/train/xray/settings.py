@@ -16,6 +16,7 @@ from rift_cl.train.environment_settings import EnvironmentSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.settings import LearningRates, TrainSettings
 from rift_cl.train.strategy import StrategySettings, XraySettings
+from rift_cl.train.surface_settings import SurfaceSettings
 from rift_cl.train.xray.solve_settings import SolveSettings
 
 X = TypeVar("X", bound="XrayTrainSettings")
@@ -66,6 +67,7 @@ class XrayTrainSettings(TrainSettings):
     basis: ShortSplats[BasisSettings] = field(default_factory=XrayBasisSettings)
     angular: NoOption[AngularSettings] = field(default_factory=AngularSettings)
     environment: NoOption[EnvironmentSettings] = field(default_factory=EnvironmentSettings)
+    surface: NoOption[SurfaceSettings] = field(default_factory=SurfaceSettings)
     strategy: ShortExpert[StrategySettings] = field(default_factory=XraySettings)
     # Orbits are dense along the detector's rows, and along nothing else.
     homogenisation: Short[Homogenisation] = field(
@@ -80,6 +82,10 @@ class XrayTrainSettings(TrainSettings):
         if self.environment.shared:
             raise SettingError(
                 self.environment, "kind", "is 'shared', but X-rays are not reflected: wanted none"
+            )
+        if self.surface.wanted:
+            raise SettingError(
+                "TrainSettings", "surface", "asks for surfaces, which X-rays pass: wanted none"
             )
 
     def decided(self: X, views: int) -> X:

@@ -16,7 +16,6 @@ that are not known are refused, so that none is passed over for a slip.
 
 from __future__ import annotations
 
-import json
 import math
 import reprlib
 from collections.abc import Mapping
@@ -26,15 +25,18 @@ from typing import Any
 
 import numpy as np
 
-from rift_cl.errors import FileFormatError, InputError
+from rift_cl.errors import FileFormatError, InputError, RiftError
 from rift_cl.geometry.numbers import real_numbers
 from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.captures.capture_paths import CaptureFolder
 from rift_cl.io.number_list import SUFFIXES
 from rift_cl.io.scans.angle_list import AngleList, even_turn, file_angles
 from rift_cl.io.scans.beam import AnyBeam, Beam, Floats
+from rift_cl.json_parsing import parse_json
 
 _LARGEST = 64 << 20
+# Extensions of such files.
+DESCRIBED = (".json", ".yaml", ".yml")
 _LENGTHS = ("source_to_axis", "source_to_detector")
 _NAMES = (
     *_LENGTHS,
@@ -85,13 +87,24 @@ def read_described(path: Path) -> AnyBeam:
     )
 
 
+def is_described(path: Path) -> bool:
+    """Whether a file holds a scan's geometry, and not what else is written as YAML or JSON.
+
+    It need not be without faults: ``read_described`` tells of these.
+    """
+    try:
+        return not {*_LENGTHS, "projections", "geometry"}.isdisjoint(_fields(path))
+    except RiftError:
+        return False
+
+
 def _elsewhere(
     path: Path, fields: Mapping[str, Any], pitch: tuple[float, float] | None, unit: str
 ) -> AnyBeam:
     from rift_cl.io.scans.beam_file import read_beam  # our own file is one of its kinds
 
     other = CaptureFolder(path.parent).file(str(path), str(fields["geometry"]))
-    if other == path or other.suffix.lower() in (".json", ".yaml", ".yml"):
+    if other == path or other.suffix.lower() in DESCRIBED:
         raise FileFormatError(f"{path}: geometry names {other.name!r}, a file of this same kind")
     beam = read_beam(other, pitch, unit)
     changes: dict[str, Any] = {"folder": str(fields.get("projections") or "")}
@@ -119,7 +132,7 @@ def _read(text: str) -> Any:
         ValueError: it is neither.
     """
     if text.lstrip().startswith("{"):
-        return json.loads(text)
+        return parse_json(text)
     import yaml
 
     class Plain(yaml.BaseLoader):  # type: ignore[misc]
@@ -144,7 +157,7 @@ def _meant(value: Any) -> Any:
     if isinstance(value, list):
         return [_meant(entry) for entry in value]
     try:
-        return json.loads(value) if value else None
+        return parse_json(value) if value else None
     except ValueError:
         return value
 

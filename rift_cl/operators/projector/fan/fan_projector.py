@@ -29,6 +29,8 @@ _RECORD_BYTES = {"cpu": 1 << 20, "gpu": 64 << 20}
 _RECORD = 4
 # Pixels that a kernel reads at once.
 _QUAD = 4
+# Vectors of edges that an item of ``fan_project`` has.
+_EDGE_VECTORS = {"cpu": 8, "gpu": 2}
 
 
 class FanProjector(Projector):
@@ -107,10 +109,9 @@ class FanProjector(Projector):
             slabs, lines = self.grid.shape if not transpose else self.grid.shape[::-1]
             margin = walk.rays.pixels + _QUAD
             plane = self._split(x, slabs, lines, margin, transpose)
-            lanes = self.device.traits.macros["LANES"]
             self.device.launch(
                 "fan_project",
-                (-(-self.scan.bins // lanes), walk.count),
+                (-(-self.scan.bins // self._item_bins), walk.count),
                 sinogram=out,
                 plane=plane,
                 **walk.arrays,
@@ -120,6 +121,14 @@ class FanProjector(Projector):
                 margin=margin,
                 **self._macros,
             )
+
+    @property
+    def _item_bins(self) -> int:
+        """Bins that an item of ``fan_project`` owns; of strips, edges are one more."""
+        lanes = self.device.traits.macros["LANES"]
+        if self.footprint != "strip":
+            return int(lanes)
+        return _EDGE_VECTORS["cpu" if self.device.traits.is_cpu else "gpu"] * int(lanes) - 1
 
     def _split(
         self, image: DeviceArray, slabs: int, lines: int, margin: int, transpose: int

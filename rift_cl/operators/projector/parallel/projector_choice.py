@@ -48,10 +48,11 @@ class _Costs(NamedTuple):
     fast_launches: float
 
 
-# Fitted to filtered backprojections of single slices: at 64 to 512 pixels on two cores under PoCL,
-# and at 1,024 and 2,048 on an NVIDIA H100, where the many small kernels of the Fourier projector
-# take 7 ms whatever the size. The number of slices does not count, though several at once cost less
-# each: a slice is to come out the same alone and in a stack.
+# Fitted to filtered backprojections of single slices at 64 to 512 pixels on two cores under PoCL.
+# Those of a GPU are a guess: they were set by a few times of one GPU that were not kept, with
+# kernels that have changed since, and only decide which projector is taken. The number of slices
+# does not count, though several at once cost less each: a slice is to come out the same alone and
+# in a stack.
 _COSTS = {
     "cpu": _Costs(0.17, 4.0, 20.0, 5.0, launches=1e5, fast_launches=1e5),
     "gpu": _Costs(0.0018, 0.05, 2.0, 0.95, launches=3e5, fast_launches=7.1e6),
