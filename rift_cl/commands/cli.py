@@ -6,11 +6,16 @@ imports its own settings to parse or to help, and its job only to run; ``rift --
 
 from __future__ import annotations
 
+import os
+import shlex
 import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import redirect_stderr
+from dataclasses import fields
 from importlib import import_module
+from itertools import takewhile
 from typing import Any, NamedTuple
 
 import tyro
@@ -75,8 +80,7 @@ def _run(arguments: Sequence[str]) -> int:
     name, rest = _named(list(arguments))
     if name in COMMANDS:
         entry = _command(name, _earlier(name, rest), rest)
-        run: Callable[[], int] = tyro.cli(entry, prog=f"rift {name}", args=rest)
-        return run()
+        return _parsed(name, entry, rest)()
     if first == "fit":
         print(_FIT_HELP)
         return 0 if rest else _USAGE
@@ -88,6 +92,38 @@ def _run(arguments: Sequence[str]) -> int:
     what = f"there is no command {first!r}" if first else "a command is missing"
     print_line(f"rift: {what}; 'rift --help' lists the commands")
     return _USAGE
+
+
+def _parsed(
+    name: str, entry: Callable[..., Callable[[], int]], rest: Sequence[str]
+) -> Callable[[], int]:
+    """What a command's arguments ask for; tyro says what is wrong with them and ends the process.
+
+    Below what tyro says of a word too many stands what its writer probably meant by it.
+    """
+    try:
+        run: Callable[[], int] = tyro.cli(entry, prog=f"rift {name}", args=rest)
+    except SystemExit as end:
+        words = _unknown_words(entry, rest) if end.code == _USAGE else []
+        has_out = any(field.name == "out" for field in fields(COMMANDS[name].settings_class()))
+        if has_out and len(words) == 1 and "--out" not in rest:
+            print_line(
+                f"rift: {words[0]!r} is one path too many; if 'rift {name}' is to write there, it "
+                f"is --out {shlex.quote(words[0])}"
+            )
+        raise
+    return run
+
+
+def _unknown_words(entry: Callable[..., Callable[[], int]], rest: Sequence[str]) -> list[str]:
+    """Words of a command line that belong to nothing, up to the first unknown option."""
+    try:
+        with open(os.devnull, "w") as nowhere, redirect_stderr(nowhere):  # noqa: PTH123
+            _, unknown = tyro.cli(entry, args=rest, return_unknown_args=True)
+    except SystemExit:
+        # Something else is wrong with it, too.
+        return []
+    return list(takewhile(lambda word: not word.startswith("-"), unknown))
 
 
 def _named(arguments: list[str]) -> tuple[str, list[str]]:

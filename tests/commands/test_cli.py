@@ -80,6 +80,26 @@ def test_no_command_is_told(capsys, arguments):
     assert "rift --help" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "hint"),
+    [
+        (["export", "fit", "a film.webp"], "--out 'a film.webp'"),
+        (["reconstruct", "scan.h5", "out", "--no-such", "3"], "--out out"),
+        (["fit", "photos", "capture", "fit"], "'rift fit photos' is to write there"),
+        (["render", "fit", "a", "b"], None),
+        (["render", "fit", "a", "--out", "b"], None),
+        (["devices", "out"], None),
+    ],
+)
+def test_a_path_too_many_is_taken_for_an_output(arguments, hint, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    assert end.value.code == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "Unrecognized options" in said
+    assert hint in said if hint else "too many" not in said
+
+
 def test_completion_knows_every_command(capsys):
     with pytest.raises(SystemExit) as end:
         main(["--tyro-print-completion", "bash"])

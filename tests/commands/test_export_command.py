@@ -83,3 +83,22 @@ def test_up_is_y_in_formats_that_say_so(here, arrays):
     _, read = read_glb((here / "ball.glb").read_bytes())
     x, y, z = np.float32(arrays["means"]).T
     np.testing.assert_allclose(read["POSITION"], np.column_stack([x, z, -y]), atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["html", "ply", "compressed-ply", "glb"])
+def test_the_format_follows_from_the_extension(name, here, arrays):
+    SplatScene(**arrays).save(here / "ball.ply")
+    out = "new." + name.replace("-", ".")
+    assert export("ball.ply", "--out", out, "--quiet") == 0
+    assert export("ball.ply", "--out", "same", "--to", name, "--quiet") == 0
+    assert (here / out).read_bytes() == (here / "same").read_bytes()
+
+
+def test_an_extension_of_no_format_is_told(here, arrays, capsys):
+    SplatScene(**arrays).save(here / "ball.ply")
+    assert export("ball.ply", "--out", "film.webp") == 3
+    assert "'rift render'" in " ".join(capsys.readouterr().err.split())
+    assert export("ball.ply", "--mesh", "--out", "new.xyz") == 3
+    said = " ".join(capsys.readouterr().err.split())
+    assert "(--to)" in said and "render" not in said
+    assert [entry.name for entry in here.iterdir()] == ["ball.ply"]

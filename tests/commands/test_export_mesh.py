@@ -79,6 +79,6 @@ def test_what_has_no_surface_is_told_so(bone, capsys):
         (["bone.ply", "--mesh", "--voxels", "2"], "wanted 8 to 2048"),
         (["photo.ply", "--to", "stl"], "add --mesh"),
     ):
-        assert main(["export", *arguments, "--out", "new.file"]) == 3
+        assert main(["export", *arguments, "--out", "new"]) == 3
         assert words in " ".join(capsys.readouterr().err.split())
     assert sorted(entry.name for entry in bone.iterdir()) == ["bone.ply", "photo.ply"]

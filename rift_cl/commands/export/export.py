@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from rift_cl.cl.budget import format_bytes
 from rift_cl.commands.cameras.film_path import first_view
 from rift_cl.commands.export.axes import turn_between, turned
 from rift_cl.commands.export.plain_scene import plain_scene
-from rift_cl.commands.export.settings import ExportSettings
+from rift_cl.commands.export.settings import ExportSettings, Target
 from rift_cl.commands.export.web_page import FirstView, web_page
 from rift_cl.commands.inputs.opened_scene import in_display_light, scene_file
 from rift_cl.errors import InputError, OutputError
@@ -25,6 +26,8 @@ from rift_cl.io.scenes.splat_scene import SplatScene
 from rift_cl.progress import Report
 
 _PAGE = ".html"
+# What people call films, which are another command's.
+_FILMS = (".webm", ".mp4", ".gif", ".webp", ".png", ".apng")
 _UP = np.array([0.0, 1, 0])
 # What viewers add to splats on the screen, in square pixels.
 _VIEWERS = 0.3
@@ -47,7 +50,7 @@ class Export:
         self.settings = settings
         self.announce: Callable[[str], None] = lambda sentence: None
         self.scene = settings.open_scene()
-        self.format = self._format(settings.to or "html")
+        self.format = self._format(format_name(settings, "html"))
         self.path = output_path(settings, self.format.suffix)
         self._bounds = settings.bounds(self.scene)
         self.plain, self.notes = plain_scene(
@@ -115,6 +118,26 @@ class Export:
         write_whole(self.path, content)
         self.result = f"{self.path}, {format_bytes(len(content))}"
         yield Report(len(self.plain), len(self.plain), "splats")
+
+
+def format_name(settings: ExportSettings, usual: str) -> str:
+    """The format that is asked for: ``--to``, or else the extension of the file to write.
+
+    Raises:
+        InputError: no format has this extension.
+    """
+    if settings.to is not None or settings.out is None or not settings.out.suffix:
+        return settings.to or usual
+    suffixes = {name: "." + name.replace("-", ".") for name in get_args(Target)}
+    # The longer ones first: .compressed.ply ends in .ply as well.
+    for name, suffix in sorted(suffixes.items(), key=lambda pair: -len(pair[1])):
+        if settings.out.name.lower().endswith(suffix):
+            return name
+    film = settings.out.suffix.lower() in _FILMS
+    raise InputError(
+        f"{settings.out}: no export has the extension {settings.out.suffix}: name the format "
+        + ("(--to), or make a film by 'rift render'" if film else "(--to)")
+    )
 
 
 def output_path(settings: ExportSettings, suffix: str) -> Path:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.budget import format_bytes
-from rift_cl.commands.export.export import output_path, write_whole
+from rift_cl.commands.export.export import format_name, output_path, write_whole
 from rift_cl.commands.export.fused_depth import FusedDepth
 from rift_cl.commands.export.settings import ExportSettings
 from rift_cl.commands.inputs.opened_scene import scene_file
@@ -48,7 +48,7 @@ class MeshExport:
     def __init__(self, settings: ExportSettings) -> None:
         self.settings = settings
         self.announce: Callable[[str], None] = lambda sentence: None
-        self._name = settings.to or "ply"
+        self._name = format_name(settings, "ply")
         if self._name not in MESH_FORMATS:
             raise InputError(f"--to {self._name} holds no triangles: take ply, stl, obj or glb")
         if not _FEWEST <= settings.voxels <= _MOST:

@@ -21,7 +21,8 @@ class ExportOutput:
 
     to: Auto[Target] = None
     """File format: a web page (html), splats (ply, compressed-ply, spz, sog, glb), or with --mesh
-    triangles (ply, stl, obj, glb). Default: html; with --mesh, ply."""
+    triangles (ply, stl, obj, glb). Default: by the extension of --out; html, or with --mesh ply,
+    where there is none."""
     out: Auto[Path] = None
     """File to write. Default: the scene's name with the extension of the format, in the current
     folder."""
