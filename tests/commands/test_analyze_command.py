@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 from test_start import MIDDLE_OF_RING, ring
@@ -137,6 +139,24 @@ def test_a_parallel_scan_has_directions_and_no_cameras(scan, tmp_path, capsys):
     assert not (tmp_path / "all" / "views.csv").exists()
 
 
+def test_the_axis_of_counts_is_searched_in_their_line_integrals(scan, tmp_path, capsys):
+    lone = tmp_path / "lone.h5"
+    with h5py.File(scan.counts) as file, h5py.File(lone, "w") as copy:
+        for name, named in (("data", "seen"), ("data_white", "beam"), ("data_dark", "none")):
+            copy[named] = file[f"exchange/{name}"][:]
+        copy["turn"] = file["exchange/theta"][:]
+    asked = AnalyzeSettings(lone, dataset="seen", theta="turn")
+    sampled = open_sampled(asked)
+    assert sampled.scan.center == (96 - 1) / 2
+    assert "there are no flats" in sampled.notes[-2]
+    sampled = open_sampled(replace(asked, flats="beam", darks="none"))
+    assert sampled.scan.center == pytest.approx(45, abs=0.1)
+    for more in (("--flats", "no-beam"), ("--background", 1000)):
+        named = ("--dataset", "seen", "--theta", "turn", *more)
+        assert analyze(lone, tmp_path / "out", *named) == 3
+        assert str(more[1]) in capsys.readouterr().err
+
+
 def test_a_wedge_of_a_scan_is_missing_and_its_middle_is_suggested(scan):
     sampled = open_sampled(AnalyzeSettings(scan.integrals, theta="0:120"))
     hole = missing(sampled).figures["missing"][1]
@@ -180,6 +200,8 @@ def test_a_dry_run_writes_nothing_and_says_what_would_be_done(ringed, tmp_path, 
         (("--unit", "inf"), "--unit is inf"),
         (("--add", -1), "--add is -1"),
         (("--theta", "0:180"), "--theta"),
+        (("--flats", "air"), "--flats applies to scans"),
+        (("--reversed",), "--reversed applies to scans"),
     ],
 )
 def test_what_makes_no_sense_is_named_and_leaves_nothing(ringed, tmp_path, capsys, more, words):

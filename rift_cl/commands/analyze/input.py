@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.cameras.arc import check_places
 from rift_cl.commands.inputs.scan_axis import find_axis
+from rift_cl.commands.inputs.scan_input import ScanArrays
 from rift_cl.commands.inputs.scene_bounds import SceneBounds, bounds_of_cameras
 from rift_cl.commands.inputs.scene_depth import space_of
 from rift_cl.commands.inputs.surfaces import trusted
@@ -21,7 +22,6 @@ from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.scan_cameras import scan_cameras
 from rift_cl.geometry.seen_grid import scan_lengths, seen_grid
 from rift_cl.io.captures.capture import Capture, capture_name, holds_capture, open_capture
-from rift_cl.io.scans.formats import open_scan
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.sampling.targets.target import Target
 
@@ -32,6 +32,8 @@ _OPAQUE = (
     "The target is taken to be opaque, with a sphere for its surface (--mode volume is for "
     "transparent ones)."
 )
+# Options of a scan's values, which the search for its axis alone reads.
+_OF_VALUES = "flats", "darks", "kind", "background"
 # Nanometres in a millimetre.
 _NANO = 1e6
 
@@ -54,9 +56,9 @@ def open_views(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
 
 
 def _capture(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
-    for name in ("dataset", "theta", "image_key", "axes", "angle_unit", "geometry"):
-        if getattr(settings, name) is not None:
-            option = name.replace("_", "-")
+    for field in fields(ScanArrays):
+        if getattr(settings, field.name) != field.default:
+            option = field.name.replace("_", "-")
             raise InputError(f"--{option} applies to scans, {settings.source} is a capture")
     capture = open_capture(settings.source, photographs=False)
     cameras = [view.camera for view in capture.views]
@@ -204,7 +206,7 @@ def _scan(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
     for name in ("center", "aperture", "focus", "unit"):
         if getattr(settings, name) is not None:
             raise InputError(f"--{name} applies to captures, {settings.source} is a scan")
-    file = _opened(settings, values=False)
+    file = settings.open_file(settings.source, values=False)
     up = np.array([0.0, 0, 1])
     pitch, unit = (file.pitch, file.unit or "unit") if file.pitch else (1.0, "bin")
     notes = list(file.notes)
@@ -239,21 +241,6 @@ def _scan(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
     return sampled, decided
 
 
-def _opened(settings: AnalyzeSettings, *, values: bool) -> ScanFile:
-    return open_scan(
-        settings.source,
-        dataset=settings.dataset,
-        theta=settings.theta,
-        image_key=settings.image_key,
-        axes=settings.axes,
-        angle_unit=settings.angle_unit,
-        geometry=settings.geometry,
-        reversed=settings.reversed,
-        repeat=settings.repeat,
-        values=values,
-    )
-
-
 def _rays(
     settings: AnalyzeSettings, file: ScanFile, pitch: float, notes: list[str]
 ) -> tuple[tuple[Camera, ...], Parallel | None, float]:
@@ -265,14 +252,29 @@ def _rays(
 
 
 def _axis(settings: AnalyzeSettings, notes: list[str]) -> float | None:
-    """Bin of the rotation axis, None for the middle: a file is analysed even if it hides it."""
+    """Bin of the rotation axis, None for the middle: a file is analysed even if it hides it.
+
+    Raises:
+        InputError: what was said of the values is not so.
+    """
     try:
-        found = find_axis(_opened(settings, values=True))
+        file = settings.open_file(settings.source)
     except InputError as error:
-        notes.append(
-            "The rotation axis is taken to be at the middle of the detector, since it was not "
-            f"found: {error}"
-        )
+        if any(getattr(settings, name) is not None for name in _OF_VALUES):
+            raise
+        notes.append(_middle(error))
+        return None
+    try:
+        found = find_axis(file)
+    except InputError as error:
+        notes.append(_middle(error))
         return None
     notes.append(f"The rotation axis was found {found.in_words()}.")
     return found.center
+
+
+def _middle(error: InputError) -> str:
+    return (
+        "The rotation axis is taken to be at the middle of the detector, since it was not found: "
+        f"{error}"
+    )

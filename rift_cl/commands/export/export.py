@@ -126,9 +126,12 @@ def format_name(settings: ExportSettings, usual: str) -> str:
     Raises:
         InputError: no format has this extension.
     """
-    if settings.to is not None or settings.out is None or not settings.out.suffix:
-        return settings.to or usual
-    suffixes = {name: "." + name.replace("-", ".") for name in get_args(Target)}
+    if settings.to is not None:
+        return settings.to
+    if settings.out is None or not settings.out.suffix:
+        return usual
+    names: tuple[str, ...] = get_args(Target)
+    suffixes = {name: "." + name.replace("-", ".") for name in names}
     # The longer ones first: .compressed.ply ends in .ply as well.
     for name, suffix in sorted(suffixes.items(), key=lambda pair: -len(pair[1])):
         if settings.out.name.lower().endswith(suffix):

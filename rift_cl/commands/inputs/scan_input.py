@@ -22,13 +22,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class ScanArrays:
-    """Which arrays of a file are a scan's projections and angles."""
+    """Which arrays of a file are a scan's, and what their values are."""
 
     dataset: Auto[str] = None
     """Name of the projections in the file. Default: that of the file's layout."""
     theta: Auto[str] = None
     """Angles: their name in the file, a file of them (.txt, .csv, .npy), or a range in degrees that
     is divided evenly, such as 0:180 (its end excluded). Default: those of the file."""
+    flats: Auto[str] = None
+    """Flat fields (beam without sample): their name in the file; for TIFF, their folder or file.
+    For counts without flat fields, 'air' estimates the incident beam of each view from the
+    outermost bins at both ends, which must see only air, 'mean' from the mean of the view."""
+    darks: Auto[str] = None
+    """Dark fields (no beam): their name in the file; for TIFF, their folder or file."""
+    kind: Auto[Kind] = None
+    """What the values are: detector counts, transmission (counts divided by those of the beam), or
+    attenuation (line integrals). Default: inferred from flat fields, names, units and values."""
     image_key: AutoExpert[str] = None
     """Name of the array that tells what each frame is: 0 projection, 1 flat, 2 dark, 3 invalid.
     Default: that of an NXtomo file."""
@@ -47,6 +56,47 @@ class ScanArrays:
     repeat: AutoExpert[int] = None
     """For a sample that is symmetric about the axis: number of views over a full turn that its one
     TIFF image is taken for. Default: every image is one view."""
+    background: AutoExpert[int] = None
+    """For line integrals that are not zero in air: number of bins at each end of the detector whose
+    mean is subtracted from every view. Default: what the file's layout says, usually 0."""
+
+    def open_file(self, path: Path, *, values: bool = True, budget: int | None = None) -> ScanFile:
+        """The description of a file, read as the options say.
+
+        Args:
+            path: the file or the folder.
+            values: as for ``rift_cl.open_scan``.
+            budget: bytes that one reading may take.
+
+        Raises:
+            InputError: it cannot be read so, or the background is wider than the detector.
+        """
+        from rift_cl.io.scans.formats import open_scan
+
+        scan = open_scan(
+            path,
+            dataset=self.dataset,
+            theta=self.theta,
+            flats=self.flats,
+            darks=self.darks,
+            image_key=self.image_key,
+            kind=self.kind,
+            axes=self.axes,
+            angle_unit=self.angle_unit,
+            geometry=self.geometry,
+            reversed=self.reversed,
+            repeat=self.repeat,
+            values=values,
+            budget=budget,
+        )
+        if self.background is None:
+            return scan
+        if not 0 <= 2 * self.background <= scan.shape[2]:
+            raise InputError(
+                f"--background is {self.background}, wanted 0 to {scan.shape[2] // 2} bins at each "
+                "end of the detector"
+            )
+        return dataclasses.replace(scan, background=self.background)
 
 
 @dataclass(frozen=True)
@@ -59,20 +109,8 @@ class ScanInput(ScanArrays):
     """HDF5 (Data Exchange, NXtomo, or any named dataset), NPZ, MAT, MRC, TXRM or TIFF file, folder
     of TIFF files, or a file that describes one: a scanner's .xtekct or .log, or .yaml or .json as
     in docs/how-to/scan_cones.md."""
-    flats: Auto[str] = None
-    """Flat fields (beam without sample): their name in the file; for TIFF, their folder or file.
-    For counts without flat fields, 'air' estimates the incident beam of each view from the
-    outermost bins at both ends, which must see only air, 'mean' from the mean of the view."""
-    darks: Auto[str] = None
-    """Dark fields (no beam): their name in the file; for TIFF, their folder or file."""
-    kind: Auto[Kind] = None
-    """What the values are: detector counts, transmission (counts divided by those of the beam), or
-    attenuation (line integrals). Default: inferred from flat fields, names, units and values."""
     memory: Auto[str] = None
     """Maximum memory to use, such as 512M or 4G. Default: a share of what is free."""
-    background: AutoExpert[int] = None
-    """For line integrals that are not zero in air: number of bins at each end of the detector whose
-    mean is subtracted from every view. Default: what the file's layout says, usually 0."""
 
     @property
     def memory_limit(self) -> int | None:
@@ -91,34 +129,11 @@ class ScanInput(ScanArrays):
             InputError: it is one of these and they are not accepted, or the background is wider
                 than the detector.
         """
-        from rift_cl.io.scans.formats import open_scan
-
-        scan = open_scan(
-            self.scan,
-            dataset=self.dataset,
-            theta=self.theta,
-            flats=self.flats,
-            darks=self.darks,
-            image_key=self.image_key,
-            kind=self.kind,
-            axes=self.axes,
-            angle_unit=self.angle_unit,
-            geometry=self.geometry,
-            reversed=self.reversed,
-            repeat=self.repeat,
-            budget=self.memory_limit,
-        )
+        scan = self.open_file(self.scan, budget=self.memory_limit)
         if not (fan or (scan.fan is None and scan.cone is None)):
             beam = "fan" if scan.cone is None else "cone"
             raise InputError(
                 f"{scan.path}: is a {beam}-beam scan, this command takes parallel beams; "
                 "'rift reconstruct' takes both"
             )
-        if self.background is None:
-            return scan
-        if not 0 <= 2 * self.background <= scan.shape[2]:
-            raise InputError(
-                f"--background is {self.background}, wanted 0 to {scan.shape[2] // 2} bins at each "
-                "end of the detector"
-            )
-        return dataclasses.replace(scan, background=self.background)
+        return scan
