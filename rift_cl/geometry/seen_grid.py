@@ -13,6 +13,9 @@ from rift_cl.geometry.grid import Grid
 from rift_cl.geometry.scan_value import checked_length
 from rift_cl.geometry.vectors import Vectors
 
+# Rows that an interpolation of any footprint reads beside a shadow.
+_BESIDE = 4
+
 
 class ScanLengths(NamedTuple):
     """Lengths that most views of a scan have.
@@ -98,6 +101,34 @@ def slices_beyond(scan: Cone | Vectors, grid: Grid) -> tuple[int, int]:
     share = radius / (lengths.source_to_axis * grid.spacing[0])
     below, above = (_whole(abs(height) * share) for height in heights)
     return below, above
+
+
+def rows_seen(scan: Cone | Vectors, grid: Grid) -> tuple[int, int]:
+    """The first detector row that voxels are seen in, in any view, and the one after the last.
+
+    With the rows beside them that are read between; at least one. Of vectors these are all rows.
+
+    Args:
+        scan: source and detector.
+        grid: the voxels, none of them as far from the axis as the source.
+    """
+    if isinstance(scan, Vectors):
+        return 0, scan.rows
+    z, half = grid.center[0], grid.shape[0] * grid.spacing[0] / 2
+    ends = z - half - float(scan.heights.max()), z + half - float(scan.heights.min())
+    across = zip(grid.center[1:], grid.shape[1:], grid.spacing[1:], strict=True)
+    radius = math.hypot(*(abs(middle) + count * step / 2 for middle, count, step in across))
+    nearest, farthest = scan.source_to_axis - radius, scan.source_to_axis + radius
+    scale = scan.source_to_detector / scan.pitch[0]
+    low, high = (
+        end * scale / (nearest if end * way > 0 else farthest)
+        for end, way in zip(ends, (-1, 1), strict=True)
+    )
+    beside = _BESIDE + grid.spacing[0] * scale / nearest
+    first = math.floor(scan.center[0] + low - beside)
+    stop = math.ceil(scan.center[0] + high + beside) + 1
+    first = min(max(first, 0), scan.rows - 1)
+    return first, min(max(stop, first + 1), scan.rows)
 
 
 def _rows_of_cone(scan: Cone, row: float) -> tuple[float, float]:

@@ -1,14 +1,11 @@
 """``rift reconstruct --cluster``: other processes make the slices, to the same bits."""
 
 import json
-import os
-import signal
-from contextlib import suppress
 
 import numpy as np
 import pytest
+from killed_worker import kill_one
 
-from rift_cl.cluster import workers
 from rift_cl.commands.reconstruct.job import Reconstruction
 from rift_cl.commands.reconstruct.kept_slabs import SlabFolder
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
@@ -46,24 +43,7 @@ def made(job):
 @pytest.mark.full
 def test_a_killed_worker_changes_no_bit(scan, tmp_path, monkeypatch):
     pytest.importorskip("distributed", reason=WANTED)
-    psutil = pytest.importorskip("psutil")
-    begin, begun = workers._Running.begin, []
-
-    def words_of(process):
-        # One that has just ended has none.
-        with suppress(psutil.Error):
-            return " ".join(process.cmdline())
-        return ""
-
-    def killing(self, task, tries=1):
-        begin(self, task, tries)
-        begun.append(task)
-        if len(begun) == 3:
-            children = psutil.Process().children(recursive=True)
-            own = [child for child in children if "spawn_main" in words_of(child)]
-            os.kill(own[-1].pid, signal.SIGKILL)
-
-    monkeypatch.setattr(workers._Running, "begin", killing)
+    begun = kill_one(monkeypatch, after=3)
     monkeypatch.chdir(scan.parent)
     job = Reconstruction(settings(scan.relative_to(scan.parent), tmp_path / "a", cluster="local:2"))
     told = []

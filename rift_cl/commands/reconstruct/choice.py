@@ -7,8 +7,14 @@ from rift_cl.commands.reconstruct.job import Reconstruction
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 
 
-def reconstruction_of(settings: ReconstructSettings) -> Reconstruction | ConeReconstruction:
+def reconstruction_of(
+    settings: ReconstructSettings, *, joins: bool = False
+) -> Reconstruction | ConeReconstruction:
     """The reconstruction of the settings' scan, planned; nothing is written yet.
+
+    Args:
+        settings: what to do.
+        joins: whether parts of a run are to be done that another process has begun.
 
     Raises:
         RiftError: anything about the settings, the file, the device or the folder is wrong.
@@ -17,4 +23,4 @@ def reconstruction_of(settings: ReconstructSettings) -> Reconstruction | ConeRec
     file = settings.open_scan(fan=True)
     if file.cone is None:
         return Reconstruction(settings, file)
-    return ConeReconstruction(settings, file)
+    return ConeReconstruction(settings, file, joins=joins)

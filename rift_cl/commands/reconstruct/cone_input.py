@@ -31,7 +31,6 @@ _REFUSED: dict[str, Any] = {
     "error": None,
     "centers": None,
     "half_acquisition": "weighted",
-    "cluster": None,
 }
 # Volumes and stacks of projections that a method holds at a time, on host and device together.
 _HELD = {"fbp": (3, 5), "backproject": (3, 4), "sirt": (6, 6), "cgls": (6, 6), "tv": (16, 7)}
@@ -138,6 +137,7 @@ class ConeInput:
         self.tilt = math.degrees(file.lean) if settings.tilt is None else settings.tilt
         # Whether the angles run the other way than the file was taken to say.
         self.turned = False
+        self._axis_taken = False
         self.clean = CleanRows(self.scan, settings, None, device)
         self.notes: list[str] = [*file.notes]
         self.axis: dict[str, Any] = {}
@@ -173,13 +173,25 @@ class ConeInput:
         first, stop = (number + self.beyond[0] for number in self.window.slices)
         return slice(first, stop), slice(top, bottom), slice(left, right)
 
-    def read(self) -> Attenuation:
-        """Line integrals of all rows, corrected."""
-        return self.clean.read(0, self.scan.shape[1])
+    def read(self, first: int = 0, stop: int | None = None) -> Attenuation:
+        """Line integrals of some rows, corrected; of all if none are named."""
+        return self.clean.read(first, self.scan.shape[1] if stop is None else stop)
 
     def identity(self) -> dict[str, str]:
         """The file and the geometry, which decide the volume besides the settings."""
-        return {**scan_identity(self.file), "geometry": self.geometry.digest}
+        axis = {"axis": repr(self.center), "tilt of the axis": repr(self.tilt)}
+        axis["angles"] = "reversed" if self.turned else "as given"
+        return {**scan_identity(self.file), **axis, "geometry": self.geometry.digest}
+
+    def take(self, axis: tuple[float, float, bool] | None) -> None:
+        """Take the axis that was found when the run began, in place of a search.
+
+        Args:
+            axis: its bin, its tilt in degrees, and whether angles were reversed; None where the
+                run had none to find.
+        """
+        if axis is not None and self.settings.center is None:
+            (self.center, self.tilt, self.turned), self._axis_taken = axis, True
 
     def locate(self) -> None:
         """Find the axis and the sense of rotation, unless they are said, and say what is done."""
@@ -248,6 +260,8 @@ class ConeInput:
         """Bin of the axis on the detector as the file has it, and how it is known."""
         if self.settings.center is not None:
             return {"center": self.settings.center, "by": "--center"}
+        if self._axis_taken:
+            return {"center": self.center, "by": "search"}
         cone = self.file.cone
         if not isinstance(cone, Cone):
             return {"center": (self.file.shape[2] - 1) / 2, "by": "the vectors"}

@@ -4,25 +4,29 @@ No slice of a cone-beam scan is independent of its neighbours: every one needs a
 these are in memory together. The volume need not be: where both do not fit, ``fbp`` and
 ``backproject`` make and write it in slabs, and methods that take steps keep it beside the device,
 in memory or in temporary files, and work on parts of it. What does not fit is told before any work.
+A formula's slabs may be made by the workers of a cluster, each from its rows (``cone_slabs``).
 """
 
 from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import suppress
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl import __version__
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
 from rift_cl.commands.pictures.coverage_pictures import add_missed_planes
 from rift_cl.commands.pictures.slice_pictures import display_window
 from rift_cl.commands.reconstruct.cone_input import ConeInput, VolumeWindow, decided_cone_settings
+from rift_cl.commands.reconstruct.cone_slabs import ConeSlabs
 from rift_cl.commands.reconstruct.inversion import least_squares
+from rift_cl.commands.reconstruct.kept_slabs import SlabFolder, refuse_begun, run_folder, stopped
 from rift_cl.commands.reconstruct.report import PREVIEW_PICTURE, Preview, reconstruction_page
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.volume import volume_path
@@ -49,6 +53,7 @@ from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_png, image_grid
 
 Floats = NDArray[np.float32]
+Formula: TypeAlias = "FDK | Katsevich | Backprojection"
 # Slices that are written together.
 _WRITTEN = 16
 
@@ -72,12 +77,15 @@ class ConeReconstruction:
     Args:
         settings: what to do.
         file: the scan.
+        joins: whether parts of a run are to be done that another process has begun.
 
     Raises:
         RiftError: anything about the settings, the file, the device or the folder is wrong.
     """
 
-    def __init__(self, settings: ReconstructSettings, file: ScanFile) -> None:
+    def __init__(
+        self, settings: ReconstructSettings, file: ScanFile, *, joins: bool = False
+    ) -> None:
         settings.check()
         self.settings = settings
         self.device: Device = settings.open_device(settings.memory_limit)
@@ -86,15 +94,22 @@ class ConeReconstruction:
         # Made now, so that a scan that the method does not take is told before any work.
         self.projector, self._formula = self._operators()
         self._check_parts()
-        out = settings.out
-        alone = out.is_dir() and {p.name for p in out.iterdir()} <= {PREVIEW_PICTURE, "config.json"}
-        # A preview alone is there to be followed by the slices.
-        begun = dataclasses.replace(settings, overwrite=True, resume=False) if alone else settings
-        self.folder = RunFolder.of(begun, "reconstruct")
+        self.kept = SlabFolder(settings.out / "slabs", self.shape)
+        """The slices that are done, where they are made slab by slab."""
+        self.folder = run_folder(settings, self.kept) if joins else self._own_folder()
+        self._gone_on = False
         self.metrics: dict[str, Any] = {}
         self.announce: Callable[[str], None] = lambda line: None
         self._values: tuple[float, float] | None = None
         self._begin = time.perf_counter()
+
+    def _own_folder(self) -> RunFolder:
+        settings, out = self.settings, self.settings.out
+        refuse_begun(settings, self.kept)
+        alone = out.is_dir() and {p.name for p in out.iterdir()} <= {PREVIEW_PICTURE, "config.json"}
+        # A preview alone is there to be followed by the slices.
+        begun = dataclasses.replace(settings, overwrite=True, resume=False) if alone else settings
+        return RunFolder.of(begun, "reconstruct")
 
     @property
     def finished(self) -> bool:
@@ -124,7 +139,21 @@ class ConeReconstruction:
         """The settings with all that was decided."""
         return decided_cone_settings(self.source, self._values)
 
-    def _operators(self) -> tuple[Projector, FDK | Katsevich | Backprojection | None]:
+    @property
+    def block(self) -> int:
+        """Slices that parts of the run are not cut between."""
+        return self._slabs.block
+
+    @property
+    def _slabs(self) -> ConeSlabs:
+        if self._formula is None:
+            raise InputError(
+                "--cluster of a cone-beam scan is for --method fbp or backproject: a step needs "
+                "the whole volume, so that it cannot be divided among workers"
+            )
+        return ConeSlabs(self.source, self._formula)
+
+    def _operators(self) -> tuple[Projector, Formula | None]:
         """The projector of the voxels that are solved for, and the formula where it is one."""
         settings = self.settings
         options: dict[str, Any] = {"device": self.device}
@@ -136,7 +165,7 @@ class ConeReconstruction:
         A = Projector(self.source.solved, self.source.geometry, **options)
         return A, None if settings.iterative else self._formula_of(A)
 
-    def _formula_of(self, A: Projector) -> FDK | Katsevich | Backprojection:
+    def _formula_of(self, A: Projector) -> Formula:
         """The formula that was asked for."""
         settings = self.settings
         if settings.method == "backproject":
@@ -146,6 +175,8 @@ class ConeReconstruction:
     def _check_parts(self) -> None:
         """Refuse parts that find no room, or of which no window of values can be chosen."""
         settings, left = self.settings, self.source.part_budget
+        if settings.cluster is not None:
+            _ = self._slabs
         if left is None:
             return
         if self._formula is None:
@@ -153,7 +184,9 @@ class ConeReconstruction:
             check_part(self.projector.T, left)
             return
         self._formula.check_slabs(left)
-        if settings.dtype != "float32" and settings.window is None and not settings.preview:
+        kept = settings.cluster is not None
+        whole = settings.dtype == "float32" or settings.window is not None
+        if not (whole or kept or settings.preview):
             raise InputError(
                 f"--dtype {settings.dtype} wants --window LOW HIGH here: volume and projections do "
                 f"not fit the memory budget of {format_bytes(self.device.budget)} at once, and a "
@@ -189,6 +222,7 @@ class ConeReconstruction:
             "method": self.settings.method,
             "assumed": " ".join(self.source.notes) or "nothing",
             "device": f"{device.name}, budget {format_bytes(device.budget)}",
+            **({} if self.settings.cluster is None else {"workers": self.settings.cluster}),
             "output": str(volume_path(self.settings)),
         }
 
@@ -199,8 +233,17 @@ class ConeReconstruction:
             self.announce(f"{self.settings.out}: the reconstruction is complete already")
             return
         total = 1 + self.settings.most_steps
-        yield Report(0, total, "steps")
+        in_slabs = not self.settings.preview and self._in_slabs
+        if not in_slabs:
+            yield Report(0, total, "steps")
+        elif not self.settings.resume:
+            yield self.report(0)
+        if in_slabs and self._goes_on:
+            self.source.take(self.kept.axis())
         self._locate()
+        if in_slabs and self._goes_on:
+            self.kept.go_on(self._facts())
+            self._gone_on = True
         for note in self.source.notes:
             self.announce(note)
         self.folder.make()
@@ -210,29 +253,118 @@ class ConeReconstruction:
                 yield Report(total, total, "steps")
                 return
             self._check_place()
+            if in_slabs:
+                yield from self._keep_slabs()
+                self._finish(None)
+                return
             integrals = self._read()
-            self.metrics = {"dead_pixels": integrals.dead, "starved_samples": integrals.starved}
+            self._count(dead_pixels=integrals.dead, starved_samples=integrals.starved)
             yield Report(1, total, "steps")
             slabs = yield from self._solve(integrals.projections, total)
             self._finish(slabs)
-        except BaseException:
-            self.folder.discard()
+        except BaseException as error:
+            if not self._keep_what_is_done():
+                self.folder.discard()
+            elif isinstance(error, KeyboardInterrupt):
+                raise stopped(self.kept) from None
             raise
         yield Report(total, total, "steps")
 
+    @property
+    def _goes_on(self) -> bool:
+        """Whether slabs that an earlier run kept are gone on with."""
+        return self.settings.resume and self.kept.begun
+
+    @property
+    def _in_slabs(self) -> bool:
+        """Whether the volume is made of slabs that are kept."""
+        return self.settings.cluster is not None or self._goes_on
+
+    def _facts(self) -> dict[str, str]:
+        """What decides the volume."""
+        own = {"rift_cl": __version__, **self.settings.decisive(), **self.source.identity()}
+        return {**own, "volume": str(self.shape)}
+
+    def join(self, names: Mapping[str, str]) -> None:
+        """Get ready to do a part of a run that another process has begun, about the axis it found.
+
+        Args:
+            names: what that process calls the files of the run, by their paths here.
+
+        Raises:
+            CheckpointError: the run is not this one.
+        """
+        self.source.take(self.kept.axis())
+        self._locate()
+        self.kept.go_on(self._facts(), names)
+
+    def _keep_slabs(self) -> Iterator[Report]:
+        """Make all slices that are missing, and keep them."""
+        self._check_sides(self._slabs.few_rows())
+        self.source.clean.zingers = 0
+        if not self._gone_on:
+            self.kept.begin(self._facts())
+        if self.settings.cluster is None:
+            yield from self.work_on(self.kept.missing())
+            return
+        # Imported when used: a worker imports this module.
+        from rift_cl.commands.reconstruct.spread import spread
+
+        yield from spread(self)
+
+    def work_on(self, runs: list[slice]) -> Iterator[Report]:
+        """Make and keep runs of slices; a report after each part that found room."""
+        for run in runs:
+            integrals = self._slabs.read(run)
+            self._count(dead_pixels=integrals.dead, starved_samples=integrals.starved)
+            for start, part in self._slabs.made(run, integrals.projections):
+                self.kept.save(start, part)
+                yield self.report(self.kept.done)
+
+    def report(self, done: int, values: Mapping[str, float] | None = None) -> Report:
+        """Where it stands after so many slices."""
+        return Report(done, self.shape[0], "slices", values or {})
+
+    def take(
+        self, figures: Mapping[str, int], zingers: int, residuals: Mapping[int, list[float]]
+    ) -> None:
+        """Take what a worker tells of the slices that it made."""
+        self._count(**figures)
+        self.source.clean.zingers += zingers
+        self.inversion.residuals.update(residuals)
+
+    def _count(self, **found: int) -> None:
+        """Add to the figures of the run."""
+        self.metrics.update({name: self.metrics.get(name, 0) + n for name, n in found.items()})
+
+    def _keep_what_is_done(self) -> bool:
+        """After a failure: whether slices are kept; else the traces of slabs are removed."""
+        if not self._in_slabs or self.settings.preview:
+            return False
+        if self._gone_on or (self.kept.begun and self.kept.done):
+            return True
+        self.kept.drop()
+        return False
+
     def _read(self) -> Attenuation:
-        """Line integrals of all rows, whose sides a formula can take.
+        """Line integrals of all rows, whose sides a formula can take."""
+        integrals = self.source.read()
+        self._check_sides(integrals.projections)
+        return integrals
+
+    def _check_sides(self, projections: Floats) -> None:
+        """Say where the object reaches beyond a side of the detector.
 
         Raises:
             InputError: no view shows what the shorter side of the detector does not.
         """
-        integrals, scan = self.source.read(), self.source.geometry
+        scan = self.source.geometry
         if not isinstance(self._formula, FDK) or not isinstance(scan, Cone):
-            return integrals
+            return
         bin, turn = scan.center[1], is_full_turn(scan.angles)
         further = sees_further(bin, scan.bins)
-        if not is_truncated(integrals.projections, bin if further and turn else None):
-            return integrals
+        if not is_truncated(projections, bin if further and turn else None):
+            return
         if further and not turn:
             raise InputError(
                 f"{self.source.file.path}: the object reaches beyond a side of the detector, whose "
@@ -246,7 +378,6 @@ class ConeReconstruction:
         )
         self.source.notes.append(note)
         self.announce(note)
-        return integrals
 
     def _solve(self, projections: Floats, total: int) -> Generator[Report, None, Iterable[Floats]]:
         """The volume in slabs, or in one, after a report for every step."""
@@ -283,10 +414,19 @@ class ConeReconstruction:
         A = Projector(grid, self.source.geometry, device=self.device)
         return [np.asarray(self._formula_of(A)(self._read().projections))[0]]
 
-    def _finish(self, slabs: Iterable[Floats]) -> None:
-        """Write the volume, its pictures and the report."""
-        if isinstance(slabs, list):
-            self._values = self._value_window(slabs[0])
+    def _finish(self, slabs: Iterable[Floats] | None) -> None:
+        """Write the volume, its pictures and the report.
+
+        Args:
+            slabs: the volume from its first slice on; None where it is kept in slabs.
+        """
+        numbers = Preview(self.shape[0]).panels
+        if slabs is None:
+            self._values = self._value_window(lambda: self.kept.slices(numbers))
+            slabs = (slab for _, slab in self.kept.slabs())
+        elif isinstance(slabs, list):
+            volume = slabs[0]
+            self._values = self._value_window(lambda: [volume[n] for n in numbers])
         else:
             self._values = self.settings.window
         preview, sections = Preview(self.shape[0]), _Sections(self.shape)
@@ -307,7 +447,7 @@ class ConeReconstruction:
         self.metrics.update(preview.statistics())
         self.metrics["seconds"] = time.perf_counter() - self._begin
         record = {**self.metrics, "assumed": self.source.notes}
-        facts = {**self.settings.decisive(), **self.source.identity(), "volume": str(self.shape)}
+        facts = self._facts()
         self.folder.finish(
             self.decided,
             record,
@@ -317,6 +457,7 @@ class ConeReconstruction:
             axis=self.source.axis,
             run=facts,
         )
+        self.kept.drop()
 
     def _page(self, preview: Preview) -> Page:
         page = reconstruction_page(self, preview)
@@ -324,11 +465,11 @@ class ConeReconstruction:
         add_missed_planes(page, self.source.geometry, self.source.window.whole, unit=unit)
         return page
 
-    def _value_window(self, volume: Floats) -> tuple[float, float] | None:
+    def _value_window(self, few: Callable[[], list[Floats]]) -> tuple[float, float] | None:
         """What the integers of the volume stand for, from a few slices where it was not said."""
         if self.settings.dtype == "float32" or self.settings.window is not None:
             return self.settings.window
-        low, high = suggested_window([volume[n] for n in Preview(len(volume)).panels])
+        low, high = suggested_window(few())
         self.source.notes.append(
             f"Samples are {self.settings.dtype} from {low:g} to {high:g}, a window chosen from a "
             "few slices (--window)."

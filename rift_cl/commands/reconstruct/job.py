@@ -27,6 +27,7 @@ from rift_cl.commands.reconstruct.kept_slabs import (
     check_same,
     finished_run,
     run_folder,
+    stopped,
 )
 from rift_cl.commands.reconstruct.overlap import Behind, ahead
 from rift_cl.commands.reconstruct.report import (
@@ -39,7 +40,6 @@ from rift_cl.commands.reconstruct.report import (
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.slice_input import SliceInput
 from rift_cl.commands.reconstruct.volume import check_place, open_slices, volume_path
-from rift_cl.errors import StoppedError
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.io.volumes import VOLUME_NAMES, suggested_window
 from rift_cl.progress import Report
@@ -95,6 +95,11 @@ class Reconstruction:
         return self.rows[1] - self.rows[0], *self.inversion.window.shape
 
     @property
+    def block(self) -> int:
+        """Slices that parts of the run are not cut between."""
+        return 1
+
+    @property
     def result(self) -> str:
         """What there is when it is done, and where."""
         if self.settings.preview:
@@ -146,10 +151,7 @@ class Reconstruction:
             if not self._keep_what_is_done():
                 self.folder.discard()
             elif isinstance(error, KeyboardInterrupt):
-                raise StoppedError(
-                    f"interrupted; {self.kept.done} of {self.shape[0]} slices are kept: the same "
-                    "command with --resume goes on"
-                ) from None
+                raise stopped(self.kept) from None
             raise
         self._finish()
 
@@ -366,11 +368,7 @@ class Reconstruction:
         """What the integers of the volume stand for, from a few slices where it was not said."""
         if self.settings.dtype == "float32" or self.settings.window is not None:
             return self.settings.window
-        wanted = Preview(self.shape[0]).panels
-        slabs = self.kept.slabs(wanted)
-        images = [
-            slab[n - start] for start, slab in slabs for n in wanted if 0 <= n - start < len(slab)
-        ]
+        images = self.kept.slices(Preview(self.shape[0]).panels)
         low, high = suggested_window(images)
         self.source.notes.append(
             f"Samples are {self.settings.dtype} from {low:g} to {high:g}, a window chosen from "

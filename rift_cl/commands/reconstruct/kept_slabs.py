@@ -24,7 +24,7 @@ from rift_cl.commands.reconstruct.report import PREVIEW_PICTURE
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.volume import volume_path
 from rift_cl.commands.run_folder.run_folder import RunFolder, difference, is_unfinished
-from rift_cl.errors import CheckpointError, InputError, OutputError
+from rift_cl.errors import CheckpointError, InputError, OutputError, StoppedError
 from rift_cl.io.boundary import reading
 from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import atomic_path, check_space, make_folder, write_json, writing
@@ -81,7 +81,7 @@ class SlabFolder:
         return token
 
     def axis(self) -> tuple[float, float, bool] | None:
-        """The rotation axis of the run that was cut off, if it had one.
+        """The rotation axis of the run that was begun, if it had one.
 
         Returns:
             Its bin, its tilt, and whether a fan's angles were reversed.
@@ -205,6 +205,13 @@ class SlabFolder:
             first, given = max(start, given), stop
             yield first, np.array(slab[first - start :])
 
+    def slices(self, numbers: Collection[int]) -> list[Floats]:
+        """Single slices, in the order in which they are kept."""
+        slabs = self.slabs(numbers)
+        return [
+            slab[n - start] for start, slab in slabs for n in numbers if 0 <= n - start < len(slab)
+        ]
+
     def drop(self) -> None:
         """Remove the folder."""
         if self.path.is_dir():
@@ -251,6 +258,27 @@ def finished_run(settings: ReconstructSettings) -> dict[str, Any] | None:
         return None
 
 
+def stopped(kept: SlabFolder) -> StoppedError:
+    """What is said when a run is broken off whose slices are kept."""
+    return StoppedError(
+        f"interrupted; {kept.done} of {kept.shape[0]} slices are kept: the same command with "
+        "--resume goes on"
+    )
+
+
+def refuse_begun(settings: ReconstructSettings, kept: SlabFolder) -> None:
+    """Refuse to begin where a run was cut off, unless it is said what shall become of it.
+
+    Raises:
+        OutputError: nothing is said.
+    """
+    if kept.begun and not (settings.resume or settings.overwrite or settings.dry_run):
+        raise OutputError(
+            f"{settings.out}: holds a reconstruction that was cut off: --resume goes on with it, "
+            "--overwrite begins anew"
+        )
+
+
 def run_folder(settings: ReconstructSettings, kept: SlabFolder) -> RunFolder:
     """The folder of a run, if it may be used.
 
@@ -258,11 +286,7 @@ def run_folder(settings: ReconstructSettings, kept: SlabFolder) -> RunFolder:
         OutputError: it holds something that would be lost.
     """
     out, begun = settings.out, kept.begun
-    if begun and not (settings.resume or settings.overwrite or settings.dry_run):
-        raise OutputError(
-            f"{out}: holds a reconstruction that was cut off: --resume goes on with it, "
-            "--overwrite begins anew"
-        )
+    refuse_begun(settings, kept)
     # A preview alone is there to be followed by the slices.
     alone = out.is_dir() and {p.name for p in out.iterdir()} <= {PREVIEW_PICTURE, "config.json"}
     # One that was killed before it kept anything is begun again.

@@ -1,8 +1,9 @@
 """A reconstruction on the workers of a cluster, who each do runs of slices of one begun run.
 
-A worker opens the scan by itself, takes the axis from the record of the run, cuts its slices into
-slabs that fit its own memory, and keeps these beside the others. What it does is what this process
-would do without a cluster, so that a run may be gone on with either way, to the same bits.
+A worker opens the scan by itself, takes the axis from the record of the run, reads the rows that
+its slices need, cuts these into slabs that fit its own memory, and keeps them beside the others.
+What it does is what this process would do without a cluster, so that a run may be gone on with
+either way, to the same bits.
 """
 
 from __future__ import annotations
@@ -11,17 +12,20 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from rift_cl.cluster.address import ClusterAddress
 from rift_cl.cluster.on_worker import token
-from rift_cl.cluster.workers import Task, Workers, cluster_workers
+from rift_cl.cluster.workers import Task, cluster_workers
 from rift_cl.commands.options import absolute_files
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.progress import Report
 
 if TYPE_CHECKING:
+    from rift_cl.commands.reconstruct.cone_job import ConeReconstruction
     from rift_cl.commands.reconstruct.job import Reconstruction
+
+    Run: TypeAlias = Reconstruction | ConeReconstruction
 
 # Tasks that a worker gets at least, and slices of one at most: a lost worker loses no more.
 _SHARES, _MOST = 4, 64
@@ -43,7 +47,7 @@ class Receipt(NamedTuple):
     device: str
 
 
-def spread(job: Reconstruction) -> Iterator[Report]:
+def spread(job: Run) -> Iterator[Report]:
     """Have the missing slices of a run that has begun made by workers; a report now and then.
 
     Raises:
@@ -57,9 +61,11 @@ def spread(job: Reconstruction) -> Iterator[Report]:
         run = kept.mark()
         with token(kept.path) as seen:
             workers.check([theirs.out, *_files(theirs), seen])
+        runs = _runs(kept.missing(), len(workers), job.block)
+        tasks = (_task(wanted, theirs, names, run) for wanted in runs)
         used: set[str] = set()
         done, lost = -1, 0
-        for come in workers.each(make_slices, _tasks(kept.missing(), workers, theirs, names, run)):
+        for come in workers.each(make_slices, tasks):
             if come is not None:
                 used.add(come[1].device)
                 job.take(*come[1][:3])
@@ -77,21 +83,25 @@ def spread(job: Reconstruction) -> Iterator[Report]:
         )
 
 
-def _tasks(
-    missing: list[slice],
-    workers: Workers,
-    settings: ReconstructSettings,
-    names: Mapping[str, str],
-    run: str,
-) -> Iterator[Task]:
-    """Runs of slices, as many as keep all workers busy to the end."""
+def _runs(missing: list[slice], workers: int, block: int) -> Iterator[slice]:
+    """Runs of slices, as many as keep all workers busy to the end.
+
+    Args:
+        missing: slices that are not there yet; they begin between blocks.
+        workers: how many there are.
+        block: slices that are not cut between.
+    """
     count = sum(wanted.stop - wanted.start for wanted in missing)
-    each = max(1, min(_MOST, -(-count // (_SHARES * len(workers)))))
+    each = max(1, min(_MOST, -(-count // (_SHARES * workers))))
+    each = -(-each // block) * block
     for wanted in missing:
         for first in range(wanted.start, wanted.stop, each):
-            stop = min(first + each, wanted.stop)
-            given = settings, tuple(names.items()), run, first, stop
-            yield Task(f"slices {first} to {stop}", given, stop - first)
+            yield slice(first, min(first + each, wanted.stop))
+
+
+def _task(wanted: slice, settings: ReconstructSettings, names: Mapping[str, str], run: str) -> Task:
+    given = settings, tuple(names.items()), run, wanted.start, wanted.stop
+    return Task(f"slices {wanted.start} to {wanted.stop}", given, wanted.stop - wanted.start)
 
 
 def _of_workers(settings: ReconstructSettings) -> tuple[ReconstructSettings, dict[str, str]]:
@@ -146,18 +156,16 @@ def make_slices(
 
 
 @lru_cache(maxsize=1)
-def _joined(
-    settings: ReconstructSettings, names: tuple[tuple[str, str], ...], run: str
-) -> Reconstruction:
+def _joined(settings: ReconstructSettings, names: tuple[tuple[str, str], ...], run: str) -> Run:
     """The run, which this worker has joined; it stays open for its next slices.
 
     A later run of the same settings has another token: files of the same names may hold else by
     then, such as angles that were mended.
     """
     from rift_cl.commands.devices.driver_test import meet_driver
-    from rift_cl.commands.reconstruct.job import Reconstruction
+    from rift_cl.commands.reconstruct.choice import reconstruction_of
 
-    job = Reconstruction(settings)
+    job = reconstruction_of(settings, joins=True)
     for _ in meet_driver(job.device):
         pass
     job.join(dict(names))

@@ -325,6 +325,14 @@ class ViewFilter(LinearOperator):
         part._taps = self._taps if len(self._taps) == 1 else self._taps[run]
         return part
 
+    def of_rows(self, count: int) -> ViewFilter:
+        """The filter of so many rows of each view, whichever they are."""
+        part = ViewFilter.__new__(ViewFilter)
+        shape = (self.domain[0], count, self.domain[-1])
+        LinearOperator.__init__(part, shape, shape, self.device, self.dtype)
+        part._factors, part._taps = self._factors, self._taps
+        return part
+
 
 def _factors_and_taps(scan: Parallel, filter: Filter, gains: Gains | None) -> tuple[Floats, Floats]:
     """A factor for each view, and halves of kernels: one for all views, or one for each."""

@@ -89,9 +89,18 @@ class VolumeInParts(Projector):
         return part
 
     @property
-    def _block(self) -> int:
+    def block(self) -> int:
         """Slices that are not cut between."""
         return _SLICES
+
+    def of_slices(self, z: slice) -> VolumeInParts:
+        """The projector of some slices in all views, whose adjoint has the bits of the whole.
+
+        Args:
+            z: first slice and the one after the last, either at an end or between blocks.
+        """
+        whole = (z.start, z.stop) == (0, self.domain[0])
+        return self if whole else self._part(z, slice(0, self.range[0]))
 
     def _rows(self, slices: int) -> int:
         """Rows of the data that so many slices are seen in."""
@@ -144,7 +153,7 @@ class VolumeInParts(Projector):
     def _cut(self, budget: int, *, volume_first: bool) -> tuple[list[slice], list[slice]]:
         """Runs of slices and of views of which any two fit, one or the other cut first."""
         (slices, *_), (views, *_) = self.domain, self.range
-        each, largest = self._block, self.device.traits.allocation
+        each, largest = self.block, self.device.traits.allocation
         blocks = -(-slices // each)
 
         def needs(blocks: int, views: int) -> tuple[int, int]:

@@ -39,6 +39,7 @@ from rift_cl.operators.filters.ramp_filters import Filter, FilterLike, ViewFilte
 from rift_cl.operators.linear import Chunk, LinearOperator
 from rift_cl.operators.projector.cone.rectification import Rectification
 from rift_cl.operators.projector.projector import Projector
+from rift_cl.operators.projector.volume_in_parts import VolumeInParts
 from rift_cl.reconstruct.direct.padding import wider
 from rift_cl.reconstruct.direct.ray_factors import RayFactors
 from rift_cl.reconstruct.direct.redundancy import ITERATE, redundancy
@@ -128,21 +129,39 @@ class FDK(Composite):
         self._A._apply_host(y, rays)
         self._weighting._apply_adjoint_host(rays, x)
 
-    def slabs(self, y: NDArray[Any], budget: int) -> Iterator[NDArray[Any]]:
+    def slabs(
+        self,
+        y: NDArray[Any],
+        budget: int,
+        z: tuple[int, int] | None = None,
+        rows: tuple[int, int] | None = None,
+    ) -> Iterator[NDArray[Any]]:
         """The volume in slabs of slices, from the first on, with the bits of the whole.
 
         Args:
-            y: projections on the host, as the operator takes them.
+            y: projections on the host, as the operator takes them; of ``rows`` alone.
             budget: bytes of the device to work in, besides arrays on the host: those of the
                 filtered projections and of a slab.
+            z: the first slice that is wanted and the one after the last, either at an end or a
+                multiple of ``block``; all if not given.
+            rows: the first detector row that ``y`` has and the one after the last, all that these
+                slices are seen in; of tilted detectors all. All if not given.
 
         Raises:
             ResourceLimitError: not even the smallest part fits.
         """
-        filtered = np.empty(self._weighting.range, self.dtype)
-        for chunk in self._weighting._chunks(budget):
-            self._weighting._apply_chunk(y, filtered, chunk, add=False)
-        yield from backprojected_slabs(self._A.T, filtered, budget)
+        weighting, run = self._weighting, slice(*(rows or (0, self.domain[-2])))
+        filtered = np.zeros(weighting.range, self.dtype)
+        part = weighting if rows is None else weighting.of_rows(run)
+        seen = filtered if rows is None else filtered[:, run]
+        for chunk in part._chunks(budget):
+            part._apply_chunk(y, seen, chunk, add=False)
+        yield from backprojected_slabs(slices_of(self._A, z).T, filtered, budget)
+
+    @property
+    def block(self) -> int:
+        """Slices that slabs are not cut between."""
+        return block_of(self._A)
 
     def check_slabs(self, budget: int) -> None:
         """Refuse a budget in which ``slabs`` would find no room.
@@ -173,6 +192,20 @@ def check_part(operator: LinearOperator, budget: int) -> None:
         ResourceLimitError: it does not.
     """
     next(iter(operator._chunks(budget)))
+
+
+def slices_of(A: LinearOperator, z: tuple[int, int] | None) -> LinearOperator:
+    """The projector of some slices of a volume; the whole one if none are named."""
+    if z is None:
+        return A
+    assert isinstance(A, VolumeInParts)
+    return A.of_slices(slice(*z))
+
+
+def block_of(A: LinearOperator) -> int:
+    """Slices of a projector's volume that are not cut between."""
+    assert isinstance(A, VolumeInParts)
+    return A.block
 
 
 def backprojected_slabs(
@@ -285,6 +318,21 @@ class _Weighting(LinearOperator):
         plan_chunks(1, need, 0, budget, what=what, array=array, largest=largest)
         runs = cut_evenly(views, most)
         return (Chunk((run,), (run,), self._of_views(run)) for run in runs)
+
+    def of_rows(self, run: slice) -> _Weighting:
+        """That of some rows of every view, with the numbers of the whole.
+
+        Tilted detectors, whose upright rows are read from several, have all.
+        """
+        (views, rows, bins), (first, stop, _) = self.domain, run.indices(self.domain[1])
+        assert self._reading is None or stop - first == rows
+        return _Weighting(
+            self._filter.of_rows(stop - first),
+            self._into.of_rows(run),
+            self._out_of.of_rows(run),
+            (views, stop - first, bins),
+            self._reading,
+        )
 
     def _of_views(self, run: slice) -> _Weighting:
         """That of some views."""

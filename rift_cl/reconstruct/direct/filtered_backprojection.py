@@ -36,7 +36,9 @@ from rift_cl.reconstruct.direct.fdk import (
     amplitude,
     as_beam,
     backprojected_slabs,
+    block_of,
     check_part,
+    slices_of,
 )
 from rift_cl.reconstruct.direct.katsevich import Katsevich, cone_inversion
 from rift_cl.reconstruct.direct.view_weights import view_gains
@@ -190,9 +192,24 @@ def backproject(A: ParallelProjector | Projector, y: Any, *, out: Any = None) ->
 class Backprojection(Scaled):
     """Backprojection without a filter, an operator from projections to images."""
 
-    def slabs(self, y: NDArray[Any], budget: int) -> Iterator[NDArray[Any]]:
+    def slabs(
+        self,
+        y: NDArray[Any],
+        budget: int,
+        z: tuple[int, int] | None = None,
+        rows: tuple[int, int] | None = None,
+    ) -> Iterator[NDArray[Any]]:
         """The volume in slabs of slices, as ``FDK.slabs``."""
-        return backprojected_slabs(self, y, budget)
+        if rows is not None:
+            given, y = y, np.zeros(self.domain, self.dtype)
+            y[:, slice(*rows)] = given
+        back = slices_of(self._inner.T, z).T * self._factor
+        return backprojected_slabs(back, y, budget)
+
+    @property
+    def block(self) -> int:
+        """Slices that slabs are not cut between."""
+        return block_of(self._inner.T)
 
     def check_slabs(self, budget: int) -> None:
         """Refuse a budget in which ``slabs`` would find no room.

@@ -124,9 +124,22 @@ class Katsevich(LinearOperator):
         self._A._apply_host(y, rays)
         x[...] = self._filter.adjoint(rays, self._gain)
 
-    def slabs(self, y: NDArray[Any], budget: int) -> Iterator[NDArray[Any]]:
-        """The volume in slabs of slices, as ``FDK.slabs``."""
-        return backprojected_slabs(self._A.T, self._filter(y, self._gain), budget)
+    def slabs(
+        self,
+        y: NDArray[Any],
+        budget: int,
+        z: tuple[int, int] | None = None,
+        rows: tuple[int, int] | None = None,
+    ) -> Iterator[NDArray[Any]]:
+        """The volume in slabs of slices, as ``FDK.slabs``; curves of the filter need all rows."""
+        assert rows is None or rows == (0, self.domain[1])
+        back = self._A if z is None else self._A.of_slices(slice(*z))
+        return backprojected_slabs(back.T, self._filter(y, self._gain), budget)
+
+    @property
+    def block(self) -> int:
+        """Slices that slabs are not cut between."""
+        return self._A.block
 
     def check_slabs(self, budget: int) -> None:
         """Refuse a budget in which ``slabs`` would find no room.

@@ -53,6 +53,12 @@ class RayFactors:
         views = views[run] if len(views) > 1 else views
         return RayFactors(self.device, self._dtype, pixels, views, self._before)
 
+    def of_rows(self, run: slice) -> RayFactors:
+        """The factors of some rows of every view."""
+        pixels, views = self._host
+        pixels = pixels[run] if len(pixels) > 1 else pixels
+        return RayFactors(self.device, self._dtype, pixels, views, self._before)
+
     def widen(self, narrow: DeviceArray, wide: DeviceArray) -> None:
         """Fill ``wide`` with the factors times ``narrow``, 0 where that has no bin."""
         self._launch(narrow, wide, -self._before, 0)

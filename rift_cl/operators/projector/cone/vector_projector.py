@@ -122,10 +122,11 @@ class VectorProjector(VolumeInParts):
         return data, slopes
 
     @property
-    def _block(self) -> int:
+    def block(self) -> int:
+        """Slices that are not cut between."""
         # Views that look along z walk from slice to slice.
         whole = any(part.exchanged for part in self._parts)
-        return self.domain[0] if whole else super()._block
+        return self.domain[0] if whole else super().block
 
     def _need(self, slices: int, views: int, *, sparing: bool) -> tuple[int, int]:
         item, of_a_slice = self.dtype.itemsize, math.prod(self.domain[1:])
@@ -134,7 +135,7 @@ class VectorProjector(VolumeInParts):
             *(part.need(slices, views, sparing=sparing) for part in self._parts), strict=True
         )
         # The volume besides that of a part, which may be exchanged or one of two to be added.
-        volumes = len(self._parts) if self._block == self.domain[0] else 0
+        volumes = len(self._parts) if self.block == self.domain[0] else 0
         return data + volumes * item * slices * of_a_slice + max(needs), max(data, *arrays)
 
     def _part(self, z: slice, views: slice) -> VectorProjector:

@@ -1,0 +1,32 @@
+"""A worker of this machine that is killed while a command's work is spread over several."""
+
+import os
+import signal
+from contextlib import suppress
+
+import pytest
+
+from rift_cl.cluster import workers
+
+
+def kill_one(monkeypatch, after):
+    """Kill one as the task of this number is handed out; the list of tasks that were."""
+    psutil = pytest.importorskip("psutil")
+    begin, begun = workers._Running.begin, []
+
+    def words_of(process):
+        # One that has just ended has none.
+        with suppress(psutil.Error):
+            return " ".join(process.cmdline())
+        return ""
+
+    def killing(self, task, tries=1):
+        begin(self, task, tries)
+        begun.append(task)
+        if len(begun) == after:
+            children = psutil.Process().children(recursive=True)
+            own = [child for child in children if "spawn_main" in words_of(child)]
+            os.kill(own[-1].pid, signal.SIGKILL)
+
+    monkeypatch.setattr(workers._Running, "begin", killing)
+    return begun
