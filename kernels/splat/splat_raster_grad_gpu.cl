@@ -206,9 +206,10 @@ KERNEL void splat_raster_grad_gpu(
     float view[CHANNELS];
     UNROLL for (int n = 0; n < CHANNELS; n++) {
       view[n] = inside ? grad_image[pixel * stride + first + n] : 0;
-      behind += view[n] * background[first + n];
       views[n * BLOCKS * PITCH + at] = view[n];
     }
+    /* Apart: clspv dies where this stands in the loop above. */
+    UNROLL for (int n = 0; n < CHANNELS; n++) behind += view[n] * background[first + n];
     /* Ends lie for a moment where sums will. */
     shares[me] = as_float(end);
     barrier(CLK_LOCAL_MEM_FENCE);

@@ -37,6 +37,7 @@ static void adam_lanes(__global float *x, Adam a, ulong i, lanes g, int place) {
   STORE(x + i, LOAD(x + i) - rate * (m * a.c1) / (roots(v * a.c2) + a.epsilon));
 }
 
+#if LANES > 1
 /* A single one, where fewer than LANES are left. */
 static void adam_one(__global float *x, Adam a, ulong i, float g, int place) {
   const float m = a.beta1 * a.m[i] + (1 - a.beta1) * g;
@@ -46,6 +47,7 @@ static void adam_one(__global float *x, Adam a, ulong i, float g, int place) {
   a.v[i] = v;
   x[i] = x[i] - rate * (m * a.c1) / (sqrt(v * a.c2) + a.epsilon);
 }
+#endif
 
 /* The place that is `far` farther on. */
 static int place_after(int place, int far, int period) {
@@ -62,17 +64,19 @@ static void adam_between(__global float *x, Adam a, ulong begin, ulong end, __gl
     adam_lanes(x, a, i, LOAD(g + i), place);
     place = place_after(place, LANES, a.period);
   }
+#if LANES > 1
   for (; i < end; i++) {
     adam_one(x, a, i, g[i], place);
     place = place_after(place, 1, a.period);
   }
+#endif
 }
 
 /* `count` of them from number i on, where a period begins, by a gradient in memory of the work-item's
  * own. */
 static void adam_along(__global float *x, Adam a, ulong i, const int count, const lanes *g) {
   int place = 0;
-#if LANES == 8
+#if LANES > 1
   int n = 0;
   for (; n + LANES <= count; n += LANES) {
     adam_lanes(x, a, i + n, g[n / LANES], place);
