@@ -105,7 +105,9 @@ KERNEL void fan_backproject(
 {
   const int x = (int)get_global_id(0) * LANES, y = (int)get_global_id(1) * ROWS;
   if (x >= width) return;
-  const int rows = y + ROWS < height ? ROWS : height - y;
+  /* No loop where an item has one row: Intel's compiler makes wrong numbers of loops that it cannot see
+   * to run once, over arrays of one number. */
+  const int rows = ROWS == 1 || y + ROWS < height ? ROWS : height - y;
   const lanes column = (real)x + LANE_NUMBERS;
   const real middle_x = (real)0.5f * (width - 1), middle_y = (real)0.5f * (height - 1);
   lanes totals[ROWS], sums[ROWS], depths[ROWS];
