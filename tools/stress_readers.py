@@ -182,6 +182,8 @@ def serve(memory: int) -> None:
     """Read the files that are named on standard input, and answer on standard output."""
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     warnings.simplefilter("error")
+    # Splats that damage made infinite are told, and are no fault.
+    warnings.filterwarnings("ignore", ".*: they are left out")
     for module in ("rift_cl.io", "rift_cl.io.captures.camera_file", "rift_cl.io.checkpoint"):
         importlib.import_module(module)
     print("ready", flush=True)

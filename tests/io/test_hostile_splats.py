@@ -14,6 +14,7 @@ from splat_files import KINDS, valid
 
 import rift_cl as rift
 from rift_cl.errors import FileFormatError, NonFiniteError, ResourceLimitError, RiftError
+from rift_cl.io.scenes.splat_activations import opacities_of
 
 
 def grown() -> int:
@@ -168,33 +169,48 @@ def test_lines_of_text_that_are_no_records(tmp_path: Path, damage: str, where: s
     refused(path, FileFormatError, "records 0 to 7 are no lines of 26 numbers|more than the 7")
 
 
-def test_values_that_are_not_finite_are_counted(tmp_path: Path) -> None:
+def test_splats_that_cannot_be_drawn_are_counted_and_left_out(tmp_path: Path) -> None:
     values = made.records(made.scene(7, 1))
-    values["opacity"][[2, 5]] = np.nan, -np.inf
+    values["opacity"][[0, 1, 2]] = np.inf, -np.inf, np.nan
+    values["scale_1"][4] = 45
     path = made.write(tmp_path / "a.ply", ("vertex", values))
-    refused(path, NonFiniteError, r"logit_opacities holds .* in 2 places, first \(nan\) at \(2,\)")
+    with pytest.warns(UserWarning, match=r"2 of 7 .*\(log_scales, logit_opacities\)"):
+        scene = rift.SplatScene.load(path)
+    # Infinite logits are opacities of 1 and 0.
+    np.testing.assert_array_equal(scene.means[:, 0], values["x"][[0, 1, 3, 5, 6]])
+    np.testing.assert_array_equal(opacities_of(scene.logit_opacities[:2]), [1, 0])
     values = made.retyped(made.records(made.scene(7, 1)), [(n, "f8") for n in made.names(1)])
     values["f_rest_4"][3] = 1e300
     for text in (True, False):
         made.write(path, ("vertex", values), text=text)
-        refused(path, NonFiniteError, r"sh holds .* in 1 places, first \(inf\) at \(3, 2, 1\)")
+        with pytest.warns(UserWarning, match=r"1 of 7 .*\(sh\)"):
+            assert len(rift.SplatScene.load(path)) == 6
+    values["f_rest_4"][:4] = np.nan
+    made.write(path, ("vertex", values))
+    refused(path, NonFiniteError, r"4 of 7 .* the file is damaged")
     # What no scene keeps may be what it likes.
-    values["f_rest_4"][3], values["nx"] = 0, np.nan
+    values["f_rest_4"], values["nx"] = 0, np.nan
     made.write(path, ("vertex", values))
     assert len(rift.SplatScene.load(path)) == 7
 
 
 @pytest.mark.parametrize(
-    ("offset", "value", "kind", "words"),
-    [
-        (36, np.nan, NonFiniteError, r"means holds .* first \(nan\) at \(1, 1\)"),
-        (44, np.inf, NonFiniteError, r"scales holds .* first \(inf\) at \(1, 0\)"),
-        (44, -1.0, FileFormatError, "1 of 7 splats have a negative scale"),
-    ],
+    ("offset", "value", "name"), [(36, np.nan, "means"), (44, np.inf, "log_scales")]
 )
-def test_splats_that_cannot_be(tmp_path: Path, offset, value, kind, words) -> None:
-    path = valid(tmp_path, "a.splat")
+def test_splats_of_32_bytes_are_left_out_alike(tmp_path: Path, offset, value, name) -> None:
+    path = changed_splat(tmp_path, offset, value)
+    with pytest.warns(UserWarning, match=rf"1 of 7 .*\({name}\)"):
+        assert len(rift.SplatScene.load(path)) == 6
+
+
+def test_a_negative_scale_is_refused(tmp_path: Path) -> None:
+    path = changed_splat(tmp_path, 44, -1)
+    refused(path, FileFormatError, "1 of 7 splats have a negative scale")
+
+
+def changed_splat(folder: Path, offset: int, value: float) -> Path:
+    path = valid(folder, "a.splat")
     content = bytearray(path.read_bytes())
     content[offset : offset + 4] = np.float32(value).tobytes()
     path.write_bytes(content)
-    refused(path, kind, words)
+    return path

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.cl.host_arrays import check_finite
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.scenes.splat_activations import (
@@ -40,7 +39,6 @@ def read_splat(
 
     Raises:
         FileFormatError: the file cannot hold splats.
-        NonFiniteError: a position or a scale is NaN or infinite.
         ResourceLimitError: they are larger than the budget; nothing was allocated.
     """
     size = file.seek(0, 2)
@@ -54,7 +52,6 @@ def read_splat(
         raise FileFormatError(f"{path}: was cut off while it was read")
     records = np.frombuffer(content, _RECORD)
     scales = records["scale"].astype(np.float32)
-    check_finite(scales, name=f"{path}: scales")
     negative = np.count_nonzero((scales < 0).any(axis=1))
     if negative:
         raise FileFormatError(

@@ -66,7 +66,7 @@ def read_ply(
         arrays["environment"] = read_light(path, header.comments, basis.environment)
     start = 0
     for block in read_blocks(path, file, header):
-        # A number too large for float32 becomes infinite, and is refused with the others.
+        # A number too large for float32 becomes infinite, and is left out with the others.
         with np.errstate(over="ignore"):
             for name, column in columns.items():
                 column[start : start + len(block)] = block[name]

@@ -33,6 +33,7 @@ from rift_cl.io.scenes.splat_activations import (
 from rift_cl.io.scenes.splat_basis import SceneBasis
 from rift_cl.io.scenes.splat_file import encode_splat, read_splat
 from rift_cl.io.scenes.splat_ply import COEFFICIENTS, encode_ply, read_ply, scene_shapes
+from rift_cl.io.scenes.whole_splats import whole_splats
 from rift_cl.splat.settings import Activation, SplatMode
 from rift_cl.splat.splats import Splats
 
@@ -140,7 +141,8 @@ class SplatScene:
 
         A PLY file may be text or binary of either byte order, with its properties in any order,
         of any scalar type, and with others between them, which are left out. A .splat file has
-        no signature and is known by its name.
+        no signature and is known by its name. Splats that cannot be drawn, since a number of
+        theirs is NaN or infinite, are left out, and a warning counts them.
 
         Args:
             path: the file.
@@ -152,14 +154,15 @@ class SplatScene:
         Raises:
             InputError: there is no such file.
             FileFormatError: the file is damaged, or holds no splats.
-            NonFiniteError: it holds NaN or infinity.
+            NonFiniteError: more than half of the splats cannot be drawn, or the light holds NaN.
             ResourceLimitError: the splats are larger than the budget; nothing was allocated.
         """
         path = Path(path)
         with reading(path, "the scene"):
             mode, basis, arrays = _read(path, budget=budget)
-            for name, array in arrays.items():
-                check_finite(array, name=f"{path}: {name}")
+        if basis.environment:
+            check_finite(arrays["environment"], name=f"{path}: environment")
+        arrays = whole_splats(path, mode, arrays)
         kind: type[SplatScene] = XrayScene if mode == "xray" else SplatScene
         return kind(**arrays, activation=basis.activation, angular=basis.angular)
 
