@@ -4,8 +4,8 @@
  *
  * with the weights and shares of include/tomo/fan_footprint.h; before = image[y][x] if `add` is
  * set, else 0. The first bin in reach is found from the place on the detector at which the pixel's
- * near end is seen, a ratio of linear forms (its arc tangent, where the detector is an arc); shares
- * do not depend on that.
+ * near end is seen, a ratio of linear forms (its angle, where the detector is an arc); shares do not
+ * depend on that.
  *
  * Of strips the sum runs over edges: bins before the first have no share, and with y the values
  * and G the part of the pixel before an edge,
@@ -28,22 +28,21 @@
 #ifndef CURVED
 #define CURVED 0
 #endif
+/* Farther than any bin. */
+#define FAR 1e30f
 #if CURVED
-/* arc tangent of |t| < 4 to 1e-5, by half the angle and a polynomial through its Chebyshev points. */
-static lanes root(lanes v) {
-#if LANES == 8
-  lanes x = 0.5f * (1.0f + v);
-  UNROLL for (int n = 0; n < 5; n++) x = 0.5f * (x + v / x);
-  return x;
-#else
-  return sqrt(v);
-#endif
-}
-static lanes arc(lanes t) {
-  const lanes h = t / (1.0f + root(1.0f + t * t)), v = h * h;
-  return 2.0f * h *
-      (0.99999611f + v * (-0.33317368f + v * (0.19807848f + v * (-0.13233519f +
-      v * (0.07962632f - v * 0.0336064f)))));
+#define RIGHT_ANGLE 1.57079633f
+/* The angle from ahead of a point so far ahead and across, to 3e-6, behind the source as well: a
+ * polynomial through the Chebyshev points of arc tangents below one. */
+static lanes angle_of(lanes across, lanes ahead) {
+  const lanes a = absolute(across), b = absolute(ahead);
+  const lanes t = a < b ? a / b : b / a, v = t * t;
+  lanes angle = t *
+      (0.99999483f + v * (-0.33295711f + v * (0.19534659f + v * (-0.12044859f +
+      v * (0.05658999f - v * 0.01313038f)))));
+  angle = a < b ? angle : RIGHT_ANGLE - angle;
+  angle = ahead < 0 ? 2 * RIGHT_ANGLE - angle : angle;
+  return across < 0 ? -angle : angle;
 }
 #endif
 
@@ -55,13 +54,17 @@ static lanes_int first_ray(lanes a, lanes s, lanes rho, __global const real *vie
 #else
   const lanes near = a - (view[WIDEST] > rho ? view[WIDEST] / rho : (lanes)1.0f);
 #endif
-  lanes place = (view[ACROSS] + near * view[ACROSS + 1] + s * view[ACROSS + 2]) /
-      (1.0f + near * view[AHEAD] + s * view[AHEAD + 1]);
+  const lanes across = view[ACROSS] + near * view[ACROSS + 1] + s * view[ACROSS + 2];
+  const lanes ahead = 1.0f + near * view[AHEAD] + s * view[AHEAD + 1];
 #if CURVED
-  place = arc(place) * view[ARC];
+  lanes place = angle_of(across, ahead) * view[ARC];
+#else
+  /* What a wide hat reaches beside the source is before all rays. */
+  lanes place = ahead > 0 ? across / ahead : -FAR;
 #endif
   place = place + view[FIRST_RAY];
-  place = place > -1.0f ? place : -1.0f;
+  const real least = view[FIRST_SEEN] - 1.0f;
+  place = place > least ? place : least;
   place = place < (real)bins ? place : (real)bins;
   return floor_int(place) + 1;
 }

@@ -66,7 +66,8 @@ static lanes_int first_pixel(lanes place, lanes c, real rho) {
 #else
 /* The first pixel within the hat of a ray. */
 static lanes_int first_pixel(lanes place, lanes width, real rho) {
-  return floor_int(place - (width > rho ? width / rho : 1.0f)) + 1;
+  const lanes near = place - (width > rho ? width / rho : 1.0f);
+  return floor_int(near > -2.0f ? near : -2.0f) + 1;
 }
 #endif
 

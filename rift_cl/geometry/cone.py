@@ -34,6 +34,7 @@ from rift_cl.geometry.scan_value import (
     checked_flag,
     checked_length,
     refuse_degrees,
+    refuse_round_arcs,
 )
 from rift_cl.geometry.vectors import Vectors
 
@@ -59,8 +60,8 @@ class Cone(ScanValue):
     Raises:
         ShapeError: ``angles`` is empty or not one-dimensional, a count is not positive, or pitch,
             centre or heights have other lengths than those named.
-        InputError: an argument is not a usable number, the detector stands before the axis, or the
-            angles look like degrees.
+        InputError: an argument is not a usable number, the detector stands before the axis, an arc
+            goes all the way round the source, or the angles look like degrees.
     """
 
     _lengths: ClassVar[tuple[str, ...]] = (
@@ -104,6 +105,9 @@ class Cone(ScanValue):
         object.__setattr__(self, "center", _center(center, self.rows, self.bins))
         object.__setattr__(self, "heights", _heights(heights, len(self.angles)))
         object.__setattr__(self, "curved", checked_flag("Cone", "curved", curved))
+        if self.curved:
+            where = self.bins, self.center[1], self.pitch[1], self.source_to_detector
+            refuse_round_arcs("Cone", *where)
 
     @property
     def magnification(self) -> float:

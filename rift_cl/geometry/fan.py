@@ -27,6 +27,7 @@ from rift_cl.geometry.scan_value import (
     checked_flag,
     checked_length,
     refuse_degrees,
+    refuse_round_arcs,
 )
 
 
@@ -93,7 +94,7 @@ class Fan(ScanValue):
     Raises:
         ShapeError: ``angles`` is empty or not one-dimensional, or ``bins`` is not positive.
         InputError: another argument is not a usable number, the detector stands before the axis,
-            or the angles look like degrees.
+            an arc goes all the way round the source, or the angles look like degrees.
     """
 
     _lengths: ClassVar[tuple[str, ...]] = ("pitch", "source_to_axis", "source_to_detector")
@@ -127,6 +128,9 @@ class Fan(ScanValue):
         middle = (self.bins - 1) / 2
         object.__setattr__(self, "center", checked_center("Fan", center, middle))
         object.__setattr__(self, "curved", checked_flag("Fan", "curved", curved))
+        if self.curved:
+            where = self.bins, self.center, self.pitch, self.source_to_detector
+            refuse_round_arcs("Fan", *where)
 
     @property
     def magnification(self) -> float:

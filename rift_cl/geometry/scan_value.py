@@ -206,6 +206,23 @@ def checked_distances(owner: str, to_axis: Any, to_detector: Any) -> tuple[float
     return axis, detector
 
 
+def refuse_round_arcs(
+    owner: str, bins: int, center: float, pitch: float, to_detector: float
+) -> None:
+    """Refuse arcs about the source whose bins would go all the way round it.
+
+    Raises:
+        InputError: they do.
+    """
+    farthest = max(center + 0.5, bins - 0.5 - center) * pitch / to_detector
+    if farthest >= math.pi:
+        raise InputError(
+            f"{owner}: pitch is {pitch:g}, so that the arc of {bins} bins {to_detector:g} from the "
+            f"source ends at {math.degrees(farthest):.3g} degrees from its axis; "
+            "check that pitch and source_to_detector are in one unit"
+        )
+
+
 def checked_flag(owner: str, name: str, value: Any) -> bool:
     """A truth value.
 

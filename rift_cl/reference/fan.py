@@ -4,7 +4,8 @@ The strip of a bin lies between the rays to its two edges. In a row of pixels (a
 view looks along x) it cuts a part from each pixel; the bin's value is the sum over rows of the
 pixels' values, weighted by these parts over the strip's width in pixels in the middle of the row,
 times the length of the central ray in the row: a mean over rays side by side. The hats of
-``joseph`` and ``linear`` stand for the parts where rays alone are looked at.
+``joseph`` and ``linear`` stand for the parts where rays alone are looked at. A bin of which an edge
+runs beside the rows, or away from them, is endlessly wide: it has nothing of any pixel.
 """
 
 from __future__ import annotations
@@ -46,17 +47,21 @@ def _view(grid: Grid, scan: Fan, angle: float, footprint: str, depth_power: int)
     x, y = grid.coordinates(1), grid.coordinates(0)
     dy, dx = grid.spacing
     middle = np.array([grid.center[1], grid.center[0]]) - source
-    along_y = abs(middle[1]) / dy >= abs(middle[0]) / dx * (1 - 1e-12)
+    columns, rows = abs(middle[0]) / dx, abs(middle[1]) / dy
+    along_y = rows >= columns * (1 - 1e-12)
+    # Slabs beside the source would have rays that never come to them.
+    if min(rows - len(y) / 2, columns - len(x) / 2) < 0.5:
+        along_y = rows - len(y) / 2 > columns - len(x) / 2
     lines, slabs, to_line, to_slab = (x, y, dx, dy) if along_y else (y, x, dy, dx)
     line, slab = (0, 1) if along_y else (1, 0)
 
     def slopes(places: NDArray[Any]) -> Floats:
-        """Pixels that the rays to these bins go on by from slab to slab."""
+        """Pixels that the rays to these bins go on by from slab to slab, NaN of those beside."""
         gamma = (places - scan.center) * scan.pitch / scan.source_to_detector
         gamma = gamma if scan.curved else np.arctan(gamma)
         way = np.cos(gamma)[:, None] * ahead + np.sin(gamma)[:, None] * across
         seen: Floats = way[:, line] / to_line / (way[:, slab] / to_slab)
-        return seen
+        return np.where(way[:, slab] * middle[slab] > 0, seen, np.nan)
 
     bins = np.arange(scan.bins)
     edges, middles = slopes(np.arange(scan.bins + 1) - 0.5), slopes(bins)
@@ -78,7 +83,7 @@ def _view(grid: Grid, scan: Fan, angle: float, footprint: str, depth_power: int)
             ray = depth * np.stack([middles * to_line, np.full(scan.bins, to_slab)], axis=1)
             away = np.linalg.norm(ray, axis=1) if scan.curved else np.abs(ray @ ahead[[line, slab]])
             share = share * (scan.source_to_axis / away)[:, None]
-        found[:, :, b] = share * lengths[:, None]
+        found[:, :, b] = np.nan_to_num(share * lengths[:, None])
     view: Floats = (found.transpose(0, 2, 1) if along_y else found).reshape(scan.bins, -1)
     return view
 

@@ -123,11 +123,19 @@ def test_the_middle_row_is_a_fan():
         ({"heights": [0, 1]}, ShapeError, "heights"),
         ({"heights": np.full(7, np.nan)}, InputError, "heights"),
         ({"curved": "yes"}, InputError, "curved"),
+        ({"curved": True, "pitch": 80}, InputError, "pitch.*in one unit"),
     ],
 )
 def test_one_sentence_names_what_is_wrong(change, error, what):
     with pytest.raises(error, match=what):
         cone(**change)
+
+
+def test_arcs_may_open_to_both_sides_by_less_than_half_a_turn():
+    beam = {"pitch": 1.0, "source_to_axis": 2.0, "source_to_detector": 2.0, "curved": True}
+    assert rift.Fan([0.0], 12, **beam).bins == 12
+    with pytest.raises(InputError, match="Fan: pitch"):
+        rift.Fan([0.0], 13, **beam)
 
 
 def test_long_helices_in_radians_are_no_degrees():

@@ -46,6 +46,7 @@
 #define RAYS 12 /* most that a pixel of the middle slab spans; fewer the deeper */
 #define LEAST_RAYS 13 /* that it spans however deep */
 #define MOST_RAYS 14 /* that any pixel of the grid reaches */
+#define FIRST_SEEN 15 /* ray that any pixel reaches, where wide hats reach for narrow bins too */
 
 /* Slants below this are one: the ramp is then a step to within float32. */
 #define STEEPEST 1e-6f

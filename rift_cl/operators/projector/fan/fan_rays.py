@@ -139,31 +139,38 @@ class _View:
         self.mirrored = (self.side > 0) != along_y
 
     def rays(self, footprint: str, depth_power: int) -> FanRays:
-        strip, bins = footprint == "strip", self.scan.bins
-        edges = self._slopes(np.arange(bins + 1.0) - 0.5)
-        middles = self._slopes(np.arange(bins, dtype=np.float64))
-        kept = self._kept(edges)
+        strip, linear = footprint == "strip", footprint == "linear"
+        edges = self._slopes(np.arange(self.scan.bins + 1.0) - 0.5)
+        middles = self._slopes(np.arange(self.scan.bins, dtype=np.float64))
         with np.errstate(invalid="ignore"):
             exact_widths = self.depth[:, None] * np.diff(edges, axis=1)
-        seen = (np.diff(kept, axis=1) > 0) & np.isfinite(exact_widths)
+        low, high = self._bounds()
+        kept = np.clip(edges, low, high)
+        reaching = np.diff(kept, axis=1) > 0
+        if linear:
+            # A hat as wide as its bin reaches the grid from wherever its middle is.
+            breadths = exact_widths / self.depth[:, None]
+            with np.errstate(invalid="ignore"):
+                reaching = (middles + breadths > low) & (middles - breadths < high)
+        seen = reaching & np.isfinite(exact_widths)
         widths = np.where(seen, exact_widths, 0)
-        rays = kept if strip else self._kept(middles)
+        rays = kept if strip else np.where(seen, middles, np.clip(middles, low, high))
         slant = np.abs(rays)
         starts = self.line[:, None] + self.depth[:, None] * rays
         starts = starts + (slant / 2 + 0.5 if strip else 0.0)
-        factors = self._lengths(middles, depth_power)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            factors = np.nan_to_num(factors / exact_widths if strip else factors, posinf=0)
-        spanned = self._spanned(footprint, slant, widths)
-        numbers = self._numbers(footprint, widths, spanned)
+        gaps = widths if strip else self._gaps(middles, seen)
+        spanned = self._spanned(footprint, slant, widths, gaps)
+        first_seen = seen.argmax(axis=1) if linear else 0
+        numbers = self._numbers(footprint, widths, spanned, first_seen)
+        across = self.depth[:, None] * np.diff(kept, axis=1) if strip else widths
         return FanRays(
             views=self.views.astype(np.int32),
             starts=starts,
             slopes=self.side[:, None] * rays,
-            widths=widths if footprint == "linear" else np.zeros_like(widths),
-            factors=np.where(np.isfinite(middles), factors, 0.0),
+            widths=widths if linear else np.zeros_like(widths),
+            factors=self._factors(footprint, middles, exact_widths, depth_power),
             numbers=numbers,
-            pixels=self._pixels(footprint, slant, self.depth[:, None] * np.diff(kept, axis=1)),
+            pixels=self._pixels(footprint, slant, across),
             rays=int(np.max(numbers[:, _MOST_RAYS], initial=1)),
         )
 
@@ -182,13 +189,37 @@ class _View:
         slopes = np.where(forward > 0, slopes, np.copysign(np.inf, way[0]))
         return np.where(self.mirrored[:, None], slopes[:, ::-1], slopes)
 
-    def _kept(self, slopes: Floats) -> Floats:
-        """The slopes themselves, those that miss the grid by far brought nearer to it."""
-        half = (self.slabs - 1) / 2
+    def _bounds(self) -> tuple[Floats, Floats]:
+        """Slopes on either side that miss the grid by far, (n, 1): beyond them rays need not go."""
+        # As far as slabs reach: what is aslant by many lines leaves a slab far from its middle.
+        half = self.slabs / 2
         depths = np.stack([self.depth - half, self.depth + half])
         low = ((-_MISS - self.line) / depths).min(axis=0) - 1 / depths[0]
         high = ((self.lines + _MISS - self.line) / depths).max(axis=0) + 1 / depths[0]
-        return np.clip(slopes, low[:, None], high[:, None])
+        return low[:, None], high[:, None]
+
+    def _gaps(self, middles: Floats, seen: NDArray[np.bool_]) -> Floats:
+        """Lines at the middle slab from each ray to the next, 0 beside those seen, (n, bins - 1).
+
+        Where bins open by much of a right angle they are less than the widths on both sides.
+        """
+        backwards = seen[:, ::-1]
+        before = np.logical_or.accumulate(seen, axis=1)[:, :-1]
+        behind = np.logical_or.accumulate(backwards, axis=1)[:, -2::-1]
+        with np.errstate(invalid="ignore"):
+            return np.where(before & behind, self.depth[:, None] * np.diff(middles, axis=1), 0)
+
+    def _factors(
+        self, footprint: str, middles: Floats, exact_widths: Floats, depth_power: int
+    ) -> Floats:
+        """What each bin's sum is multiplied by: nothing where its width or its ray has no end."""
+        lengths = self._lengths(middles, depth_power)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            factors = lengths / exact_widths if footprint == "strip" else lengths
+        ended = np.isfinite(middles) & np.isfinite(factors)
+        if footprint == "linear":
+            ended &= np.isfinite(exact_widths)
+        return np.where(ended, factors, 0.0)
 
     def _lengths(self, slopes: Floats, depth_power: int) -> Floats:
         """Of each bin's ray from slab to slab; with a power of 2 over its depth as well."""
@@ -204,7 +235,13 @@ class _View:
                 depth = depth + (slabs * self.side * self.ahead[1])[:, None]
             return lengths * self.scan.source_to_axis / (self.depth[:, None] * depth)
 
-    def _numbers(self, footprint: str, widths: Floats, spanned: tuple[Floats, Floats]) -> Floats:
+    def _numbers(
+        self,
+        footprint: str,
+        widths: Floats,
+        spanned: tuple[Floats, Floats],
+        first_seen: NDArray[np.int64] | int,
+    ) -> Floats:
         scan, strip = self.scan, footprint == "strip"
         sign = np.where(self.mirrored, -1.0, 1.0)
         first = scan.center + (0.5 if strip else 0.0)
@@ -229,6 +266,7 @@ class _View:
             self.mirrored,
             *spanned,
             np.floor(np.minimum(np.maximum(spanned[0] * nearest, spanned[1]), scan.bins + 1)) + 1,
+            first_seen,
         )
         # The order is that of fan_footprint.h, in which 9 follows the two numbers of `ahead`.
         for place, values in enumerate(columns):
@@ -253,7 +291,8 @@ class _View:
         Args:
             footprint: name.
             slant: lines by slab of each ray, (n, rays).
-            widths: of bins in lines at the middle slab, as far as they are kept, (n, bins).
+            widths: of bins in lines at the middle slab, of strips as far as they are kept,
+                (n, bins).
         """
         if footprint == "joseph" or not len(self.views):
             return 3
@@ -264,20 +303,23 @@ class _View:
             span = 2 * np.maximum(1, widest)
         return int(min((1 + _BESIDE) * span.max(), self.lines)) + 3
 
-    def _spanned(self, footprint: str, slant: Floats, widths: Floats) -> tuple[Floats, Floats]:
+    def _spanned(
+        self, footprint: str, slant: Floats, widths: Floats, gaps: Floats
+    ) -> tuple[Floats, Floats]:
         """Most bins that a pixel of the middle slab spans, and one of any slab, of each view.
 
         Args:
             footprint: name.
             slant: lines by slab of each ray, (n, rays).
             widths: of bins in lines at the middle slab, 0 of those that miss the grid, (n, bins).
+            gaps: lines from each ray to the next there, 0 of those that miss it, (n, rays - 1).
         """
         shadow: Floats | float = 2.0
         if footprint == "strip":
             slants = np.maximum(slant[:, 1:], slant[:, :-1])
             shadow = 2 * self._reach(footprint, widths)[:, None] * (1 + slants)
         with np.errstate(divide="ignore", over="ignore"):
-            spans = np.where(widths > 0, shadow / widths, 0.0).max(axis=1)
+            spans = np.where(gaps > 0, shadow / gaps, 0.0).max(axis=1, initial=0)
         least = spans * widths.max(axis=1) if footprint == "linear" else np.zeros(len(spans))
         # Bins are the narrower the steeper their rays, by so much within a pixel's reach.
         steepest = np.max(np.where(widths > 0, slant[:, : widths.shape[1]], 0.0), axis=1)
