@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.io.scans.scan_file import ScanFile, ScanRows
 from rift_cl.io.scans.tiff_frames import TiffRows
+from rift_cl.io.scans.zarr_scan import ZarrRows
 from rift_cl.reconstruct.preprocess.flatfield import (
     Attenuation,
     attenuation,
@@ -21,13 +22,15 @@ def scan_identity(scan: ScanFile) -> dict[str, str]:
     """What tells a scan from others, and from itself before a change; sentences by name."""
     angles = np.ascontiguousarray(scan.angles).tobytes()
     told = {"angles": f"{scan.angles.size} with the hash {_hash(angles)}"}
-    if not isinstance(scan.rows, TiffRows):
+    if not isinstance(scan.rows, (TiffRows, ZarrRows)):
         return {"scan file": f"{scan.path}, changed at {scan.path.stat().st_mtime_ns}", **told}
     # A folder's own date tells nothing: what is beside the frames changes it, their content not.
     lines = []
     for path in scan.rows.files:
         state = path.stat()
-        lines.append(f"{path.name}\0{state.st_size}\0{state.st_mtime_ns}\n")
+        # Chunks of a store have the same names in each of its folders.
+        name = path.relative_to(scan.path) if isinstance(scan.rows, ZarrRows) else path.name
+        lines.append(f"{name}\0{state.st_size}\0{state.st_mtime_ns}\n")
     frames = _hash("".join(lines).encode("utf-8", "surrogateescape"))
     return {
         "scan file": str(scan.path),

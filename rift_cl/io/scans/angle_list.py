@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import InputError
+from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.number_list import SUFFIXES, read_numbers
 from rift_cl.io.scans.literals import AngleUnit
 from rift_cl.io.scans.scan_file import check_angles
@@ -215,3 +215,27 @@ def named_unit(name: str) -> AngleUnit | None:
         if word in ("deg", "degs", "degree", "degrees"):
             return "degrees"
     return None
+
+
+def stated_unit(path: Path, name: str, stated: str) -> AngleUnit | None:
+    """The unit that a file states for an array of angles, else the one in its name.
+
+    Args:
+        path: the file.
+        name: of the array.
+        stated: its attribute ``units``, or nothing.
+
+    Raises:
+        FileFormatError: what is stated is no unit of angles.
+    """
+    stated = stated.strip().lower()
+    if stated.startswith("rad"):
+        return "radians"
+    if stated == "°" or stated.startswith("deg"):
+        return "degrees"
+    if stated:
+        raise FileFormatError(
+            f"{path}: the units of {name!r} are {stated!r}, wanted degrees or radians; mend the "
+            "attribute, or name other angles with theta= (--theta)"
+        )
+    return named_unit(name.rsplit("/", maxsplit=1)[-1])

@@ -26,6 +26,7 @@ from rift_cl.io.scans.npz_scan import open_npz_scan
 from rift_cl.io.scans.scan_file import ScanFile, ScanRequest
 from rift_cl.io.scans.tiff_scan import open_tiff_scan
 from rift_cl.io.scans.txrm_scan import open_txrm_scan
+from rift_cl.io.scans.zarr_scan import is_zarr, open_zarr_scan
 from rift_cl.registry import Registry
 
 # What reads a file, by its extension and then by its content.
@@ -36,6 +37,7 @@ _READERS = {
     ".npz": {"NPZ": open_npz_scan},
     **{suffix: {"MRC": open_mrc_scan} for suffix in MRC_SUFFIXES},
     ".txrm": {"TXRM": open_txrm_scan},
+    ".zarr": {"Zarr": open_zarr_scan},
 }
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 # What files begin with: TXRM is one of Microsoft's containers of streams.
@@ -87,6 +89,8 @@ def is_scan_file(path: Path) -> bool:
     suffix = path.suffix.lower()
     if not (suffix in _READERS or suffix in SCAN_READERS or suffix in DESCRIPTIONS):
         return False
+    if suffix == ".zarr":
+        return is_zarr(path)
     return path.is_file() and (suffix not in DESCRIBED or is_described(path))
 
 
@@ -118,7 +122,9 @@ def open_scan(
     are named here. NPZ holds ``projections`` (angle, row, bin) or ``sinogram`` (angle, bin) and
     ``angles`` in radians, and may hold ``flats``, ``darks`` and ``pitch``. MAT, of version 5 to
     7.3, holds a scan of the Helsinki Tomography Challenge, the dendrites of ToMoBAR, or arrays
-    that are named here (``scan.projections`` inside a structure). TIFF is a folder with a file
+    that are named here (``scan.projections`` inside a structure). Zarr (.zarr, a
+    folder of Zarr 2 or 3) holds arrays of the same names as NPZ, a Data Exchange scan, or arrays
+    that are named here. TIFF is a folder with a file
     for each projection, in the order of their numbers, one file with a page for each, or sinograms;
     flats and darks are recognised by the names of files and folders, angles by ``angles.txt`` or
     ``theta.txt``, and are else taken as even over 180 degrees. MRC (.mrc, .st, .ali, .rec) is a
@@ -225,6 +231,8 @@ def _one_of(name: str, value: Any, known: tuple[str, ...]) -> Any:
 
 
 def _content(path: Path) -> str:
+    if is_zarr(path):
+        return "Zarr"
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: is not a file")
     with path.open("rb") as file:

@@ -7,11 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import FileFormatError, ShapeError
+from rift_cl.errors import ShapeError
 from rift_cl.geometry.length_units import length_unit
 from rift_cl.io.boundary import check_claim, check_numeric
 from rift_cl.io.hdf5_tree import Hdf5Tree
-from rift_cl.io.scans.angle_list import AngleList, named_unit
+from rift_cl.io.scans.angle_list import AngleList, stated_unit
 from rift_cl.io.scans.axes import spelled
 from rift_cl.io.scans.beam import PARALLEL_BELOW, Beam
 
@@ -117,17 +117,7 @@ def read_angles(tree: Hdf5Tree, name: str) -> AngleList:
         FileFormatError: there is no such dataset, or its unit is unknown.
         InputError: it is no vector of numbers; see ``read_vector``.
     """
-    stated = unit_of(tree, name).strip().lower()
-    unit = named_unit(name.rsplit("/", maxsplit=1)[-1])
-    if stated.startswith("rad"):
-        unit = "radians"
-    elif stated == "°" or stated.startswith("deg"):
-        unit = "degrees"
-    elif stated:
-        raise FileFormatError(
-            f"{tree.path}: the units of {name!r} are {stated!r}, wanted degrees or radians; mend "
-            "the attribute, or name other angles with theta= (--theta)"
-        )
+    unit = stated_unit(tree.path, name, unit_of(tree, name))
     return AngleList(name, read_vector(tree, name), unit=unit)
 
 

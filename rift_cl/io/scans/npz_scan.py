@@ -12,23 +12,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import FileFormatError, InputError, ShapeError
+from rift_cl.errors import FileFormatError, ShapeError
 from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.npz_archive import NpzArchive
 from rift_cl.io.scans.angle_list import AngleList, named_unit
-from rift_cl.io.scans.axes import USUAL
-from rift_cl.io.scans.beam import Beam
 from rift_cl.io.scans.frame_stack import FrameStack, StackedRows
-from rift_cl.io.scans.named_arrays import Layout, scan_in
-from rift_cl.io.scans.scan_file import Frames, Part, ScanFile, ScanRequest, ScanRows, usable_pitch
+from rift_cl.io.scans.named_arrays import scan_in
+from rift_cl.io.scans.own_layout import own_layout
+from rift_cl.io.scans.scan_file import Frames, Part, ScanFile, ScanRequest, ScanRows
 
-# How distances are called: from the source to the axis, from there and from the axis to the
-# detector.
-_TO_AXIS = ("source_to_axis", "sid", "sod", "dso", "source_origin", "source_axis", "sad")
-_TO_DETECTOR = ("source_to_detector", "sdd", "dsd", "source_detector")
-_BEYOND = ("odd", "dod", "origin_detector", "axis_to_detector")
-_DISTANCES = (*_TO_AXIS, *_TO_DETECTOR, *_BEYOND)
-_PITCHES = (("pitch",), ("dv", "du"), ("row_pitch", "bin_pitch"), ("pixel_size",))
 # Eight million projections: no scan has more, and a forged header may not ask for gigabytes.
 _LONGEST_VECTOR = 64 << 20
 
@@ -86,87 +78,7 @@ def open_npz_scan(path: Path, request: ScanRequest, *, budget: int | None) -> Sc
     """Find the scan in an NPZ file; see ``open_scan``."""
     with _open(path) as archive:
         store = NpzStore(archive, budget)
-        return scan_in(store, _layout(store, request.dataset), request)
-
-
-def _layout(store: NpzStore, dataset: str | None) -> Layout:
-    archive = store.archive
-    usual = [name for name in ("projections", "sinogram") if name in archive]
-    if dataset is None and not usual:
-        raise FileFormatError(
-            f"{archive.path}: has neither 'projections' nor 'sinogram'; {archive.contents()}"
-        )
-    pitch = float(store.vector("pitch")[0]) if "pitch" in archive else 0.0
-    known = dataset is None
-    beam, notes = _beam(store)
-    return Layout(
-        source="NPZ",
-        projections=dataset or usual[0],
-        theta="angles" if "angles" in archive else None,
-        flats="flats" if known and "flats" in archive else None,
-        darks="darks" if known and "darks" in archive else None,
-        axes=USUAL if known else None,
-        angle_unit="radians",
-        search=not known,
-        pitch=usable_pitch(pitch),
-        beam=beam,
-        notes=notes,
-    )
-
-
-def _beam(store: NpzStore) -> tuple[Beam | None, tuple[str, ...]]:
-    """Source and detector where the file names their distances, or a doubt."""
-    archive = store.archive
-    named = {name.lower(): name for name in archive.names()}
-    found = [named[name] for name in _DISTANCES if name in named]
-    if not found:
-        return None, ()
-    listed = ", ".join(map(repr, found))
-    to_axis = _first_number(store, named, _TO_AXIS)
-    to_detector = _first_number(store, named, _TO_DETECTOR)
-    beyond = _first_number(store, named, _BEYOND)
-    if to_detector is None and to_axis is not None and beyond is not None:
-        to_detector = to_axis + beyond
-    if to_axis is None and to_detector is not None and beyond is not None:
-        to_axis = to_detector - beyond
-    if to_axis is None or to_detector is None:
-        return None, (
-            f"The file names one distance of a source ({listed}) and not the other, so that it is "
-            "not used: rays are taken as parallel. Give both with geometry= (--geometry).",
-        )
-    pitch = _pitch(store, named)
-    if pitch is None:
-        raise InputError(
-            f"{archive.path}: names distances of a source ({listed}) and no pitch of the detector "
-            "in the same unit: add 'pitch' (or 'dv' and 'du'), or give geometry= (--geometry)"
-        )
-    center = None
-    if "center" in named:
-        values = store.vector(named["center"])
-        if values.size != 2:
-            raise ShapeError(f"{archive.path}: 'center' has {values.size} numbers, not row and bin")
-        center = (float(values[0]), float(values[1]))
-    heights = store.vector(named["heights"]) if "heights" in named else None
-    return Beam(
-        source_to_axis=to_axis,
-        source_to_detector=to_detector,
-        pitch=pitch,
-        center=center,
-        heights=heights,
-    ), (f"Distances of the source are {listed}, in the unit of the pitch.",)
-
-
-def _first_number(store: NpzStore, named: dict[str, str], names: tuple[str, ...]) -> float | None:
-    return next((float(store.vector(named[n])[0]) for n in names if n in named), None)
-
-
-def _pitch(store: NpzStore, named: dict[str, str]) -> tuple[float, float] | None:
-    """Distance between rows and between bins."""
-    for names in _PITCHES:
-        if all(name in named for name in names):
-            values = np.concatenate([store.vector(named[name]) for name in names])
-            return float(values[0]), float(values[-1])
-    return None
+        return scan_in(store, own_layout(store, "NPZ", request.dataset), request)
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ from rift_cl.io.output import staged_folder, writing
 from rift_cl.io.volumes.layout import Floats, VolumeLayout, VolumePlace, WriteSlab
 from rift_cl.io.volumes.sample_window import restored, suggested_window
 from rift_cl.io.volumes.slice_statistics import SliceStatistics
-from rift_cl.json_parsing import parse_json
+from rift_cl.io.zarr_store import check_codecs, check_entries, read_header
 
 _CHUNK = (16, 256, 256)
 # Packing of chunks: nearly as fast as none, and every reader of Zarr has it.
@@ -41,9 +41,6 @@ _LOOKED_AT = 16
 # Our own entry among the attributes.
 _OURS = "rift_cl"
 _STORE = re.compile(r"\.zgroup(\..*)?|\.zattrs(\..*)?|\d{1,2}")
-_LARGEST_HEADER = 1 << 20
-# Decoders that only unpack bytes. Others, such as "pickle", would run what the file says.
-_CODECS = {"blosc", "bytes", "crc32c", "gzip", "lz4", "zlib", "zstd"}
 
 
 @contextmanager
@@ -69,14 +66,14 @@ def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
 
 def load_volume(path: Path, *, budget: int | None) -> Floats:
     """Read the finest array of a store, or an array that stands alone."""
-    _check_entries(path)
+    check_entries(path)
     attributes, place = _finest(path)
     ours = attributes.get(_OURS)
     if isinstance(ours, dict) and ours.get("complete") is not True:
         raise FileFormatError(f"{path}: was cut off while it was written; write it again")
     if not any((place / name).is_file() for name in ("zarr.json", ".zarray")):
         raise FileFormatError(f"{path}: lacks the array {place.name!r} that it names")
-    _check_codecs(place)
+    check_codecs(place)
     array: Any = zarr.open_array(str(place), mode="r")
     check_numeric(path, "the array", array.dtype)
     if array.ndim != 3 or 0 in array.shape:
@@ -209,25 +206,16 @@ def _write_json(path: Path, value: dict[str, Any]) -> None:
     path.write_text(json.dumps(value, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def _read_json(path: Path) -> dict[str, Any]:
-    if path.stat().st_size > _LARGEST_HEADER:
-        raise FileFormatError(f"{path}: is too long for the header of a Zarr store")
-    value = parse_json(path.read_text(encoding="utf-8"))
-    if not isinstance(value, dict):
-        raise FileFormatError(f"{path}: is no header of a Zarr store")
-    return value
-
-
 def _finest(path: Path) -> tuple[dict[str, Any], Path]:
     """Attributes of a store, and where its finest array is: of Zarr 2 and 3, group or array."""
     if (path / "zarr.json").is_file():
-        header = _read_json(path / "zarr.json")
+        header = read_header(path / "zarr.json")
         attributes = header.get("attributes", {})
         attributes = attributes.get("ome", attributes)
         group = header.get("node_type") == "group"
     else:
         there = (path / ".zattrs").is_file()
-        attributes = _read_json(path / ".zattrs") if there else {}
+        attributes = read_header(path / ".zattrs") if there else {}
         group = (path / ".zgroup").is_file()
     if not group:
         return attributes, path
@@ -244,15 +232,6 @@ def _finest(path: Path) -> tuple[dict[str, Any], Path]:
     return attributes, path / name
 
 
-def _check_entries(path: Path) -> None:
-    root = path.resolve()
-    for entry in path.rglob("*"):
-        if entry.is_symlink() and not entry.resolve().is_relative_to(root):
-            raise PathEscapeError(f"{path}: {entry.name!r} leads outside the store; copy it in")
-        if not (entry.is_file() or entry.is_dir()):
-            raise FileFormatError(f"{path}: {entry.name!r} is neither a file nor a folder")
-
-
 def _check_chunks(place: Path, array: Any) -> None:
     counts = (-(-n // chunk) for n, chunk in zip(array.shape, array.chunks, strict=True))
     for index in product(*(range(count) for count in counts)):
@@ -262,23 +241,6 @@ def _check_chunks(place: Path, array: Any) -> None:
                 f"{place.parent}: the chunk {chunk.relative_to(place.parent)} is missing; copy the "
                 "store again, or write it again"
             )
-
-
-def _check_codecs(path: Path) -> None:
-    for header in (path / "zarr.json", path / ".zarray"):
-        if header.exists():
-            strange = _codecs(header) - _CODECS
-            if strange:
-                raise FileFormatError(
-                    f"{path}: is packed with {sorted(strange)}, wanted some of {sorted(_CODECS)}"
-                )
-
-
-def _codecs(header: Path) -> set[str]:
-    meta = _read_json(header)
-    codecs = [*meta.get("codecs", []), meta.get("compressor"), *(meta.get("filters") or [])]
-    names = (codec.get(key) for codec in codecs if codec for key in ("name", "id"))
-    return {str(name) for name in names if name is not None}
 
 
 def _strange(names: list[str]) -> str | None:
