@@ -9,6 +9,9 @@ import re
 import sys
 from pathlib import Path
 
+from docutils.nodes import Text
+from sphinx.addnodes import desc_annotation, desc_parameter
+
 _ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(_ROOT), str(_ROOT / "tools")]
 
@@ -49,7 +52,11 @@ write_reference(Path(__file__).parent / "reference" / "generated")
 # Types of signatures as Python spells them out, and as the source does.
 _TYPES = (
     (r"~?[\w.]*_Buffer \| .*?_NestedSequence\[~?[\w.]*complex \| .*?\]", "ArrayLike"),
+    (r"type\[~?[\w.]*Any\] \| ~?[\w.]*dtype\[~?[\w.]*Any\] \| .*?_DTypeDict \| str", "DTypeLike"),
     (r"~?[\w.]*ndarray\[tuple\[~?[\w.]*Any, \.\.\.\], ~?[\w.]*dtype\[(.*?)\]\]", r"NDArray[\1]"),
+    # Defaults that are no Python: a signature with one would be shown as it is written here.
+    (r"<factory>", "..."),
+    (r"<class '[\w.]*?(\w+)'>", r"\1"),
 )
 
 
@@ -77,5 +84,14 @@ def setup(app):
     def escape_bars(app, what, name, of, options, lines):
         lines[:] = [re.sub(r"(``.*?``)|[|]", lambda m: m[1] or r"\|", line) for line in lines]
 
+    def shorten_others(app, doctree):
+        """Types of attributes and of overloads, of which autodoc tells no one."""
+        for kind in (desc_annotation, desc_parameter):
+            for node in doctree.findall(kind):
+                plain = _plain(node.astext())
+                if plain != node.astext():
+                    node[:] = [Text(plain)]
+
+    app.connect("doctree-read", shorten_others)
     app.connect("autodoc-process-docstring", escape_bars)
     app.connect("autodoc-process-signature", shorten_types)
