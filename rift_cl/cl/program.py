@@ -27,7 +27,7 @@ from rift_cl.cl.grid_parts import GridPart, Size, grid_parts
 from rift_cl.cl.launch_times import LaunchTimes
 from rift_cl.cl.process import claim_process
 from rift_cl.cl.signature import Arguments, Signature, check_numbers, signature
-from rift_cl.errors import DeviceError
+from rift_cl.errors import DeviceError, KernelArgumentError
 from rift_cl.progress import BUILDS
 
 if TYPE_CHECKING:
@@ -40,6 +40,9 @@ _COOPERATES = "get_local_id"
 # Such a kernel works in smaller groups as well where its launches say of how many items they would
 # like them: it then returns from groups that are one too many.
 _GROUP = "GROUP"
+# What a grid's lengths are given as: looked up in a set, since there is one at every launch.
+_WHOLE = frozenset({int, *(np.dtype(code).type for code in np.typecodes["AllInteger"])})
+_MOST_AXES = 3
 # Ways in which PoCL compiles a kernel apart: for a large grid, and for a part of a grid.
 _Way = tuple[bool, bool]
 
@@ -133,11 +136,17 @@ class Programs:
 
         Raises:
             KernelArgumentError: an argument is missing, unknown, of another type than the kernel
-                wants, or an array that is shorter than the kernel goes through.
+                wants, or an array that is shorter than the kernel goes through; ``size`` is no
+                tuple of one to three whole numbers.
             DeviceError: ``DOUBLE`` is 1 and the device has no doubles, the kernel needs larger
                 groups or more local memory than the device has, or the driver failed.
         """
         claim_process()
+        if not _is_grid(size):
+            raise KernelArgumentError(
+                f"kernel {name}: work-items are {size!r}, and not a tuple of one to three whole "
+                "numbers, none of them below zero"
+            )
         if 0 in size:
             return
         kernel, arguments = self._launch_of(name, given)
@@ -257,6 +266,15 @@ class Programs:
                 f"{needs.group}"
             )
         return None
+
+
+def _is_grid(size: Any) -> bool:
+    return (
+        type(size) is tuple
+        and 0 < len(size) <= _MOST_AXES
+        and _WHOLE.issuperset(map(type, size))
+        and min(size) >= 0
+    )
 
 
 def _magnitudes(values: Iterable[Any]) -> tuple[int, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
+from rift_cl.cl.build import guarded_build as guarded_build_module
 from rift_cl.cl.build.first_launch import told_launch
 from rift_cl.cl.build.guarded_build import Request, Worker, guarded_build
 from rift_cl.errors import DeviceError
@@ -75,6 +76,24 @@ def test_compiler_that_hangs_is_ended(worker):
     fault, answer, _ = worker("time.sleep(600)", limit=0.2).ask(REQUEST._asdict())
     assert fault == "its compiler hung for 0.2 s"
     assert answer is None
+
+
+def test_compiler_that_always_hangs_is_waited_for_no_longer_than_twice_the_limit(monkeypatch):
+    class Hanging(Worker):
+        now = 0.0
+
+        def ask(self, request, limit=None):
+            self.now += limit
+            return "its compiler hung", None, b""
+
+    hangs = Hanging(limit=300.0)
+    monkeypatch.setattr(guarded_build_module.time, "monotonic", lambda: hangs.now)
+    assert guarded_build(REQUEST, hangs).binary is None
+    assert 300 < hangs.now < 600
+    hangs.now = 0.0
+    # Once with the launches of those who died of them, and once without.
+    guarded_build(REQUEST._replace(launches=[LAUNCH]), hangs)
+    assert hangs.now < 1200
 
 
 def test_compiler_that_can_do_it_in_no_way_is_told_of(worker):

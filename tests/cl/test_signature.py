@@ -113,6 +113,13 @@ def test_a_wrongly_typed_argument_is_named(device, given, name, value):
         device.launch("axpby", (1,), **{**given, name: value})
 
 
+@pytest.mark.parametrize("size", [[1], 1, (), (1.0,), (-1,), (1, 1, 1, 1), "1", None])
+def test_a_size_that_is_no_grid_is_named(device, given, size):
+    device.launch("axpby", (np.int64(1),), **given)
+    with pytest.raises(KernelArgumentError, match=r"axpby: work-items are .*tuple"):
+        device.launch("axpby", size, **given)
+
+
 def test_arrays_of_another_type_and_views_are_refused(device, given):
     for wrong in (device.zeros(4, np.int32), device.zeros(8)[4:]):
         with pytest.raises(KernelArgumentError, match=r"\bargument x\b"):

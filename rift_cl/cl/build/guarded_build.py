@@ -1,7 +1,9 @@
 """Compiling where a compiler may die: in a child process, with workarounds for what it cannot do.
 
 One child per device lives as long as this process and is started again when it dies. A compiler
-that crashes, hangs or refuses a kernel is asked again in other ways, the gentlest first.
+that crashes, hangs or refuses a kernel is asked again in other ways, the gentlest first. Each time
+it may take half of what is left of twice ``LIMIT``: a kernel is waited for no longer than that,
+however often it is asked for, and again where nothing came of repeated launches.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,8 +24,8 @@ from rift_cl.cl.build.first_launch import FirstLaunch, without_numbers
 from rift_cl.cl.build.worker import read_message, write_message
 from rift_cl.errors import DeviceError
 
-# Seconds after which a compiler counts as hanging.
-LIMIT = 300.0
+# Seconds after which a compiler that is asked for the first time counts as hanging; and the least.
+LIMIT, _LEAST = 300.0, 1.0
 # Seconds that a child whose pipe broke is given to be gone.
 _DYING = 20.0
 # No compiler ends in this way by itself.
@@ -85,11 +88,12 @@ def guarded_build(request: Request, worker: Worker | None = None) -> Built:
         worker: the child; the one of this device if not given.
     """
     worker = worker or _worker_of(request.selector)
+    until = time.monotonic() + 2 * worker.limit
     first = log = ""
     for way in WAYS:
         source, options = way_to_build(way, request.source, request.options)
         asked = request._replace(source=source, options=options)
-        fault, answer, binary = _answer(asked, worker)
+        fault, answer, binary = _answer(asked, worker, until)
         if answer is not None and "error" not in answer:
             return Built(binary, way, first, log)
         said = "" if answer is None else answer["error"]
@@ -101,23 +105,30 @@ def guarded_build(request: Request, worker: Worker | None = None) -> Built:
     return Built(None, "", first, log)
 
 
-def _answer(request: Request, worker: Worker) -> tuple[str, dict[str, Any] | None, bytes]:
-    """What a child makes of a request; see ``Worker.ask``.
+def _answer(
+    request: Request, worker: Worker, until: float
+) -> tuple[str, dict[str, Any] | None, bytes]:
+    """What a child makes of a request, which half of the time ``until`` is left for; see ``ask``.
 
     A compiler dies of a launch whatever its numbers are. The kernel itself may die of what does not
     fit together, as numbers and the zeros of its buffers do, or of numbers that are all zero; so
     that a launch which passes in one of these ways has been compiled.
     """
     if not request.launches:
-        return worker.ask(request._asdict())
+        return worker.ask(request._asdict(), _half_of_what_is_left(until))
     found: tuple[str, dict[str, Any] | None, bytes] = ("", None, b"")
     for launches in (request.launches, list(map(without_numbers, request.launches))):
-        found = worker.ask(request._replace(launches=launches)._asdict())
+        asked = request._replace(launches=launches)._asdict()
+        found = worker.ask(asked, _half_of_what_is_left(until))
         # Nobody knows what it overwrote.
         worker.close()
         if not found[0]:
             break
     return found
+
+
+def _half_of_what_is_left(until: float) -> float:
+    return max((until - time.monotonic()) / 2, _LEAST)
 
 
 class Worker:
@@ -130,12 +141,14 @@ class Worker:
 
     def __init__(self, command: list[str] | None = None, limit: float = LIMIT) -> None:
         self._command = command or [sys.executable, "-m", "rift_cl.cl.build.worker"]
-        self._limit = limit
+        self.limit = limit
         self._process: subprocess.Popen[bytes] | None = None
         self._asking = threading.Lock()
 
-    def ask(self, request: dict[str, Any]) -> tuple[str, dict[str, Any] | None, bytes]:
-        """Have a request answered.
+    def ask(
+        self, request: dict[str, Any], limit: float | None = None
+    ) -> tuple[str, dict[str, Any] | None, bytes]:
+        """Have a request answered, within ``limit`` seconds in place of the child's own.
 
         Returns:
             What went wrong with the child, empty if nothing; its answer, or None; and the bytes
@@ -144,13 +157,14 @@ class Worker:
         Raises:
             DeviceError: no child can be started.
         """
+        limit = self.limit if limit is None else limit
         with self._asking:
             process = self._started()
             found: list[tuple[dict[str, Any], bytes]] = []
             talk = threading.Thread(target=_talk, args=(process, request, found), daemon=True)
             talk.start()
             try:
-                talk.join(self._limit)
+                talk.join(limit)
             except BaseException:
                 self._end(process, 0)
                 raise
@@ -159,9 +173,7 @@ class Worker:
             hung = talk.is_alive()
             status = self._end(process, 0 if hung else _DYING)
             fault = (
-                f"its compiler hung for {self._limit:.3g} s"
-                if hung
-                else death_of("its compiler", status)
+                f"its compiler hung for {limit:.3g} s" if hung else death_of("its compiler", status)
             )
             return fault, None, b""
 
