@@ -108,6 +108,14 @@ typedef real4 half_at __attribute__((aligned(sizeof(real))));
 #define TO_FLOAT(v) ((real)(v))
 #endif
 
+/* a b + c in one way wherever it stands. What `c + a * b` is, a compiler may choose, and Intel's chooses
+ * otherwise in a loop than in the rest of its turns: sums that are cut into parts would have other bits. */
+#if RIFT_POCL
+#define MULTIPLY_ADD(a, b, c) ((c) + (a) * (b))
+#else
+#define MULTIPLY_ADD(a, b, c) mad((lanes)(a), b, c)
+#endif
+
 /* Largest whole number not above v, for |v| < 2^31. */
 static lanes_int floor_int(lanes v) {
   lanes_int i = TO_INT(v);

@@ -51,8 +51,8 @@ KERNEL void radon_backproject(
             table + (((long)slice * count + view) * PHASES + r) * columns + WHOLE(position) + j;
         __global const real *next = r == PHASES - 1 ? at - (PHASES - 1) * columns + 1 : at + columns;
         UNROLL for (int n = 0; n < BLOCKS; n++) {
-          sum[n] = sum[n] + u * LOAD(at + n * LANES);
-          sum[n] = sum[n] + w * LOAD(next + n * LANES);
+          sum[n] = MULTIPLY_ADD(u, LOAD(at + n * LANES), sum[n]);
+          sum[n] = MULTIPLY_ADD(w, LOAD(next + n * LANES), sum[n]);
         }
       }
       UNROLL for (int n = 0; n < BLOCKS; n++) STORE(pixels + n * LANES, sum[n]);
