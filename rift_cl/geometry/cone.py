@@ -33,7 +33,6 @@ from rift_cl.geometry.scan_value import (
     checked_distances,
     checked_flag,
     checked_length,
-    refuse_degrees,
     refuse_round_arcs,
 )
 from rift_cl.geometry.vectors import Vectors
@@ -94,8 +93,9 @@ class Cone(ScanValue):
         curved: bool = False,
     ) -> None:
         """Check the arguments and bring them into their normal form."""
-        object.__setattr__(self, "angles", checked_angles("Cone", angles))
-        refuse_degrees("Cone", self.angles, helix=heights is not None)
+        object.__setattr__(
+            self, "angles", checked_angles("Cone", angles, helix=heights is not None)
+        )
         object.__setattr__(self, "rows", checked_count("Cone", "rows", rows))
         object.__setattr__(self, "bins", checked_count("Cone", "bins", bins))
         object.__setattr__(self, "pitch", _pitch(pitch))

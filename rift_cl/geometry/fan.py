@@ -26,7 +26,6 @@ from rift_cl.geometry.scan_value import (
     checked_distances,
     checked_flag,
     checked_length,
-    refuse_degrees,
     refuse_round_arcs,
 )
 
@@ -119,7 +118,6 @@ class Fan(ScanValue):
     ) -> None:
         """Check the arguments and bring them into their normal form."""
         object.__setattr__(self, "angles", checked_angles("Fan", angles))
-        refuse_degrees("Fan", self.angles)
         object.__setattr__(self, "bins", checked_count("Fan", "bins", bins))
         object.__setattr__(self, "pitch", checked_length("Fan", "pitch", pitch))
         lengths = checked_distances("Fan", source_to_axis, source_to_detector)

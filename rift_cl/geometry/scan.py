@@ -19,7 +19,6 @@ from rift_cl.geometry.scan_value import (
     checked_center,
     checked_count,
     checked_length,
-    refuse_degrees,
 )
 
 
@@ -51,7 +50,6 @@ class Parallel(ScanValue):
     ) -> None:
         """Check the arguments and bring them into their normal form."""
         object.__setattr__(self, "angles", checked_angles("Parallel", angles))
-        refuse_degrees("Parallel", self.angles)
         object.__setattr__(self, "bins", checked_count("Parallel", "bins", bins))
         object.__setattr__(self, "pitch", checked_length("Parallel", "pitch", pitch))
         middle = (self.bins - 1) / 2

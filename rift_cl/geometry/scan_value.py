@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import hashlib
 import math
+import weakref
+from collections.abc import Iterable
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +28,9 @@ _TURN_TOLERANCE = 1e-5
 _ROUND_BEYOND = 4 * np.pi
 _ROUND_STEP = 0.25
 _FEWEST_ROUND = 8
+
+# Angles that scans hold, by identity. A few of them may look like degrees, which all did not.
+_held_angles: weakref.WeakValueDictionary[int, NDArray[np.float64]] = weakref.WeakValueDictionary()
 
 
 class ScanValue:
@@ -52,7 +57,7 @@ class ScanValue:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies are made by the constructor, so that their arrays are read-only as well."""
-        return type(self), self._values()
+        return _restored, (type(self), self._values())
 
     @property
     def views(self) -> int:
@@ -66,9 +71,19 @@ class ScanValue:
             views: their numbers, or a truth value for each view.
         """
         chosen = np.asarray(views)
-        return type(self)(
-            *(value[chosen] if isinstance(value, np.ndarray) else value for value in self._values())
+        values = self._values()
+        return self._with(
+            value[chosen] if isinstance(value, np.ndarray) else value for value in values
         )
+
+    def at(self, angles: NDArray[np.float64]) -> Self:
+        """The same scan at other angles, which are radians whatever they look like.
+
+        Args:
+            angles: finite, as many as there are, computed from those of this scan.
+        """
+        _, *others = self._values()
+        return self._with([np.add(angles, 0.0), *others])
 
     def scaled(self, factor: float) -> Self:
         """The same scan with every length times a factor, as for another unit.
@@ -82,6 +97,9 @@ class ScanValue:
             values[name] = np.multiply(values[name], times)
         return type(self)(**values)
 
+    def _with(self, values: Iterable[Any]) -> Self:
+        return cast("Self", _restored(type(self), tuple(values)))
+
     def _values(self) -> tuple[Any, ...]:
         return tuple(getattr(self, field.name) for field in fields(self))  # type: ignore[arg-type]
 
@@ -91,17 +109,34 @@ class ScanValue:
         )
 
 
-def checked_angles(owner: str, angles: ArrayLike) -> NDArray[np.float64]:
-    """Angles as a read-only float64 array of one dimension.
+def _restored(kind: type[Any], values: tuple[Any, ...]) -> Any:
+    """A scan of what another scan held, whose angles are taken for radians unseen."""
+    first = values[0]
+    if np.ndim(first) == 1 and np.size(first) > 0:
+        _hold(first)
+    return kind(*values)
+
+
+def _hold(angles: NDArray[np.float64]) -> None:
+    angles.flags.writeable = False
+    _held_angles[id(angles)] = angles
+
+
+def checked_angles(owner: str, angles: ArrayLike, *, helix: bool = False) -> NDArray[np.float64]:
+    """Angles as a read-only float64 array of one dimension; those of another scan as they are.
 
     Args:
         owner: name of the class that they are given to.
         angles: in radians, at least one.
+        helix: whether they may go round many times.
 
     Raises:
         ShapeError: there are none, or not in one dimension.
-        InputError: they are no finite numbers.
+        InputError: they are no finite numbers, or look like degrees.
     """
+    held = _held_angles.get(id(angles))
+    if held is not None and held is angles:
+        return held
     values = real_numbers(angles)
     if values is None:
         raise InputError(f"{owner}: angles is {angles!r}, wanted real numbers, in radians")
@@ -112,11 +147,12 @@ def checked_angles(owner: str, angles: ArrayLike) -> NDArray[np.float64]:
     if not np.isfinite(values).all():
         index = int(np.flatnonzero(~np.isfinite(values))[0])
         raise InputError(f"{owner}: angles[{index}] is {values[index]}, wanted a finite number")
-    values.flags.writeable = False
+    _refuse_degrees(owner, values, helix=helix)
+    _hold(values)
     return values
 
 
-def refuse_degrees(owner: str, angles: NDArray[np.float64], *, helix: bool = False) -> None:
+def _refuse_degrees(owner: str, angles: NDArray[np.float64], *, helix: bool) -> None:
     """Refuse angles that are degrees by all appearance.
 
     Even steps that fill half a turn, a turn or two in degrees; and eight and more angles that would

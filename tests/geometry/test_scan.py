@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import pickle
 
@@ -11,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from rift_cl import Parallel
+from rift_cl import Cone, Fan, Parallel
 from rift_cl.errors import InputError, ShapeError
 
 # Anything but round numbers, which look like degrees.
@@ -188,3 +189,23 @@ def test_copies_are_equal_and_read_only():
     for copied in (pickle.loads(pickle.dumps(scan)), dataclasses.replace(scan)):
         assert copied == scan
         assert not copied.angles.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("kind", "others"),
+    [(Parallel, (12,)), (Fan, (12, 1.0, 50.0, 80.0)), (Cone, (4, 12, 1.0, 50.0, 80.0))],
+)
+def test_what_is_taken_from_accepted_angles_is_not_refused_as_degrees(kind, others):
+    """Every fifth angle is half a radian on, and two hundred and one end at a whole one."""
+    whole = kind(np.arange(0, 50, 0.1), *others)
+    with pytest.raises(InputError, match="degrees"):
+        kind(whole.angles[::5].copy(), *others)
+    for few in (whole.subset(np.arange(0, 500, 5)), whole.subset(np.arange(201))):
+        for scan in (few, few.at(-few.angles)):
+            assert pickle.loads(pickle.dumps(scan)) == scan == copy.deepcopy(scan)
+            wider = dataclasses.replace(scan, bins=14, center=None)
+            assert np.array_equal(wider.angles, scan.angles)
+            assert scan.subset(np.arange(50)).views == 50
+            assert scan.scaled(2.0).views == scan.views
+            with pytest.raises(ValueError, match="read-only"):
+                scan.angles[0] = 1

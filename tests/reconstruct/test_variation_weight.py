@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
+from rift_cl.errors import NonFiniteError
 from rift_cl.metrics import psnr
 from rift_cl.reconstruct import MeasuredRays, tv, variation_weight
 from rift_cl.reconstruct.solvers.variation_weight import noise_of_rays
@@ -89,3 +90,12 @@ def test_it_does_better_than_an_eighth_and_eight_times_as_much(device, noise, st
         for factor in (1 / 8, 1, 8)
     ]
     assert scores[1] == max(scores)
+
+
+def test_data_that_are_no_numbers_are_named_where_they_count(device):
+    A, y, _ = measured(device, 0.02)
+    y[3, 5] = np.nan
+    with pytest.raises(NonFiniteError, match=r"y holds NaN.*\(3, 5\)"):
+        variation_weight(A, y)
+    counted = np.isfinite(y).astype(float)
+    assert variation_weight(A, y, weights=counted) > 0

@@ -262,7 +262,7 @@ class SliceInput:
             fan = dataclasses.replace(fan, pitch=self._pitch)
         if self.center is not None:
             fan = dataclasses.replace(fan, center=binned_center(self.center, settings.binning))
-        return dataclasses.replace(fan, angles=-fan.angles) if self.turned else fan
+        return fan.at(-fan.angles) if self.turned else fan
 
     def _geometry(self) -> Parallel | Fan:
         fan, settings = self.fan, self.settings

@@ -117,7 +117,7 @@ def axis_of_fan(
             f"span is {span}, wanted two bins in ascending order, between 0 and {fan.bins - 1}"
         )
     mean = rows.mean(axis=1, keepdims=True)
-    ways = fan, replace(fan, angles=-fan.angles)
+    ways = fan, fan.at(-fan.angles)
     try:
         found, told = _either_way(rows, mean, places, middle, ways, span)
     except InputError as error:

@@ -79,8 +79,7 @@ class _Rays:
         chosen = order[:: max(1, round(fan.views / _VIEWS))]
         self._views = views[chosen]
         self._fan = replace(
-            fan,
-            angles=fan.angles[chosen],
+            fan.subset(chosen),
             bins=views.shape[1],
             pitch=fan.pitch * count,
             center=(fan.center - (count - 1) / 2) / count,
@@ -100,7 +99,7 @@ class _Rays:
         fan = self._fan
         angles = fan.angles[0] + turn * (fan.angles - fan.angles[0])
         # A factor of the fan's tangents, which leaves the source where it is.
-        fan = replace(fan, angles=angles, pitch=fan.pitch / distance)
+        fan = replace(fan.at(angles), pitch=fan.pitch / distance)
         return min(self._differences(replace(fan, center=fan.center + aside)) for aside in _CENTERS)
 
     def _differences(self, fan: Fan) -> float:

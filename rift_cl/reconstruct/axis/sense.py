@@ -74,7 +74,7 @@ def sense_of(sinogram: Views, fan: Fan, centers: list[float]) -> Sense:
     contrast = float(sinogram.std())
     squares = [
         min((_squares(sinogram, replace(one, center=center)) for center in centers), key=np.sum)
-        for one in (fan, replace(fan, angles=-fan.angles))
+        for one in (fan, fan.at(-fan.angles))
     ]
     if squares[0].size != squares[1].size or squares[0].size < 3 or not contrast > 0:
         return Sense(0, (np.nan, np.nan))

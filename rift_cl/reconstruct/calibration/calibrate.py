@@ -143,9 +143,9 @@ def calibrate(
     sign = -1.0 if axis.sense is not None and axis.sense.sign < 0 else 1.0
     right: Fan | Cone
     if isinstance(scan, Fan):
-        right = replace(scan, angles=sign * scan.angles, center=axis.center)
+        right = replace(scan.at(sign * scan.angles), center=axis.center)
     else:
-        right = replace(scan, angles=sign * scan.angles, center=(scan.center[0], axis.center))
+        right = replace(scan.at(sign * scan.angles), center=(scan.center[0], axis.center))
     stack = as_host_array(projections, np.shape(projections), name="projections", wants="calibrate")
     if isinstance(right, Fan):
         stack = stack if stack.ndim == 2 else stack[:, stack.shape[1] // 2]

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rift_cl.cl.host_arrays import download, is_device_array
+from rift_cl.cl.host_arrays import check_finite, download, is_device_array
 from rift_cl.operators.linear import LinearOperator
-from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays
+from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays, masked_data
 
 Floats = NDArray[np.float32]
 
@@ -47,17 +47,21 @@ def variation_weight(A: LinearOperator, y: Any, *, weights: ArrayLike | None = N
 
     Returns:
         The weight, in the unit of y squared over the unit of TV (see ``tv``).
+
+    Raises:
+        NonFiniteError: y holds NaN or infinity where something was measured.
     """
     data = np.asarray(download(A.device, y) if is_device_array(y) else y)
     if weights is None and isinstance(A, WeightedRays):
         weights = A.weights
     counted = np.broadcast_to(1 if weights is None else np.asarray(weights), data.shape)
+    data = masked_data(data, counted)
+    check_finite(data, name="y")
     order = _views_in_order(A.scan, len(data))
     if data.ndim == 3:
         rows = np.unique(np.linspace(0, data.shape[1] - 1, _ROWS).astype(int))
         data, counted = data[:, rows], counted[:, rows]
     data, roots = data[order].astype(np.float32), np.sqrt(counted[order], dtype=np.float32)
-    data[roots == 0] = 0
     largest = float(np.abs(data * roots).max(initial=0))
     noise = max(noise_of_rays(data, roots), _LEAST * largest)
     if noise == 0:

@@ -320,7 +320,7 @@ class PhaseProjector(ParallelProjector, Projector):
             (*between[0], *spacing),
             (*between[1], middle, plane.center[1]),
         )
-        seen = Parallel(scan.angles[views], scan.bins, scan.pitch, scan.center)
+        seen = scan.subset(np.arange(views.start, views.stop))
         part = PhaseProjector(grid, seen, self.footprint, self.device, self.dtype)
         part._table_bytes = 0
         by_rows, by_columns = self._tables
