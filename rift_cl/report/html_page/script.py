@@ -7,10 +7,15 @@ SCRIPT = """
 document.documentElement.classList.add("live");
 for (const figure of document.querySelectorAll("figure.slider")) {
   const pictures = figure.querySelectorAll("img"), said = figure.querySelector("output");
-  figure.querySelector("[type=range]").addEventListener("input", (event) => {
-    pictures.forEach((img, k) => img.classList.toggle("shown", k === +event.target.value));
-    said.textContent = pictures[event.target.value].dataset.label;
+  const slide = figure.querySelector("[type=range]");
+  const tell = () => { slide.setAttribute("aria-valuetext", said.textContent); };
+  slide.addEventListener("input", () => {
+    pictures.forEach((img, k) => img.classList.toggle("shown", k === +slide.value));
+    said.textContent = pictures[slide.value].dataset.label;
+    tell();
   });
+  tell();
+  figure.querySelector(".frames").removeAttribute("tabindex");
 }
 for (const pair of document.querySelectorAll(".pair")) {
   pair.querySelector("[type=range]").addEventListener("input", (event) => {
