@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import subprocess
 import sys
 
@@ -73,15 +74,19 @@ def test_family_gives_the_known_results_in_a_child(name):
     assert found["deviation"] < driver_test.RIGHT
 
 
-def test_driver_that_is_right_is_tested_once(tested):
+@pytest.mark.parametrize(("days", "age"), [(0, "today"), (1, "yesterday"), (3, "3 days ago")])
+def test_driver_that_is_right_is_tested_once(tested, monkeypatch, days, age):
+    day = datetime.date(2026, 12, 30)
+    monkeypatch.setattr(driver_test, "_today", lambda: day)
     assert verdict(tested) is None
     assert findings(tested) == []
     record = _examined(tested, _always(**RIGHT))
     assert record["way"] == ""
     assert record["refused"] == {}
+    monkeypatch.setattr(driver_test, "_today", lambda: day + datetime.timedelta(days))
     (said,) = findings(tested)
     assert said.startswith("2 of 2 families")
-    assert "today" in said
+    assert f"tested {age} " in said
 
 
 def test_driver_that_keeps_nothing_is_met_once(tested, monkeypatch):

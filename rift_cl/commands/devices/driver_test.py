@@ -93,9 +93,9 @@ def examine_driver(
             best = way, results
         if _count(results) == len(families):
             break
-    today = datetime.datetime.now(datetime.timezone.utc).date().isoformat()
     way, results = best
-    add_to_record(driver, way=way, families=results, tested=today, refused=_refused(results))
+    tested = _today().isoformat()
+    add_to_record(driver, way=way, families=results, tested=tested, refused=_refused(results))
 
 
 def in_child(selector: str, families: Sequence[str], limit: float = LIMIT) -> Iterator[Found]:
@@ -125,6 +125,11 @@ def in_child(selector: str, families: Sequence[str], limit: float = LIMIT) -> It
             process.wait()
 
 
+def _today() -> datetime.date:
+    """The day in UTC, so that a record kept beside a journey has no negative age."""
+    return datetime.datetime.now(datetime.timezone.utc).date()
+
+
 def findings(device: Device) -> list[str]:
     """What ``rift devices`` says of a driver, in sentences; nothing where it was not tested."""
     record = verdict(device)
@@ -132,8 +137,8 @@ def findings(device: Device) -> list[str]:
         return []
     results: dict[str, Found] = record["families"]
     right = [found["deviation"] for found in results.values() if is_right(found)]
-    days = (datetime.date.today() - datetime.date.fromisoformat(record["tested"])).days
-    age = "today" if days < 1 else f"{days} days ago"
+    days = (_today() - datetime.date.fromisoformat(record["tested"])).days
+    age = "today" if days < 1 else "yesterday" if days == 1 else f"{days} days ago"
     said = [
         f"{len(right)} of {len(results)} families of kernels give the known results (largest "
         f"deviation {max(right, default=0):.1g}), tested {age} with driver {device.driver}"
