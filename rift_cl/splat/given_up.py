@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rift_cl.errors import GivenUpError
 
@@ -14,7 +14,19 @@ def give_up(owner: Any, *names: str) -> None:
 
 
 class MayBeGivenUp:
-    """What says in a sentence that it has nothing any more."""
+    """A dataclass that says in a sentence that it has nothing any more."""
+
+    if TYPE_CHECKING:
+        __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def __repr__(self) -> str:
+        """What there is; what was given up is named."""
+        held = vars(self)
+        fields = (
+            f"{name}={held[name]!r}" if name in held else f"{name} given up"
+            for name in type(self).__dataclass_fields__
+        )
+        return f"{type(self).__name__}({', '.join(fields)})"
 
     if not TYPE_CHECKING:
 

@@ -48,7 +48,7 @@ _PIXEL_RUN = 1024
 DepthKind = Literal["accumulated", "expected"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Frame(MayBeGivenUp):
     """A rendered image with what its gradient needs.
 

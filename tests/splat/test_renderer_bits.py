@@ -70,7 +70,7 @@ def all_digests():
     for device in rift.devices():
         found[f"{device.selector} units"] = device.traits.compute_units
         for is_cpu in {device.traits.is_cpu, False}:
-            traits = dataclasses.replace(device.traits, is_cpu=is_cpu)
+            traits = dataclasses.replace(device.traits, is_cpu=is_cpu, optimized=is_cpu)
             dressed = rift.Device(device._handle, device.selector, traits=traits)
             found[kind(dressed)] = digest(*drawn(dressed))
     return found
@@ -224,6 +224,7 @@ def test_what_is_not_retained_is_gone_before_the_sums_are_made(device, monkeypat
 
     monkeypatch.setattr(RASTER_PASS, "sum_slots", noted)
     gradient(renderer, frame, retain=False)
+    assert "raster_pass given up" in repr(frame)
     assert left == [["slots"]]
 
 
