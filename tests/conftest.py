@@ -7,7 +7,6 @@ are tested without a GPU.
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import subprocess
 import sys
@@ -17,6 +16,7 @@ from pathlib import Path
 
 import hypothesis
 import pytest
+from limited_devices import as_gpu
 
 import rift_cl as rift
 
@@ -43,8 +43,7 @@ def _variants() -> list[rift.Device]:
     found = _devices().copy()
     for device in _devices():
         if device.traits.is_cpu:
-            traits = dataclasses.replace(device.traits, is_cpu=False)
-            found.append(rift.Device(device._handle, device.selector, traits=traits))
+            found.append(as_gpu(device))
     return found
 
 

@@ -18,6 +18,15 @@ def limited(device: rift.Device, memory: int | None = None, **traits: Any) -> ri
     return rift.Device(device._handle, device.selector, traits=changed, memory=memory)
 
 
+def as_gpu(device: rift.Device) -> rift.Device:
+    """A CPU dressed as a GPU: one lane, groups of 64.
+
+    No CPU optimizes a GPU's kernels for anybody, and two thirds of the tests' time with them would
+    go into that.
+    """
+    return limited(device, is_cpu=False, optimized=False)
+
+
 def normal(*shape: int) -> np.ndarray[Any, Any]:
     return np.random.default_rng(len(shape)).standard_normal(shape).astype(np.float32)
 

@@ -45,6 +45,8 @@ class Traits:
         seconds: longest time that one launch may take where the system ends those that take longer,
             and with them the program's use of the device; launches are cut by it. None where
             nothing does that.
+        optimized: whether the compiler optimizes. It takes most of its time for that, more than a
+            kernel that is launched once or twice is worth.
     """
 
     is_cpu: bool
@@ -60,6 +62,7 @@ class Traits:
     share: float = 1.0
     items: tuple[int, int, int] = (_ALONG_X, _FURTHER, _FURTHER)
     seconds: float | None = None
+    optimized: bool = True
 
     @classmethod
     def of(cls, device: Any) -> Traits:

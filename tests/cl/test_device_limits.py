@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from limited_devices import Arrays, assert_same, limited, normal
+from limited_devices import Arrays, as_gpu, assert_same, limited, normal
 from observations_of_all_kinds import random_observations
 from projection_scenes import camera_of
 from projection_scenes import random_splats as visible_splats
@@ -170,7 +170,7 @@ def test_no_array_is_larger_than_the_largest_buffer(device, job, largest, monkey
 @pytest.mark.once
 @pytest.mark.full
 def test_slabs_of_rows_fit_the_largest_buffer_of_a_gpu(device):
-    gpu = limited(device, is_cpu=False)
+    gpu = as_gpu(device)
     assert_same(fourier_filtering(limited(gpu, allocation=1 << 16)), fourier_filtering(gpu))
 
 
@@ -262,7 +262,7 @@ def test_no_kernel_asks_for_what_is_wrong_in_a_part_of_a_grid(asked):
 @pytest.mark.once
 def test_filtered_views_beyond_the_groups_that_a_gpu_numbers(device):
     """65,537 rows, one to a work-item along y."""
-    gpu = limited(device, is_cpu=False)
+    gpu = as_gpu(device)
     scan = rift.Parallel(np.zeros(1), 2)
     F = ViewFilter(scan, rift.Ramp(), rows=65_537, device=gpu)
     y = normal(*F.domain)
@@ -281,7 +281,7 @@ def test_local_memory_beyond_the_devices_is_told(device):
 @every_job
 def test_a_gpu_of_small_groups_has_results_to_rounding(device, job):
     """Sums over the items of a group are in another order there."""
-    gpu = limited(device, is_cpu=False)
+    gpu = as_gpu(device)
     small = limited(gpu, group=20)
     assert small.traits.macros["GROUP"] == 16
     for one, other in zip(job(small), job(gpu), strict=True):
@@ -291,7 +291,7 @@ def test_a_gpu_of_small_groups_has_results_to_rounding(device, job):
 @pytest.mark.once
 @pytest.mark.parametrize("most", [32, 20])
 def test_a_kernel_that_runs_in_smaller_groups_alone(device, most, monkeypatch):
-    gpu = limited(device, is_cpu=False)
+    gpu = as_gpu(device)
     needs = kernel_needs
 
     def few(kernel, handle):

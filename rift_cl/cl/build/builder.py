@@ -22,7 +22,12 @@ import numpy as np
 
 from rift_cl.cl.build.driver_record import OTHER_KIND, keeps_programs, read_record
 from rift_cl.cl.build.first_launch import FirstLaunch
-from rift_cl.cl.build.guarded_build import Request, guarded_build, way_to_build
+from rift_cl.cl.build.guarded_build import (
+    UNOPTIMIZED,
+    Request,
+    guarded_build,
+    way_to_build,
+)
 from rift_cl.cl.build.kernel_cache import build_lock
 from rift_cl.cl.build.kernel_features import feature_of
 from rift_cl.cl.build.program_store import (
@@ -103,7 +108,8 @@ class Builder:
         if _DOUBLE in macros:
             real_type(self._device, np.float64)
         defines = self.defines(macros).items()
-        options = [*OPTIONS, *(f"-D{macro}={value}" for macro, value in defines)]
+        optimized = () if self._device.traits.optimized else (UNOPTIMIZED,)
+        options = [*OPTIONS, *optimized, *(f"-D{macro}={value}" for macro, value in defines)]
         source, options = way_to_build(self._known.get("way", ""), kernel_source(name), options)
         entry = self._entries[key] = program_name(self._driver, source, options)
         if self.keeps_programs:

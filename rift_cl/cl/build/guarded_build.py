@@ -30,11 +30,12 @@ LIMIT, _LEAST = 300.0, 1.0
 _DYING = 20.0
 # No compiler ends in this way by itself.
 _KILLED = "SIGKILL"
+UNOPTIMIZED = "-cl-opt-disable"
 # How a kernel is built: what stands before its source, and further options.
 WAYS = {
     "": ("", ()),
     "noinline": ("#define static static __attribute__((noinline))\n", ()),
-    "without optimization": ("", ("-cl-opt-disable",)),
+    "without optimization": ("", (UNOPTIMIZED,)),
 }
 
 
