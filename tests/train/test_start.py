@@ -7,7 +7,13 @@ import pytest
 
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
-from rift_cl.train.start.points import focus_of, random_points, scene_extent, start_splats
+from rift_cl.train.start.points import (
+    far_points,
+    focus_of,
+    random_points,
+    scene_extent,
+    start_splats,
+)
 
 MIDDLE_OF_RING = np.array([0.3, -0.2, 0.1])
 
@@ -50,6 +56,21 @@ def test_random_points_lie_where_half_of_the_cameras_look():
     assert (seen >= 6).all()
     assert np.array_equal(points, random_points(cameras, 500, 3))
     assert not np.array_equal(points, random_points(cameras, 500, 4))
+
+
+def test_far_points_lie_behind_the_focus_of_a_camera_that_sees_them():
+    cameras = ring()
+    points = far_points(cameras, 300, 3)
+    seen = np.zeros(300, bool)
+    for camera in cameras:
+        local = points @ camera.view[:3, :3].T + camera.view[:3, 3]
+        pixels = local[:, :2] / local[:, 2:] * 90 + (40, 30)
+        beyond = local[:, 2] > 2.1 * np.linalg.norm(camera.center - MIDDLE_OF_RING)
+        seen |= beyond & ((pixels >= 0) & (pixels <= (80, 60))).all(axis=1)
+    assert seen.all()
+    assert np.linalg.norm(points - MIDDLE_OF_RING, axis=1).max() > 5 * 5
+    assert np.array_equal(points, far_points(cameras, 300, 3))
+    assert far_points(cameras, 0, 3).shape == (0, 3)
 
 
 def test_cameras_that_look_apart_are_told():

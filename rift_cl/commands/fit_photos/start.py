@@ -11,10 +11,12 @@ from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.io.captures.capture import Capture
 from rift_cl.train.parameters import Parameters
-from rift_cl.train.start.points import hull_points, random_points, start_splats
+from rift_cl.train.start.points import far_points, hull_points, random_points, start_splats
 
 # A fit begins with no more random splats than this share of all it may have.
 _FIRST_SHARE = 0.5
+# Share of these beyond what the cameras have in common.
+_FAR_SHARE = 0.2
 # Photographs that carve the visual hull.
 _HULL_VIEWS = 50
 
@@ -45,7 +47,7 @@ def first_splats(
 
 
 def _guessed(pictures: CapturePictures, count: int, seed: int) -> Any:
-    """Points in the visual hull, or about the focus if there is no background."""
+    """Points in the visual hull, or about the focus and beyond it if there is no background."""
     views = len(pictures.cameras)
     few = evenly(views, _HULL_VIEWS)
     fronts = [pictures.foreground(number) for number in few]
@@ -55,4 +57,8 @@ def _guessed(pictures: CapturePictures, count: int, seed: int) -> Any:
         points = hull_points(cameras, masks, count, seed)
         if points is not None:
             return points
-    return random_points(pictures.cameras, max(1, int(count * _FIRST_SHARE)), seed)
+    first = max(1, int(count * _FIRST_SHARE))
+    perspective = all(camera.model != "ortho" for camera in pictures.cameras)
+    far = int(first * _FAR_SHARE) if perspective else 0
+    near = random_points(pictures.cameras, first - far, seed)
+    return np.concatenate([near, far_points(pictures.cameras, far, seed)])

@@ -1,4 +1,8 @@
-"""Initial positions of splats: at sparse points, in the visual hull, or at random in view."""
+"""Initial positions of splats: at sparse points, in the visual hull, or at random in view.
+
+What is at random in view lies in the volume that cameras have in common, and a share of it beyond:
+surroundings that no splat begins at become fog before the cameras in short fits.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +22,8 @@ _OPACITY = 0.1
 _NEIGHBOURS = 3
 # Share of the views that must see a random point, and how often points are drawn.
 _SHARE_OF_VIEWS, _TRIES = 0.5, 400
+# How far beyond the focus surroundings begin and end, in distances of the cameras from it.
+_SURROUNDINGS = (1.2, 8.0)
 # Share of the views that must see foreground at a point of the hull, share of points that lie near
 # its surface, and how near, as a share of the distance at which the cameras stand.
 _HULL, _SHELL, _DEPTH = 0.98, 0.85, 0.03
@@ -77,6 +83,31 @@ def random_points(cameras: Sequence[Camera], count: int, seed: int) -> Floats:
     raise InputError(
         "the cameras have no volume in common that half of them see: give points to begin with"
     )
+
+
+def far_points(cameras: Sequence[Camera], count: int, seed: int) -> Floats:
+    """Points beyond the focus, each on a pixel of one camera, (N, 3); even in inverse distance.
+
+    Args:
+        cameras: with perspective; rays of fisheye lenses are taken as straight ones.
+        count: how many points.
+        seed: random seed.
+    """
+    random = np.random.default_rng((seed, 0xFA2))
+    middle = focus_of(cameras)
+    away = np.array([np.linalg.norm(camera.center - middle) for camera in cameras])
+    first, last = (factor * (float(np.median(away)) or 1.0) for factor in _SURROUNDINGS)
+    which = random.integers(len(cameras), size=count)
+    depths = away[which] + 1 / random.uniform(1 / last, 1 / first, count)
+    places = random.uniform(size=(count, 2))
+    points = np.empty((count, 3))
+    for number, camera in enumerate(cameras):
+        mine = which == number
+        fx, fy, cx, cy = camera.intrinsics
+        pixels = places[mine] * (camera.width, camera.height)
+        rays = np.column_stack([(pixels - (cx, cy)) / (fx, fy), np.ones(len(pixels))])
+        points[mine] = (rays * depths[mine, None]) @ camera.view[:3, :3] + camera.center
+    return points
 
 
 def hull_points(
