@@ -52,3 +52,31 @@ def test_fans_are_as_true_as_the_peer_s(tool, monkeypatch, capsys):
     tool("bench_fan").main()
     ours, peer = map(float, re.findall(r" (0\.\d+)", capsys.readouterr().out)[:2])
     assert ours == pytest.approx(peer, rel=0.05)
+
+
+@pytest.mark.full
+def test_cones_are_timed_part_by_part_and_left_out_where_memory_is_short(tool, monkeypatch, capsys):
+    bench = tool("bench_cone")
+    options = bench.Options(sizes=("16x8",), rounds=1)
+    bench.main(options)
+    said = capsys.readouterr()
+    for part in ("filtered backprojection", "forward", "backward", "10 steps of CGLS"):
+        assert re.search(rf"{part}, ours: [\d.]+ s, [\d.]+ s of processors", said.err)
+        assert part in said.out
+    monkeypatch.setattr(bench, "free_host_memory", lambda: 1000)
+    bench.main(options)
+    said = capsys.readouterr()
+    assert "forward, ours: left out, needs " in said.err
+    assert "ours" not in said.out
+
+
+def test_what_both_do_is_compared(tool):
+    bench = tool("bench_cone")
+
+    def timed(who, name, seconds):
+        part = bench.Part(who, name, lambda: None, lambda: None, 1.0)
+        return bench.Timed(part, seconds, seconds / 2, None)
+
+    found = [timed("ours", "forward", 2.0), timed("ours", "CGLS", 1.0)]
+    sentence = "forward: 3.0 times by the clock, 3.0 by processors' time"
+    assert list(bench._ratios([*found, timed("RTK", "forward", 6.0)])) == [sentence]
