@@ -123,7 +123,7 @@ def _values(kind: Any) -> str:
 
 
 def _default(value: Any) -> str:
-    if value is None or value == () or isinstance(value, bool) or "MISSING" in repr(value):
+    if value in (None, (), "") or isinstance(value, bool) or "MISSING" in repr(value):
         return ""
     shown = " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
     return f"Default: `{shown}`"

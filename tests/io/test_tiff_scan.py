@@ -247,3 +247,11 @@ def test_darks_without_flats_are_not_used(tmp_path: Path) -> None:
     scan = as_they_are(tmp_path)
     assert (scan.kind, scan.read(0, 1).darks) == ("attenuation", None)
     assert any("darks are not used" in note for note in scan.notes)
+
+
+@pytest.mark.parametrize("theta", [None, "0:180"])
+def test_sinograms_ask_for_angles_only_where_none_are_given(tmp_path: Path, theta) -> None:
+    made.write_series(tmp_path, "sino_{}.tif", made.frames())
+    with pytest.raises(InputError, match="--axes row,angle,bin") as caught:
+        as_they_are(tmp_path, theta=theta)
+    assert ("--theta" in str(caught.value)) == (theta is None)

@@ -168,10 +168,11 @@ def _axes(place: _Place, stack: TiffStack, angles: AngleList | None, request: Sc
         remark = "; if this one page is a single projection, it is no scan"
         return "r" + axes_of(path, name, shape[1:], count=count, asked=asked, remark=remark)
     if count is None and asked is None and words_of(stack.files[0].stem) & _SINOGRAMS:
+        theta = "" if request.theta else "give the angles with theta= (--theta), and "
         raise InputError(
-            f"{path}: {name!r} is named as a sinogram, and there are no angles: give them with "
-            "theta= (--theta), and say which axis is which with axes= (--axes), such as --axes "
-            "row,angle,bin for a sinogram on each page"
+            f"{path}: {name!r} is named as a sinogram, and no number of angles tells its axes: "
+            f"{theta}say which axis is which with axes= (--axes), such as --axes row,angle,bin for "
+            "a sinogram on each page"
         )
     usual = "nrb" if count is None else None
     return axes_of(path, name, shape, count=count, asked=asked, usual=usual)
