@@ -128,7 +128,8 @@ def _timed(device: rift.Device, case: ConeCase, rounds: int) -> Iterator[Timed]:
         part.prepare()
         found = _best(part, truth, rounds)
         took = f"{found.seconds:.2f} s, {found.processor:.2f} s of processors"
-        say(f"  {part.name}, {part.who}: {took}")
+        quality = "" if found.psnr is None else f", {found.psnr:.2f} dB"
+        say(f"  {part.name}, {part.who}: {took}{quality}")
         yield found
 
 
