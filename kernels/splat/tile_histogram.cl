@@ -4,14 +4,15 @@
  *
  * Index space: chunks of the walk of include/splat/tile_walk.h.
  *
- * Buffers: ranks[splats, 4], offsets[splats + 1], table[chunks, tiles]. */
+ * Buffers: ranks[splats, 4], owners[splats, 2], offsets[splats + 1], table[chunks, tiles]. */
 
 #include "include/portable.h"
 #include "include/splat/tile_walk.h"
 
 KERNEL void tile_histogram(
-    __global const int4 *restrict ranks, __global const int *restrict offsets,
-    __global int *restrict table, int splats, int pairs, int chunks, int tiles, int tiles_x)
+    __global const int4 *restrict ranks, __global const int2 *restrict owners,
+    __global const int *restrict offsets, __global int *restrict table, int splats, int pairs,
+    int chunks, int tiles, int tiles_x, int first_tile_row)
 {
   const int chunk = (int)get_global_id(0);
   if (chunk >= chunks) return;

@@ -5,7 +5,11 @@
  * with xi standard normal (3DGS as MCMC, Kheradmand et al. 2024; constants of gsplat). Numbers are
  * made from (splat, step, seed) alone by a hash (PCG4D, Jarzynski and Olano 2020) and Box and
  * Muller's transform, so that a run can be repeated and taken up again, whatever the number of lanes
- * that hash at a time. Index space: (runs of RUN splats), LANES of them at a time.
+ * that hash at a time.
+ *
+ * It reads the lines that splat_update.cl writes, but stands by itself: relocation comes between the
+ * two, on the host, and it takes 0.6 to 2.4 % of a step's kernels where it is asked for at all
+ * (docs/benchmarks/training.md). Index space: (runs of RUN splats), LANES of them at a time.
  *
  * Buffers: means, scales[count, 3], quats[count, 4], opacities[count]. */
 

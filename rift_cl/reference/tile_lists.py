@@ -1,7 +1,8 @@
 """Which splats each tile of an image must draw, and in which order, from the definition.
 
-Every splat has a box of tiles; every (splat, tile) pair of a box becomes an entry of that tile's
-list. Within a list nearer splats come first, and splats of equal depth by index.
+Every splat has a box of tiles, and every (splat, tile) pair of a box, or of those of its tiles that
+its ellipse reaches, becomes an entry of that tile's list. Within a list nearer splats come first,
+and splats of equal depth by index.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ def tile_lists(
     tiles_x: int,
     tiles_y: int,
     first_row: int = 0,
+    touched: NDArray[np.bool_] | None = None,
     sort: bool = True,
 ) -> TileListArrays:
     """The tile lists of N splats.
@@ -45,23 +47,51 @@ def tile_lists(
         tiles_x: tiles in a row.
         tiles_y: rows of tiles.
         first_row: the row of tiles that they begin with, and are counted from.
+        touched: (N, tiles_y, tiles_x) which tiles count of those in a box; all if not given.
         sort: front to back; otherwise in index order.
     """
     depths: NDArray[np.float32] = np.asarray(depth, dtype=np.float32)
     down = np.array([0, first_row, 0, first_row])
     moved = np.asarray(boxes, np.int64).reshape(-1, 4) - down
-    clipped: NDArray[Any] = np.clip(moved, 0, [tiles_x, tiles_y, tiles_x, tiles_y])
-    sides = np.maximum(clipped[:, 2:].astype(np.int64) - clipped[:, :2], 0)
-    areas = np.where(np.isnan(depths), 0, sides.prod(axis=1))
-    slots = np.concatenate([[0], np.cumsum(areas)])
-    order = np.flatnonzero(areas)
-    if sort:
-        order = order[np.argsort(depths[order], kind="stable")]
-    splats = np.repeat(order, areas[order])
-    numbers = np.concatenate([np.arange(0), *(np.arange(area) for area in areas[order])])
-    rows, columns = np.divmod(numbers, np.maximum(sides[splats, 0], 1))
-    tiles = (clipped[splats, 1] + rows) * tiles_x + clipped[splats, 0] + columns
-    by_tile = np.argsort(tiles, kind="stable")
-    entries = np.stack([splats, slots[splats] + numbers], axis=1)[by_tile]
-    starts = np.searchsorted(tiles[by_tile], np.arange(tiles_x * tiles_y + 1))
+    x0, y0, x1, y1 = np.clip(moved, 0, [tiles_x, tiles_y, tiles_x, tiles_y]).T[:, :, None]
+    columns, rows = np.arange(tiles_x), np.arange(tiles_y)
+    within: NDArray[Any] = ((y0 <= rows) & (rows < y1))[:, :, None]
+    within = within & ((x0 <= columns) & (columns < x1))[:, None] & ~np.isnan(depths)[:, None, None]
+    if touched is not None:
+        within &= touched
+    slots = np.concatenate([[0], np.cumsum(within.sum(axis=(1, 2)))])
+    owners, tiles = np.nonzero(within.reshape(len(depths), tiles_x * tiles_y))
+    places = np.arange(len(owners))
+    order = np.argsort(depths[owners], kind="stable") if sort else places
+    order = order[np.argsort(tiles[order], kind="stable")]
+    entries = np.stack([owners, places], axis=1)[order]
+    starts = np.searchsorted(tiles[order], np.arange(tiles_x * tiles_y + 1))
     return TileListArrays(*(array.astype(np.int32) for array in (slots, entries, starts)))
+
+
+def reached_tiles(
+    screen: ArrayLike,
+    *,
+    tiles_x: int,
+    tiles_y: int,
+    edge: int,
+    first_row: int = 0,
+    grown: float = 0,
+) -> NDArray[np.bool_]:
+    """(N, tiles_y, tiles_x) whether a pixel centre of a tile lies in a splat's ellipse.
+
+    Args:
+        screen: (N, 8): mean, conic a, b, c, weight, half sides of the ellipse's box.
+        tiles_x: tiles in a row.
+        tiles_y: rows of tiles.
+        edge: pixels along a side of a tile.
+        first_row: the row of tiles that they begin with.
+        grown: pixels by which the half sides are larger.
+    """
+    x, y, a, b, c, _, ex, ey = np.asarray(screen, float).T[:, :, None, None]
+    ex, ey, slant = ex + grown, ey + grown, -b / np.sqrt(a * c)
+    u = (np.arange(tiles_x * edge) + 0.5 - x) / ex
+    v = (np.arange(tiles_y * edge)[:, None] + first_row * edge + 0.5 - y) / ey
+    inside = u * u - 2 * slant * u * v + v * v <= 1 - slant * slant
+    reached: NDArray[np.bool_] = inside.reshape(-1, tiles_y, edge, tiles_x, edge).any(axis=(2, 4))
+    return reached

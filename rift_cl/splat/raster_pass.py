@@ -27,6 +27,7 @@ from rift_cl.splat.raster import (
 )
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.tile_lists import (
+    Ellipses,
     TileLists,
     Tiles,
     count_tiles,
@@ -100,7 +101,8 @@ def draw(
     """
     settings = settings.for_image(size, cpu=device.traits.is_cpu)
     tiles, sort = Tiles.of(size, settings.edge), settings.mode == "light"
-    counts = count_tiles(device, boxes, depths, tiles, sort=sort)
+    ellipses = Ellipses(screen.screen, settings.edge)
+    counts = count_tiles(device, boxes, depths, tiles, ellipses=ellipses, sort=sort)
     screen = packed(device, screen)
     lists, raster = None, None
     if memory.fits(counts.n_entries, tiles.count, device.budget, device.traits.allocation):
@@ -109,7 +111,7 @@ def draw(
         raster = rasterize(device, screen, lists, size, settings=settings, background=background)
         return RasterPass(screen, boxes, depths, size, settings, background, memory, lists, raster)
     del counts
-    for band in _bands(device, boxes, depths, tiles, memory, sort=sort):
+    for band in _bands(device, boxes, depths, tiles, memory, ellipses=ellipses, sort=sort):
         raster = rasterize(
             device, screen, band, size, settings=settings, background=background, into=raster
         )
@@ -136,8 +138,8 @@ def draw_bands(
     """
     edge = settings.edge
     tiles, sort = Tiles.of(size, edge), settings.mode == "light"
-    screen = packed(device, screen)
-    for lists in _bands(device, boxes, depths, tiles, memory, sort=sort):
+    screen, ellipses = packed(device, screen), Ellipses(screen.screen, edge)
+    for lists in _bands(device, boxes, depths, tiles, memory, ellipses=ellipses, sort=sort):
         above = lists.tiles.first_row * edge
         rows = min(lists.tiles.rows * edge, size[0] - above)
         band = Raster.empty(device, (rows, size[1]), memory.channels, above)
@@ -176,7 +178,6 @@ def draw_grad(
     screen = packed(device, done.screen)
     if last:
         give_up(done.raster, "image")
-        give_up(done.screen, "screen")
     for lists in _lists_again(device, done, last=last):
         records = raster_grad(
             device,
@@ -199,15 +200,15 @@ def draw_grad(
 def listed(
     device: Device, done: RasterPass
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """The tile lists on the host, of all bands.
+    """Lists of the tiles that splats' boxes touch, as gsplat tells them, on the host.
+
+    Those that were drawn leave out what ellipses do not reach.
 
     Returns:
         Tiles of every splat (N,), the splats of all entries (M,), and where each tile's entries
         begin (tiles,).
     """
-    memory = done.memory
-    kept = [done.lists] if done.lists else None
-    bands = kept or _bands_of(device, done, memory)
+    bands = _bands_of(device, done, done.memory, ellipses=None)
     of_each = np.zeros(len(done.depths), np.int32)
     owners, begins, before = [], [], 0
     for lists in bands:
@@ -225,16 +226,19 @@ def _bands(
     tiles: Tiles,
     memory: FrameMemory,
     *,
+    ellipses: Ellipses | None,
     sort: bool,
 ) -> Iterator[TileLists]:
     room = device.budget, device.traits.allocation
     for band in plan_bands(device.get(boxes), tiles, memory, *room):
-        yield tile_lists(device, boxes, depths, band, sort=sort)
+        yield tile_lists(device, boxes, depths, band, ellipses=ellipses, sort=sort)
 
 
-def _bands_of(device: Device, done: RasterPass, memory: FrameMemory) -> Iterator[TileLists]:
-    where = (done.boxes, done.depths, done.tiles)
-    return _bands(device, *where, memory, sort=done.settings.mode == "light")
+def _bands_of(
+    device: Device, done: RasterPass, memory: FrameMemory, *, ellipses: Ellipses | None
+) -> Iterator[TileLists]:
+    where, sort = (done.boxes, done.depths, done.tiles), done.settings.mode == "light"
+    return _bands(device, *where, memory, ellipses=ellipses, sort=sort)
 
 
 def _lists_again(device: Device, done: RasterPass, *, last: bool) -> Iterator[TileLists]:
@@ -249,6 +253,7 @@ def _lists_again(device: Device, done: RasterPass, *, last: bool) -> Iterator[Ti
             object.__setattr__(done, "lists", None)
         if last:
             give_up(done, "boxes", "depths")
+            give_up(done.screen, "screen")
         if hidden:
             kept = seen_slots(device, kept, done.raster.last, done.size, done.settings.edge)
         handed = [kept]
@@ -256,7 +261,8 @@ def _lists_again(device: Device, done: RasterPass, *, last: bool) -> Iterator[Ti
         del kept
         yield handed.pop()
         return
-    yield from _bands_of(device, done, memory)
+    ellipses = Ellipses(done.screen.screen, done.settings.edge)
+    yield from _bands_of(device, done, memory, ellipses=ellipses)
 
 
 def _mostly_hidden(device: Device, done: RasterPass, memory: FrameMemory) -> bool:

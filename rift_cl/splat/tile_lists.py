@@ -76,6 +76,11 @@ def exclusive_scan(
 
 
 _MOST = 2**31 - 1
+# Ints that a splat's span has room for; it needs four. Spans are gone when splats are packed, and
+# records, which have as many numbers, take the same memory: less would be held beside it.
+_SPAN_ROOM = 16
+# Columns of tiles that the kernels can tell: see ``kernels/include/splat/tile_spans.h``.
+_MOST_ACROSS = 2**24 - 1
 _KEY_BITS = 32
 # A GPU's work-items are many: each takes so few of the pairs.
 _GPU_PAIRS = 256
@@ -110,10 +115,10 @@ class Tiles:
                 f"Tiles: across, rows, first_row are {self.across}, {self.rows}, "
                 f"{self.first_row}, wanted at least one tile"
             )
-        if self.across * (self.first_row + self.rows) >= _MOST:
+        if self.across > _MOST_ACROSS or self.across * (self.first_row + self.rows) >= _MOST:
             raise ResourceLimitError(
                 f"Tiles: {self.across} x {self.first_row + self.rows} are too many, wanted less "
-                f"than {_MOST}: use larger tiles"
+                f"than {_MOST}, and {_MOST_ACROSS} in a row at most: use larger tiles"
             )
 
     @classmethod
@@ -128,13 +133,26 @@ class Tiles:
 
 
 @dataclass(frozen=True, eq=False)
+class Ellipses:
+    """What splats draw of their boxes of tiles.
+
+    Args:
+        screen: (N, 8) device array, see ``ScreenSplats``.
+        edge: pixels along a side of a tile.
+    """
+
+    screen: DeviceArray
+    edge: int
+
+
+@dataclass(frozen=True, eq=False)
 class TileLists:
     """The lists of all tiles, on the device.
 
     Args:
         slots: (N + 1,) int32, where each splat's slots begin, in index order.
         entries: (M, 2) int32, the pairs (splat, slot), tile after tile, front to back within one.
-            A slot is ``slots[splat]`` plus the row-major place of the tile in the splat's box.
+            A slot is ``slots[splat]`` plus the row-major place of the tile among the splat's own.
         starts: (tiles + 1,) int32, where each tile's entries begin.
         n_entries: M.
         tiles: the tiles that were listed.
@@ -160,8 +178,9 @@ class TileCounts:
 
     Args:
         slots: (N + 1,) int32, as in ``TileLists``.
-        ranks: (N, 4) int32, what the lists need of each splat, in the order of the lists: see
-            ``kernels/splat/tile_ranks.cl``.
+        ranks: (N, 4) int32, the tiles of each splat, in the order of the lists: see
+            ``kernels/include/splat/tile_spans.h``.
+        owners: (N, 2) int32, where its slots begin, and its index.
         offsets: (N + 1,) int32, how many entries the ranks before have.
         tiles: the tiles that are to be listed.
         total: waits for M and gives it, (1,).
@@ -169,6 +188,7 @@ class TileCounts:
 
     slots: DeviceArray
     ranks: DeviceArray
+    owners: DeviceArray
     offsets: DeviceArray
     tiles: Tiles
     total: Callable[[], NDArray[np.int64]]
@@ -190,14 +210,27 @@ class TileCounts:
 
 
 def tile_lists(
-    device: Device, boxes: DeviceArray, depths: DeviceArray, tiles: Tiles, *, sort: bool = True
+    device: Device,
+    boxes: DeviceArray,
+    depths: DeviceArray,
+    tiles: Tiles,
+    *,
+    ellipses: Ellipses | None = None,
+    sort: bool = True,
 ) -> TileLists:
     """List the splats of every tile: ``count_tiles`` and ``list_tiles``, which say more."""
-    return list_tiles(device, count_tiles(device, boxes, depths, tiles, sort=sort))
+    counts = count_tiles(device, boxes, depths, tiles, ellipses=ellipses, sort=sort)
+    return list_tiles(device, counts)
 
 
 def count_tiles(
-    device: Device, boxes: DeviceArray, depths: DeviceArray, tiles: Tiles, *, sort: bool = True
+    device: Device,
+    boxes: DeviceArray,
+    depths: DeviceArray,
+    tiles: Tiles,
+    *,
+    ellipses: Ellipses | None = None,
+    sort: bool = True,
 ) -> TileCounts:
     """Order the splats and count the tiles of each; nothing waits for the device.
 
@@ -208,6 +241,8 @@ def count_tiles(
         depths: (N,) float32 device array: any number, infinite ones and negative ones too. A
             splat whose depth is NaN is culled.
         tiles: which tiles to list.
+        ellipses: what the splats draw of their boxes, all of it if not given. Tiles that an
+            ellipse does not reach are left out; of boxes of more than 8 x 8 tiles as many cells.
         sort: front to back, equal depths by index; otherwise all in index order.
 
     Raises:
@@ -215,29 +250,38 @@ def count_tiles(
         DTypeError: an array has the wrong type.
         ResourceLimitError: not even counts fit the budget.
     """
-    splats = _checked_splats(device, boxes, depths)
+    splats = _checked_splats(device, boxes, depths, ellipses)
     _check_room(device, splats, 0, tiles)
     slots, keys = device.empty(splats + 1, np.int32), device.empty(splats, np.uint32)
     levels = scan_levels(device, _longest_scan(device, splats))
     run = run_length(device, splats, gpu=1)
-    by_splat = {"boxes": boxes, "splats": splats, "run": run, **_rectangle(tiles)}
+    spans = device.empty((splats, _SPAN_ROOM), np.int32)
+    by_splat = {"spans": spans, "splats": splats, "run": run}
     runs = pieces(splats, run)
     total = device.empty(1, np.int64) if runs == 1 else None
     device.launch(
         "tile_count",
         (runs,),
         **by_splat,
+        boxes=boxes,
         depths=depths,
         counts=slots,
         keys=keys,
         total=total,
+        tiles_x=tiles.across,
+        first_tile_row=tiles.first_row,
+        tiles_y=tiles.rows,
+        screen=ellipses.screen if ellipses else None,
+        edge=ellipses.edge if ellipses else None,
         WHOLE=runs == 1,
+        ELLIPSES=ellipses is not None,
     )
     if total is None:
         total = exclusive_scan(device, slots, splats + 1, levels)
     sent = fetch(device, total, 1)
     order, visible = _depth_order(device, keys, slots, levels) if sort else (None, None)
-    ranks, offsets = device.empty((splats, 4), np.int32), device.empty(splats + 1, np.int32)
+    ranks, owners = (device.empty((splats, numbers), np.int32) for numbers in (4, 2))
+    offsets = device.empty(splats + 1, np.int32)
     device.launch(
         "tile_ranks",
         (runs,),
@@ -246,13 +290,14 @@ def count_tiles(
         order=order,
         visible=visible,
         ranks=ranks,
+        owners=owners,
         counts=offsets,
         SORTED=sort,
         WHOLE=runs == 1,
     )
     if runs > 1:
         exclusive_scan(device, offsets, splats + 1, levels)
-    return TileCounts(slots, ranks, offsets, tiles, sent)
+    return TileCounts(slots, ranks, owners, offsets, tiles, sent)
 
 
 def list_tiles(device: Device, counts: TileCounts) -> TileLists:
@@ -323,16 +368,21 @@ def tile_lists_bytes(n: int, m: int, *, tiles: int = 0) -> int:
         m: entries of all lists.
         tiles: tiles of the image; they may be left out where they are far fewer than entries.
     """
-    # Splats: slots, offsets, keys and order twice, ranks (40), digits (1), sums of scans. Entries:
-    # the lists (8) and the chunks' histograms, which have a row of all tiles at least.
-    return 42 * n + 8 * m + 4 * max(_TABLE_SHARE * m, tiles) + 5 * tiles + (1 << 14)
+    # Splats: slots, offsets, keys and order twice, ranks and owners (48), room for spans (64),
+    # digits (1), sums of scans. Entries: the lists (8) and the chunks' histograms, which have a row
+    # of all tiles at least.
+    return 114 * n + 8 * m + 4 * max(_TABLE_SHARE * m, tiles) + 5 * tiles + (1 << 14)
 
 
-def _checked_splats(device: Device, boxes: DeviceArray, depths: DeviceArray) -> int:
+def _checked_splats(
+    device: Device, boxes: DeviceArray, depths: DeviceArray, ellipses: Ellipses | None
+) -> int:
     if len(boxes.shape) != 2 or boxes.shape[1] != 4:
         raise ShapeError(f"boxes has shape {boxes.shape}, wanted (splats, 4)")
     as_device_array(device, boxes, boxes.shape, name="boxes", dtype=np.int32)
     as_device_array(device, depths, (boxes.shape[0],), name="depths")
+    if ellipses:
+        as_device_array(device, ellipses.screen, (boxes.shape[0], 8), name="screen")
     return int(boxes.shape[0])
 
 
@@ -346,11 +396,6 @@ def _longest_scan(device: Device, splats: int) -> int:
     """Most numbers of any scan by splats: of these, or of the digits of a radix pass."""
     bits, chunks = _radix(device, splats)
     return max(splats + 1, chunks << bits)
-
-
-def _rectangle(tiles: Tiles) -> dict[str, int]:
-    """Which tiles of the image are listed, as kernels are told."""
-    return {"tiles_x": tiles.across, "first_tile_row": tiles.first_row, "tiles_y": tiles.rows}
 
 
 def _depth_order(
@@ -434,17 +479,20 @@ def _sort_by_tile(device: Device, counts: TileCounts) -> tuple[DeviceArray, Devi
     table = device.empty((chunks, tiles), np.int32)
     starts = device.empty(tiles + 1, np.int32)
     entries = device.empty((pairs, 2), np.int32)
-    walk = {"ranks": counts.ranks, "offsets": counts.offsets, "table": table}
-    sizes = {"chunks": chunks, "tiles": tiles}
-    many = {"splats": len(counts.ranks), "pairs": pairs, "tiles_x": across}
+    walk = {
+        **{name: getattr(counts, name) for name in ("ranks", "owners", "offsets")},
+        "splats": len(counts.ranks),
+        "pairs": pairs,
+        "tiles_x": across,
+        "first_tile_row": counts.tiles.first_row,
+    }
+    sizes = {"table": table, "chunks": chunks, "tiles": tiles}
     run = run_length(device, tiles, gpu=1)
-    device.launch("tile_histogram", (chunks,), **walk, **sizes, **many)
+    device.launch("tile_histogram", (chunks,), **walk, **sizes)
     runs = pieces(tiles, run)
-    by_tile = {"table": table, "counts": starts, **sizes, "run": run}
+    by_tile = {"counts": starts, **sizes, "run": run}
     device.launch("tile_offsets", (runs,), **by_tile, WHOLE=runs == 1)
     if runs > 1:
         exclusive_scan(device, starts, tiles + 1, scan_levels(device, tiles + 1))
-    device.launch(
-        "tile_scatter", (chunks,), **walk, starts=starts, entries=entries, **sizes, **many
-    )
+    device.launch("tile_scatter", (chunks,), **walk, starts=starts, entries=entries, **sizes)
     return entries, starts

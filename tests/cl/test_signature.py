@@ -29,6 +29,7 @@ _VARIANTS = [
     ("hermite_project", {"MODAL": 1, "DEFOCUS": 1}),
     ("scan_sum", {"WIDE": 1}),
     ("tile_count", {"WHOLE": 1}),
+    ("tile_count", {"ELLIPSES": 1}),
     ("scan_place", {"WIDE": 1}),
 ]
 

@@ -43,7 +43,7 @@ def needs(device, frame, *, gradient):
     memory = dataclasses.replace(FrameMemory.of(*given), gradient=gradient)
     tiles = Tiles.of(SIZE, 8)
     rows = entries_per_row(device.get(frame.projection.boxes), tiles)
-    whole = memory.lists(int(rows.sum()), tiles.count)
+    whole = memory.lists(frame.lists.n_entries, tiles.count)
     return memory.fixed + whole, memory.fixed + memory.lists(int(rows.max()), tiles.across)
 
 

@@ -36,7 +36,7 @@ SIZE, TILE = (120, 160), 8
 def drawn(device):
     """A frame with every output there is."""
     values = random_splats(3000)
-    values["scales"] *= 5
+    values["scales"] *= 10
     renderer = Renderer(SplatSettings(absgrad=True, tile=TILE), device=device)
     splats, background = Splats.upload(device, **values), device.array([0.2, 0.5, 0.9])
     camera = camera_of("pinhole", size=SIZE)
@@ -110,7 +110,7 @@ def needs(device, frame, *, gradient):
     """Bytes for the image at once, and bytes for its fullest row of tiles."""
     memory, tiles = memory_of(frame, gradient=gradient), Tiles.of(SIZE, TILE)
     rows = entries_per_row(device.get(frame.projection.boxes), tiles)
-    whole = memory.lists(int(rows.sum()), tiles.count)
+    whole = memory.lists(frame.lists.n_entries, tiles.count)
     return memory.fixed + whole, memory.fixed + memory.lists(int(rows.max()), tiles.across)
 
 

@@ -162,7 +162,19 @@ static void write_one(__global float *table, const int stride, int column, Rows 
 #endif
 }
 
-/* Whole numbers are written as the bits that they are. */
+/* Whole numbers are read and written as the bits that they are. */
+static void read_ints(
+    __global const int *table, const int stride, const int from, const int width, Rows rows, lanes_int *column)
+{
+#if LANES == 8
+  lanes bits[4];
+  read_columns((__global const float *)table, stride, from, width, rows, bits);
+  UNROLL for (int k = 0; k < width; k++) column[k] = AS_INT(bits[k]);
+#else
+  UNROLL for (int k = 0; k < width; k++) column[k] = table[rows.first * stride + from + k];
+#endif
+}
+
 static void write_ints(
     __global int *table, const int stride, const int from, const int width, Rows rows, const lanes_int *column)
 {
