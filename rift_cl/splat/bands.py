@@ -25,8 +25,9 @@ from rift_cl.splat.raster import MOMENTS
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.tile_lists import Tiles, tile_lists_bytes
 
-# Bytes of a splat on the screen: screen, packed record, depth, box, code.
-_PROJECTED = 32 + 64 + 4 + 16 + 1
+# Bytes of a splat on the screen: screen, packed record, depth, box, code; and what the span of its
+# tiles has room for beside what it needs.
+_PROJECTED = 32 + 64 + 4 + 16 + 1 + 48
 # Bytes of a splat's part in the gradient by the camera and its aperture, and of what does not grow.
 _CAMERA, _SMALL = 72, 4096
 # Bytes of a lobe of a shared light: axis, radiance, row, and the last part of its gradient.

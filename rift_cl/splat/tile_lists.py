@@ -76,8 +76,8 @@ def exclusive_scan(
 
 
 _MOST = 2**31 - 1
-# Ints that a splat's span has room for; it needs four. Spans are gone when splats are packed, and
-# records, which have as many numbers, take the same memory: less would be held beside it.
+# Ints that a drawn splat's span has room for; it needs four. Spans are gone when splats are packed,
+# and records, which have as many numbers, take the same memory: less would be held beside it.
 _SPAN_ROOM = 16
 # Columns of tiles that the kernels can tell: see ``kernels/include/splat/tile_spans.h``.
 _MOST_ACROSS = 2**24 - 1
@@ -255,7 +255,7 @@ def count_tiles(
     slots, keys = device.empty(splats + 1, np.int32), device.empty(splats, np.uint32)
     levels = scan_levels(device, _longest_scan(device, splats))
     run = run_length(device, splats, gpu=1)
-    spans = device.empty((splats, _SPAN_ROOM), np.int32)
+    spans = device.empty((splats, _SPAN_ROOM if ellipses else 4), np.int32)
     by_splat = {"spans": spans, "splats": splats, "run": run}
     runs = pieces(splats, run)
     total = device.empty(1, np.int64) if runs == 1 else None
@@ -368,10 +368,10 @@ def tile_lists_bytes(n: int, m: int, *, tiles: int = 0) -> int:
         m: entries of all lists.
         tiles: tiles of the image; they may be left out where they are far fewer than entries.
     """
-    # Splats: slots, offsets, keys and order twice, ranks and owners (48), room for spans (64),
-    # digits (1), sums of scans. Entries: the lists (8) and the chunks' histograms, which have a row
-    # of all tiles at least.
-    return 114 * n + 8 * m + 4 * max(_TABLE_SHARE * m, tiles) + 5 * tiles + (1 << 14)
+    # Splats: slots, offsets, keys and order twice, spans, ranks and owners (64), digits (1), sums
+    # of scans. Entries: the lists (8) and the chunks' histograms, which have a row of all tiles at
+    # least.
+    return 66 * n + 8 * m + 4 * max(_TABLE_SHARE * m, tiles) + 5 * tiles + (1 << 14)
 
 
 def _checked_splats(
