@@ -55,13 +55,16 @@ class Task(NamedTuple):
 
 
 @contextmanager
-def cluster_workers(address: str, device: Device, selector: str | None) -> Iterator[Workers]:
+def cluster_workers(
+    address: str, device: Device, selector: str | None, limit: float | None = None
+) -> Iterator[Workers]:
     """The workers that ``--cluster`` names; those of this machine are started, and ended at last.
 
     Args:
         address: ``local:N``, or that of a scheduler.
         device: the one that was chosen here, whose memory local workers divide.
         selector: what it was chosen by; None where nothing was said.
+        limit: seconds that a worker may take for a task; told from what others took if None.
 
     Raises:
         InputError: the address is none, or Dask is not installed.
@@ -96,7 +99,7 @@ def cluster_workers(address: str, device: Device, selector: str | None) -> Itera
                 f"--cluster {address}: no connection by TLS ({error}); name the certificates in "
                 "Dask's configuration, distributed.comm.tls.ca-file and client.cert and client.key"
             ) from error
-        workers = Workers(client, where, None if where.workers else selector)
+        workers = Workers(client, where, None if where.workers else selector, limit)
         workers.wait()
         yield workers
 
@@ -123,10 +126,18 @@ class Workers:
         client: a ``distributed.Client``.
         address: what ``--cluster`` says.
         selector: of the device on each worker; its own choice if None.
+        limit: seconds that a worker may take for a task; told from what others took if None.
     """
 
-    def __init__(self, client: Any, address: ClusterAddress, selector: str | None) -> None:
+    def __init__(
+        self,
+        client: Any,
+        address: ClusterAddress,
+        selector: str | None,
+        limit: float | None = None,
+    ) -> None:
         self._client, self._address, self._selector = client, address, selector
+        self._limit = limit
         self.lost = 0
         """How many workers were lost so far."""
         self._there: set[str] = set()
@@ -204,7 +215,7 @@ class Workers:
             ClusterError: tasks ended every worker that they were given to, which is told once
                 no others are left; or there are no workers any more, or no scheduler.
         """
-        waiting, running = iter(tasks), _Running(self._client, function)
+        waiting, running = iter(tasks), _Running(self._client, function, self._limit)
         killers: list[str] = []
         try:
             while True:
@@ -335,10 +346,13 @@ class _Running:
     Args:
         client: of the scheduler.
         function: does a task.
+        limit: seconds that a worker may take for a task; told from what others took if None.
     """
 
-    def __init__(self, client: Any, function: Callable[..., Any]) -> None:
-        self._client, self._function = client, function
+    def __init__(
+        self, client: Any, function: Callable[..., Any], limit: float | None = None
+    ) -> None:
+        self._client, self._function, self._limit = client, function, limit
         self._ended: queue.Queue[Any] = queue.Queue()
         self._begun: dict[str, _Begun] = {}
         # Seconds of the slowest so far, for each of its parts.
@@ -394,6 +408,8 @@ class _Running:
     def _longest(self, keys: Iterable[str]) -> float:
         """Seconds that a worker with these tasks may take for one of them."""
         sizes = [self._begun[key].task.size for key in keys]
+        if self._limit is not None:
+            return self._limit if sizes else float("inf")
         if not (self._slowest and sizes and all(sizes)):
             return float("inf")
         return max(_HANGS * self._slowest * max(sizes), _HANGS_FROM)

@@ -32,6 +32,7 @@ from rift_cl.commands.results import (
     ScenePage,
     Scored,
 )
+from rift_cl.commands.run_folder.run_folder import released
 from rift_cl.commands.run_folder.saved_settings import (
     begun_settings,
     parsed_settings,
@@ -77,7 +78,7 @@ def reconstruct_scan(
         path = volume_path(job.settings)
         if job.finished:
             return ReconstructedScan(*_finished_run(folder, ReconstructSettings), path=path)
-        _run(job.run(), progress)
+        _run(job, progress)
         record = (folder, job.decided, dict(job.metrics), tuple(job.source.notes))
         return keep(ReconstructedScan(*record, path=path))
 
@@ -124,7 +125,7 @@ def fit(
             job = Fit(_settings(given, "fit photos", FitPhotosSettings))
         notes: list[str] = []
         job.announce = lambda line: notes.append(line.removeprefix("rift: "))
-        _run(job.run(), progress)
+        _run(job, progress)
         record = (folder, job.settled, dict(job.metrics), tuple(notes))
         return keep(FittedScene(*record, scores=job.scores, losses=tuple(job.losses)))
 
@@ -155,7 +156,7 @@ def evaluate(
     with _folder(out) as (folder, keep):
         given = {"scene": scene, "captures": tuple(captures), "out": folder, **settings}
         job = Evaluation(_settings(given, "eval", EvalSettings))
-        _run(job.run(), progress)
+        _run(job, progress)
         return keep(Scored(folder, job.decided, dict(job.metrics), (), scores=job.scores))
 
 
@@ -181,7 +182,7 @@ def render(
     with _folder(out) as (folder, keep):
         given = {"scene": scene, "out": folder, **settings}
         job = Render(_settings(given, "render", RenderSettings))
-        _run(job.run(), progress)
+        _run(job, progress)
         record = (folder, job.decided, dict(job.metrics), tuple(job.notes))
         return keep(
             RenderedScene(
@@ -215,7 +216,7 @@ def analyze(
     with _folder(out) as (folder, keep):
         given = {"source": source, "out": folder, **settings}
         job = Analysis(_settings(given, "analyze", AnalyzeSettings))
-        _run(job.run(), progress)
+        _run(job, progress)
         record = (folder, job.decided, dict(job.metrics), tuple(job.notes))
         return keep(AnalyzedViews(*record, tables=tuple(job.tables), added=tuple(job.added)))
 
@@ -243,7 +244,7 @@ def plan_views(
 
     with _folder(out) as (folder, keep):
         job = Planning(_settings({"views": views, "out": folder, **settings}, "plan", PlanSettings))
-        _run(job.run(), progress)
+        _run(job, progress)
         assert job.found is not None
         record = (folder, job.given.decided, dict(job.metrics), tuple(job.notes))
         return keep(PlannedViews(*record, plan=job.found))
@@ -273,7 +274,7 @@ def export(
 
     parsed = _settings({"scene": scene, "out": out, **settings}, "export", ExportSettings)
     job = MeshExport(parsed) if parsed.mesh else Export(parsed)
-    _run(job.run(), progress)
+    _run(job, progress)
     return job.path
 
 
@@ -371,9 +372,10 @@ def _plain(value: Any) -> Any:
     return tuple(map(_plain, value)) if isinstance(value, (list, tuple)) else value
 
 
-def _run(reports: Iterator[Report], progress: Progress) -> None:
-    if isinstance(progress, bool) or progress is None:
-        show_progress(reports, quiet=not progress)
-        return
-    for report in reports:
-        progress(report)
+def _run(job: Any, progress: Progress) -> None:
+    with released(job):
+        if isinstance(progress, bool) or progress is None:
+            show_progress(job.run(), quiet=not progress)
+            return
+        for report in job.run():
+            progress(report)

@@ -12,11 +12,21 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import Field, dataclass, fields, is_dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, TypeVar, get_type_hints
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    NamedTuple,
+    TypeVar,
+    get_type_hints,
+)
 
 import tyro
 
-from rift_cl.option_marks import Auto, Group
+from rift_cl.errors import InputError
+from rift_cl.option_marks import EXPERT, Auto, Group
 
 if TYPE_CHECKING:
     from rift_cl.cl.device import Device
@@ -98,15 +108,29 @@ class SpreadRun(ResumableRun):
     """Spread the work over processes: local:N for N workers on this machine, which divide its
     devices, cores and memory, or the address of a Dask scheduler, such as tcp://10.0.0.1:8786 (see
     docs/how-to/scale_out.md). Default: this process does it."""
+    part_timeout: Annotated[Auto[float], EXPERT] = None
+    """Seconds that a worker of --cluster may take for a part, such as a few slices, before its
+    process is begun anew and the part goes to another. Default: 20 times what parts of that size
+    took at most so far, 300 at least."""
 
     def check_cluster(self) -> None:
-        """Check what ``--cluster`` says.
+        """Check what ``--cluster`` and ``--part-timeout`` say.
 
         Raises:
-            InputError: it is no address.
+            InputError: there is no such address, or no such time.
         """
         from rift_cl.cluster.address import ClusterAddress
 
+        if self.part_timeout is not None:
+            if not 0 < self.part_timeout < float("inf"):
+                raise InputError(
+                    f"--part-timeout is {self.part_timeout:g}, wanted a positive number of seconds"
+                )
+            if self.cluster is None:
+                raise InputError(
+                    "--part-timeout is for the workers of --cluster: add --cluster local:1 to have "
+                    "one watched, or leave it out"
+                )
         if self.cluster is not None:
             ClusterAddress.of(self.cluster)
 

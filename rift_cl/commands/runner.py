@@ -191,11 +191,13 @@ def run_job(job: Any, output: Output) -> None:
     """Run a job, behind the test of a driver that is new here."""
     # Imported when used, so that a command's help loads no device layer.
     from rift_cl.commands.devices.driver_test import meet_driver
+    from rift_cl.commands.run_folder.run_folder import released
 
     device = getattr(job, "device", None)
     if device is not None:
         watch(meet_driver(device), output)
-    watch(job.run(), output)
+    with released(job):
+        watch(job.run(), output)
 
 
 def _guarded(

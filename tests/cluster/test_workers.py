@@ -238,6 +238,13 @@ def test_a_worker_hangs_by_the_size_of_its_tasks():
     assert handed.hanging({"a": ["1"], "b": ["2"]}, 9001 + 2 * 20 * 10 * 8) == ["b"]
 
 
+def test_a_time_that_is_said_holds_for_every_task():
+    handed = workers._Running(Scheduled(), task, 5.0)
+    handed.fill(iter([workers.Task("", (), 0)]), 1)
+    assert handed.hanging({"a": ["0"], "b": []}, 0) == handed.hanging({"a": ["0"]}, 5) == []
+    assert handed.hanging({"a": ["0"]}, 6) == ["a"]
+
+
 def test_nobody_hangs_over_a_run_of_a_sweep():
     handed = running(0)
     handed.took(workers.Task("", (), 1), 1.0)

@@ -1,4 +1,4 @@
-"""A worker of this machine that is killed while a command's work is spread over several."""
+"""A worker of this machine that is killed, or stopped, while work is spread over several."""
 
 import os
 import signal
@@ -9,8 +9,8 @@ import pytest
 from rift_cl.cluster import workers
 
 
-def kill_one(monkeypatch, after):
-    """Kill one as the task of this number is handed out; the list of tasks that were."""
+def kill_one(monkeypatch, after, by=signal.SIGKILL):
+    """Send one a signal as the task of this number is handed out; the list of tasks that were."""
     psutil = pytest.importorskip("psutil")
     begin, begun = workers._Running.begin, []
 
@@ -26,7 +26,7 @@ def kill_one(monkeypatch, after):
         if len(begun) == after:
             children = psutil.Process().children(recursive=True)
             own = [child for child in children if "spawn_main" in words_of(child)]
-            os.kill(own[-1].pid, signal.SIGKILL)
+            os.kill(own[-1].pid, by)
 
     monkeypatch.setattr(workers._Running, "begin", killing)
     return begun

@@ -1,6 +1,7 @@
 """``rift reconstruct --cluster``: other processes make the slices, to the same bits."""
 
 import json
+import signal
 
 import numpy as np
 import pytest
@@ -57,6 +58,17 @@ def test_a_killed_worker_changes_no_bit(scan, tmp_path, monkeypatch):
         assert figures[name] == wanted[name]
     assert figures["workers"] >= 1
     assert not (tmp_path / "a" / "slabs").exists()
+
+
+@pytest.mark.full
+def test_a_worker_that_hangs_changes_no_bit(scan, tmp_path, monkeypatch):
+    """Stopped, as one is whose device does not answer: its slices go to others, after a while."""
+    pytest.importorskip("distributed", reason=WANTED)
+    kill_one(monkeypatch, after=3, by=signal.SIGSTOP)
+    job = Reconstruction(settings(scan, tmp_path / "a", cluster="local:2", part_timeout=30.0))
+    volume, figures = made(job)
+    assert volume.tobytes() == made(Reconstruction(settings(scan, tmp_path / "b")))[0].tobytes()
+    assert figures["workers"] >= 1
 
 
 def test_a_run_goes_on_with_a_part_that_a_worker_made(scan, tmp_path, monkeypatch):
@@ -155,6 +167,9 @@ def test_a_slice_that_two_workers_kept_comes_once(tmp_path):
 def test_the_option_is_checked_and_not_repeated(scan, tmp_path):
     with pytest.raises(InputError, match="local:N"):
         Reconstruction(settings(scan, tmp_path / "a", cluster="two"))
+    for timeout, word in ((-1.0, "positive"), (5.0, "--cluster")):
+        with pytest.raises(InputError, match=word):
+            Reconstruction(settings(scan, tmp_path / "a", part_timeout=timeout))
     job = Reconstruction(settings(scan, tmp_path / "a", cluster="local:2"))
     assert job.plan()["workers"] == "local:2"
     assert "cluster" not in job._facts()

@@ -12,7 +12,7 @@ import tiff_files as made
 import tifffile
 from test_hostile_scans import grown
 
-from rift_cl.errors import FileFormatError, PathEscapeError, ResourceLimitError
+from rift_cl.errors import FileFormatError, PathEscapeError, ResourceLimitError, ShapeError
 from rift_cl.io import open_scan
 
 
@@ -111,7 +111,8 @@ def test_huge_frames_in_a_kilobyte(
         tags[278] = size[0]
     path = claim(tmp_path / "a.tif", tags, dtype, **options)
     before = grown()
-    with pytest.raises((ResourceLimitError, FileFormatError), match=r"a\.tif"):
+    # Old versions of tifffile make one page of it, and which axis is which is asked first.
+    with pytest.raises((ResourceLimitError, FileFormatError, ShapeError), match=r"a\.tif"):
         open_scan(path, budget=1 << 24).read(0, 1)
     assert grown() - before < 50 << 20
 

@@ -26,7 +26,13 @@ from rift_cl.commands.pictures.slice_pictures import display_window
 from rift_cl.commands.reconstruct.cone_input import ConeInput, VolumeWindow, decided_cone_settings
 from rift_cl.commands.reconstruct.cone_slabs import ConeSlabs
 from rift_cl.commands.reconstruct.inversion import least_squares
-from rift_cl.commands.reconstruct.kept_slabs import SlabFolder, refuse_begun, run_folder, stopped
+from rift_cl.commands.reconstruct.kept_slabs import (
+    SlabFolder,
+    is_preview,
+    refuse_begun,
+    run_folder,
+    stopped,
+)
 from rift_cl.commands.reconstruct.report import PREVIEW_PICTURE, Preview, reconstruction_page
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.volume import volume_path
@@ -104,10 +110,10 @@ class ConeReconstruction:
         self._begin = time.perf_counter()
 
     def _own_folder(self) -> RunFolder:
-        settings, out = self.settings, self.settings.out
+        settings = self.settings
         refuse_begun(settings, self.kept)
-        alone = out.is_dir() and {p.name for p in out.iterdir()} <= {PREVIEW_PICTURE, "config.json"}
         # A preview alone is there to be followed by the slices.
+        alone = is_preview(settings.out)
         begun = dataclasses.replace(settings, overwrite=True, resume=False) if alone else settings
         return RunFolder.of(begun, "reconstruct")
 
@@ -250,6 +256,7 @@ class ConeReconstruction:
         try:
             if self.settings.preview:
                 self._show(self._preview())
+                self.folder.release()
                 yield Report(total, total, "steps")
                 return
             self._check_place()

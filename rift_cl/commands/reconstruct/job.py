@@ -141,6 +141,7 @@ class Reconstruction:
         try:
             if self.settings.preview:
                 yield from self._look()
+                self.folder.release()
                 return
             check_place(self.settings, self.source, self.inversion.window)
             if not self._gone_on:

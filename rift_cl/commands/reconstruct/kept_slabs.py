@@ -26,6 +26,7 @@ from rift_cl.commands.reconstruct.volume import volume_path
 from rift_cl.commands.run_folder.run_folder import RunFolder, difference, is_unfinished
 from rift_cl.errors import CheckpointError, InputError, OutputError, StoppedError
 from rift_cl.io.boundary import reading
+from rift_cl.io.folder_lock import LOCK_NAME
 from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import atomic_path, check_space, make_folder, write_json, writing
 
@@ -279,6 +280,12 @@ def refuse_begun(settings: ReconstructSettings, kept: SlabFolder) -> None:
         )
 
 
+def is_preview(out: Path) -> bool:
+    """Whether a folder holds a preview and nothing else."""
+    known = {PREVIEW_PICTURE, "config.json", LOCK_NAME}
+    return out.is_dir() and {path.name for path in out.iterdir()} <= known
+
+
 def run_folder(settings: ReconstructSettings, kept: SlabFolder) -> RunFolder:
     """The folder of a run, if it may be used.
 
@@ -287,8 +294,8 @@ def run_folder(settings: ReconstructSettings, kept: SlabFolder) -> RunFolder:
     """
     out, begun = settings.out, kept.begun
     refuse_begun(settings, kept)
-    # A preview alone is there to be followed by the slices.
-    alone = out.is_dir() and {p.name for p in out.iterdir()} <= {PREVIEW_PICTURE, "config.json"}
+    # One is there to be followed by the slices.
+    alone = is_preview(out)
     # One that was killed before it kept anything is begun again.
     unfinished = is_unfinished(out, "reconstruct")
     there = begun or (settings.resume and (unfinished or finished_run(settings) is not None))

@@ -45,6 +45,7 @@ _FEWEST_PASSES = 5
 _FREE = (
     *("out", "device", "memory", "format", "dtype", "window"),
     *("overwrite", "resume", "dry_run", "preview", "config", "cluster"),
+    "part_timeout",
 )
 
 

@@ -55,7 +55,8 @@ def spread(job: Run) -> Iterator[Report]:
     """
     settings, kept = job.settings, job.kept
     assert settings.cluster is not None
-    with cluster_workers(settings.cluster, job.device, settings.device) as workers:
+    given = settings.cluster, job.device, settings.device, settings.part_timeout
+    with cluster_workers(*given) as workers:
         job.announce(workers.sentence)
         theirs, names = _of_workers(settings)
         run = kept.mark()
@@ -117,6 +118,7 @@ def _of_workers(settings: ReconstructSettings) -> tuple[ReconstructSettings, dic
     if ClusterAddress.of(settings.cluster or "").workers:
         own = {"device": None, "memory": None}
     begun: dict[str, Any] = {"resume": True, "overwrite": False, "cluster": None, "config": None}
+    begun["part_timeout"] = None
     return dataclasses.replace(theirs, **begun, **own), names
 
 

@@ -12,7 +12,7 @@ import os
 import platform
 import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from datetime import datetime, timezone
 from fnmatch import fnmatch
 from importlib.metadata import version
@@ -23,6 +23,7 @@ from rift_cl import __version__
 from rift_cl.cl.device import Device
 from rift_cl.commands.run_folder.saved_settings import options_of, record_of
 from rift_cl.errors import CheckpointError, InputError, OutputError
+from rift_cl.io.folder_lock import LOCK_NAME, keep, let_go
 from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import PART, json_text, make_folder, write_json, write_text, writing
 from rift_cl.json_parsing import parse_json
@@ -34,7 +35,10 @@ _CLEARED = "cleared"
 # Texts that name a file or a folder, or a part of the scan.
 _MAY_BE_FILES = ("theta", "flats", "darks")
 # Settings that change nothing of what comes out.
-_FREE = ("cluster", "config", "device", "dry_run", "out", "overwrite", "resume", "view")
+_FREE = (
+    *("cluster", "config", "device", "dry_run", "out", "overwrite", "part_timeout", "resume"),
+    "view",
+)
 
 
 class RunFolder:
@@ -70,6 +74,7 @@ class RunFolder:
         # As it is when the run begins: what changes meanwhile is found by the next one.
         self._read = None if settings is None else _stamps(settings, path)
         self._overwrite = overwrite
+        self._seen = self._config_stamp()
         above = next(parent for parent in path.absolute().parents if parent.exists())
         if not above.is_dir():
             raise OutputError(f"{path}: {above} is no folder; name another place (--out)")
@@ -133,8 +138,20 @@ class RunFolder:
         return _record_of(self.path).get("complete") is True
 
     def make(self) -> None:
-        """Make the folder, and mark it as ours if no earlier run did: the first thing written."""
+        """Make the folder, and mark it as ours if no earlier run did: the first thing written.
+
+        From here on no other process writes into it, until ``release``.
+
+        Raises:
+            OutputError: another process does, or did since this run looked at what is there.
+        """
         make_folder(self.path)
+        keep(self.path)
+        if self._config_stamp() != self._seen:
+            self.release()
+            raise OutputError(
+                f"{self.path}: another run has written here meanwhile: begin this one again"
+            )
         begun_by_other = self._overwrite and not self.is_complete
         if begun_by_other or not (self.path / _CONFIG).exists():
             self.mark()
@@ -150,8 +167,19 @@ class RunFolder:
         cleared = {_CLEARED: True} if self._cleared else {}
         write_json(self.path / _CONFIG, {**mark, **asked, **cleared, **decided})
 
+    def release(self) -> None:
+        """Let other processes write into the folder."""
+        let_go(self.path)
+
+    def _config_stamp(self) -> str | None:
+        try:
+            return _stamp(self.path / _CONFIG)
+        except OSError:
+            return None
+
     def discard(self) -> None:
         """Remove the folder if a failed run left nothing in it but the mark."""
+        self.release()
         if self.path.is_dir() and [entry.name for entry in self.path.iterdir()] == [_CONFIG]:
             (self.path / _CONFIG).unlink()
             self.path.rmdir()
@@ -235,6 +263,18 @@ class RunFolder:
         write_text(self.path / "report.html", page.html())
         write_json(self.path / "metrics.json", metrics)
         write_json(self.path / _CONFIG, config)
+        self.release()
+
+
+@contextmanager
+def released(job: Any) -> Iterator[None]:
+    """Let others have a job's folder at the end, however it ends."""
+    try:
+        yield
+    finally:
+        folder = getattr(job, "folder", None)
+        if folder is not None:
+            folder.release()
 
 
 def environment(device: Device) -> dict[str, str]:
@@ -278,8 +318,8 @@ def difference(before: Mapping[str, Any], run: Mapping[str, Any]) -> str | None:
 
 
 def _is_used(entry: Path) -> bool:
-    """Whether an entry of a folder is more than what a run was killed over as it marked it."""
-    return entry.name != _CONFIG + PART
+    """Whether an entry of a folder is more than what a run leaves that was killed early."""
+    return entry.name not in (_CONFIG + PART, LOCK_NAME)
 
 
 def _asked(settings: Any) -> dict[str, Any]:

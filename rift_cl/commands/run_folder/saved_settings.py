@@ -23,7 +23,9 @@ from rift_cl.errors import InputError, SettingError
 
 S = TypeVar("S")
 # Options that say how a command runs, not what comes out: they are not repeated.
-_NOT_REPEATED = ("cluster", "config", "dry_run", "overwrite", "preview", "resume", "view")
+_NOT_REPEATED = (
+    *("cluster", "config", "dry_run", "overwrite", "part_timeout", "preview", "resume", "view"),
+)
 
 
 class Option(NamedTuple):

@@ -113,7 +113,8 @@ class Sweep:
 
         settings, done = self.settings, len(self.runs) - len(left)
         local = ClusterAddress.of(settings.cluster or "").workers > 0
-        with cluster_workers(settings.cluster or "", self.device, settings.device) as workers:
+        where = settings.cluster or "", self.device, settings.device, settings.part_timeout
+        with cluster_workers(*where) as workers:
             self.announce(workers.sentence)
             with token(settings.out.absolute() / _RUNS) as seen:
                 workers.check([*(path.absolute() for path in settings.inputs), seen])

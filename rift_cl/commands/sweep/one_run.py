@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rift_cl.commands.fit_photos.scores import ViewScore
+from rift_cl.commands.run_folder.run_folder import released
 from rift_cl.errors import ClusterError, DeviceError, InputError
 from rift_cl.io.output import atomic_path
 from rift_cl.json_parsing import parse_json
@@ -32,10 +33,13 @@ def steps(job: str, settings: Any) -> Iterator[Report]:
     if job == "reconstruct":
         from rift_cl.commands.reconstruct.choice import reconstruction_of
 
-        yield from reconstruction_of(settings).run()
+        slices = reconstruction_of(settings)
+        with released(slices):
+            yield from slices.run()
         return
     fit = _fit(job, settings)
-    yield from fit.run()
+    with released(fit):
+        yield from fit.run()
     for scores in fit.scores.values():
         _leave_picture(settings.out / PICTURE, scores)
         return

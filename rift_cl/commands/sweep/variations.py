@@ -18,7 +18,7 @@ from rift_cl.json_parsing import parse_json
 
 # What differs between the runs in any case, or is the sweep's own.
 _OWN = ("scan", "capture", "out", "resume", "overwrite", "dry_run", "preview", "config", "cluster")
-_OWN_TOO = ("view", "device")
+_OWN_TOO = ("view", "device", "part_timeout")
 _MOST_RUNS = 10_000
 _LONGEST_NAME = 100
 

@@ -1,0 +1,92 @@
+"""Keeps a folder for one process at a time: two runs that write into one folder would mix.
+
+What keeps it is a lock on an open file, not that the file is there: the operating system lets go of
+it when the process ends, however that ends. Where there are no such locks (Windows, some network
+file systems) nothing is kept. A process does not keep a folder from itself.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import socket
+from contextlib import suppress
+from pathlib import Path
+from typing import IO
+
+from rift_cl.errors import OutputError
+from rift_cl.io.output import writing
+
+try:
+    import fcntl
+except ImportError:
+    fcntl = None  # type: ignore[assignment]
+
+# There while a run is; a run that was killed leaves it, and nobody holds it then.
+LOCK_NAME = ".running"
+_LONGEST_NOTE = 200
+_held: dict[Path, IO[str]] = {}
+
+
+def keep(folder: Path) -> None:
+    """Keep a folder until ``let_go``, or until this process ends.
+
+    Raises:
+        OutputError: another process keeps it, or nothing can be written there.
+    """
+    path = folder.resolve() / LOCK_NAME
+    if fcntl is None or path in _held:
+        return
+    with writing(folder):
+        while path not in _held:
+            handle = path.open("a+", encoding="utf-8")
+            if not _locked(handle):
+                handle.seek(0)
+                who = handle.read(_LONGEST_NOTE).strip() or "another process"
+                handle.close()
+                raise OutputError(
+                    f"{folder}: {who} is writing here: wait for its end, or name another folder "
+                    "(--out)"
+                )
+            # Whoever had it before may have removed the file that was opened.
+            with suppress(OSError):
+                if os.path.samestat(os.fstat(handle.fileno()), path.stat()):
+                    _held[path] = handle
+                    continue
+            handle.close()
+    with suppress(OSError):
+        handle.truncate(0)
+        handle.write(f"process {os.getpid()} on {socket.gethostname()}")
+        handle.flush()
+
+
+def let_go(folder: Path) -> None:
+    """Let others have a folder; nothing where it is not kept."""
+    _release(folder.resolve() / LOCK_NAME)
+
+
+def _release(path: Path) -> None:
+    handle = _held.pop(path, None)
+    if handle is not None:
+        # Removed while it is locked, so that nobody's lock is on a file without a name.
+        with suppress(OSError):
+            path.unlink()
+        with suppress(OSError):
+            handle.close()
+
+
+def _locked(handle: IO[str]) -> bool:
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        # A file system without locks.
+        pass
+    return True
+
+
+@atexit.register
+def _release_all() -> None:
+    for path in [*_held]:
+        _release(path)
