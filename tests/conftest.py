@@ -39,12 +39,9 @@ def _devices() -> list[rift.Device]:
 
 
 @cache
-def _variants() -> list[rift.Device]:
-    found = _devices().copy()
-    for device in _devices():
-        if device.traits.is_cpu:
-            found.append(as_gpu(device))
-    return found
+def _variants(*, optimized: bool) -> list[rift.Device]:
+    cpus = (device for device in _devices() if device.traits.is_cpu)
+    return [*_devices(), *(as_gpu(device, optimized=optimized) for device in cpus)]
 
 
 def _label(device: rift.Device) -> str:
@@ -59,7 +56,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """
     if "device" in metafunc.fixturenames:
         once = metafunc.definition.get_closest_marker("once") is not None
-        chosen = _devices() if once else _variants()
+        # Few splats and many kernels: two thirds of the time would go into optimizing.
+        many = metafunc.definition.path.parent.name == "splat"
+        chosen = _devices() if once else _variants(optimized=not many)
         metafunc.parametrize("device", chosen, ids=_label, scope="session")
 
 

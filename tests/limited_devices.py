@@ -18,13 +18,15 @@ def limited(device: rift.Device, memory: int | None = None, **traits: Any) -> ri
     return rift.Device(device._handle, device.selector, traits=changed, memory=memory)
 
 
-def as_gpu(device: rift.Device) -> rift.Device:
+def as_gpu(device: rift.Device, *, optimized: bool = True) -> rift.Device:
     """A CPU dressed as a GPU: one lane, groups of 64.
 
-    No CPU optimizes a GPU's kernels for anybody, and two thirds of the tests' time with them would
-    go into that.
+    Args:
+        device: the CPU.
+        optimized: whether kernels are optimized: of use to nobody here, but a test that computes
+            for long is faster by it, and one that compiles many kernels slower.
     """
-    return limited(device, is_cpu=False, optimized=False)
+    return limited(device, is_cpu=False, optimized=optimized)
 
 
 def normal(*shape: int) -> np.ndarray[Any, Any]:

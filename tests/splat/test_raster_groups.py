@@ -49,7 +49,7 @@ def groups_of(device):
 )
 def test_small_groups_draw_the_same_picture(device, group, channels):
     """A tile is then drawn in parts, whose sums a slot holds together."""
-    gpu = as_gpu(device)
+    gpu = as_gpu(device, optimized=False)
     small = limited(gpu, group=group)
     scene = random_scene(60, SIZE, channels=channels)
     assert_alike(drawn(small, scene), drawn(gpu, scene))
@@ -60,7 +60,7 @@ def test_small_groups_draw_the_same_picture(device, group, channels):
 @pytest.mark.full
 @pytest.mark.parametrize("channels", [3, 8])
 def test_little_local_memory_is_enough(device, channels):
-    gpu = as_gpu(device)
+    gpu = as_gpu(device, optimized=False)
     small = limited(gpu, local_memory=16 << 10)
     scene = random_scene(60, SIZE, channels=channels)
     assert_alike(drawn(small, scene), drawn(gpu, scene))
@@ -71,7 +71,7 @@ def test_little_local_memory_is_enough(device, channels):
 @pytest.mark.once
 @pytest.mark.full
 def test_a_driver_that_runs_them_in_smaller_groups(device, monkeypatch):
-    gpu = as_gpu(device)
+    gpu = as_gpu(device, optimized=False)
     scene = random_scene(60, SIZE)
     wanted, needs = drawn(gpu, scene), program.kernel_needs
     monkeypatch.setattr(program, "kernel_needs", lambda *kernel: needs(*kernel)._replace(group=100))
@@ -82,7 +82,7 @@ def test_a_driver_that_runs_them_in_smaller_groups(device, monkeypatch):
 
 @pytest.mark.once
 def test_an_image_of_one_pixel(device):
-    gpu = as_gpu(device)
+    gpu = as_gpu(device, optimized=False)
     scene = random_scene(40, (1, 1), scale=3.0)
     found, wanted = drawn(gpu, scene), drawn(device, scene)
     assert 0 < found[1][0, 0] < 0.9
@@ -92,7 +92,7 @@ def test_an_image_of_one_pixel(device):
 @pytest.mark.once
 def test_what_lies_behind_finished_pixels_leaves_nothing(device):
     """Ten splats that end every pixel, and fifty behind them."""
-    gpu = as_gpu(device)
+    gpu = as_gpu(device, optimized=False)
     scene = random_scene(60, (16, 16), scale=60.0, weights=(0.97, 0.99))
     splats, lists = scene.upload(gpu)
     raster = rasterize(gpu, splats, lists, (16, 16), settings=SplatSettings())
@@ -107,7 +107,7 @@ def test_what_lies_behind_finished_pixels_leaves_nothing(device):
 @pytest.mark.once
 def test_needles_lose_no_pixel(device):
     """Of widths to lengths of 1 to 1000, in every direction, without any blur."""
-    gpu = as_gpu(device)
+    gpu = as_gpu(device, optimized=False)
     scene = random_scene(200, SIZE)
     random, screen = np.random.default_rng(7), scene.screen.copy()
     turn, long = random.uniform(0, np.pi, 200), np.exp(random.uniform(0, np.log(300), 200))

@@ -7,6 +7,7 @@ the device makes of them in float32 is NaN or infinite otherwise, and the splat 
 
 from __future__ import annotations
 
+import math
 import warnings
 from pathlib import Path
 
@@ -60,7 +61,7 @@ def whole_splats(path: Path, mode: SplatMode, arrays: Arrays) -> Arrays:
 
 def _broken(name: str, array: NDArray[np.float32]) -> NDArray[np.bool_]:
     """Which splats have a number in an array that cannot be drawn with; NaN is no number."""
-    rows = array.reshape(len(array), -1)
+    rows = array.reshape(len(array), math.prod(array.shape[1:]))
     most = _BOUNDS.get(name, _LARGEST)
     least = -_LARGEST if name == "log_scales" else -most
     inside: NDArray[np.bool_] = (rows.min(1, initial=0) >= least) & (rows.max(1, initial=0) <= most)
