@@ -67,7 +67,7 @@ def sums(device: rift.Device) -> Arrays:
 def splats(device: rift.Device) -> Arrays:
     renderer = Renderer(SplatSettings(absgrad=True, tile=8), device=device)
     values = visible_splats(150)
-    values["scales"] *= 3
+    values["scales"] *= 6
     behind = device.array([0.2, 0.5, 0.9])
     uploaded = Splats.upload(device, **values)
     camera = camera_of("pinhole", size=(40, 56))
