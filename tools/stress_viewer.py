@@ -125,14 +125,14 @@ def _attack(options: Options, process: subprocess.Popen[str], url: str) -> Itera
 
 
 def _end(process: subprocess.Popen[str]) -> list[str]:
-    """End it as Ctrl-C does."""
+    """End it as a batch system does; Ctrl-C is ignored by what a shell starts in the background."""
     if process.poll() is not None:
         return [f"the viewer ended with status {process.returncode}"]
-    process.send_signal(signal.SIGINT)
+    process.send_signal(signal.SIGTERM)
     try:
         process.wait(60)
     except subprocess.TimeoutExpired:
-        return ["the viewer does not heed Ctrl-C any more"]
+        return ["the viewer does not heed SIGTERM any more"]
     return []
 
 
