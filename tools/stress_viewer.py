@@ -73,10 +73,19 @@ def main(options: Options) -> int:
     return 1 if faults else 0
 
 
+# What a shell starts in the background ignores Ctrl-C, and so does what that starts.
+_VIEW = """
+import signal, sys
+from rift_cl.commands.cli import main
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.exit(main())
+"""
+
+
 @contextlib.contextmanager
 def _viewing(scene: Path, said: Any) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """The viewer in a process of its own, and its address."""
-    command = [sys.executable, "-m", "rift_cl", "view", str(scene), "--port", "0", "--size", "96"]
+    command = [sys.executable, "-c", _VIEW, "view", str(scene), "--port", "0", "--size", "96"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=said, text=True)
     assert process.stdout is not None
     # What is said once the address is.
@@ -125,14 +134,14 @@ def _attack(options: Options, process: subprocess.Popen[str], url: str) -> Itera
 
 
 def _end(process: subprocess.Popen[str]) -> list[str]:
-    """End it as a batch system does; Ctrl-C is ignored by what a shell starts in the background."""
+    """End it as Ctrl-C does."""
     if process.poll() is not None:
         return [f"the viewer ended with status {process.returncode}"]
-    process.send_signal(signal.SIGTERM)
+    process.send_signal(signal.SIGINT)
     try:
         process.wait(60)
     except subprocess.TimeoutExpired:
-        return ["the viewer does not heed SIGTERM any more"]
+        return ["the viewer does not heed Ctrl-C any more"]
     return []
 
 
