@@ -88,6 +88,12 @@ PROMISES = (
         100,
     ),
     Promise(
+        "a disk that is full from any write on ends a command with a sentence; --resume goes on",
+        "stress_disk.py",
+        "--tries",
+        400,
+    ),
+    Promise(
         "processes that build the same kernels at once all succeed",
         "stress_builds.py",
         "--rounds",
