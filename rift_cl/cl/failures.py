@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
+from rift_cl.cl.watchdog import in_driver
 from rift_cl.errors import (
     DeviceError,
     DeviceLostError,
@@ -30,7 +31,8 @@ def named_errors(doing: str, device: str) -> Iterator[None]:
         DeviceError: any other failure of the driver.
     """
     try:
-        yield
+        with in_driver(doing, device):
+            yield
     except driver_errors() as error:
         raise named_error(error, doing, device) from error
 

@@ -27,6 +27,7 @@ from rift_cl.cl.grid_parts import GridPart, Size, grid_parts
 from rift_cl.cl.launch_times import LaunchTimes
 from rift_cl.cl.process import claim_process
 from rift_cl.cl.signature import Arguments, Signature, check_numbers, signature
+from rift_cl.cl.watchdog import in_driver
 from rift_cl.errors import DeviceError, KernelArgumentError
 from rift_cl.progress import BUILDS
 
@@ -214,7 +215,8 @@ class Programs:
         begun = self._builder.first_launch(kernel.key, launch)
         with building, build_lock(name), BUILDS.of(name), begun:
             cl.enqueue_nd_range_kernel(queue, kernel.handle, size, local, offset)
-            queue.finish()
+            with in_driver(f"running {name}", self._device.name):
+                queue.finish()
             kernel.started.add(way)
 
     def _kernel(self, key: Key) -> _Kernel:

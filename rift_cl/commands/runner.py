@@ -29,7 +29,7 @@ from rift_cl.errors import RiftError, SettingError
 from rift_cl.option_marks import EXPERT, Group
 from rift_cl.progress import Report
 
-_INPUT, _OUTPUT, _INTERRUPTED, _TERMINATED = 3, 5, 130, 143
+_INPUT, _DEVICE, _OUTPUT, _INTERRUPTED, _TERMINATED = 3, 4, 5, 130, 143
 # Options have names of their own, whichever group they are in.
 _OMITTED: Any = tyro.conf.OmitArgPrefixes
 # Options in no group, which the help lists under tyro's own title.
@@ -190,14 +190,21 @@ def ran(job: Any, settings: Any, output: Output) -> bool:
 def run_job(job: Any, output: Output) -> None:
     """Run a job, behind the test of a driver that is new here."""
     # Imported when used, so that a command's help loads no device layer.
+    from rift_cl.cl.watchdog import patience_with, watched
     from rift_cl.commands.devices.driver_test import meet_driver
     from rift_cl.commands.run_folder.run_folder import released
 
     device = getattr(job, "device", None)
     if device is not None:
         watch(meet_driver(device), output)
-    with released(job):
+    patience = 0.0 if device is None else patience_with(device)
+    with released(job), watched(patience, _end):
         watch(job.run(), output)
+
+
+def _end(sentence: str) -> None:
+    """End the process at once, without what other threads would have to be waited for."""
+    os._exit(_say(f"rift: {sentence}; --resume goes on where something was kept", _DEVICE))
 
 
 def _guarded(

@@ -1,8 +1,8 @@
 """Keeps a folder for one process at a time: two runs that write into one folder would mix.
 
 What keeps it is a lock on an open file, not that the file is there: the operating system lets go of
-it when the process ends, however that ends. Where there are no such locks (Windows, some network
-file systems) nothing is kept. A process does not keep a folder from itself.
+it when the process ends, however that ends. Where there are no such locks (some network file
+systems) nothing is kept. A process does not keep a folder from itself.
 """
 
 from __future__ import annotations
@@ -21,10 +21,16 @@ try:
     import fcntl
 except ImportError:
     fcntl = None  # type: ignore[assignment]
+try:
+    import msvcrt
+except ImportError:
+    msvcrt = None  # type: ignore[assignment]
 
 # There while a run is; a run that was killed leaves it, and nobody holds it then.
 LOCK_NAME = ".running"
 _LONGEST_NOTE = 200
+# Windows lets nobody else read a byte that is locked: one far behind the note is.
+_LOCKED_BYTE = 1 << 20
 _held: dict[Path, IO[str]] = {}
 
 
@@ -35,7 +41,7 @@ def keep(folder: Path) -> None:
         OutputError: another process keeps it, or nothing can be written there.
     """
     path = folder.resolve() / LOCK_NAME
-    if fcntl is None or path in _held:
+    if path in _held:
         return
     with writing(folder):
         while path not in _held:
@@ -48,12 +54,10 @@ def keep(folder: Path) -> None:
                     f"{folder}: {who} is writing here: wait for its end, or name another folder "
                     "(--out)"
                 )
-            # Whoever had it before may have removed the file that was opened.
-            with suppress(OSError):
-                if os.path.samestat(os.fstat(handle.fileno()), path.stat()):
-                    _held[path] = handle
-                    continue
-            handle.close()
+            if _is_there(handle, path):
+                _held[path] = handle
+            else:
+                handle.close()
     with suppress(OSError):
         handle.truncate(0)
         handle.write(f"process {os.getpid()} on {socket.gethostname()}")
@@ -67,23 +71,41 @@ def let_go(folder: Path) -> None:
 
 def _release(path: Path) -> None:
     handle = _held.pop(path, None)
-    if handle is not None:
-        # Removed while it is locked, so that nobody's lock is on a file without a name.
+    if handle is None:
+        return
+    # Removed while it is locked, so that nobody's lock is on a file without a name. Windows removes
+    # no file that anybody has open, so that there it is closed before.
+    steps = [handle.close, path.unlink] if fcntl is None else [path.unlink, handle.close]
+    for step in steps:
         with suppress(OSError):
-            path.unlink()
-        with suppress(OSError):
-            handle.close()
+            step()
 
 
 def _locked(handle: IO[str]) -> bool:
+    """Lock a file, without waiting; whether nobody else has."""
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+        if fcntl is not None:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        else:
+            os.lseek(handle.fileno(), _LOCKED_BYTE, os.SEEK_SET)
+            msvcrt.locking(handle.fileno(), msvcrt.LK_NBLCK, 1)
+    except (BlockingIOError, PermissionError):
         return False
     except OSError:
         # A file system without locks.
         pass
     return True
+
+
+def _is_there(handle: IO[str], path: Path) -> bool:
+    """Whether a file still has its name: whoever had it before may have removed it."""
+    if fcntl is None:
+        # Not on Windows, while it is open.
+        return True
+    try:
+        return os.path.samestat(os.fstat(handle.fileno()), path.stat())
+    except OSError:
+        return False
 
 
 @atexit.register

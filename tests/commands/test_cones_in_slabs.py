@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -88,6 +89,18 @@ def test_slabs_from_their_rows_are_those_of_the_whole(make, change):
         parts += formula.slabs(y[:, slice(*rows)], 1 << 30, z, rows)
     assert fewest < 40
     assert np.concatenate(parts).tobytes() == formula(y).tobytes()
+
+
+def test_what_was_mended_is_counted_once_however_rows_are_cut(scan, tmp_path):
+    """Zingers are told by the rows above and below, which are read twice."""
+    clean = reconstruction_of(settings(scan, tmp_path / "out", zingers=9.0)).source.clean
+    found = []
+    for edges in ([0, ROWS], [0, 14, 15, 16, 21, 22, ROWS]):
+        clean.zingers = 0
+        parts = [clean.read(*rows) for rows in pairwise(edges)]
+        counts = [sum(part.dead for part in parts), sum(part.starved for part in parts)]
+        found.append([*counts, clean.zingers])
+    assert found[0] == found[1] and found[0][0] == 1 and found[0][2] > 0
 
 
 @pytest.mark.full

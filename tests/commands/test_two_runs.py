@@ -1,12 +1,15 @@
 """Two runs into one folder at a time: the second is told, and the first loses nothing."""
 
+import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import OutputError
+from rift_cl.io import folder_lock
 from rift_cl.io.folder_lock import LOCK_NAME, keep, let_go
 
 OTHER = """
@@ -56,3 +59,40 @@ def test_what_another_run_wrote_meanwhile_is_not_written_over(tmp_path):
     with pytest.raises(OutputError, match="meanwhile"):
         late.make()
     late.release()
+
+
+def test_windows_locks_a_byte_behind_the_note(tmp_path, monkeypatch):
+    """By a stand-in for its module, with which nobody may open the file to remove it."""
+    locked, removed = [], []
+
+    def locking(number, mode, count):
+        if locked:
+            raise PermissionError(13, "Permission denied")
+        locked.append((os.lseek(number, 0, os.SEEK_CUR), mode, count))
+
+    def unlink(path):
+        # Closed by then.
+        removed.append(all(handle.closed for handle in opened))
+        remove(path)
+
+    opened, usual, remove = [], type(tmp_path).open, type(tmp_path).unlink
+    monkeypatch.setattr(
+        type(tmp_path),
+        "open",
+        lambda *given, **more: opened.append(usual(*given, **more)) or opened[-1],
+    )
+    monkeypatch.setattr(type(tmp_path), "unlink", unlink)
+    monkeypatch.setattr(folder_lock, "fcntl", None)
+    monkeypatch.setattr(folder_lock, "msvcrt", SimpleNamespace(locking=locking, LK_NBLCK=2))
+    keep(tmp_path)
+    note = (tmp_path / LOCK_NAME).read_bytes()
+    assert note == f"process {os.getpid()} on {folder_lock.socket.gethostname()}".encode()
+    assert locked == [(folder_lock._LOCKED_BYTE, 2, 1)] and len(note) < folder_lock._LOCKED_BYTE
+    held = dict(folder_lock._held)
+    folder_lock._held.clear()
+    # As another process sees it.
+    with pytest.raises(OutputError, match=f"process {os.getpid()} on .* is writing here"):
+        keep(tmp_path)
+    folder_lock._held.update(held)
+    let_go(tmp_path)
+    assert removed == [True] and not list(tmp_path.iterdir())

@@ -66,7 +66,8 @@ def read_attenuation(scan: ScanFile, start: int, stop: int) -> Attenuation:
 
 def _integrals(scan: ScanFile, rows: ScanRows, start: int) -> Attenuation:
     if scan.kind == "attenuation":
-        return Attenuation(rows.projections, 0, 0)
+        none = np.zeros(rows.projections.shape[1], np.int64)
+        return Attenuation(rows.projections, none, none)
     if rows.flats is None:
         return attenuation_without_flats(
             rows.projections, rows.darks, incident=scan.incident, first_row=start

@@ -144,11 +144,16 @@ class CleanRows:
         return LoadedRows(start, stop, kept, first, read_attenuation(self._scan, first, last))
 
     def clean(self, loaded: LoadedRows) -> Attenuation:
-        """Correct what was loaded."""
+        """Correct what was loaded.
+
+        What was mended in the neighbours of the rows that are wanted is not counted: it is where
+        they are wanted themselves.
+        """
         (first, last), rows = loaded.kept, loaded.integrals.projections
         kept = slice(first - loaded.first, last - loaded.first)
+        counted = slice(loaded.start - loaded.first, loaded.stop - loaded.first)
         if self._settings.zingers is not None:
-            rows = self._without_zingers(rows, kept)
+            rows = self._without_zingers(rows, counted)
         if self.phase is not None:
             rows = paganin(np.exp(-rows), **_arguments(self.phase))
         rows = np.ascontiguousarray(rows[:, kept])
@@ -159,7 +164,8 @@ class CleanRows:
         if self.alignment is not None:
             wanted = slice(loaded.start - first, loaded.stop - first)
             rows = self.alignment.aligned(rows, first, wanted, self._device)
-        return dataclasses.replace(loaded.integrals, projections=rows)
+        found = loaded.integrals
+        return Attenuation(rows, found.dead_of_rows[counted], found.starved_of_rows[counted])
 
     @property
     def _halo(self) -> int:
@@ -167,10 +173,10 @@ class CleanRows:
         halo = 0 if self.phase is None else self.phase.halo_rows()
         return halo + (0 if self._settings.zingers is None else _ZINGER_HALO)
 
-    def _without_zingers(self, rows: Floats, inner: slice) -> Floats:
+    def _without_zingers(self, rows: Floats, counted: slice) -> Floats:
         sigma = self._settings.zingers or 0.0
         clean, _ = remove_zingers(rows, sigma=sigma, kind="attenuation", device=self._device)
-        self.zingers += int(np.count_nonzero(clean[:, inner] != rows[:, inner]))
+        self.zingers += int(np.count_nonzero(clean[:, counted] != rows[:, counted]))
         return clean
 
     def _around(self, start: int, stop: int, halo: int) -> tuple[int, int]:

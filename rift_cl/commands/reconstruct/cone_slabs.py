@@ -52,7 +52,8 @@ class ConeSlabs:
         """
         first, stop = self._rows_of(slab)
         own = max(first, self._seam(slab.start)), min(stop, self._seam(slab.stop))
-        clean, found = self._source.clean, Attenuation(np.empty(0, np.float32), 0, 0)
+        clean, none = self._source.clean, np.zeros(0, np.int64)
+        found = Attenuation(np.empty(0, np.float32), none, none)
         pieces = []
         for piece in ((first, own[0]), own, (own[1], stop)):
             if piece[0] >= piece[1]:

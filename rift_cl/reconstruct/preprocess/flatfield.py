@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from rift_cl.errors import InputError, ShapeError
 
 Floats = NDArray[np.float32]
+Counts = NDArray[np.int64]
 # A pixel is dead when the beam raises it by less than this share of what is usual in its row.
 _DEAD = 0.05
 # Fewer quanta than this share of the beam are not told from none, whatever the darks' noise.
@@ -43,13 +44,24 @@ class Attenuation:
 
     Args:
         projections: line integrals of attenuation, (angle, row, bin), no unit.
-        dead: detector pixels that were filled from their neighbours.
-        starved: samples without a signal above the darks' noise, filled in the same way.
+        dead_of_rows: detector pixels of each row that were filled from their neighbours, (row,).
+        starved_of_rows: samples of each row without a signal above the darks' noise, filled in the
+            same way, (row,).
     """
 
     projections: Floats
-    dead: int
-    starved: int
+    dead_of_rows: Counts
+    starved_of_rows: Counts
+
+    @property
+    def dead(self) -> int:
+        """Detector pixels that were filled from their neighbours."""
+        return int(self.dead_of_rows.sum())
+
+    @property
+    def starved(self) -> int:
+        """Samples without a signal above the darks' noise, filled in the same way."""
+        return int(self.starved_of_rows.sum())
 
 
 def attenuation(
@@ -179,13 +191,14 @@ def _minus_log(
     """-log in place, with dead pixels and what is not above ``faintest`` filled."""
     unknown = ~(transmission > np.maximum(faintest, np.float32(_FAINTEST)))
     unknown |= dead
-    starved = int(unknown.sum()) - len(transmission) * int(dead.sum())
+    dead_of_rows = dead.sum(axis=1)
+    starved_of_rows = unknown.sum(axis=(0, 2)) - len(transmission) * dead_of_rows
     transmission[unknown] = 1
     np.negative(np.log(transmission, out=transmission), out=transmission)
     if unknown.any():
         for row in np.flatnonzero(unknown.any(axis=(0, 2))):
             _fill(transmission[:, row], unknown[:, row], first_row + int(row))
-    return Attenuation(transmission, int(dead.sum()), starved)
+    return Attenuation(transmission, dead_of_rows, starved_of_rows)
 
 
 def _fill(lines: Floats, unknown: NDArray[np.bool_], row: int) -> None:
