@@ -14,8 +14,7 @@ from rift_cl.errors import (
     RiftError,
 )
 
-_MEMORY = ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES")
-_MEMORY_TOO = ("OUT_OF_HOST_MEMORY",)
+_MEMORY = ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES", "OUT_OF_HOST_MEMORY")
 _SIZE = "INVALID_BUFFER_SIZE"
 _LOST = ("DEVICE_NOT_AVAILABLE", "INVALID_COMMAND_QUEUE", "INVALID_CONTEXT")
 
@@ -44,6 +43,11 @@ def driver_errors() -> tuple[type[Exception], ...]:
     return cl.Error, MemoryError
 
 
+def is_out_of_memory(error: Exception) -> bool:
+    """Whether a driver's failure is one of memory, its own or the computer's."""
+    return isinstance(error, MemoryError) or any(code in str(error) for code in _MEMORY)
+
+
 def named_error(error: Exception, doing: str, device: str) -> RiftError:
     """What a driver's failure means.
 
@@ -53,7 +57,7 @@ def named_error(error: Exception, doing: str, device: str) -> RiftError:
         device: the device's name.
     """
     text = str(error)
-    if isinstance(error, MemoryError) or any(code in text for code in _MEMORY + _MEMORY_TOO):
+    if is_out_of_memory(error):
         return DeviceMemoryError(
             f"{device} ran out of memory while {doing} ({text}): give it less at a time, for "
             "example a smaller memory budget (RIFT_MEMORY or --memory)"

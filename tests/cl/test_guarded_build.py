@@ -11,7 +11,7 @@ import pytest
 import rift_cl as rift
 from rift_cl.cl.build import guarded_build as guarded_build_module
 from rift_cl.cl.build.first_launch import told_launch
-from rift_cl.cl.build.guarded_build import Request, Worker, guarded_build
+from rift_cl.cl.build.guarded_build import Built, Request, Worker, guarded_build
 from rift_cl.errors import DeviceError
 
 REQUEST = Request("0:0", "device", "probe", "source", ["-w"])
@@ -42,12 +42,29 @@ def worker():
 
 
 def test_compiler_that_does_its_work_is_asked_once(worker):
-    assert guarded_build(REQUEST, worker("pass")) == (b"binary", "", "", "")
+    assert guarded_build(REQUEST, worker("pass")) == Built(b"binary", "", "", "")
 
 
 def test_compiler_that_dies_is_asked_in_another_way(worker):
     built = guarded_build(REQUEST, worker(f"'noinline' in request['source'] or {DIES}"))
-    assert built == (b"binary", "noinline", "its compiler died (SIGSEGV)", "")
+    assert built == Built(b"binary", "noinline", "its compiler died (SIGSEGV)", "")
+
+
+@pytest.mark.parametrize("way", ["noinline", "nothing"])
+@pytest.mark.parametrize(
+    ("fate", "fault"),
+    [
+        ("os.kill(os.getpid(), signal.SIGKILL)", "its compiler died (SIGKILL)"),
+        (
+            "write_message(sys.stdout.buffer, {'error': 'E', 'short of memory': True}); continue",
+            "its compiler had no memory",
+        ),
+    ],
+)
+def test_what_others_did_to_a_child_is_no_verdict(worker, fate, fault, way):
+    built = guarded_build(REQUEST, worker(f"if {way!r} not in request['source']: {fate}"))
+    assert (built.fault, built.passing) == (fault, True)
+    assert built.binary == (b"binary" if way == "noinline" else None)
 
 
 LAUNCH = {"size": [1], "local": [1], "offset": None, "arguments": [4, "0800", None]}
@@ -55,21 +72,21 @@ LAUNCH = {"size": [1], "local": [1], "offset": None, "arguments": [4, "0800", No
 
 def test_launch_that_no_way_survives_refuses_a_kernel_only_when_processes_died_twice(worker):
     dies = worker(f"request['launches'] and {DIES}")
-    assert guarded_build(REQUEST._replace(launches=[LAUNCH]), dies) == (b"binary", "", "", "")
+    assert guarded_build(REQUEST._replace(launches=[LAUNCH]), dies) == Built(b"binary", "", "", "")
     twice = guarded_build(REQUEST._replace(launches=[LAUNCH, LAUNCH]), dies)
-    assert twice == (None, "", "its compiler died (SIGSEGV)", "")
+    assert twice == Built(None, "", "its compiler died (SIGSEGV)", "")
 
 
 def test_launch_whose_child_somebody_ends_refuses_no_kernel(worker):
     ends = worker("request['launches'] and os.kill(os.getpid(), signal.SIGKILL)")
     twice = REQUEST._replace(launches=[LAUNCH, LAUNCH])
-    assert guarded_build(twice, ends) == (b"binary", "", "", "")
+    assert guarded_build(twice, ends) == Built(b"binary", "", "", "")
 
 
 def test_launch_that_dies_of_its_numbers_alone_is_no_fault_of_the_compiler(worker):
     fate = f"request['launches'][0]['arguments'] != [4, '0000', None] and {DIES}"
     built = guarded_build(REQUEST._replace(launches=[LAUNCH]), worker(fate))
-    assert built == (b"binary", "", "", "")
+    assert built == Built(b"binary", "", "", "")
 
 
 def test_compiler_that_hangs_is_ended(worker):
@@ -97,7 +114,8 @@ def test_compiler_that_always_hangs_is_waited_for_no_longer_than_twice_the_limit
 
 
 def test_compiler_that_can_do_it_in_no_way_is_told_of(worker):
-    assert guarded_build(REQUEST, worker(DIES)) == (None, "", "its compiler died (SIGSEGV)", "")
+    died = Built(None, "", "its compiler died (SIGSEGV)", "")
+    assert guarded_build(REQUEST, worker(DIES)) == died
 
 
 def test_compiler_that_ends_the_process_is_told_of(worker):

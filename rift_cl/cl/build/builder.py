@@ -33,6 +33,7 @@ from rift_cl.cl.build.kernel_features import feature_of
 from rift_cl.cl.build.program_store import (
     Stored,
     begun,
+    is_settled,
     load,
     program_name,
     remove,
@@ -70,6 +71,7 @@ class Builder:
         self._device = device
         self._programs: dict[Key, Any] = {}
         self._entries: dict[Key, str] = {}
+        self._refused: dict[Key, str] = {}
 
     def defines(self, macros: tuple[tuple[str, str], ...]) -> dict[str, str]:
         """Every macro that a program is built with."""
@@ -85,7 +87,8 @@ class Builder:
         """The ``pyopencl.Program`` of a kernel and its macros, built by the first who asks.
 
         Raises:
-            KernelBuildError: it does not compile.
+            KernelBuildError: it does not compile; or it was not compiled for a reason that may
+                pass, such as memory, and whoever asks again tries again.
             DeviceError: this driver computes wrong numbers with it, or ``DOUBLE`` is 1 and the
                 device has no doubles.
         """
@@ -176,29 +179,59 @@ class Builder:
         """A program of our own store, which a child process compiles where it is not there yet."""
         import pyopencl as cl
 
-        name, macros = key
+        name = key[0]
+        if key in self._refused:
+            raise KernelBuildError(self._refused[key])
         with build_lock(name, write_down=False):
             died_of = unfinished(entry) or []
         stored = load(entry)
-        launches = [*(stored.about.get("launches", []) if stored else []), *died_of]
-        if stored is not None and not died_of:
+        kept = stored.about if stored else {}
+        launches = [*kept.get("launches", []), *died_of]
+        if stored is not None and is_settled(kept) and not died_of:
             # A driver need not take what it gave; then it compiles again.
             with contextlib.suppress(cl.Error):
-                return self._loaded(name, stored, source, options)
+                return self._loaded(key, stored, source, options)
             remove(entry)
-        device = self._device
+        stored = self._guarded(entry, key, source, options, {**kept, "launches": launches})
+        with named_errors(f"loading kernel {name}", self._device.name):
+            return self._loaded(key, stored, source, options)
+
+    def _guarded(
+        self, entry: str, key: Key, source: str, options: list[str], kept: dict[str, Any]
+    ) -> Stored:
+        """A program that a child process compiles, stored if nothing else had a hand in it.
+
+        Args:
+            entry: its name in the store.
+            key: the kernel and its macros.
+            source: with what its way of building wants.
+            options: the same.
+            kept: what the store says of it, and the launches that processes died of.
+        """
+        name, macros = key
+        device, launches = self._device, kept["launches"]
         request = Request(device.selector, device.name, name, source, options, launches)
         built = guarded_build(request)
-        about = {"kernel": name, "macros": dict(macros), "driver": self._driver}
-        about |= {"way": built.way, "fault": built.fault, "launches": launches}
-        if built.binary is None and built.log:
+        there = built.binary is not None
+        if built.passing and not there:
+            raise KernelBuildError(
+                f"kernel {name} was not compiled for {device.name}: {built.fault}, for a reason "
+                "that may pass; see that there is memory and that nothing ends processes, and try "
+                "again"
+            )
+        if built.log and not there:
             raise _build_error(name, built.log, options, device.name)
-        stored = Stored({**about, "built": built.binary is not None}, built.binary or b"")
-        save(entry, stored)
-        with named_errors(f"loading kernel {name}", device.name):
-            return self._loaded(name, stored, source, options)
+        about = {"kernel": name, "macros": dict(macros), "driver": self._driver, "built": there}
+        about |= {"way": built.way, "fault": built.fault, "launches": launches}
+        if not there:
+            met = 0 if kept.get("built", True) else kept.get("met", 0)
+            about |= {"met": met + 1, "when": time.time()}
+        stored = Stored(about, built.binary or b"")
+        if not built.passing:
+            save(entry, stored)
+        return stored
 
-    def _loaded(self, name: str, stored: Stored, source: str, options: list[str]) -> Any:
+    def _loaded(self, key: Key, stored: Stored, source: str, options: list[str]) -> Any:
         """The program that a file of the store stands for.
 
         Raises:
@@ -209,12 +242,13 @@ class Builder:
         device, about = self._device, stored.about
         if not about["built"]:
             macros = " ".join(f"{macro}={value}" for macro, value in about["macros"].items())
-            raise KernelBuildError(
-                f"{feature_of(name)}: {device.name} ({device.platform}, driver {device.driver}) "
+            again = "'rift devices --retest'" if is_settled(about) else "the next start"
+            self._refused[key] = (
+                f"{feature_of(key[0])}: {device.name} ({device.platform}, driver {device.driver}) "
                 f"cannot build it ({macros}): {about['fault']}, and no workaround helped; use "
-                "another device (--device) or another version of the driver ('rift devices "
-                "--retest' tries again)"
+                f"another device (--device) or another version of the driver ({again} tries again)"
             )
+            raise KernelBuildError(self._refused[key])
         context = device.context
         if not stored.binary:
             # The driver gives no binaries; the child saw that it compiles.

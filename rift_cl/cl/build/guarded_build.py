@@ -3,7 +3,8 @@
 One child per device lives as long as this process and is started again when it dies. A compiler
 that crashes, hangs or refuses a kernel is asked again in other ways, the gentlest first. Each time
 it may take half of what is left of twice ``LIMIT``: a kernel is waited for no longer than that,
-however often it is asked for, and again where nothing came of repeated launches.
+however often it is asked for, and again where nothing came of repeated launches. What a child says
+that somebody ended, or that had no memory, is no verdict on its compiler, and is told as passing.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ from rift_cl.errors import DeviceError
 LIMIT, _LEAST = 300.0, 1.0
 # Seconds that a child whose pipe broke is given to be gone.
 _DYING = 20.0
-# No compiler ends in this way by itself.
-_KILLED = "SIGKILL"
+# Others end a child in these ways, as the system does where memory runs out; no compiler by itself.
+_ENDED = ("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP")
 UNOPTIMIZED = "-cl-opt-disable"
 # How a kernel is built: what stands before its source, and further options.
 WAYS = {
@@ -47,12 +48,15 @@ class Built(NamedTuple):
         way: the workaround that was taken, empty for none.
         fault: what the first attempt met, empty for nothing.
         log: the compiler's words, where it refused the kernel.
+        passing: whether a cause outside of the compiler had a hand in it, so that another time may
+            bring something else.
     """
 
     binary: bytes | None
     way: str
     fault: str
     log: str
+    passing: bool = False
 
 
 class Request(NamedTuple):
@@ -91,19 +95,23 @@ def guarded_build(request: Request, worker: Worker | None = None) -> Built:
     worker = worker or _worker_of(request.selector)
     until = time.monotonic() + 2 * worker.limit
     first = log = ""
+    passing = False
     for way in WAYS:
         source, options = way_to_build(way, request.source, request.options)
         asked = request._replace(source=source, options=options)
         fault, answer, binary = _answer(asked, worker, until)
         if answer is not None and "error" not in answer:
-            return Built(binary, way, first, log)
+            return Built(binary, way, first, log, passing)
         said = "" if answer is None else answer["error"]
-        first, log = first or fault or "its compiler refused it", log or said
-    if len(request.launches) == 1 or (request.launches and _KILLED in first):
+        short = answer is not None and answer.get("short of memory", False)
+        passing |= short or any(signal in fault for signal in _ENDED)
+        fault = fault or ("its compiler had no memory" if short else "its compiler refused it")
+        first, log = first or fault, log or said
+    if request.launches and (passing or len(request.launches) == 1):
         # One process may have been ended for another reason, and a launch on zeros die of those;
-        # a child that somebody ends, as the system does where memory runs out, tells nothing.
+        # a child that somebody ends tells nothing.
         return guarded_build(request._replace(launches=()), worker)
-    return Built(None, "", first, log)
+    return Built(None, "", first, log, passing)
 
 
 def _answer(

@@ -13,6 +13,7 @@ import hashlib
 import json
 import os
 import tempfile
+import time
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,13 +28,17 @@ from rift_cl.json_parsing import parse_json
 _FORMAT = b"RIFT-CL program 1\n"
 _HASH = 64
 _FOLDER, _SUFFIX, _BEGUN = "programs", ".program", ".begun"
+# How many processes must have met a compiler's fault before none asks it again; and for how many
+# seconds they do not where it hung, as a compiler may on a machine that has too much to do.
+_MET, _A_DAY = 2, 86_400
 
 
 class Stored(NamedTuple):
     """A program as the store keeps it.
 
     Args:
-        about: what it is, for a person; ``fault`` says why there is no binary where there is none.
+        about: what it is, for a person; ``fault`` says why there is no binary where there is none,
+            ``met`` how many processes met it, one after the other, and ``when`` the last did.
         binary: what the driver gave, and takes again.
     """
 
@@ -64,6 +69,14 @@ def load(name: str) -> Stored | None:
     if stored is None:
         remove(name)
     return stored
+
+
+def is_settled(about: dict[str, Any]) -> bool:
+    """Whether what is said of a program holds: a compiler's fault does when it came again."""
+    if about["built"]:
+        return True
+    fresh = "hung" not in about["fault"] or time.time() - about.get("when", 0) < _A_DAY
+    return bool(about.get("met", 0) >= _MET and fresh)
 
 
 def save(name: str, stored: Stored) -> None:

@@ -18,6 +18,7 @@ from functools import cache
 from typing import IO, Any
 
 from rift_cl.cl.build.first_launch import repeat_launch
+from rift_cl.cl.failures import driver_errors, is_out_of_memory
 from rift_cl.json_parsing import parse_json
 
 LENGTH = struct.Struct(">I")
@@ -74,8 +75,8 @@ def _answer(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
         kernel = cl.Kernel(program, request["kernel"])
         for launch in request["launches"]:
             repeat_launch(kernel, context, launch)
-    except (cl.Error, LookupError, TypeError, ValueError) as error:
-        return {"error": str(error)}, b""
+    except (*driver_errors(), LookupError, TypeError, ValueError) as error:
+        return {"error": str(error), "short of memory": is_out_of_memory(error)}, b""
     return {}, binary
 
 

@@ -28,7 +28,7 @@ from rift_cl.cl.build.driver_record import (
 )
 from rift_cl.cl.build.guarded_build import WAYS, death_of
 from rift_cl.cl.build.kernel_features import feature_of
-from rift_cl.cl.build.program_store import forget, stored_programs
+from rift_cl.cl.build.program_store import forget, is_settled, stored_programs
 from rift_cl.cl.device import Device
 from rift_cl.json_parsing import parse_json
 from rift_cl.progress import Report
@@ -149,7 +149,8 @@ def findings(device: Device) -> list[str]:
     for about in stored_programs(device.identity):
         if about["fault"]:
             macros = " ".join(f"{macro}={value}" for macro, value in about["macros"].items())
-            taken = f"built with a workaround: {about['way']}" if about["built"] else "refused"
+            refused = "refused" if is_settled(about) else "tried again when it is next wanted"
+            taken = f"built with a workaround: {about['way']}" if about["built"] else refused
             said.append(f"{feature_of(about['kernel'])} {macros}: {about['fault']}; {taken}")
     if record["refused"]:
         said.append(f"refused: {', '.join(map(feature_of, record['refused']))}")
