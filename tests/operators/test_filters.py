@@ -8,6 +8,7 @@ import pytest
 from rift_cl import Grid, HighPass, Parallel, Projector, Ramp, Response, dot_test, fbp
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.operators import FILTERS, ViewFilter, as_filter, register_filter
+from rift_cl.operators.filters.ramp_filters import Finer
 from rift_cl.reference import filter_rows, ramp_taps, response_taps, shepp_logan_taps
 
 pytestmark = pytest.mark.dealt
@@ -155,6 +156,12 @@ def test_any_response_is_a_filter():
     assert isinstance(filter, Response)
     assert relative(filter.taps(BINS, PITCH), response_taps(gaussian, BINS, PITCH)) < 1e-4
     assert relative(as_filter(lambda f: f).taps(BINS, PITCH), ramp_taps(BINS, PITCH)) < 1e-3
+
+
+def test_finer_bins_pass_what_the_wider_hold():
+    finer, cut = Finer(Ramp("hann"), 2).taps(60, 0.5), Ramp("hann", 0.5).taps(60, 0.5)
+    np.testing.assert_allclose(finer, cut, atol=1e-3 * cut.max())
+    assert finer.sum() == pytest.approx(Ramp("hann").taps(30, 1.0).sum() * 2, abs=1e-2)
 
 
 def test_the_pitch_is_a_length():

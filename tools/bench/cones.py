@@ -118,6 +118,8 @@ _UPRIGHT = Cost(
     lambda c: 8 * c.pixels,
     "112 flop per pixel: eight cubic weights and 16 multiply-adds; bytes: data on both sides",
 )
+# Between bins, of which there are then twice as many.
+_BETWEEN = _UPRIGHT._replace(units=lambda c: 2 * c.pixels, bytes=lambda c: 12 * c.pixels)
 _RAY = Cost(
     "update",
     20,
@@ -180,9 +182,10 @@ _PLANES: dict[str, Cost] = {
 
 def upright_reading(device: rift.Device, case: ConeCase) -> Rectification:
     """What filtered backprojection reads of tilted detectors."""
-    _, forms = upright_cone(case.scan)
-    shape, views = (case.n, case.n), np.arange(case.views, dtype=np.int32)
-    return Rectification(device, shape, shape, views, forms, np.dtype(np.float32), spline=True)
+    cone, forms = upright_cone(case.scan)
+    upright, shape = (cone.rows, cone.bins), (case.n, case.n)
+    views, kind = np.arange(case.views, dtype=np.int32), np.dtype(np.float32)
+    return Rectification(device, upright, shape, views, forms, kind, spline=True)
 
 
 def cone_tasks(device: rift.Device, n: int, views: int) -> Iterator[Task]:
@@ -205,9 +208,11 @@ def cone_tasks(device: rift.Device, n: int, views: int) -> Iterator[Task]:
         yield Task(f"{case.kind}, forward", case, partial(A, x), {**CONE_COSTS, **_PLANES})
         yield Task(f"{case.kind}, backward", case, partial(A.T, y), {**CONE_COSTS, **_PLANES})
         if case.kind == "vectors":
-            reading, out = upright_reading(device, case), device.empty(A.range)
+            reading = upright_reading(device, case)
+            out = device.empty((case.views, *reading.shape))
             run = partial(reading.read, y, out, 0, case.views)
-            yield Task("vectors, read as upright views", case, run, CONE_COSTS)
+            costs = {**CONE_COSTS, "upright_read": _BETWEEN}
+            yield Task("vectors, read as upright views", case, run, costs)
         if case.kind == "cone":
             ones = np.ones((1, case.n))
             weights, out = RayFactors(device, np.float32, ones, ones), device.empty(A.range)

@@ -24,6 +24,7 @@ from rift_cl.geometry.seen_grid import scan_lengths, seen_grid, slices_beyond
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.reconstruct import Attenuation
 from rift_cl.reconstruct.direct.padding import goes_on
+from rift_cl.reconstruct.direct.upright_views import FINER
 from rift_cl.reconstruct.preprocess import binned_center, binning_note
 
 # Options that do not apply to cones, with what they are where they are not used.
@@ -308,6 +309,8 @@ class ConeInput:
     def _need(self) -> int:
         """Bytes that the method takes of host and device together."""
         volumes, stacks = _HELD[self.settings.method]
+        if self.settings.method == "fbp" and isinstance(self.geometry, Vectors):
+            stacks *= FINER
         return 4 * (
             volumes * int(np.prod(self.solved.shape)) + stacks * int(np.prod(self.scan.shape))
         )

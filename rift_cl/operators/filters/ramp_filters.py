@@ -149,6 +149,29 @@ class Response:
         return np.concatenate([kernel[:0:-1], kernel])
 
 
+@dataclass(frozen=True)
+class Finer:
+    """A filter on bins that were read between wider ones: it passes what these can hold.
+
+    Args:
+        filter: as it is on the wider bins.
+        times: how many of the finer bins stand in the place of one.
+    """
+
+    filter: Filter
+    times: int
+
+    def taps(self, bins: int, pitch: float) -> Floats:
+        """Convolution kernel h[-(bins-1)] .. h[bins-1], that of the wider bins, band-limited."""
+        half = 2 * bins
+        wide = self.filter.taps(half, self.times * pitch)[half - 1 :]
+        response = np.fft.rfft(np.concatenate([wide, [0.0], wide[:0:-1]])).real
+        # The Nyquist frequency of the wider bins is one of two signs on the finer.
+        response[-1] /= 2
+        kernel = self.times * np.fft.irfft(response, 2 * half * self.times)[:bins]
+        return np.concatenate([kernel[:0:-1], kernel])
+
+
 FilterLike = str | Filter | Callable[[Floats], ArrayLike]
 FILTERS: Registry[Filter] = Registry(
     "filter", {**{window: Ramp(window) for window in WINDOWS}, HIGH_PASS: HighPass()}

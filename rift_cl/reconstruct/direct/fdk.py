@@ -35,7 +35,13 @@ from rift_cl.cl.budget import cut_evenly, plan_chunks
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Fan, Grid, Scan, Vectors, at_axis
 from rift_cl.operators.composite import Composite
-from rift_cl.operators.filters.ramp_filters import Filter, FilterLike, ViewFilter, as_filter
+from rift_cl.operators.filters.ramp_filters import (
+    Filter,
+    FilterLike,
+    Finer,
+    ViewFilter,
+    as_filter,
+)
 from rift_cl.operators.linear import Chunk, LinearOperator
 from rift_cl.operators.projector.cone.rectification import Rectification
 from rift_cl.operators.projector.projector import Projector
@@ -82,7 +88,7 @@ class FDK(Composite):
         """What was chosen for the scan's span and detector, for a reader."""
         filter_of_rows = ViewFilter(
             at_axis(wide),
-            self._row_filter(wide),
+            self._row_filter(wide, finer=scan.bins // self.domain[-1]),
             rows=self._A.range[1] if len(self._A.range) == 3 else None,
             gains=counted.views * amplitude(A.grid, wide),
             device=A.device,
@@ -98,9 +104,9 @@ class FDK(Composite):
             reading,
         )
 
-    def _row_filter(self, scan: Fan | Cone) -> Filter:
+    def _row_filter(self, scan: Fan | Cone, finer: int) -> Filter:
         if not scan.curved:
-            return self.filter
+            return self.filter if finer == 1 else Finer(self.filter, finer)
         return _OnArc(self.filter, at_axis(scan).pitch / scan.source_to_axis)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -253,10 +259,11 @@ class _Weighting(LinearOperator):
     ) -> None:
         super().__init__(domain, filter.range, filter.device, filter.dtype)
         self._filter, self._into, self._out_of, self._reading = filter, into, out_of, reading
+        self._upright = domain if reading is None else (domain[0], *reading.shape)
 
     def _apply(self, x: Any, out: Any) -> None:
         if self._reading is not None:
-            tilted, x = x, self.device.empty(self.domain, self.dtype)
+            tilted, x = x, self.device.empty(self._upright, self.dtype)
             self._reading.read(tilted, x, 0, len(x))
         rays = self.device.empty(self.range, self.dtype)
         self._into.widen(x, rays)
@@ -271,7 +278,7 @@ class _Weighting(LinearOperator):
         if self._reading is None:
             self._into.narrow(filtered, out)
             return
-        upright = self.device.empty(self.domain, self.dtype)
+        upright = self.device.empty(self._upright, self.dtype)
         self._into.narrow(filtered, upright)
         self._reading.spread(upright, out, 0, len(out))
 
@@ -282,9 +289,9 @@ class _Weighting(LinearOperator):
 
     @property
     def scratch(self) -> int:
-        """Weighted and filtered projections, upright ones twice, and what the filter needs."""
-        upright, rays = (math.prod(shape) for shape in (self.domain, self.range))
-        numbers = 2 * rays + (2 * upright if self._reading is not None else 0)
+        """Weighted and filtered projections, upright ones with their splines, and the filter's."""
+        given, upright, rays = map(math.prod, (self.domain, self._upright, self.range))
+        numbers = 2 * rays + (upright + 2 * given if self._reading is not None else 0)
         return self.dtype.itemsize * numbers + self._filter.scratch
 
     @property
@@ -427,8 +434,9 @@ def _untilted(A: Projector, scan: Vectors) -> tuple[Cone, Rectification]:
         raise InputError(
             f"filtered backprojection wants a circular scan; {failure}; {ITERATE}"
         ) from None
-    shape, views = (scan.rows, scan.bins), np.arange(scan.views, dtype=np.int32)
-    return cone, Rectification(A.device, shape, shape, views, forms, A.dtype, spline=True)
+    upright, shape = (cone.rows, cone.bins), (scan.rows, scan.bins)
+    views = np.arange(scan.views, dtype=np.int32)
+    return cone, Rectification(A.device, upright, shape, views, forms, A.dtype, spline=True)
 
 
 def _backprojector(A: Projector, scan: Fan | Cone) -> Projector:

@@ -53,6 +53,11 @@ class Rectification:
         return self._device.array(self._host[0])
 
     @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and bins of the detectors that read."""
+        return self._rows, self._bins
+
+    @property
     def nbytes(self) -> int:
         """Bytes of the device that the records take."""
         views, forms = self._host
