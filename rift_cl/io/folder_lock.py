@@ -75,20 +75,24 @@ def _release(path: Path) -> None:
         return
     # Removed while it is locked, so that nobody's lock is on a file without a name. Windows removes
     # no file that anybody has open, so that there it is closed before.
-    steps = [handle.close, path.unlink] if fcntl is None else [path.unlink, handle.close]
+    steps = [handle.close, path.unlink] if _on_windows() else [path.unlink, handle.close]
     for step in steps:
         with suppress(OSError):
             step()
 
 
+def _on_windows() -> bool:
+    return fcntl is None
+
+
 def _locked(handle: IO[str]) -> bool:
     """Lock a file, without waiting; whether nobody else has."""
     try:
-        if fcntl is not None:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        else:
+        if _on_windows():
             os.lseek(handle.fileno(), _LOCKED_BYTE, os.SEEK_SET)
-            msvcrt.locking(handle.fileno(), msvcrt.LK_NBLCK, 1)
+            msvcrt.locking(handle.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
+        else:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except (BlockingIOError, PermissionError):
         return False
     except OSError:
@@ -99,8 +103,8 @@ def _locked(handle: IO[str]) -> bool:
 
 def _is_there(handle: IO[str], path: Path) -> bool:
     """Whether a file still has its name: whoever had it before may have removed it."""
-    if fcntl is None:
-        # Not on Windows, while it is open.
+    if _on_windows():
+        # Nobody can, while it is open.
         return True
     try:
         return os.path.samestat(os.fstat(handle.fileno()), path.stat())

@@ -16,6 +16,7 @@ import h5py
 
 from rift_cl.errors import FileFormatError, PathEscapeError
 from rift_cl.io.boundary import HOW_TO_NAME, reading
+from rift_cl.io.hdf5_heaps import check_heaps
 
 _MOST_LINKS = 200
 _DEEPEST_VIRTUAL = 16
@@ -58,10 +59,14 @@ class Hdf5Tree:
 
         Raises:
             PathEscapeError: a link on the way leads outside the file's folder.
-            FileFormatError: links go round in circles, or to a file that is missing.
+            FileFormatError: links go round in circles, or to a file that is missing; or texts of
+                its attributes are kept in a damaged heap.
         """
         self._links = 0
-        return self._follow(self.root, name)
+        node = self._follow(self.root, name)
+        if node is not None:
+            check_heaps(node)
+        return node
 
     def dataset(self, name: str) -> Any:
         """The dataset of that name, whose storage was found to lie in the file's folder.

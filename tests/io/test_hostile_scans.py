@@ -19,6 +19,7 @@ import scan_files as made
 
 from rift_cl.errors import FileFormatError, ResourceLimitError, RiftError
 from rift_cl.io import ScanFile, open_scan
+from rift_cl.io.hdf5_tree import open_tree
 
 
 def grown() -> int:
@@ -77,6 +78,24 @@ def npz_claim(path: Path, shape: tuple[int, ...], angles: bytes | None = None) -
         archive.writestr("projections.npy", header(shape))
         archive.writestr("angles.npy", angles or header((6,)) + np.arange(6, dtype="f4").tobytes())
     return path
+
+
+@pytest.mark.parametrize("user_block", [0, 512])
+@pytest.mark.parametrize("headers", ["earliest", "latest"])
+def test_a_heap_of_texts_without_end(tmp_path: Path, headers: str, user_block: int) -> None:
+    """HDF5 walks it for ever; the attributes are more than the object's first header holds."""
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w", libver=headers, userblock_size=user_block) as file:
+        angles = file.create_dataset("angles", data=np.zeros(3))
+        for number in range(6):
+            angles.attrs[f"units{number}"] = 40 * "degrees"
+    with open_tree(path) as tree:
+        assert tree.dataset("angles").attrs["units5"] == 40 * "degrees"
+    whole = path.read_bytes()
+    heap = whole.index(b"GCOL") + 16
+    path.write_bytes(whole[:heap] + bytes(16) + whole[heap + 16 :])
+    with open_tree(path) as tree, pytest.raises(FileFormatError, match=r"a\.h5: the heap"):
+        tree.dataset("angles")
 
 
 def test_terabytes_in_a_kilobyte_of_npz(tmp_path: Path) -> None:

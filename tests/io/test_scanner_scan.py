@@ -182,6 +182,13 @@ def test_what_our_own_file_may_not_say(
         open_scan(path, kind="counts", flats="mean")
 
 
+def test_a_named_geometry_says_all_but_the_pitch(tmp_path: Path) -> None:
+    path = made.described(tmp_path, "geometry: rtk.xml\npitch: [0.25, 0.2]\nwhite: 60000")
+    (tmp_path / "rtk.xml").write_text("")
+    with pytest.raises(FileFormatError, match="white does not go with geometry"):
+        open_scan(path)
+
+
 @pytest.mark.parametrize(
     ("fields", "error", "words"),
     [

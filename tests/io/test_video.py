@@ -140,3 +140,10 @@ def test_pixels_that_are_not_square_are_said(tmp_path: Path) -> None:
         store_video(tmp_path / "a.mp4", [checkers(2)], sample_aspect_ratio=Fraction(4, 3))
     )
     assert "1.33 times as wide as high" in note
+
+
+def test_a_video_that_nothing_decodes(video: Path) -> None:
+    """What is known of a stream without a decoder has no width to ask for."""
+    video.write_bytes(video.read_bytes().replace(b"stsd", b"free"))
+    with pytest.raises(FileFormatError, match="no decoder"):
+        check_video(video)

@@ -170,6 +170,8 @@ def _stream(path: Path) -> Iterator[tuple[Any, Any]]:
         if not container.streams.video:
             raise InputError(f"{path}: the video holds no pictures")
         stream = container.streams.video[0]
+        if stream.codec_context is None:
+            raise FileFormatError(f"{path}: no decoder is known for the video's pictures")
         if not (stream.width and stream.height):
             raise FileFormatError(f"{path}: the video does not say how large its pictures are")
         check_claim(path, "a frame", 12 * stream.width * stream.height, None)

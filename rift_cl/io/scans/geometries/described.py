@@ -106,6 +106,12 @@ def _elsewhere(
     other = CaptureFolder(path.parent).file(str(path), str(fields["geometry"]))
     if other == path or other.suffix.lower() in DESCRIBED:
         raise FileFormatError(f"{path}: geometry names {other.name!r}, a file of this same kind")
+    beside = sorted(set(fields) - {"geometry", "projections", "pitch", "unit"})
+    if beside:
+        raise FileFormatError(
+            f"{path}: {beside[0]} does not go with geometry, which names a file that says "
+            "everything but projections, pitch and unit"
+        )
     beam = read_beam(other, pitch, unit)
     changes: dict[str, Any] = {"folder": str(fields.get("projections") or "")}
     if unit:
