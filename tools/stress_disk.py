@@ -7,8 +7,8 @@ Then the disk is full from one of these on, drawn by chance: an audit hook of Py
 as a full disk does. What libraries in C write (HDF5, TIFF) is not seen by it; their files meet the
 full disk as they are forced to it. The command must end with the status of an output that cannot be
 written and one sentence, or with the same bytes as in peace; what it leaves under final names must
-be whole; and --resume must end with the bytes of the run in peace. Ends with status 1 if one of
-these does not hold.
+be whole; and --resume (--overwrite of `rift export`) must end with the bytes of the run in peace.
+Ends with status 1 if one of these does not hold.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import tyro
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from stress.small_commands import left_in, short_commands, started
+from stress.small_commands import differing, left_in, resumed, short_commands, started
 
 _OUTPUT = 5
 # Told its folder, and after how many writes the disk is full; -1: never.
@@ -94,7 +94,7 @@ def main(options: Options) -> int:
     with tempfile.TemporaryDirectory(prefix="rift-cl-disk-") as temporary:
         folder = Path(temporary)
         whole = {
-            name: _in_peace(words, folder / name)
+            name: _in_peace(words, folder / "peace" / name)
             for name, words in short_commands(folder).items()
             if options.only in name
         }
@@ -102,7 +102,7 @@ def main(options: Options) -> int:
         for number in range(options.tries):
             name = names[number % len(names)]
             full = drawn.randrange(whole[name].writes)
-            fault = _fault(whole[name], folder / f"{name}-{number}", full)
+            fault = _fault(whole[name], folder / str(number) / name, full)
             if fault:
                 print(f"try {number} ({name}, full after {full} writes): {fault}", flush=True)
                 faults += 1
@@ -131,10 +131,11 @@ def _fault(peace: Peace, out: Path, full: int) -> str:
     ]
     if broken:
         return f"left {broken[0]}"
-    process = started(peace.words, out, "--resume")
+    process = resumed(peace.words, out)
     _, again = process.communicate()
-    if process.returncode or left_in(out) != peace.left:
-        return f"--resume: status {process.returncode}: {again.strip()[-200:]}"
+    other = differing(left_in(out), peace.left)
+    if process.returncode or other:
+        return f"--resume: status {process.returncode}: {other} {again.strip()[-200:]}"
     return ""
 
 

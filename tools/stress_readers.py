@@ -2,10 +2,11 @@
 
     python tools/stress_readers.py --files 2000 --seed 0 --keep found
 
-Valid files of the kinds in ``KINDS`` (scans as TIFF, MAT, HDF5, NPZ and MRC; pictures, splats,
-points, cameras, lenses, volumes, checkpoints and settings) are damaged by chance: bits flipped, the
-end cut off, sizes forged, blocks of one file put into another. Each is read in a child process with
-a limit of time and of memory. Prints what became of them; ends with status 1 if one crashed, hung,
+Valid files of the kinds in ``KINDS`` (scans as TIFF, MAT, HDF5, NPZ, MRC, Zarr and with scanners'
+texts; geometries; pictures, videos, splats, points, cameras, COLMAP models, lenses, volumes,
+checkpoints, kept slabs and settings) are damaged by chance: bits flipped, the end cut off, sizes
+forged, blocks of one file put into another. Each is read in a child process with a limit of time
+and of memory. Prints what became of them; ends with status 1 if one crashed, hung,
 or raised anything but one of the package's errors.
 """
 
@@ -47,6 +48,7 @@ class Options:
         files: how many, dealt to all kinds.
         seed: of the damage; file i depends on the seed and on i alone.
         first: number of the first file, to repeat one that was found.
+        only: kinds to damage, by a part of their names; all if not given.
         seconds: after which a file counts as a hang.
         memory: bytes of address space of the child.
         keep: folder for the files that crash, hang or raise an error without a name.
@@ -55,6 +57,7 @@ class Options:
     files: int = 2000
     seed: int = 0
     first: int = 0
+    only: str = ""
     seconds: float = 20.0
     memory: int = 6 << 30
     keep: Path | None = None
@@ -66,14 +69,14 @@ def main(options: Options) -> int:
     tally: dict[str, Counter[str]] = {name: Counter() for name in KINDS}
     with tempfile.TemporaryDirectory(prefix="rift-cl-readers-") as folder:
         reader = Reader(options.memory, options.seconds)
+        places = {name: Path(folder, str(number)) for number, name in enumerate(KINDS)}
         for index, name, content in damaged_files(options):
-            path = Path(folder, f"file{KINDS[name].suffix}")
-            path.write_bytes(content)
+            path = KINDS[name].put(places[name], content)
             outcome, reason = reader.read(path, KINDS[name].read)
             tally[name][outcome] += 1
             if outcome in _FAILURES:
                 print(f"file {index} ({name}): {outcome}, {reason}")
-                _keep(options.keep, f"{options.seed}-{index}-{path.name}", content)
+                _keep(options.keep, f"{options.seed}-{index}-{name}", content)
         reader.close()
     print(table(tally))
     print(summary(tally))
@@ -83,11 +86,11 @@ def main(options: Options) -> int:
 def damaged_files(options: Options) -> Iterator[tuple[int, str, bytes]]:
     """Number, kind and content of every file."""
     intact = {name: kind.make() for name, kind in KINDS.items()}
-    names = list(KINDS)
+    names = [name for name in KINDS if options.only in name]
     for index in range(options.first, options.first + options.files):
         random = np.random.default_rng([options.seed, index])
         name = names[index % len(names)]
-        other = intact[names[random.integers(len(names))]]
+        other = intact[list(KINDS)[random.integers(len(KINDS))]]
         yield index, name, KINDS[name].pack(damaged(random, intact[name], other))
 
 
@@ -242,6 +245,24 @@ def _read_config(path: Path) -> str:
     return ""
 
 
+def _read_video(path: Path) -> str:
+    from rift_cl.io.captures.video import sharpest_frames
+
+    for _ in sharpest_frames(path, path.parent / "frames", 3):
+        pass
+    return ""
+
+
+def _read_slabs(path: Path) -> str:
+    """Go on with slabs; those that are whole are read."""
+    from rift_cl.commands.reconstruct.kept_slabs import SlabFolder
+
+    kept = SlabFolder(path, (4, 5, 6))
+    kept.projection(), kept.axis()
+    kept.go_on({"scan": "a", "axis": "2.5", "tilt of the axis": "0"})
+    return "" if sum(len(slab) for _, slab in kept.slabs()) == kept.done else "slices are missing"
+
+
 _READ: dict[str, Callable[[Path], str]] = {
     "scan": _read_scan,
     "image": _read_other("io", "read_image", budget=_BUDGET),
@@ -253,6 +274,9 @@ _READ: dict[str, Callable[[Path], str]] = {
     "volume": _read_other("io", "read_volume", budget=_BUDGET),
     "checkpoint": _read_other("io.checkpoint", "load_checkpoint"),
     "config": _read_config,
+    "video": _read_video,
+    "slabs": _read_slabs,
+    "numbers": _read_other("io.number_list", "read_numbers", what="angles"),
 }
 
 

@@ -29,8 +29,7 @@ def test_two_hundred_damaged_files(stress, capsys):
 def test_undamaged_files_are_read(stress, tmp_path):
     reader = stress.Reader(memory=6 << 30, seconds=60)
     for name, kind in stress.KINDS.items():
-        path = tmp_path / f"a{kind.suffix}"
-        path.write_bytes(kind.pack(kind.make()))
+        path = kind.put(tmp_path / name, kind.pack(kind.make()))
         assert reader.read(path, kind.read) == ("read", ""), name
     child = reader._child.pid
     assert reader.read(tmp_path / "gone.h5")[0] == "InputError" and reader._child.pid == child

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import io
 import json
+import runpy
 import tempfile
 import zipfile
 from collections.abc import Callable
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +21,7 @@ from rift_cl.io.images.image import write_png
 from rift_cl.io.images.pixels import write_pixels
 from rift_cl.io.scenes.splat_scene import SplatScene
 from rift_cl.sample.stock_lenses import stock_lens
+from stress.valid_folders import FOLDERS
 from stress.valid_scans import Kind
 
 _SPLATS = 40
@@ -102,6 +105,44 @@ def _config() -> bytes:
     )
 
 
+def _heic() -> bytes:
+    """The tests' own: no package that is wanted here writes HEIC."""
+    made = Path(__file__).resolve().parents[2] / "tests" / "io" / "heic_file.py"
+    return bytes(runpy.run_path(str(made))["HEIC"])
+
+
+def _video() -> bytes:
+    import av
+
+    def write(path: Path) -> None:
+        with av.open(str(path), "w") as container:
+            stream = container.add_stream("mpeg4", rate=10)
+            stream.width, stream.height, stream.pix_fmt = 32, 24, "yuv420p"
+            for number in range(6):
+                codes = np.full((24, 32, 3), 30 * number, np.uint8)
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(codes, "rgb24")))
+            container.mux(stream.encode())
+
+    return _written("a.mp4", write)
+
+
+def _zemax() -> bytes:
+    """A singlet of glass without a name, as Zemax writes it."""
+    surfaces = [("0.0", "INFINITY", ""), ("0.02", "4.0", "GLAS ___BLANK 1 0 1.5168 64.17"),
+                ("-0.02", "48.0", ""), ("0.0", "0", "")]  # fmt: skip
+    lines = ["MODE SEQ", "NAME singlet", "UNIT MM X W X CM MR CPMM", "ENPD 1.0E+1"]
+    lines += ["WAVM 1 5.5E-1 1", "PWAV 1"]
+    for number, (curvature, thickness, glass) in enumerate(surfaces):
+        lines += [f"SURF {number}", "  TYPE STANDARD", f"  CURV {curvature} 0 0 0 0"]
+        lines += [f"  DISZ {thickness}", "  DIAM 6.0 0 0 0 1", *["  STOP"] * (number == 1)]
+        lines += [f"  {glass}"] * bool(glass)
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _numbers() -> bytes:
+    return _written("a.npy", lambda path: np.save(path, np.arange(7.0)))
+
+
 OTHERS = {
     "PNG": Kind(
         ".png", lambda: _written("a.png", lambda p: write_png(p, _picture())), read="image"
@@ -118,4 +159,15 @@ OTHERS = {
     "volume MRC": Kind(".mrc", partial(_volume, "mrc", "a.mrc"), read="volume"),
     "checkpoint": Kind(".npz", _checkpoint, read="checkpoint"),
     "config.json": Kind(".json", _config, read="config"),
+    "JPEG": Kind(".jpg", partial(_pixels, "jpeg", "a.jpg"), read="image"),
+    "environment HDR": Kind(".hdr", partial(_pixels, "hdr", "a.hdr"), read="image"),
+    "Zemax lens": Kind(".zmx", _zemax, read="lens"),
+    "numbers NPY": Kind(".npy", _numbers, read="numbers"),
+    "numbers text": Kind(".txt", lambda: b"# angles\n0\n1.5\n3e0\n", read="numbers"),
+    **FOLDERS,
 }
+# What extras of the package read.
+if find_spec("pi_heif"):
+    OTHERS["HEIC"] = Kind(".heic", _heic, read="image")
+if find_spec("av"):
+    OTHERS["video"] = Kind(".mp4", _video, read="video")

@@ -61,7 +61,6 @@ white: 60000
 _RTK = """projections: images
 unit: mm
 pitch: [0.25, 0.2]
-white: 60000
 geometry: rtk.xml
 """
 _VECTORS = _RTK.replace("rtk.xml", "vectors.geom")
@@ -70,12 +69,13 @@ _IMAGES = "".join(f"{n + 1} 1 0 0 0 {n} 0 4 7 {n}.png\n1.5 2.5 -1\n" for n in ra
 _POINTS = "".join(f"{n} {n} 1 2 255 0 9 0.5 1 0\n" for n in range(4))
 
 
-def _frames(folder: Path, name: str) -> None:
+def _frames(folder: Path, name: str, *, counts: bool = True) -> None:
     folder.mkdir(exist_ok=True)
     for view in range(VIEWS):
         frame = np.full((ROWS, BINS), 59000, np.uint16)
         frame[:, 3:7] = 20000 + 100 * view
-        tifffile.imwrite(folder / name.format(view), frame)
+        integrals = -np.log(frame.astype(np.float32) / 59000)
+        tifffile.imwrite(folder / name.format(view), frame if counts else integrals)
 
 
 def _nikon(folder: Path) -> None:
@@ -89,7 +89,7 @@ def _skyscan(folder: Path) -> None:
 
 
 def _described(text: str, folder: Path) -> None:
-    _frames(folder / "images", "{:04d}.tif")
+    _frames(folder / "images", "{:04d}.tif", counts="white" in text)
     (folder / "geometry.yaml").write_text(text)
     angles = [f"<Projection><GantryAngle>{30 * n}</GantryAngle></Projection>" for n in range(VIEWS)]
     lengths = "<SourceToIsocenterDistance>50</SourceToIsocenterDistance>"
@@ -109,7 +109,9 @@ def _zarr(version: int, folder: Path) -> None:
     group = {"zarr_format": version, **({"node_type": "group"} if version == 3 else {})}
     (path / ("zarr.json" if version == 3 else ".zgroup")).write_text(json.dumps(group))
     frames = np.arange(VIEWS * ROWS * BINS).reshape(VIEWS, ROWS, BINS) % 251
-    arrays = {"projections": frames.astype("f4"), "angles": np.arange(VIEWS) * 0.2}
+    # Air at the ends of the detector: these are line integrals.
+    edge = (np.arange(BINS) > 1) & (np.arange(BINS) < BINS - 2)
+    arrays = {"projections": (frames / 100 * edge).astype("f4"), "angles": np.arange(VIEWS) * 0.2}
     for name, values in arrays.items():
         given = {"shape": values.shape, "dtype": values.dtype, "chunks": values.shape}
         given |= {"zarr_format": version} if _ZARR_3 else {}

@@ -30,12 +30,45 @@ class Kind:
         make: gives a valid one.
         pack: what is done to it after the damage.
         read: what reads it; see ``stress_readers``.
+        around: makes the folder that the file is one of, where it is read with others.
+        inside: its name in that folder.
+        opened: what of that folder is read; the folder itself if empty.
     """
 
     suffix: str
     make: Callable[[], bytes]
     pack: Callable[[bytes], bytes] = bytes
     read: str = "scan"
+    around: Callable[[Path], object] | None = None
+    inside: str = ""
+    opened: str = ""
+
+    @classmethod
+    def of_folder(
+        cls, around: Callable[[Path], object], inside: str, opened: str = "", read: str = "scan"
+    ) -> Kind:
+        """A kind of file that is read with others; the arguments are those of the class."""
+
+        def make() -> bytes:
+            with tempfile.TemporaryDirectory() as folder:
+                around(Path(folder))
+                return Path(folder, inside).read_bytes()
+
+        suffix = Path(inside).suffix
+        return cls(suffix, make, read=read, around=around, inside=inside, opened=opened)
+
+    def put(self, folder: Path, content: bytes) -> Path:
+        """Write a file into its kind's folder, which the first one makes; what is to be read."""
+        first = not folder.exists()
+        folder.mkdir(exist_ok=True)
+        if self.around is None:
+            path = folder / f"file{self.suffix}"
+            path.write_bytes(content)
+            return path
+        if first:
+            self.around(folder)
+        (folder / self.inside).write_bytes(content)
+        return folder / self.opened
 
 
 def _frames(count: int = _VIEWS, dtype: str = "u2") -> np.ndarray:
