@@ -16,7 +16,7 @@ from pathlib import Path
 
 import hypothesis
 import pytest
-from limited_devices import as_gpu
+from limited_devices import as_gpu, limited
 
 import rift_cl as rift
 
@@ -40,8 +40,14 @@ def _devices() -> list[rift.Device]:
 
 @cache
 def _variants(*, optimized: bool) -> list[rift.Device]:
+    devices = _devices() if optimized else [_unoptimized(device) for device in _devices()]
     cpus = (device for device in _devices() if device.traits.is_cpu)
-    return [*_devices(), *(as_gpu(device, optimized=optimized) for device in cpus)]
+    return [*devices, *(as_gpu(device, optimized=optimized) for device in cpus)]
+
+
+def _unoptimized(device: rift.Device) -> rift.Device:
+    """A CPU whose compiler leaves out what takes most of its time; any other device as it is."""
+    return limited(device, optimized=False) if device.traits.is_cpu else device
 
 
 def _label(device: rift.Device) -> str:
@@ -56,8 +62,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """
     if "device" in metafunc.fixturenames:
         once = metafunc.definition.get_closest_marker("once") is not None
-        # Few splats and many kernels: two thirds of the time would go into optimizing.
-        many = metafunc.definition.path.parent.name == "splat"
+        marked = metafunc.definition.get_closest_marker("variants") is not None
+        many = marked or metafunc.definition.path.parent.name == "splat"
         chosen = _devices() if once else _variants(optimized=not many)
         metafunc.parametrize("device", chosen, ids=_label, scope="session")
 

@@ -10,8 +10,14 @@ they share kernels). Marks change that:
 - ``dealt``: ``pytest -m full`` runs it with each row of its parameters on one kind of device. It
   puts kernels together that have tests of their own on every kind.
 
+- ``variants``: builds many kernels, each for a launch or two. Where a CPU compiles them, it does so
+  without optimization, which takes most of the time and changes nothing of our source; all of
+  tests/splat is compiled so. What users get, optimized, is launched by the other folders and by
+  every command.
 - ``study``: no selection runs it. It computes a study of ``tools/`` at length, as whoever writes
-  the figures down does; ``-m study`` runs all of them.
+  the figures down does, or goes again, in another way, through what a selection runs: tutorials as
+  notebooks are, but for one, since their code and their commands are run as pages
+  (``test_documents``). ``-m study`` runs all of them.
 
 A test of eight and more rows is dealt in any case: each kind of device gets half of them, and,
 where there are several parameters, each value of every one.
@@ -40,6 +46,7 @@ MARKS = (
     "each: plain `pytest` runs it with each of its parameters, not with the first alone",
     "once: a CPU runs it as a CPU alone; others test its kernels on every kind of device",
     "dealt: all cases together run each of its parameters once, on the devices in turn",
+    "variants: builds many kernels for a launch or two each, without optimization on a CPU",
     "study: computes a study of tools/ at length; `pytest -m study` runs it, or whoever names it",
 )
 # A worker holds its compiled kernels and its data: up to some 2 GB each.

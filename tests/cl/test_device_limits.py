@@ -35,6 +35,8 @@ from rift_cl.sampling.targets.target import Target
 from rift_cl.splat import Renderer, Splats, SplatSettings
 from rift_cl.train.loss.image_loss import ImageLoss
 
+pytestmark = pytest.mark.variants
+
 
 def tomography(device: rift.Device) -> Arrays:
     grid, scan = rift.Grid((5, 44, 40)), rift.Parallel(np.linspace(0, 3, 37), 60)
@@ -170,7 +172,7 @@ def test_no_array_is_larger_than_the_largest_buffer(device, job, largest, monkey
 @pytest.mark.once
 @pytest.mark.full
 def test_slabs_of_rows_fit_the_largest_buffer_of_a_gpu(device):
-    gpu = as_gpu(device)
+    gpu = as_gpu(device, optimized=False)
     assert_same(fourier_filtering(limited(gpu, allocation=1 << 16)), fourier_filtering(gpu))
 
 
@@ -262,7 +264,7 @@ def test_no_kernel_asks_for_what_is_wrong_in_a_part_of_a_grid(asked):
 @pytest.mark.once
 def test_filtered_views_beyond_the_groups_that_a_gpu_numbers(device):
     """65,537 rows, one to a work-item along y."""
-    gpu = as_gpu(device)
+    gpu = as_gpu(device, optimized=False)
     scan = rift.Parallel(np.zeros(1), 2)
     F = ViewFilter(scan, rift.Ramp(), rows=65_537, device=gpu)
     y = normal(*F.domain)
@@ -281,7 +283,7 @@ def test_local_memory_beyond_the_devices_is_told(device):
 @every_job
 def test_a_gpu_of_small_groups_has_results_to_rounding(device, job):
     """Sums over the items of a group are in another order there."""
-    gpu = as_gpu(device)
+    gpu = as_gpu(device, optimized=False)
     small = limited(gpu, group=20)
     assert small.traits.macros["GROUP"] == 16
     for one, other in zip(job(small), job(gpu), strict=True):
@@ -291,7 +293,7 @@ def test_a_gpu_of_small_groups_has_results_to_rounding(device, job):
 @pytest.mark.once
 @pytest.mark.parametrize("most", [32, 20])
 def test_a_kernel_that_runs_in_smaller_groups_alone(device, most, monkeypatch):
-    gpu = as_gpu(device)
+    gpu = as_gpu(device, optimized=False)
     needs = kernel_needs
 
     def few(kernel, handle):

@@ -17,6 +17,8 @@ from rift_cl.errors import InputError, ResourceLimitError
 from rift_cl.operators.projector.cone import slab_projector
 from rift_cl.reference.cone import ConeProjector
 
+pytestmark = pytest.mark.variants
+
 ROUNDING = 6e-6
 TURN = np.array([0, 0.3, np.pi / 4, np.pi / 4 + 1e-9, np.pi / 2, 2, 3 * np.pi / 4 - 1e-9, 4, 5.5])
 STEPS = np.arange(9) - 3.0

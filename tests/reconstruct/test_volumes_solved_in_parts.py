@@ -14,12 +14,12 @@ from rift_cl.reconstruct.solvers.few_levels import FewLevels
 
 pytestmark = pytest.mark.dealt
 
-GRID = Grid((192, 32, 30), (0.5, 1, 1))
-CONE = Cone([0.2, 2.0], 60, 20, 2.6, 100, 150)
+GRID = Grid((192, 16, 15), (0.5, 2, 2))
+CONE = Cone([0.2, 2.0], 30, 10, 5.2, 100, 150)
 # Bytes of a quarter of the volume.
 SMALL = int(np.prod(GRID.shape))
 LEANING = leaning(CONE, 0.03)
-WEIGHTS = 0.5 + np.random.default_rng(3).random((2, 60, 20))
+WEIGHTS = 0.5 + np.random.default_rng(3).random((2, 30, 10))
 METHODS = {
     "cgls": lambda A, y: cgls(A, y, 2),
     "tv": lambda A, y: tv(A, y, 0.02, 3, nonnegative=True),
@@ -45,7 +45,7 @@ def close(found, wanted):
 def problem(device):
     A = Projector(GRID, CONE, device=device)
     box = np.zeros(GRID.shape, np.float32)
-    box[30:150, 8:22, 6:20] = 1 + 0.1 * normal(120, 14, 14)
+    box[30:150, 4:11, 3:10] = 1 + 0.1 * normal(120, 7, 7)
     return A, A(box)
 
 
@@ -61,7 +61,7 @@ def test_a_volume_four_times_the_memory_is_solved_for(device, problem, method):
 @pytest.mark.full
 def test_vectors_are_solved_for_in_parts(device, problem):
     y = problem[1]
-    whole, A = (Projector(GRID, LEANING, device=d) for d in (device, limited(device, SMALL)))
+    whole, A = (Projector(GRID, LEANING, device=d) for d in (device, limited(device, 2 * SMALL)))
     assert close(cgls(A, y, 2), cgls(whole, y, 2))
 
 
@@ -87,13 +87,13 @@ def test_where_no_sum_is_cut_parts_have_the_same_bits(device, problem, method):
 )
 def test_a_run_in_parts_goes_on_from_its_state(device, problem, make):
     y = problem[1]
-    A = Projector(GRID, CONE, device=limited(device, SMALL))
+    A = Projector(GRID, CONE, device=limited(device, 2 * SMALL))
     straight, broken, resumed = (make(A, y) for _ in range(3))
-    list(straight.run(3))
+    list(straight.run(2))
     list(broken.run(1))
     resumed.restore(broken.state())
-    list(broken.run(3))
-    list(resumed.run(3))
+    list(broken.run(2))
+    list(resumed.run(2))
     assert not straight.data.home.on_device
     assert np.array_equal(resumed.image, straight.image)
     assert np.array_equal(broken.image, straight.image)

@@ -91,11 +91,15 @@ def test_a_command_that_fails_ends_a_notebook(tool, page):
     assert module.executed(module.notebook(page)).startswith("CalledProcessError")
 
 
+# The code of each tutorial is run by tests/test_documents.py, without a notebook round it.
+LONG = [pytest.param(name, marks=pytest.mark.study) for name in TUTORIALS if name != "scan"]
+
+
 @needs_kernel
 @pytest.mark.full
 @pytest.mark.timeout(1200)
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("name", TUTORIALS)
+@pytest.mark.parametrize("name", ["scan", *LONG])
 def test_a_tutorial_runs_as_a_notebook(tool, tmp_path, name):
     module = tool("make_notebooks")
     assert {page.stem for page in module.tutorials()} == TUTORIALS.keys()
