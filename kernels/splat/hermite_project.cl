@@ -50,7 +50,7 @@ KERNEL void hermite_project(
     write_one(screen_modes, TABLE_LENGTH, 0, rows, drawn ? w.i00 : 0);
     write_one(screen_modes, TABLE_LENGTH, 1, rows, drawn ? w.i10 : 0);
     write_one(screen_modes, TABLE_LENGTH, 2, rows, drawn ? w.i11 : 0);
-    for (int order = 1; order <= SHAPE_ORDER; order++) {
+    UNROLL for (int order = 1; order <= SHAPE_ORDER; order++) {
       const Columns at = columns_of(SHAPE_MODES, MODES3(order - 1) - 1, 1);
       const Columns to = columns_of(TABLE_LENGTH, WHITENING + MODES2(order - 1) - 1, 1);
       project_order(&w, shape_modes, at, rows, drawn, order, screen_modes, to);

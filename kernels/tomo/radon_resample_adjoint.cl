@@ -30,7 +30,9 @@ KERNEL void radon_resample_adjoint(
   const int b1 = b0 + BINS < bins ? b0 + BINS : bins;
   const int number = (int)get_global_id(1), view = first + number;
   const int slice = (int)get_global_id(2), used = views[view].y;
-  const long4 g = geometry[view];
+  /* One by one: of a whole long4 clspv makes a vector of eight, which Vulkan has none of. */
+  __global const long *line = (__global const long *)(geometry + view);
+  const long4 g = (long4)(line[0], line[1], line[2], line[3]);
   const view_shape shape = shape_of_view(footprints, view);
   const real per_bin = 1.0f / FIXED_TO_REAL(g.w);
   const real reach = (per_bin < 0 ? -per_bin : per_bin) * shape.SUPPORT + 1e-3f + 1e-6f * columns;

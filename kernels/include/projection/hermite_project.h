@@ -111,7 +111,8 @@ static void contract(const lanes *row, lanes3 a, int degree, lanes *out) {
 /* Contract so many indices of the tensor of an order. */
 static void contract_order(lanes *tensor, const Whitening *w, int order, int steps) {
   lanes *newest = tensor;
-  for (int k = 1; k <= steps; k++) {
+  /* Unrolled, as hermite_project's orders are: clspv nests loops wrongly where it unrolls some itself. */
+  UNROLL for (int k = 1; k <= steps; k++) {
     lanes *row = tensor, *next = newest + MODES2(order - k + 1);
     contract(newest, w->a1, order - k, next);
     for (int j = 0; j < k; j++) {

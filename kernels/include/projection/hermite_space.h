@@ -45,10 +45,12 @@ static void times_form(float *p, int degree, float3 form) {
   p[0] *= form.x;
 }
 
+/* 1 / sqrt(n!). */
+__constant float INVERSE_ROOT[] = {
+    1, 1, 0.70710678f, 0.40824829f, 0.20412415f, 0.091287093f, 0.037267800f, 0.014085904f, 0.0049801192f};
+
 /* Turn coefficients c~_n of He~_n(x') into those of He_m(u), u = A x': columns of A are given. */
 static void map_modes(float *modes, float3 column0, float3 column1, float3 column2) {
-  const float inverse_root[9] = { /* 1 / sqrt(n!) */
-      1, 1, 0.70710678f, 0.40824829f, 0.20412415f, 0.091287093f, 0.037267800f, 0.014085904f, 0.0049801192f};
   float powers[MODES], whole[HIGHEST_MODES], part[HIGHEST_MODES];
   powers[0] = 1;
   for (int n = 1; n <= ORDER; n++) {
@@ -64,7 +66,7 @@ static void map_modes(float *modes, float3 column0, float3 column1, float3 colum
         const int c = degree - b, size = (c + 1) * (c + 2) / 2;
         const float *power = powers + modes_below(c);
         const float factor = given[(b + c) * (b + c + 1) / 2 + c] *
-            inverse_root[a] * inverse_root[b] * inverse_root[c];
+            INVERSE_ROOT[a] * INVERSE_ROOT[b] * INVERSE_ROOT[c];
         if (c > 0) times_form(part, c - 1, column1);
         for (int k = 0; k < size; k++) part[k] = (c > 0 ? part[k] : 0) + factor * power[k];
       }
@@ -76,9 +78,10 @@ static void map_modes(float *modes, float3 column0, float3 column1, float3 colum
 }
 
 /* Replace He_n by powers along one dimension: He_n(x) = sum over k of (-1)^k n! / (k! (n-2k)! 2^k)
- * x^(n-2k). A coefficient takes in those two, four.. places above it, which are not yet replaced. */
+ * x^(n-2k). A coefficient takes in those two, four.. places above it, which are not yet replaced.
+ * Unrolled, since clspv nests these loops wrongly where it unrolls some of them itself. */
 static void to_powers(float *modes, int dimension) {
-  for (int p = 0; p <= ORDER; p++)
+  UNROLL for (int p = 0; p <= ORDER; p++)
     for (int q = 0; q <= ORDER - p; q++)
       for (int j = 0; j <= ORDER - p - q; j++) {
         float sum = 0, factor = 1;

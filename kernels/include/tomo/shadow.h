@@ -27,11 +27,9 @@ static lanes share(lanes x, view_shape shadow) {
 
 /* A view whose columns run down the detector is seen in a mirror, so that they run up it. */
 static long4 run_upwards(long4 g, int bins) {
-  if (g.w < 0) {
-    g.z = ((long)(bins - 1) << 32) - g.z;
-    g.w = -g.w;
-  }
-  return g;
+  const int down = g.w < 0;
+  /* One by one: of a choice between two long4 clspv makes a vector of eight, which Vulkan has none of. */
+  return (long4)(g.x, g.y, down ? ((long)(bins - 1) << 32) - g.z : g.z, down ? -g.w : g.w);
 }
 
 /* Where bin b of a view stands in memory, from the view's first number on. */
