@@ -8,6 +8,8 @@ from fan_scenes import FULL, KINDS, SHORT, cone, fan, projections, sinogram
 
 import rift_cl as rift
 from rift_cl.errors import InputError, ShapeError
+from rift_cl.phantom import Ellipsoid, project
+from rift_cl.reconstruct.axis.lying_axis import lying_axis
 
 TURNS = {
     "full": FULL,
@@ -87,6 +89,24 @@ def test_cones_are_searched_near_the_orbit():
     order = np.random.default_rng(0).permutation(scan.views)
     again = rift.find_center(y[order], replace(scan, angles=scan.angles[order]))
     assert again.center == pytest.approx(found.center, abs=0.01)
+
+
+def test_rows_taken_for_bins_are_doubted():
+    scan = cone(FULL[::4], rows=160, center=(79.5, 79.5))
+    y = projections(scan, noise=0.05)
+    assert rift.find_center(y, scan).doubt == ""
+    assert "probably swapped" in rift.find_center(y.transpose(0, 2, 1), scan).doubt
+    # A round body that turns about its axis changes nowhere, whichever axis that is.
+    rod = project([Ellipsoid((0, 0, 0), (30.0, 20.0, 20.0))], rift.Grid((4, 4, 4)), scan)
+    for views in (rod, rod.transpose(0, 2, 1)):
+        assert lying_axis(views) == ""
+
+
+def test_a_pitch_in_another_unit_is_doubted():
+    scan = fan()
+    y = sinogram(KINDS["porous"], scan)
+    found = rift.find_center(y, replace(scan, pitch=1e-3 * scan.pitch))
+    assert "0.001 times as far" in found.doubt
 
 
 def test_what_cannot_be_told_is_refused():

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.commands.inputs.scan_rows import read_attenuation
@@ -14,10 +15,11 @@ from rift_cl.geometry import Cone, Fan, Vectors
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.reconstruct.axis import AxisEstimate, axis_of_rows, searched_rows
 from rift_cl.reconstruct.axis.circular import axis_of_fan, axis_of_scan, orbit_rows
+from rift_cl.reconstruct.axis.lying_axis import looked_at, lying_axis
 from rift_cl.reconstruct.axis.search import GIVE_IT
 
-# A fan that opens by less than this many degrees is no scanner's.
-_NARROW = 0.25
+# Transmission below this share of the median tells nothing more.
+_LEAST_LIGHT = 1e-3
 
 
 def find_axis(
@@ -95,10 +97,9 @@ def settled_axis(scan: ScanFile, center: float, device: Device | None = None) ->
             f"The axis was taken to be that of {told}, bin {center:.2f} (--center), since the data "
             f"do not tell it: {reason}."
         )
-        notes = (note, *_narrow(scan))
-        return SettledAxis(center, False, None, {"center": center, "by": told}, notes)
+        return SettledAxis(center, False, None, {"center": center, "by": told}, (note,))
     words = f"The rotation axis was found {found.in_words()}; {told} has bin {center:.2f}."
-    notes = (words, *_narrow(scan))
+    notes: tuple[str, ...] = (words,)
     turned = found.sense is not None and found.sense.sign < 0
     if turned:
         reason = (
@@ -107,20 +108,6 @@ def settled_axis(scan: ScanFile, center: float, device: Device | None = None) ->
         )
         notes = (*notes, reason)
     return SettledAxis(found.center, turned, found, found.record(), notes)
-
-
-def _narrow(scan: ScanFile) -> tuple[str, ...]:
-    """A doubt about lengths that make a fan as narrow as no scanner's."""
-    beam = scan.geometry if scan.cone is None else scan.cone
-    if not isinstance(beam, Fan | Cone):
-        return ()
-    opening = float(np.rad2deg(np.ptp(beam.fan_angles())))
-    if opening >= _NARROW:
-        return ()
-    return (
-        f"The fan opens by {opening:.2g} degrees, hardly more than parallel rays: are distances "
-        "and pitch in one unit of length (--geometry, --pitch)?",
-    )
 
 
 def _of_cone(
@@ -136,4 +123,14 @@ def _of_cone(
     read = read_attenuation(scan, first, stop).projections
     rows = np.stack([read[:, group - first].mean(axis=1) for group in groups], axis=1)
     places = np.array([group.mean() for group in groups])
-    return axis_of_fan(rows, places, cone.center[0], cone.fan(), span)
+    lying = lying_axis(_integrals_but_flats(scan, *looked_at(cone)))
+    return axis_of_fan(rows, places, cone.center[0], cone.fan(), span, lying)
+
+
+def _integrals_but_flats(scan: ScanFile, views: list[int], rows: list[int]) -> NDArray[np.float32]:
+    """Line integrals of some rows of some views, but for what all views have in common."""
+    values = scan.rows.look("projections", views, rows)
+    if scan.kind == "attenuation":
+        return values
+    least = _LEAST_LIGHT * float(np.median(values))
+    return -np.log(np.maximum(values, max(least, np.finfo(np.float32).tiny)))

@@ -31,6 +31,8 @@ PARALLEL_BELOW = 1.01
 _FEWEST_BINS = 10
 # Half of the angle that a detector is seen under from the source; no scanner's is wider.
 _WIDEST = math.radians(60)
+# A fan that opens by less than this many degrees is no scanner's either.
+_NARROWEST = 0.25
 # Scans whose source, detector and axis are off a circle by less than this share of a bin are cones.
 _CIRCULAR = 0.25
 
@@ -245,6 +247,23 @@ def circular(vectors: Vectors) -> Cone | Vectors:
         return Cone.of_vectors(vectors, tolerance=_CIRCULAR)
     except InputError:
         return vectors
+
+
+def narrow_words(geometry: Geometry, bins: int) -> tuple[str, ...]:
+    """A doubt about lengths that make a detector as narrow from the source as no scanner's."""
+    if isinstance(geometry, Vectors):
+        width = float(np.median(np.linalg.norm(geometry.across, axis=1)))
+        away = float(np.median(np.linalg.norm(geometry.middle - geometry.source, axis=1)))
+    else:
+        width = geometry.pitch[1] if isinstance(geometry, Cone) else geometry.pitch
+        away = geometry.source_to_detector
+    opening = math.degrees(2 * math.atan(bins * width / 2 / away))
+    if opening >= _NARROWEST:
+        return ()
+    return (
+        f"The fan opens by {opening:.2g} degrees, hardly more than parallel rays: are distances "
+        "and pitch in one unit of length (--geometry)?",
+    )
 
 
 def beam_words(geometry: Geometry, unit: str) -> str:

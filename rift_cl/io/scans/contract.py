@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.geometry import FanBeam
 from rift_cl.io.scans.axes import words
-from rift_cl.io.scans.beam import AnyBeam, Geometry, ViewVectors
+from rift_cl.io.scans.beam import AnyBeam, Geometry, ViewVectors, narrow_words
 from rift_cl.io.scans.kind import (
     INTEGRAL,
     Sample,
@@ -115,6 +115,9 @@ def scan_of(found: Finding, request: ScanRequest) -> ScanFile:
         notes = (*found.notes, *found.beam.notes)
         pitch, unit = found.beam.bin_pitch, found.beam.unit
         found = replace(found, pitch=pitch, unit=unit, notes=notes)
+    beam = geometry or found.fan
+    if beam is not None:
+        found = replace(found, notes=(*found.notes, *narrow_words(beam, found.shape[2])))
     if not request.values:
         return _unseen(found, geometry)
     seen = sample(found.rows, found.shape, found.dtype)

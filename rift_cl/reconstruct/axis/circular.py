@@ -22,6 +22,7 @@ from rift_cl.geometry import Cone, Fan, Scan
 from rift_cl.reconstruct.axis.estimate import AxisEstimate
 from rift_cl.reconstruct.axis.fan_doubt import fan_doubt
 from rift_cl.reconstruct.axis.fan_rays import ParallelViews, parallel_views
+from rift_cl.reconstruct.axis.lying_axis import looked_at, lying_axis
 from rift_cl.reconstruct.axis.opposite_views import enough_pairs, shared_views
 from rift_cl.reconstruct.axis.search import searched_axis, searched_rows
 from rift_cl.reconstruct.axis.sense import sense_of
@@ -76,7 +77,9 @@ def axis_of_scan(
         groups = [np.array([row]) for row in searched_rows(stack.shape[1])]
         middle = (stack.shape[1] - 1) / 2
     rows = np.stack([stack[:, group].mean(axis=1) for group in groups], axis=1)
-    return axis_of_fan(rows, np.array([group.mean() for group in groups]), middle, fan, span)
+    places = np.array([group.mean() for group in groups])
+    lying = lying_axis(stack[np.ix_(*looked_at(scan))]) if isinstance(scan, Cone) else ""
+    return axis_of_fan(rows, places, middle, fan, span, lying)
 
 
 def orbit_rows(scan: Cone) -> list[NDArray[np.intp]]:
@@ -98,7 +101,12 @@ def orbit_rows(scan: Cone) -> list[NDArray[np.intp]]:
 
 
 def axis_of_fan(
-    rows: Views, places: Floats, middle: float, fan: Fan, span: tuple[float, float] | None = None
+    rows: Views,
+    places: Floats,
+    middle: float,
+    fan: Fan,
+    span: tuple[float, float] | None = None,
+    doubted: str = "",
 ) -> AxisEstimate:
     """Find the axis from some rows that are fans.
 
@@ -108,6 +116,8 @@ def axis_of_fan(
         middle: the row that the estimate is for.
         fan: the geometry; its centre is a first guess.
         span: where to search, in bins.
+        doubted: what the data are known to have against the scan already; nothing else is then
+            looked for.
 
     Raises:
         InputError: the data do not tell the axis.
@@ -121,11 +131,12 @@ def axis_of_fan(
     try:
         found, told = _either_way(rows, mean, places, middle, ways, span)
     except InputError as error:
-        doubt = fan_doubt(mean[:, 0], ways[0]) or fan_doubt(mean[:, 0], ways[1])
+        doubt = doubted or fan_doubt(mean[:, 0], ways[0]) or fan_doubt(mean[:, 0], ways[1])
         if not doubt:
             raise
         raise type(error)(f"{error}; {doubt}") from error
-    return replace(found, doubt=fan_doubt(mean[:, 0], replace(told, center=found.center)))
+    doubt = doubted or fan_doubt(mean[:, 0], replace(told, center=found.center))
+    return replace(found, doubt=doubt)
 
 
 def _either_way(

@@ -26,7 +26,8 @@ Floats = NDArray[np.float64]
 _BINS, _VIEWS, _FEWEST, _FEWEST_SHARE = 64, 120, 200, 0.04
 # Trial factors of the angles and of the distance, and how far from 1 they begin to count.
 _TURNS = np.exp(np.arange(-26, 27) * np.log(2.6) / 26)
-_DISTANCES = 1.25 ** np.arange(-14.0, 15)
+# Those that another unit of length makes are far away.
+_DISTANCES = np.append(1.25 ** np.arange(-14.0, 15), [1e-3, 1e3])
 _OTHER_TURN, _OTHER_DISTANCE = 0.05, 0.5
 # Trial centres beside the one that is given, in the bins that are compared.
 _CENTERS = (0.0, -1.0, 1.0, -2.0, 2.0)
