@@ -75,6 +75,42 @@ def test_a_single_flat_without_its_axis(tmp_path: Path) -> None:
     np.testing.assert_array_equal(rows.flats, made.counts(4, 5)[None, 2:4] + 2000)
 
 
+def test_flats_as_taken_beside_projections_the_other_way_round(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    made.data_exchange(path)
+    with h5py.File(path, "a") as file:
+        taken = file["exchange/data"][()]
+        del file["exchange/data"]
+        file["exchange/data"] = np.moveaxis(taken, 0, -1)
+    rows = open_scan(path, axes="row,bin,angle").read(1, 3)
+    np.testing.assert_array_equal(rows.projections, taken[:, 1:3])
+    assert rows.flats is not None
+    np.testing.assert_array_equal(rows.flats, made.counts(2, 4, 5)[:, 1:3] + 2000)
+
+
+def test_unsigned_counts_stored_as_signed_are_told(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    made.data_exchange(path)
+    with h5py.File(path, "a") as file:
+        for name in ("data", "data_white", "data_dark"):
+            values = (40 * file["exchange"][name][()].astype("<u4")).astype("<u2").view("<i2")
+            values[..., 2] = -30000
+            del file["exchange"][name]
+            file["exchange"][name] = values
+    with pytest.raises(InputError, match=r"far below zero.*store it as uint16"):
+        open_scan(path)
+
+
+def test_flats_without_a_beam_are_told(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    made.data_exchange(path)
+    with h5py.File(path, "a") as file:
+        file["exchange/data"][...] = 20000
+        file["exchange/data_white"][...] = file["exchange/data_dark"][:1]
+    with pytest.raises(InputError, match=r"2 times as bright as the flats.*--flats"):
+        open_scan(path)
+
+
 @pytest.mark.parametrize("group", ["entry1/tomo_entry", "entry0000", "/"])
 def test_nxtomo(tmp_path: Path, group: str) -> None:
     data = made.nxtomo(tmp_path / "a.nxs", group=group)

@@ -54,6 +54,8 @@ def find_axis(
         sinograms = (read_attenuation(scan, row, row + 1).projections[:, 0] for row in rows)
         return axis_of_rows(sinograms, rows, count, scan.angles, span)
     except InputError as error:
+        if str(error).startswith(f"{scan.path}: "):
+            raise  # of the file itself, which says so
         raise type(error)(f"{scan.path}: {error}") from error
 
 

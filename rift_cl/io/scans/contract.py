@@ -43,6 +43,8 @@ _MEAN_ROWS = 16
 # Air at the ends of counts is at least this share of the brightest; projections are at most so many
 # times as bright as flats, and flats at most so many times as bright as projections.
 _AIR_LEAST, _BRIGHTER, _DIMMER = 0.7, 2.0, 20.0
+# Counts below zero by this share of the brightest are no noise about the darks.
+_BELOW = 0.25
 # Ends of line integrals that are worth a word, as a share of their range.
 _OFF = 0.02
 # Bins differ from their neighbours by at most this share where the beam is taken from the ends.
@@ -126,6 +128,8 @@ def scan_of(found: Finding, request: ScanRequest) -> ScanFile:
         substitute = substitute or MEAN
     if request.flats is None and _has_white(found, request, seen):
         substitute = _WHITE
+    if found.flats or substitute is not None or request.kind == "counts":
+        _check_signs(found, request, seen)
     kind, notes = _kind(found, request, seen, substitute)
     rows: RowSource = found.rows
     flats, darks = found.flats, found.darks
@@ -228,6 +232,18 @@ def _kind(
     return found.kind or _by_values(found, seen), _passed_over(found, "")
 
 
+def _check_signs(found: Finding, request: ScanRequest, seen: Sample) -> None:
+    """Refuse what may be counts and lies so far below zero that its type must be wrong."""
+    if request.kind in ("transmission", "attenuation") or found.dtype.kind != "i":
+        return
+    if seen.low < -_BELOW * max(seen.high, 0):
+        raise InputError(
+            f"{found.path}: {found.name} ({seen}) holds counts far below zero, as unsigned numbers "
+            f"do that were stored as signed ones: store it as u{found.dtype.name}, or say what "
+            "else the values are with kind= (--kind transmission or attenuation)"
+        )
+
+
 def _passed_over(found: Finding, kind: str) -> tuple[str, ...]:
     if kind and found.flats:
         return (f"The flats are not used: the values are said to be {kind}.",)
@@ -292,10 +308,9 @@ def _no_counts_of(found: Finding, seen: Sample) -> str | None:
     """Why flats cannot be those of the projections, or None."""
     bright = _level(found, "flats")
     dark = _level(found, "darks") if found.darks else 0.0
-    beam = bright - dark
-    if not beam > 0:
-        # Told when rows are corrected, in a sentence that names the row.
-        return None
+    # Where neither flats nor projections are brighter than darks, a sentence that names the row is
+    # told when rows are corrected.
+    beam = max(bright - dark, 0.0)
     if not seen.whole and seen.high <= min(beam / _DIMMER, INTEGRAL):
         return (
             f"{found.name} ({seen}) is far below the flats' {bright:.4g}, as data are that were "

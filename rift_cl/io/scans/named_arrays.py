@@ -28,6 +28,8 @@ from rift_cl.io.scans.scan_file import RowSource, ScanFile, ScanRequest
 
 _THETA = ("theta", "thetas", "angle", "angles", "rotation_angle", "rotation_angles", "anglesrad")
 _KEY = ("image_key",)
+# Axes of frames as detectors give them.
+_FRAME_BY_FRAME = "nrb"
 # Keys of frames in NXtomo; everything else is no part of a scan.
 PROJECTION, FLAT, DARK = 0, 1, 2
 
@@ -224,16 +226,19 @@ def _calibration(
 ) -> FrameStack | None:
     """Flats or darks: frames like the projections, or one without the axis of frames.
 
+    Beside projections whose axes were put in another order, flats often stand frame by frame.
     What was found beside the projections, and named by nobody, is passed over if it does not fit.
     """
     if name is None:
         return None
-    shape, axes = store.shape(name), frames.axes
-    if len(shape) < len(axes):
-        axes = axes.replace("n", "")
-    stack = FrameStack(name, shape, axes, ())
-    if len(shape) == len(axes) and all(stack.size(axis) == frames.size(axis) for axis in "rb"):
-        return replace(stack, runs=((0, stack.size("n")),))
+    shape = store.shape(name)
+    for order in (frames.axes, _FRAME_BY_FRAME):
+        axes = order.replace("n", "") if len(shape) < len(order) else order
+        if len(shape) != len(axes):
+            continue
+        stack = FrameStack(name, shape, axes, ())
+        if all(stack.size(axis) == frames.size(axis) for axis in "rb"):
+            return replace(stack, runs=((0, stack.size("n")),))
     if name in beside:
         return None
     raise ShapeError(
