@@ -134,5 +134,6 @@ def _integrals_but_flats(scan: ScanFile, views: list[int], rows: list[int]) -> N
     values = scan.rows.look("projections", views, rows)
     if scan.kind == "attenuation":
         return values
-    least = _LEAST_LIGHT * float(np.median(values))
-    return -np.log(np.maximum(values, max(least, np.finfo(np.float32).tiny)))
+    least = max(_LEAST_LIGHT * float(np.median(values)), float(np.finfo(np.float32).tiny))
+    integrals: NDArray[np.float32] = -np.log(np.maximum(values, np.float32(least)))
+    return integrals
