@@ -34,9 +34,16 @@
 #define RUN LANES
 #endif
 
+/* Halves of doubles: PoCL's compiler dies ("Cannot emit physreg copy instruction") of eight at once. */
+#if DOUBLE && LANES == 8
+#define ARC_TANGENT(v) ((lanes)(atan((v).lo), atan((v).hi)))
+#else
+#define ARC_TANGENT(v) atan(v)
+#endif
+
 static lanes seen(__global const real *f, lanes a, real b) {
   const lanes fraction = ((f[0] + f[2] * b) + f[1] * a) / ((f[3] + f[5] * b) + f[4] * a);
-  return ARC ? f[7] * atan(fraction) : fraction;
+  return ARC ? f[7] * ARC_TANGENT(fraction) : fraction;
 }
 
 /* Height of a footprint in the entry that stands `ahead` of where it begins. */

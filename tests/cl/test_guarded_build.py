@@ -50,6 +50,12 @@ def test_compiler_that_dies_is_asked_in_another_way(worker):
     assert built == Built(b"binary", "noinline", "its compiler died (SIGSEGV)", "")
 
 
+def test_child_meets_nothing_that_a_dead_one_left_in_its_drivers_cache(worker):
+    leaves = "open(os.environ['POCL_CACHE_DIR'] + '/left', 'x')"
+    built = guarded_build(REQUEST, worker(f"{leaves}; 'noinline' in request['source'] or {DIES}"))
+    assert built.way == "noinline"
+
+
 @pytest.mark.parametrize("way", ["noinline", "nothing"])
 @pytest.mark.parametrize(
     ("fate", "fault"),

@@ -15,6 +15,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Sequence
@@ -152,6 +153,7 @@ class Worker:
         self._command = command or [sys.executable, "-m", "rift_cl.cl.build.worker"]
         self.limit = limit
         self._process: subprocess.Popen[bytes] | None = None
+        self._scratch: tempfile.TemporaryDirectory[str] | None = None
         self._asking = threading.Lock()
 
     def ask(
@@ -196,14 +198,17 @@ class Worker:
             root = str(Path(__file__).parents[3])
             path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
             try:
+                # What PoCL leaves in its cache as it dies, it would load without any kernel in it.
+                self._scratch = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
                 self._process = subprocess.Popen(
                     self._command,
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     stderr=subprocess.DEVNULL,
-                    env={**os.environ, "PYTHONPATH": path},
+                    env={**os.environ, "PYTHONPATH": path, "POCL_CACHE_DIR": self._scratch.name},
                 )
             except OSError as error:
+                self._clean()
                 raise DeviceError(
                     f"the process that compiles kernels cannot be started ({error}): it is Python "
                     "itself, and wants memory and the right to start processes"
@@ -223,7 +228,13 @@ class Worker:
                 # What was not sent to a dead child is of no use.
                 with contextlib.suppress(OSError):
                     pipe.close()
+        self._clean()
         return status
+
+    def _clean(self) -> None:
+        if self._scratch is not None:
+            self._scratch.cleanup()
+            self._scratch = None
 
 
 def _talk(
