@@ -14,6 +14,8 @@ from rift_cl.geometry.leaning import leaning
 from rift_cl.reconstruct import FDK
 from rift_cl.reconstruct.direct.filtered_backprojection import unfiltered_backprojection
 
+pytestmark = pytest.mark.variants
+
 # Off the middle, no whole number of lanes, and looked at along both axes.
 GRID = Grid((22, 18, 20), (1.3, 0.8, 1.1), (1, 2, -1))
 ANGLES = np.arange(40) * 2 * np.pi / 40
