@@ -41,7 +41,7 @@ def _few_angles(group):
     ("change", "words"),
     [
         (_nan, ("broken.h5", "view 4, row 2, bin 7")),
-        (_no_flats, ("broken.h5", "no brighter than darks anywhere in row 1")),
+        (_no_flats, ("broken.h5", "no brighter than the darks", "--flats")),
         (_few_angles, ("149", "150")),
     ],
 )

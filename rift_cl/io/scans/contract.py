@@ -308,9 +308,11 @@ def _no_counts_of(found: Finding, seen: Sample) -> str | None:
     """Why flats cannot be those of the projections, or None."""
     bright = _level(found, "flats")
     dark = _level(found, "darks") if found.darks else 0.0
-    # Where neither flats nor projections are brighter than darks, a sentence that names the row is
-    # told when rows are corrected.
-    beam = max(bright - dark, 0.0)
+    beam = bright - dark
+    if not beam > 0:
+        # Where projections are no brighter either, rows say so when they are corrected.
+        dim = f"the flats, {bright:.4g}, are no brighter than the darks, {dark:.4g}"
+        return dim if seen.high > dark else None
     if not seen.whole and seen.high <= min(beam / _DIMMER, INTEGRAL):
         return (
             f"{found.name} ({seen}) is far below the flats' {bright:.4g}, as data are that were "
