@@ -98,8 +98,9 @@ def test_the_adjoint_is_exact_and_bits_repeat(device):
 
 
 @pytest.mark.full
-def test_doubles(device):
-    grid, scan = SCANS["all at once"]
+@pytest.mark.parametrize("name", ["all at once", "curved"])
+def test_doubles(device, name):
+    grid, scan = SCANS[name]
     A, twin = Projector(grid, scan, device=device, dtype="float64"), ConeProjector(grid, scan)
     x = np.random.default_rng(3).standard_normal(A.domain)
     assert relative(A(x), twin.project(x)) <= 1e-13

@@ -18,7 +18,7 @@ from functools import cache
 from typing import IO, Any
 
 from rift_cl.cl.build.first_launch import repeat_launch
-from rift_cl.cl.failures import driver_errors, is_out_of_memory
+from rift_cl.cl.failures import is_out_of_memory
 from rift_cl.json_parsing import parse_json
 
 LENGTH = struct.Struct(">I")
@@ -75,7 +75,7 @@ def _answer(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
         kernel = cl.Kernel(program, request["kernel"])
         for launch in request["launches"]:
             repeat_launch(kernel, context, launch)
-    except (*driver_errors(), LookupError, TypeError, ValueError) as error:
+    except (cl.Error, MemoryError, LookupError, TypeError, ValueError) as error:
         return {"error": str(error), "short of memory": is_out_of_memory(error)}, b""
     return {}, binary
 
