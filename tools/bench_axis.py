@@ -1,6 +1,7 @@
 """How well the rotation axis is found: sixty sinograms with a known axis, and the time it takes.
 
     python tools/bench_axis.py
+    python tools/bench_axis.py --rows 5
     python tools/bench_axis.py --peers --sizes 256 --cases 24
     python tools/bench_axis.py --limit
     python tools/bench_axis.py --fan 10 --sizes 256 --hard
@@ -55,6 +56,8 @@ class Options:
     """Number of sinograms."""
     sizes: tuple[int, ...] = (256, 512, 1024)
     """Bins of the detector."""
+    rows: int = 1
+    """Rows of each case, each with another object of its kind; of parallel beams."""
     seed: int = _SEED
     """Seed of objects, offsets and noise."""
     peers: bool = False
@@ -103,6 +106,17 @@ def ours(case: AxisCase, sinogram: Any) -> Outcome:
         return Outcome(None, seconds=time.process_time() - begun)
     half = (found.interval[1] - found.interval[0]) / 2
     return Outcome(found.center - case.center, half, time.process_time() - begun)
+
+
+def scanned(case: AxisCase, rows: int) -> Any:
+    """The sinogram of a case; of more rows than one a stack, (angle, row, bin), of several objects.
+
+    The first row is that of the case itself.
+    """
+    if rows == 1:
+        return case.sinogram()
+    several = [replace(case, seed=case.seed + row).sinogram() for row in range(rows)]
+    return np.stack(several, axis=1)
 
 
 def of_fan(case: AxisCase, half_angle: float) -> Outcome:
@@ -205,7 +219,7 @@ def main(options: Options) -> None:
         if options.fan:
             mine.append(of_fan(case, options.fan))
         else:
-            sinogram = case.sinogram()
+            sinogram = scanned(case, options.rows)
             mine.append(ours(case, sinogram))
         line = (
             f"{case.bins:5d} {case.turn:4d} {case.kind:8s} noise {case.noise:.0%} "

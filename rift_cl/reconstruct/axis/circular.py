@@ -32,9 +32,6 @@ Floats = NDArray[np.float64]
 
 # Most groups of a cone's rows, and by how many rows opposite rays may part at the object's edge.
 _GROUPS, _PARTED = 5, 2.0
-# The widest half interval that is still an answer, in bins: rays read by wrong angles or lengths
-# may agree on an axis as vaguely as noisy ones.
-_WIDEST = 0.5
 # Parts of views are compared if they make pairs so many times as many.
 _MORE = 1.5
 # Most readings, and the change of the centre that ends them, in bins.
@@ -175,7 +172,7 @@ def _settled(
         sinograms = (views[:, row] for row in range(views.shape[1]))
         # Rows counted from the one that the estimate is for.
         offsets = list(places - middle)
-        told = searched_axis(sinograms, offsets, 1, read.directions, within, _WIDEST, seen)
+        told = searched_axis(sinograms, offsets, 1, read.directions, within, seen)
         found = _on_detector(told, bins, middle)
         change = found.center - fan.center
         fan = replace(fan, center=found.center)

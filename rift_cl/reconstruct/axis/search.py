@@ -31,8 +31,10 @@ _ROWS = 5
 _HALF_INTERVAL = 2.3
 # The least standard error: views are sums over bins, and detectors are not perfect.
 _FINEST = 0.01
-# The widest half interval that is still an answer, in bins, and that of a single row.
-_WIDEST, _WIDEST_ROW = 0.75, 2.0
+# The widest half interval that is still an answer, in bins, and that of a single row: an axis that
+# is off by more than half a bin doubles edges, and of fans and cones rays read by wrong angles or
+# lengths can agree on an axis to no better than that.
+_WIDEST, _WIDEST_ROW = 0.5, 2.0
 # A rival's share of the best log-likelihood from which on neither is believed; the least of the
 # best, and the least share of it of what it were if all frequencies agreed.
 _RIVAL, _SCORE, _COHERENCE = 0.75, 25.0, 0.5
@@ -93,13 +95,11 @@ def searched_axis(
     count: int,
     angles: Floats,
     span: tuple[float, float] | None = None,
-    widest: float = _WIDEST,
     seen: Floats | None = None,
 ) -> AxisEstimate:
     """The axis of ``axis_of_rows``, the angles taken as they are.
 
-    ``widest`` is the half interval, in bins, from which on no answer is given; ``seen`` is as for
-    ``chosen_measure``.
+    ``seen`` is as for ``chosen_measure``.
     """
     measure = chosen_measure(angles, span, seen)
     places, found, why = [], [], ""
@@ -118,7 +118,7 @@ def searched_axis(
             found.append(told)
     if 2 * len(found) <= len(rows):
         raise _refusal(why)
-    return _line(np.array(places, float), found, (count - 1) / 2, widest)
+    return _line(np.array(places, float), found, (count - 1) / 2)
 
 
 def _check_searchable(views: Views, span: tuple[float, float] | None) -> None:
@@ -162,7 +162,7 @@ def _refusal(why: str) -> InputError:
     return InputError(f"the rotation axis cannot be found: {why}{GIVE_IT}")
 
 
-def _line(places: Floats, found: list[RowAxis], middle: float, widest: float) -> AxisEstimate:
+def _line(places: Floats, found: list[RowAxis], middle: float) -> AxisEstimate:
     """The axis through the rows' centres.
 
     Raises:
@@ -183,7 +183,7 @@ def _line(places: Floats, found: list[RowAxis], middle: float, widest: float) ->
     # Rows share what the axis moved by, so that no number of them averages it out.
     drift = np.median([row.drift for row, counts in zip(found, kept, strict=True) if counts])
     half = _HALF_INTERVAL * float(np.hypot(error, drift))
-    if not half <= widest:
+    if not half <= _WIDEST:
         raise _refusal(_too_wide(half))
     used = [row for row, counts in zip(found, kept, strict=True) if counts]
     said = [part for row in used for part in (row.evidence, row.mass) if part is not None]
