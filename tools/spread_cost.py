@@ -21,8 +21,8 @@ import tempfile
 import time
 from pathlib import Path
 
-import h5py
 import numpy as np
+import zarr
 
 import rift_cl as rift
 from rift_cl.cluster.workers import Task, cluster_workers
@@ -35,16 +35,18 @@ _NAP = 0.002
 
 
 def save_scan(path: Path, slices: int, bins: int, views: int) -> None:
-    """A phantom in the layout of Data Exchange, row by row in chunks that a worker reads whole."""
+    """A phantom as a store of Zarr, row by row in chunks that a worker reads whole."""
     angles = np.arange(views) * np.pi / views
     row = rift.phantom.shepp_logan_sinogram(
         rift.Grid((bins, bins)), rift.Parallel(angles, bins)
     ).astype(np.float32)
-    with h5py.File(path, "w") as file:
-        data = file.create_dataset("data", (views, slices, bins), "f4", chunks=(views, 1, bins))
-        file["angles"] = angles
-        for number in range(slices):
-            data[:, number] = row * (1 + number / slices)
+    zarr.open_group(str(path), mode="w")
+    given = {"shape": (views, slices, bins), "chunks": (views, 1, bins), "dtype": "f4"}
+    data = zarr.open_array(str(path / "data"), mode="w", **given)
+    for number in range(slices):
+        data[:, number] = row * (1 + number / slices)
+    given = {"shape": angles.shape, "chunks": angles.shape, "dtype": "f8"}
+    zarr.open_array(str(path / "angles"), mode="w", **given)[:] = angles
 
 
 def command(scan: Path, out: Path, bins: int, *options: str) -> list[str]:
@@ -77,7 +79,7 @@ def timed(commands: list[list[str]]) -> tuple[float, float]:
 
 def compare(folder: Path, slices: int, bins: int, views: int, workers: int, runs: int) -> None:
     """Print the cost of a cluster."""
-    scan = folder / "scan.h5"
+    scan = folder / "scan.zarr"
     save_scan(scan, slices, bins, views)
     edges = np.linspace(0, slices, workers + 1).astype(int)
     apart = [

@@ -266,3 +266,20 @@ def test_cache_follows_the_users_cache_folder(python, tmp_path):
     assert Path(done.stdout.strip()) == tmp_path / "xdg" / "rift_cl" / __version__
     done = python(code, RIFT_CACHE_DIR=None, XDG_CACHE_HOME=None, HOME=str(tmp_path))
     assert Path(done.stdout.strip()) == tmp_path / ".cache" / "rift_cl" / __version__
+
+
+def test_a_full_disk_is_told_before_a_compiler_meets_it(tmp_path, monkeypatch):
+    """PoCL ends the process where it cannot write what it compiled."""
+    assert kernel_cache._private(tmp_path) is not None
+    kernel_cache.cache_folder()
+    limits = (4096, kernel_cache.resource.RLIM_INFINITY)
+    monkeypatch.setattr(kernel_cache.resource, "getrlimit", lambda _: limits)
+    assert kernel_cache._private(tmp_path) is None
+    with (
+        pytest.raises(DeviceError, match=r"4 KiB are left .*RIFT_CACHE_DIR"),
+        kernel_cache.build_lock("axpby"),
+    ):
+        pass
+    # Looking after the cache takes no room.
+    with kernel_cache.build_lock():
+        pass

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import IO
 
 from rift_cl import __version__
+from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.build.cache_check import own_file, record, remove_damaged
 from rift_cl.errors import DeviceError
 
@@ -27,9 +28,15 @@ try:
     import fcntl
 except ImportError:  # Windows: no PoCL wheel there, so no cache to guard
     fcntl = None  # type: ignore[assignment]
+try:
+    import resource
+except ImportError:
+    resource = None  # type: ignore[assignment]
 
 _LOCK, _TURN = "build.lock", "turn.lock"
 _LOCK_SUFFIX = ".lock"
+# Bytes that a build is given: PoCL ends the process where its compiler cannot write.
+_LEAST_ROOM = 16 << 20
 
 
 def prepare_cache() -> None:
@@ -52,8 +59,9 @@ def cache_folder() -> Path:
     if folder is None:
         folder = _temporary()
         warnings.warn(
-            f"kernel cache in {_root()} cannot be used; compiled kernels go to {folder}, where the "
-            "next run will not find them: set RIFT_CACHE_DIR to a folder that you own",
+            f"kernel cache in {_root()} cannot be used, or its disk is full; compiled kernels go "
+            f"to {folder}, where the next run will not find them: set RIFT_CACHE_DIR to a folder "
+            "that you own",
             stacklevel=2,
         )
         # Child processes go to the same place, so that its lock holds for them too.
@@ -80,9 +88,18 @@ def _private(root: Path) -> Path | None:
             return None
         folder.chmod(0o700)
         with tempfile.TemporaryFile(dir=folder):
-            return folder
+            return folder if _room(folder) >= _LEAST_ROOM else None
     except OSError:
         return None
+
+
+def _room(folder: Path) -> float:
+    """Bytes that a file in a folder may take: what the disk has left, or ``ulimit -f`` allows."""
+    left = float(shutil.disk_usage(folder).free)
+    if resource is not None:
+        limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
+        left = left if limit == resource.RLIM_INFINITY else min(left, limit)
+    return left
 
 
 def _temporary() -> Path:
@@ -92,7 +109,8 @@ def _temporary() -> Path:
             return folder
     raise DeviceError(
         f"compiled kernels can be kept neither in {_root()} nor in a temporary folder: set "
-        "RIFT_CACHE_DIR to a folder that you own and can write to"
+        "RIFT_CACHE_DIR to a folder that you own and can write to, on a disk with "
+        f"{format_bytes(_LEAST_ROOM)} left"
     )
 
 
@@ -106,7 +124,7 @@ def build_lock(kernel: str = "", *, write_down: bool = True) -> Iterator[None]:
             where the next to hold it does.
 
     Raises:
-        DeviceError: the cache folder cannot be used any more.
+        DeviceError: the cache folder cannot be used any more, or has no room for a kernel.
     """
     folder = cache_folder()
     with contextlib.ExitStack() as held:
@@ -120,11 +138,18 @@ def build_lock(kernel: str = "", *, write_down: bool = True) -> Iterator[None]:
             if kernel:
                 own = own_file(folder / f"{kernel}{_LOCK_SUFFIX}")
                 _lock(held.enter_context(own.open("w")))
+            room = _room(folder)
         except OSError as error:
             raise DeviceError(
                 f"kernel cache {folder} cannot be used any more ({error.strerror}): make it "
                 "writable, or set RIFT_CACHE_DIR to a folder that you own"
             ) from error
+        if kernel and room < _LEAST_ROOM:
+            raise DeviceError(
+                f"kernel cache {folder}: {format_bytes(int(room))} are left for compiled kernels, "
+                f"wanted {format_bytes(_LEAST_ROOM)}: free some space on that disk, or set "
+                "RIFT_CACHE_DIR to a folder on another"
+            )
         yield
         if not write_down:
             return
