@@ -3,9 +3,11 @@
     python tools/bench_kernels.py --json bench.json
     python tools/bench_kernels.py --peers --json b.json --markdown docs/benchmarks/performance.md
     python tools/bench_kernels.py --json bench.json --keep docs/benchmarks
+    python tools/bench_kernels.py --only "beams from a point" --json b.json --markdown PAGE
 
 Limits, kernels and whole operations are measured in one process on one device. A kernel that is
-shipped and not measured makes the run fail, so that none is forgotten.
+shipped and not measured makes the run fail, so that none is forgotten. With --only a group is
+measured alone, and its table takes the place of the former one on a page that was printed before.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,8 +35,9 @@ from bench.race import compared
 from bench.rasterizers import RASTERIZERS
 from bench.splats import SplatCase
 from bench.surroundings import surroundings
-from bench.tables import markdown, tables
+from bench.tables import markdown, renewed, tables
 from rift_cl.cl.build.source import kernel_names
+from rift_cl.errors import InputError
 
 _SIZES = ("256x384", "512x768", "2048x1500")
 _QUICK_SIZES = ("256x384",)
@@ -58,6 +62,8 @@ class Options:
             compares with others.
         peers: also run ASTRA, silx, gratopy, scikit-image and a rasterizer in torch, as far as
             they are installed.
+        only: name of the one group to measure, as its table has it after "Kernels, "; on the page
+            of --markdown, which is there already, that table alone is replaced.
         quick: one size and few repeats.
         device: which OpenCL device, as RIFT_DEVICE selects it.
         sizes: PIXELSxVIEWS, any number of them.
@@ -72,6 +78,7 @@ class Options:
     markdown: Path | None = None
     keep: Path | None = None
     peers: bool = False
+    only: str | None = None
     quick: bool = False
     device: str | None = None
     sizes: tuple[str, ...] = ()
@@ -111,22 +118,38 @@ def measure_all(options: Options) -> Iterator[dict[str, Any]]:
     device = rift.open_device(options.device)
     meter, skipped = LimitMeter(device), dict[str, str]()
     driven = [name for name in kernel_names() if _drives(name, device)]
+    if options.only is not None:
+        grouped = _measure_groups(meter, options)
+        yield _record(meter, options, driven, skipped, [], grouped, [])
+        return
     drawn, grouped = _draw(meter, options), _measure_groups(meter, options)
     measured: list[Measured] = []
     for case in cases:
         measured += _measure(meter, case, options, skipped)
         done = [split for found in (*measured, *drawn, *grouped) for split in found.splits]
         check_measured(driven, {name for split in done for name in split.kernels})
-        yield {
-            **surroundings(device),
-            "seed": options.seed,
-            "limits": {**asdict(meter.best()), "raw": [asdict(each) for each in meter.measured]},
-            "formulas": {name: KNOWN[name].formula for name in driven},
-            "skipped": skipped,
-            "cases": [found.finished(meter.best()) for found in measured],
-            "groups": [found.finished(meter.best()) for found in grouped],
-            "splats": [found.finished(meter.best()) for found in drawn],
-        }
+        yield _record(meter, options, driven, skipped, measured, grouped, drawn)
+
+
+def _record(
+    meter: LimitMeter,
+    options: Options,
+    driven: Sequence[str],
+    skipped: dict[str, str],
+    measured: Sequence[Measured],
+    grouped: Sequence[Measured],
+    drawn: Sequence[Measured],
+) -> dict[str, Any]:
+    return {
+        **surroundings(meter.device),
+        "seed": options.seed,
+        "limits": {**asdict(meter.best()), "raw": [asdict(each) for each in meter.measured]},
+        "formulas": {name: KNOWN[name].formula for name in driven},
+        "skipped": skipped,
+        "cases": [found.finished(meter.best()) for found in measured],
+        "groups": [found.finished(meter.best()) for found in grouped],
+        "splats": [found.finished(meter.best()) for found in drawn],
+    }
 
 
 def _drives(kernel: str, device: rift.Device) -> bool:
@@ -151,7 +174,12 @@ def _draw(meter: LimitMeter, options: Options) -> list[Measured]:
 def _measure_groups(meter: LimitMeter, options: Options) -> list[Measured]:
     case = Case.parse(options.groups or (_QUICK_GROUPS_AT if options.quick else _GROUPS_AT))
     rounds, found = options.rounds or (2 if options.quick else 5), []
-    for group in groups(meter.device, case):
+    every = groups(meter.device, case)
+    chosen = [group for group in every if options.only in (None, group.name)]
+    if not chosen:
+        names = "; ".join(group.name for group in every)
+        raise InputError(f"--only is {options.only!r}, wanted one of: {names}")
+    for group in chosen:
         say(group.name)
         kernel_splits = splits(meter, group.tasks(), repeats=rounds)
         sizes = {split.task.operation: split.task.case.record() for split in kernel_splits}
@@ -213,13 +241,16 @@ def _dot_test(device: rift.Device, case: Case, seed: int) -> float:
 def main() -> int:
     """Run with the command line's arguments; the exit status."""
     options = tyro.cli(Options)
+    page = markdown
+    if options.only is not None and options.markdown is not None:
+        page = partial(renewed, options.markdown.read_text(encoding="utf-8"))
     return report(
         "bench_kernels",
         measure_all(options),
         keep_in=options.keep,
         json_file=options.json,
         markdown_file=options.markdown,
-        page=markdown,
+        page=page,
         tables=tables,
     )
 

@@ -154,6 +154,18 @@ def test_unknown_kernel_stops_the_run(tool, monkeypatch, tmp_path, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_one_group_takes_its_place_on_a_page(bench, tool):
+    record, page, _ = bench
+    tables = tool("bench.tables")
+    (group,) = [group for group in record["groups"] if group["name"] == "coverage"]
+    now = tables.renewed(page, {**record, "groups": [group]})
+    assert now.count("Measured apart, ") == 1
+    kept = [line for line in now.splitlines() if not line.startswith("Measured apart")]
+    assert [line for line in kept if line] == [line for line in page.splitlines() if line]
+    with pytest.raises(InputError, match="no table 'Kernels, another'"):
+        tables.renewed(page, {**record, "groups": [{**group, "name": "another"}]})
+
+
 @pytest.mark.parametrize("slices", [1, 3])
 def test_inputs_may_be_written_to(tool, slices):
     # scikit-image refuses read-only images, and would be reported as a peer that failed.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from bench.table import (
@@ -13,6 +14,7 @@ from bench.table import (
     percent,
     times,
 )
+from rift_cl.errors import InputError
 
 _LEGEND = (
     "Gup/s: 10⁹ pixels times views per second. PSNR (peak 1) and SSIM of the reconstruction from "
@@ -67,6 +69,25 @@ def markdown(record: dict[str, Any]) -> str:
         "`tools/compare_benchmarks.py` lists the kernels that became slower.",
     ]
     return "\n".join([*lines, *markdown_lines(tables(record))]) + "\n"
+
+
+def renewed(page: str, record: dict[str, Any]) -> str:
+    """A page on which the tables of a record's groups take the place of former ones.
+
+    Raises:
+        InputError: the page has no such table.
+    """
+    limit = record["limits"]["multiply_add"] / 1e9
+    when = f"Measured apart, {record['date']}, beside multiply-adds at {limit:.1f} GFLOP/s."
+    for group in record["groups"]:
+        table = _kernels(group)
+        before, head, after = page.partition(f"\n## {table.title}\n")
+        if not head:
+            raise InputError(f"the page has no table {table.title!r} that could be replaced")
+        _, next_head, rest = after.partition("\n## ")
+        lines = markdown_lines([replace(table, notes=(*table.notes, when))])
+        page = before + "\n".join(lines) + "\n" + next_head + rest
+    return page
 
 
 def _limits(record: dict[str, Any]) -> Table:
