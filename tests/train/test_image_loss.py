@@ -13,7 +13,7 @@ from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
 from rift_cl.reference import image_loss as twin
 from rift_cl.train.loss.image_loss import ImageLoss
 
-pytestmark = pytest.mark.dealt
+pytestmark = [pytest.mark.dealt, pytest.mark.variants]
 
 IMAGE_LOSS = importlib.import_module("rift_cl.train.loss.image_loss")
 
