@@ -14,7 +14,7 @@ from rift_cl.operators.fourier import row_transform
 from rift_cl.operators.fourier.row_transform import RowTransform, transform_length
 from rift_cl.reference import filter_rows, ramp_taps
 
-pytestmark = pytest.mark.dealt
+pytestmark = [pytest.mark.dealt, pytest.mark.variants]
 
 PITCH = 0.7
 RANDOM = np.random.default_rng(12)

@@ -9,7 +9,7 @@ from rift_cl.errors import NonFiniteError, ShapeError
 from rift_cl.operators.fourier.spectrum import SpectralFilter, padded_length
 from rift_cl.reference.spectrum import spectrally_filtered
 
-pytestmark = pytest.mark.dealt
+pytestmark = [pytest.mark.dealt, pytest.mark.variants]
 
 SIZES = [(1, 1), (3, 40), (33, 20), (60, 64), (140, 23)]
 

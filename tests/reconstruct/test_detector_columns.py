@@ -6,7 +6,7 @@ import pytest
 from rift_cl.reconstruct.preprocess.columns import DetectorColumns
 from rift_cl.reference import detector_columns as twin
 
-pytestmark = pytest.mark.dealt
+pytestmark = [pytest.mark.dealt, pytest.mark.variants]
 
 # (view, row, bin): the fewest views; no multiple of any vector, strip or group; a longer column.
 SHAPES = [(16, 1, 16), (37, 3, 75), (64, 2, 128), (517, 2, 33)]

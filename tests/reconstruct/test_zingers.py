@@ -7,7 +7,7 @@ from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.reconstruct.preprocess import remove_zingers
 from rift_cl.reference import zingers as twin
 
-pytestmark = pytest.mark.dealt
+pytestmark = [pytest.mark.dealt, pytest.mark.variants]
 
 SHAPE = (90, 12, 160)
 

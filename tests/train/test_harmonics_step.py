@@ -15,7 +15,7 @@ from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.parameters import Parameters
 
-pytestmark = pytest.mark.dealt
+pytestmark = [pytest.mark.dealt, pytest.mark.variants]
 
 SIZE = (24, 40)
 K = np.array([[30, 0, 20], [0, 30, 12], [0, 0, 1]], np.float32)
