@@ -182,6 +182,13 @@ def test_what_our_own_file_may_not_say(
         open_scan(path, kind="counts", flats="mean")
 
 
+def test_a_pixel_without_size(tmp_path: Path) -> None:
+    path = made.nikon(tmp_path)
+    path.write_text(path.read_text().replace("SizeX=0.2", "SizeX=0"))
+    with pytest.raises(FileFormatError, match="a pixel of 0 is no size"):
+        open_scan(path)
+
+
 def test_a_named_geometry_says_all_but_the_pitch(tmp_path: Path) -> None:
     path = made.described(tmp_path, "geometry: rtk.xml\npitch: [0.25, 0.2]\nwhite: 60000")
     (tmp_path / "rtk.xml").write_text("")

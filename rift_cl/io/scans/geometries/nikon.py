@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.scans.angle_list import AngleList
 from rift_cl.io.scans.beam import Beam, Floats
@@ -36,6 +37,8 @@ def read_nikon(path: Path) -> Beam:
     file = IniFile.read(path)
     rows, bins = file.whole("DetectorPixelsY"), file.whole("DetectorPixelsX")
     pitch = (file.number("DetectorPixelSizeY"), file.number("DetectorPixelSizeX"))
+    if not min(pitch) > 0:
+        raise FileFormatError(f"{path}: a pixel of {min(pitch):g} is no size")
     to_axis, to_detector = file.number("SrcToObject"), file.number("SrcToDetector")
     offset, lean = _axis(file, rows * pitch[0], to_detector / max(to_axis, 1e-30))
     offset += file.number("DetectorOffsetX", 0.0)
