@@ -70,6 +70,16 @@ def test_damaged_exif_costs_no_pixels(photograph: Path, damage: bytes) -> None:
     np.testing.assert_array_equal(pixels, read_image(photograph))
 
 
+@pytest.mark.parametrize("name", [b"hvc1", b"Exif\0\0\0\0\x1airef"])
+def test_an_item_whose_type_is_no_text_is_named(photograph: Path, name: bytes) -> None:
+    """pi-heif 1.4.0 ends the process for the second."""
+    pytest.importorskip("pi_heif")
+    photograph.write_bytes(HEIC.replace(name, name.replace(name[2:4], b"\xff\x7f")))
+    for read in (read_image, read_picture_header):
+        with pytest.raises(FileFormatError, match=r"IMG_0001\.HEIC: an item's type"):
+            read(photograph)
+
+
 def test_without_the_library_one_sentence_says_what_to_install(
     photograph: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,7 +7,9 @@ and columns are upright already; what EXIF says besides about the orientation do
 
 from __future__ import annotations
 
+import struct
 import warnings
+from collections.abc import Iterator
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -22,6 +24,12 @@ from rift_cl.errors import FileFormatError, InputError
 BRANDS = (b"heic", b"heix", b"heim", b"heis", b"mif1")
 # EXIF's numbers of the maker, the model, its own folder of facts, and the focal lengths in there.
 _MAKE, _MODEL, _EXIF, _FOCALS = 271, 272, 0x8769, (0x920A, 0xA405)
+# Bytes of boxes that are looked at; a phone's take a few thousand.
+_MOST_BOXES = 16 << 20
+# Bytes before the boxes in these boxes, by the version of those that have several.
+_BEFORE_IN_META, _BEFORE_IN_IINF = 4, (6, 8)
+# Bytes before an item's type, by the version of the box that describes it.
+_BEFORE_TYPE = {2: 8, 3: 10}
 
 
 def check_heic(path: Path) -> None:
@@ -42,9 +50,10 @@ def opened_heic(path: Path) -> Any:
 
     Raises:
         InputError: pi-heif is not installed.
-        FileFormatError: it is neither grey nor RGB.
+        FileFormatError: it is neither grey nor RGB, or its items have types that are no text.
     """
     check_heic(path)
+    _check_types(path)
     from pi_heif import open_heif
 
     picture = open_heif(path)
@@ -71,3 +80,40 @@ def heic_codes(picture: Any) -> NDArray[np.uint8]:
     """Decode a picture: (y, x, channel), alpha straight."""
     codes = np.asarray(picture)
     return codes if codes.ndim == 3 else codes[..., np.newaxis]
+
+
+def _check_types(path: Path) -> None:
+    """Make sure that types and names of a file's items are text: pi-heif 1.4.0 dies of others.
+
+    Whatever else is wrong with the boxes (ISO 14496-12, 8.11) is libheif's to tell.
+
+    Raises:
+        FileFormatError: they are not.
+    """
+    with path.open("rb") as file:
+        content = memoryview(file.read(_MOST_BOXES))
+    metas = (box[_BEFORE_IN_META:] for kind, box in _boxes(content) if kind == b"meta")
+    lists = (box for meta in metas for kind, box in _boxes(meta) if kind == b"iinf")
+    for items in lists:
+        for kind, item in _boxes(items[_BEFORE_IN_IINF[bool(items[0])] :]):
+            if kind != b"infe" or item[0] not in _BEFORE_TYPE:
+                continue
+            try:
+                str(item[_BEFORE_TYPE[item[0]] :], "utf-8")
+            except UnicodeDecodeError:
+                raise FileFormatError(
+                    f"{path}: an item's type or name is no text: the file is damaged"
+                ) from None
+
+
+def _boxes(content: memoryview) -> Iterator[tuple[bytes, memoryview]]:
+    """Boxes that stand one after the other, as far as they are whole and hold anything."""
+    while len(content) >= 8:
+        size, kind, start = *struct.unpack_from(">I4s", content), 8
+        if size == 1 and len(content) >= 16:
+            size, start = struct.unpack_from(">Q", content, 8)[0], 16
+        size = size or len(content)
+        if not start < size <= len(content):
+            return
+        yield kind, content[start:size]
+        content = content[size:]
