@@ -50,7 +50,7 @@ TUTORIALS = {
     },
 }
 # Options of programs other than ours.
-ELSEWHERE = {"--tyro-print-completion", "--extra", "--prefix", "--durations"}
+ELSEWHERE = {"--tyro-print-completion", "--extra", "--prefix", "--durations", "--costs"}
 
 
 @pytest.fixture
@@ -266,6 +266,7 @@ def test_every_option_that_a_text_names_is_one_of_a_command_or_a_tool(helps):
     known = set(re.findall(r"--[a-z][\w-]*", "".join(helps.values())))
     tools = "".join(path.read_text() for path in (ROOT / "tools").glob("*.py"))
     known |= {"--" + name.replace("_", "-") for name in re.findall(r"^    (\w+): ", tools, re.M)}
+    known |= set(re.findall(r'add_argument\("(--[\w-]+)"', tools))
     for page in PAGES:
         code = re.findall(r"`(?!`)([^`]+)`", re.sub(r"```.*?```", "", page.read_text(), flags=re.S))
         named = {word for each in code for word in re.findall(r"(?<![\w-])--[a-z][\w-]*", each)}
