@@ -15,7 +15,7 @@ from typing import Any
 import rift_cl as rift
 
 _OURS = ("numpy", "scipy", "pyopencl")
-_PACKAGES = (*_OURS, "astra-toolbox", "silx", "gratopy", "scikit-image", "torch")
+_PACKAGES = (*_OURS, "astra-toolbox", "itk-rtk", "silx", "gratopy", "scikit-image", "torch")
 _IMPORTS = 5
 
 
