@@ -129,7 +129,7 @@ def test_another_run_is_neither_gone_on_with_nor_lost(scene, tmp_path, capsys):
 
 @pytest.mark.full
 def test_a_plan_that_is_finished_says_so(tmp_path, capsys):
-    words, out = ["plan", "--views", 2, "--band", 0.03], tmp_path / "out"
+    words, out = ["plan", "--views", 2, "--mode", "volume", "--band", 0.02], tmp_path / "out"
     assert run(words, out) == 0
     assert run(words, out, "--resume") == 0
     assert str(out) in capsys.readouterr().err

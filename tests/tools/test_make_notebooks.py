@@ -92,14 +92,14 @@ def test_a_command_that_fails_ends_a_notebook(tool, page):
 
 
 # The code of each tutorial is run by tests/test_documents.py, without a notebook round it.
-LONG = [pytest.param(name, marks=pytest.mark.study) for name in TUTORIALS if name != "scan"]
+LONG = [pytest.param(name, marks=pytest.mark.study) for name in TUTORIALS if name != "own_parts"]
 
 
 @needs_kernel
 @pytest.mark.full
 @pytest.mark.timeout(1200)
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("name", ["scan", *LONG])
+@pytest.mark.parametrize("name", ["own_parts", *LONG])
 def test_a_tutorial_runs_as_a_notebook(tool, tmp_path, name):
     module = tool("make_notebooks")
     assert {page.stem for page in module.tutorials()} == TUTORIALS.keys()
