@@ -83,18 +83,23 @@ class Hdf5Tree:
 
     def contents(self) -> str:
         """A phrase that lists the first datasets of the file, and how to name one."""
-        found: list[str] = []
-
-        def note(name: str, node: Any) -> bool | None:
-            if isinstance(node, h5py.Dataset):
-                found.append(f"{'/' + name!r} {node.shape}")
-            return True if len(found) > _LISTED else None
-
-        self.root.visititems(note)
+        found = [f"{name!r} {shape}" for name, shape in self.datasets(_LISTED + 1)]
         if not found:
             return "it holds no dataset at all"
         more = ", ..." if len(found) > _LISTED else ""
         return f"it holds {', '.join(found[:_LISTED])}{more}: {HOW_TO_NAME}"
+
+    def datasets(self, most: int) -> list[tuple[str, tuple[int, ...]]]:
+        """Names and shapes of the first datasets that no link leads to."""
+        found: list[tuple[str, tuple[int, ...]]] = []
+
+        def note(name: str, node: Any) -> bool | None:
+            if isinstance(node, h5py.Dataset):
+                found.append((f"/{name}", node.shape))
+            return True if len(found) >= most else None
+
+        self.root.visititems(note)
+        return found
 
     def _follow(self, here: Any, name: str) -> Any:
         if name.startswith("/"):

@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 import tiff_files as made
 import tifffile
+from scipy.io import savemat
 
 from rift_cl.errors import DTypeError, FileFormatError, InputError, PathEscapeError, ShapeError
 from rift_cl.io import open_scan
 from rift_cl.io.scans.angle_list import AngleList
 from rift_cl.io.scans.axes import axes_of, parsed
+from rift_cl.io.scans.frame_words import is_said, says_angles, says_projections
 from rift_cl.io.scans.kind import named_kind, possible_kinds, sampled
 
 VIEWS, ROWS, BINS = 40, 3, 32
@@ -157,6 +159,52 @@ def test_what_is_said_comes_first_and_must_make_sense(tmp_path: Path) -> None:
 def test_flats_beside_that_do_not_fit_are_passed_over(tmp_path: Path) -> None:
     path = hdf5(tmp_path / "a.h5", p=lines(), theta=DEGREES, white=np.ones(7), dark=np.ones(7))
     assert open_scan(path, dataset="p").kind == "attenuation"
+
+
+@pytest.mark.parametrize("form", ["npz", "h5", "mat"])
+def test_projections_are_found_by_their_name_alone(tmp_path: Path, form: str) -> None:
+    data = np.rint(3000 * np.exp(-lines())).astype(">u2")
+    flats, darks = np.full((2, ROWS, BINS), 3000, ">u2"), np.full((2, ROWS, BINS), 9, ">u2")
+    arrays = {"raw_data": data, "white": flats, "black": darks, "theta_deg": DEGREES, "step": 4.5}
+    path = tmp_path / f"a.{form}"
+    if form == "h5":
+        hdf5(path, **{f"run/{name}": values for name, values in arrays.items()})
+    elif form == "npz":
+        np.savez(path, **arrays)
+    else:
+        savemat(path, {name: np.asarray(values, ">f4") for name, values in arrays.items()})
+    scan = open_scan(path)
+    assert (scan.kind, scan.shape) == ("counts", (VIEWS, ROWS, BINS))
+    assert np.allclose(scan.angles, np.deg2rad(DEGREES))
+    assert any("raw_data' are the projections (--dataset)" in note for note in scan.notes)
+    assert any("white' and " in note and "black'" in note for note in scan.notes)
+
+
+def test_two_that_may_be_the_projections_are_asked_about(tmp_path: Path) -> None:
+    path = hdf5(tmp_path / "a.h5", data=lines(), sino=lines(), theta=DEGREES)
+    with pytest.raises(InputError, match="dataset"):
+        open_scan(path)
+    with h5py.File(path, "a") as file:
+        del file["sino"]
+        file["other/sino"] = lines()
+    assert open_scan(path).shape == (VIEWS, ROWS, BINS)
+
+
+@pytest.mark.parametrize(
+    ("name", "angles", "projections"),
+    [
+        ("anglesRad", True, False),
+        ("rotation_angle", True, False),
+        ("angle_step", False, False),
+        ("RawData", False, True),
+        ("frames", False, True),
+        ("data_white", False, False),
+        ("ring_current", False, False),
+    ],
+)
+def test_names_of_angles_and_projections(name: str, angles: bool, projections: bool) -> None:
+    assert (says_angles(name), says_projections(name)) == (angles, projections)
+    assert not is_said("darks", name)
 
 
 def test_geometry_alone_asks_for_no_kind(tmp_path: Path) -> None:

@@ -328,6 +328,8 @@ def _npz(data: Reals, flats: Reals) -> list[Case]:
         Case("NPZ: angles in degrees", npz(sinogram=one, angles=DEGREES), RIGHT, rows=first),
         Case("NPZ: a sinogram (bin, angle)", npz(sinogram=one.T, angles=RADIANS), RIGHT,
              rows=first),
+        Case("NPZ: data, white, black and theta_deg",
+             npz(data=data, white=flats, black=np.full_like(flats, 100), theta_deg=DEGREES), RIGHT),
         Case("NPZ: as many angles as bins, named", npz(s=square, t=RADIANS[:BINS]), REFUSED,
              said),
     ]  # fmt: skip

@@ -10,12 +10,20 @@ FrameKind = Literal["projections", "flats", "darks"]
 WORDS: dict[FrameKind, frozenset[str]] = {
     "flats": frozenset(
         ("flat", "flats", "flatfield", "flatfields", "ff", "white", "whites", "bright", "brights")
-    ).union(("openbeam", "ob", "ref", "refs", "reference", "references")),
-    "darks": frozenset(("dark", "darks", "darkfield", "darkfields", "df")),
+    ).union(("open", "openbeam", "ob", "ref", "refs", "reference", "references")),
+    "darks": frozenset(("dark", "darks", "darkfield", "darkfields", "df", "black", "blacks")),
 }
 CALIBRATION = WORDS["flats"] | WORDS["darks"]
 FILLERS = frozenset(
     ("field", "fields", "frame", "frames", "image", "images", "before", "after", "pre", "post")
+).union(("beam", "current"))
+# What projections are called, where nothing but a name tells of them.
+_PROJECTIONS = frozenset(
+    ("projection", "projections", "proj", "projs", "sinogram", "sinograms", "sino", "sinos")
+).union(("data", "frames", "images", "radiographs", "counts", "intensity", "tomo"))
+_ANGLES = frozenset(("angle", "angles", "theta", "thetas"))
+_OF_ANGLES = frozenset(
+    ("rotation", "projection", "view", "deg", "degree", "degrees", "rad", "radian", "radians")
 )
 
 
@@ -28,3 +36,15 @@ def is_said(kind: FrameKind, name: str) -> bool:
     """Whether the name of an array says this kind of frame, and nothing else."""
     words = words_of(name) - FILLERS - {"data"}
     return bool(words) and words <= WORDS[kind]
+
+
+def says_projections(name: str) -> bool:
+    """Whether the name of an array is one that projections have."""
+    words = words_of(name) - {"raw"}
+    return bool(words) and words <= _PROJECTIONS
+
+
+def says_angles(name: str) -> bool:
+    """Whether the name of an array says angles of views, and perhaps their unit."""
+    words = words_of(name)
+    return bool(words & _ANGLES) and words <= _ANGLES | _OF_ANGLES

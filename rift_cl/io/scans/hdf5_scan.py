@@ -27,7 +27,7 @@ from rift_cl.io.scans.hdf5_values import (
     read_vector,
     unit_of,
 )
-from rift_cl.io.scans.named_arrays import Layout, scan_in
+from rift_cl.io.scans.named_arrays import Layout, layout_by_name, scan_in
 from rift_cl.io.scans.nxtomo import entry_of, find_entry, nxtomo_layout
 from rift_cl.io.scans.scan_file import ScanFile, ScanRequest, usable_pitch
 
@@ -46,17 +46,20 @@ _DISTANCES = (
     "/measurement/instrument/source/distance",
     "/measurement/instrument/detector/distance",
 )
+# Datasets among which one is looked for whose name says that it holds projections.
+_MOST_NAMED = 1000
 
 
 def open_hdf5_scan(path: Path, request: ScanRequest, *, budget: int | None) -> ScanFile:
     """Find the scan in an HDF5 file; see ``open_scan``."""
     with open_tree(path) as tree:
         store = Hdf5Store(tree, budget)
-        return scan_in(store, _layout(tree, request.dataset), request)
+        return scan_in(store, _layout(store, request.dataset), request)
 
 
-def _layout(tree: Hdf5Tree, dataset: str | None) -> Layout:
+def _layout(store: Hdf5Store, dataset: str | None) -> Layout:
     """What there is to know of the file before anything is named."""
+    tree = store.tree
     named = tree.find(dataset) if dataset else tree.root
     exchange = tree.find(_DATA)
     if exchange is not None and (dataset is None or named == exchange):
@@ -67,12 +70,16 @@ def _layout(tree: Hdf5Tree, dataset: str | None) -> Layout:
             return nxtomo_layout(tree, entry)
         return Layout(source=f"array {dataset}", projections=dataset, search=True)
     entry = find_entry(tree, dataset or "/")
-    if entry is None:
+    if entry is not None:
+        return nxtomo_layout(tree, entry)
+    inside = (name for name, _ in tree.datasets(_MOST_NAMED))
+    called = None if dataset else layout_by_name(store, "HDF5", inside)
+    if called is None:
         raise FileFormatError(
             f"{tree.path}: holds neither a Data Exchange scan ({_DATA}) nor an NXtomo scan; "
             f"{tree.contents()}"
         )
-    return nxtomo_layout(tree, entry)
+    return called
 
 
 def _data_exchange(tree: Hdf5Tree) -> Layout:

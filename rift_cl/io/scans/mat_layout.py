@@ -22,7 +22,7 @@ from rift_cl.geometry.fan import FanBeam
 from rift_cl.io.boundary import HOW_TO_NAME
 from rift_cl.io.scans.angle_list import AngleList, named_unit
 from rift_cl.io.scans.frame_stack import FrameStack
-from rift_cl.io.scans.named_arrays import Layout
+from rift_cl.io.scans.named_arrays import Layout, layout_by_name
 from rift_cl.io.scans.scan_file import RowSource, ScanRequest, usable_pitch
 
 _LISTED = 8
@@ -155,13 +155,14 @@ class MatStore:
         return self.reader(projections, flats, darks)
 
 
-def find_layout(file: MatFile, request: ScanRequest) -> Layout:
+def find_layout(store: MatStore, request: ScanRequest) -> Layout:
     """Find the scan among the arrays of a file.
 
     Raises:
         FileFormatError: there is none that is known, and none was named.
         InputError: other reasons why the arrays cannot be used.
     """
+    file = store.file
     challenges = [
         name.removesuffix(".sinogram")
         for name in file.arrays
@@ -182,7 +183,12 @@ def find_layout(file: MatFile, request: ScanRequest) -> Layout:
         return _challenge(file, challenges[0])
     if "sinoRD" in file.arrays and "anglesRad" in file.arrays:
         return _dendrites(file)
-    raise FileFormatError(f"{file.path}: holds no layout of a scan that is known; {contents(file)}")
+    called = layout_by_name(store, "MAT", file.arrays)
+    if called is None:
+        raise FileFormatError(
+            f"{file.path}: holds no layout of a scan that is known; {contents(file)}"
+        )
+    return called
 
 
 def _challenge(file: MatFile, scan: str) -> Layout:

@@ -61,7 +61,8 @@ def open_mat5_scan(path: Path, request: ScanRequest, *, budget: int | None) -> S
         return Mat5Rows(path, projections, flats, darks, budget)
 
     file = Mat5File(path, budget)
-    return scan_in(MatStore(file, rows), find_layout(file, request), request)
+    store = MatStore(file, rows)
+    return scan_in(store, find_layout(store, request), request)
 
 
 def open_mat73_scan(path: Path, request: ScanRequest, *, budget: int | None) -> ScanFile:
@@ -80,7 +81,8 @@ def open_mat73_scan(path: Path, request: ScanRequest, *, budget: int | None) -> 
                 budget,
             )
 
-        return scan_in(MatStore(file, rows), find_layout(file, request), request)
+        store = MatStore(file, rows)
+        return scan_in(store, find_layout(store, request), request)
 
 
 def _frames(

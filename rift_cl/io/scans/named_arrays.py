@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import FileFormatError, ShapeError
+from rift_cl.errors import FileFormatError, InputError, ShapeError
 from rift_cl.geometry import FanBeam
 from rift_cl.io.scans.angle_list import AngleList, given_angles
 from rift_cl.io.scans.axes import axes_of
@@ -22,11 +22,12 @@ from rift_cl.io.scans.beam import AnyBeam
 from rift_cl.io.scans.beam_file import given_beam
 from rift_cl.io.scans.contract import AIR, MEAN, Finding, scan_of
 from rift_cl.io.scans.frame_stack import FrameStack, runs_of
-from rift_cl.io.scans.frame_words import is_said
+from rift_cl.io.scans.frame_words import is_said, says_angles, says_projections
 from rift_cl.io.scans.literals import AngleUnit, Kind
 from rift_cl.io.scans.scan_file import RowSource, ScanFile, ScanRequest
 
-_THETA = ("theta", "thetas", "angle", "angles", "rotation_angle", "rotation_angles", "anglesrad")
+# Projections are views of rows, or of a single one.
+_AXES = (2, 3)
 _KEY = ("image_key",)
 # Axes of frames as detectors give them.
 _FRAME_BY_FRAME = "nrb"
@@ -157,6 +158,36 @@ def scan_in(store: ArrayStore, layout: Layout, request: ScanRequest) -> ScanFile
     return scan_of(found, request)
 
 
+def layout_by_name(store: ArrayStore, source: str, names: Iterable[str]) -> Layout | None:
+    """Projections that no layout prescribes: the only array that is called so, if there is one.
+
+    Args:
+        store: the arrays.
+        source: the format, for people.
+        names: arrays that may be meant; those beside angles come first.
+    """
+    called = [name for name in names if says_projections(_last(name)) and _is_stack(store, name)]
+    beside_angles = [
+        name for name in called if any(says_angles(_last(other)) for other in store.beside(name))
+    ]
+    found = beside_angles or called
+    if len(found) != 1:
+        return None
+    return Layout(
+        source=source,
+        projections=found[0],
+        search=True,
+        notes=(f"Nothing but its name says that {found[0]!r} are the projections (--dataset).",),
+    )
+
+
+def _is_stack(store: ArrayStore, name: str) -> bool:
+    try:
+        return len(store.shape(name)) in _AXES
+    except InputError:
+        return False
+
+
 def _completed(
     store: ArrayStore, layout: Layout, request: ScanRequest
 ) -> tuple[Layout, frozenset[str]]:
@@ -178,7 +209,7 @@ def _completed(
         return layout, frozenset()
     beside = [name for name in store.beside(layout.projections) if name != layout.projections]
     found = {
-        "theta": [name for name in beside if _last(name).lower() in _THETA],
+        "theta": [name for name in beside if says_angles(_last(name))],
         "image_key": [name for name in beside if _last(name).lower() in _KEY],
         "flats": [name for name in beside if is_said("flats", _last(name))],
         "darks": [name for name in beside if is_said("darks", _last(name))],
@@ -193,8 +224,7 @@ def _angles(store: ArrayStore, layout: Layout, beam: AnyBeam | None) -> AngleLis
         return beam.angles
     if layout.theta is None:
         raise FileFormatError(
-            f"{store.path}: the angles of {layout.projections!r} are not known; name them with "
-            f"theta= (--theta); {store.contents()}"
+            f"{store.path}: the angles of {layout.projections!r} are not known; {store.contents()}"
         )
     given = None if layout.theta in store else given_angles(layout.theta)
     return given or replace(store.angles(layout.theta), usual=layout.angle_unit)

@@ -12,7 +12,7 @@ import numpy as np
 from rift_cl.errors import FileFormatError, InputError, ShapeError
 from rift_cl.io.scans.axes import USUAL
 from rift_cl.io.scans.beam import Beam
-from rift_cl.io.scans.named_arrays import ArrayStore, Layout
+from rift_cl.io.scans.named_arrays import ArrayStore, Layout, layout_by_name
 from rift_cl.io.scans.scan_file import usable_pitch
 
 PROJECTIONS = "projections", "sinogram"
@@ -36,11 +36,14 @@ def own_layout(store: ArrayStore, source: str, dataset: str | None = None) -> La
     Raises:
         FileFormatError: no array has the name of projections.
     """
-    usual = [name for name in PROJECTIONS if name in store]
+    usual, called = [name for name in PROJECTIONS if name in store], tuple[str, ...]()
     if dataset is None and not usual:
-        raise FileFormatError(
-            f"{store.path}: has neither 'projections' nor 'sinogram'; {store.contents()}"
-        )
+        named = layout_by_name(store, source, store.beside(""))
+        if named is None:
+            raise FileFormatError(
+                f"{store.path}: has neither 'projections' nor 'sinogram'; {store.contents()}"
+            )
+        dataset, called = named.projections, named.notes
     pitch = float(store.vector("pitch")[0]) if "pitch" in store else 0.0
     known = dataset is None
     beam, notes = _beam(store)
@@ -51,11 +54,11 @@ def own_layout(store: ArrayStore, source: str, dataset: str | None = None) -> La
         flats="flats" if known and "flats" in store else None,
         darks="darks" if known and "darks" in store else None,
         axes=USUAL if known else None,
-        angle_unit="radians",
-        search=not known,
+        angle_unit="radians" if "angles" in store else "degrees",
+        search=True,
         pitch=usable_pitch(pitch),
         beam=beam,
-        notes=notes,
+        notes=(*called, *notes),
     )
 
 
