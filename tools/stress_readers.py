@@ -241,7 +241,7 @@ def _read_config(path: Path) -> str:
     from rift_cl.commands.plan.settings import PlanSettings
     from rift_cl.commands.run_folder.saved_settings import saved_settings
 
-    saved_settings(path, "plan", PlanSettings).check()
+    saved_settings(path, "plan", PlanSettings)
     return ""
 
 

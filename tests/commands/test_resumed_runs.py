@@ -9,6 +9,7 @@ import pytest
 
 import rift_cl
 from rift_cl.commands.cli import main
+from rift_cl.commands.plan.settings import PlanSettings
 from rift_cl.commands.reconstruct.kept_slabs import SlabFolder
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.run_folder import run_folder
@@ -232,6 +233,13 @@ def test_a_forged_record_holds_no_run(tmp_path, content):
     (tmp_path / "run.json").write_bytes(content)
     with pytest.raises(CheckpointError, match=r"run\.json"):
         SlabFolder(tmp_path, (1, 1, 1)).axis()
+
+
+def test_a_saved_value_out_of_its_range_is_told_with_its_file(tmp_path):
+    config = tmp_path / "config.json"
+    config.write_text(json.dumps({"job": "plan", "settings": {"elevation": [40, -10]}}))
+    with pytest.raises(InputError, match=r"config\.json: 'rift plan': --elevation is 40 -10"):
+        saved_settings(config, "plan", PlanSettings)
 
 
 def test_frames_that_are_there_are_not_drawn_again(scene, tmp_path, monkeypatch):

@@ -131,7 +131,26 @@ def saved_settings(path: Path, job: str, settings: type[S]) -> S:
             "settings may mean something else: give them as options"
         )
     repeated = {name: value for name, value in values.items() if name not in _NOT_REPEATED}
-    return _read_tree(settings, None, repeated, f"--config {path}: 'rift {job}'", open_ended=True)
+    where = f"--config {path}: 'rift {job}'"
+    saved = _read_tree(settings, None, repeated, where, open_ended=True)
+    _check_saved(saved, where)
+    return saved
+
+
+def _check_saved(saved: Any, where: str) -> None:
+    """Check what a file says by itself, so that a sentence about it names the file.
+
+    Raises:
+        InputError: a value is out of its range, or two contradict each other.
+    """
+    values = (getattr(saved, field.name) for field in dataclasses.fields(saved))
+    # What has to be given may come from the command line, and is checked with it.
+    if not hasattr(saved, "check") or any(value is tyro.MISSING for value in values):
+        return
+    try:
+        saved.check()
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
 
 
 def named_preset(arguments: Sequence[str]) -> str | None:
