@@ -10,7 +10,7 @@ import rift_cl as rift
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.phantom import Ellipsoid, project
 from rift_cl.reconstruct.axis.fan_doubt import fan_doubt
-from rift_cl.reconstruct.axis.lying_axis import lying_axis
+from rift_cl.reconstruct.axis.lying_axis import looked_at, lying_axis
 
 TURNS = {
     "full": FULL,
@@ -92,18 +92,60 @@ def test_cones_are_searched_near_the_orbit():
     assert again.center == pytest.approx(found.center, abs=0.01)
 
 
+def swapped(y, scan):
+    """What is said against rows, and the same of views whose rows and bins are exchanged."""
+    other = replace(
+        scan, rows=scan.bins, bins=scan.rows, pitch=scan.pitch[::-1], center=scan.center[::-1]
+    )
+    ways = (y, scan), (y.transpose(0, 2, 1), other)
+    return [lying_axis(views[np.ix_(*looked_at(way))], way) for views, way in ways]
+
+
 def test_rows_taken_for_bins_are_doubted():
     scan = cone(FULL[::8], rows=80, center=(39.5, 83.7))
     y = projections(scan, noise=0.05, count=8)
-    assert lying_axis(y) == ""
-    assert "probably swapped" in lying_axis(y.transpose(0, 2, 1))
+    right, wrong = swapped(y, scan)
+    assert not right and "probably swapped" in wrong
     square = replace(scan, rows=160, bins=80, center=(83.7, 39.5))
     with pytest.raises(InputError, match=r"7 degrees apart; .*probably swapped"):
         rift.find_center(y.transpose(0, 2, 1), square)
     # A round body that turns about its axis changes nowhere, whichever axis that is.
     rod = project([Ellipsoid.ball(25.0)], rift.Grid((4, 4, 4)), scan)
-    for views in (rod, rod.transpose(0, 2, 1)):
-        assert lying_axis(views) == ""
+    assert swapped(rod, scan) == ["", ""]
+
+
+def wide_cone():
+    """A half-angle of 30 degrees: slices are seen by many rows in turn."""
+    return rift.Cone(FULL[::4], 40, 40, 2.6, 40.0, 90.0)
+
+
+@pytest.mark.parametrize("flicker", [0.0, 3.0])
+def test_rows_taken_for_bins_are_doubted_in_a_wide_cone_and_a_beam_that_flickers(flicker):
+    balls = ((3.0, (12.0, 2.0, 9.0)), (5.0, (0.0, 5.0, -6.0)))
+    parts = [Ellipsoid.ball(radius, 1.0, place) for radius, place in balls]
+    scan = wide_cone()
+    y = project(parts, rift.Grid((4, 4, 4)), scan)
+    y = y + flicker * np.random.default_rng(0).standard_normal((scan.views, 1, 1))
+    right, wrong = swapped(y, scan)
+    assert not right and "probably swapped" in wrong
+
+
+@pytest.mark.parametrize("heights", [[14.0], np.arange(-14.0, 15.0, 4.0)], ids=["one", "stack"])
+def test_thin_layers_beside_the_orbit_are_no_rows_taken_for_bins(heights):
+    """They move from row to row more than they change along the rows."""
+    parts = [
+        Ellipsoid((z, 5 * np.sin(z), 5 * np.cos(z)), (0.9, 12.0, 12.0), 0.0, 1.0) for z in heights
+    ]
+    scan = wide_cone()
+    assert not swapped(project(parts, rift.Grid((4, 4, 4)), scan), scan)[0]
+
+
+def test_a_search_that_leads_off_the_detector_comes_back():
+    """Beyond its ends windows are empty, of which nothing can be told."""
+    scan = wide_cone()
+    disc = [Ellipsoid((14.0, 0.0, 5.0), (1.0, 12.0, 12.0), 0.0, 1.0)]
+    y = project(disc, rift.Grid((4, 4, 4)), scan).transpose(0, 2, 1)
+    assert 0 <= rift.find_center(np.ascontiguousarray(y), scan).center <= 39
 
 
 def test_a_pitch_in_another_unit_is_doubted():

@@ -125,7 +125,7 @@ def _of_cone(
     read = read_attenuation(scan, first, stop).projections
     rows = np.stack([read[:, group - first].mean(axis=1) for group in groups], axis=1)
     places = np.array([group.mean() for group in groups])
-    lying = lying_axis(_integrals_but_flats(scan, *looked_at(cone)))
+    lying = lying_axis(_integrals_but_flats(scan, *looked_at(cone)), cone)
     return axis_of_fan(rows, places, cone.center[0], cone.fan(), span, lying)
 
 

@@ -75,7 +75,7 @@ def axis_of_scan(
         middle = (stack.shape[1] - 1) / 2
     rows = np.stack([stack[:, group].mean(axis=1) for group in groups], axis=1)
     places = np.array([group.mean() for group in groups])
-    lying = lying_axis(stack[np.ix_(*looked_at(scan))]) if isinstance(scan, Cone) else ""
+    lying = lying_axis(stack[np.ix_(*looked_at(scan))], scan) if isinstance(scan, Cone) else ""
     return axis_of_fan(rows, places, middle, fan, span, lying)
 
 

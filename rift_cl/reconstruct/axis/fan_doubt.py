@@ -31,6 +31,9 @@ _DISTANCES = np.append(1.25 ** np.arange(-14.0, 15), [1e-3, 1e3])
 _OTHER_TURN, _OTHER_DISTANCE = 0.05, 0.5
 # Trial centres beside the one that is given, in the bins that are compared.
 _CENTERS = (0.0, -1.0, 1.0, -2.0, 2.0)
+# Where the centre may be of rays of which nothing is known: so far from the one that is given, as a
+# share of the bins, at so many places, each with those beside it.
+_APART, _PLACES = 0.15, 5
 # Differences as a share of those of unrelated rays, noise taken off: least of what is doubted, for
 # angles and for the distance, and the most of it that an explanation leaves.
 _DOUBTED_TURN, _DOUBTED_DISTANCE, _LEFT = 0.25, 0.04, 0.3
@@ -67,6 +70,27 @@ def fan_doubt(sinogram: Views, fan: Fan) -> str:
     return (
         "rays that measure the same line do not agree, and do if the detector is about "
         f"{factor:.2g} times as far from the source: a length is probably wrong"
+    )
+
+
+def disagreement(sinogram: Views, fan: Fan) -> float:
+    """How far opposite rays disagree in either sense, about whatever centre is best.
+
+    Args:
+        sinogram: line integrals of one row, (view, bin).
+        fan: its geometry but for the centre.
+
+    Returns:
+        Mean square difference as a share of that of unrelated rays: 0 where they agree, or where
+        there is no contrast; infinite where too few lines were measured twice.
+    """
+    reach = _APART * fan.bins
+    centers = fan.center + np.linspace(-reach, reach, _PLACES)
+    ways = (fan.at(sign * fan.angles) for sign in (1, -1))
+    return min(
+        _Rays(sinogram, replace(way, center=center)).disagreement(1.0, 1.0)
+        for way in ways
+        for center in centers.tolist()
     )
 
 

@@ -299,7 +299,8 @@ def _followed(row: Row, look: Look, start: float, by: str) -> RowAxis:
         if _SLOW[0] < ratio < _SLOW[1]:
             found = center + float(np.clip(change / (1 - ratio), -_JUMP, _JUMP)) * row.bin
             change = 0.0
-        center, last = found, change
+        # Off the detector no window has anything in it.
+        center, last = float(np.clip(found, 0, row.views.shape[1] * row.bin - 1)), change
     center = told.peak(center)
     score = float(told.scores(np.array([center]))[0])
     return RowAxis(center, told.error(center), score, 0.0, score / max(told.most, 1e-9), told, by)
