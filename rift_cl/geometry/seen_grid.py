@@ -15,6 +15,8 @@ from rift_cl.geometry.vectors import Vectors
 
 # Rows that an interpolation of any footprint reads beside a shadow.
 _BESIDE = 4
+# Least cosine of the angle to a direction along which a detector's edge, or a view, mostly is.
+_MOSTLY = math.sqrt(0.5)
 
 
 class ScanLengths(NamedTuple):
@@ -71,7 +73,7 @@ def seen_grid(scan: Fan | Cone | Vectors, spacing: float | None = None) -> Grid:
     row, bin = scan_lengths(scan).pixel
     edge = bin if spacing is None else checked_length("seen_grid", "spacing", spacing)
     if isinstance(scan, Vectors):
-        width, low, high = scan.bins * bin, *_rows_of_vectors(scan, row)
+        width, low, high = _reach_of_vectors(scan)
     else:
         center = scan.center if isinstance(scan, Fan) else scan.center[1]
         width = 2 * max(center + 0.5, scan.bins - 0.5 - center) * bin
@@ -138,13 +140,27 @@ def _rows_of_cone(scan: Cone, row: float) -> tuple[float, float]:
     return first, last
 
 
-def _rows_of_vectors(scan: Vectors, row: float) -> tuple[float, float]:
-    """As for a cone, about where the middle of the detector looks past the axis."""
+def _reach_of_vectors(scan: Vectors) -> tuple[float, float, float]:
+    """What is seen across the axis, and the lowest and the highest place along it.
+
+    Counted from where the middle of the detector looks past the axis. Where bins run along z the
+    detector lies on its side; views that look along z have no side that the axis could be on.
+    """
     lengths = scan_lengths(scan)
+    row, bin = lengths.pixel
+    height, width = scan.rows * row, scan.bins * bin
     share = lengths.source_to_axis / lengths.source_to_detector
-    heights = (scan.source + share * (scan.middle - scan.source))[:, 2]
-    half = scan.rows / 2 * row
-    return float(heights.min()) - half, float(heights.max()) + half
+    places = scan.source + share * (scan.middle - scan.source)
+    normal = np.cross(scan.across, scan.down)
+    flat = np.hypot(normal[:, 0], normal[:, 1])
+    across_z = _MOSTLY * np.linalg.norm(scan.across, axis=1)
+    if np.median(np.abs(scan.across[:, 2]) - across_z) > 0:
+        height, width = width, height
+    if np.median(flat - _MOSTLY * np.linalg.norm(normal, axis=1)) > 0:
+        aside = (places[:, 0] * normal[:, 1] - places[:, 1] * normal[:, 0]) / flat
+        width += 2 * abs(float(np.median(aside)))
+    half = height / 2
+    return width, float(places[:, 2].min()) - half, float(places[:, 2].max()) + half
 
 
 def _whole(count: float) -> int:

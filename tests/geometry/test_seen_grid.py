@@ -34,10 +34,17 @@ def test_a_helix_is_as_long_as_the_source_rises():
 
 
 def test_vectors_of_a_cone_see_what_the_cone_sees():
-    for cone in (CONE, rift.Cone(ANGLES, 9, 16, 0.8, 50, 100, heights=ANGLES)):
+    displaced = rift.Cone(ANGLES, 9, 16, 0.8, 50, 100, (1.0, 3.5))
+    for cone in (CONE, displaced, rift.Cone(ANGLES, 9, 16, 0.8, 50, 100, heights=ANGLES)):
         assert seen_grid(cone.vectors()).shape == seen_grid(cone).shape
         np.testing.assert_allclose(seen_grid(cone.vectors()).center, seen_grid(cone).center)
         np.testing.assert_allclose(scan_lengths(cone.vectors()).pixel, scan_lengths(cone).pixel)
+
+
+def test_a_detector_on_its_side_is_as_high_as_it_is_long():
+    seen = rift.Cone(ANGLES, 9, 16, 0.8, 50, 100, (1.0, 3.5)).vectors()
+    lying = rift.Vectors(seen.source, seen.middle, seen.down, seen.across, 16, 9)
+    assert seen_grid(lying) == seen_grid(seen)
 
 
 def test_a_fan_sees_a_slice():
