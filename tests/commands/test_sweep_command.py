@@ -190,6 +190,32 @@ def test_figures_that_are_lost_are_named(scans, tmp_path, text):
         Row.of(each, "")
 
 
+PLAN = ("diameter=40", "mode=volume", "band=0.05")
+
+
+def test_plans_take_views_for_inputs_or_none(scans, tmp_path):
+    alone = SweepSettings("plan", (), vary=("views=2,3", "elevation=0 20,0 60"), out=tmp_path)
+    runs = variations(alone)
+    assert [run.name for run in runs][:2] == ["views=2_elevation=0-20", "views=2_elevation=0-60"]
+    assert runs[-1].settings.elevation == (0.0, 60.0) and runs[-1].settings.have is None
+    of_scans = variations(replace(alone, inputs=tuple(scans)))
+    assert [run.settings.have for run in of_scans[::4]] == scans
+    with pytest.raises(InputError, match="have cannot be"):
+        variations(replace(alone, fixed=("have=a.npz",)))
+
+
+@pytest.mark.full
+def test_a_study_of_plans_is_the_same_on_workers(tmp_path):
+    pytest.importorskip("distributed", reason=WANTED)
+    given = SweepSettings("plan", (), vary=("views=2,3",), fixed=PLAN, out=tmp_path / "here")
+    here, _ = done(given)
+    there, _ = done(replace(given, out=tmp_path / "there", cluster="local:2"))
+    assert [row.figures["views"] for row in there.rows] == [2, 3]
+    for one, other in zip(here.rows, there.rows, strict=True):
+        folders = one.run.settings.out, other.run.settings.out
+        assert len({(folder / "views.csv").read_bytes() for folder in folders}) == 1
+
+
 @pytest.mark.full
 def test_runs_on_workers_have_the_same_bits(scans, tmp_path):
     pytest.importorskip("distributed", reason=WANTED)

@@ -70,7 +70,7 @@ class RunFolder:
     ) -> None:
         self.path = path
         self._job = job
-        self._asked = None if settings is None else _asked(settings)
+        self._asked = None if settings is None else asked_settings(settings)
         # As it is when the run begins: what changes meanwhile is found by the next one.
         self._read = None if settings is None else _stamps(settings, path)
         self._overwrite = overwrite
@@ -322,7 +322,7 @@ def _is_used(entry: Path) -> bool:
     return entry.name not in (_CONFIG + PART, LOCK_NAME)
 
 
-def _asked(settings: Any) -> dict[str, Any]:
+def asked_settings(settings: Any) -> dict[str, Any]:
     """The settings that differ from their defaults and decide what comes out, as JSON has them."""
     return _decisive(parse_json(json_text(_changed(settings))))
 
@@ -331,7 +331,7 @@ def _decisive(asked: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in asked.items() if name not in _FREE}
 
 
-def _read_by(settings: Any) -> Iterator[Path]:
+def files_read(settings: Any) -> Iterator[Path]:
     """What a run reads, as far as its options name it."""
     for option in options_of(settings):
         if option.name in _FREE:
@@ -344,7 +344,7 @@ def _read_by(settings: Any) -> Iterator[Path]:
 def _stamps(settings: Any, out: Path) -> dict[str, str]:
     """Sizes and times of change of what a run reads, but for its own, by whole paths."""
     own, stamps = Path(os.path.realpath(out)), {}
-    for named in _read_by(settings):
+    for named in files_read(settings):
         # A text that names a part of the scan may be no path at all.
         with suppress(OSError, ValueError):
             read = Path(os.path.realpath(named))

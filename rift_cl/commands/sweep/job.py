@@ -10,10 +10,11 @@ import dataclasses
 import json
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 from rift_cl.cl.device import Device
-from rift_cl.commands.run_folder.run_folder import RunFolder
+from rift_cl.commands.run_folder.run_folder import RunFolder, asked_settings, files_read
 from rift_cl.commands.sweep.one_run import is_done, run, steps
 from rift_cl.commands.sweep.report import Row, sweep_page, write_table
 from rift_cl.commands.sweep.settings import SweepSettings
@@ -117,7 +118,7 @@ class Sweep:
         with cluster_workers(*where) as workers:
             self.announce(workers.sentence)
             with token(settings.out.absolute() / _RUNS) as seen:
-                workers.check([*(path.absolute() for path in settings.inputs), seen])
+                workers.check([*_files(left), seen])
             tasks = []
             for each in left:
                 own: dict[str, Any] = {"device": None, "memory": None} if local else {}
@@ -148,7 +149,7 @@ class Sweep:
     def _decisive(self) -> dict[str, Any]:
         """What decides each run of this sweep, by its name."""
         return {
-            each.name: parse_json(json.dumps(each.settings.decisive(), default=str))
+            each.name: parse_json(json.dumps(_decisive(each.settings), default=str))
             for each in self.runs
         }
 
@@ -191,3 +192,15 @@ class Sweep:
         self.folder.finish(
             self.settings, self.metrics, page, self.device, asked=self.settings, runs=self._record()
         )
+
+
+def _decisive(settings: Any) -> dict[str, Any]:
+    """What decides a run: what its command says, or else all that was asked for."""
+    own = getattr(settings, "decisive", None)
+    return asked_settings(settings) if own is None else dict(own())
+
+
+def _files(runs: list[Variation]) -> list[Path]:
+    """The files and folders that runs read."""
+    named = (path for each in runs for path in files_read(each.settings))
+    return [path for path in dict.fromkeys(named) if path.exists()]

@@ -30,17 +30,11 @@ def steps(job: str, settings: Any) -> Iterator[Report]:
     """
     # Seen here and now: a worker that was lost may have begun it.
     settings = replace(settings, resume=settings.out.exists())
-    if job == "reconstruct":
-        from rift_cl.commands.reconstruct.choice import reconstruction_of
-
-        slices = reconstruction_of(settings)
-        with released(slices):
-            yield from slices.run()
-        return
-    fit = _fit(job, settings)
-    with released(fit):
-        yield from fit.run()
-    for scores in fit.scores.values():
+    made = _of_command(job, settings)
+    with released(made):
+        yield from made.run()
+    # Fits alone have scores.
+    for scores in getattr(made, "scores", {}).values():
         _leave_picture(settings.out / PICTURE, scores)
         return
 
@@ -73,7 +67,16 @@ def is_done(folder: Path) -> bool:
         return False
 
 
-def _fit(job: str, settings: Any) -> Any:
+def _of_command(job: str, settings: Any) -> Any:
+    """What does a command's work, ready to run."""
+    if job == "reconstruct":
+        from rift_cl.commands.reconstruct.choice import reconstruction_of
+
+        return reconstruction_of(settings)
+    if job == "plan":
+        from rift_cl.commands.plan.job import Planning
+
+        return Planning(settings)
     if job == "fit xray":
         from rift_cl.commands.fit_xray.job import XrayFit
 

@@ -19,10 +19,11 @@ class SweepInput:
 
     group: ClassVar[str] = "input"
 
-    command: Annotated[Literal["reconstruct", "fit"], Positional]
-    """The command that is run many times: 'rift reconstruct' or 'rift fit'."""
+    command: Annotated[Literal["reconstruct", "fit", "plan"], Positional]
+    """The command that is run many times: 'rift reconstruct', 'rift fit' or 'rift plan'."""
     inputs: Annotated[tuple[Path, ...], Positional]
-    """Scans or captures, each of which is run with all settings."""
+    """Scans or captures, each of which is run with all settings. Those of 'rift plan' are its
+    --have, and may be left out."""
     vary: Several[str] = ()
     """Settings to try, each as NAME=VALUE,VALUE,..., such as method=fbp,cgls steps=10,20: every
     combination is a run. Names are those of the command's options; a value of several numbers is in
@@ -59,7 +60,7 @@ class SweepSettings(SpreadRun, SweepOutput, SweepInput):
             InputError: there is no input, or two options contradict each other.
         """
         self.check_cluster()
-        if not self.inputs:
+        if not self.inputs and self.command != "plan":
             raise InputError("a sweep wants a scan or a capture: name one or more")
         if self.resume and self.overwrite:
             raise InputError("--resume continues what --overwrite discards: give one of them")

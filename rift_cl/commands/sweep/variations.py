@@ -16,8 +16,10 @@ from rift_cl.commands.sweep.settings import SweepSettings
 from rift_cl.errors import InputError
 from rift_cl.json_parsing import parse_json
 
+# The setting that an input is for, by the command.
+_INPUT = {"reconstruct": "scan", "fit xray": "capture", "fit photos": "capture", "plan": "have"}
 # What differs between the runs in any case, or is the sweep's own.
-_OWN = ("scan", "capture", "out", "resume", "overwrite", "dry_run", "preview", "config", "cluster")
+_OWN = (*_INPUT.values(), "out", "resume", "overwrite", "dry_run", "preview", "config", "cluster")
 _OWN_TOO = ("view", "device", "part_timeout")
 _MOST_RUNS = 10_000
 _LONGEST_NAME = 100
@@ -55,23 +57,24 @@ def variations(sweep: SweepSettings) -> list[Variation]:
     fixed = {name: _one(name, values) for name, values in named[: len(sweep.fixed)]}
     varied = dict(named[len(sweep.fixed) :])
     earlier = begun_settings(sweep.base, fixed.get("preset"), job, kind)
-    count = len(sweep.inputs)
+    inputs: Sequence[Path | None] = sweep.inputs or [None]
+    count = len(inputs)
     for several_values in varied.values():
         count *= len(several_values)
     if count > _MOST_RUNS:
         raise InputError(f"--vary makes {count} runs, wanted {_MOST_RUNS} at most")
-    several = len(sweep.inputs) > 1
+    several = len(inputs) > 1
     runs = []
-    for path, values in itertools.product(sweep.inputs, itertools.product(*varied.values())):
+    for path, values in itertools.product(inputs, itertools.product(*varied.values())):
         texts = dict(zip(varied, values, strict=True))
         given = {
             name: _value(name, text, job, kind, earlier)
             for name, text in {**fixed, **texts}.items()
         }
-        shown = {"input": _input_name(path), **texts} if several else texts
+        shown = {"input": _input_name(path), **texts} if several and path is not None else texts
         name = _folder_name(shown) or "run"
-        first = "scan" if job == "reconstruct" else "capture"
-        given |= {first: str(path), "out": str(sweep.out / "runs" / name)}
+        given |= {} if path is None else {_INPUT[job]: str(path)}
+        given |= {"out": str(sweep.out / "runs" / name)}
         settings = parsed_settings(given, job, kind, earlier=earlier)
         # Whole paths, for a worker in another folder; and so that a sweep goes on anywhere.
         settings = absolute_files(replace(settings, device=sweep.device))
@@ -91,6 +94,10 @@ def _job(sweep: SweepSettings) -> tuple[str, type[Any]]:
         from rift_cl.commands.reconstruct.settings import ReconstructSettings
 
         return "reconstruct", ReconstructSettings
+    if sweep.command == "plan":
+        from rift_cl.commands.plan.settings import PlanSettings
+
+        return "plan", PlanSettings
     kinds = {kind_of_fit([str(path)]) for path in sweep.inputs}
     if len(kinds) > 1:
         raise InputError("a sweep is of scans or of photographs, these inputs are some of each")
