@@ -155,6 +155,14 @@ def test_tomosipo() -> None:
         assert arguments["src_pos"][1, ::-1] == pytest.approx(
             (scan.vectors() if isinstance(scan, Cone) else scan).source[1]
         )
+        source, middle, across, down = (
+            arguments[name][1, ::-1] for name in ("src_pos", "det_pos", "det_u", "det_v")
+        )
+        bin, row, _ = np.linalg.solve(
+            np.stack([across, down, source - POINT], axis=1), source - middle
+        )
+        found = row + (shape[0] - 1) / 2, bin + (shape[1] - 1) / 2
+        assert found == pytest.approx(seen(scan))
         back = from_tomosipo(SimpleNamespace(det_shape=shape, **arguments))
         assert type(back) is type(scan) and seen(back) == pytest.approx(seen(scan))
     with pytest.raises(InputError, match="src_pos"):

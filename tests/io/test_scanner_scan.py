@@ -82,6 +82,11 @@ def test_nikon_angles_beside(tmp_path: Path) -> None:
     assert np.rad2deg(open_scan(path, theta="0:360").angles[1]) == pytest.approx(30)
 
 
+def test_an_image_too_many_is_to_be_taken_away(tmp_path: Path) -> None:
+    with pytest.raises(ShapeError, match=r"11 projections .* found: 12\. Take away"):
+        open_scan(made.nikon(tmp_path, views=11))
+
+
 def test_one_image_of_a_symmetric_sample(tmp_path: Path) -> None:
     """A radiograph whose text names more: refused, or repeated where a person says so."""
     path = made.nikon(tmp_path, views=3142)

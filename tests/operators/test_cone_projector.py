@@ -98,7 +98,7 @@ def test_the_adjoint_is_exact_and_bits_repeat(device):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("name", ["all at once", "curved"])
+@pytest.mark.parametrize("name", ["all at once", "curved", "bins much wider"])
 def test_doubles(device, name):
     grid, scan = SCANS[name]
     A, twin = Projector(grid, scan, device=device, dtype="float64"), ConeProjector(grid, scan)

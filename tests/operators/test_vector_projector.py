@@ -107,15 +107,15 @@ def test_line_integrals_along_z_are_true(device, rms):
 
 @pytest.mark.parametrize("name", ["tilted", "lying", "both"])
 def test_the_pair_is_matched(device, name):
-    across, along = tilted(circle(24).vectors(), 4), tilted(lying(24, 5), 4)
+    across, along = tilted(circle(40).vectors(), 4), tilted(lying(40, 5), 4)
     scan = {
         "tilted": across,
         "lying": along,
         "both": joined(across, changed(along, rows=across.rows, bins=across.bins)),
     }[name]
-    A = Projector(Grid((20, 22, 24)), scan, device=device)
-    assert dot_test(A, seed=2) <= 3e-8
-    assert dot_test(A.T, seed=3) <= 3e-8
+    A = Projector(Grid((36, 38, 40)), scan, device=device)
+    assert dot_test(A, seed=2) <= 1e-8
+    assert dot_test(A.T, seed=3) <= 1e-8
 
 
 def test_repeats_to_the_bit_and_travels(device):

@@ -34,6 +34,8 @@ def test_levels_are_true_in_the_middle_and_fall_off_with_the_cone(tool, monkeypa
     middle = [float(value) for value in re.findall(r"middle plane.*: ([\d.]+)", said)]
     assert len(middle) == 4
     assert middle == pytest.approx([1] * 4, abs=1e-3)
+    (own, beams), _ = re.findall(r"across the ball: ([\d.]+), parallel beams ([\d.]+)", said)
+    assert float(own) == pytest.approx(float(beams), abs=3e-4)
     (narrow, _), (wide, solved) = re.findall(r"half-angle.*: ([\d.]+), CGLS ([\d.]+)", said)
     assert float(narrow) == pytest.approx(1, abs=1e-3)
     assert 0.97 < float(wide) < 0.99

@@ -147,9 +147,10 @@ def _check_complete(place: _Place, stack: TiffStack, request: ScanRequest) -> No
     count = stack.stack.shape[0]
     if named is None or named == count or request.theta is not None or request.axes is not None:
         return
+    remedy = "Add the missing ones" if count < named else "Take away those that are none"
     raise ShapeError(
-        f"{place.path}: {named} projections are named, images found: {count}. Add the missing "
-        "ones, or give the angles of those that are there with theta= (--theta)"
+        f"{place.path}: {named} projections are named, images found: {count}. {remedy}, or give "
+        "the angles of those that are there with theta= (--theta)"
     )
 
 
