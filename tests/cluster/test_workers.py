@@ -4,13 +4,14 @@ import socket
 import sys
 import types
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 
 import rift_cl as rift
 from rift_cl.cluster import workers
 from rift_cl.cluster.address import ClusterAddress
-from rift_cl.cluster.local import worker_environments
+from rift_cl.cluster.local import local_cluster, worker_environments
 from rift_cl.cluster.on_worker import look, token
 from rift_cl.errors import ClusterError, DeviceLostError, InputError, SettingError
 
@@ -44,6 +45,30 @@ def test_local_workers_divide_memory_and_cores(monkeypatch):
         assert environment["RIFT_DEVICE"] == device.selector
         assert environment["RIFT_MEMORY"] == "2000"
         assert environment["POCL_MAX_PTHREAD_COUNT"] == "2"
+
+
+@pytest.mark.full
+def test_local_workers_listen_on_loopback_alone():
+    """Scheduler, dashboard, nanny and worker: whoever reaches one of their ports may run code."""
+    pytest.importorskip("distributed", reason=WANTED)
+    import psutil
+
+    def listening():
+        own = psutil.Process()
+        return {
+            (end.laddr.ip, end.laddr.port)
+            for process in (own, *own.children(recursive=True))
+            for end in process.net_connections("inet")
+            if end.status == psutil.CONN_LISTEN
+        }
+
+    before = listening()
+    with local_cluster([{}]) as cluster:
+        opened = listening() - before
+        known = {urlsplit(url).port for url in (cluster.scheduler_address, cluster.dashboard_link)}
+    # The scheduler, its dashboard, the nanny and the worker at least.
+    assert known <= {port for _, port in opened} and len(opened) >= 4
+    assert {address for address, _ in opened} == {"127.0.0.1"}
 
 
 def test_a_worker_says_what_it_has(tmp_path):
