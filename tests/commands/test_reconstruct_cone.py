@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,11 @@ from scipy.ndimage import gaussian_filter
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
+from rift_cl.commands.inputs.scan_axis import doubted_vectors
 from rift_cl.errors import InputError
-from rift_cl.geometry import Cone, Grid
+from rift_cl.geometry import Cone, Grid, Vectors
 from rift_cl.geometry.leaning import leaning
-from rift_cl.io import read_volume
+from rift_cl.io import open_scan, read_volume
 from rift_cl.phantom import Ellipsoid, project
 
 VIEWS, ROWS, BINS, PITCH, R, S = 60, 20, 28, 2.0, 60.0, 120.0
@@ -120,6 +122,25 @@ def test_an_axis_that_leans_is_turned(tmp_path: Path, said: str) -> None:
         assert found.settings.tilt == pytest.approx(4 if name == "turned" else 0)
     off = {name: np.linalg.norm(image - smooth["upright"]) for name, image in smooth.items()}
     assert off["turned"] < 0.5 * off["untold"]
+
+
+@pytest.mark.parametrize("flipped", ["across", "down"])
+def test_vectors_that_the_data_contradict_are_doubted(tmp_path: Path, flipped: str) -> None:
+    """Images whose bins, or rows, run the other way belong to vectors that do so as well."""
+    cone = Cone(2 * np.pi * np.arange(VIEWS) / VIEWS, ROWS, BINS, PITCH, R, S)
+    balls = [Ellipsoid.ball(4.0, 0.02, (0.5, 5.0, -4.0)), Ellipsoid.ball(2.5, 0.03, (0.5, -3, 6))]
+    straight, y = cone.vectors(), project(balls, Grid((2, 2, 2)), cone)
+    turned = y[:, :, ::-1] if flipped == "across" else y[:, ::-1]
+    vectors = replace(straight, **{flipped: -getattr(straight, flipped)})
+    columns = [getattr(vectors, name) for name in ("source", "middle", "across", "down")]
+    np.save(tmp_path / "vectors.npy", np.concatenate(columns, axis=1))
+    path = tmp_path / "scan.npz"
+    for images, right in ((turned, True), (turned[:, :, ::-1], False)):
+        np.savez(path, projections=images, angles=cone.angles)
+        scan = open_scan(path, geometry=tmp_path / "vectors.npy", kind="attenuation")
+        assert isinstance(scan.cone, Vectors)
+        said = doubted_vectors(scan, scan.cone)
+        assert not said if right else "mirrored" in said[0]
 
 
 def test_center_of_a_cone(ball: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 import rift_cl as rift
 from rift_cl.errors import InputError, ShapeError
+from rift_cl.geometry.nearly_upright import nearly_upright
 
 lengths = st.floats(1e-2, 1e2)
 USUAL = {
@@ -77,6 +79,22 @@ def test_rows_that_grow_downwards_are_no_cone():
     turned = rift.Vectors(vectors.source, vectors.middle, vectors.across, -vectors.down, 10, 12)
     with pytest.raises(InputError, match="rows"):
         rift.Cone.of_vectors(turned)
+
+
+@pytest.mark.parametrize("turned_over", [False, True])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_vectors_that_are_nearly_a_cone_s_tell_how_their_images_lie(turned_over, mirrored):
+    cone = rift.Cone(np.arange(20) * 0.3, 30, 40, 0.5, 60, 150, (12.0, 22.0))
+    straight = cone.vectors()
+    middle = straight.middle + 0.2 * np.random.default_rng(0).standard_normal((20, 3))
+    down = -straight.down if turned_over else straight.down
+    across = -straight.across if mirrored else straight.across
+    vectors = rift.Vectors(straight.source, middle, across, down, 30, 40)
+    found, *lie = nearly_upright(vectors)
+    assert lie == [turned_over, mirrored] and found.source_to_axis == pytest.approx(60)
+    assert found.center == pytest.approx(cone.center, abs=0.3)
+    rising = replace(straight, source=straight.source + np.arange(20)[:, None] * [0, 0, 5])
+    assert nearly_upright(rising) is None
 
 
 def test_curved_rows_have_no_vectors_and_even_fan_angles():

@@ -12,9 +12,11 @@ from rift_cl.cl.device import Device
 from rift_cl.commands.inputs.scan_rows import read_attenuation
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Fan, Vectors
+from rift_cl.geometry.nearly_upright import nearly_upright
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.reconstruct.axis import AxisEstimate, axis_of_rows, searched_rows
 from rift_cl.reconstruct.axis.circular import axis_of_fan, axis_of_scan, orbit_rows
+from rift_cl.reconstruct.axis.fan_doubt import sense_doubt
 from rift_cl.reconstruct.axis.lying_axis import looked_at, lying_axis
 from rift_cl.reconstruct.axis.search import GIVE_IT
 
@@ -110,6 +112,30 @@ def settled_axis(scan: ScanFile, center: float, device: Device | None = None) ->
         )
         notes = (*notes, reason)
     return SettledAxis(found.center, turned, found, found.record(), notes)
+
+
+def doubted_vectors(scan: ScanFile, vectors: Vectors) -> tuple[str, ...]:
+    """What the data have against the sense of rotation of vectors that nearly are a cone's.
+
+    Vectors are taken as they are; a sentence says that images or vectors are mirrored.
+
+    Raises:
+        NonFiniteError: a sample is not finite.
+    """
+    found = nearly_upright(vectors)
+    if found is None:
+        return ()
+    cone, turned_over, mirrored = found
+    row = round(min(max(cone.center[0], 0), cone.rows - 1))
+    row = cone.rows - 1 - row if turned_over else row
+    line = read_attenuation(scan, row, row + 1).projections[:, 0]
+    doubt = sense_doubt(line[:, ::-1] if mirrored else line, cone.fan())
+    if not doubt:
+        return ()
+    return (
+        f"{doubt}: the images are mirrored, or the vectors are. They were taken as they are; turn "
+        "the images, or mend the vectors (--geometry).",
+    )
 
 
 def _of_cone(

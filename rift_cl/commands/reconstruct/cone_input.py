@@ -11,7 +11,7 @@ import numpy as np
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
-from rift_cl.commands.inputs.scan_axis import settled_axis
+from rift_cl.commands.inputs.scan_axis import doubted_vectors, settled_axis
 from rift_cl.commands.inputs.scan_rows import check_center, scan_identity
 from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
 from rift_cl.commands.reconstruct.clean_rows import Alignment, CleanRows
@@ -264,6 +264,8 @@ class ConeInput:
         if self._axis_taken:
             return {"center": self.center, "by": "search"}
         cone = self.file.cone
+        if isinstance(cone, Vectors):
+            self.notes += doubted_vectors(self.file, cone)
         if not isinstance(cone, Cone):
             return {"center": (self.file.shape[2] - 1) / 2, "by": "the vectors"}
         axis = settled_axis(self.file, cone.center[1], self.device)

@@ -74,7 +74,7 @@ def fan_doubt(sinogram: Views, fan: Fan) -> str:
 
 
 def disagreement(sinogram: Views, fan: Fan) -> float:
-    """How far opposite rays disagree in either sense, about whatever centre is best.
+    """How far opposite rays disagree, about whatever centre is best.
 
     Args:
         sinogram: line integrals of one row, (view, bin).
@@ -86,11 +86,28 @@ def disagreement(sinogram: Views, fan: Fan) -> float:
     """
     reach = _APART * fan.bins
     centers = fan.center + np.linspace(-reach, reach, _PLACES)
-    ways = (fan.at(sign * fan.angles) for sign in (1, -1))
     return min(
-        _Rays(sinogram, replace(way, center=center)).disagreement(1.0, 1.0)
-        for way in ways
+        _Rays(sinogram, replace(fan, center=center)).disagreement(1.0, 1.0)
         for center in centers.tolist()
+    )
+
+
+def sense_doubt(sinogram: Views, fan: Fan) -> str:
+    """What opposite rays have against the sense in which the angles run, whatever the centre.
+
+    Args:
+        sinogram: line integrals of one row, (view, bin).
+        fan: its geometry but for the centre.
+
+    Returns:
+        A sentence; empty where the rays agree, or do not tell.
+    """
+    given, reversed_ = (disagreement(sinogram, fan.at(s * fan.angles)) for s in (1, -1))
+    if not _DOUBTED_TURN < given < np.inf or reversed_ > _LEFT * given:
+        return ""
+    return (
+        f"Rays that measure the same line differ by {given:.2f} of what unrelated ones do, and by "
+        f"{reversed_:.2f} if the source goes round the other way"
     )
 
 

@@ -74,7 +74,7 @@ def _disagreement_of_a_row(seen: Views, scan: Cone) -> float:
     """Of opposite rays of the row nearest to the orbit's."""
     views, rows = looked_at(scan)
     row = int(np.abs(np.array(rows) - scan.center[0]).argmin())
-    return disagreement(seen[:, row], scan.fan().subset(np.array(views)))
+    return _in_either_sense(seen[:, row], scan.fan().subset(np.array(views)))
 
 
 def _disagreement_of_a_column(seen: Views, scan: Cone) -> float:
@@ -90,4 +90,8 @@ def _disagreement_of_a_column(seen: Views, scan: Cone) -> float:
         scan.source_to_detector,
         (scan.center[0] + 0.5) / step - 0.5,
     )
-    return disagreement(np.ascontiguousarray(seen[:, :, column]), fan)
+    return _in_either_sense(seen[:, :, column], fan)
+
+
+def _in_either_sense(sinogram: Views, fan: Fan) -> float:
+    return min(disagreement(sinogram, fan.at(sign * fan.angles)) for sign in (1, -1))
