@@ -7,6 +7,7 @@ gives back C-ordered native float32 (float64 where wanted) of the wanted shape, 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeGuard
 
@@ -60,10 +61,20 @@ def as_host_array(
     """
     array = as_real_array(values, name=name)
     if array.shape != shape:
-        raise ShapeError(f"{name} has shape {array.shape}, {wants} wants {shape}")
+        remedy = _other_order(name, array.shape, shape)
+        raise ShapeError(f"{name} has shape {array.shape}, {wants} wants {shape}{remedy}")
     plain = as_plain(array, dtype)
     check_finite(plain, name=name)
     return plain
+
+
+def _other_order(name: str, given: tuple[int, ...], wanted: tuple[int, ...]) -> str:
+    """How the error ends where the same axes come in another order, as rows for bins do."""
+    if sorted(given) != sorted(wanted):
+        return ""
+    orders = itertools.permutations(range(len(given)))
+    order = next(axes for axes in orders if tuple(given[axis] for axis in axes) == wanted)
+    return f": are its axes in another order? numpy.transpose({name}, {order}) has this shape"
 
 
 def as_real_array(values: Any, *, name: str) -> NDArray[Any]:

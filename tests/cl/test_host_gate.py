@@ -89,6 +89,13 @@ def test_another_shape_is_refused_and_both_are_named(shape, wanted):
     assert all(text in str(caught.value) for text in (str(shape), str(wanted), "sinogram"))
 
 
+def test_axes_in_another_order_are_told_with_what_puts_them_right():
+    values = np.zeros((60, 20, 10))
+    with pytest.raises(ShapeError, match="another order") as refused:
+        _gate(values, (60, 10, 20))
+    assert "numpy.transpose(sinogram, (0, 2, 1))" in str(refused.value)
+
+
 @pytest.mark.parametrize("dtype", WRONG)
 def test_what_is_no_real_number_is_refused(dtype, device):
     array = np.zeros((2, 2), dtype)
