@@ -118,6 +118,12 @@ def test_npz_distances(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", **arrays, sid=50.0, sdd=200.0, du=0.2, dv=0.25)
     cone = cone_of(open_scan(tmp_path / "a.npz"))
     assert cone.pitch == (0.25, 0.2) and cone.magnification == 4
+    for curved in (1, 0):
+        np.savez(tmp_path / "a.npz", **arrays, sid=50.0, sdd=200.0, pitch=0.2, curved=curved)
+        assert cone_of(open_scan(tmp_path / "a.npz")).curved is bool(curved)
+    np.savez(tmp_path / "a.npz", **arrays, sid=50.0, sdd=200.0, pitch=0.2, curved=300.0)
+    with pytest.raises(InputError, match="'curved' is 300"):
+        open_scan(tmp_path / "a.npz")
     np.savez(tmp_path / "b.npz", **arrays, sid=50.0, sdd=200.0)
     with pytest.raises(InputError, match=r"no pitch.*--geometry"):
         open_scan(tmp_path / "b.npz")

@@ -1,8 +1,8 @@
 """Our own layout of a scan in a file of named arrays, NPZ or Zarr.
 
 ``projections`` (angle, row, bin) or ``sinogram`` (angle, bin), ``angles`` in radians, and where
-there are such ``flats``, ``darks``, ``pitch``, and the distances of a source with ``center`` and
-``heights``.
+there are such ``flats``, ``darks``, ``pitch``, and the distances of a source with ``center``,
+``heights`` and ``curved``.
 """
 
 from __future__ import annotations
@@ -94,12 +94,19 @@ def _beam(store: ArrayStore) -> tuple[Beam | None, tuple[str, ...]]:
             raise ShapeError(f"{store.path}: 'center' has {values.size} numbers, not row and bin")
         center = (float(values[0]), float(values[1]))
     heights = store.vector(named["heights"]) if "heights" in named else None
+    curved = _first_number(store, named, ("curved",)) or 0.0
+    if curved not in (0, 1):
+        raise InputError(
+            f"{store.path}: 'curved' is {curved:g}, wanted 1 where rows are arcs about the source, "
+            "else 0"
+        )
     return Beam(
         source_to_axis=to_axis,
         source_to_detector=to_detector,
         pitch=pitch,
         center=center,
         heights=heights,
+        curved=bool(curved),
     ), (f"Distances of the source are {listed}, in the unit of the pitch.",)
 
 
