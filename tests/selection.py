@@ -19,7 +19,7 @@ they share kernels). Marks change that:
   notebooks are, but for one, since their code and their commands are run as pages
   (``test_documents``). ``-m study`` runs all of them.
 
-A test of eight and more rows is dealt in any case: each kind of device gets half of them, and,
+A test of four and more rows is dealt in any case: each kind of device gets half of them, and,
 where there are several parameters, each value of every one.
 
 ``pytest -m rest`` is ``-m full`` without what the last plain ``pytest`` passed, for .ci/run, which
@@ -53,7 +53,7 @@ MARKS = (
 _WORKER_BYTES = 3 << 30
 _MOST_WORKERS = 8
 # From this many rows of parameters on, a row is run on one kind of device.
-_MANY_ROWS = 8
+_MANY_ROWS = 4
 # Where pytest's cache keeps what plain ``pytest`` passed.
 _PASSED_KEY = "selection/passed"
 _passed: set[str] = set()
@@ -96,7 +96,8 @@ def _use_all_cores(config: pytest.Config) -> None:
     if getattr(option, "numprocesses", 0) is not None or option.usepdb or option.collectonly:
         return
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    workers = max(1, min(cores or 1, _memory() // _WORKER_BYTES, _MOST_WORKERS))
+    # One more than cores, for tests wait as well: for processes, disks and browsers.
+    workers = max(1, min((cores or 1) + 1, _memory() // _WORKER_BYTES, _MOST_WORKERS))
     if workers == 1:
         return
     # PoCL's threads of one worker would take every core from the others.

@@ -48,7 +48,7 @@ def likeness(picture, photograph, there):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("name", CAPTURES)
+@pytest.mark.parametrize("name", ["ornament", pytest.param("fox", marks=pytest.mark.study)])
 def test_a_fit_that_runs_is_seen_from_its_photographs(tmp_path, name):
     pytest.importorskip("viser", reason="viser is not installed")
     path = CAPTURES[name]

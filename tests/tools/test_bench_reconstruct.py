@@ -6,9 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 
 
+# Turns themselves are those of tests/tools/test_bench_splats.py.
+@pytest.mark.study
 def test_two_versions_take_turns(tmp_path):
     record = tmp_path / "figures.json"
     options = ["--rows", "2", "--views", "90", "--bins", "64", "--center", "33", "--rounds", "1"]
