@@ -61,6 +61,16 @@ def test_what_another_run_wrote_meanwhile_is_not_written_over(tmp_path):
     late.release()
 
 
+def test_a_run_that_is_gone_meanwhile_is_replaced(tmp_path):
+    """As the demo's second run removes the fits of its first."""
+    RunFolder(tmp_path, "plan").mark()
+    again = RunFolder(tmp_path, "plan", overwrite=True)
+    (tmp_path / "config.json").unlink()
+    again.make()
+    again.release()
+    assert (tmp_path / "config.json").is_file()
+
+
 def test_windows_locks_a_byte_behind_the_note(tmp_path, monkeypatch):
     """By a stand-in for its module, with which nobody may open the file to remove it."""
     locked, removed = [], []

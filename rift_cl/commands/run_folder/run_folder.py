@@ -147,7 +147,10 @@ class RunFolder:
         """
         make_folder(self.path)
         keep(self.path)
-        if self._config_stamp() != self._seen:
+        stamp = self._config_stamp()
+        # The demo removes the fits of an earlier one: a run that is gone can be replaced.
+        gone = self._overwrite and stamp is None
+        if stamp != self._seen and not gone:
             self.release()
             raise OutputError(
                 f"{self.path}: another run has written here meanwhile: begin this one again"
