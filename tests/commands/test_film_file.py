@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -82,6 +84,20 @@ def test_the_same_frames_give_the_same_bytes(av, tmp_path, kind):
     chosen(kind)
     one, two = (written(tmp_path / name, kind, frames()) for name in "ab")
     assert one == two != written(tmp_path / "c", kind, frames()[::-1])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.skipif(sys.platform != "linux", reason="threads have priorities in Linux")
+def test_no_thread_becomes_more_urgent_than_all_others(av, tmp_path, kind):
+    """SVT-AV1 makes itself and its caller real-time threads where root calls it."""
+    chosen(kind)
+    before = os.sched_getscheduler(0)
+    with film_writer(tmp_path / "film", kind, SIZE, 24.0) as add:
+        for picture in frames(3):
+            add(picture)
+            threads = [int(thread.name) for thread in Path("/proc/self/task").iterdir()]
+            assert {os.sched_getscheduler(thread) for thread in threads} == {before}
+    assert os.sched_getscheduler(0) == before
 
 
 def test_an_odd_edge_loses_its_last_row(av, tmp_path):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -29,6 +29,8 @@ Codes = NDArray[np.uint8]
 
 # ITU-R BT.709 and its range from 16 to 235, in the numbers of FFmpeg.
 _BT709, _LIMITED = 1, 1
+# Of this process, as Linux lists them.
+_THREADS = Path("/proc/self/task")
 
 
 @dataclass(frozen=True)
@@ -129,12 +131,33 @@ def _encoding(path: Path, encoder: _Encoder, size: tuple[int, int]) -> Iterator[
     import av
 
     try:
-        yield
+        with _kept_priority():
+            yield
     except (av.FFmpegError, ValueError) as error:
         raise OutputError(
             f"{path}: {encoder.codec} writes no film of {size[1]} x {size[0]} pixels "
             f"({error}); say --film apng, or another --size"
         ) from error
+
+
+@contextmanager
+def _kept_priority() -> Iterator[None]:
+    """Take back the real-time priority that SVT-AV1 gives its caller, and itself, where root calls.
+
+    It would last as long as the process, hold for whatever that starts, and let nothing else run.
+    """
+    if not (hasattr(os, "sched_setscheduler") and _THREADS.is_dir()):
+        yield
+        return
+    policy, priority = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        yield
+    finally:
+        if os.sched_getscheduler(0) != policy:
+            for thread in _THREADS.iterdir():
+                # A thread may end meanwhile.
+                with suppress(OSError):
+                    os.sched_setscheduler(int(thread.name), policy, priority)
 
 
 def _stream(container: Any, encoder: _Encoder, size: tuple[int, int], rate: float) -> Any:
