@@ -12,13 +12,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.build.builder import Builder, Key, building
-from rift_cl.cl.build.first_launch import told_launch
+from rift_cl.cl.build.first_launch import FirstLaunch, Way, told_launch, way_of
 from rift_cl.cl.build.kernel_cache import build_lock
 from rift_cl.cl.build.kernel_features import feature_of
 from rift_cl.cl.build.source import kernel_source
@@ -34,8 +35,6 @@ from rift_cl.progress import BUILDS
 if TYPE_CHECKING:
     from rift_cl.cl.device import Device
 
-# PoCL compiles for grids up to this size and for larger ones apart.
-_SMALL_GRID = 65534
 # Items of a group that know of each other: the kernel's driver in Python counts in groups as well.
 _COOPERATES = "get_local_id"
 # Such a kernel works in smaller groups as well where its launches say of how many items they would
@@ -44,26 +43,27 @@ _GROUP = "GROUP"
 # What a grid's lengths are given as: looked up in a set, since there is one at every launch.
 _WHOLE = frozenset({int, *(np.dtype(code).type for code in np.typecodes["AllInteger"])})
 _MOST_AXES = 3
-# Ways in which PoCL compiles a kernel apart: for a large grid, and for a part of a grid.
-_Way = tuple[bool, bool]
 
 
-class _Kernel(NamedTuple):
+@dataclass(slots=True)
+class _Kernel:
     """A kernel object of one thread, what the kernel takes, and the size of its groups.
 
     Args:
         key: the kernel and its macros.
+        program: the program that it is of, which may become another at a first launch.
         handle: the ``pyopencl.Kernel``.
         signature: what it takes.
         group: work-items of a group.
-        started: ways in which any thread has launched it before.
+        started: ways in which any thread has launched it of this program before.
     """
 
     key: Key
+    program: Any
     handle: Any
     signature: Signature
     group: int
-    started: set[_Way]
+    started: set[Way]
 
 
 class _Launch(NamedTuple):
@@ -103,7 +103,7 @@ class Programs:
     def __init__(self, device: Device) -> None:
         self._device = device
         self._builder = Builder(device)
-        self._started: dict[Key, set[_Way]] = {}
+        self._started: dict[Any, set[Way]] = {}
         self._own = _ThreadKernels()
         seconds = device.traits.seconds
         self._times = None if seconds is None else LaunchTimes(seconds, device.finish)
@@ -204,20 +204,30 @@ class Programs:
         import pyopencl as cl
 
         queue = self._device.queue
-        way = max(size) > _SMALL_GRID, offset is not None
+        way = way_of(size, offset)
         if way in kernel.started:
             cl.enqueue_nd_range_kernel(queue, kernel.handle, size, local, offset)
             return
-        # PoCL compiles again for the first launch, into the same cache, and may die of it.
+        # PoCL compiles again for the first launch, and may die of it.
         name = kernel.key[0]
         taken = [each.dtype if each.lanes else None for each in kernel.signature.parameters]
         launch = told_launch(size, local, offset, zip(taken, values, strict=True))
-        begun = self._builder.first_launch(kernel.key, launch)
-        with building, build_lock(name), BUILDS.of(name), begun:
-            cl.enqueue_nd_range_kernel(queue, kernel.handle, size, local, offset)
-            with in_driver(f"running {name}", self._device.name):
-                queue.finish()
+        with building, build_lock(name), BUILDS.of(name):
+            self._renew(kernel, values, launch)
+            with self._builder.first_launch(kernel.key, launch):
+                cl.enqueue_nd_range_kernel(queue, kernel.handle, size, local, offset)
+                with in_driver(f"running {name}", self._device.name):
+                    queue.finish()
             kernel.started.add(way)
+
+    def _renew(self, kernel: _Kernel, values: list[Any], launch: FirstLaunch) -> None:
+        """Give a kernel the program that can be launched so, where that is another."""
+        program = self._builder.launchable(kernel.key, launch)
+        if program is not kernel.program:
+            kernel.program = program
+            kernel.handle = self._handle(program, kernel.key[0], kernel.signature)
+            kernel.handle.set_args(*values)
+            kernel.started = self._started.setdefault(program, set())
 
     def _kernel(self, key: Key) -> _Kernel:
         kernel = self._own.kernels.get(key)
@@ -233,26 +243,31 @@ class Programs:
             DeviceError: its groups are too large, or take too much local memory, in a kernel that
                 is not made for smaller ones.
         """
-        import pyopencl as cl
-
         name, macros = key
         program = self._builder.program(key)
         with building, named_errors(f"loading kernel {name}", self._device.name):
-            handle = cl.Kernel(program, name)
             found = signature(name, kernel_source(name), self._builder.defines(macros))
-            # Numbers whose types are known beforehand are set many times faster.
-            handle.set_scalar_arg_dtypes(
-                [each.dtype.type if each.lanes == 1 else None for each in found.parameters]
-            )
+            handle = self._handle(program, name, found)
             needs = kernel_needs(handle, self._device._handle)
         fault = self._fault(needs, group)
         if fault is None:
-            return _Kernel(key, handle, found, group, self._started.setdefault(key, set()))
+            started = self._started.setdefault(program, set())
+            return _Kernel(key, program, handle, found, group, started)
         fixed = _COOPERATES in kernel_source(name) and _GROUP not in dict(macros)
         if group == 1 or fixed:
             raise DeviceError(f"{feature_of(name)}: {fault}: use another device (--device)")
         smaller = {**dict(macros), _GROUP: str(group // 2)}
         return self._built((name, tuple(sorted(smaller.items()))), group // 2)
+
+    def _handle(self, program: Any, name: str, taken: Signature) -> Any:
+        import pyopencl as cl
+
+        handle = cl.Kernel(program, name)
+        # Numbers whose types are known beforehand are set many times faster.
+        handle.set_scalar_arg_dtypes(
+            [each.dtype.type if each.lanes == 1 else None for each in taken.parameters]
+        )
+        return handle
 
     def _fault(self, needs: KernelNeeds, group: int) -> str | None:
         """Why a kernel does not run on this device in groups of so many items; None if it does."""

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
+import subprocess
 import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import rift_cl as rift
 from rift_cl.cl.build import guarded_build as guarded_build_module
-from rift_cl.cl.build.first_launch import told_launch
+from rift_cl.cl.build.first_launch import smallest_alike, told_launch, way_of
 from rift_cl.cl.build.guarded_build import Built, Request, Worker, guarded_build
 from rift_cl.errors import DeviceError
 
@@ -54,6 +59,44 @@ def test_child_meets_nothing_that_a_dead_one_left_in_its_drivers_cache(worker):
     leaves = "open(os.environ['POCL_CACHE_DIR'] + '/left', 'x')"
     built = guarded_build(REQUEST, worker(f"{leaves}; 'noinline' in request['source'] or {DIES}"))
     assert built.way == "noinline"
+
+
+def test_child_whose_process_is_killed_leaves_nothing_behind(tmp_path):
+    starts = (
+        "from rift_cl.cl.build.guarded_build import Worker\n"
+        "import os, signal\n"
+        "worker = Worker()\n"
+        "worker.ask({'selector': 'none'})\n"
+        "print(worker._scratch.name, flush=True)\n"
+        "os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    own = {"TMPDIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parents[2])}
+    done = subprocess.run(
+        [sys.executable, "-c", starts],
+        env={**os.environ, **own},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    place = Path(done.stdout.strip())
+    until = time.monotonic() + 120
+    while place.exists() and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not place.exists()
+
+
+def test_child_that_dies_after_other_work_is_no_verdict(worker):
+    twice = worker(f"served = globals().get('served', 0) + 1; served > 1 and {DIES}")
+    assert guarded_build(REQUEST, twice).way == ""
+    assert guarded_build(REQUEST, twice) == Built(b"binary", "", "", "")
+
+
+def test_child_that_dies_where_the_disk_is_full_is_no_verdict(worker, monkeypatch):
+    monkeypatch.setattr(guarded_build_module, "room", lambda _: 1000.0)
+    built = guarded_build(REQUEST, worker(DIES))
+    assert (built.passing, built.binary) == (True, None)
+    assert "is full" in built.fault
 
 
 @pytest.mark.parametrize("way", ["noinline", "nothing"])
@@ -148,6 +191,20 @@ LATE = """
 #endif
 __kernel void probe(__global int *p, ulong where) { *PLACE = 1; }
 """
+
+
+@pytest.mark.parametrize(
+    ("size", "local", "alike"),
+    [
+        ([1024, 7], [64, 1], [64, 1]),
+        ([65_536], [64], [65_536]),
+        ([100_032, 3], [64, 1], [65_536, 1]),
+        ([64, 70_000], [64, 1], [64, 65_535]),
+    ],
+)
+def test_a_repeated_grid_is_the_smallest_that_is_compiled_for_alike(size, local, alike):
+    assert smallest_alike(size, local) == alike
+    assert way_of(alike, None) == way_of(size, None)
 
 
 @pytest.mark.parametrize(("offset", "died"), [(None, True), ([4], True), (None, False)])

@@ -1,10 +1,11 @@
 """Building kernels: the only caller of the driver's compiler.
 
-A program is built once per device, kernel and macros. A driver that keeps what it compiles in our
-cache folder, as PoCL does, compiles in this process, but for kernels that it died of before. For
-any other the binaries are kept by us (``program_store``), and a child process compiles them
-(``guarded_build``): a compiler that dies or hangs does not take this process with it. Where a
-process died of a first launch, which drivers compile for as well, the child repeats that launch.
+A program is built once per device, kernel and macros, and first in a child process
+(``guarded_build``): a compiler that dies or hangs does not take this process with it. What came of
+it is kept in a store of our own (``program_store``), with the binary; a driver that keeps what it
+compiles in our cache folder, as PoCL does, finds there what the child's has compiled. Drivers may
+compile again for a first launch, which the child therefore does before this process. Where one died
+of either all the same, the next keeps the binary in the store for such a driver too.
 """
 
 from __future__ import annotations
@@ -16,16 +17,17 @@ import time
 import warnings
 from contextlib import AbstractContextManager
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rift_cl.cl.build.driver_record import OTHER_KIND, keeps_programs, read_record
-from rift_cl.cl.build.first_launch import FirstLaunch
+from rift_cl.cl.build.first_launch import FirstLaunch, way_of
 from rift_cl.cl.build.guarded_build import (
     UNOPTIMIZED,
     Request,
     guarded_build,
+    guarded_launch,
     way_to_build,
 )
 from rift_cl.cl.build.kernel_cache import build_lock
@@ -58,6 +60,22 @@ _PAUSES = (0.0, 0.1, 0.3)
 _DOUBLE = ("DOUBLE", "1")
 
 
+class _Recipe(NamedTuple):
+    """What a program is compiled from.
+
+    Args:
+        entry: its name in the store.
+        key: the kernel and its macros.
+        source: with the includes in line.
+        options: what the compiler is given.
+    """
+
+    entry: str
+    key: Key
+    source: str
+    options: list[str]
+
+
 class Builder:
     """The built programs of one device.
 
@@ -70,7 +88,7 @@ class Builder:
         warnings.filterwarnings("ignore", message="Non-empty compiler output")
         self._device = device
         self._programs: dict[Key, Any] = {}
-        self._entries: dict[Key, str] = {}
+        self._recipes: dict[Key, _Recipe] = {}
         self._refused: dict[Key, str] = {}
 
     def defines(self, macros: tuple[tuple[str, str], ...]) -> dict[str, str]:
@@ -99,12 +117,36 @@ class Builder:
                     self._programs[key] = self._build(key)
             return self._programs[key]
 
+    def launchable(self, key: Key, launch: FirstLaunch) -> Any:
+        """The program to launch in a way that is new to this process; hold the kernel's lock.
+
+        Where the driver would compile for it, a child launches it before. If its compiler dies of
+        that, the program is another from then on, built with a workaround.
+
+        Raises:
+            KernelBuildError: there is no way in which it can be launched.
+        """
+        recipe = self._recipes[key]
+        stored = load(recipe.entry) if self.keeps_programs else None
+        way = list(way_of(launch["size"], launch["offset"]))
+        if stored is None or stored.binary or way in stored.about["launched"]:
+            return self._programs[key]
+        about = stored.about
+        fault = guarded_launch(self._request(recipe, about["way"], [launch]))
+        if not fault:
+            about = {**about, "launched": [*about["launched"], way]}
+            save(recipe.entry, Stored(about, b""))
+        else:
+            found = {**about, "launches": [*about["launches"], launch]}
+            self._programs[key] = self._guarded(recipe, found, binary=False)
+        return self._programs[key]
+
     def first_launch(self, key: Key, launch: FirstLaunch) -> AbstractContextManager[None]:
         """Mark a built program while it is first launched, which some drivers compile for.
 
-        The next process leaves it to a child if this one dies of it; hold the build lock.
+        The next process knows of it if this one dies of it; hold the kernel's lock.
         """
-        return begun(self._entries[key], launch)
+        return begun(self._recipes[key].entry, launch)
 
     def _build(self, key: Key) -> Any:
         name, macros = key
@@ -114,12 +156,15 @@ class Builder:
         optimized = () if self._device.traits.optimized else (UNOPTIMIZED,)
         options = [*OPTIONS, *optimized, *(f"-D{macro}={value}" for macro, value in defines)]
         source, options = way_to_build(self._known.get("way", ""), kernel_source(name), options)
-        entry = self._entries[key] = program_name(self._driver, source, options)
-        if self.keeps_programs:
-            program = self._compiled(entry, name, source, options)
-            if program is not None:
-                return program
-        return self._stored(entry, key, source, options)
+        entry = program_name(self._driver, source, options)
+        recipe = self._recipes[key] = _Recipe(entry, key, source, options)
+        if key in self._refused:
+            raise KernelBuildError(self._refused[key])
+        # It is found out under a lock of its own, the first time.
+        keeps = self.keeps_programs
+        # The first launch, which compiles as well, writes down what both left.
+        with build_lock(name, write_down=False):
+            return self._stored(recipe, keeps)
 
     @cached_property
     def _driver(self) -> dict[str, str]:
@@ -151,67 +196,33 @@ class Builder:
                 "or another version of the driver ('rift devices --retest' tests it again)"
             )
 
-    def _compiled(self, entry: str, name: str, source: str, options: list[str]) -> Any:
-        """A program that the driver compiles in this process, or takes from a cache of its own.
-
-        None where a process once died of it: a child compiles it, or did so.
-        """
+    def _stored(self, recipe: _Recipe, keeps: bool) -> Any:
+        """A program of the store, which a child process compiles where it is not there yet."""
         import pyopencl as cl
 
-        failure = ""
-        for pause in _PAUSES:
-            time.sleep(pause)
-            try:
-                # Its first launch, which compiles as well, writes down what both left.
-                with build_lock(name, write_down=False):
-                    if unfinished(entry) is not None or load(entry) is not None:
-                        return None
-                    with begun(entry):
-                        return cl.Program(self._device.context, source).build(options)
-            except cl.Error as error:
-                failure = str(error)
-            # An empty log is PoCL's way to lose a race for its cache; a real error has one.
-            if _log(failure):
-                break
-        raise _build_error(name, failure, options, self._device.name)
-
-    def _stored(self, entry: str, key: Key, source: str, options: list[str]) -> Any:
-        """A program of our own store, which a child process compiles where it is not there yet."""
-        import pyopencl as cl
-
-        name = key[0]
-        if key in self._refused:
-            raise KernelBuildError(self._refused[key])
-        with build_lock(name, write_down=False):
-            died_of = unfinished(entry) or []
-        stored = load(entry)
+        died_of = unfinished(recipe.entry)
+        stored = load(recipe.entry)
         kept = stored.about if stored else {}
-        launches = [*kept.get("launches", []), *died_of]
-        if stored is not None and is_settled(kept) and not died_of:
+        if stored is not None and is_settled(kept) and died_of is None:
             # A driver need not take what it gave; then it compiles again.
             with contextlib.suppress(cl.Error):
-                return self._loaded(key, stored, source, options)
-            remove(entry)
-        stored = self._guarded(entry, key, source, options, {**kept, "launches": launches})
-        with named_errors(f"loading kernel {name}", self._device.name):
-            return self._loaded(key, stored, source, options)
+                return self._loaded(recipe, stored)
+            remove(recipe.entry)
+        launches = [*kept.get("launches", []), *(died_of or [])]
+        binary = not keeps or died_of is not None or bool(stored and stored.binary)
+        return self._guarded(recipe, {**kept, "launches": launches}, binary)
 
-    def _guarded(
-        self, entry: str, key: Key, source: str, options: list[str], kept: dict[str, Any]
-    ) -> Stored:
+    def _guarded(self, recipe: _Recipe, kept: dict[str, Any], binary: bool) -> Any:
         """A program that a child process compiles, stored if nothing else had a hand in it.
 
         Args:
-            entry: its name in the store.
-            key: the kernel and its macros.
-            source: with what its way of building wants.
-            options: the same.
+            recipe: what it is compiled from.
             kept: what the store says of it, and the launches that processes died of.
+            binary: whether the store is to keep the binary.
         """
-        name, macros = key
+        name, macros = recipe.key
         device, launches = self._device, kept["launches"]
-        request = Request(device.selector, device.name, name, source, options, launches)
-        built = guarded_build(request)
+        built = guarded_build(self._request(recipe, "", launches, binary))
         there = built.binary is not None
         if built.passing and not there:
             raise KernelBuildError(
@@ -220,18 +231,29 @@ class Builder:
                 "again"
             )
         if built.log and not there:
-            raise _build_error(name, built.log, options, device.name)
+            raise _build_error(name, built.log, recipe.options, device.name)
         about = {"kernel": name, "macros": dict(macros), "driver": self._driver, "built": there}
         about |= {"way": built.way, "fault": built.fault, "launches": launches}
+        about["launched"] = [way_of(each["size"], each["offset"]) for each in launches]
         if not there:
             met = 0 if kept.get("built", True) else kept.get("met", 0)
             about |= {"met": met + 1, "when": time.time()}
         stored = Stored(about, built.binary or b"")
         if not built.passing:
-            save(entry, stored)
-        return stored
+            save(recipe.entry, stored)
+        with named_errors(f"loading kernel {name}", device.name):
+            return self._loaded(recipe, stored)
 
-    def _loaded(self, key: Key, stored: Stored, source: str, options: list[str]) -> Any:
+    def _request(
+        self, recipe: _Recipe, way: str, launches: list[FirstLaunch], binary: bool = False
+    ) -> Request:
+        source, options = way_to_build(way, recipe.source, recipe.options)
+        device = self._device
+        return Request(
+            device.selector, device.name, recipe.key[0], source, options, launches, binary
+        )
+
+    def _loaded(self, recipe: _Recipe, stored: Stored) -> Any:
         """The program that a file of the store stands for.
 
         Raises:
@@ -239,7 +261,7 @@ class Builder:
         """
         import pyopencl as cl
 
-        device, about = self._device, stored.about
+        device, about, key = self._device, stored.about, recipe.key
         if not about["built"]:
             macros = " ".join(f"{macro}={value}" for macro, value in about["macros"].items())
             again = "'rift devices --retest'" if is_settled(about) else "the next start"
@@ -250,11 +272,28 @@ class Builder:
             )
             raise KernelBuildError(self._refused[key])
         context = device.context
-        if not stored.binary:
-            # The driver gives no binaries; the child saw that it compiles.
-            source, options = way_to_build(about["way"], source, options)
-            return cl.Program(context, source).build(options)
-        return cl.Program(context, context.devices, [stored.binary]).build()
+        if stored.binary:
+            return cl.Program(context, context.devices, [stored.binary]).build()
+        # The driver has it in its cache, or gives no binaries; the child saw that it compiles.
+        return self._compiled(recipe, about["way"])
+
+    def _compiled(self, recipe: _Recipe, way: str) -> Any:
+        """A program that the driver compiles in this process, or takes from a cache of its own."""
+        import pyopencl as cl
+
+        source, options = way_to_build(way, recipe.source, recipe.options)
+        failures = []
+        for pause in _PAUSES:
+            time.sleep(pause)
+            try:
+                with begun(recipe.entry):
+                    return cl.Program(self._device.context, source).build(options)
+            except cl.Error as error:
+                failures.append(error)
+            # An empty log is PoCL's way to lose a race for its cache; a real error has one.
+            if _log(str(failures[-1])):
+                break
+        raise failures[-1]
 
 
 def _log(text: str) -> str:

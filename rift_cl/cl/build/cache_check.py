@@ -39,7 +39,7 @@ def remove_damaged(folder: Path) -> int:
         The number of programs that were removed.
     """
     known = _read(folder)
-    found = dict(_files(folder))
+    found = dict(program_files(folder))
     damaged = {
         _program(name) for name, path in found.items() if not _is_as_recorded(known, name, path)
     }
@@ -69,7 +69,7 @@ def _is_folder(folder: Path, name: str) -> bool:
 def record(folder: Path) -> None:
     """Write down the checksums of files that are new; hold the build lock meanwhile."""
     known = _read(folder) or {}
-    new = {name: _checksum(path) for name, path in _files(folder) if name not in known}
+    new = {name: _checksum(path) for name, path in program_files(folder) if name not in known}
     if new:
         _write(folder, {**known, **new})
 
@@ -90,10 +90,10 @@ def own_file(path: Path) -> Path:
 
 def files_kept(folder: Path) -> int:
     """How many files drivers have put into the cache."""
-    return sum(1 for _ in _files(folder))
+    return sum(1 for _ in program_files(folder))
 
 
-def _files(folder: Path) -> Iterator[tuple[str, str]]:
+def program_files(folder: Path) -> Iterator[tuple[str, str]]:
     """Every file of every program: its name inside the cache, and its path.
 
     The cache is walked at every build, and os.walk would take twice as long over it. What lies

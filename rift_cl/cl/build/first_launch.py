@@ -1,8 +1,9 @@
 """A kernel's first launch, told so that another process can repeat it.
 
 Some drivers compile a kernel again when it is first launched, for the groups that it is launched
-in, and their compiler may die then as well. Whoever launches writes down beforehand what he is
-about to do; if he dies of it, the next process has a child do the same before it does.
+in, and their compiler may die then as well. So a child does the same before, over the smallest grid
+that is compiled for alike. Whoever launches writes down beforehand what he is about to do, so that
+the next process knows of it if he dies of it all the same.
 """
 
 from __future__ import annotations
@@ -10,9 +11,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+import numpy as np
+
 # A launch as JSON holds it: its grid, and of each argument the bytes of a number as text, the size
 # of a buffer, or null for none.
 FirstLaunch = dict[str, Any]
+# Ways in which PoCL compiles a kernel apart: for a large grid, and for a part of a grid.
+Way = tuple[bool, bool]
+# It compiles for grids up to this size and for larger ones apart.
+_SMALL_GRID = 65534
+# Longest buffers, in bytes, that are filled with zeros for a CPU: what is longer comes from the
+# system, which gives zeros, and takes no memory as long as nobody writes there.
+_FILLED = 1 << 26
+
+
+def way_of(size: Sequence[int], offset: Sequence[int] | None) -> Way:
+    """The way in which a kernel is compiled for a grid of ``size`` work-items at ``offset``."""
+    return max(size) > _SMALL_GRID, offset is not None
 
 
 def told_launch(
@@ -30,7 +45,6 @@ def told_launch(
         arguments: for each the type of a number (a NumPy dtype) or None, and the number, an array
             of numbers, or a buffer.
     """
-    import numpy as np
 
     def told(dtype: Any, value: Any) -> str | int | None:
         if value is None:
@@ -52,8 +66,19 @@ def without_numbers(launch: FirstLaunch) -> FirstLaunch:
     return {**launch, "arguments": list(told)}
 
 
+def smallest_alike(size: Sequence[int], local: Sequence[int]) -> list[int]:
+    """The smallest grid that a kernel is compiled for as for another: mostly one group."""
+    smallest = list(local)
+    if max(size) > _SMALL_GRID:
+        longest = int(np.argmax(size))
+        smallest[longest] *= _SMALL_GRID // local[longest] + 1
+    return smallest
+
+
 def repeat_launch(kernel: Any, context: Any, launch: FirstLaunch) -> None:
-    """Launch a kernel as another process did, on buffers that hold zeros, and wait for it.
+    """Launch a kernel as another process does, on buffers of zeros, and wait for it.
+
+    The grid is the smallest that is compiled for alike: a large one may take long.
 
     Args:
         kernel: the ``pyopencl.Kernel``.
@@ -65,10 +90,10 @@ def repeat_launch(kernel: Any, context: Any, launch: FirstLaunch) -> None:
             nothing can be found out.
         LookupError, TypeError, ValueError: it is not what ``told_launch`` told.
     """
-    import numpy as np
     import pyopencl as cl
 
     queue = cl.CommandQueue(context)
+    on_cpu = context.devices[0].type & cl.device_type.CPU
     buffers = []
     for place, told in enumerate(launch["arguments"]):
         if isinstance(told, str):
@@ -78,10 +103,12 @@ def repeat_launch(kernel: Any, context: Any, launch: FirstLaunch) -> None:
         if told is not None:
             try:
                 value = cl.Buffer(context, cl.mem_flags.READ_WRITE, told)
-                cl.enqueue_fill_buffer(queue, value, np.uint8(0), 0, told).wait()
+                if told <= _FILLED or not on_cpu:
+                    cl.enqueue_fill_buffer(queue, value, np.uint8(0), 0, told).wait()
             except (cl.MemoryError, MemoryError):
                 return
             buffers.append(value)
         kernel.set_arg(place, value)
-    cl.enqueue_nd_range_kernel(queue, kernel, launch["size"], launch["local"], launch["offset"])
+    size = smallest_alike(launch["size"], launch["local"])
+    cl.enqueue_nd_range_kernel(queue, kernel, size, launch["local"], launch["offset"])
     queue.finish()

@@ -1,6 +1,8 @@
 """Compiling where a compiler may die: in a child process, with workarounds for what it cannot do.
 
-One child per device lives as long as this process and is started again when it dies. A compiler
+One child per device lives as long as this process and is started again when it dies. Its driver
+has a cache of its own: what PoCL leaves in one as it dies, it would load without any kernel in it.
+What it leaves there otherwise is put into ours, where this process finds it compiled. A compiler
 that crashes, hangs or refuses a kernel is asked again in other ways, the gentlest first. Each time
 it may take half of what is left of twice ``LIMIT``: a kernel is waited for no longer than that,
 however often it is asked for, and again where nothing came of repeated launches. What a child says
@@ -22,8 +24,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from rift_cl.cl.build.cache_check import program_files
 from rift_cl.cl.build.first_launch import FirstLaunch, without_numbers
-from rift_cl.cl.build.worker import read_message, write_message
+from rift_cl.cl.build.kernel_cache import LEAST_ROOM, cache_folder, room
+from rift_cl.cl.build.program_store import write_whole
+from rift_cl.cl.build.worker import SCRATCH, read_message, write_message
 from rift_cl.errors import DeviceError
 
 # Seconds after which a compiler that is asked for the first time counts as hanging; and the least.
@@ -32,6 +37,9 @@ LIMIT, _LEAST = 300.0, 1.0
 _DYING = 20.0
 # Others end a child in these ways, as the system does where memory runs out; no compiler by itself.
 _ENDED = ("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP")
+# Seconds that repeated launches may take: all that they wait for is the compiler.
+_LONGEST_LAUNCHES = 120.0
+_HUNG, _FULL = "hung", "is full"
 UNOPTIMIZED = "-cl-opt-disable"
 # How a kernel is built: what stands before its source, and further options.
 WAYS = {
@@ -69,7 +77,8 @@ class Request(NamedTuple):
         kernel: its entry point.
         source: its source, with the includes in line.
         options: what the compiler is given.
-        launches: first launches that a process died of; the child tries them as well.
+        launches: first launches that the child tries as well.
+        binary: whether the binary is wanted; if not, our cache is given what the driver keeps.
     """
 
     selector: str
@@ -78,6 +87,7 @@ class Request(NamedTuple):
     source: str
     options: list[str]
     launches: Sequence[FirstLaunch] = ()
+    binary: bool = True
 
 
 def way_to_build(way: str, source: str, options: list[str]) -> tuple[str, list[str]]:
@@ -105,7 +115,7 @@ def guarded_build(request: Request, worker: Worker | None = None) -> Built:
             return Built(binary, way, first, log, passing)
         said = "" if answer is None else answer["error"]
         short = answer is not None and answer.get("short of memory", False)
-        passing |= short or any(signal in fault for signal in _ENDED)
+        passing |= short or _is_passing(fault)
         fault = fault or ("its compiler had no memory" if short else "its compiler refused it")
         first, log = first or fault, log or said
     if request.launches and (passing or len(request.launches) == 1):
@@ -113,6 +123,26 @@ def guarded_build(request: Request, worker: Worker | None = None) -> Built:
         # a child that somebody ends tells nothing.
         return guarded_build(request._replace(launches=()), worker)
     return Built(None, "", first, log, passing)
+
+
+def guarded_launch(request: Request) -> str:
+    """Have a child launch a kernel as this process is about to, and keep what is compiled for that.
+
+    Args:
+        request: the kernel, and the launch.
+
+    Returns:
+        What its compiler died of, empty for nothing; a child that somebody ended tells nothing,
+        nor does one that hangs, since the kernel itself may on zeros.
+    """
+    worker = _worker_of(request.selector)
+    fault, _, _ = _answer(request, worker, time.monotonic() + _LONGEST_LAUNCHES)
+    return "" if _is_passing(fault) or _HUNG in fault else fault
+
+
+def _is_passing(fault: str) -> bool:
+    """Whether a child came to its end by what was no doing of its compiler."""
+    return any(words in fault for words in (*_ENDED, _FULL))
 
 
 def _answer(
@@ -124,16 +154,16 @@ def _answer(
     fit together, as numbers and the zeros of its buffers do, or of numbers that are all zero; so
     that a launch which passes in one of these ways has been compiled.
     """
-    if not request.launches:
-        return worker.ask(request._asdict(), _half_of_what_is_left(until))
     found: tuple[str, dict[str, Any] | None, bytes] = ("", None, b"")
-    for launches in (request.launches, list(map(without_numbers, request.launches))):
+    tries = [request.launches, list(map(without_numbers, request.launches))]
+    for launches in tries if request.launches else [()]:
         asked = request._replace(launches=launches)._asdict()
         found = worker.ask(asked, _half_of_what_is_left(until))
-        # Nobody knows what it overwrote.
-        worker.close()
         if not found[0]:
             break
+    answer = found[1]
+    if answer is not None and "error" not in answer and not request.binary:
+        worker.hand_over()
     return found
 
 
@@ -161,6 +191,9 @@ class Worker:
     ) -> tuple[str, dict[str, Any] | None, bytes]:
         """Have a request answered, within ``limit`` seconds in place of the child's own.
 
+        A child that dies after other work may die of that, such as of a kernel that wrote where it
+        must not: a fresh one is asked again.
+
         Returns:
             What went wrong with the child, empty if nothing; its answer, or None; and the bytes
             that came with it.
@@ -170,23 +203,51 @@ class Worker:
         """
         limit = self.limit if limit is None else limit
         with self._asking:
-            process = self._started()
-            found: list[tuple[dict[str, Any], bytes]] = []
-            talk = threading.Thread(target=_talk, args=(process, request, found), daemon=True)
-            talk.start()
-            try:
-                talk.join(limit)
-            except BaseException:
-                self._end(process, 0)
-                raise
-            if found:
-                return "", *found[0]
-            hung = talk.is_alive()
-            status = self._end(process, 0 if hung else _DYING)
-            fault = (
-                f"its compiler hung for {limit:.3g} s" if hung else death_of("its compiler", status)
-            )
-            return fault, None, b""
+            fresh = self._process is None
+            found = self._ask(request, limit)
+            if not found[0] or fresh or _HUNG in found[0]:
+                return found
+            return self._ask(request, limit)
+
+    def _ask(
+        self, request: dict[str, Any], limit: float
+    ) -> tuple[str, dict[str, Any] | None, bytes]:
+        process = self._started()
+        found: list[tuple[dict[str, Any], bytes]] = []
+        talk = threading.Thread(target=_talk, args=(process, request, found), daemon=True)
+        talk.start()
+        try:
+            talk.join(limit)
+        except BaseException:
+            self._end(process, 0)
+            raise
+        if found:
+            return "", *found[0]
+        if talk.is_alive():
+            self._end(process, 0)
+            return f"its compiler {_HUNG} for {limit:.3g} s", None, b""
+        place = tempfile.gettempdir()
+        full = f": {place} {_FULL}" if room(Path(place)) < LEAST_ROOM else ""
+        return death_of("its compiler", self._end(process, _DYING)) + full, None, b""
+
+    def hand_over(self) -> None:
+        """Put what the child's driver has compiled into our cache; hold the kernel's lock.
+
+        Raises:
+            DeviceError: it cannot be written there.
+        """
+        if self._scratch is None:
+            return
+        folder = cache_folder()
+        try:
+            for name, path in program_files(Path(self._scratch.name)):
+                if not (folder / name).exists():
+                    write_whole(folder / name, Path(path).read_bytes())
+        except OSError as error:
+            raise DeviceError(
+                f"kernel cache {folder} cannot be written ({error.strerror or error}): make room, "
+                "or set RIFT_CACHE_DIR to another folder that you own"
+            ) from error
 
     def close(self) -> None:
         """End the child."""
@@ -198,14 +259,17 @@ class Worker:
             root = str(Path(__file__).parents[3])
             path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
             try:
-                # What PoCL leaves in its cache as it dies, it would load without any kernel in it.
-                self._scratch = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+                self._scratch = tempfile.TemporaryDirectory(
+                    prefix="rift-cl-compiler-", ignore_cleanup_errors=True
+                )
+                place = self._scratch.name
+                own = {"PYTHONPATH": path, "POCL_CACHE_DIR": place, SCRATCH: place}
                 self._process = subprocess.Popen(
                     self._command,
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     stderr=subprocess.DEVNULL,
-                    env={**os.environ, "PYTHONPATH": path, "POCL_CACHE_DIR": self._scratch.name},
+                    env={**os.environ, **own},
                 )
             except OSError as error:
                 self._clean()

@@ -36,7 +36,7 @@ except ImportError:
 _LOCK, _TURN = "build.lock", "turn.lock"
 _LOCK_SUFFIX = ".lock"
 # Bytes that a build is given: PoCL ends the process where its compiler cannot write.
-_LEAST_ROOM = 16 << 20
+LEAST_ROOM = 16 << 20
 
 
 def prepare_cache() -> None:
@@ -88,12 +88,12 @@ def _private(root: Path) -> Path | None:
             return None
         folder.chmod(0o700)
         with tempfile.TemporaryFile(dir=folder):
-            return folder if _room(folder) >= _LEAST_ROOM else None
+            return folder if room(folder) >= LEAST_ROOM else None
     except OSError:
         return None
 
 
-def _room(folder: Path) -> float:
+def room(folder: Path) -> float:
     """Bytes that a file in a folder may take: what the disk has left, or ``ulimit -f`` allows."""
     left = float(shutil.disk_usage(folder).free)
     if resource is not None:
@@ -110,7 +110,7 @@ def _temporary() -> Path:
     raise DeviceError(
         f"compiled kernels can be kept neither in {_root()} nor in a temporary folder: set "
         "RIFT_CACHE_DIR to a folder that you own and can write to, on a disk with "
-        f"{format_bytes(_LEAST_ROOM)} left"
+        f"{format_bytes(LEAST_ROOM)} left"
     )
 
 
@@ -138,16 +138,16 @@ def build_lock(kernel: str = "", *, write_down: bool = True) -> Iterator[None]:
             if kernel:
                 own = own_file(folder / f"{kernel}{_LOCK_SUFFIX}")
                 _lock(held.enter_context(own.open("w")))
-            room = _room(folder)
+            left = room(folder)
         except OSError as error:
             raise DeviceError(
                 f"kernel cache {folder} cannot be used any more ({error.strerror}): make it "
                 "writable, or set RIFT_CACHE_DIR to a folder that you own"
             ) from error
-        if kernel and room < _LEAST_ROOM:
+        if kernel and left < LEAST_ROOM:
             raise DeviceError(
-                f"kernel cache {folder}: {format_bytes(int(room))} are left for compiled kernels, "
-                f"wanted {format_bytes(_LEAST_ROOM)}: free some space on that disk, or set "
+                f"kernel cache {folder}: {format_bytes(int(left))} are left for compiled kernels, "
+                f"wanted {format_bytes(LEAST_ROOM)}: free some space on that disk, or set "
                 "RIFT_CACHE_DIR to a folder on another"
             )
         yield

@@ -4,13 +4,15 @@
 
 It reads requests from its input and writes answers to its output, each a JSON object behind its
 length (four bytes, big-endian); a binary follows the answer that announces its ``size``. It ends
-when its input does. What a driver prints goes nowhere.
+when its input does, and takes the folder with it that it was given for its driver's cache: whoever
+started it may have been killed. What a driver prints goes nowhere.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import struct
 import sys
@@ -21,6 +23,8 @@ from rift_cl.cl.build.first_launch import repeat_launch
 from rift_cl.cl.failures import is_out_of_memory
 from rift_cl.json_parsing import parse_json
 
+# The variable that names the folder.
+SCRATCH = "RIFT_COMPILER_SCRATCH"
 LENGTH = struct.Struct(">I")
 # The most bytes that are read at once: a source is some 100 KB, a compiler's log may be longer.
 _LONGEST = 1 << 26
@@ -57,6 +61,8 @@ def main() -> None:
     os.dup2(2, 1)
     while (request := read_message(sys.stdin.buffer)) is not None:
         write_message(answers, *_answer(request[0]))
+    if folder := os.environ.get(SCRATCH):
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _answer(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
@@ -68,7 +74,7 @@ def _answer(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
     try:
         context = _context(request["selector"], request["device"])
         program = cl.Program(context, request["source"]).build(request["options"])
-        binary = program.get_info(cl.program_info.BINARIES)[0]
+        binary = program.get_info(cl.program_info.BINARIES)[0] if request["binary"] else b""
         if binary:
             # Whoever asked will load it in a process that must not die of it.
             program = cl.Program(context, context.devices, [binary]).build()
