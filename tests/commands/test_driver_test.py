@@ -136,7 +136,8 @@ def test_way_that_puts_a_driver_right_is_taken_for_every_kernel(tested, monkeypa
     monkeypatch.setattr(builder, "way_to_build", lambda way, *rest: (seen.append(way), *rest)[1:])
     tested = _fresh()
     total(tested, tested.array(np.ones(5)))
-    assert seen == ["noinline"]
+    # The first is for the driver; a workaround for the kernel itself comes on top, here none.
+    assert (seen[0], set(seen[1:])) == ("noinline", {""})
 
 
 def test_kernels_of_the_other_kind_of_device_are_taken_where_they_alone_are_right(tested):
