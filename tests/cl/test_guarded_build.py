@@ -67,7 +67,7 @@ def test_child_whose_process_is_killed_leaves_nothing_behind(tmp_path):
         "import os, signal\n"
         "worker = Worker()\n"
         "worker.ask({'selector': 'none'})\n"
-        "print(worker._scratch.name, flush=True)\n"
+        "print(worker._scratch, flush=True)\n"
         "os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     own = {"TMPDIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parents[2])}
@@ -84,6 +84,27 @@ def test_child_whose_process_is_killed_leaves_nothing_behind(tmp_path):
     while place.exists() and time.monotonic() < until:
         time.sleep(0.1)
     assert not place.exists()
+
+
+def test_process_that_ends_leaves_nothing_behind_and_warns_of_nothing(tmp_path):
+    builds = (
+        "import rift_cl as rift\n"
+        "device = rift.default_device()\n"
+        "x = device.array([1.0, 2.0])\n"
+        "device.launch('axpby', (2,), x=x, y=x, a=1.0, b=1.0, size=2, RUN=1, DOUBLE=0)\n"
+        "from rift_cl.cl.build.guarded_build import _workers\n"
+        "assert _workers\n"
+    )
+    own = {"TMPDIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parents[2])}
+    done = subprocess.run(
+        [sys.executable, "-W", "error::ResourceWarning", "-c", builds],
+        env={**os.environ, **own, "RIFT_CACHE_DIR": str(tmp_path / "cache")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert [path.name for path in tmp_path.iterdir()] == ["cache"]
 
 
 def test_child_that_dies_after_other_work_is_no_verdict(worker):

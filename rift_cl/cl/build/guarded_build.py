@@ -14,6 +14,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -183,7 +184,7 @@ class Worker:
         self._command = command or [sys.executable, "-m", "rift_cl.cl.build.worker"]
         self.limit = limit
         self._process: subprocess.Popen[bytes] | None = None
-        self._scratch: tempfile.TemporaryDirectory[str] | None = None
+        self._scratch: str | None = None
         self._asking = threading.Lock()
 
     def ask(
@@ -240,7 +241,7 @@ class Worker:
             return
         folder = cache_folder()
         try:
-            for name, path in program_files(Path(self._scratch.name)):
+            for name, path in program_files(Path(self._scratch)):
                 if not (folder / name).exists():
                     write_whole(folder / name, Path(path).read_bytes())
         except OSError as error:
@@ -259,10 +260,7 @@ class Worker:
             root = str(Path(__file__).parents[3])
             path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
             try:
-                self._scratch = tempfile.TemporaryDirectory(
-                    prefix="rift-cl-compiler-", ignore_cleanup_errors=True
-                )
-                place = self._scratch.name
+                place = self._scratch = tempfile.mkdtemp(prefix="rift-cl-compiler-")
                 own = {"PYTHONPATH": path, "POCL_CACHE_DIR": place, SCRATCH: place}
                 self._process = subprocess.Popen(
                     self._command,
@@ -297,7 +295,7 @@ class Worker:
 
     def _clean(self) -> None:
         if self._scratch is not None:
-            self._scratch.cleanup()
+            shutil.rmtree(self._scratch, ignore_errors=True)
             self._scratch = None
 
 
