@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -61,22 +59,16 @@ def test_child_meets_nothing_that_a_dead_one_left_in_its_drivers_cache(worker):
     assert built.way == "noinline"
 
 
-def test_child_whose_process_is_killed_leaves_nothing_behind(tmp_path):
-    starts = (
+@pytest.mark.skipif(sys.platform == "win32", reason="nothing is killed by a signal on Windows")
+def test_child_whose_process_is_killed_leaves_nothing_behind(python, tmp_path):
+    done = python(
         "from rift_cl.cl.build.guarded_build import Worker\n"
         "import os, signal\n"
         "worker = Worker()\n"
         "worker.ask({'selector': 'none'})\n"
         "print(worker._scratch, flush=True)\n"
-        "os.kill(os.getpid(), signal.SIGKILL)\n"
-    )
-    own = {"TMPDIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parents[2])}
-    done = subprocess.run(
-        [sys.executable, "-c", starts],
-        env={**os.environ, **own},
-        capture_output=True,
-        text=True,
-        check=False,
+        "os.kill(os.getpid(), signal.SIGKILL)\n",
+        TMPDIR=str(tmp_path),
     )
     assert done.returncode == -signal.SIGKILL, done.stderr
     place = Path(done.stdout.strip())
@@ -86,22 +78,17 @@ def test_child_whose_process_is_killed_leaves_nothing_behind(tmp_path):
     assert not place.exists()
 
 
-def test_process_that_ends_leaves_nothing_behind_and_warns_of_nothing(tmp_path):
-    builds = (
+def test_process_that_ends_leaves_nothing_behind_and_warns_of_nothing(python, tmp_path):
+    done = python(
         "import rift_cl as rift\n"
         "device = rift.default_device()\n"
         "x = device.array([1.0, 2.0])\n"
         "device.launch('axpby', (2,), x=x, y=x, a=1.0, b=1.0, size=2, RUN=1, DOUBLE=0)\n"
         "from rift_cl.cl.build.guarded_build import _workers\n"
-        "assert _workers\n"
-    )
-    own = {"TMPDIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parents[2])}
-    done = subprocess.run(
-        [sys.executable, "-W", "error::ResourceWarning", "-c", builds],
-        env={**os.environ, **own, "RIFT_CACHE_DIR": str(tmp_path / "cache")},
-        capture_output=True,
-        text=True,
-        check=False,
+        "assert _workers\n",
+        TMPDIR=str(tmp_path),
+        RIFT_CACHE_DIR=str(tmp_path / "cache"),
+        PYTHONWARNINGS="error::ResourceWarning",
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert [path.name for path in tmp_path.iterdir()] == ["cache"]

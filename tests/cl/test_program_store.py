@@ -197,15 +197,15 @@ def test_kernel_is_built_and_first_launched_by_a_child_before(device, kept, fold
 
         monkeypatch.setattr(builder, asked, noted)
     assert np.array_equal(_sum(kept()), wanted)
-    wanted_of = [("guarded_build", "axpby", 0, False), ("guarded_launch", "axpby", 1, False)]
-    assert seen == wanted_of
+    once = [("guarded_build", "axpby", 0, False), ("guarded_launch", "axpby", 1, False)]
+    assert seen == once
     (path,) = folder.iterdir()
     about = load(path.stem).about
     assert (about["built"], about["way"], about["launched"]) == (True, "", [[False, False]])
     if device._handle.platform.name.startswith("Portable"):
         assert [path for path in folder.parent.rglob("*") if path.suffix == ".so"]
     assert np.array_equal(_sum(kept()), wanted)
-    assert seen == wanted_of
+    assert seen == once
 
 
 # Crashes when it is launched, unless it is built with the workaround that redefines "static".

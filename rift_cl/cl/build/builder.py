@@ -56,7 +56,7 @@ OPTIONS = ("-cl-std=CL1.2", "-cl-mad-enable", "-w")
 building = threading.RLock()
 # A kernel and its macros as the compiler sees them: 1 and 1.0 are equal, but not the same.
 Key = tuple[str, tuple[tuple[str, str], ...]]
-_PAUSES = (0.0, 0.1, 0.3)
+_PAUSES = (0.1, 0.3)
 _DOUBLE = ("DOUBLE", "1")
 
 
@@ -282,18 +282,17 @@ class Builder:
         import pyopencl as cl
 
         source, options = way_to_build(way, recipe.source, recipe.options)
-        failures = []
-        for pause in _PAUSES:
-            time.sleep(pause)
+        pauses = iter(_PAUSES)
+        while True:
             try:
                 with begun(recipe.entry):
                     return cl.Program(self._device.context, source).build(options)
             except cl.Error as error:
-                failures.append(error)
-            # An empty log is PoCL's way to lose a race for its cache; a real error has one.
-            if _log(str(failures[-1])):
-                break
-        raise failures[-1]
+                # An empty log is PoCL's way to lose a race for its cache; a real error has one.
+                pause = next(pauses, None)
+                if pause is None or _log(str(error)):
+                    raise
+                time.sleep(pause)
 
 
 def _log(text: str) -> str:

@@ -20,9 +20,9 @@ FirstLaunch = dict[str, Any]
 Way = tuple[bool, bool]
 # It compiles for grids up to this size and for larger ones apart.
 _SMALL_GRID = 65534
-# Longest buffers, in bytes, that are filled with zeros for a CPU: what is longer comes from the
-# system, which gives zeros, and takes no memory as long as nobody writes there.
-_FILLED = 1 << 26
+# Longest buffers, in bytes, that are filled with zeros for a CPU: glibc uses memory again up to
+# this size. What is longer comes from the system as zeros, and takes none until somebody writes.
+_FILLED = 1 << 25
 
 
 def way_of(size: Sequence[int], offset: Sequence[int] | None) -> Way:

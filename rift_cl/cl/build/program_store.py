@@ -1,9 +1,10 @@
-"""Our own store of compiled programs, for drivers that keep none.
+"""Our own store of programs: what came of compiling each, and its binary.
 
-A file holds one program: a line that names the format, the SHA-256 of all that follows, a line of
-JSON that says what it is, and the driver's binary. Its name is a hash of all that the binary
-depends on, so that a new source, option, driver or release never meets an old file. A file that
-is not as it was written is removed, and the program built again.
+The binary of a driver that keeps what it compiles is left to it. A file holds one program: a line
+that names the format, the SHA-256 of all that follows, a line of JSON that says what it is, and the
+driver's binary. Its name is a hash of all that the binary depends on, so that a new source, option,
+driver or release never meets an old file. A file that is not as it was written is removed, and the
+program built again.
 """
 
 from __future__ import annotations
@@ -38,8 +39,9 @@ class Stored(NamedTuple):
 
     Args:
         about: what it is, for a person; ``fault`` says why there is no binary where there is none,
-            ``met`` how many processes met it, one after the other, and ``when`` the last did.
-        binary: what the driver gave, and takes again.
+            ``met`` how many processes met it, one after the other, and ``when`` the last did;
+            ``launched`` the ways in which a child has launched it.
+        binary: what the driver gave, and takes again; empty where it keeps it, or gives none.
     """
 
     about: dict[str, Any]
