@@ -16,6 +16,7 @@ from contextlib import redirect_stderr
 from dataclasses import fields
 from importlib import import_module
 from itertools import takewhile
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import tyro
@@ -77,7 +78,7 @@ def _run(arguments: Sequence[str]) -> int:
     if first in ("-h", "--help", "-H", "--help-verbose"):
         print(_overview())
         return 0
-    name, rest = _named(list(arguments))
+    name, rest = _with_capture(*_named(list(arguments)))
     if name in COMMANDS:
         entry = _command(name, _earlier(name, rest), rest)
         return _parsed(name, entry, rest)()
@@ -104,9 +105,9 @@ def _parsed(
     try:
         run: Callable[[], int] = tyro.cli(entry, prog=f"rift {name}", args=rest)
     except SystemExit as end:
-        words = _unknown_words(entry, rest) if end.code == _USAGE else []
+        words = _unknown_words(entry, rest) if end.code == _USAGE else None
         has_out = any(field.name == "out" for field in fields(COMMANDS[name].settings_class()))
-        if has_out and len(words) == 1 and "--out" not in rest:
+        if has_out and words and len(words) == 1 and "--out" not in rest:
             print_line(
                 f"rift: {words[0]!r} is one path too many; if 'rift {name}' is to write there, it "
                 f"is --out {shlex.quote(words[0])}"
@@ -115,14 +116,18 @@ def _parsed(
     return run
 
 
-def _unknown_words(entry: Callable[..., Callable[[], int]], rest: Sequence[str]) -> list[str]:
-    """Words of a command line that belong to nothing, up to the first unknown option."""
+def _unknown_words(
+    entry: Callable[..., Callable[[], int]], rest: Sequence[str]
+) -> list[str] | None:
+    """Words of a command line that belong to nothing, up to the first unknown option.
+
+    None where something else is wrong with it, too.
+    """
     try:
         with open(os.devnull, "w") as nowhere, redirect_stderr(nowhere):  # noqa: PTH123
             _, unknown = tyro.cli(entry, args=rest, return_unknown_args=True)
     except SystemExit:
-        # Something else is wrong with it, too.
-        return []
+        return None
     return list(takewhile(lambda word: not word.startswith("-"), unknown))
 
 
@@ -138,6 +143,25 @@ def _named(arguments: list[str]) -> tuple[str, list[str]]:
 
         return f"fit {kind_of_fit(rest)}", rest
     return "", rest
+
+
+def _with_capture(name: str, rest: list[str]) -> tuple[str, list[str]]:
+    """A fit and its arguments, also where the name of its capture was taken for the command's.
+
+    ``rift fit photos --out fit`` means the folder ``photos`` where there is one: as a command, it
+    would want a capture, and has none.
+    """
+    folder = name.removeprefix("fit ")
+    if folder == name or {"-h", "--help"} & set(rest) or not Path(folder).exists():
+        return name, rest
+    given = [f"./{folder}", *rest]
+    if _parses(name, rest) or not _parses(name, given):
+        return name, rest
+    return _named(["fit", *given])
+
+
+def _parses(name: str, rest: Sequence[str]) -> bool:
+    return _unknown_words(_command(name, _earlier(name, rest), rest), rest) is not None
 
 
 def _overview() -> str:

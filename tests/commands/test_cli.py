@@ -100,6 +100,21 @@ def test_a_path_too_many_is_taken_for_an_output(arguments, hint, capsys):
     assert hint in said if hint else "too many" not in said
 
 
+@pytest.mark.parametrize("options", [[], ["--out", "fit"], ["--quiet", "--out", "fit"]])
+def test_a_folder_called_as_the_command_is_the_capture(options, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit):
+        main(["fit", "photos", *options])
+    assert "Missing from rift fit photos" in capsys.readouterr().err
+    (tmp_path / "photos").mkdir()
+    assert main(["fit", "photos", *options]) == 3
+    assert "photos: " in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["fit", "photos", *options, "--steps", "none"])
+    assert main(["fit", "photos", *options, "other"]) == 3
+    assert "other: " in capsys.readouterr().err
+
+
 def test_completion_knows_every_command(capsys):
     with pytest.raises(SystemExit) as end:
         main(["--tyro-print-completion", "bash"])

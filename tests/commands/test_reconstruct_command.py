@@ -92,3 +92,12 @@ def test_progress_is_plain_where_there_is_no_terminal(scan, tmp_path, capsys):
     assert "3/3 slices" in captured.err
     assert "\x1b" not in captured.err
     assert "slices/s" in captured.err
+
+
+def test_what_is_assumed_is_told_before_the_axis_cannot_be_found(tmp_path, capsys):
+    path = tmp_path / "flat.npz"
+    np.savez(path, projections=np.zeros((40, 2, 30), np.float32), angles=np.arange(40) * 4.5)
+    options = ["--kind", "attenuation", "--out", str(tmp_path / "out")]
+    assert main(["reconstruct", str(path), *options]) == 3
+    said = " ".join(capsys.readouterr().err.split())
+    assert said.index("angles in degrees over") < said.index("the rotation axis cannot be found")

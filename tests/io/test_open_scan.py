@@ -188,6 +188,11 @@ def test_angles_may_be_said_outside_any_file(tmp_path: Path) -> None:
     for name in ("a.h5", "a.npz"):
         even = open_scan(tmp_path / name, theta="0:180")
         np.testing.assert_allclose(np.rad2deg(even.angles), 30 * np.arange(made.FRAMES), atol=1e-12)
+        ended = open_scan(tmp_path / name, theta="0:180:endpoint")
+        np.testing.assert_allclose(
+            np.rad2deg(ended.angles), np.linspace(0, 180, made.FRAMES), atol=1e-12
+        )
+        assert "the end included" in ended.notes[0]
         listed = open_scan(tmp_path / name, theta=str(tmp_path / "t.txt"))
         np.testing.assert_allclose(np.rad2deg(listed.angles), made.DEGREES[::-1], atol=1e-12)
         with pytest.raises(FileFormatError, match="thta"):

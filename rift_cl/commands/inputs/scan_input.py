@@ -28,7 +28,8 @@ class ScanArrays:
     """Name of the projections in the file. Default: that of the file's layout."""
     theta: Auto[str] = None
     """Angles: their name in the file, a file of them (.txt, .csv, .npy), or a range in degrees that
-    is divided evenly, such as 0:180 (its end excluded). Default: those of the file."""
+    is divided evenly, such as 0:180 (its end excluded) or 0:180:endpoint. Default: those of the
+    file."""
     flats: Auto[str] = None
     """Flat fields (beam without sample): their name in the file; for TIFF, their folder or file.
     For counts without flat fields, 'air' estimates the incident beam of each view from the

@@ -166,6 +166,10 @@ class Reconstruction:
         going_on = self.settings.resume and self.kept.begun
         if going_on:
             self._take_found()
+        # What is assumed of the file is told first: where no axis is found, it may be why.
+        of_file = len(self.source.notes)
+        for note in self.source.notes:
+            self.announce(note)
         self._locate()
         if going_on and not self.settings.preview:
             self.kept.go_on(self._facts())
@@ -176,7 +180,7 @@ class Reconstruction:
                 f"Gone on after {self.kept.done} of {self.shape[0]} slices; steps, seconds and "
                 "dead pixels are those of the rest."
             )
-        for note in self.source.notes:
+        for note in self.source.notes[of_file:]:
             self.announce(note)
 
     def join(self, names: Mapping[str, str]) -> None:

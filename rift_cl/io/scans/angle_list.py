@@ -21,7 +21,7 @@ from rift_cl.io.scans.literals import AngleUnit
 from rift_cl.io.scans.scan_file import check_angles
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
-_TURN = re.compile(rf"(?:({_NUMBER}):)?({_NUMBER})")
+_TURN = re.compile(rf"(?:({_NUMBER}):)?({_NUMBER})(:endpoint)?")
 # Spans up to this are radians of one turn or, in degrees, too little to reconstruct from.
 _RADIANS_UP_TO = 7.0
 # Two turns; what spans more counts something else, frames or steps of a motor, or many turns.
@@ -44,6 +44,7 @@ class AngleList:
         name: what they are called in a sentence.
         values: the numbers; or, of a turn that is evenly divided, its two ends in degrees.
         even: whether they are such a turn.
+        endpoint: whether the end of such a turn is one of them.
         unit: their unit where a file states it, or None.
         usual: their unit by the layout of their file.
     """
@@ -51,6 +52,7 @@ class AngleList:
     name: str
     values: Angles
     even: bool = False
+    endpoint: bool = False
     unit: AngleUnit | None = None
     usual: AngleUnit = "degrees"
 
@@ -87,11 +89,12 @@ class AngleList:
 
     def _turn(self, path: Path, projections: int) -> tuple[Angles, str, tuple[str, ...]]:
         start, stop = (float(value) for value in self.values)
-        degrees = start + (stop - start) * np.arange(projections) / projections
+        degrees = np.linspace(start, stop, projections, endpoint=self.endpoint)
         radians: Angles = np.deg2rad(degrees)
         radians.flags.writeable = False
         check_directions(path, self.name, radians)
-        phrase = f"angles even from {start:g} to {stop:g} degrees, the end left out"
+        end = "included" if self.endpoint else "left out"
+        phrase = f"angles even from {start:g} to {stop:g} degrees, the end {end}"
         return radians, phrase, ()
 
     def _unit(self, path: Path, asked: AngleUnit | None) -> tuple[AngleUnit, tuple[str, ...]]:
@@ -175,10 +178,11 @@ def given_angles(text: str) -> AngleList | None:
 
 
 def even_turn(text: str) -> AngleList | None:
-    """Angles evenly over a turn; the end of the turn is not one of them.
+    """Angles evenly over a turn; its end is one of them only where the text says so.
 
     Args:
-        text: the turn in degrees as ``start:stop``, or ``stop`` alone where it starts at 0.
+        text: the turn in degrees as ``start:stop``, or ``stop`` alone where it starts at 0; with
+            ``:endpoint`` behind it, the end is the last angle.
 
     Returns:
         The angles, or None where the text says no such thing.
@@ -187,7 +191,7 @@ def even_turn(text: str) -> AngleList | None:
     if match is None:
         return None
     ends = np.array([float(match[1] or 0), float(match[2])])
-    return AngleList(text.strip(), ends, even=True)
+    return AngleList(text.strip(), ends, even=True, endpoint=match[3] is not None)
 
 
 def file_angles(path: Path) -> AngleList:

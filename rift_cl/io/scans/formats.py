@@ -140,7 +140,8 @@ def open_scan(
         dataset: name of the projections, (angle, row, bin), or of a sinogram, (angle, bin);
             or the name of an HDF5 group that holds one NXtomo scan of several.
         theta: name of the angles; or a file of them (.txt, .csv, .npy); or a turn in degrees that
-            is evenly divided, ``0:180`` or ``360``, its end left out.
+            is evenly divided, ``0:180`` or ``360``, its end left out, or included as in
+            ``0:180:endpoint``.
         flats: name of frames with the beam but without the sample; for TIFF, of a file or folder.
             Counts without any: "air", where the outermost 2 % of the bins at both ends of the
             detector see nothing but air, takes the beam of every view and row from these; "mean"

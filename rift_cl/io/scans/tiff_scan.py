@@ -310,5 +310,6 @@ def _assumed(place: _Place, stack: TiffStack) -> tuple[AngleList, tuple[str, ...
     assert angles is not None
     return angles, (
         f"No angles were found: {stack.stack.frames} projections are taken as evenly spread over "
-        "180 degrees, the end left out; give others with theta= (--theta).",
+        "180 degrees, the end left out; give others with theta= (--theta), such as "
+        "0:180:endpoint where the last of them is at 180 degrees, or 0:360.",
     )
