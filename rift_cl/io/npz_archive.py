@@ -7,44 +7,22 @@ kilobyte may ask for terabytes. Nothing is ever unpickled.
 
 from __future__ import annotations
 
-import math
 import zipfile
-from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from rift_cl.errors import FileFormatError, ShapeError
-from rift_cl.io.boundary import HOW_TO_NAME, check_claim, check_numeric
+from rift_cl.errors import FileFormatError
+from rift_cl.io.boundary import HOW_TO_NAME, check_claim
+from rift_cl.io.npy_file import ArrayHeader, read_header
 
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 # Deflate packs at most this many bytes into one; a few more cover the blocks' own headers.
 _DEFLATE_LIMIT = 1032
 _DEFLATE_SLACK = 4096
 _LISTED = 8
-
-
-@dataclass(frozen=True)
-class ArrayHeader:
-    """What an array in the archive claims to be.
-
-    Args:
-        shape: its shape.
-        dtype: its type; a real number.
-        offset: bytes of the NPY header before the values.
-    """
-
-    shape: tuple[int, ...]
-    dtype: np.dtype[np.generic]
-    offset: int
-
-    @property
-    def size(self) -> int:
-        """Bytes of the values."""
-        return math.prod(self.shape) * self.dtype.itemsize
 
 
 class NpzArchive:
@@ -74,11 +52,8 @@ class NpzArchive:
         if name not in self:
             raise FileFormatError(f"{self.path}: has no array {name!r}; {self.contents()}")
         with self._archive.open(self._members[f"{name}.npy"]) as file:
-            shape, dtype = _parse(file)
-            header = ArrayHeader(shape, dtype, file.tell())
-        check_numeric(self.path, name, dtype)
-        if min(shape, default=1) < 1:
-            raise ShapeError(f"{self.path}: {name!r} has shape {shape}, it holds nothing")
+            header = read_header(file)
+        header.check(self.path, name)
         return header
 
     def load(self, name: str, *, budget: int | None) -> NDArray[np.generic]:
@@ -122,13 +97,4 @@ class NpzArchive:
 
     def _shape(self, name: str) -> tuple[int, ...] | str:
         with self._archive.open(self._members[f"{name}.npy"]) as file:
-            return _parse(file)[0]
-
-
-def _parse(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[np.generic]]:
-    version = npy.read_magic(file)
-    readers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
-    if version not in readers:
-        raise ValueError(f"NPY version {version} is not known")
-    shape, _, dtype = readers[version](file)
-    return tuple(int(n) for n in shape), dtype
+            return read_header(file).shape

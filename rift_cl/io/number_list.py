@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import re
 from pathlib import Path
 
 import numpy as np
-from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, InputError, ShapeError
-from rift_cl.io.boundary import check_claim, check_numeric, reading
+from rift_cl.io.boundary import check_claim, reading
+from rift_cl.io.npy_file import load_npy
 
 Numbers = NDArray[np.float64]
 
@@ -66,17 +65,7 @@ def _number(path: Path, line: int, word: str, what: str) -> float:
 
 
 def _array(path: Path, what: str) -> Numbers:
-    with path.open("rb") as file:
-        version = npy.read_magic(file)
-        if version not in ((1, 0), (2, 0)):
-            raise FileFormatError(f"{path}: NPY version {version} is not known")
-        header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, _, dtype = header(file)
-        check_numeric(path, path.name, dtype)
-        size = math.prod(shape)
-        check_claim(path, f"the list of {what}", 8 * size, _LONGEST)
-        if size != max(shape, default=1):
-            raise ShapeError(f"{path}: has shape {shape}, wanted {what} along one axis")
-        file.seek(0)
-        values = npy.read_array(file, allow_pickle=False)
-    return np.asarray(values, np.float64).reshape(size)
+    values = load_npy(path, f"the list of {what}", _LONGEST)
+    if values.size != max(values.shape, default=1):
+        raise ShapeError(f"{path}: has shape {values.shape}, wanted {what} along one axis")
+    return values.reshape(values.size)

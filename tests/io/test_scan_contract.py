@@ -177,7 +177,7 @@ def test_projections_are_found_by_their_name_alone(tmp_path: Path, form: str) ->
     assert (scan.kind, scan.shape) == ("counts", (VIEWS, ROWS, BINS))
     assert np.allclose(scan.angles, np.deg2rad(DEGREES))
     assert any("raw_data' are the projections (--dataset)" in note for note in scan.notes)
-    assert any("white' and " in note and "black'" in note for note in scan.notes)
+    assert any("white', " in note and "black'" in note for note in scan.notes)
 
 
 def test_two_that_may_be_the_projections_are_asked_about(tmp_path: Path) -> None:

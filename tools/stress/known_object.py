@@ -127,6 +127,17 @@ def npz(**arrays: Any) -> Callable[[Path], Path]:
     return write
 
 
+def npy(**arrays: Any) -> Callable[[Path], Path]:
+    """Writes arrays into NPY files that are called so; the first is the scan's."""
+
+    def write(folder: Path) -> Path:
+        for name, values in arrays.items():
+            np.save(folder / f"{name}.npy", values)
+        return folder / f"{next(iter(arrays))}.npy"
+
+    return write
+
+
 def mat(**arrays: Any) -> Callable[[Path], Path]:
     """Writes arrays into a MAT file of version 5."""
 
@@ -189,6 +200,7 @@ def cases() -> list[Case]:
         *_angles(full),
         *_values(named),
         *_npz(data, flats),
+        *_npy(data, flats),
         *_mat(data),
         *_tiff(data, flats, darks),
         *_mrc(data),
@@ -332,6 +344,27 @@ def _npz(data: Reals, flats: Reals) -> list[Case]:
              npz(data=data, white=flats, black=np.full_like(flats, 100), theta_deg=DEGREES), RIGHT),
         Case("NPZ: as many angles as bins, named", npz(s=square, t=RADIANS[:BINS]), REFUSED,
              said),
+    ]  # fmt: skip
+
+
+def _npy(data: Reals, flats: Reals) -> list[Case]:
+    lines = attenuation()
+    one, first = lines[:, 0], (0,)
+    turn = {"theta": "0:180"}
+    return [
+        Case("NPY: uint16 counts, flats and darks, angles in degrees beside",
+             npy(scan=data, flat=flats, dark=np.full_like(flats, 100), theta=DEGREES), RIGHT),
+        Case("NPY: uint16 counts without flats", npy(scan=data, theta=DEGREES), REFUSED),
+        Case("NPY: a sinogram and a turn", npy(scan=one), RIGHT, {**turn, "axes": "angle,bin"},
+             rows=first),
+        Case("NPY: a sinogram (bin, angle), angles in radians beside",
+             npy(scan=np.asfortranarray(one.T), angles=RADIANS), RIGHT, rows=first),
+        Case("NPY: sinograms (row, angle, bin) of big-endian numbers",
+             npy(scan=np.moveaxis(lines, 1, 0).astype(">f4"), theta=DEGREES), RIGHT),
+        Case("NPY: angles of another scan beside", npy(scan=lines, theta=DEGREES[:-1]), REFUSED),
+        Case("NPY: flats of another scan beside",
+             npy(scan=lines, flat=flats[..., 1:], theta=DEGREES), RIGHT),
+        Case("NPY: no angles at all", npy(scan=lines), REFUSED),
     ]  # fmt: skip
 
 

@@ -165,6 +165,12 @@ def _npz() -> bytes:
     return file.getvalue()
 
 
+def _npy_files(folder: Path) -> None:
+    np.save(folder / "proj.npy", _frames())
+    np.save(folder / "flats.npy", _frames(2) + 300)
+    np.save(folder / "theta.npy", np.arange(_VIEWS) * 30.0)
+
+
 def _mrc() -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "a.mrc")
@@ -194,5 +200,8 @@ SCANS = {
     "Data Exchange": Kind(".h5", _data_exchange),
     "NXtomo": Kind(".nxs", _nxtomo),
     "NPZ": Kind(".npz", _npz),
+    "NPY": Kind.of_folder(_npy_files, "proj.npy", "proj.npy"),
+    "NPY flats": Kind.of_folder(_npy_files, "flats.npy", "proj.npy"),
+    "NPY angles": Kind.of_folder(_npy_files, "theta.npy", "proj.npy"),
     "MRC": Kind(".mrc", _mrc),
 }

@@ -31,11 +31,13 @@ class ScanArrays:
     is divided evenly, such as 0:180 (its end excluded) or 0:180:endpoint. Default: those of the
     file."""
     flats: Auto[str] = None
-    """Flat fields (beam without sample): their name in the file; for TIFF, their folder or file.
-    For counts without flat fields, 'air' estimates the incident beam of each view from the
-    outermost bins at both ends, which must see only air, 'mean' from the mean of the view."""
+    """Flat fields (beam without sample): their name in the file; for TIFF, their folder or file;
+    for NPY, their file. For counts without flat fields, 'air' estimates the incident beam of each
+    view from the outermost bins at both ends, which must see only air, 'mean' from the mean of the
+    view."""
     darks: Auto[str] = None
-    """Dark fields (no beam): their name in the file; for TIFF, their folder or file."""
+    """Dark fields (no beam): their name in the file; for TIFF, their folder or file; for NPY,
+    their file."""
     kind: Auto[Kind] = None
     """What the values are: detector counts, transmission (counts divided by those of the beam), or
     attenuation (line integrals). Default: inferred from flat fields, names, units and values."""
@@ -107,9 +109,9 @@ class ScanInput(ScanArrays):
     group: ClassVar[str] = "input"
 
     scan: Annotated[Path, Positional]
-    """HDF5 (Data Exchange, NXtomo, or any named dataset), NPZ, MAT, MRC, TXRM or TIFF file, folder
-    of TIFF files, or a file that describes one: a scanner's .xtekct or .log, or .yaml or .json as
-    in docs/how-to/scan_cones.md."""
+    """HDF5 (Data Exchange, NXtomo, or any named dataset), NPZ, NPY, MAT, MRC, TXRM or TIFF file,
+    folder of TIFF files, or a file that describes one: a scanner's .xtekct or .log, or .yaml or
+    .json as in docs/how-to/scan_cones.md."""
     memory: Auto[str] = None
     """Maximum memory to use, such as 512M or 4G. Default: a share of what is free."""
 

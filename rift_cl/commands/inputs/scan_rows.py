@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError, NonFiniteError
+from rift_cl.io.scans.npy_scan import NpyRows
 from rift_cl.io.scans.scan_file import ScanFile, ScanRows
 from rift_cl.io.scans.tiff_frames import TiffRows
 from rift_cl.io.scans.zarr_scan import ZarrRows
@@ -22,7 +23,7 @@ def scan_identity(scan: ScanFile) -> dict[str, str]:
     """What tells a scan from others, and from itself before a change; sentences by name."""
     angles = np.ascontiguousarray(scan.angles).tobytes()
     told = {"angles": f"{scan.angles.size} with the hash {_hash(angles)}"}
-    if not isinstance(scan.rows, (TiffRows, ZarrRows)):
+    if not isinstance(scan.rows, (TiffRows, ZarrRows, NpyRows)):
         return {"scan file": f"{scan.path}, changed at {scan.path.stat().st_mtime_ns}", **told}
     # A folder's own date tells nothing: what is beside the frames changes it, their content not.
     lines = []

@@ -246,11 +246,15 @@ class ConeReconstruction:
             yield self.report(0)
         if in_slabs and self._goes_on:
             self.source.take(self.kept.axis())
+        # What is assumed of the file is told first: where no axis is found, it may be why.
+        of_file = len(self.source.notes)
+        for note in self.source.notes:
+            self.announce(note)
         self._locate()
         if in_slabs and self._goes_on:
             self.kept.go_on(self._facts())
             self._gone_on = True
-        for note in self.source.notes:
+        for note in self.source.notes[of_file:]:
             self.announce(note)
         self.folder.make()
         try:

@@ -15,6 +15,7 @@ from typing import Any, get_args
 
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.boundary import reading
+from rift_cl.io.npy_file import SIGNATURE
 from rift_cl.io.scans.beam_file import DESCRIPTIONS, projections_of
 from rift_cl.io.scans.geometries.described import DESCRIBED, is_described
 from rift_cl.io.scans.hdf5_scan import open_hdf5_scan
@@ -22,6 +23,7 @@ from rift_cl.io.scans.literals import AngleUnit, Kind
 from rift_cl.io.scans.mat_scan import open_mat5_scan, open_mat73_scan
 from rift_cl.io.scans.mrc_scan import SUFFIXES as MRC_SUFFIXES
 from rift_cl.io.scans.mrc_scan import open_mrc_scan
+from rift_cl.io.scans.npy_scan import open_npy_scan
 from rift_cl.io.scans.npz_scan import open_npz_scan
 from rift_cl.io.scans.scan_file import ScanFile, ScanRequest
 from rift_cl.io.scans.tiff_scan import open_tiff_scan
@@ -34,6 +36,7 @@ _READERS = {
     **{suffix: {"HDF5": open_hdf5_scan} for suffix in (".h5", ".hdf5", ".hdf", ".nxs")},
     **{suffix: {"TIFF": open_tiff_scan} for suffix in (".tif", ".tiff")},
     ".mat": {"MAT": open_mat5_scan, "HDF5": open_mat73_scan},
+    ".npy": {"NPY": open_npy_scan},
     ".npz": {"NPZ": open_npz_scan},
     **{suffix: {"MRC": open_mrc_scan} for suffix in MRC_SUFFIXES},
     ".txrm": {"TXRM": open_txrm_scan},
@@ -43,6 +46,7 @@ _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 # What files begin with: TXRM is one of Microsoft's containers of streams.
 _SIGNATURES = (
     ((b"PK\x03\x04",), "NPZ"),
+    ((SIGNATURE,), "NPY"),
     ((b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1",), "TXRM"),
     ((b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"), "TIFF"),
 )
@@ -120,7 +124,9 @@ def open_scan(
 
     HDF5 (.h5, .hdf5, .hdf, .nxs) may hold a Data Exchange scan, an NXtomo scan, or arrays that
     are named here. NPZ holds ``projections`` (angle, row, bin) or ``sinogram`` (angle, bin) and
-    ``angles`` in radians, and may hold ``flats``, ``darks`` and ``pitch``. MAT, of version 5 to
+    ``angles`` in radians, and may hold ``flats``, ``darks`` and ``pitch``. NPY holds the
+    projections or a sinogram alone; angles, flats and darks are files beside it that are called so,
+    or are named here. MAT, of version 5 to
     7.3, holds a scan of the Helsinki Tomography Challenge, the dendrites of ToMoBAR, or arrays
     that are named here (``scan.projections`` inside a structure). Zarr (.zarr, a
     folder of Zarr 2 or 3) holds arrays of the same names as NPZ, a Data Exchange scan, or arrays

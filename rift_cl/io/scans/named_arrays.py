@@ -152,7 +152,7 @@ def scan_in(store: ArrayStore, layout: Layout, request: ScanRequest) -> ScanFile
         fan=layout.fan,
         beam=beam,
         background=layout.background,
-        notes=(*layout.notes, *_told(beside, flats, darks), *notes),
+        notes=(*layout.notes, *_told(beside, layout, flats, darks), *notes),
         contents=store.contents,
     )
     return scan_of(found, request)
@@ -278,12 +278,13 @@ def _calibration(
 
 
 def _told(
-    beside: frozenset[str], flats: FrameStack | None, darks: FrameStack | None
+    beside: frozenset[str], layout: Layout, flats: FrameStack | None, darks: FrameStack | None
 ) -> tuple[str, ...]:
-    found = [repr(stack.name) for stack in (flats, darks) if stack and stack.name in beside]
+    names = [layout.theta, *(stack.name for stack in (flats, darks) if stack)]
+    found = [repr(name) for name in names if name in beside]
     if not found:
         return ()
-    return (f"Found beside the projections and used: {' and '.join(found)}.",)
+    return (f"Found beside the projections and used: {', '.join(found)}.",)
 
 
 def _sorted(

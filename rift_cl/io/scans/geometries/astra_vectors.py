@@ -9,10 +9,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.lib import format as npy
 
 from rift_cl.errors import FileFormatError, NonFiniteError, ShapeError
-from rift_cl.io.boundary import check_claim, check_numeric, reading
+from rift_cl.io.boundary import check_claim, reading
+from rift_cl.io.npy_file import SUFFIX, load_npy
 from rift_cl.io.scans.beam import Floats, ViewVectors
 
 # A million views.
@@ -31,7 +31,8 @@ def read_vectors(path: Path) -> ViewVectors:
     """
     with reading(path, "the list of vectors"):
         check_claim(path, "the list of vectors", path.stat().st_size, 4 * _LARGEST)
-        values = _array(path) if path.suffix.lower() == ".npy" else _text(path)
+        is_npy = path.suffix.lower() == SUFFIX
+        values = load_npy(path, "the list of vectors", _LARGEST) if is_npy else _text(path)
     return view_vectors(path, values)
 
 
@@ -48,17 +49,6 @@ def view_vectors(path: Path, values: Floats) -> ViewVectors:
     parts = (values[:, k : k + 3] for k in (0, 3, 6, 9))
     source, middle, across, down = parts
     return ViewVectors(source=source, middle=middle, across=across, down=down)
-
-
-def _array(path: Path) -> Floats:
-    with path.open("rb") as file:
-        version = npy.read_magic(file)
-        header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, _, dtype = header(file)
-        check_numeric(path, path.name, dtype)
-        check_claim(path, "the list of vectors", 8 * int(np.prod(shape, dtype=float)), _LARGEST)
-        file.seek(0)
-        return np.asarray(npy.read_array(file, allow_pickle=False), np.float64)
 
 
 def _text(path: Path) -> Floats:
