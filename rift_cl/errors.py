@@ -19,6 +19,8 @@ _NOT_MEANT: dict[type, type | tuple[type, ...]] = {
     abc.Sequence: (str, bytes),
     abc.Iterable: (str, bytes),
 }
+# Of what a person may not know where to get it, by the name of the type.
+_FROM = {"Device": 'a Device, which rift.open_device("cpu") gives'}
 _IN_WORDS: dict[type, str] = {
     numbers.Real: "a number",
     numbers.Integral: "a whole number",
@@ -168,5 +170,5 @@ def check_type(where: str, name: str, value: object, wanted: type) -> None:
     if passes_by_chance or not isinstance(one, wanted):
         raise WrongTypeError(
             f"{where}: {name} is {reprlib.repr(value)} (type {type(value).__name__}), wanted "
-            f"{_IN_WORDS.get(wanted, wanted.__name__)}"
+            f"{_IN_WORDS.get(wanted) or _FROM.get(wanted.__name__, wanted.__name__)}"
         )

@@ -57,7 +57,7 @@ class Registry(Generic[T]):
             InputError: there is none.
         """
         if not isinstance(name, str) or name not in self._entries:
-            raise InputError(f"{self.kind} is {name!r}, wanted one of {', '.join(self)}")
+            raise InputError(f"{self.kind} is {name!r}, wanted {self.wanted}")
         return self._entries[name]
 
     def __contains__(self, name: object) -> bool:
@@ -74,6 +74,14 @@ class Registry(Generic[T]):
     def names(self) -> tuple[str, ...]:
         """All names."""
         return tuple(self._entries)
+
+    @property
+    def wanted(self) -> str:
+        """What a name has to be, for an error."""
+        return (
+            f"one of {', '.join(self)}, or one of yours that was registered (in a shell: "
+            "rift --load FILE.py COMMAND)"
+        )
 
     def name_of(self, entry: T) -> str:
         """The name of an entry.

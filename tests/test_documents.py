@@ -50,7 +50,14 @@ TUTORIALS = {
     },
 }
 # Options of programs other than ours.
-ELSEWHERE = {"--tyro-print-completion", "--extra", "--prefix", "--durations", "--costs"}
+ELSEWHERE = {
+    "--tyro-print-completion",
+    "--extra",
+    "--prefix",
+    "--durations",
+    "--costs",
+    "--preload",
+}
 
 
 @pytest.fixture
@@ -232,6 +239,9 @@ def helps():
         found[name] = printed.getvalue()
         assert "--quiet" in found[name] or name == "fit"
     found["fit"] += found["fit photos"] + found["fit xray"]
+    with redirect_stdout(StringIO()) as printed:
+        main(["--help"])
+    found["--help"] = printed.getvalue()
     return found
 
 
@@ -240,6 +250,8 @@ def commands_on(page):
     text = page.read_text().replace("\\\n", " ")
     fenced = re.findall(r"^```(?:bash|text)\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
     shown = [*re.findall(r"^    (.*)$", text, re.MULTILINE), *"\n".join(fenced).splitlines()]
+    # Files that are loaded first are a reader's own, and so are the names that they register.
+    shown = [re.sub(r"^rift(?: --load \S+)+(.*)$", r"rift\1 ...", line) for line in shown]
     return [re.split(r"\s{2,}#", line)[0] for line in shown if re.match(r"rift [^-\s]", line)]
 
 

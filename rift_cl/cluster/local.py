@@ -59,6 +59,7 @@ def local_cluster(environments: list[dict[str, str]]) -> Any:
                 "memory_limit": 0,
                 "dashboard": False,
                 "env": environment,
+                "preload": ["rift_cl.cluster.on_worker"],
                 "silence_logs": "CRITICAL",
             },
         }

@@ -13,6 +13,12 @@ from typing import Any
 from rift_cl import __version__
 from rift_cl.errors import ClusterError, DeviceError
 from rift_cl.io.output import make_folder, writing
+from rift_cl.own_parts import load_parts
+
+
+def dask_setup(worker: Any) -> None:
+    """Load a person's own parts, before objects of their classes arrive (``preload`` of Dask)."""
+    load_parts()
 
 
 def look(device: str | None, paths: Sequence[Path]) -> dict[str, str]:
@@ -59,6 +65,7 @@ def do(version: str, function: Callable[..., Any], *arguments: Any) -> tuple[flo
             f"worker {get_worker().address}: has the version {__version__} of rift_cl, wanted "
             f"{version}: install the same on all machines; --resume goes on"
         )
+    load_parts()
     begin = time.perf_counter()
     try:
         result = function(*arguments)

@@ -35,8 +35,11 @@ from rift_cl.commands.runner import (
     told,
     watch,
 )
+from rift_cl.errors import InputError
+from rift_cl.own_parts import load_parts
 
 _USAGE = 2
+_LOAD = "--load"
 # Figures of a run that a line of a terminal has room for.
 _FIGURES = 4
 
@@ -71,6 +74,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str]) -> int:
+    files, arguments = _own_files(list(arguments))
+    load_parts(files)
     first = arguments[0] if arguments else ""
     if first == "--version":
         print(f"rift {__version__}")
@@ -93,6 +98,17 @@ def _run(arguments: Sequence[str]) -> int:
     what = f"there is no command {first!r}" if first else "a command is missing"
     print_line(f"rift: {what}; 'rift --help' lists the commands")
     return _USAGE
+
+
+def _own_files(arguments: list[str]) -> tuple[list[str], list[str]]:
+    """The files that are to be run before the command, and the command's words."""
+    files = []
+    while arguments and arguments[0].partition("=")[0] == _LOAD:
+        word = arguments.pop(0)
+        if "=" not in word and not arguments:
+            raise InputError(f"{_LOAD} is followed by nothing, wanted a Python file")
+        files.append(word.partition("=")[2] if "=" in word else arguments.pop(0))
+    return files, arguments
 
 
 def _parsed(
@@ -170,12 +186,15 @@ def _overview() -> str:
     lines = [f"  {name:<{width}}  {entry.summary}" for name, entry in COMMANDS.items()]
     return "\n".join(
         [
-            "usage: rift COMMAND [OPTIONS]",
+            f"usage: rift [{_LOAD} FILE.py] COMMAND [OPTIONS]",
             "",
             "Tomography and splatting on any OpenCL device.",
             "",
             "commands:",
             *lines,
+            "",
+            f"{_LOAD} FILE.py runs a file of yours first, which registers filters, losses, angular "
+            "bases,\nstrategies or readers; it may be repeated; RIFT_LOAD names such files, too.",
             "",
             "'rift COMMAND --help' lists the options of a command, 'rift --version' tells the "
             "version.",

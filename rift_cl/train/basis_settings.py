@@ -18,7 +18,7 @@ from rift_cl.errors import SettingError
 from rift_cl.option_marks import Expert, Short, ShortAuto
 from rift_cl.splat.orders import HIGHEST
 from rift_cl.splat.settings import Activation
-from rift_cl.train.ranges import check_choice, check_number, check_whole
+from rift_cl.train.ranges import check_choice, check_number, check_registered, check_whole
 
 BasisKind = Literal["gaussian", "hermite", "laguerre"]
 
@@ -120,7 +120,7 @@ class AngularSettings:
 
     def __post_init__(self) -> None:
         """Check every number's range."""
-        check_choice(self, "kind", ANGULAR_BASES.names)
+        check_registered(self, "kind", ANGULAR_BASES)
         check_whole(self, "modes", 1, 35)
         check_number(self, "first", most=1)
 

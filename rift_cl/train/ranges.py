@@ -7,6 +7,7 @@ from typing import Any
 
 from rift_cl.errors import SettingError
 from rift_cl.geometry.numbers import one_number
+from rift_cl.registry import Registry
 
 # Devices count in float32.
 _LARGEST = 3.4028234e38
@@ -44,6 +45,17 @@ def check_number(settings: Any, name: str, *, most: float = _LARGEST, above: boo
         if most < _LARGEST:
             wanted = f"a number above 0, at most {most}" if above else f"0 to {most}"
         raise SettingError(settings, name, f"is {given!r}, wanted {wanted}")
+
+
+def check_registered(settings: Any, name: str, registry: Registry[Any]) -> None:
+    """Check that a field is a name in a registry.
+
+    Raises:
+        SettingError: it is not.
+    """
+    given = getattr(settings, name)
+    if given not in registry:
+        raise SettingError(settings, name, f"is {given!r}, wanted {registry.wanted}")
 
 
 def check_choice(settings: Any, name: str, choices: Sequence[str]) -> None:

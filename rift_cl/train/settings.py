@@ -17,7 +17,7 @@ from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.environment_settings import EnvironmentSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.loss.pixel_loss import PIXEL_LOSSES
-from rift_cl.train.ranges import check_choice, check_number, check_whole
+from rift_cl.train.ranges import check_number, check_registered, check_whole
 from rift_cl.train.strategy import STRATEGIES, DefaultSettings, McmcSettings, StrategySettings
 from rift_cl.train.surface_settings import SurfaceSettings
 from rift_cl.train.xray.solve_settings import SolveSettings
@@ -159,7 +159,7 @@ class TrainSettings:
             check_number(self, name, most=1)
         if self.noise is not None:
             check_number(self, "noise")
-        check_choice(self, "loss", PIXEL_LOSSES.names)
+        check_registered(self, "loss", PIXEL_LOSSES)
         if self.band_limit is not None and self.band_limit not in get_args(BandLimit):
             wanted = "None, " + " or ".join(get_args(BandLimit))
             raise SettingError(self, "band_limit", f"is {self.band_limit!r}, wanted {wanted}")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
-from rift_cl.operators import ParallelProjector
+from rift_cl.operators import FILTERS, ParallelProjector, Ramp
 from rift_cl.reconstruct.direct.view_weights import view_weights
 
 if TYPE_CHECKING:
@@ -67,8 +67,11 @@ def filter_settings(settings: ReconstructSettings) -> dict[str, Any]:
     """The filter along the detector, with the values that were left open."""
     if settings.filter == "high-pass":
         return {"exponent": 1.0 if settings.exponent is None else settings.exponent}
-    cutoff = 1.0 if settings.cutoff is None else settings.cutoff
-    return {"filter": settings.filter or "ram-lak", "cutoff": cutoff}
+    name = settings.filter or "ram-lak"
+    if not isinstance(FILTERS[name], Ramp):
+        # A person's own filter has no cut-off besides its own.
+        return {"filter": name}
+    return {"filter": name, "cutoff": 1.0 if settings.cutoff is None else settings.cutoff}
 
 
 def _weights(angles: np.ndarray[Any, np.dtype[np.float64]]) -> str:
@@ -81,9 +84,9 @@ def in_words(decided: ReconstructSettings) -> str:
     """The method and its options, for people: ``fbp, ram-lak filter, voronoi weights``."""
     words: list[str] = [decided.method]
     if decided.method == "fbp":
-        high_pass = decided.filter == "high-pass"
-        shape = f"exponent {decided.exponent:g}" if high_pass else f"cut-off {decided.cutoff:g}"
-        words += [f"{decided.filter} filter, {shape}"]
+        words += [f"{decided.filter} filter"]
+        words += [] if decided.exponent is None else [f"exponent {decided.exponent:g}"]
+        words += [] if decided.cutoff is None else [f"cut-off {decided.cutoff:g}"]
         words += [f"{decided.compensate} view weights"] if decided.compensate else []
     if decided.iterative:
         words += [f"at most {decided.steps} steps"]
