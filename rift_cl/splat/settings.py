@@ -84,11 +84,13 @@ class SplatSettings:
         for name, choices in (
             ("mode", get_args(SplatMode)),
             ("activation", get_args(Activation)),
-            ("angular", ANGULAR_BASES.names),
         ):
             if getattr(self, name) not in choices:
                 wanted = " or ".join(choices)
                 raise SettingError(self, name, f"is {getattr(self, name)!r}, wanted {wanted}")
+        if self.angular not in ANGULAR_BASES:
+            said = f"is {self.angular!r}, wanted {ANGULAR_BASES.wanted}"
+            raise SettingError(self, "angular", said)
         if self.antialiased and self.mode == "xray":
             raise SettingError(
                 self,

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
-from rift_cl.errors import CheckpointError, InputError, ShapeError
+from rift_cl.errors import CheckpointError, InputError, NonFiniteError, ShapeError
 from rift_cl.geometry import Camera
 from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
@@ -30,6 +30,7 @@ from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.band_limit import BandLimiter
 from rift_cl.train.loss.coverage_weight import weight_of
 from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
+from rift_cl.train.loss.own_loss import check_own_loss
 from rift_cl.train.parameters import Environment, Parameters
 from rift_cl.train.per_view.exposures import Exposures
 from rift_cl.train.per_view.poses import Poses
@@ -112,6 +113,7 @@ class Trainer:
         self.flat = flat
         settings.solve.check_heed(self.solves)
         self.device: Device = parameters.device
+        check_own_loss(self.device, settings.loss)
         self.schedule = LearningRateSchedule(settings, scene_extent(pictures.cameras))
         extent, views = self.schedule.extent, len(pictures.cameras)
         run = TrainingRun(
@@ -156,10 +158,19 @@ class Trainer:
             done = self.parameters.step
             if done % REPORT_EVERY == 0 or done == total or stop:
                 loss = float(self.device.get(value)[0])
+                self._check_finite(loss)
                 values = {"loss": loss, "splats": float(len(self.parameters))}
                 yield Report(done, total, "steps", values, (worked, worked + self._work_left()))
             if stop:
                 return
+
+    def _check_finite(self, loss: float) -> None:
+        if not math.isfinite(loss):
+            raise NonFiniteError(
+                f"the loss is {loss} after step {self.parameters.step}: the fit has diverged, "
+                "usually by learning rates that are too high or by a loss of one's own that is not "
+                "finite; checkpoints from before are kept"
+            )
 
     @final
     def step(self) -> DeviceArray:

@@ -7,23 +7,35 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from rift_cl.basis.angular import (
+    ANGULAR_BASES,
+    SphericalGaussians,
+    angular_basis,
+    register_angular_basis,
+)
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.run_folder.saved_settings import parsed_settings
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, NonFiniteError
+from rift_cl.geometry import Camera
 from rift_cl.registry import Registry
 from rift_cl.train import (
     PIXEL_LOSSES,
     STRATEGIES,
     ImageLoss,
+    ImageViews,
     McmcSettings,
+    Parameters,
     PixelLoss,
     Strategy,
     StrategySettings,
+    Trainer,
     TrainSettings,
     register_loss,
     register_strategy,
+    start_splats,
 )
+from rift_cl.train.loss.own_loss import check_own_loss
 
 pytestmark = pytest.mark.once
 
@@ -106,3 +118,78 @@ def test_strategies_are_settings_by_name():
 def test_what_cannot_be_used_is_refused(act, words):
     with pytest.raises(InputError, match=words):
         act()
+
+
+WRONG_LOSSES = {
+    "wrongsign": (PixelLoss("d * d", "-2 * d * m"), "the gradient is .* and the slope"),
+    "nothing": (PixelLoss("1.0f", "0.0f"), "0 everywhere"),
+    "root": (PixelLoss("sqrt(d)", "0.5f * m / sqrt(d)"), "wanted finite numbers"),
+    "halves": (PixelLoss("fabs(d)", "m * (d > 0 ? 1 : -1)"), "does not compile; d and m are vec"),
+    "open": (PixelLoss("sqrt(d * d", "d"), "does not compile: .*expected"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_LOSSES)
+def test_a_loss_that_is_wrong_is_refused_before_a_fit(device, name):
+    if name == "halves" and device.traits.macros["LANES"] == 1:
+        pytest.skip("compiles where d is a number")
+    loss, said = WRONG_LOSSES[name]
+    register_loss(name, loss)
+    try:
+        with pytest.raises(InputError, match=f"pixel loss '{name}'.*{said}"):
+            check_own_loss(device, name)
+    finally:
+        PIXEL_LOSSES.remove(name)
+
+
+@pytest.mark.parametrize(
+    "loss",
+    [
+        PixelLoss("sqrt(d * d + 1e-4f)", "m * d / sqrt(d * d + 1e-4f)"),
+        PixelLoss("fabs(d) < 0.1f ? 5 * d * d : fabs(d) - 0.05f",
+                  "m * (fabs(d) < 0.1f ? 10 * d : sign(d))"),
+        PixelLoss("d > 0 ? 3 * d : -d", "d > 0 ? 3 * m : -m"),
+        PixelLoss("d * d", "d > 0 ? m : -m", surrogate=True),
+    ],
+)  # fmt: skip
+def test_losses_that_are_right_or_meant_so_pass(device, loss):
+    register_loss("right", loss)
+    try:
+        check_own_loss(device, "right")
+    finally:
+        PIXEL_LOSSES.remove("right")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda s: s._replace(values=s.values[..., :-1]), r"values of .* has shape \(24, 3\)"),
+        (lambda s: s._replace(values=np.nan * s.values), "values holds NaN"),
+        (lambda s: s._replace(values=2 * s.values), "wanted the constant"),
+        (lambda s: s._replace(by_geometry=-s.by_geometry), r"by_geometry\[..., 0\] is"),
+        (lambda s: s._replace(by_directions=0 * s.by_directions), r"by_directions\[..., 0\] is"),
+        (tuple, "gives tuple, wanted Slopes"),
+    ],
+)
+def test_a_basis_that_is_wrong_is_refused_before_a_fit(monkeypatch, change, said):
+    class Wrong(SphericalGaussians):
+        def slopes(self, geometry, directions):
+            return change(super().slopes(geometry, directions))
+
+    register_angular_basis("wrong", lambda count: Wrong(count - 1))
+    try:
+        with pytest.raises(InputError, match=f"angular basis 'wrong'.*{said}"):
+            angular_basis("wrong", 4)
+    finally:
+        ANGULAR_BASES.remove("wrong")
+
+
+def test_a_fit_that_diverges_stops_where_it_is_seen(device, monkeypatch):
+    camera = Camera((16, 16), [[16, 0, 8], [0, 16, 8], [0, 0, 1]], np.eye(4))
+    views = ImageViews(device, [camera], [np.zeros((16, 16, 3), np.float32)])
+    splats = Parameters.of(device, start_splats(np.array([[0, 0, 3.0], [0, 1, 3.0]])))
+    trainer = Trainer(views, splats, TrainSettings(steps=60, splats=2))
+    real = trainer._step
+    monkeypatch.setattr(trainer, "_step", lambda: real() * np.float32(np.nan))
+    with pytest.raises(NonFiniteError, match="after step 25: the fit has diverged"):
+        list(trainer.run())

@@ -13,6 +13,7 @@ from rift_cl.basis.angular.chart import HGLobe, LGLobe
 from rift_cl.basis.angular.frame import unit_axes, unit_directions
 from rift_cl.basis.angular.gaussians import AnisotropicSphericalGaussians, SphericalGaussians
 from rift_cl.basis.angular.harmonics import SphericalHarmonics
+from rift_cl.basis.angular.own_basis import check_own_basis
 from rift_cl.basis.angular.protocol import (
     CONSTANT,
     AngularBasis,
@@ -51,6 +52,9 @@ ANGULAR_BASES: Registry[Callable[[int], AngularBasis]] = Registry(
         "asg": AnisotropicSphericalGaussians.of_count,
     },
 )
+_OURS = ANGULAR_BASES.names
+# Bases of users that were tried, with so many functions.
+_CHECKED: set[tuple[Callable[[int], AngularBasis], int]] = set()
 # What the comment of a file of splats can hold.
 _NAME = re.compile(r"[a-z0-9]+")
 
@@ -85,6 +89,12 @@ def angular_basis(kind: str, n_linear: int) -> AngularBasis:
             chart lobe; 2 to 36 of spherical Gaussians, which is one more than there are lobes.
 
     Raises:
-        InputError: the kind is unknown, or has no such number of functions.
+        InputError: the kind is unknown, has no such number of functions, or was registered and
+            does not do what ``AngularFunctions`` promises.
     """
-    return ANGULAR_BASES[kind](n_linear)
+    make = ANGULAR_BASES[kind]
+    basis = make(n_linear)
+    if kind not in _OURS and (make, n_linear) not in _CHECKED:
+        check_own_basis(kind, basis, n_linear)
+        _CHECKED.add((make, n_linear))
+    return basis

@@ -253,7 +253,11 @@ def _parsed(path: Path, said: str, rest: int) -> SceneBasis:
         found[match[1]] = match[2]
     activation, angular = found.get("activation", "clamp"), found.get("angular", "sh")
     orders = [found.get(f"{name} order", "0") for name in ("shape", "color")]
-    known = activation in get_args(Activation) and angular in ANGULAR_BASES
+    if angular not in ANGULAR_BASES:
+        raise FileFormatError(
+            f"{path}: its {ANGULAR_BASES.kind} is {angular!r}, wanted {ANGULAR_BASES.wanted}"
+        )
+    known = activation in get_args(Activation)
     if not known or any(order not in map(str, range(HIGHEST + 1)) for order in orders):
         raise _meaningless(path, said)
     linear = 0 if angular == "sh" else 1 + rest // 3

@@ -17,10 +17,15 @@ class PixelLoss:
     """A loss of the difference d = image - target, both float32.
 
     Numbers in the expressions want an f behind them (``0.5f``); functions are OpenCL's (``sqrt``).
+    On a CPU ``d`` and ``m`` are vectors of several pixels, so that what stands on both sides of a
+    colon is to be made of them: ``d > 0 ? m : -m``, and not ``d > 0 ? 1 : -1``, which is
+    ``sign(d)``.
 
     Args:
         value: the loss, an expression of ``d``.
         gradient: ``m`` times the derivative of the loss by d, an expression of ``d`` and ``m``.
+        surrogate: the gradient is another than that of the value, and is meant to be. Otherwise a
+            trainer compares the two before it begins.
 
     Raises:
         InputError: an expression is empty or no text.
@@ -28,6 +33,7 @@ class PixelLoss:
 
     value: str
     gradient: str
+    surrogate: bool = False
 
     def __post_init__(self) -> None:
         """Check both expressions."""
@@ -46,6 +52,7 @@ PIXEL_LOSSES = Registry(
     "pixel loss",
     {"l1": PixelLoss("absolute(d)", "d > 0 ? m : d < 0 ? -m : 0"), "l2": PixelLoss("d*d", "2*d*m")},
 )
+OURS = PIXEL_LOSSES.names
 
 
 def register_loss(name: str, loss: PixelLoss) -> None:

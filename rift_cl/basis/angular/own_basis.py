@@ -1,0 +1,98 @@
+"""What is asked of an angular basis that a user registers, before colours are made of it.
+
+Shapes, finite values, the constant in the first place, and slopes that are those of the functions:
+a derivative with a mistake in it would end in a fit that is merely worse than it could be.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rift_cl.basis.angular.protocol import CONSTANT, AngularBasis, Floats, Slopes
+from rift_cl.errors import InputError
+
+_POINTS = 24
+_STEP = 1e-5
+# Of the largest slope: what differences of doubles lose, and a function that is not quite smooth.
+_TOLERANCE = 1e-3
+# Share of the slopes that may differ: functions may have edges.
+_EDGES = 0.1
+
+
+def check_own_basis(name: str, basis: AngularBasis, n_linear: int) -> None:
+    """Check a basis where some lobes meet some directions.
+
+    Args:
+        name: what it is called.
+        basis: the basis.
+        n_linear: the number of functions that it was asked for.
+
+    Raises:
+        InputError: it has another number of functions or no geometry, arrays of other shapes,
+            values that are not finite, another first function than the constant, or slopes that
+            are not those of its functions.
+    """
+    said = f"angular basis {name!r}"
+    if basis.n_linear != n_linear or not basis.n_geometry >= 1:
+        raise InputError(
+            f"{said}: has {basis.n_linear} functions and {basis.n_geometry} numbers of geometry, "
+            f"wanted {n_linear} and at least one"
+        )
+    random = np.random.default_rng(0)
+    axes, directions = random.normal(size=(2, _POINTS, 3))
+    geometry = _array(f"{said}: start_geometry", basis.start_geometry(axes), basis.n_geometry)
+    geometry = geometry + 0.01 * random.normal(size=geometry.shape)
+    slopes = _slopes(said, basis, geometry, directions)
+    if not np.allclose(slopes.values[:, 0], CONSTANT):
+        raise InputError(
+            f"{said}: its first function is {slopes.values[0, 0]:.4g}, wanted the constant "
+            f"{CONSTANT:.4g} (rift_cl.basis.angular.CONSTANT), which all kinds begin with"
+        )
+    for axis in range(basis.n_geometry):
+        step = _STEP * np.eye(basis.n_geometry)[axis]
+        either = [_slopes(said, basis, geometry + s * step, directions).values for s in (1, -1)]
+        _compare(f"{said}: by_geometry[..., {axis}]", slopes.by_geometry[..., axis], either)
+    for axis in range(3):
+        step = _STEP * np.eye(3)[axis]
+        either = [_slopes(said, basis, geometry, directions + s * step).values for s in (1, -1)]
+        _compare(f"{said}: by_directions[..., {axis}]", slopes.by_directions[..., axis], either)
+
+
+def _slopes(said: str, basis: AngularBasis, geometry: Floats, directions: Floats) -> Slopes:
+    found = basis.slopes(geometry, directions)
+    if not isinstance(found, Slopes):
+        raise InputError(f"{said}: slopes gives {type(found).__name__}, wanted Slopes")
+    n = basis.n_linear
+    return Slopes(
+        _array(f"{said}: values", found.values, n),
+        _array(f"{said}: by_geometry", found.by_geometry, n, basis.n_geometry),
+        _array(f"{said}: by_directions", found.by_directions, n, 3),
+    )
+
+
+def _array(what: str, values: Any, *shape: int) -> Floats:
+    """Numbers for each of the points."""
+    array = np.asarray(values)
+    wanted = (_POINTS, *shape)
+    if array.dtype.kind not in "fiu" or array.shape != wanted:
+        raise InputError(
+            f"{what} of {_POINTS} directions has shape {array.shape} and type {array.dtype}, "
+            f"wanted real numbers of shape {wanted}"
+        )
+    if not np.isfinite(array).all():
+        raise InputError(f"{what} holds NaN or infinity")
+    return array.astype(np.float64)
+
+
+def _compare(what: str, slopes: Floats, either: list[Floats]) -> None:
+    differences = (either[0] - either[1]) / (2 * _STEP)
+    off = np.abs(slopes - differences)
+    bad = off > _TOLERANCE * max(np.abs(differences).max(), np.abs(slopes).max(), 1e-6)
+    if bad.mean() > _EDGES:
+        worst = np.unravel_index(np.argmax(off), off.shape)
+        raise InputError(
+            f"{what} is {slopes[worst]:.4g} where differences of function {worst[1]} give "
+            f"{differences[worst]:.4g}: the derivative is not that of the function"
+        )
