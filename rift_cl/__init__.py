@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from rift_cl.operators import (
         FastProjector,
         HighPass,
+        HostOperator,
         LinearOperator,
         Projector,
         Ramp,
@@ -65,6 +66,7 @@ if TYPE_CHECKING:
         cheapest_projector,
         dot_test,
         register_filter,
+        vstack,
     )
     from rift_cl.progress import Report
     from rift_cl.reconstruct import (
@@ -99,6 +101,7 @@ __all__ = [
     "FastProjector",
     "Grid",
     "HighPass",
+    "HostOperator",
     "LinearOperator",
     "Observations",
     "Parallel",
@@ -148,6 +151,7 @@ __all__ = [
     "sirt",
     "tv",
     "view",
+    "vstack",
 ]
 
 __getattr__, __dir__ = lazy_names(
@@ -188,6 +192,7 @@ __getattr__, __dir__ = lazy_names(
         "operators": (
             "FastProjector",
             "HighPass",
+            "HostOperator",
             "LinearOperator",
             "Projector",
             "Ramp",
@@ -195,6 +200,7 @@ __getattr__, __dir__ = lazy_names(
             "cheapest_projector",
             "dot_test",
             "register_filter",
+            "vstack",
         ),
         "progress": ("Report",),
         "reconstruct": (

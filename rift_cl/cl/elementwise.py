@@ -29,12 +29,22 @@ def copy(device: Device, x: AnyArray, y: AnyArray) -> None:
 
 def take(device: Device, x: DeviceArray, index: int, y: DeviceArray) -> None:
     """Y = x[index]."""
-    _copy_bytes(device, x, index * y.nbytes, y, 0, y.nbytes)
+    take_run(device, x, index * y.size, y)
 
 
 def put(device: Device, x: DeviceArray, y: DeviceArray, index: int) -> None:
     """Y[index] = x."""
-    _copy_bytes(device, x, 0, y, index * x.nbytes, x.nbytes)
+    put_run(device, x, y, index * x.size)
+
+
+def take_run(device: Device, x: DeviceArray, first: int, y: DeviceArray) -> None:
+    """Y = the samples of x from ``first`` on, in C order."""
+    _copy_bytes(device, x, first * x.dtype.itemsize, y, 0, y.nbytes)
+
+
+def put_run(device: Device, x: DeviceArray, y: DeviceArray, first: int) -> None:
+    """X becomes the samples of y from ``first`` on, in C order."""
+    _copy_bytes(device, x, 0, y, first * y.dtype.itemsize, x.nbytes)
 
 
 def _copy_bytes(

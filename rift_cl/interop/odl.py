@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.errors import DTypeError, ShapeError
-from rift_cl.interop.host_operator import HostOperator
 from rift_cl.interop.optional_package import optional_package
+from rift_cl.operators.host_operator import HostOperator
 from rift_cl.operators.linear import LinearOperator
 
 __all__ = ["from_odl", "to_odl"]

@@ -18,9 +18,9 @@ import numpy as np
 
 from rift_cl.cl.device import Device
 from rift_cl.errors import DTypeError
-from rift_cl.interop.host_operator import HostOperator
 from rift_cl.interop.optional_package import optional_package
 from rift_cl.interop.scipy import aslinearoperator
+from rift_cl.operators.host_operator import HostOperator
 from rift_cl.operators.linear import LinearOperator
 
 __all__ = ["from_pylops", "to_pylops"]

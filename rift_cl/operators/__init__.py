@@ -13,6 +13,7 @@ from rift_cl.operators.filters.ramp_filters import (
     as_filter,
     register_filter,
 )
+from rift_cl.operators.host_operator import HostOperator
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.operators.projector.cone.geometry_gradient import GeometryGradient, geometry_gradient
 from rift_cl.operators.projector.footprint import FOOTPRINTS
@@ -20,6 +21,7 @@ from rift_cl.operators.projector.parallel.fast_projector import FastProjector
 from rift_cl.operators.projector.parallel.parallel_projector import ParallelProjector
 from rift_cl.operators.projector.parallel.projector_choice import cheapest_projector
 from rift_cl.operators.projector.projector import Projector
+from rift_cl.operators.stack import vstack
 
 __all__ = [
     "COMPENSATIONS",
@@ -30,6 +32,7 @@ __all__ = [
     "Filter",
     "GeometryGradient",
     "HighPass",
+    "HostOperator",
     "LinearOperator",
     "ParallelProjector",
     "Projector",
@@ -43,4 +46,5 @@ __all__ = [
     "geometry_gradient",
     "radial_lines",
     "register_filter",
+    "vstack",
 ]

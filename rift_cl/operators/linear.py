@@ -223,6 +223,18 @@ class LinearOperator(ABC):
 
     __rmul__ = __mul__
 
+    def __truediv__(self, divisor: Any) -> LinearOperator:
+        """The operator x -> A x / divisor.
+
+        Raises:
+            InputError: the divisor is 0, or no finite real number.
+        """
+        if isinstance(divisor, (int, float, np.integer, np.floating)) and divisor == 0:
+            raise InputError("an operator cannot be divided by 0")
+        if isinstance(divisor, (int, float, np.integer, np.floating)):
+            return self * (1 / float(divisor))
+        return NotImplemented
+
     def __neg__(self) -> LinearOperator:
         """The operator x -> -A x."""
         return self * -1.0

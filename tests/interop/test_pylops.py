@@ -10,8 +10,8 @@ from scipy.sparse.linalg import aslinearoperator as scipy_operator
 
 import rift_cl as rift
 from rift_cl.errors import DTypeError, InputError
-from rift_cl.interop.host_operator import HostOperator
 from rift_cl.interop.pylops import from_pylops, to_pylops
+from rift_cl.operators.host_operator import HostOperator
 
 pytestmark = pytest.mark.once
 

@@ -1,10 +1,11 @@
-"""An operator that another package computes on the host, as one of ours.
+"""An operator that NumPy, or another package, computes on the host.
 
 Solvers, sums and products take it like any other; device arrays come to the host and go back.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -26,7 +27,8 @@ class HostOperator(LinearOperator):
     """A linear map that two functions of NumPy arrays compute.
 
     Args:
-        forward: takes (*domain), gives what has the numbers of (*range) in C order.
+        forward: takes an array of shape ``domain``, gives one of shape ``range``, or its numbers
+            in C order along one axis.
         adjoint: the other way; ``rift_cl.dot_test`` says whether it is the adjoint.
         domain: shape of the input.
         range: shape of the output.
@@ -35,6 +37,7 @@ class HostOperator(LinearOperator):
 
     Raises:
         DTypeError: ``dtype`` is complex.
+        ShapeError: a function gave another shape, when it was applied.
     """
 
     def __init__(
@@ -53,6 +56,11 @@ class HostOperator(LinearOperator):
         super().__init__(domain, range, device or default_device(), real)
         self._forward, self._backward = forward, adjoint
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _remade, (
+            self._forward, self._backward, self.domain, self.range, self.dtype, self.device
+        )  # fmt: skip
+
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
         self._on_host(self._forward, x, out)
 
@@ -70,5 +78,18 @@ class HostOperator(LinearOperator):
         copy(self.device, upload(self.device, found), out)
 
     def _computed(self, function: Function, given: NDArray[Any], shape: Shape) -> NDArray[Any]:
-        flat = np.asarray(function(given)).reshape(shape)
-        return as_host_array(flat, shape, name="result", wants="the operator", dtype=self.dtype)
+        found = np.asarray(function(given))
+        if found.shape == (math.prod(shape),):
+            found = found.reshape(shape)
+        return as_host_array(found, shape, name="result", wants="the operator", dtype=self.dtype)
+
+
+def _remade(
+    forward: Function,
+    adjoint: Function,
+    domain: Shape,
+    range: Shape,
+    dtype: DTypeLike,
+    device: Device,
+) -> HostOperator:
+    return HostOperator(forward, adjoint, domain, range, dtype=dtype, device=device)
