@@ -6,6 +6,7 @@ import io
 import itertools
 import subprocess
 import sys
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -124,8 +125,31 @@ def test_colours_are_shown_as_they_are():
     red = np.zeros((3, 4, 3))
     red[..., 0] = 2
     figure = grid([red, np.zeros((3, 4))], window=(-5, 5))
-    shown = [axes.images[0].get_array() for axes in figure.axes]
-    assert np.array_equal(shown[0], np.clip(red, 0, 1)) and shown[1].shape == (3, 4)
+    shown = [image.get_array() for image in figure.images]
+    assert np.all(shown[0] == (255, 0, 0, 255)) and np.all(shown[1] == (128, 128, 128, 255))
+
+
+@pytest.mark.parametrize("side", [3, 1800])
+def test_samples_stand_where_they_are_and_share_pixels_by_their_mean(side):
+    chequers = np.add.outer(np.arange(side) // (side // 3), np.arange(side) // (side // 3)) % 2
+    figure = grid([np.zeros((2, 2)), chequers], window=(0, 1))
+    picture, panel = pixels(figure)[..., 0], figure.images[1]
+    high, wide = panel.get_array().shape[:2]
+    low, left = picture.shape[0] - int(panel.oy), int(panel.ox)
+    drawn = picture[low - high : low, left : left + wide]
+    assert high % 3 == wide % 3 == 0
+    truth = np.add.outer(np.arange(3), np.arange(3)) % 2
+    assert np.array_equal(drawn, 255 * truth.repeat(high // 3, 0).repeat(wide // 3, 1))
+
+
+def test_a_picture_of_a_large_slice_takes_little_more_memory_than_the_slice():
+    slice = np.zeros((2048, 2048), np.float32)
+    plot.figure_png(grid([slice]))
+    tracemalloc.start()
+    plot.figure_png(grid([slice]))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1.5 * slice.nbytes
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import tyro
 
@@ -68,7 +69,7 @@ def main(options: Options) -> None:
 
 def _slices(folder: Path, options: Options) -> Path:
     shape = options.views, options.rows, options.bins
-    return _saved(folder / "parallel.npz", shape, np.pi, {})
+    return _saved(folder / "parallel.h5", shape, np.pi, {})
 
 
 def _cone(folder: Path, size: int) -> Path:
@@ -82,8 +83,13 @@ def _saved(path: Path, shape: tuple[int, int, int], turn: float, lengths: dict[s
     z, x = np.arange(rows)[:, None] - (rows - 1) / 2, np.arange(bins) - (bins - 1) / 2
     one = np.sqrt(np.maximum((0.4 * min(rows, bins)) ** 2 - x**2 - z**2, 0)) / bins
     angles = np.arange(views) * turn / views
-    np.savez(path, projections=np.repeat(one[None].astype(np.float32), views, 0), angles=angles,
-             **lengths)  # fmt: skip
+    projections = np.repeat(one[None].astype(np.float32), views, 0)
+    if path.suffix == ".npz":
+        np.savez(path, projections=projections, angles=angles, **lengths)
+        return path
+    with h5py.File(path, "w") as file:
+        file["exchange/data"] = projections
+        file["exchange/theta"] = np.rad2deg(angles)
     return path
 
 
@@ -100,9 +106,9 @@ def serve(scan: str, method: str, out: str) -> None:
     """Reconstruct in this process, and print both numbers of bytes."""
     from rift_cl.commands.reconstruct.choice import reconstruction_of
     from rift_cl.commands.reconstruct.settings import ReconstructSettings
+    from rift_cl.io import open_scan
 
-    with np.load(scan) as file:
-        _, rows, bins = file["projections"].shape
+    _, rows, bins = open_scan(scan, values=False).shape
     given = {"kind": "attenuation", "center": (bins - 1) / 2, "method": method, **METHODS[method]}
     given |= {"footprint": "strip", "format": "h5"}
     first = ReconstructSettings(Path(scan), out=Path(out + "-1"), **given)
@@ -127,7 +133,7 @@ def _planned(job: Any, rows: int) -> int:
         return int(job.source._need)
     slabs = job.inversion.slabs([slice(0, rows)])
     most = max(slab.stop - slab.start for slab in slabs)
-    return int(job.inversion.need * most + job.inversion.projector(most).scratch)
+    return int(job.inversion.need * most + job.inversion.fixed(most))
 
 
 def _status(name: str) -> int:

@@ -54,7 +54,7 @@ def test_two_runs_give_the_same_bits(scan, tmp_path):
 def test_a_small_budget_gives_the_same_bits(scan, tmp_path):
     whole = Reconstruction(ReconstructSettings(scan.counts, out=tmp_path / "whole", center=45))
     list(whole.run())
-    need = whole.inversion.projector(1).scratch + whole.inversion.need * 3 // 2
+    need = whole.inversion.fixed() + whole.inversion.need * 3 // 2
     small = ReconstructSettings(scan.counts, out=tmp_path / "small", center=45, memory=str(need))
     pieces = Reconstruction(small)
     assert len(pieces.slabs) == 3

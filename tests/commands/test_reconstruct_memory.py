@@ -44,7 +44,7 @@ def test_slices_four_times_the_memory_have_the_same_bits(scan, tmp_path, method)
     common |= {"center": 63.5, "method": method, "format": "h5", "pad": "off"}
     common |= {"footprint": "strip", **METHODS[method]}
     planned = Reconstruction(ReconstructSettings(scan, out=tmp_path / "none", **common)).inversion
-    memory = planned.projector(1).scratch + planned.need * 3 // 2
+    memory = planned.fixed() + planned.need * 3 // 2
     assert 4 * memory <= 4 * ROWS * BINS * BINS
     whole = rift.reconstruct_scan(scan, tmp_path / "a", **common)
     parts = rift.reconstruct_scan(scan, tmp_path / "b", memory=str(memory), **common)

@@ -431,7 +431,7 @@ class ConeReconstruction:
         Args:
             slabs: the volume from its first slice on; None where it is kept in slabs.
         """
-        numbers = Preview(self.shape[0]).panels
+        numbers = Preview(self.shape[0]).numbers
         if slabs is None:
             self._values = self._value_window(lambda: self.kept.slices(numbers))
             slabs = (slab for _, slab in self.kept.slabs())
@@ -511,7 +511,7 @@ class ConeReconstruction:
     def _show(self, planes: list[Floats]) -> None:
         """Leave the middle planes across the three axes as a picture."""
         titles = ["z, across the axis", "y, along the axis", "x, along the axis"][: len(planes)]
-        window = display_window([np.concatenate([plane.ravel() for plane in planes])])
+        window = display_window(planes)
         figure = image_grid(planes, titles=titles, columns=len(planes), window=window, size=5.0)
         with atomic_path(self.settings.out / PREVIEW_PICTURE) as part:
             part.write_bytes(figure_png(figure))

@@ -51,17 +51,13 @@ Floats = NDArray[np.float32]
 AnyProjector = ParallelProjector | Projector
 # Projectors that take arrays of a slice in parts where they must, as solvers do.
 _IN_PARTS = PhaseProjector, FanSlicesProjector
-# Images and sinograms, float32, that a slice needs on host and device at a time: a formula's are
-# counts, line integrals, two temporaries and the filtered ones; a method's are its state as well.
-# The next slab is read and the last one written at the same time: an image and two sinograms more.
-_ARRAYS = {
-    "fbp": (3, 8),
-    "backproject": (3, 8),
-    "sirt": (6, 11),
-    "cgls": (6, 12),
-    "tv": (17, 12),
-    "levels": (20, 13),
-}
+# Images and sinograms, float32, that each slice of a slab needs on host and device at a time: a
+# formula's are counts, line integrals, two temporaries and the filtered ones. The next slab is read
+# and the last one written at the same time: an image and two sinograms more.
+_OF_A_SLICE = {"fbp": (3, 8), "backproject": (3, 8)}
+_OF_A_SOLVED_SLICE = (2, 6)
+# Those of the state of a method that takes steps, which one slice of a slab has at a time.
+_OF_THE_STATE = {"sirt": (11, 5), "cgls": (8, 5), "tv": (11, 4), "levels": (14, 6)}
 # Directions that no view looks along, in one piece, from which on angles count as limited.
 _LIMITED = np.pi / 6
 # Copies of what is read before it is binned.
@@ -103,13 +99,28 @@ class Inversion:
         """Bytes that a slice takes, on host and device together, besides the projector's own."""
         return self._need(self.projector(1))
 
+    def fixed(self, slices: int = 1) -> int:
+        """Bytes that a slab needs besides those of its slices: of the projector and of a state."""
+        return self._fixed(self.projector(slices))
+
     def _need(self, A: AnyProjector) -> int:
-        images, sinograms = _ARRAYS[self.settings.method]
-        views, bins = A.range[0], max(A.range[-1], self.source.scan.shape[2])
-        views = max(views, self.source.scan.shape[0])
+        arrays = _OF_A_SLICE.get(self.settings.method, _OF_A_SOLVED_SLICE)
         # What is binned is read as it is.
-        fine = (self.settings.binning**2 - 1) * _READ * self.source.scan.shape[0] * bins
-        return 4 * (images * int(np.prod(A.grid.shape[-2:])) + sinograms * views * bins + fine)
+        fine = (self.settings.binning**2 - 1) * _READ * self._sinogram(A)
+        return self._bytes(A, *arrays) + 4 * fine
+
+    def _fixed(self, A: AnyProjector) -> int:
+        return A.scratch + self._bytes(A, *_OF_THE_STATE.get(self.settings.method, (0, 0)))
+
+    def _bytes(self, A: AnyProjector, images: int, sinograms: int) -> int:
+        """Of so many images and sinograms."""
+        image = int(np.prod(A.grid.shape[-2:]))
+        return 4 * (images * image + sinograms * self._sinogram(A))
+
+    def _sinogram(self, A: AnyProjector) -> int:
+        """Samples of a slice's sinogram, before and after views were combined and padded."""
+        views, bins = self.source.scan.shape[0], self.source.scan.shape[2]
+        return max(A.range[0], views) * max(A.range[-1], bins)
 
     def projector(self, slices: int) -> AnyProjector:
         """The projector of a number of slices, kept for the next slab of the same size."""
@@ -155,7 +166,7 @@ class Inversion:
         return plan_chunks(
             count,
             self._need(A),
-            A.scratch,
+            self._fixed(A),
             self.device.budget,
             what="slice",
             array=array,

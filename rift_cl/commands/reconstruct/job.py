@@ -340,6 +340,8 @@ class Reconstruction:
 
     def _finish(self) -> None:
         """Make the volume of the slabs, and the report."""
+        # Pictures want memory that the device keeps for arrays to come.
+        self.device.release()
         preview = Preview(self.shape[0])
         self._values = self._value_window()
         window = self.inversion.window
@@ -354,6 +356,7 @@ class Reconstruction:
         self.folder.mark()
         self.folder.drop(*set(VOLUME_NAMES.values()) - {volume_path(self.settings).name})
         if not self._shown:
+            assert preview.middle is not None
             self._show(preview.middle)
         if self.source.center is not None:
             self.metrics = {"center": self.source.center, **self.metrics}
@@ -373,7 +376,7 @@ class Reconstruction:
         """What the integers of the volume stand for, from a few slices where it was not said."""
         if self.settings.dtype == "float32" or self.settings.window is not None:
             return self.settings.window
-        images = self.kept.slices(Preview(self.shape[0]).panels)
+        images = self.kept.slices(Preview(self.shape[0]).numbers)
         low, high = suggested_window(images)
         self.source.notes.append(
             f"Samples are {self.settings.dtype} from {low:g} to {high:g}, a window chosen from "

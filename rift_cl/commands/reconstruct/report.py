@@ -21,6 +21,7 @@ from rift_cl.commands.pictures.slice_pictures import (
     display_window,
     show_slices,
     smaller,
+    thinned,
 )
 from rift_cl.commands.reconstruct.decided import in_words
 from rift_cl.commands.reconstruct.volume import volume_path
@@ -44,14 +45,16 @@ class Preview:
 
     Args:
         count: slices of the volume.
-        slices: those kept so far, by their number: a few, and the middle one.
+        panels: samples of a few slices so far, by their number (``thinned``).
+        middle: the middle slice, once it has passed.
         frames: more of them, made smaller, for the slider through z.
         upright: planes along the axis, for the slider through y: rows of every slice by their
             number, from the first slice to the last, each made smaller.
     """
 
     count: int
-    slices: dict[int, NDArray[np.float32]] = field(default_factory=dict)
+    panels: dict[int, NDArray[np.float32]] = field(default_factory=dict)
+    middle: NDArray[np.float32] | None = None
     frames: dict[int, NDArray[np.float32]] = field(default_factory=dict)
     upright: dict[int, list[NDArray[np.float32]]] = field(default_factory=dict)
     _lowest: float = np.inf
@@ -60,14 +63,9 @@ class Preview:
     _samples: int = 0
 
     @property
-    def panels(self) -> list[int]:
-        """Numbers of the slices that are kept as they are, evenly from the first to the last."""
+    def numbers(self) -> list[int]:
+        """Numbers of a few slices, evenly from the first to the last."""
         return evenly(self.count, min(self.count, _PANELS))
-
-    @property
-    def middle(self) -> NDArray[np.float32]:
-        """The middle slice."""
-        return self.slices[self.count // 2]
 
     def take(self, start: int, block: NDArray[np.float32]) -> None:
         """Look at a block of slices, the first of which is number ``start``."""
@@ -76,8 +74,11 @@ class Preview:
         self._sum += float(block.sum(dtype=np.float64))
         self._samples += block.size
         passing = range(start, start + len(block))
-        for index in {*self.panels, self.count // 2}.intersection(passing):
-            self.slices[index] = block[index - start].copy()
+        for index in self.numbers:
+            if index in passing:
+                self.panels[index] = thinned(block[index - start]).copy()
+        if self.count // 2 in passing:
+            self.middle = block[self.count // 2 - start].copy()
         for index in evenly(self.count, min(self.count, FRAMES)):
             if index in passing:
                 self.frames[index] = smaller(block[index - start])
@@ -121,7 +122,7 @@ def write_preview(path: Path, image: NDArray[np.float32], title: str) -> None:
 def reconstruction_page(job: Reconstruction | ConeReconstruction, preview: Preview) -> Page:
     """The report of a finished reconstruction."""
     page = Page(f"Reconstruction of {job.source.scan.path.name}", f"{job.shape[0]} slices")
-    images = [preview.slices[index] for index in preview.panels]
+    images = list(preview.panels.values())
     window, unit = display_window(images), job.source.unit or "unit of length"
     show_slices(
         page,
@@ -172,7 +173,8 @@ def _residuals(page: Page, residuals: Mapping[int, list[float]]) -> None:
 
 def _histogram(page: Page, images: list[NDArray[np.float32]], unit: str) -> None:
     low, high = display_window(images)
-    counts, edges = np.histogram(np.stack(images), bins=_BARS, range=(low, high))
+    edges = np.histogram_bin_edges([], bins=_BARS, range=(low, high))
+    counts = np.sum([np.histogram(image, bins=edges)[0] for image in images], axis=0)
     share = 100 * counts / max(counts.sum(), 1)
     per = f"per {unit}" if unit else "per unit of length"
     draw = partial(

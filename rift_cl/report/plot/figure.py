@@ -38,7 +38,12 @@ Reals = NDArray[np.float64]
 
 
 def real_values(name: str, values: ArrayLike, *, axes: int = 1) -> Reals:
-    """Values that can be drawn, with so many axes.
+    """Values that can be drawn, with so many axes, as float64; errors as ``drawable``."""
+    return drawable(name, values, axes=axes).astype(np.float64)
+
+
+def drawable(name: str, values: ArrayLike, *, axes: int) -> NDArray[Any]:
+    """Values that can be drawn, with so many axes, as they are.
 
     Raises:
         ShapeError: they have other axes, or there are none.
@@ -52,7 +57,7 @@ def real_values(name: str, values: ArrayLike, *, axes: int = 1) -> Reals:
         raise ShapeError(f"{name} has shape {array.shape}, wanted {axes} axes and a sample or more")
     if not np.isfinite(array).all():
         raise NonFiniteError(f"{name} holds NaN or infinity; replace such values before plotting")
-    return array.astype(np.float64)
+    return array
 
 
 def new_figure(width: int, height: int) -> Figure:

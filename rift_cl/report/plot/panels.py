@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.report.plot.figure import (
@@ -16,8 +16,7 @@ from rift_cl.report.plot.figure import (
     INK,
     POINTS,
     SOFT,
-    Reals,
-    add_panel,
+    drawable,
     new_figure,
     real_values,
 )
@@ -31,9 +30,8 @@ _Window = tuple[float, float]
 
 
 class _Panel(NamedTuple):
-    image: Reals
+    codes: NDArray[np.uint8]  # (y, x, 3)
     title: str
-    window: _Window
     high: int
     wide: int
 
@@ -67,7 +65,10 @@ def image_grid(
         NonFiniteError: an image holds NaN or infinity.
         InputError: white is not above black, or ``columns`` or ``size`` is not positive.
     """
-    pixels = [_pixels(f"images[{k}]", image) for k, image in enumerate(images)]
+    pixels = [
+        drawable(f"images[{k}]", image, axes=3 if np.shape(image)[2:] == (3,) else 2)
+        for k, image in enumerate(images)
+    ]
     if columns < 1 or not 0 < size < math.inf:
         raise InputError(f"image_grid: columns is {columns}, size {size}; wanted positive numbers")
     rows = -(-len(pixels) // columns)
@@ -85,18 +86,41 @@ def image_grid(
     panels = []
     for k, (image, title) in enumerate(zip(pixels, titles, strict=True)):
         high, wide = _drawn_size(image, round(size * DPI))
-        panels.append(_Panel(image, _wrapped(title, wide), windows[k // columns], high, wide))
+        codes = _codes(_drawn(image, high, wide), windows[k // columns])
+        panels.append(_Panel(codes, _wrapped(title, wide), high, wide))
     return _draw_grid(panels, columns, labels, footer if grey else "")
 
 
-def _pixels(name: str, image: ArrayLike) -> Reals:
-    if np.shape(image)[2:] == (3,):
-        return np.clip(real_values(name, image, axes=3), 0, 1)
-    return real_values(name, image, axes=2)
+def _codes(image: NDArray[Any], window: _Window) -> NDArray[np.uint8]:
+    """Grey or colours from 0 to 255; Matplotlib would take a dozen copies of numbers for them."""
+    low, high = window if image.ndim == 2 else (0.0, 1.0)
+    codes = np.rint(np.clip((image - low) / (high - low), 0, 1) * 255).astype(np.uint8)
+    return codes if image.ndim == 3 else np.repeat(codes[..., None], 3, axis=2)
+
+
+def _drawn(image: NDArray[Any], high: int, wide: int) -> NDArray[Any]:
+    """The samples that are drawn: means of those that share a pixel.
+
+    They are taken before anything is made of the image, a slice of which may be most of the memory.
+    """
+    from PIL import Image
+
+    if high < image.shape[0] or wide < image.shape[1]:
+        channels = np.moveaxis(np.atleast_3d(image), 2, 0)
+        means = [
+            np.asarray(
+                Image.fromarray(np.asarray(channel, np.float32)).resize(
+                    (wide, high), Image.Resampling.BOX
+                )
+            )
+            for channel in channels
+        ]
+        image = means[0] if image.ndim == 2 else np.stack(means, axis=2)
+    return image
 
 
 def _windows(
-    images: Sequence[Reals], window: _Window | Sequence[_Window] | None, rows: int
+    images: Sequence[NDArray[Any]], window: _Window | Sequence[_Window] | None, rows: int
 ) -> list[_Window]:
     if window is None:
         low, high = min(p.min() for p in images), max(p.max() for p in images)
@@ -109,7 +133,7 @@ def _windows(
     return [(float(low), float(high)) for low, high in np.broadcast_to(pairs, (rows, 2))]
 
 
-def _drawn_size(image: Reals, target: int) -> tuple[int, int]:
+def _drawn_size(image: NDArray[Any], target: int) -> tuple[int, int]:
     factor = target / max(image.shape[:2])
     factor = max(1, round(factor)) if factor > 0.75 else factor
     return max(1, round(image.shape[0] * factor)), max(1, round(image.shape[1] * factor))
@@ -146,11 +170,12 @@ def _draw_grid(
 
 
 def _draw_panel(figure: Figure, panel: _Panel, x: int, y: int) -> None:
-    axes = add_panel(figure, x, y, panel.wide, panel.high)
-    axes.set_axis_off()
-    look = "nearest" if panel.high >= panel.image.shape[0] else "antialiased"
-    low, high = panel.window
-    axes.imshow(panel.image, cmap="gray", vmin=low, vmax=high, aspect="auto", interpolation=look)
+    from rift_cl.report.plot.pixels import Pixels
+
+    height, width = panel.codes.shape[:2]
+    codes = panel.codes.repeat(panel.high // height, 0).repeat(panel.wide // width, 1)
+    _, below = figure.get_size_inches() * DPI
+    figure.images.append(Pixels(figure, codes, x, round(below) - y - panel.high))
 
 
 def _write(figure: Figure, at: tuple[float, float], text: str, **style: Any) -> None:

@@ -28,7 +28,7 @@ _IN_SPACE, _IN_PLANE = 4096, 2048
 # Rounds in which the largest hole is looked for more closely, and places tried in each.
 _ROUNDS, _TRIES = 6, 64
 # Numbers that are held at a time.
-_BLOCK = 1 << 22
+_BLOCK = 1 << 19
 
 
 @dataclass(frozen=True, eq=False)

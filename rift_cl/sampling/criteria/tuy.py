@@ -134,8 +134,10 @@ def missed_planes(scan: Cone | Vectors, points: ArrayLike) -> Floats:
     if places.ndim != 2 or places.shape[1] != 3:
         raise ShapeError(f"points has shape {places.shape}, wanted (P, 3)")
     normals = half_sphere(_CROSSED)
-    heights = normals @ scan.source.T
-    low, high = heights.min(axis=1), heights.max(axis=1)
+    low, high = np.empty((2, len(normals)))
+    for part in runs(len(normals), len(scan.source)):
+        heights = normals[part] @ scan.source.T
+        low[part], high[part] = heights.min(axis=1), heights.max(axis=1)
     shares = np.empty(len(places))
     for part in runs(len(places), len(normals)):
         across = places[part] @ normals.T
