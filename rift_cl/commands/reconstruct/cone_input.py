@@ -34,7 +34,7 @@ _REFUSED: dict[str, Any] = {
     "half_acquisition": "weighted",
 }
 # Volumes and stacks of projections that a method holds at a time, on host and device together.
-_HELD = {"fbp": (3, 5), "backproject": (3, 4), "sirt": (6, 6), "cgls": (6, 6), "tv": (16, 7)}
+_HELD = {"fbp": (3, 5), "backproject": (3, 4), "sirt": (6, 6), "cgls": (6, 6), "tv": (9, 6)}
 # Stacks of projections on the host where a volume is worked on in parts: as read, corrected, and
 # filtered or with weights of rays.
 _HELD_BESIDE_PARTS = {"fbp": 3, "backproject": 2, "sirt": 5, "cgls": 5, "tv": 5}
