@@ -174,7 +174,7 @@ def saved(folder: Path, kind=KINDS[8]) -> Path:
         ("shape order 1", "shape order 99999999999", "has no meaning"),
         ("shape order 1, ", "", r"has 3 properties shape_0"),
         ("angular asg", "angular lg", r"has 12 properties lobe_0\.\."),
-        ("angular asg", "angular xx", "has no meaning"),
+        ("angular asg", "angular xx", "angular basis is .xx."),
         ("angular asg", "angular asg, angular asg", "has no meaning"),
         ("rift-cl basis", "rift_cl basis", "no comment 'rift-cl basis:' that says"),
         ("rift-cl basis:", "rift-cl basis: exp\ncomment rift-cl basis:", "has 2 comments"),
