@@ -28,6 +28,8 @@ from rift_cl.train import Parameters, Trainer, TrainSettings, start_splats
 
 _PACKAGE = Path(rift.__file__).parent
 _SIZE, _VIEWS = 32, 4
+# Steps after which harmonics of all degrees have joined, and no kernel is new.
+_WARM = 4
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,8 @@ def walks(folder: Path) -> dict[str, Counter[Path]]:
     pictures, points = Still(device), np.random.default_rng(0).uniform(-0.5, 0.5, (60, 3))
     settings = TrainSettings(steps=10, splats=60)
     trainer = Trainer(pictures, Parameters.of(device, start_splats(points, None)), settings)
-    trainer.step()
+    for _ in range(_WARM):
+        trainer.step()
     splats, renderer = trainer.parameters.drawn, rift.Renderer(device=device)
     renderer.forward(splats, pictures.cameras[0])
     angles = np.arange(36) * np.pi / 36
