@@ -1,7 +1,7 @@
 """A step of training by its definitions.
 
-Coincident of adam, splat_update, splat_activate, splat_band, splat_band_coverage, splat_noise and
-splat_statistics.
+Coincident of adam, splat_update, splat_activate, splat_band, splat_band_coverage, splat_noise,
+splat_statistics, residual_image and residual_statistics.
 """
 
 from __future__ import annotations
@@ -164,6 +164,27 @@ def screen_statistics(
     counts = drawn & np.isfinite(magnitude)
     radius = np.maximum(before[:, 2], extents.max(axis=1) / max(height, width))
     after = np.stack([before[:, 0] + magnitude, before[:, 1] + 1, radius], axis=1)
+    return np.where(counts[:, None], after, before)
+
+
+def residual_image(image: Floats, target: Floats, weights: Floats | float, channels: int) -> Floats:
+    """(height, width, channels): weighted mean absolute difference, weight, and zeros."""
+    found = np.zeros((*image.shape[:2], channels))
+    off = np.abs(image[..., : target.shape[2]] - target).mean(axis=2)
+    found[..., 0], found[..., 1] = weights * off, weights
+    return found
+
+
+def residual_statistics(before: Floats, shown: Floats, culled: NDArray[np.uint8]) -> Floats:
+    """What is known of each splat's share in residuals after one more view, (N, 3).
+
+    Args:
+        before: (N, 3) sums of the residual shown and of the pixels made up, and views.
+        shown: (N, 2) what it shows of the residual of this view, and the pixels it makes up.
+        culled: (N,) codes of ``CULL_REASONS``: 1 and 4 are out of the view.
+    """
+    counts = ~np.isin(culled, (1, 4)) & np.isfinite(shown.sum(axis=1))
+    after = before + np.append(shown, np.ones((len(shown), 1)), axis=1)
     return np.where(counts[:, None], after, before)
 
 

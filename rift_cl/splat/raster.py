@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rift_cl.basis.indices import n_coeff
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.host_arrays import as_device_array
@@ -146,6 +147,11 @@ class ScreenSplats:
     features: DeviceArray
     modes: ScreenModes | None = None
     records: DeviceArray | None = field(default=None, init=False)
+
+    @property
+    def first_feature(self) -> int:
+        """Column of each splat's sums at which the gradient by its features begins."""
+        return MOMENTS if self.modes is None else n_coeff(self.modes.shape_order + 2, 2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from rift_cl.train.environment_settings import EnvironmentSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.loss.pixel_loss import PIXEL_LOSSES
 from rift_cl.train.ranges import check_number, check_registered, check_whole
-from rift_cl.train.strategy import STRATEGIES, DefaultSettings, McmcSettings, StrategySettings
+from rift_cl.train.strategy import STRATEGIES, DefaultSettings, ResidualSettings, StrategySettings
 from rift_cl.train.surface_settings import SurfaceSettings
 from rift_cl.train.xray.solve_settings import SolveSettings
 
@@ -27,9 +27,10 @@ BandLimit = Literal["pixels", "coverage"]
 
 T = TypeVar("T", bound="TrainSettings")
 _STRATEGY_HELP = (
-    "How splats are added, moved and removed: relocation with random walks (mcmc), or cloning, "
-    "splitting and pruning as in the original 3D Gaussian splatting (default). Each has options of "
-    "its own, which --help lists with it."
+    "How splats are added, moved and removed: splats that contribute little are moved to where the "
+    "residual is largest (residual), transparent ones are relocated, with random walks if wanted "
+    "(mcmc), or splats are cloned, split and pruned as in the original 3D Gaussian splatting "
+    "(default). Each has options of its own, which --help lists with it."
 )
 
 
@@ -139,7 +140,7 @@ class TrainSettings:
     surface: ShortSplats[SurfaceSettings] = field(default_factory=SurfaceSettings)
     """Priors that make splats lie on surfaces."""
     strategy: ShortExpert[StrategySettings] = field(
-        default_factory=McmcSettings,
+        default_factory=ResidualSettings,
         metadata={"registry": STRATEGIES, "without": ("xray",), "help": _STRATEGY_HELP},
     )
     """How splats are added, moved and removed."""
@@ -167,7 +168,7 @@ class TrainSettings:
             raise SettingError(
                 self,
                 "strategy",
-                f"is {self.strategy!r}, wanted the settings of one, such as McmcSettings()",
+                f"is {self.strategy!r}, wanted the settings of one, such as ResidualSettings()",
             )
         absgrad = isinstance(self.strategy, DefaultSettings) and self.strategy.absgrad
         if absgrad and not self.basis.plain:

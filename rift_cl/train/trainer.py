@@ -25,7 +25,7 @@ from rift_cl.cl.device import Device
 from rift_cl.errors import CheckpointError, InputError, NonFiniteError, ShapeError
 from rift_cl.geometry import Camera
 from rift_cl.progress import Report
-from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.renderer import Frame, Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.band_limit import BandLimiter
 from rift_cl.train.loss.coverage_weight import weight_of
@@ -194,7 +194,7 @@ class Trainer:
         frame = self.renderer.forward(
             parameters.drawn, self.camera(number), background=self.pictures.background(number)
         )
-        value, by_image = self._compared(frame.image, number, rates["exposures"])
+        value, by_image = self._compared(frame, number, rates["exposures"])
         shares = settings.learning_rates
         sh_rest = shares.lobes_rest if "lobes" in parameters.raw else shares.sh_rest
         kept = self.strategy.wants_sh_gradient
@@ -332,14 +332,16 @@ class Trainer:
             return None
         return Environment.restored(self.device, groups["environment"])
 
-    def _compared(self, image: Any, number: int, rate: float) -> tuple[DeviceArray, DeviceArray]:
+    def _compared(self, frame: Frame, number: int, rate: float) -> tuple[DeviceArray, DeviceArray]:
         """The loss of a rendered image and its gradient."""
-        pictures, exposures = self.pictures, self.exposures
+        pictures, exposures, image = self.pictures, self.exposures, frame.image
         target, weights = pictures.target(number), pictures.weights(number)
         exposed = image if exposures is None else exposures.applied(image, number)
         value, by_exposed = self.loss(exposed, target, weights=weights, view=number)
         if (self.parameters.step + 1) % REPORT_EVERY == 0:
             self.loss.watch(exposed, target, weights=weights)
+        if self.strategy.looks_at(self.parameters.step):
+            self.strategy.look(frame, exposed, target, weights)
         if exposures is None:
             return value, by_exposed
         return value, exposures.pulled_back(image, by_exposed, number, rate)

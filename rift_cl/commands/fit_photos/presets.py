@@ -28,6 +28,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
         "learning_rates.quats": 1e-3,
         "learning_rates.log_scales": 5e-3,
         "learning_rates.sh_rest": 0.2,
+        "strategy": "mcmc",
         "strategy.noise": 5e5,
     },
 }

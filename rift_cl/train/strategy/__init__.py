@@ -1,8 +1,9 @@
 """Strategies: how splats are added, moved and removed while they are trained.
 
-Three come with the package, by the names of ``STRATEGIES``: ``mcmc`` relocates splats that have
-become transparent (3DGS as MCMC), ``default`` clones, splits and prunes (the original 3DGS), and
-``xray`` relocates X-ray splats, whose densities add up. ``protocol`` says how to write another.
+Four come with the package, by the names of ``STRATEGIES``: ``residual`` moves splats that images
+hardly need to where the residual is largest, ``mcmc`` relocates those that have become transparent
+(3DGS as MCMC), ``default`` clones, splits and prunes (the original 3DGS), and ``xray`` relocates
+X-ray splats, whose densities add up. ``protocol`` says how to write another.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from rift_cl.registry import Registry
 from rift_cl.train.strategy.default import DefaultSettings, DefaultStrategy
 from rift_cl.train.strategy.mcmc import McmcSettings, McmcStrategy
 from rift_cl.train.strategy.protocol import Penalties, Strategy, StrategySettings, TrainingRun
+from rift_cl.train.strategy.residual import ResidualSettings, ResidualStrategy
 from rift_cl.train.strategy.xray import XraySettings, XrayStrategy
 
 __all__ = [
@@ -23,6 +25,8 @@ __all__ = [
     "McmcSettings",
     "McmcStrategy",
     "Penalties",
+    "ResidualSettings",
+    "ResidualStrategy",
     "Strategy",
     "StrategySettings",
     "TrainingRun",
@@ -32,7 +36,13 @@ __all__ = [
 ]
 
 STRATEGIES: Registry[type[StrategySettings]] = Registry(
-    "strategy", {"mcmc": McmcSettings, "default": DefaultSettings, "xray": XraySettings}
+    "strategy",
+    {
+        "residual": ResidualSettings,
+        "mcmc": McmcSettings,
+        "default": DefaultSettings,
+        "xray": XraySettings,
+    },
 )
 
 

@@ -11,14 +11,11 @@ the one before:
 Where densities are drawn as optical depths (``SplatSettings.activation``) depths add up: each of
 the k gets one k-th, which is the same o', and keeps its scale, whatever its modes. That is exact.
 
-Relocation is seldom and has no kernel: it is done on the host, in NumPy. The random walk is
-``kernels/train/splat_noise.cl`` (``Parameters.shake``); what is random comes from (seed, step)
-alone.
+The random walk is ``kernels/train/splat_noise.cl`` (``Parameters.shake``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from math import comb
 from typing import TYPE_CHECKING
@@ -27,15 +24,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError, SettingError
-from rift_cl.train.ranges import check_number, check_whole
-from rift_cl.train.strategy.protocol import Penalties, Strategy, StrategySettings, TrainingRun
+from rift_cl.train.ranges import check_number
+from rift_cl.train.strategy.growth import (
+    GrowthSettings,
+    GrowthStrategy,
+    extended,
+    grown,
+    sigmoid,
+)
+from rift_cl.train.strategy.protocol import TrainingRun
 
 if TYPE_CHECKING:
     from rift_cl.splat.renderer import Frame, FrameGradients
     from rift_cl.train.parameters import Parameters
 
-# A set of splats grows by no more than this share at once.
-_MOST_GROWTH = 1.0
 # More splats than this in one place share it like so many.
 _MOST_IN_PLACE = 51
 _OPACITY_EDGE = 1e-6
@@ -44,42 +46,21 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class McmcSettings(StrategySettings):
+class McmcSettings(GrowthSettings):
     """Relocate transparent splats, with penalties and, if asked for, random walks (3DGS as MCMC).
 
     Raises:
         InputError: a number is out of its range.
     """
 
-    every: int = 100
-    """Steps between two relocations."""
-    first: int = 500
-    """Step of the first relocation."""
-    last: float = 0.85
-    """Fraction of the run after which the number of splats no longer grows."""
-    growth: float = 0.05
-    """Fraction by which the number of splats grows at each relocation, up to the most that there
-    may be; more where the run is too short for it. 0 = the number stays."""
-    full: float = 0.5
-    """Fraction of the run after which the most splats that there may be should be there."""
-    min_opacity: float = 0.005
-    """Opacity up to which a splat counts as transparent and is relocated."""
     noise: float = 0.0
     """Step of the random walk of faint splats, as a multiple of the positions' learning rate; 5e5
     in Kheradmand et al. 2024 (0 = none)."""
-    opacity_penalty: float = 0.01
-    """Weight of the mean opacity in the loss."""
-    scale_penalty: float = 0.01
-    """Weight of the mean scale in the loss, with scales in units of the scene."""
 
     def __post_init__(self) -> None:
         """Check every number's range."""
-        check_whole(self, "every", 1)
-        check_whole(self, "first", 0)
-        for name in ("last", "full", "min_opacity"):
-            check_number(self, name, most=1)
-        for name in ("growth", "noise", "opacity_penalty", "scale_penalty"):
-            check_number(self, name)
+        super().__post_init__()
+        check_number(self, "noise")
 
     def begin(self, parameters: Parameters, run: TrainingRun) -> McmcStrategy:
         """The strategy of a run; see ``StrategySettings``."""
@@ -92,7 +73,7 @@ class McmcSettings(StrategySettings):
         return McmcStrategy(self, run)
 
 
-class McmcStrategy(Strategy):
+class McmcStrategy(GrowthStrategy):
     """Relocates transparent splats, and moves faint ones at random if that is asked for.
 
     Args:
@@ -103,15 +84,8 @@ class McmcStrategy(Strategy):
     wants_frame = False
 
     def __init__(self, settings: McmcSettings, run: TrainingRun) -> None:
-        super().__init__(run)
+        super().__init__(settings, run)
         self.settings = settings
-
-    def penalties(self, step: int) -> Penalties:
-        """Of opacities and scales, until the cooldown."""
-        settings = self.settings
-        if step >= self.run.cooldown:
-            return Penalties()
-        return Penalties(settings.opacity_penalty, settings.scale_penalty)
 
     def after_step(
         self,
@@ -122,36 +96,17 @@ class McmcStrategy(Strategy):
     ) -> Parameters:
         """Relocated every few steps, and moved at random until the cooldown if that is wanted."""
         settings, run, step = self.settings, self.run, parameters.step
-        if step >= settings.first and step % settings.every == 0 and step < run.steps:
+        if self.relocates_at(step):
             parameters = relocate(
                 parameters,
                 min_opacity=settings.min_opacity,
                 most=run.splats,
                 seed=run.seed,
-                growth=self._growth(step, len(parameters)),
+                growth=self.growth(step, len(parameters)),
             )
         if settings.noise and step <= run.cooldown:
             parameters.shake(settings.noise * learning_rate, run.seed)
         return parameters
-
-    def forecast(self, step: int, count: int) -> Iterator[tuple[int, int]]:
-        """Growth follows from the number of splats alone; see ``Strategy``."""
-        run, every = self.run, self.settings.every
-        next_one = every * (max(step, self.settings.first - 1) // every + 1)
-        for until in range(next_one, run.steps, every):
-            yield until - step, count
-            step = until
-            count += grown(count, self._growth(until, count), run.splats)
-        yield run.steps - step, count
-
-    def _growth(self, step: int, count: int) -> float:
-        """The usual growth, or what a short run needs to have all its splats in time."""
-        settings, run = self.settings, self.run
-        if step >= run.steps * settings.last:
-            return 0.0
-        left = max(1, int(run.steps * settings.full - step) // settings.every + 1)
-        needed = (run.splats / count) ** (1 / left) - 1
-        return max(settings.growth, min(needed, _MOST_GROWTH)) if settings.growth else 0.0
 
 
 def relocate(
@@ -176,7 +131,7 @@ def relocate(
         raise InputError("relocate: these splats have densities, wanted opacities")
     raw, first, second = parameters.host()
     random = np.random.default_rng((seed, parameters.step, 0xA11))
-    opacities = _sigmoid(raw["logits"].astype(float))
+    opacities = sigmoid(raw["logits"].astype(float))
     faded = np.flatnonzero(opacities <= min_opacity)
     alive = np.flatnonzero(opacities > min_opacity)
     if alive.size == 0:
@@ -189,17 +144,12 @@ def relocate(
     places = np.concatenate([faded, np.arange(len(parameters), len(parameters) + added)])
     touched = np.concatenate([places, np.flatnonzero(shared)])
     for name in parameters.groups:
-        raw[name] = _extended(raw[name], added)
+        raw[name] = extended(raw[name], added)
         raw[name][places] = raw[name][chosen]
         for moments in (first, second):
-            moments[name] = _extended(moments[name], added)
+            moments[name] = extended(moments[name], added)
             moments[name][touched] = 0
     return parameters.replaced(raw, first, second)
-
-
-def grown(count: int, growth: float, most: int) -> int:
-    """Number of splats that a relocation adds to ``count``."""
-    return max(0, min(round(count * growth), most - count))
 
 
 def _share(
@@ -229,11 +179,3 @@ def _overlap(opacity: float, count: int) -> float:
         for j in range(i)
     )
     return float(sum(terms))
-
-
-def _extended(array: NDArray[np.float32], more: int) -> NDArray[np.float32]:
-    return np.concatenate([array, np.zeros((more, *array.shape[1:]), np.float32)])
-
-
-def _sigmoid(x: Floats) -> Floats:
-    return np.asarray(1 / (1 + np.exp(-x)))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rift_cl.errors import CheckpointError
 
 if TYPE_CHECKING:
+    from rift_cl.cl.array import DeviceArray
     from rift_cl.splat.renderer import Frame, FrameGradients
     from rift_cl.splat.settings import SplatSettings
     from rift_cl.train.parameters import Parameters
@@ -100,6 +101,26 @@ class Strategy:
     def penalties(self, step: int) -> Penalties:
         """The penalties in the loss of the step after ``step`` steps."""
         return Penalties()
+
+    def looks_at(self, step: int) -> bool:
+        """Whether ``look`` is called in the step after ``step`` steps."""
+        return False
+
+    def look(
+        self,
+        frame: Frame,
+        image: DeviceArray,
+        target: DeviceArray,
+        weights: DeviceArray | None,
+    ) -> None:
+        """Called with what was rendered, before its gradient is made.
+
+        Args:
+            frame: what was rendered in the step, whatever ``wants_frame`` says.
+            image: its image as it is compared, with the exposure of the view, (height, width, D).
+            target: the training image, (height, width, C); channels behind C are not compared.
+            weights: of the pixels, (height, width); None where all are 1.
+        """
 
     def after_step(
         self,
