@@ -39,7 +39,7 @@ class Asked:
     """Most splats."""
     downscale: int = 2
     """Whole factor by which photographs are made smaller."""
-    strategy: Literal["mcmc", "default"] = "mcmc"
+    strategy: Literal["residual", "mcmc", "default"] = "residual"
     """How splats find their places."""
 
 

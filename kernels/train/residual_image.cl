@@ -13,6 +13,16 @@
 
 #include "include/portable.h"
 
+#ifndef CHANNELS
+#define CHANNELS 3
+#endif
+#ifndef IMAGE_CHANNELS
+#define IMAGE_CHANNELS CHANNELS
+#endif
+#ifndef WEIGHTED
+#define WEIGHTED 0
+#endif
+
 KERNEL void residual_image(
     __global const float *restrict image, __global const float *restrict target,
     __global const float *restrict weights, __global float *restrict residual, int pixels)

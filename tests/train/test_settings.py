@@ -9,7 +9,12 @@ import pytest
 from rift_cl.errors import InputError, SettingError
 from rift_cl.train.environment_settings import EnvironmentSettings
 from rift_cl.train.settings import LearningRates, TrainSettings
-from rift_cl.train.strategy import DefaultSettings, McmcSettings, XraySettings
+from rift_cl.train.strategy import (
+    DefaultSettings,
+    McmcSettings,
+    ResidualSettings,
+    XraySettings,
+)
 from rift_cl.train.surface_settings import SurfaceSettings
 from rift_cl.train.xray.settings import XrayTrainSettings
 
@@ -30,6 +35,9 @@ NAN, INF = float("nan"), float("inf")
         (McmcSettings, {"last": 1.1}, r"last is 1.1"),
         (McmcSettings, {"growth": -0.1}, "growth is -0.1"),
         (McmcSettings, {"min_opacity": 2}, "min_opacity is 2"),
+        (ResidualSettings, {"views": 0}, "ResidualSettings: views is 0"),
+        (ResidualSettings, {"min_contribution": -1}, "min_contribution is -1"),
+        (ResidualSettings, {"every": 0}, "every is 0"),
         (DefaultSettings, {"every": 0}, "DefaultSettings: every is 0"),
         (DefaultSettings, {"min_reset": 0}, "min_reset is 0"),
         (DefaultSettings, {"first": -0.1}, r"first is -0.1"),
@@ -52,7 +60,15 @@ def test_a_number_out_of_its_range_is_named(kind, changes, words):
 
 
 @pytest.mark.parametrize(
-    "kind", [LearningRates, McmcSettings, DefaultSettings, XraySettings, SurfaceSettings]
+    "kind",
+    [
+        LearningRates,
+        ResidualSettings,
+        McmcSettings,
+        DefaultSettings,
+        XraySettings,
+        SurfaceSettings,
+    ],
 )
 @pytest.mark.parametrize("value", [NAN, INF, -INF, "1", [1, 2]])
 def test_what_is_no_number_is_refused_everywhere(kind, value):
@@ -85,5 +101,5 @@ def test_the_threshold_follows_the_kind_of_gradient():
     assert DefaultSettings(absgrad=True, grow_gradient=5e-4).threshold == 5e-4
 
 
-def test_the_default_strategy_is_mcmc():
-    assert TrainSettings().strategy == McmcSettings()
+def test_the_default_strategy_goes_by_residuals():
+    assert TrainSettings().strategy == ResidualSettings()

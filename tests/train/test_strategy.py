@@ -15,13 +15,22 @@ from rift_cl.train.loss.image_loss import ImageLoss
 from rift_cl.train.parameters import GROUPS, Parameters
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import random_points, scene_extent, start_splats
-from rift_cl.train.strategy import DefaultSettings, DefaultStrategy, McmcSettings, TrainingRun
+from rift_cl.train.strategy import (
+    DefaultSettings,
+    DefaultStrategy,
+    McmcSettings,
+    ResidualSettings,
+    TrainingRun,
+)
 
 pytestmark = pytest.mark.once
 
 RATES = {"means": 1e-3, "quats": 1e-3, "log_scales": 5e-3, "logits": 5e-2, "sh": 2.5e-3}
 MCMC = TrainSettings(
     steps=40, splats=90, cooldown=0.25, strategy=McmcSettings(first=10, every=5, noise=5e5)
+)
+RESIDUAL = TrainSettings(
+    steps=40, splats=90, cooldown=0.25, strategy=ResidualSettings(first=10, every=5, views=3)
 )
 # The scene is as large as its extent and its splats are few, so that size prunes none.
 HOW = DefaultSettings(
@@ -59,7 +68,10 @@ def run(ball, parameters, strategy, steps):
         frame = renderer.forward(
             parameters.drawn, ball.cameras[number], background=ball.background(number)
         )
-        by_image = ImageLoss(ssim_weight=0)(device, frame.image, ball.target(number))[1]
+        target = ball.target(number)
+        by_image = ImageLoss(ssim_weight=0)(device, frame.image, target)[1]
+        if strategy.looks_at(step):
+            strategy.look(frame, frame.image, target, None)
         gradients = renderer.backward(frame, by_image)
         penalties = strategy.penalties(step)
         parameters.update(
@@ -74,7 +86,11 @@ def run(ball, parameters, strategy, steps):
     return parameters, sizes
 
 
-@pytest.mark.parametrize("settings", [MCMC, DEFAULT, ABSGRAD], ids=["mcmc", "default", "absgrad"])
+@pytest.mark.parametrize(
+    "settings",
+    [RESIDUAL, MCMC, DEFAULT, ABSGRAD],
+    ids=["residual", "mcmc", "default", "absgrad"],
+)
 def test_a_run_taken_up_in_the_middle_is_the_same_run(ball, settings):
     straight, sizes = run(ball, *begun(ball, settings), 30)
     first, strategy = begun(ball, settings)

@@ -19,6 +19,7 @@ from rift_cl.train import Homogenisation, ImageLoss, Parameters
 from rift_cl.train.band_limit import Detail, camera_table
 from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
 from rift_cl.train.per_view.exposures import Exposures
+from rift_cl.train.strategy.residual import Contributions
 from rift_cl.train.strategy.screen_statistics import ScreenStatistics
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def training_operations(case: SplatCase) -> dict[str, Callable[[], Any]]:
         parameters.shake(1.0, 0)
 
     statistics = ScreenStatistics(device, case.count)
+    contributions = Contributions(device, case.count)
     homogenised = HomogenisedLoss(device, Homogenisation(0.5), ssim_weight=0.2, kind="l1")
     cameras = device.array(camera_table([case.camera] * _VIEWS))
     limited, detail = Parameters.of(device, raw), Detail(2.0, 1000.0)
@@ -61,6 +63,7 @@ def training_operations(case: SplatCase) -> dict[str, Callable[[], Any]]:
         "loss": lambda: loss(device, case.frame.image, target),
         "update": update,
         "statistics": lambda: statistics.add(case.frame, case.gradients),
+        "contributions": lambda: contributions.add(case.frame, case.frame.image, target, None),
         "homogenised loss": lambda: homogenised(case.frame.image, target),
         "band limit": lambda: limited.limit_band(cameras, near=0.01, unseen=1.0),
         "band limit by coverage": lambda: limited.limit_band(
@@ -115,6 +118,8 @@ TRAINING_COSTS: dict[str, Cost] = {
     "splat_statistics": _per(
         "splat", _splats, 41, "gradient, extents, code in; statistics both", 8
     ),
+    "residual_image": _per("sample", _samples, 12, "two images in, residual out", 3),
+    "residual_statistics": _per("splat", _splats, 33, "sums and code in; statistics both", 3),
     "splat_band": _per("splat", _splats, 16, "place in, length out; 100 cameras", 22 * _VIEWS),
     "splat_band_coverage": _per(
         "splat", _splats, 16, "place in, length out; 100 cameras, 8 halvings", 8 * 60 * _VIEWS

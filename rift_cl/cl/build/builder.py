@@ -296,7 +296,11 @@ class Builder:
 
 
 def _log(text: str) -> str:
-    lines = [line for line in text.splitlines() if re.search(r"error|warning", line, re.IGNORECASE)]
+    lines = [
+        line
+        for line in text.splitlines()
+        if re.search(r"(error|warning)\b *:", line, re.IGNORECASE)
+    ]
     return "\n".join(line for line in lines if "BUILD_PROGRAM_FAILURE" not in line)
 
 

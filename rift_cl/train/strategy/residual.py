@@ -67,7 +67,7 @@ class ResidualSettings(GrowthSettings):
     """Fraction of the run after which splats are no longer relocated, and their number stays."""
     opacity_penalty: float = 0.0
     """Weight of the mean opacity in the loss."""
-    views: int = 50
+    views: int = 20
     """Training views before a relocation that say what each splat contributes: those of so many
     steps, or of all since the last relocation where these are fewer."""
     min_contribution: float = 0.07
