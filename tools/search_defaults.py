@@ -42,7 +42,9 @@ _USUAL = {
 }
 _MEANS = "learning_rates.means"
 _SHAPES = ("learning_rates.log_scales", "learning_rates.quats")
-_PENALTIES = ("strategy.opacity_penalty", "strategy.scale_penalty")
+_SCALES = "strategy.scale_penalty"
+# The default strategy of before, which finds what it relocates by opacity.
+_MCMC = {"strategy": "mcmc"}
 
 
 def times(factor: float, *names: str, of: Settings | None = None) -> Settings:
@@ -66,19 +68,24 @@ VARIANTS: dict[str, Settings] = {
     "no ramp": {"homogenise": 0.0},
     "linear light": {"light": "linear"},
     "surface": PRESETS["surface"],
-    "walk": {"strategy.noise": 5e5},
-    "walk / 10": {"strategy.noise": 5e4},
+    "mcmc": _MCMC,
+    "walk": {**_MCMC, "strategy.noise": 5e5},
+    "walk / 10": {**_MCMC, "strategy.noise": 5e4},
     "harmonics as in 0.1": {"sh_every": 1 / 6, "learning_rates.sh_rest": 0.2},
     "colours x 2": times(2, "learning_rates.sh"),
     "colours / 2": times(0.5, "learning_rates.sh"),
     "logits x 2": times(2, "learning_rates.logits"),
     "logits / 2": times(0.5, "learning_rates.logits"),
-    "penalties x 2": times(2, *_PENALTIES),
-    "penalties / 2": times(0.5, *_PENALTIES),
+    "scales penalised x 2": times(2, _SCALES),
+    "scales penalised / 2": times(0.5, _SCALES),
+    "opacities penalised": {"strategy.opacity_penalty": 0.01},
     "cooldown 0.25": {"cooldown": 0.25},
-    "relocation from 200": {"strategy.first": 200},
-    "relocation every 50": {"strategy.first": 200, "strategy.every": 50},
+    "relocation from 100": {"strategy.first": 100},
+    "relocation every 50": {"strategy.first": 100, "strategy.every": 50},
+    "contribution / 2": times(0.5, "strategy.min_contribution"),
+    "contribution x 3": times(3, "strategy.min_contribution"),
     "lobes": _LOBES,
+    "lobes, mcmc": {**_LOBES, **_MCMC},
     "lobes, moves x 2": times(2, *_MOVES, of=_LOBES),
     "lobes, moves / 2": times(0.5, *_MOVES, of=_LOBES),
     "lobes, scales and rotations / 2": times(0.5, *_SHAPES, of=_LOBES),
