@@ -112,7 +112,7 @@ def test_a_failed_command_leaves_no_folder(tmp_path, monkeypatch, capsys):
         rift.plan_views(3, speed=2)
     for settings, words in (
         ({"steps": "many"}, "steps is 'many', wanted a whole number$"),
-        ({"strategy": "best"}, "strategy is 'best', wanted one of mcmc"),
+        ({"strategy": "best"}, "strategy is 'best', wanted one of residual"),
         ({"kind": "xrays"}, "kind"),
     ):
         with pytest.raises(InputError, match=words):

@@ -27,7 +27,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import CheckpointError, InputError, SettingError
-from rift_cl.splat.raster_pass import draw_grad
 from rift_cl.train.per_view.quaternions import rotated
 from rift_cl.train.ranges import check_number, check_whole
 from rift_cl.train.strategy.growth import (
@@ -61,12 +60,16 @@ class ResidualSettings(GrowthSettings):
         InputError: a number is out of its range.
     """
 
-    first: int = 200
+    every: int = 50
+    """Steps between two relocations."""
+    first: int = 100
     """Step of the first relocation."""
     last: float = 0.85
     """Fraction of the run after which splats are no longer relocated, and their number stays."""
     opacity_penalty: float = 0.0
     """Weight of the mean opacity in the loss."""
+    scale_penalty: float = 0.04
+    """Weight of the mean scale in the loss, with scales in units of the scene."""
     views: int = 20
     """Training views before a relocation that say what each splat contributes: those of so many
     steps, or of all since the last relocation where these are fewer."""
@@ -121,6 +124,9 @@ class Contributions:
         Raises:
             InputError: the image has a single channel.
         """
+        # Here, so that the help of a fit, which shows these settings, loads no renderer.
+        from rift_cl.splat.raster_pass import draw_grad
+
         device, (height, width, channels) = self._device, image.shape
         if channels < 2:
             raise InputError(
