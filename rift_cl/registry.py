@@ -25,19 +25,32 @@ class Registry(Generic[T]):
     def __init__(self, kind: str, entries: Mapping[str, T]) -> None:
         self.kind = kind
         self._entries = dict(entries)
+        self._ours = frozenset(entries)
 
-    def add(self, name: str, entry: T) -> None:
+    def __repr__(self) -> str:
+        return f"<Registry of a {self.kind}: {', '.join(self)}>"
+
+    def add(self, name: str, entry: T, *, replace: bool = False) -> None:
         """Add an entry.
 
+        Args:
+            name: of the entry.
+            entry: what is known by it.
+            replace: take the place of an entry of that name that was added before, as a cell of a
+                notebook does that is run again.
+
         Raises:
-            InputError: the name is empty, no text, or taken.
+            InputError: the name is empty, no text, or taken; or, with ``replace``, it is one of
+                those that the package came with.
         """
         if not isinstance(name, str) or not name:
             raise InputError(f"the name of a {self.kind} is {name!r}, wanted a text")
-        if name in self._entries:
+        if name in self._ours & self._entries.keys() and replace:
+            raise InputError(f"the {self.kind} {name!r} is the package's own: choose another name")
+        if name in self._entries and not replace:
             raise InputError(
                 f"a {self.kind} named {name!r} is registered already: choose another name, or "
-                "remove that one first (.remove of its registry)"
+                "register it with replace=True"
             )
         self._entries[name] = entry
 

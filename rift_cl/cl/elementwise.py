@@ -47,6 +47,21 @@ def put_run(device: Device, x: DeviceArray, y: DeviceArray, first: int) -> None:
     _copy_bytes(device, x, 0, y, first * y.dtype.itemsize, x.nbytes)
 
 
+def with_own_buffer(device: Device, x: DeviceArray) -> DeviceArray:
+    """An array itself, or its copy where it begins inside the buffer of another, as x[1] does."""
+    if not x.offset:
+        return x
+    y = device.empty(x.shape, x.dtype)
+    _copy_bytes(device, x, x.offset, y, 0, x.nbytes)
+    return y
+
+
+def put_inside(device: Device, x: DeviceArray, y: DeviceArray) -> DeviceArray:
+    """Y = x, where y may begin inside the buffer of another array; y."""
+    _copy_bytes(device, x, 0, y, y.offset, x.nbytes)
+    return y
+
+
 def _copy_bytes(
     device: Device, x: DeviceArray, x_first: int, y: DeviceArray, y_first: int, count: int
 ) -> None:

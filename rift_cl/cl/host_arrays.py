@@ -245,8 +245,17 @@ def as_device_array(
     *,
     name: str,
     dtype: DTypeLike = np.float32,
+    inside: bool = False,
 ) -> DeviceArray:
     """Check a device array that a caller handed in.
+
+    Args:
+        device: that it has to be on.
+        array: what came.
+        shape: that it has to have.
+        name: what the caller calls it, for the error.
+        dtype: that it has to have.
+        inside: whether it may begin inside the buffer of another array, as ``stack[1]`` does.
 
     Raises:
         ShapeError: the shape or memory order is not the wanted one.
@@ -262,14 +271,18 @@ def as_device_array(
     if array.dtype != dtype:
         wanted = np.dtype(dtype).name
         raise DTypeError(f"{name} has type {array.dtype} on the device, wanted {wanted}")
-    _check_whole(device, array, name=name)
+    _check_whole(device, array, name=name, inside=inside)
     return array
 
 
-def _check_whole(device: Device, array: DeviceArray, *, name: str) -> None:
+def _check_whole(device: Device, array: DeviceArray, *, name: str, inside: bool = False) -> None:
     """Kernels and copies see buffers, and know nothing of views into them."""
-    if not array.flags.c_contiguous or array.offset:
-        raise ShapeError(f"{name} is a strided view on the device: pass {name}.copy()")
+    # A copy of an output would be written in its place.
+    remedy = "give an array of its own" if name == "out" else f"pass {name}.copy()"
+    if not array.flags.c_contiguous:
+        raise ShapeError(f"{name} is a strided view on the device: {remedy}")
+    if array.offset and not inside:
+        raise ShapeError(f"{name} begins inside the buffer of another device array: {remedy}")
     if array.context != device.context:
         raise DeviceError(f"{name} lives on another device than {device.name}: copy it over first")
 
@@ -299,8 +312,10 @@ def check_output(out: Any, shape: tuple[int, ...], dtype: DTypeLike = np.float32
     wanted = np.dtype(dtype)
     if not isinstance(out, np.ndarray) or out.dtype != wanted or not out.flags.writeable:
         raise DTypeError(f"out must be a writable NumPy array of native {wanted.name}")
-    if out.shape != shape or not out.flags.c_contiguous:
-        raise ShapeError(f"out has shape {out.shape}, wanted a C-ordered array of shape {shape}")
+    if out.shape != shape:
+        raise ShapeError(f"out has shape {out.shape}, wanted {shape}")
+    if not out.flags.c_contiguous:
+        raise ShapeError("out is not in C order: give a contiguous array (numpy.empty makes one)")
     return out
 
 
@@ -312,7 +327,8 @@ def check_apart(x: Any, out: Any, *, name: str) -> None:
     """
     if is_device_array(x):
         shared = x.base_data is not None and x.base_data == out.base_data
+        shared = shared and x.offset < out.offset + out.nbytes and out.offset < x.offset + x.nbytes
     else:
         shared = np.may_share_memory(x, out)
     if shared:
-        raise InputError(f"out is {name} itself: give it memory of its own")
+        raise InputError(f"out shares memory with {name}: give it memory of its own")

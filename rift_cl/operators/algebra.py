@@ -35,10 +35,10 @@ class Adjoint(LinearOperator):
         return self._forward
 
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
-        self._forward._apply_adjoint(x, out)
+        self._forward._fill_adjoint(x, out)
 
     def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
-        self._forward._apply(y, out)
+        self._forward._fill(y, out)
 
     def _apply_host(self, x: NDArray[Any], y: NDArray[Any]) -> None:
         self._forward._apply_adjoint_host(x, y)
@@ -79,11 +79,11 @@ class Scaled(Composite):
         return type(self), (self._inner, self._factor)
 
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
-        self._inner._apply(x, out)
+        self._inner._fill(x, out)
         axpby(self.device, 0.0, out, self._factor, out)
 
     def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
-        self._inner._apply_adjoint(y, out)
+        self._inner._fill_adjoint(y, out)
         axpby(self.device, 0.0, out, self._factor, out)
 
     def _apply_steps(self, x: NDArray[Any], y: NDArray[Any]) -> None:
@@ -151,16 +151,16 @@ class Sum(Composite):
 
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
         left, right = self._terms
-        left._apply(x, out)
+        left._fill(x, out)
         other = self.device.empty(out.shape, self.dtype)
-        right._apply(x, other)
+        right._fill(x, other)
         axpby(self.device, 1.0, other, 1.0, out)
 
     def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
         left, right = self._terms
-        left._apply_adjoint(y, out)
+        left._fill_adjoint(y, out)
         other = self.device.empty(out.shape, self.dtype)
-        right._apply_adjoint(y, other)
+        right._fill_adjoint(y, other)
         axpby(self.device, 1.0, other, 1.0, out)
 
     def _apply_steps(self, x: NDArray[Any], y: NDArray[Any]) -> None:
@@ -212,13 +212,13 @@ class Product(Composite):
 
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
         between = self.device.empty(self._inner.range, self.dtype)
-        self._inner._apply(x, between)
-        self._outer._apply(between, out)
+        self._inner._fill(x, between)
+        self._outer._fill(between, out)
 
     def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
         between = self.device.empty(self._inner.range, self.dtype)
-        self._outer._apply_adjoint(y, between)
-        self._inner._apply_adjoint(between, out)
+        self._outer._fill_adjoint(y, between)
+        self._inner._fill_adjoint(between, out)
 
     def _apply_steps(self, x: NDArray[Any], y: NDArray[Any]) -> None:
         between = np.empty(self._inner.range, self.dtype)

@@ -17,8 +17,11 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.cl.elementwise import copy
 from rift_cl.cl.host_arrays import as_host_array, download, upload
-from rift_cl.errors import DTypeError
+from rift_cl.errors import DTypeError, InputError
 from rift_cl.operators.linear import LinearOperator, Shape
+
+# In what NumPy says to who writes into an array that may only be read.
+_READ_ONLY = "read-only"
 
 Function = Callable[[NDArray[Any]], Any]
 
@@ -27,8 +30,8 @@ class HostOperator(LinearOperator):
     """A linear map that two functions of NumPy arrays compute.
 
     Args:
-        forward: takes an array of shape ``domain``, gives one of shape ``range``, or its numbers
-            in C order along one axis.
+        forward: takes an array of shape ``domain``, which it may not write into, gives one of
+            shape ``range``, or its numbers in C order along one axis.
         adjoint: the other way; ``rift_cl.dot_test`` says whether it is the adjoint.
         domain: shape of the input.
         range: shape of the output.
@@ -38,6 +41,7 @@ class HostOperator(LinearOperator):
     Raises:
         DTypeError: ``dtype`` is complex.
         ShapeError: a function gave another shape, when it was applied.
+        InputError: a function wrote into its argument, when it was applied.
     """
 
     def __init__(
@@ -78,7 +82,18 @@ class HostOperator(LinearOperator):
         copy(self.device, upload(self.device, found), out)
 
     def _computed(self, function: Function, given: NDArray[Any], shape: Shape) -> NDArray[Any]:
-        found = np.asarray(function(given))
+        # What comes is the caller's own array where it has the right type already.
+        view = given.view()
+        view.flags.writeable = False
+        try:
+            found = np.asarray(function(view))
+        except ValueError as error:
+            if _READ_ONLY not in str(error):
+                raise
+            raise InputError(
+                "a function of a HostOperator writes into its argument, which is the array that "
+                "the operator was applied to: let it begin with x = x.copy()"
+            ) from error
         if found.shape == (math.prod(shape),):
             found = found.reshape(shape)
         return as_host_array(found, shape, name="result", wants="the operator", dtype=self.dtype)

@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from functools import cached_property
+from functools import cached_property, partial
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -28,6 +28,7 @@ from numpy.typing import DTypeLike, NDArray
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
+from rift_cl.cl.elementwise import put_inside, with_own_buffer
 from rift_cl.cl.host_arrays import (
     as_device_array,
     as_host_array,
@@ -137,8 +138,9 @@ class LinearOperator(ABC):
             x: array of shape ``domain``; a device array, or anything NumPy takes for an array of
                 real numbers; or a torch tensor or JAX array of shape (..., *domain) and type
                 ``dtype``.
-            out: where to put the result, of the same kind as ``x`` and not ``x`` itself; a new
-                array if not given. Not for torch and JAX.
+            out: where to put the result, of the same kind as ``x`` and with memory of its own; a
+                new array if not given. Not for torch and JAX. Device arrays that begin inside
+                another's buffer, such as ``stack[1]``, cost a copy on the device, as ``x`` too.
             name: the caller's name for ``x``, for error messages.
 
         Returns:
@@ -155,12 +157,15 @@ class LinearOperator(ABC):
                 raise InputError(f"out is given and {name} is a {kind}: use what is returned")
             return import_module(_BRIDGES[kind]).apply(self, x, name=name)
         if is_device_array(x):
-            x = as_device_array(self.device, x, self.domain, name=name, dtype=self.dtype)
-            y = self.device.empty(self.range, self.dtype) if out is None else out
-            y = as_device_array(self.device, y, self.range, name="out", dtype=self.dtype)
-            check_apart(x, y, name=name)
-            self._apply(x, y)
-            return y
+            allowed = partial(as_device_array, self.device, dtype=self.dtype, inside=True)
+            x = allowed(x, self.domain, name=name)
+            if out is not None:
+                out = allowed(out, self.range, name="out")
+                check_apart(x, out, name=name)
+            x = with_own_buffer(self.device, x)
+            y = self.device.empty(self.range, self.dtype) if out is None or out.offset else out
+            self._fill(x, y)
+            return y if out is None or y is out else put_inside(self.device, y, out)
         host = as_host_array(x, self.domain, name=name, wants="the operator", dtype=self.dtype)
         y = np.empty(self.range, self.dtype) if out is None else out
         y = check_output(y, self.range, self.dtype)
@@ -272,7 +277,7 @@ class LinearOperator(ABC):
         given = np.ascontiguousarray(x[chunk.inside])
         part = y[chunk.outside]
         target = self.device.empty(part.shape, self.dtype)
-        operator._apply(share(self.device, given), target)
+        operator._fill(share(self.device, given), target)
         if add:
             part += download(self.device, target)
         elif part.flags.c_contiguous:
@@ -307,6 +312,25 @@ class LinearOperator(ABC):
     def _adjoint_chunks(self, budget: int) -> Iterable[Chunk]:
         """Chunks of the adjoint's work."""
         return [chunk.transposed for chunk in self._chunks(budget)]
+
+    def _fill(self, x: DeviceArray, out: DeviceArray) -> None:
+        """``_apply``, which must write into ``out``."""
+        # As an own operator may be written that is used to SciPy or PyLops.
+        found: object = self._apply(x, out)
+        self._check_nothing(found, "_apply")
+
+    def _fill_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
+        """``_apply_adjoint``, which must write into ``out``."""
+        found: object = self._apply_adjoint(y, out)
+        self._check_nothing(found, "_apply_adjoint")
+
+    def _check_nothing(self, returned: object, method: str) -> None:
+        if returned is not None:
+            raise InputError(
+                f"{type(self).__name__}.{method} returned a {type(returned).__name__}, which "
+                "nobody reads: let it write the result into its second argument, or make the "
+                "operator of two functions of NumPy arrays (rift_cl.HostOperator)"
+            )
 
     @abstractmethod
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:

@@ -88,7 +88,7 @@ class Stack(Composite):
     def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
         for operator, first in zip(self.operators, self._firsts, strict=True):
             part = self.device.empty(operator.range, self.dtype)
-            operator._apply(x, part)
+            operator._fill(x, part)
             put_run(self.device, part, out, first)
 
     def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
@@ -96,7 +96,7 @@ class Stack(Composite):
         for operator, first in zip(self.operators, self._firsts, strict=True):
             part = self.device.empty(operator.range, self.dtype)
             take_run(self.device, y, first, part)
-            operator._apply_adjoint(part, image)
+            operator._fill_adjoint(part, image)
             if first:
                 axpby(self.device, 1.0, image, 1.0, out)
             else:

@@ -210,6 +210,10 @@ class Renderer:
             depth: draw depth along the camera's axis as the last channel: ``accumulated``, the
                 sum of weights times depths, or ``expected``, that divided by alpha.
 
+        Returns:
+            The frame: ``.image`` (height, width, D), ``.transmittance`` (height, width), and what
+            ``backward`` needs of it.
+
         Raises:
             InputError: there is nothing to draw, no depth or no lens in this mode, or splats
                 with modes have more than 32 channels or shall have magnitudes of gradients.
@@ -312,6 +316,12 @@ class Renderer:
             retain: keep the frame. Otherwise it holds nothing afterwards, no image either: its
                 arrays, a sixth of what a large scene takes with its gradients, are given up one
                 after the other, each as soon as it is not needed.
+
+        Returns:
+            Gradients as device arrays: by the splats' geometry ``.splats.means``,
+            ``.splats.quats``, ``.splats.scales``, ``.splats.opacities``; by what they show ``.sh``
+            or ``.colors``; ``.camera`` and ``.background``. What the splats have not, or was not
+            asked for, is None (see ``FrameGradients``).
 
         Raises:
             ShapeError: a gradient does not fit the frame.

@@ -41,9 +41,9 @@ def test_views_are_refused_and_the_copy_is_taken(device):
     views = {"strided": wide[::2, ::2], "later rows": tall[4:], "transposed": tall[:6, :4].T}
     for view in views.values():
         assert view.shape == SHAPE
-        with pytest.raises(ShapeError, match="strided view"):
+        with pytest.raises(ShapeError, match=r"strided view|begins inside"):
             _checked(device, view)
-        with pytest.raises(ShapeError, match="strided view"):
+        with pytest.raises(ShapeError, match=r"strided view|begins inside"):
             device.get(view)
     np.testing.assert_array_equal(device.get(tall[4:].copy()), np.arange(24.0, 48.0).reshape(SHAPE))
     assert _checked(device, tall[4:].copy()).shape == SHAPE

@@ -393,3 +393,58 @@ def test_the_dot_test_finds_a_pair_that_is_not_matched(A):
 
 def test_the_dot_test_of_nothing_is_nothing(A):
     assert rift.dot_test(0 * A) == 0
+
+
+def test_device_arrays_that_begin_inside_another_are_taken_and_written(device):
+    A = rift.Projector(
+        rift.Grid((9, 7)), rift.Parallel(np.arange(5) / 5 * np.pi, 11), device=device
+    )
+    random = np.random.default_rng(0)
+    images = random.uniform(size=(3, 9, 7)).astype(np.float32)
+    stack, out = device.array(images), device.zeros((3, 5, 11))
+    for k in range(3):
+        assert A(stack[k], out=out[k]).shape == (5, 11)
+        np.testing.assert_array_equal(device.get(A(stack[k])), A(images[k]))
+    np.testing.assert_array_equal(device.get(out), [A(image) for image in images])
+    with pytest.raises(InputError, match="shares memory"):
+        both = device.zeros((5 * 11 + 9 * 7,))
+        A(both[:63].reshape((9, 7)), out=both[40:95].reshape((5, 11)))
+
+
+def test_no_copy_is_advised_for_an_output(device):
+    A = rift.Projector(
+        rift.Grid((9, 7)), rift.Parallel(np.arange(5) / 5 * np.pi, 11), device=device
+    )
+    with pytest.raises(InputError, match=r"out is a strided view.*an array of its own"):
+        A(device.zeros((9, 7)), out=device.zeros((5, 22))[:, ::2])
+    with pytest.raises(InputError, match="out is not in C order"):
+        A(np.zeros((9, 7)), out=np.zeros((5, 11), np.float32, order="F"))
+
+
+class Returning(rift.operators.LinearOperator):
+    """An operator as SciPy wants it: it returns what it computes, and fills nothing."""
+
+    def _apply(self, x, out):
+        return x
+
+    _apply_adjoint = _apply
+
+
+def test_an_operator_that_returns_instead_of_writing_is_refused(device):
+    B = Returning((4,), (4,), device)
+    for apply in (B, B.T, 2 * B, B @ B, B.T + B, rift.vstack(B, B)):
+        for x in (np.ones(4, np.float32), device.zeros((4,))):
+            with pytest.raises(InputError, match=r"Returning\._apply.*returned"):
+                apply(x)
+
+
+def test_a_function_of_an_operator_cannot_overwrite_what_it_is_applied_to(device):
+    def double(x):
+        x *= 2
+        return x
+
+    B, x = rift.HostOperator(double, double, (4,), (4,), device=device), np.ones(4, np.float32)
+    for given in (x, device.array(x)):
+        with pytest.raises(InputError, match=r"writes into its argument.*copy"):
+            B(given)
+    assert (x == 1).all()

@@ -62,6 +62,11 @@ def test_a_registry_says_what_it_holds_and_what_is_taken():
     assert "one" in numbers and "three" not in numbers and numbers.name_of(2) == "two"
     with pytest.raises(InputError, match="'one'"):
         numbers.add("one", 3)
+    numbers.add("two", 22, replace=True)
+    assert numbers["two"] == 22 and "one, two" in repr(numbers)
+    numbers.add("two", 2, replace=True)
+    with pytest.raises(InputError, match="'one' is the package's own"):
+        numbers.add("one", 3, replace=True)
     with pytest.raises(InputError, match="number is 'three'"):
         numbers["three"]
     for name in ("", 3, None):

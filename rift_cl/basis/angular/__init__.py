@@ -59,7 +59,9 @@ _CHECKED: set[tuple[Callable[[int], AngularBasis], int]] = set()
 _NAME = re.compile(r"[a-z0-9]+")
 
 
-def register_angular_basis(name: str, basis: Callable[[int], AngularBasis]) -> None:
+def register_angular_basis(
+    name: str, basis: Callable[[int], AngularBasis], *, replace: bool = False
+) -> None:
     """Make an angular basis known by a name, for ``AngularSettings`` and ``SplatSettings``.
 
     Its colours are computed on the host, in NumPy, which is slower than the kernels that the
@@ -69,6 +71,7 @@ def register_angular_basis(name: str, basis: Callable[[int], AngularBasis]) -> N
         name: small letters and digits.
         basis: makes the basis of so many functions, the constant included; one derived from
             ``AngularFunctions``, with at least one number of geometry.
+        replace: take the place of one that was registered by that name before.
 
     Raises:
         InputError: the name is taken or has other characters.
@@ -77,7 +80,7 @@ def register_angular_basis(name: str, basis: Callable[[int], AngularBasis]) -> N
         raise InputError(
             f"register_angular_basis: the name is {name!r}, wanted small letters and digits"
         )
-    ANGULAR_BASES.add(name, basis)
+    ANGULAR_BASES.add(name, basis, replace=replace)
 
 
 def angular_basis(kind: str, n_linear: int) -> AngularBasis:

@@ -62,13 +62,14 @@ Reader = Callable[[Path, ScanRequest], ScanFile]
 SCAN_READERS: Registry[Reader] = Registry("scan reader", {})
 
 
-def register_scan_reader(extension: str, reader: Reader) -> None:
+def register_scan_reader(extension: str, reader: Reader, *, replace: bool = False) -> None:
     """Read scans from files of another kind, in ``open_scan`` and in every command.
 
     Args:
         extension: of the files, lower case with its dot, such as ``.raw``.
         reader: takes the file and what a person said about it, and gives back its scan, as
             ``scan_of_arrays`` makes it.
+        replace: take the place of one that was registered for it before.
 
     Raises:
         InputError: the extension has no dot, is read already, or the reader is no function.
@@ -81,7 +82,7 @@ def register_scan_reader(extension: str, reader: Reader) -> None:
         raise InputError(f"register_scan_reader: reader is {reader!r}, wanted a function")
     if extension in _READERS:
         raise InputError(f"register_scan_reader: {extension!r} is read by the package already")
-    SCAN_READERS.add(extension, reader)
+    SCAN_READERS.add(extension, reader, replace=replace)
 
 
 def is_scan_file(path: Path) -> bool:

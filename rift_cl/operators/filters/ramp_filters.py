@@ -178,19 +178,22 @@ FILTERS: Registry[Filter] = Registry(
 )
 
 
-def register_filter(name: str, filter: Filter | Callable[[Floats], ArrayLike]) -> None:
+def register_filter(
+    name: str, filter: Filter | Callable[[Floats], ArrayLike], *, replace: bool = False
+) -> None:
     """Make a filter known by a name, for ``fbp(filter=name)`` and ``--filter name``.
 
     Args:
         name: what it is called from now on, in this process.
         filter: a filter, or a response function as ``Response`` takes it.
+        replace: take the place of one that was registered by that name before.
 
     Raises:
         InputError: the name is taken, or the filter is neither of the two.
     """
     if isinstance(filter, str):
         raise InputError(f"register_filter: {filter!r} is a name, wanted a filter or a function")
-    FILTERS.add(name, as_filter(filter))
+    FILTERS.add(name, as_filter(filter), replace=replace)
 
 
 def as_filter(filter: FilterLike) -> Filter:

@@ -142,7 +142,9 @@ def fbp(
     """Reconstruct by filtered backprojection; of cones by that of Feldkamp, Davis and Kress.
 
     Args:
-        A: the projector that describes grid and scan. A cone's source goes round a full turn or
+        A: the projector that describes grid and scan. Parallel views that cover less than half a
+            turn are taken as they are: what lies between the first and the last is missing from
+            the image. A cone's source goes round a full turn or
             half a turn and the fan; the rotation axis may be near one side of the detector in a
             full turn (see ``FDK``). Or it goes along an even helix (see ``Katsevich``).
         y: sinogram (angles, bins) or projections (angles, rows, bins); line integrals in the

@@ -173,7 +173,11 @@ def sirt(
     subsets: int = 1,
     out: Any = None,
 ) -> Any:
-    """Simultaneous iterative reconstruction.
+    """Simultaneous iterative reconstruction: ``x <- x + relaxation * C A' R (y - A x)``.
+
+    R is one over the sums of the rows of A, C one over those of its columns. Rays whose sum is
+    below a thousandth of the largest, which hardly touch the grid, are left out, and so are such
+    pixels (``rift_cl.reconstruct.solvers.simultaneous_iteration`` has the sources).
 
     Args:
         A: a linear operator without negative weights (with ``precondition``: any).

@@ -39,7 +39,8 @@ def tv(
         y: the data, of shape ``A.range``.
         weight: of the variation, in the unit of y squared over the unit of TV, which is the
             integral of the gradient's length: an image's unit times length for an image, an image's
-            unit for a volume. ``variation_weight(A, y)`` is a place to begin.
+            unit for a volume.
+            ``rift_cl.reconstruct.variation_weight(A, y)`` is a place to begin.
         steps: most steps.
         method: ``pdhg`` (Chambolle and Pock) or ``fista``; both reach the same minimum.
         start: image to begin from; zero if not given.

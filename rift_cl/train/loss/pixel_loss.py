@@ -55,12 +55,17 @@ PIXEL_LOSSES = Registry(
 OURS = PIXEL_LOSSES.names
 
 
-def register_loss(name: str, loss: PixelLoss) -> None:
+def register_loss(name: str, loss: PixelLoss, *, replace: bool = False) -> None:
     """Make a pixel loss known by a name, for ``TrainSettings(loss=name)`` and ``ImageLoss``.
+
+    Args:
+        name: what it is called from now on, in this process.
+        loss: its value and gradient.
+        replace: take the place of one that was registered by that name before.
 
     Raises:
         InputError: the name is taken, or it is no ``PixelLoss``.
     """
     if not isinstance(loss, PixelLoss):
         raise InputError(f"register_loss: {loss!r} is not a PixelLoss")
-    PIXEL_LOSSES.add(name, loss)
+    PIXEL_LOSSES.add(name, loss, replace=replace)

@@ -46,13 +46,16 @@ STRATEGIES: Registry[type[StrategySettings]] = Registry(
 )
 
 
-def register_strategy(name: str, settings: type[StrategySettings]) -> None:
+def register_strategy(
+    name: str, settings: type[StrategySettings], *, replace: bool = False
+) -> None:
     """Make a strategy known by a name.
 
     Args:
         name: what saved settings call it.
         settings: its settings: a dataclass derived from ``StrategySettings``, all of whose fields
             have defaults.
+        replace: take the place of one that was registered by that name before.
 
     Raises:
         InputError: the name is taken, or the settings are no such class.
@@ -62,4 +65,4 @@ def register_strategy(name: str, settings: type[StrategySettings]) -> None:
         raise InputError(
             f"register_strategy: {settings!r} is not a dataclass derived from StrategySettings"
         )
-    STRATEGIES.add(name, settings)
+    STRATEGIES.add(name, settings, replace=replace)

@@ -405,11 +405,16 @@ def _taps(widest: float, narrowest: float, footprint: str, scan: Cone | Upright)
     taps = _fitting(widest, footprint)
     if not taps or (narrowest < _SMALLEST and footprint != "point"):
         raise InputError(
-            f"Cone: pitch is {scan.pitch}, so that a sample's shadow is {narrowest:.3g} to "
-            f"{widest:.3g} bins wide, {_SMALLEST} to {_TAPS[-1] - 1} are allowed: see that all "
-            "lengths have one unit, or bin the data or the volume"
+            f"{_called(scan)}: pitch is {scan.pitch}, so that a sample's shadow is "
+            f"{narrowest:.3g} to {widest:.3g} bins wide, {_SMALLEST} to {_TAPS[-1] - 1} are "
+            "allowed: see that all lengths have one unit, or bin the data or the volume"
         )
     return taps
+
+
+def _called(scan: Cone | Upright) -> str:
+    """What the user gave: the views of vectors are read from upright detectors."""
+    return "Vectors" if isinstance(scan, Upright) else "Cone"
 
 
 def _fitting(shadow: float, footprint: str) -> int:
@@ -428,9 +433,17 @@ def _check_source(grid: Grid, scan: Cone | Upright) -> None:
     depth = distances - aside.max(axis=0)
     if not (depth > 0).all():
         view = int(np.argmin(depth))
+        reach = aside[:, view].max()
+        if isinstance(scan, Upright):
+            raise InputError(
+                f"Vectors: in view {view} the source stands {distances[view]:g} before the middle "
+                f"of the grid as the detector faces it, and the volume reaches {reach:.4g} that "
+                "way, so that it would stand in the volume, beside it or behind it: see that the "
+                "detector faces the grid, give a smaller grid, or all lengths in one unit"
+            )
         raise InputError(
             f"Cone: source_to_axis is {distances[view]:g}, but the volume reaches "
-            f"{aside[:, view].max():.4g} towards the source in view {view}, which would stand in "
+            f"{reach:.4g} towards the source in view {view}, which would stand in "
             "it or beside it: give a smaller grid, or all lengths in one unit"
         )
 
