@@ -73,8 +73,8 @@ class ResidualSettings(GrowthSettings):
     views: int = 20
     """Training views before a relocation that say what each splat contributes: those of so many
     steps, or of all since the last relocation where these are fewer."""
-    min_contribution: float = 0.07
-    """Contribution up to which a splat is relocated, as a fraction of the mean contribution: how
+    min_contribution: float = 0.2
+    """Contribution up to which a splat is relocated, as a fraction of the median contribution: how
     many pixels it makes up in a view that looks at it."""
 
     def __post_init__(self) -> None:
@@ -260,7 +260,7 @@ def relocate_by_residual(
         contributions: (N, 3), what ``Contributions`` gathered since the last time. A splat that no
             view looked at stays where it is, unless it is transparent.
         min_opacity: opacity up to which a splat is relocated.
-        min_contribution: fraction of the mean contribution up to which a splat is relocated.
+        min_contribution: fraction of the median contribution up to which a splat is relocated.
         added: new splats; fewer where there are not as many to be halved.
         seed: random seed, used with the step.
 
@@ -305,7 +305,8 @@ def _unneeded(
     if not seen.any():
         return transparent
     each = np.divide(pixels, views, out=np.zeros_like(pixels), where=seen)
-    return np.asarray(transparent | (seen & (each <= min_contribution * each[seen].mean())))
+    # Not of the mean: a few splats of a background may make up more pixels than all others.
+    return np.asarray(transparent | (seen & (each <= min_contribution * np.median(each[seen]))))
 
 
 def _set_apart(raw: Raw, hosts: NDArray[np.intp], places: NDArray[np.intp]) -> None:
