@@ -4,7 +4,7 @@
 
     P = to_odl(A)                                     # between odl.rn spaces
     P = to_odl(A, domain=space)                       # from a uniform_discr, with its weights
-    D = from_odl(odl.Gradient(space)[0], device=A.device)
+    D = from_odl(odl.PartialDerivative(space, axis=0), device=A.device)
 
 The spaces of functions that ODL discretizes weigh their inner products by the size of a cell, and
 ODL's adjoint goes by these. ``to_odl`` does as well; ``from_odl`` gives the transpose, without

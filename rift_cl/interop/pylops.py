@@ -4,7 +4,8 @@
 
     P = to_pylops(A)                     # P.dims, P.dimsd are A.domain, A.range
     x = pylops.optimization.basic.cgls(P, y, niter=20)[0]
-    D = from_pylops(pylops.Gradient((256, 256)), device=A.device)
+    D = from_pylops(pylops.Gradient(A.domain, dtype=A.dtype), device=A.device)
+    K = rift_cl.vstack(A, D)             # operators that are combined have one type
 
 Numbers are on the host on PyLops' side. What it computes of a float32 operator is good to 7 digits.
 """
@@ -42,7 +43,8 @@ def from_pylops(P: Any, *, device: Device | None = None) -> LinearOperator:
 
     Args:
         P: a real operator with ``shape``, ``dtype``, ``matvec`` and ``rmatvec``; ``dims`` and
-            ``dimsd``, where it has them, are the shapes of domain and range.
+            ``dimsd``, where it has them, are the shapes of domain and range. A sparse or dense
+            matrix becomes one by ``scipy.sparse.linalg.aslinearoperator``.
         device: whose arrays the result takes as well; the default one if not given.
 
     Raises:
@@ -51,7 +53,8 @@ def from_pylops(P: Any, *, device: Device | None = None) -> LinearOperator:
     missing = [n for n in ("shape", "dtype", "matvec", "rmatvec") if not hasattr(P, n)]
     if missing:
         raise DTypeError(
-            f"P is a {type(P).__name__} without {missing[0]}, wanted an operator of PyLops or SciPy"
+            f"P is a {type(P).__name__} without {missing[0]}, wanted an operator of PyLops or "
+            "SciPy (scipy.sparse.linalg.aslinearoperator makes one of a matrix)"
         )
     rows, columns = P.shape
     return HostOperator(

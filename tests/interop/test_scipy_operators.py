@@ -10,6 +10,7 @@ from scipy.sparse import linalg
 
 import rift_cl as rift
 from rift_cl.errors import DTypeError, NonFiniteError
+from rift_cl.interop.pylops import from_pylops
 from rift_cl.interop.scipy import aslinearoperator
 from rift_cl.reconstruct import FilteredBackprojection
 
@@ -128,5 +129,9 @@ def test_pylops_solvers_and_products_take_it(A):
     gradient = pylops.Gradient(P.dims, dtype=A.dtype)
     assert (gradient @ P.H).shape == (2 * math.prod(P.dims), 300)
     x = white(72, dtype=A.dtype)
+    penalised = rift.vstack(
+        A, from_pylops(pylops.Gradient(A.domain, dtype=A.dtype), device=A.device)
+    )
+    assert rift.dot_test(penalised) < 1e-6
     found = pylops.optimization.basic.cgls(P, P @ x, niter=30, tol=0)[0]
     assert np.linalg.norm(P @ (found.ravel() - x)) < 1e-2 * np.linalg.norm(P @ x)
