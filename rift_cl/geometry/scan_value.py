@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 # Whole turns in degrees. Evenly spaced angles that fill one of them to rounding are degrees.
 _TURNS_IN_DEGREES = (180.0, 360.0, 720.0)
 _TURN_TOLERANCE = 1e-5
+# Those of an encoder are even to such a part of a step, and fill a turn to half a step.
+_JITTER, _FILLS = 0.1, 0.5
 # Beyond two turns in radians, lists of round numbers are degrees: a turn is no such number.
 _ROUND_BEYOND = 4 * np.pi
 _ROUND_STEP = 0.25
@@ -155,7 +157,8 @@ def checked_angles(owner: str, angles: ArrayLike, *, helix: bool = False) -> NDA
 def _refuse_degrees(owner: str, angles: NDArray[np.float64], *, helix: bool) -> None:
     """Refuse angles that are degrees by all appearance.
 
-    Even steps that fill half a turn, a turn or two in degrees; and eight and more angles that would
+    Even steps that fill half a turn, a turn or two in degrees, or eight and more steps that do so
+    nearly, as an encoder reads them; and eight and more angles that would
     fill more than two turns as radians, and are multiples of a quarter or lead in even steps from
     one whole number to another. A helix has many turns: of it, only the first is refused.
 
@@ -171,6 +174,16 @@ def _refuse_degrees(owner: str, angles: NDArray[np.float64], *, helix: bool) -> 
     for turn in _TURNS_IN_DEGREES if even else ():
         if any(abs(whole - turn) < _TURN_TOLERANCE * turn for whole in wholes):
             _refuse(owner, f"fill {turn:g} in even steps")
+    step = float(steps.mean())
+    # Steps that are even to rounding were computed, and may be radians of many turns.
+    if (
+        not even
+        and len(angles) >= _FEWEST_ROUND
+        and np.abs(steps - step).max() <= _JITTER * abs(step)
+    ):
+        for turn in _TURNS_IN_DEGREES:
+            if any(abs(whole - turn) <= _FILLS * abs(step) for whole in wholes):
+                _refuse(owner, f"fill {turn:g} in nearly even steps")
     if helix or len(angles) < _FEWEST_ROUND or span <= _ROUND_BEYOND:
         return
     if _are_round(angles, _ROUND_STEP) or (even and _are_round(angles[[0, -1]], 1.0)):

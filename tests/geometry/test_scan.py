@@ -64,6 +64,8 @@ def test_any_order_and_range_of_angles_is_kept(angles):
         np.linspace(0, 120, 77),
         np.r_[0:40, 50:200:0.5],
         np.r_[0, 137.5, 275, 52.5, 190, 327.5, 105, 242.5],
+        np.arange(180) + 1e-3 * np.sin(np.arange(180)),
+        np.linspace(0, 360, 200) + 0.05 * np.cos(3 * np.arange(200)),
     ],
 )
 def test_degrees_are_refused(angles):
@@ -76,6 +78,8 @@ def test_degrees_are_refused(angles):
     [
         np.deg2rad(np.arange(720)),
         np.arange(90) * np.pi * (3 - np.sqrt(5)),
+        np.arange(75) * np.pi * (3 - np.sqrt(5)),
+        np.arange(75) * 2.3 + 0.01 * np.sin(np.arange(75)),
         np.arange(0, 13),
         [0, 45, 90],
         np.deg2rad(np.r_[0:40, 50:200:0.5]) + 40 * np.pi,
