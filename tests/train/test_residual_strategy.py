@@ -252,6 +252,8 @@ def test_grey_images_and_densities_are_refused(device):
     parameters = parameters_of(device)
     frame = frame_of(device, parameters)
     one = device.zeros((40, 50, 1))
+    with pytest.raises(InputError, match="60 splats, contributions are of 59"):
+        Contributions(device, 59).add(frame, frame.image, frame.image, None)
     with pytest.raises(InputError, match=r"channels.*mcmc"):
         Contributions(device, 60).add(frame, one, one, None)
     dense = Parameters.of(device, parameters.host()[0], density=True)

@@ -122,7 +122,7 @@ class Contributions:
             weights: of the pixels, (height, width); None where all are 1.
 
         Raises:
-            InputError: the image has a single channel.
+            InputError: the image has a single channel, or the frame other splats.
         """
         # Here, so that the help of a fit, which shows these settings, loads no renderer.
         from rift_cl.splat.raster_pass import draw_grad
@@ -132,6 +132,10 @@ class Contributions:
             raise InputError(
                 "the strategy 'residual' wants images of 2 channels or more, and these have 1: use "
                 "'mcmc'"
+            )
+        if len(frame.splats) != len(self._table):
+            raise InputError(
+                f"the frame has {len(frame.splats)} splats, contributions are of {len(self._table)}"
             )
         residual = device.empty(image.shape)
         device.launch(
