@@ -279,7 +279,10 @@ def _reconstruct(settings: Any, output: Output) -> None:
     if not ran(job, settings, output):
         return
     if job.metrics:
-        print_table(("figure", "value"), job.metrics.items())
+        # Imported when used: it loads pictures, which a preview or a plan may do without.
+        from rift_cl.commands.reconstruct.report import figures
+
+        print_table(("figure", "value"), figures(job).items())
     print(job.result)
 
 

@@ -40,3 +40,8 @@ def length_unit(unit: str) -> LengthUnit | None:
     """The unit of length that a word or a sign stands for; None where it stands for none."""
     found = _LENGTHS.get(_ALIASES.get(unit.strip(), unit.strip()))
     return None if found is None else LengthUnit(*found)
+
+
+def known_units() -> str:
+    """The units of length by their shortest names, as a phrase."""
+    return ", ".join(_LENGTHS)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rift_cl.errors import NonFiniteError, ShapeError
-from rift_cl.io.volumes import SampleWindow, suggested_window
+from rift_cl.io.volumes import SampleWindow, suggested_window, whole_window
 
 DTYPES = pytest.mark.parametrize("dtype", ["uint8", "uint16"])
 
@@ -55,6 +55,17 @@ def test_a_window_that_suits() -> None:
     assert 0.79 < high < 0.84
     # Round numbers.
     assert (low, high) == (round(low, 3), round(high, 3))
+
+
+def test_a_window_of_the_whole_volume() -> None:
+    slices = np.random.default_rng(2).normal(0, 0.01, (3, 50, 50))
+    assert whole_window(slices, -0.07, 0.5) == (-0.07, 0.5)
+    # One value far off leaves the others 2048 integers.
+    low, high = whole_window(slices, -0.07, 1e6)
+    assert low == -0.07 and high > 1 and np.ptp(slices) / (high - low) * 65535 > 1500
+    constant = np.full((1, 5, 5), 0.3)
+    low, high = whole_window(constant, 0.3, 0.3)
+    assert low < 0.3 < high
 
 
 @pytest.mark.parametrize("level", [0.0, -3.0, 1e-4, 100.0])

@@ -23,6 +23,7 @@ from rift_cl.commands.fit_photos.pictures import Light
 from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.inputs.scan_axis import find_axis
 from rift_cl.commands.inputs.scan_input import ScanInput
+from rift_cl.commands.inputs.scan_lengths import BIN, with_lengths
 from rift_cl.commands.inputs.scan_rows import (
     check_center,
     chosen_rows,
@@ -71,7 +72,11 @@ class XrayInput:
             reversed=settings.reversed,
             memory=settings.memory,
         )
-        self.scan: ScanFile = self.source.open_scan(fan=True)
+        opened = self.source.open_scan(fan=True)
+        # Of cones --pitch is refused below.
+        self.scan: ScanFile = with_lengths(
+            opened, settings.pitch if opened.cone is None else None, settings.unit
+        )
         if self.scan.fan is not None:
             raise InputError(
                 f"{self.scan.path}: is a fan-beam scan, a fit takes parallel and cone beams; "
@@ -85,7 +90,7 @@ class XrayInput:
         solve = settings.training.solve
         self._solved = solve.views if solve.every else 0
         self.pitch = self._length(settings)
-        self.unit = settings.unit or self.scan.unit or ("bin" if self.pitch == 1.0 else "")
+        self.unit = self.scan.unit or (BIN if self.pitch == 1.0 else "")
         # Made now, so that a bad pitch is told before any work.
         Parallel(self.scan.angles, self.scan.shape[2], self.pitch, self.center)
         check_claim(self.scan.path, "a fit of these rows", self.need, settings.budget())

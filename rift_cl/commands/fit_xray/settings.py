@@ -55,9 +55,11 @@ class XrayInput(SplitOptions):
     rows: Auto[tuple[int, int]] = None
     """First detector row, and the one after the last, of parallel beams. Default: all rows."""
     pitch: Auto[float] = None
-    """Distance between detector bins of parallel beams. Default: the file's own, or 1 bin."""
+    """Distance between detector bins of parallel beams, in --unit. Default: the file's own, or 1
+    bin."""
     unit: Auto[str] = None
-    """Unit of the pitch, such as mm. Default: the file's."""
+    """Unit of length of pitch, voxels and values: m, cm, mm, um, nm, pm, angstrom or inch. A file's
+    lengths in another unit are converted to it. Default: the file's, or bin."""
     memory: Auto[str] = None
     """Maximum memory to use, such as 512M or 4G. Default: what is free."""
 

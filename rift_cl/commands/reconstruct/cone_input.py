@@ -131,7 +131,7 @@ class ConeInput:
         self.settings, self.file, self.device = settings, file, device
         # The scan as it is worked on.
         self.scan = binned_file(file, settings.binning)
-        self.unit = (file.unit or "") if settings.unit is None else settings.unit
+        self.unit = file.unit
         # Bin of the axis on the detector as the file has it, where that is said or found.
         self.center = settings.center
         # Degrees by which the axis leans, and by which projections are turned.

@@ -33,15 +33,25 @@ from rift_cl.commands.reconstruct.kept_slabs import (
     run_folder,
     stopped,
 )
-from rift_cl.commands.reconstruct.report import PREVIEW_PICTURE, Preview, reconstruction_page
+from rift_cl.commands.reconstruct.report import (
+    PREVIEW_PICTURE,
+    Preview,
+    reconstruction_page,
+    voxel,
+)
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
-from rift_cl.commands.reconstruct.volume import volume_path
+from rift_cl.commands.reconstruct.volume import (
+    chosen_window,
+    clipped_words,
+    made_words,
+    volume_path,
+)
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone
 from rift_cl.io.output import atomic_path
 from rift_cl.io.scans.scan_file import ScanFile
-from rift_cl.io.volumes import VOLUME_NAMES, VolumeWriter, open_volume, suggested_window
+from rift_cl.io.volumes import VOLUME_NAMES, VolumeWriter, open_volume
 from rift_cl.operators import Projector
 from rift_cl.progress import Report
 from rift_cl.reconstruct import FDK, Attenuation, Katsevich, poisson_weights
@@ -138,7 +148,7 @@ class ConeReconstruction:
         """What there is when it is done, and where."""
         if self.settings.preview:
             return f"{self.settings.out / PREVIEW_PICTURE} shows the middle slice"
-        return f"slices and report.html are in {self.settings.out}"
+        return made_words(self.settings)
 
     @property
     def decided(self) -> ReconstructSettings:
@@ -225,6 +235,7 @@ class ConeReconstruction:
             "scan": f"{scan.path} ({scan.source}, {scan.kind})",
             "projections": f"{scan.shape} (angle, row, bin)",
             "volume": f"{self.shape} (z, y, x), {format_bytes(volume)}",
+            "voxel": voxel(self),
             "method": self.settings.method,
             "assumed": " ".join(self.source.notes) or "nothing",
             "device": f"{device.name}, budget {format_bytes(device.budget)}",
@@ -433,11 +444,13 @@ class ConeReconstruction:
         """
         numbers = Preview(self.shape[0]).numbers
         if slabs is None:
-            self._values = self._value_window(lambda: self.kept.slices(numbers))
+            self._values = self._value_window(
+                lambda: self.kept.slices(numbers), (slab for _, slab in self.kept.slabs())
+            )
             slabs = (slab for _, slab in self.kept.slabs())
         elif isinstance(slabs, list):
             volume = slabs[0]
-            self._values = self._value_window(lambda: [volume[n] for n in numbers])
+            self._values = self._value_window(lambda: [volume[n] for n in numbers], slabs)
         else:
             self._values = self.settings.window
         preview, sections = Preview(self.shape[0]), _Sections(self.shape)
@@ -446,16 +459,20 @@ class ConeReconstruction:
                 writer.write(start, block)
                 preview.take(start, block)
                 sections.take(start, block)
+        statistics = preview.statistics()
         if self._values is not None:
             below, above = writer.clipped
             self.metrics |= {"clipped_below": below, "clipped_above": above}
+            reached = statistics["minimum"], statistics["maximum"]
+            clipped = clipped_words((below, above), self._values, reached, self.source.unit)
+            self._say(*[clipped] if clipped else [])
         self.folder.mark()
         self.folder.drop(*set(VOLUME_NAMES.values()) - {volume_path(self.settings).name})
         self._show(sections.planes)
         if self.settings.zingers is not None:
             self.metrics["zingers"] = self.source.clean.zingers
         self.metrics = {"center": self.source.axis["center"], **self.metrics}
-        self.metrics.update(preview.statistics())
+        self.metrics.update(statistics)
         self.metrics["seconds"] = time.perf_counter() - self._begin
         record = {**self.metrics, "assumed": self.source.notes}
         facts = self._facts()
@@ -476,16 +493,21 @@ class ConeReconstruction:
         add_missed_planes(page, self.source.geometry, self.source.window.whole, unit=unit)
         return page
 
-    def _value_window(self, few: Callable[[], list[Floats]]) -> tuple[float, float] | None:
+    def _value_window(
+        self, few: Callable[[], list[Floats]], parts: Iterable[Floats]
+    ) -> tuple[float, float] | None:
         """What the integers of the volume stand for, from a few slices where it was not said."""
         if self.settings.dtype == "float32" or self.settings.window is not None:
             return self.settings.window
-        low, high = suggested_window(few())
-        self.source.notes.append(
-            f"Samples are {self.settings.dtype} from {low:g} to {high:g}, a window chosen from a "
-            "few slices (--window)."
-        )
-        return low, high
+        values, sentence = chosen_window(self.settings, few(), parts)
+        self._say(sentence)
+        return values
+
+    def _say(self, *sentences: str) -> None:
+        """Tell what became of the slices, now and in the report."""
+        self.source.notes.extend(sentences)
+        for sentence in sentences:
+            self.announce(sentence)
 
     def _open(
         self, settings: ReconstructSettings, values: tuple[float, float] | None

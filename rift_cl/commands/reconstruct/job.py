@@ -39,9 +39,16 @@ from rift_cl.commands.reconstruct.report import (
 )
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.slice_input import SliceInput
-from rift_cl.commands.reconstruct.volume import check_place, open_slices, volume_path
+from rift_cl.commands.reconstruct.volume import (
+    check_place,
+    chosen_window,
+    clipped_words,
+    made_words,
+    open_slices,
+    volume_path,
+)
 from rift_cl.io.scans.scan_file import ScanFile
-from rift_cl.io.volumes import VOLUME_NAMES, suggested_window
+from rift_cl.io.volumes import VOLUME_NAMES
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Attenuation
 
@@ -107,7 +114,7 @@ class Reconstruction:
                 f"{self.settings.out / PREVIEW_PICTURE} shows the middle slice; all "
                 f"{self.shape[0]} would take about {self.metrics['seconds_for_all']:.3g} s"
             )
-        return f"slices and report.html are in {self.settings.out}"
+        return made_words(self.settings)
 
     @property
     def decided(self) -> ReconstructSettings:
@@ -349,9 +356,13 @@ class Reconstruction:
             for start, slab in self.kept.slabs():
                 volume.write(start, slab)
                 preview.take(start, slab)
+        statistics = preview.statistics()
         if self._values is not None:
             below, above = volume.clipped
             self.metrics |= {"clipped_below": below, "clipped_above": above}
+            reached = statistics["minimum"], statistics["maximum"]
+            clipped = clipped_words((below, above), self._values, reached, self.source.unit)
+            self._say(*[clipped] if clipped else [])
         # From here on the slices are this run's, and an earlier configuration no longer theirs.
         self.folder.mark()
         self.folder.drop(*set(VOLUME_NAMES.values()) - {volume_path(self.settings).name})
@@ -363,7 +374,7 @@ class Reconstruction:
         if self.settings.zingers is not None:
             self.metrics["zingers"] = self.source.clean.zingers
         self.metrics.update(self.inversion.figures())
-        self.metrics.update(preview.statistics())
+        self.metrics.update(statistics)
         self.metrics["seconds"] = time.perf_counter() - self._begin
         self.metrics.pop("seconds_for_all", None)
         page = reconstruction_page(self, preview)
@@ -377,12 +388,16 @@ class Reconstruction:
         if self.settings.dtype == "float32" or self.settings.window is not None:
             return self.settings.window
         images = self.kept.slices(Preview(self.shape[0]).numbers)
-        low, high = suggested_window(images)
-        self.source.notes.append(
-            f"Samples are {self.settings.dtype} from {low:g} to {high:g}, a window chosen from "
-            f"{len(images)} slices (--window)."
-        )
-        return low, high
+        parts = (slab for _, slab in self.kept.slabs())
+        values, sentence = chosen_window(self.settings, images, parts)
+        self._say(sentence)
+        return values
+
+    def _say(self, *sentences: str) -> None:
+        """Tell what became of the slices, now and in the report."""
+        self.source.notes.extend(sentences)
+        for sentence in sentences:
+            self.announce(sentence)
 
     def _keep_what_is_done(self) -> bool:
         """After a failure: whether slices are kept; else the traces of the run are removed."""

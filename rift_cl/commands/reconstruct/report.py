@@ -23,6 +23,7 @@ from rift_cl.commands.pictures.slice_pictures import (
     smaller,
     thinned,
 )
+from rift_cl.commands.reconstruct.cone_input import VolumeWindow
 from rift_cl.commands.reconstruct.decided import in_words
 from rift_cl.commands.reconstruct.volume import volume_path
 from rift_cl.io.output import atomic_path
@@ -100,6 +101,7 @@ def planned(job: Reconstruction, seconds: float) -> dict[str, str]:
         "scan": f"{scan.path} ({scan.source}, {scan.kind})",
         "projections": f"{scan.shape} (angle, row, bin)",
         "volume": f"{job.shape} (z, y, x), {format_bytes(4 * math.prod(job.shape))}",
+        "voxel": voxel(job),
         "method": job.settings.method,
         "assumed": " ".join(job.source.notes) or "nothing",
         "slabs": f"{len(job.slabs)} of at most {max(s.stop - s.start for s in job.slabs)}",
@@ -108,6 +110,32 @@ def planned(job: Reconstruction, seconds: float) -> dict[str, str]:
         "output": str(volume_path(job.settings)),
         "time": f"about {seconds:.3g} s, from one slice",
     }
+
+
+def voxel(job: Reconstruction | ConeReconstruction) -> str:
+    """Edges of a voxel and the unit of its value, in words."""
+    if isinstance(job.inversion.window, VolumeWindow):
+        edges = job.inversion.window.whole.spacing
+    else:
+        edges = (job.source.pitch, *(job.inversion.window.pixel,) * 2)
+    alike = max(edges) - min(edges) <= 1e-6 * max(edges)
+    sizes = " x ".join(f"{edge:.4g}" for edge in (edges[-1:] if alike else edges))
+    named = "" if alike else " (z, y, x)"
+    return f"{sizes} {job.source.unit}".rstrip() + f"{named}; values {_per(job.source.unit)}"
+
+
+def figures(job: Reconstruction | ConeReconstruction) -> dict[str, Any]:
+    """The figures of a finished run for people, with the voxel and units."""
+    metrics = dict(job.metrics)
+    if not {"minimum", "mean"} <= metrics.keys():
+        return metrics
+    per = _per(job.source.unit)
+    metrics |= {name: f"{metrics[name]:.4g} {per}" for name in ("minimum", "maximum", "mean")}
+    return {"voxel": voxel(job), **metrics}
+
+
+def _per(unit: str) -> str:
+    return f"per {unit or 'unit of length'}"
 
 
 def write_preview(path: Path, image: NDArray[np.float32], title: str) -> None:
@@ -123,13 +151,13 @@ def reconstruction_page(job: Reconstruction | ConeReconstruction, preview: Previ
     """The report of a finished reconstruction."""
     page = Page(f"Reconstruction of {job.source.scan.path.name}", f"{job.shape[0]} slices")
     images = list(preview.panels.values())
-    window, unit = display_window(images), job.source.unit or "unit of length"
+    window, per = display_window(images), _per(job.source.unit)
     show_slices(
         page,
         list(preview.frames.values()),
         labels=[f"slice {job.rows[0] + index}" for index in preview.frames],
         window=window,
-        what=f"Attenuation per {unit}, slices across the axis",
+        what=f"Attenuation {per}, slices across the axis",
     )
     if preview.upright:
         show_slices(
@@ -137,7 +165,7 @@ def reconstruction_page(job: Reconstruction | ConeReconstruction, preview: Previ
             [smaller(np.stack(rows)) for rows in preview.upright.values()],
             labels=[f"y {row}" for row in preview.upright],
             window=window,
-            what=f"Attenuation per {unit}, planes along the axis",
+            what=f"Attenuation {per}, planes along the axis",
         )
     if job.source.notes:
         page.section("Assumptions and corrections")
@@ -176,11 +204,10 @@ def _histogram(page: Page, images: list[NDArray[np.float32]], unit: str) -> None
     edges = np.histogram_bin_edges([], bins=_BARS, range=(low, high))
     counts = np.sum([np.histogram(image, bins=edges)[0] for image in images], axis=0)
     share = 100 * counts / max(counts.sum(), 1)
-    per = f"per {unit}" if unit else "per unit of length"
     draw = partial(
         curves,
         {"samples": ((edges[1:] + edges[:-1]) / 2, share)},
-        xlabel=f"attenuation, {per}",
+        xlabel=f"attenuation, {_per(unit)}",
         ylabel="samples, %",
     )
     page.section("Values")
@@ -197,13 +224,12 @@ def _axis(job: Reconstruction | ConeReconstruction) -> str:
 
 
 def _facts(job: Reconstruction | ConeReconstruction) -> dict[str, Any]:
-    scan, window = job.source.scan, job.inversion.window
+    scan = job.source.scan
     return {
         "projections": f"{scan.shape} (angle, row, bin)",
         "volume": f"{job.shape} (z, y, x)",
         "file": f"{scan.source}, {scan.kind}",
         "method": in_words(job.decided),
         "axis": _axis(job),
-        "spacing": f"{window.pixel:g} {job.source.unit}",
-        **job.metrics,
+        **figures(job),
     }

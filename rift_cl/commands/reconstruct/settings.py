@@ -13,6 +13,7 @@ from rift_cl.errors import InputError
 from rift_cl.option_marks import Auto, AutoExpert, Expert
 
 if TYPE_CHECKING:
+    from rift_cl.io.scans.scan_file import ScanFile
     from rift_cl.operators import Filter
 
 SOLVERS = ("sirt", "cgls", "tv")
@@ -122,10 +123,11 @@ class GeometryOptions:
     """First detector row and the one after the last; of cone beams, slices of the volume. Default:
     all."""
     pitch: Auto[float] = None
-    """Distance between detector bins; of cone beams that between rows is scaled alike. Default:
-    that of the file, or 1."""
+    """Distance between detector bins, in --unit; of cone beams that between rows is scaled alike.
+    Default: that of the file, or 1."""
     unit: Auto[str] = None
-    """Unit of the pitch, such as mm. Default: that of the file, or bin."""
+    """Unit of length of pitch, voxels and values: m, cm, mm, um, nm, pm, angstrom or inch. A file's
+    lengths in another unit are converted to it. Default: that of the file, or bin."""
     pixel: Auto[float] = None
     """Distance between samples of a slice. Default: that between bins, at the rotation axis."""
     size: Auto[int] = None
@@ -192,8 +194,9 @@ class VolumeOutput:
     dtype: Literal["float32", "uint16", "uint8"] = "float32"
     """Sample type of the volume; integers cover --window."""
     window: AutoExpert[tuple[float, float]] = None
-    """For integer samples: attenuation of the smallest and the largest integer. Default: the range
-    of a few slices, with a margin."""
+    """For integer samples: attenuation of the smallest and the largest integer. Default: of uint16
+    the range of all slices; of uint8 that of 99.8 % of the values of a few slices, with a
+    margin."""
     preview: bool = False
     """Reconstruct only the middle slice, as preview.png, and estimate the time for all. Of cone
     beams, for fbp and backproject only."""
@@ -264,6 +267,12 @@ class ReconstructSettings(
             SampleWindow(self.dtype, *self.window)
         if self.format == "mrc" and self.dtype == "uint8":
             raise InputError("--format mrc cannot hold unsigned 8-bit samples: use --dtype uint16")
+
+    def open_scan(self, *, fan: bool = False) -> ScanFile:
+        """As of every command, with lengths in the unit that is asked for."""
+        from rift_cl.commands.inputs.scan_lengths import with_lengths
+
+        return with_lengths(super().open_scan(fan=fan), self.pitch, self.unit)
 
     @property
     def iterative(self) -> bool:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.commands.inputs.scan_axis import SettledAxis, find_axis, settled_axis
+from rift_cl.commands.inputs.scan_lengths import BIN
 from rift_cl.commands.inputs.scan_rows import (
     check_center,
     chosen_rows,
@@ -78,8 +79,7 @@ class SliceInput:
         pitch = (self.file.pitch or 1.0) if settings.pitch is None else settings.pitch
         if self.file.fan is not None and settings.tilt:
             raise InputError(f"{self.file.path}: --tilt is for parallel rays, these are a fan's")
-        unit = self.file.unit or ("bin" if pitch == 1.0 else "")
-        self.unit = unit if settings.unit is None else settings.unit
+        self.unit = self.file.unit or (BIN if pitch == 1.0 else "")
         self._pitch = pitch * binning
         # Bin of the rotation axis on the detector as the file has it, at its middle row.
         self.center = settings.center
@@ -356,7 +356,7 @@ def _notes_of(source: SliceInput) -> list[str]:
     Args:
         source: the scan; located.
     """
-    notes = _axis_note(source)
+    notes = _pitch_note(source) + _axis_note(source)
     if source.fan is not None:
         notes += _fan_note(source)
     if source.settings.binning > 1:
@@ -396,6 +396,16 @@ def _axis_note(source: SliceInput) -> list[str]:
     if source.estimate is None:
         return [f"The rotation axis was found before, at bin {source.center:.2f}."]
     return [f"The rotation axis was found {source.estimate.in_words()}."]
+
+
+def _pitch_note(source: SliceInput) -> list[str]:
+    """What the unit of lengths is, where nobody says it."""
+    given, own, unit = source.settings.pitch, source.file.pitch, source.unit
+    if given is None and own is None:
+        return ["No distance between detector bins is known (--pitch): lengths are in bins."]
+    if given is None or own is None or math.isclose(given, own, rel_tol=1e-6):
+        return []
+    return [f"--pitch {given:g} {unit} takes the place of {own:.4g} {unit}, which the file says."]
 
 
 def _fan_note(source: SliceInput) -> list[str]:

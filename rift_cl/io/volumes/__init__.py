@@ -4,7 +4,7 @@
 file for each format, and what formats share: the samples' integers, the layout, ImageJ's notes.
 """
 
-from rift_cl.io.volumes.sample_window import SampleWindow, suggested_window
+from rift_cl.io.volumes.sample_window import SampleWindow, suggested_window, whole_window
 from rift_cl.io.volumes.volume import (
     VOLUME_NAMES,
     VolumeWriter,
@@ -21,4 +21,5 @@ __all__ = [
     "read_volume",
     "read_volume_place",
     "suggested_window",
+    "whole_window",
 ]

@@ -26,6 +26,9 @@ _MARGIN = 0.1
 _CONSTANT = 1e-5
 # Samples of a slice that percentiles are taken from, at most.
 _SAMPLES = 1 << 18
+# Integers of 16 bits that the window which suits a few slices keeps at least, where all values of a
+# volume are to have one: a stray value far off does not take them from the others.
+_FEWEST_LEVELS = 2048
 # Lines converted at a time, so that what lies in between stays in the cache.
 _LINES = 32
 
@@ -163,6 +166,26 @@ def suggested_window(slices: Iterable[NDArray[Any]]) -> tuple[float, float]:
     ends = math.floor((low - margin) / unit), math.ceil((high + margin) / unit)
     digits = max(0, -round(math.log10(unit)))
     return round(ends[0] * unit, digits), round(ends[1] * unit, digits)
+
+
+def whole_window(slices: Iterable[NDArray[Any]], least: float, most: float) -> tuple[float, float]:
+    """A window of 16 bits in which no value of a volume is lost, from the least to the greatest.
+
+    Where that would leave the values of most samples fewer than 2048 integers, it reaches as far
+    as leaves them so many.
+
+    Args:
+        slices: a few of the volume, as for ``suggested_window``.
+        least: value of the volume.
+        most: the greatest value of the volume.
+
+    Raises:
+        ShapeError, NonFiniteError: as for ``suggested_window``.
+    """
+    low, high = suggested_window(slices)
+    further = ((1 << 16) / _FEWEST_LEVELS - 1) / 2 * (high - low)
+    ends = max(least, low - further), min(most, high + further)
+    return ends if ends[1] - ends[0] > _CONSTANT * max(map(abs, ends)) else (low, high)
 
 
 def _some(image: NDArray[Any]) -> NDArray[np.float64]:

@@ -1,0 +1,77 @@
+"""Lengths of a scan in the unit that a person wants: ``--pitch``, ``--unit`` and a file's own.
+
+A density per unit of length is wrong by a power of ten where a unit is. So a unit that is asked for
+converts what the file says in another one, names what the file says in none, and is refused where
+there is no length that it could be the unit of.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+from rift_cl.errors import InputError
+from rift_cl.geometry.length_units import known_units, length_unit
+from rift_cl.io.scans.scan_file import ScanFile
+
+# The unit of lengths that are counted in bins.
+BIN = "bin"
+
+
+def with_lengths(scan: ScanFile, pitch: float | None, unit: str | None) -> ScanFile:
+    """The scan with its lengths in the unit that is asked for.
+
+    Args:
+        scan: as its file has it.
+        pitch: distance between bins that takes the place of the file's, in ``unit``; or None.
+        unit: of the lengths; the file's own if None.
+
+    Returns:
+        The scan; its pitch is still that of the file, where that has one.
+
+    Raises:
+        InputError: the unit is none of length, it has no length to belong to, or the pitch has no
+            unit beside a file that has one.
+    """
+    if unit is None:
+        if pitch is not None and scan.unit:
+            raise InputError(
+                f"--pitch {pitch:g} has no unit, and lengths in {scan.path} are in {scan.unit}: "
+                f"say which it is with --unit, such as --unit {scan.unit}"
+            )
+        return scan
+    own, wanted = length_unit(scan.unit), length_unit(unit)
+    if wanted is None and unit not in ("", BIN, scan.unit):
+        raise InputError(f"--unit is {unit!r}, wanted a unit of length: {known_units()}")
+    if wanted is not None and pitch is None and scan.pitch is None:
+        raise InputError(
+            f"--unit {unit} needs --pitch, the distance between detector bins in {unit}: "
+            f"{scan.path} gives none"
+        )
+    if scan.unit in (unit, ""):
+        return dataclasses.replace(scan, unit=unit)
+    if own is None or wanted is None:
+        note = f"Lengths in {scan.unit}, the file's unit, were taken to be in {unit} (--unit)."
+        return dataclasses.replace(scan, unit=unit, notes=(*scan.notes, note))
+    # Of powers of ten, exactly: 1e-3 / 1e-6 is not 1000.
+    return _converted(scan, unit, float(f"{own.metres / wanted.metres:.12g}"))
+
+
+def _converted(scan: ScanFile, unit: str, factor: float) -> ScanFile:
+    """The scan with every length times a factor, in another unit."""
+    lengths = ("source_to_axis", "source_to_detector", "pitch")
+    fan = scan.fan
+    if fan is not None:
+        fan = dataclasses.replace(fan, **{name: factor * getattr(fan, name) for name in lengths})
+    pitch = None if scan.pitch is None else factor * scan.pitch
+    told = "" if pitch is None else f": bins are {pitch:.4g} {unit} apart"
+    # Two names of one unit change nothing that is worth a word.
+    note = f"The file's lengths, in {scan.unit}, were converted to {unit} (--unit){told}."
+    return dataclasses.replace(
+        scan,
+        pitch=pitch,
+        unit=unit,
+        fan=fan,
+        cone=None if scan.cone is None else scan.cone.scaled(factor),
+        notes=scan.notes if math.isclose(factor, 1) else (*scan.notes, note),
+    )
