@@ -421,3 +421,35 @@ def test_what_tilt_series_do_not_have(tmp_path: Path) -> None:
     for options in ({"dataset": "x"}, {"darks": "x"}, {"image_key": "x"}, {"flats": "x"}):
         with pytest.raises(InputError, match=r"a\.mrc"):
             open_scan(path, kind="counts", **options)
+
+
+@pytest.mark.parametrize(
+    ("values", "word"),
+    [
+        (np.rint(1500 * lines()).astype("u2"), "reach 1498"),
+        (-lines(), "negative"),
+        (lines(12.0), ""),
+        (lines() - 0.1, ""),
+    ],
+)
+def test_values_that_are_no_line_integrals_are_doubted(
+    tmp_path: Path, values: np.ndarray, word: str
+) -> None:
+    np.savez(tmp_path / "scan.npz", projections=values, angles=np.deg2rad(DEGREES))
+    told = [n for n in open_scan(tmp_path / "scan.npz", kind="attenuation").notes if "Doubt" in n]
+    assert len(told) == bool(word) and word in " ".join(told)
+
+
+def test_frames_of_the_same_size_that_are_not_used_are_named(tmp_path: Path) -> None:
+    counts = np.rint(3000 * np.exp(-lines())).astype("u2")
+    flats, shutter = np.full((2, ROWS, BINS), 3000), np.full((4, ROWS, BINS), 20)
+    path = hdf5(
+        tmp_path / "scan.h5",
+        **{"a/projections": counts, "a/angles": DEGREES, "a/openbeam": flats},
+        **{"a/shutter": shutter, "a/small": shutter[..., 1:], "a/current": DEGREES},
+    )
+    told = " ".join(open_scan(path).notes)
+    assert "'/a/shutter'" in told.replace("'a/", "'/a/") and "small" not in told
+    assert "--darks" in told
+    named = open_scan(path, darks="a/shutter")
+    assert "not used" not in " ".join(named.notes)

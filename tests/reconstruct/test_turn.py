@@ -11,6 +11,7 @@ from fan_scenes import sinogram as fan_sinogram
 import rift_cl as rift
 from rift_cl.errors import InputError
 from rift_cl.reconstruct.axis.fan_doubt import fan_doubt
+from rift_cl.reconstruct.axis.repeated import repeated_angles
 from rift_cl.reconstruct.axis.turn import other_turn
 
 KINDS = {"parts": PARTS, "porous": grains(45, 80), "wider than the detector": grains(110, 300)}
@@ -107,3 +108,28 @@ def test_the_search_doubts_a_fan():
     wrong = replace(scan, angles=1.75 * scan.angles, center=None)
     with pytest.raises(InputError, match="angles are probably wrong"):
         rift.find_center(fan_sinogram(KINDS["porous"], scan), wrong)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_views_of_one_angle_that_show_other_pictures(kind):
+    angles = spread(180)
+    y = sinogram(KINDS[kind], angles, 83.7, noise=0.02)
+    stuck = angles.copy()
+    stuck[99:150] = stuck[99]
+    found = repeated_angles(y, stuck)
+    assert found.views == 51 and found.angle == pytest.approx(99)
+    assert rift.find_center(sinogram(KINDS[kind], angles, 83.7), angles).doubt == ""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("way", ["two frames each", "two turns", "none", "rounded"])
+def test_views_of_one_angle_that_agree_are_not_doubted(kind, way):
+    angles = spread(180)
+    if way == "two frames each":
+        angles = np.repeat(angles[::2], 2)
+    if way == "two turns":
+        angles = np.tile(angles, 2)
+    y = sinogram(KINDS[kind], angles, 83.7, noise=0.03)
+    if way == "rounded":
+        angles = np.deg2rad(np.floor(np.rad2deg(angles) / 2 + 1e-6) * 2)
+    assert repeated_angles(y, angles) is None

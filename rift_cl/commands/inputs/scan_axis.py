@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.commands.inputs.scan_rows import read_attenuation
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, RiftError
 from rift_cl.geometry import Cone, Fan, Vectors
 from rift_cl.geometry.nearly_upright import nearly_upright
 from rift_cl.io.scans.scan_file import ScanFile
@@ -20,6 +20,8 @@ from rift_cl.reconstruct.axis.fan_doubt import sense_doubt
 from rift_cl.reconstruct.axis.lying_axis import looked_at, lying_axis
 from rift_cl.reconstruct.axis.search import GIVE_IT
 
+# By how many bins an interval may miss an axis that was given before that is worth a doubt.
+_NEAR = 0.5
 # Transmission below this share of the median tells nothing more.
 _LEAST_LIGHT = 1e-3
 
@@ -112,6 +114,35 @@ def settled_axis(scan: ScanFile, center: float, device: Device | None = None) ->
         )
         notes = (*notes, reason)
     return SettledAxis(found.center, turned, found, found.record(), notes)
+
+
+def doubted_center(found: AxisEstimate, given: float) -> list[str]:
+    """A doubt where data tell another axis than a person does.
+
+    Args:
+        found: what the data tell.
+        given: the bin that was given (--center).
+    """
+    low, high = found.interval
+    if low - _NEAR <= given <= high + _NEAR:
+        return []
+    away = found.center - given
+    return [
+        f"Doubt: the data tell the axis at bin {found.center:.2f} ({low:.2f} to {high:.2f}), "
+        f"{abs(away):.2f} bins {'above' if away > 0 else 'below'} --center {given:g}; without "
+        "--center it is looked for."
+    ]
+
+
+def doubted_circle(scan: ScanFile, given: float, device: Device | None = None) -> list[str]:
+    """What the data of a fan or a cone have against an axis that was given; empty where nothing.
+
+    Data that cannot be read here, or do not tell the axis, have nothing against one.
+    """
+    try:
+        return doubted_center(find_axis(scan, device), given)
+    except RiftError:
+        return []
 
 
 def doubted_vectors(scan: ScanFile, vectors: Vectors) -> tuple[str, ...]:

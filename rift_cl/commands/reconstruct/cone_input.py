@@ -11,12 +11,12 @@ import numpy as np
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
-from rift_cl.commands.inputs.scan_axis import doubted_vectors, settled_axis
+from rift_cl.commands.inputs.scan_axis import doubted_circle, doubted_vectors, settled_axis
 from rift_cl.commands.inputs.scan_rows import check_center, scan_identity
 from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
 from rift_cl.commands.reconstruct.clean_rows import Alignment, CleanRows
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
-from rift_cl.commands.reconstruct.slice_input import tilt_worth_turning
+from rift_cl.commands.reconstruct.slice_input import tilt_worth_turning, unsure_tilt
 from rift_cl.commands.reconstruct.slice_window import check_window
 from rift_cl.errors import InputError, ResourceLimitError
 from rift_cl.geometry import Cone, Grid, Vectors
@@ -260,6 +260,7 @@ class ConeInput:
     def _found_axis(self) -> dict[str, Any]:
         """Bin of the axis on the detector as the file has it, and how it is known."""
         if self.settings.center is not None:
+            self.notes += doubted_circle(self.file, self.settings.center, self.device)
             return {"center": self.settings.center, "by": "--center"}
         if self._axis_taken:
             return {"center": self.center, "by": "search"}
@@ -272,6 +273,7 @@ class ConeInput:
         self.center, self.turned = axis.center, axis.turned
         if self.settings.tilt is None and axis.found is not None:
             self.tilt = tilt_worth_turning(axis.found, self.file.shape[1]) or self.tilt
+            self.notes += unsure_tilt(axis.found, self.file.shape[1])
         self.notes += axis.notes
         return axis.record
 

@@ -112,7 +112,7 @@ class GeometryOptions:
     tilt: Auto[float] = None
     """Tilt of the rotation axis in the detector plane in degrees, positive where its bin grows with
     the row. Default: the tilt found with the axis if it moves the axis by a quarter of a bin or
-    more, otherwise 0."""
+    more and the rows agree on it, otherwise 0."""
     centers: AutoExpert[Path] = None
     """File with the bin of the rotation axis in every detector row (.txt, .csv or .npy), for an
     axis that drifts; replaces --center and --tilt."""

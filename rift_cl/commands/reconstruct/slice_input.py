@@ -9,13 +9,20 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.commands.inputs.scan_axis import SettledAxis, find_axis, settled_axis
+from rift_cl.commands.inputs.scan_axis import (
+    SettledAxis,
+    doubted_center,
+    doubted_circle,
+    find_axis,
+    settled_axis,
+)
 from rift_cl.commands.inputs.scan_lengths import BIN
 from rift_cl.commands.inputs.scan_rows import (
     check_center,
@@ -32,7 +39,7 @@ from rift_cl.io.number_list import read_numbers
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.reconstruct import Attenuation
 from rift_cl.reconstruct.axis import AxisEstimate
-from rift_cl.reconstruct.axis.turn import other_turn
+from rift_cl.reconstruct.axis.search import angle_doubt, axis_of_rows
 from rift_cl.reconstruct.direct.fan_rebin import covered_rays, rebin_fan
 from rift_cl.reconstruct.direct.offset_axis import (
     is_full_turn,
@@ -45,9 +52,9 @@ from rift_cl.reconstruct.direct.redundancy import redundancy
 from rift_cl.reconstruct.preprocess import binned_center, binning_note, stitched
 
 Floats = NDArray[np.float32]
-# A tilt is turned where it is so many times its standard error, and moves the axis by so many bins
-# between the middle row and the first.
-_SURE_TILT, _TILT_MATTERS = 4.0, 0.25
+# A tilt is turned where it moves the axis by so many bins between the middle row and the first; one
+# that is not sure is told from so many times its standard error.
+_TILT_MATTERS, _TOLD = 0.25, 2.0
 # The detector is continued by this share of its width on each side.
 _PAD_SHARE = 2
 # A gap between directions that is worth a word, in mean steps and in radians.
@@ -160,8 +167,8 @@ class SliceInput:
         row = self.clean.read(middle, middle + 1).projections
         if not self.settled:
             self._find_axis()
-        elif self.fan is None:
-            self._doubt_angles(row[:, 0])
+        else:
+            self.notes += self._doubts(row[:, 0])
         self.fan = self._fan()
         self.geometry = self._geometry()
         self.axis = self._axis_record()
@@ -183,11 +190,32 @@ class SliceInput:
             self.geometry = self.geometry if self.fan is None else self._geometry()
         self.notes += _notes_of(self)
 
-    def _doubt_angles(self, row: Floats) -> None:
-        """Say what the data have against the angles, where no search for the axis has looked."""
-        other = other_turn(row, self.scan.angles)
-        if other is not None:
-            self.notes.append(f"Doubt: {other.in_words()}.")
+    def _doubts(self, row: Floats) -> list[str]:
+        """What the middle row has against the angles, and against an axis that was given."""
+        given = self.settings.center
+        if self.fan is not None:
+            return [] if given is None else doubted_circle(self.file, given, self.device)
+        found = None
+        if given is not None:
+            with suppress(InputError):  # data that do not tell the axis have nothing against one
+                found = axis_of_rows([row], [0], 1, self.scan.angles)
+        doubt = angle_doubt(row, self.scan.angles) if found is None else found.doubt
+        doubts = [f"Doubt: {doubt}."] if doubt else []
+        if found is None or given is None:
+            return doubts
+        return doubts + doubted_center(self._at_middle(found), given)
+
+    def _at_middle(self, found: AxisEstimate) -> AxisEstimate:
+        """What the middle row of the slices tells, for the middle of the detector as it is."""
+        binning, block = self.settings.binning, row_binning(self.file, self.settings.binning)
+        away = sum(self.rows) // 2 - binned_center((self.file.shape[1] - 1) / 2, block)
+        moved = math.tan(math.radians(self.tilt)) * away
+        center, low, high = (
+            # The inverse of binned_center.
+            (place - moved) * binning + (binning - 1) / 2
+            for place in (found.center, *found.interval)
+        )
+        return dataclasses.replace(found, center=center, interval=(low, high))
 
     def _find_axis(self) -> None:
         """Find the axis, of a fan the sense of rotation too."""
@@ -345,9 +373,25 @@ class SliceInput:
 
 def tilt_worth_turning(estimate: AxisEstimate, rows: int) -> float:
     """The tilt that was found, in degrees, where it is sure and moves the axis; else 0."""
-    sure = abs(estimate.tilt) > _SURE_TILT * estimate.tilt_error
-    moves = abs(estimate.tilt) * (rows - 1) / 2 >= _TILT_MATTERS
-    return math.degrees(math.atan(estimate.tilt)) if sure and moves else 0.0
+    turns = estimate.tilt_is_sure and _moves(estimate, rows)
+    return math.degrees(math.atan(estimate.tilt)) if turns else 0.0
+
+
+def unsure_tilt(estimate: AxisEstimate, rows: int) -> list[str]:
+    """What is told of a tilt that would matter, and is not sure enough to turn projections."""
+    told = abs(estimate.tilt) > _TOLD * estimate.tilt_error and _moves(estimate, rows)
+    if estimate.tilt_is_sure or not told:
+        return []
+    tilt, error = (math.degrees(math.atan(slope)) for slope in (estimate.tilt, estimate.tilt_error))
+    return [
+        f"The rows' axes lie about a line that tilts by {tilt:.2g} +- {error:.2g} degrees, from "
+        f"which they scatter {estimate.scatter:.2g} times as much as their errors explain: "
+        f"projections were not turned by it (--tilt {tilt:.2g} does so)."
+    ]
+
+
+def _moves(estimate: AxisEstimate, rows: int) -> bool:
+    return abs(estimate.tilt) * (rows - 1) / 2 >= _TILT_MATTERS
 
 
 def _notes_of(source: SliceInput) -> list[str]:
@@ -395,7 +439,9 @@ def _axis_note(source: SliceInput) -> list[str]:
         return list(source.settled_by.notes)
     if source.estimate is None:
         return [f"The rotation axis was found before, at bin {source.center:.2f}."]
-    return [f"The rotation axis was found {source.estimate.in_words()}."]
+    rows, said = source.file.shape[1], source.settings.tilt is not None
+    tilt = [] if said else unsure_tilt(source.estimate, rows)
+    return [f"The rotation axis was found {source.estimate.in_words()}.", *tilt]
 
 
 def _pitch_note(source: SliceInput) -> list[str]:

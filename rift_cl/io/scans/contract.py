@@ -45,6 +45,11 @@ _MEAN_ROWS = 16
 _AIR_LEAST, _BRIGHTER, _DIMMER = 0.7, 2.0, 20.0
 # Counts below zero by this share of the brightest are no noise about the darks.
 _BELOW = 0.25
+# Line integrals above this let nothing through that a detector could count: exp(-20) is 2e-9. Those
+# whose least is so many times their greatest below zero have the other sign.
+_OPAQUE, _NEGATIVE = 20.0, 3.0
+# Arrays that are named in a sentence at most.
+_MOST_UNUSED = 4
 # Ends of line integrals that are worth a word, as a share of their range.
 _OFF = 0.02
 # Bins differ from their neighbours by at most this share where the beam is taken from the ends.
@@ -73,6 +78,7 @@ class Finding:
         flats_at: see ``ScanFile``.
         pitch, unit, fan, background, notes: as in ``ScanFile``.
         beam: source and detector as a file tells them, where rays diverge; in place of ``fan``.
+        unused: names of arrays of the projections' rows and bins that are no part of the scan.
         contents: a phrase that lists what else the file holds, or nothing.
         advice: for formats whose values tell nothing of their kind, what to do about it; counts
             without flats are then divided by the mean of each view.
@@ -98,6 +104,7 @@ class Finding:
     beam: AnyBeam | None = None
     background: int = 0
     notes: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
     contents: Callable[[], str] = str
     advice: str = ""
 
@@ -143,8 +150,7 @@ def scan_of(found: Finding, request: ScanRequest) -> ScanFile:
         incident = _means(found, rows)
     if kind == "counts" and substitute == _WHITE:
         incident = _white(found, seen)
-    if kind != "counts" and found.kind is None:
-        notes += _off_air(kind, seen)
+    notes += _doubts(found, kind, seen, calibrated=bool(flats and darks))
     calibration = _calibration(found, kind, substitute, flats, darks)
     line = _line(found, kind, seen, calibration, geometry)
     return ScanFile(
@@ -252,6 +258,14 @@ def _passed_over(found: Finding, kind: str) -> tuple[str, ...]:
     return ()
 
 
+def _doubts(found: Finding, kind: Kind, seen: Sample, *, calibrated: bool) -> tuple[str, ...]:
+    """What values, and arrays beside them, have against what the scan was taken to be."""
+    if kind == "counts":
+        return _unused(found) if found.unused and not calibrated else ()
+    doubts = _off_air(kind, seen) if found.kind is None else ()
+    return doubts + _impossible(seen) if kind == "attenuation" else doubts
+
+
 def _off_air(kind: Kind, seen: Sample) -> tuple[str, ...]:
     """A doubt, where both ends of the detector are off what air reads by about as much."""
     air = 0.0 if kind == "attenuation" else 1.0
@@ -263,6 +277,33 @@ def _off_air(kind: Kind, seen: Sample) -> tuple[str, ...]:
     return (
         f"Both ends of the detector read {read:.3g}, and air {air:g}: if they see nothing but air, "
         "bring their line integrals to zero with --background, so many bins at each end.",
+    )
+
+
+def _impossible(seen: Sample) -> tuple[str, ...]:
+    """A doubt, where values cannot be line integrals as they are."""
+    if seen.high > _OPAQUE:
+        return (
+            f"Doubt: line integrals reach {seen.high:.4g}, and no X-rays pass more than about "
+            f"{_OPAQUE:g}: values that were multiplied, as absorbance times 1000, make densities "
+            "wrong by the same factor; divide them first.",
+        )
+    if seen.middle < 0 and -seen.low > _NEGATIVE * max(seen.high, 0):
+        return (
+            f"Doubt: most line integrals are negative ({seen.low:.4g} to {seen.high:.4g}), as "
+            "logarithms of transmission are whose sign was not changed: densities are negative "
+            "as well; change the sign first.",
+        )
+    return ()
+
+
+def _unused(found: Finding) -> tuple[str, ...]:
+    """What else there is of the size of a frame, where flats or darks are missing."""
+    listed = ", ".join(map(repr, found.unused[:_MOST_UNUSED]))
+    many = len(found.unused) > 1
+    return (
+        f"{listed} {'hold' if many else 'holds'} frames of the size of the projections' and "
+        f"{'were' if many else 'was'} not used: name flats and darks (--flats, --darks).",
     )
 
 

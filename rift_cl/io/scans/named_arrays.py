@@ -153,6 +153,7 @@ def scan_in(store: ArrayStore, layout: Layout, request: ScanRequest) -> ScanFile
         beam=beam,
         background=layout.background,
         notes=(*layout.notes, *_told(beside, layout, flats, darks), *notes),
+        unused=_unused(store, frames, flats, darks),
         contents=store.contents,
     )
     return scan_of(found, request)
@@ -274,6 +275,20 @@ def _calibration(
     raise ShapeError(
         f"{store.path}: {name!r} has shape {shape}, the projections {frames.name!r} have "
         f"{frames.shape}: rows and bins must agree"
+    )
+
+
+def _unused(
+    store: ArrayStore, frames: FrameStack, flats: FrameStack | None, darks: FrameStack | None
+) -> tuple[str, ...]:
+    """Names beside the projections that hold frames of their size, and are no part of the scan."""
+    used = {_last(stack.name) for stack in (frames, flats, darks) if stack}
+    names = [name for name in store.beside(frames.name) if _last(name) not in used]
+    beside = frozenset(names)
+    return tuple(
+        name
+        for name in names
+        if _is_stack(store, name) and _calibration(store, name, frames, beside) is not None
     )
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rift_cl.errors import InputError
 from rift_cl.reconstruct.axis.estimate import AxisEstimate
 from rift_cl.reconstruct.axis.measures import RowAxis, chosen_measure
+from rift_cl.reconstruct.axis.repeated import repeated_angles
 from rift_cl.reconstruct.axis.turn import other_turn
 from rift_cl.reconstruct.axis.views import Views, without_rings
 
@@ -40,6 +41,8 @@ _WIDEST, _WIDEST_ROW = 0.5, 2.0
 _RIVAL, _SCORE, _COHERENCE = 0.75, 25.0, 0.5
 # Rows further from the line than so many standard errors, and than this many bins, do not count.
 _OUTLIER, _STRAY = 6.0, 2.0
+# From how many standard errors on, and how many bins, rows off the axis are worth a doubt.
+_DISAGREED, _NOTED = 3.0, 0.1
 # How far from the best the reported scores reach, in bins, and their step.
 _REACH, _STEP = 8.0, 0.05
 
@@ -81,12 +84,36 @@ def axis_of_rows(
     try:
         found = searched_axis(watched(), rows, count, angles, span)
     except InputError as error:
-        other = other_turn(middle[0], angles) if middle else None
-        if other is None:
+        doubt = angle_doubt(middle[0], angles) if middle else ""
+        if not doubt:
             raise
-        raise type(error)(f"{error}; {other.in_words()}") from error
-    other = other_turn(middle[0], angles)
-    return found if other is None else replace(found, doubt=other.in_words())
+        raise type(error)(f"{error}; {doubt}") from error
+    return replace(found, doubt=angle_doubt(middle[0], angles) or _scatter_doubt(found))
+
+
+def angle_doubt(views: Views, angles: Floats) -> str:
+    """What the views of a row of parallel rays have against their angles; empty where nothing.
+
+    Args:
+        views: line integrals, (angle, bin), in the order in which they were taken.
+        angles: their directions in radians.
+
+    Returns:
+        The end of a sentence.
+    """
+    found = repeated_angles(views, angles) or other_turn(views, angles)
+    return "" if found is None else found.in_words()
+
+
+def _scatter_doubt(found: AxisEstimate) -> str:
+    """A doubt where rows disagree on the axis by more than their errors and by what matters."""
+    if found.scatter <= _DISAGREED or found.spread <= _NOTED:
+        return ""
+    return (
+        f"the rows lie {found.spread:.2f} bins off it, {found.scatter:.2g} times what their errors "
+        "explain, as where angles are a little wrong (an encoder that slipped), the axis moved or "
+        "the detector is distorted"
+    )
 
 
 def searched_axis(
