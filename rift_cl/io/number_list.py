@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -42,16 +43,93 @@ def read_numbers(path: Path, what: str) -> Numbers:
 
 def text_numbers(path: Path, what: str) -> Numbers:
     """Numbers of a text file, one to a line or all in one line."""
+    return table_numbers(path, what)[0]
+
+
+def table_numbers(
+    path: Path,
+    what: str,
+    column: str | None = None,
+    called: Callable[[str], bool] = lambda name: False,
+) -> tuple[Numbers, str]:
+    """Numbers of a text file, of which a table has them in one of its columns.
+
+    Args:
+        path: text whose numbers stand one to a line, all in one line, or in a column; cells are
+            parted by semicolons, commas, tabs or spaces, and what follows ``#`` is a comment.
+        what: what the numbers are, in a sentence.
+        column: name of the column by the table's first line, or its number from 1.
+        called: whether a column of that name is the one, where none is said.
+
+    Returns:
+        The numbers, and the name of their column; empty where it has none.
+
+    Raises:
+        FileFormatError: a line holds something else, or it is not told which column is meant.
+        ResourceLimitError: it is far longer than any such list.
+    """
     check_claim(path, f"the list of {what}", path.stat().st_size, _LONGEST)
     lines = path.read_text(encoding="utf-8-sig").splitlines()
-    rows = [re.split(r"[\s,;]+", line.split("#")[0].strip(" \t,;")) for line in lines]
-    filled = [(index, row) for index, row in enumerate(rows, 1) if row != [""]]
-    for index, row in filled:
-        if len(row) > 1 and len(filled) > 1:
-            raise FileFormatError(
-                f"{path}: line {index} holds {len(row)} numbers, wanted one to a line"
-            )
-    return np.array([_number(path, index, word, what) for index, row in filled for word in row])
+    texts = [(index, line.split("#")[0].strip(" \t,;")) for index, line in enumerate(lines, 1)]
+    filled = [(index, text) for index, text in texts if text]
+    whole = len(filled) == 1 and column is None
+    rows = [(at, re.split(r"[\s,;]+", text) if whole else _cells(text)) for at, text in filled]
+    width = max((len(cells) for _, cells in rows), default=0)
+    if column is None and (width <= 1 or whole):
+        return np.array([_number(path, at, word, what) for at, row in rows for word in row]), ""
+    header = rows[0][1] if rows and not any(map(_is_number, rows[0][1])) else []
+    place = _place(path, column, header, width, called, rows)
+    body = rows[1:] if header else rows
+    short = [at for at, row in body if len(row) <= place]
+    if short:
+        raise FileFormatError(f"{path}: line {short[0]} has no column {place + 1}")
+    values = [_number(path, at, row[place], what) for at, row in body]
+    return np.array(values), header[place] if header else ""
+
+
+def _cells(line: str) -> list[str]:
+    """The cells of a line; with semicolons between them, commas may be those of decimals."""
+    if ";" in line:
+        cells = [cell.strip() for cell in line.split(";")]
+        return [re.sub(r"^([+-]?\d+),(\d+)$", r"\1.\2", cell) for cell in cells]
+    if "," in line:
+        return [cell for part in line.split(",") for cell in (part.split() or [""])]
+    return [cell.strip() for cell in line.split("\t")] if "\t" in line else line.split()
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _place(
+    path: Path,
+    column: str | None,
+    header: list[str],
+    width: int,
+    called: Callable[[str], bool],
+    rows: list[tuple[int, list[str]]],
+) -> int:
+    """Which column of a table is meant, counted from 0."""
+    if column is not None:
+        if column in header:
+            return header.index(column)
+        if column.isdecimal() and 1 <= int(column) <= width:
+            return int(column) - 1
+    found = [place for place, name in enumerate(header) if column is None and called(name)]
+    if len(found) == 1:
+        return found[0]
+    line, cells = next((row for row in rows if len(row[1]) > 1), rows[0] if rows else (1, []))
+    named = f" called {', '.join(map(repr, header))}" if header else ""
+    asked = "" if column is None else f", none of them {column!r}"
+    raise FileFormatError(
+        f"{path}: line {line} ({' '.join(cells)[:60]!r}) holds {len(cells)} columns{named}{asked}: "
+        f"name the one that is meant as {path.name}:COLUMN, by its name or its number from 1, or "
+        "write one number to a line, with a point in decimals"
+    )
 
 
 def _number(path: Path, line: int, word: str, what: str) -> float:

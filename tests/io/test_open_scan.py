@@ -237,3 +237,40 @@ def test_the_tooth(shared_data: Path) -> None:
     line = -np.log((rows.projections - dark) / (rows.flats.mean(0) - dark))
     assert abs(np.median(line[:, 0, :40])) < 0.05
     assert line[:, 0, 250:350].mean() > 0.5
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_flats_darks_and_angles_in_other_hdf5_files(tmp_path: Path, named: bool) -> None:
+    frames = made.counts(6, 4, 5) + 100
+    with h5py.File(tmp_path / "scan.h5", "w") as file:
+        file["entry/data"] = frames
+    for name, array in (
+        ("ff", made.counts(2, 4, 5) + 2000),
+        ("dd", made.counts(3, 4, 5)),
+        ("rot", made.DEGREES),
+    ):
+        with h5py.File(tmp_path / f"{name}.h5", "w") as file:
+            file["entry/values"], file["entry/exposure"] = array, 0.1
+    inside = ":/entry/values" if named else ""
+    given = {"flats": f"ff.h5{inside}", "darks": f"dd.h5{inside}", "theta": f"rot.h5{inside}"}
+    scan = open_scan(tmp_path / "scan.h5", dataset="entry/data", **given)
+    assert scan.kind == "counts" and "2 flats and 3 darks" in scan.notes[0]
+    np.testing.assert_allclose(scan.angles, np.deg2rad(made.DEGREES))
+    rows = pickle.loads(pickle.dumps(scan)).read(1, 3)
+    np.testing.assert_array_equal(rows.projections, frames[:, 1:3])
+    np.testing.assert_array_equal(rows.flats, made.counts(2, 4, 5)[:, 1:3] + 2000)
+    np.testing.assert_array_equal(rows.darks, made.counts(3, 4, 5)[:, 1:3])
+
+
+def test_what_is_named_in_another_file_and_is_not_there(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "scan.h5", "w") as file:
+        file["data"], file["angles"] = made.counts(6, 4, 5), made.DEGREES
+    with h5py.File(tmp_path / "two.h5", "w") as file:
+        file["a"], file["b"] = made.counts(2, 4, 5), made.counts(2, 4, 5)
+    for flats, word in (
+        ("none.h5", "none.h5"),
+        ("two.h5", "--flats two.h5:/NAME"),
+        ("two.h5:/c", "'/c'"),
+    ):
+        with pytest.raises(InputError, match=word):
+            open_scan(tmp_path / "scan.h5", flats=flats)

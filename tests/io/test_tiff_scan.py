@@ -255,3 +255,74 @@ def test_sinograms_ask_for_angles_only_where_none_are_given(tmp_path: Path, thet
     with pytest.raises(InputError, match="--axes row,angle,bin") as caught:
         as_they_are(tmp_path, theta=theta)
     assert ("--theta" in str(caught.value)) == (theta is None)
+
+
+@pytest.mark.parametrize(
+    ("table", "column"),
+    [
+        ("index,angle_deg\n{rows:,}", ""),
+        ("file;angle\n{files:;}", ""),
+        ("0 of them\tTheta\n{rows:\t}", ""),
+        ("# written by the stage\nframe, rotation\n{rows:,}", ":rotation"),
+        ("{rows:,}", ":2"),
+        ("file;angle\n{commas:;}", ":angle"),
+    ],
+)
+def test_angles_in_a_column_of_a_table(tmp_path: Path, table: str, column: str) -> None:
+    made.write_series(tmp_path / "tomo", "p_{}.tif", made.frames())
+    degrees = np.arange(made.VIEWS) * 30.5
+    part = next(sign for sign in ",;\t" if sign + "}" in table)
+    lines = {
+        "rows": [f"{n}{part}{angle}" for n, angle in enumerate(degrees)],
+        "files": [f"p_{n}.tif{part}{angle}" for n, angle in enumerate(degrees)],
+        "commas": [
+            f"p_{n}.tif{part}{angle}".replace(".5", ",5") for n, angle in enumerate(degrees)
+        ],
+    }
+    head, _, tail = table.partition("{")
+    log = tmp_path / "log.csv"
+    log.write_text(head + "\n".join(lines[tail.split(":")[0]]) + "\n")
+    scan = as_they_are(tmp_path / "tomo", theta=f"{log}{column}")
+    np.testing.assert_allclose(scan.angles, np.deg2rad(degrees))
+
+
+@pytest.mark.parametrize(
+    ("text", "column", "words"),
+    [
+        ("index,rotation\n0,1\n1,2\n", "", ["line 1", "'rotation'", "log.csv:COLUMN"]),
+        ("0,1\n1,2\n", "", ["line 1", "2 columns"]),
+        ("1,20\n2,40\n", "", ["2 columns", "point"]),
+        ("index,angle\n0,1\n1,2\n", ":phi", ["'phi'", "'angle'"]),
+        ("index,angle\n0,1\n1\n", "", ["line 3", "column 2"]),
+        ("index,angle\n0,1\n1,up\n", "", ["line 3", "'up'"]),
+    ],
+)
+def test_tables_that_do_not_tell_their_angles(
+    tmp_path: Path, text: str, column: str, words: list[str]
+) -> None:
+    made.write_series(tmp_path / "tomo", "p_{}.tif", made.frames(2))
+    (tmp_path / "log.csv").write_text(text)
+    with pytest.raises(InputError) as told:
+        as_they_are(tmp_path / "tomo", theta=f"{tmp_path / 'log.csv'}{column}")
+    assert all(word in str(told.value) for word in words)
+
+
+def test_a_view_that_is_missing_is_told_beside_angles_of_all(tmp_path: Path) -> None:
+    folder = made.write_series(tmp_path / "tomo", "p_{}.tif", made.frames())
+    (folder / "p_4.tif").unlink()
+    (tmp_path / "all.txt").write_text("\n".join(str(30 * n) for n in range(made.VIEWS)))
+    with pytest.raises(InputError, match=r"jump after 'p_3.tif'"):
+        as_they_are(folder, theta=str(tmp_path / "all.txt"))
+
+
+def test_flats_frame_by_frame_beside_sinograms(tmp_path: Path) -> None:
+    counts = np.rint(1000 + 500 * np.hanning(made.BINS)).astype("u2")
+    sinograms = np.broadcast_to(counts, (made.ROWS, made.VIEWS, made.BINS))
+    flats = np.full((3, made.ROWS, made.BINS), 3000, "u2") + np.arange(made.BINS, dtype="u2")
+    made.write_pages(tmp_path / "sino.tif", sinograms)
+    made.write_pages(tmp_path / "flat.tif", flats)
+    given = {"axes": "row,angle,bin", "theta": "0:180", "flats": str(tmp_path / "flat.tif")}
+    scan = open_scan(tmp_path / "sino.tif", **given)
+    read = scan.read(2, 5)
+    assert read.projections.shape == (made.VIEWS, 3, made.BINS) and read.flats is not None
+    np.testing.assert_array_equal(read.flats, flats[:, 2:5])

@@ -27,17 +27,16 @@ class ScanArrays:
     dataset: Auto[str] = None
     """Name of the projections in the file. Default: that of the file's layout."""
     theta: Auto[str] = None
-    """Angles: their name in the file, a file of them (.txt, .csv, .npy), or a range in degrees that
-    is divided evenly, such as 0:180 (its end excluded) or 0:180:endpoint. Default: those of the
-    file."""
+    """Angles: their name in the file, a file of them (.txt, .csv, .npy; FILE.csv:COLUMN for a
+    column of a table), or a range in degrees that is divided evenly, such as 0:180 (its end
+    excluded) or 0:180:endpoint. Default: those of the file."""
     flats: Auto[str] = None
     """Flat fields (beam without sample): their name in the file; for TIFF, their folder or file;
-    for NPY, their file. For counts without flat fields, 'air' estimates the incident beam of each
-    view from the outermost bins at both ends, which must see only air, 'mean' from the mean of the
-    view."""
+    for NPY, their file; for HDF5 also FILE.h5:/name, or FILE.h5 if one array alone fits. For counts
+    without flat fields, 'air' estimates the incident beam of each view from the outermost bins at
+    both ends, which must see only air, 'mean' from the mean of the view."""
     darks: Auto[str] = None
-    """Dark fields (no beam): their name in the file; for TIFF, their folder or file; for NPY,
-    their file."""
+    """Dark fields (no beam): their name in the file, or as for --flats another file or folder."""
     kind: Auto[Kind] = None
     """What the values are: detector counts, transmission (counts divided by those of the beam), or
     attenuation (line integrals). Default: inferred from flat fields, names, units and values."""
@@ -46,7 +45,8 @@ class ScanArrays:
     Default: that of an NXtomo file."""
     axes: AutoExpert[str] = None
     """Order of the axes of the projections: angle,row,bin, or row,angle,bin for sinograms;
-    angle,bin or bin,angle for a single sinogram. Default: inferred from the number of angles."""
+    angle,bin or bin,angle for a single sinogram; angle,bin,row if the rotation axis lies along the
+    images' rows. Default: inferred from the number of angles."""
     angle_unit: AutoExpert[AngleUnit] = None
     """Unit of the angles. Default: that of the file, checked against their range."""
     geometry: Auto[Path] = None
@@ -54,8 +54,9 @@ class ScanArrays:
     .log, RTK .xml, ASTRA vectors (.geom, .npy, .txt; 12 numbers per view), or .yaml or .json as in
     docs/how-to/scan_cones.md. Default: that of the scan, otherwise parallel rays."""
     reversed: Expert[bool] = False
-    """Negate the angles, for an object that turned in the other sense than assumed; a wrong sense
-    doubles edges in fan and cone beams."""
+    """Negate the angles, for an object that turned in the other sense than assumed (see
+    docs/reference/conventions.md); a wrong sense doubles edges in fan and cone beams, and mirrors
+    the slices of parallel beams, whose data do not show it."""
     repeat: AutoExpert[int] = None
     """For a sample that is symmetric about the axis: number of views over a full turn that its one
     TIFF image is taken for. Default: every image is one view."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError, NonFiniteError
+from rift_cl.io.scans.hdf5_frames import Hdf5Rows
 from rift_cl.io.scans.npy_scan import NpyRows
 from rift_cl.io.scans.scan_file import ScanFile, ScanRows
 from rift_cl.io.scans.tiff_frames import TiffRows
@@ -23,6 +24,9 @@ def scan_identity(scan: ScanFile) -> dict[str, str]:
     """What tells a scan from others, and from itself before a change; sentences by name."""
     angles = np.ascontiguousarray(scan.angles).tobytes()
     told = {"angles": f"{scan.angles.size} with the hash {_hash(angles)}"}
+    if isinstance(scan.rows, Hdf5Rows) and scan.rows.others:
+        changed = (f"{path}, changed at {path.stat().st_mtime_ns}" for path in scan.rows.others)
+        told["flats and darks"] = "; ".join(changed)
     if not isinstance(scan.rows, (TiffRows, ZarrRows, NpyRows)):
         return {"scan file": f"{scan.path}, changed at {scan.path.stat().st_mtime_ns}", **told}
     # A folder's own date tells nothing: what is beside the frames changes it, their content not.

@@ -16,12 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, InputError
-from rift_cl.io.number_list import SUFFIXES, read_numbers
+from rift_cl.io.boundary import reading
+from rift_cl.io.number_list import SUFFIXES, read_numbers, table_numbers
+from rift_cl.io.scans.frame_words import says_angles
 from rift_cl.io.scans.literals import AngleUnit
 from rift_cl.io.scans.scan_file import check_angles
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
 _TURN = re.compile(rf"(?:({_NUMBER}):)?({_NUMBER})(:endpoint)?")
+# Text, which may be a table, and a column of it.
+_TABLES = (".txt", ".csv")
+_COLUMN = re.compile(r"(.+\.(?:txt|csv)):([^/\\:]+)", re.IGNORECASE)
 # Spans up to this are radians of one turn or, in degrees, too little to reconstruct from.
 _RADIANS_UP_TO = 7.0
 # Two turns; what spans more counts something else, frames or steps of a motor, or many turns.
@@ -172,9 +177,16 @@ def given_angles(text: str) -> AngleList | None:
         InputError: a file's; see ``file_angles`` for its kinds.
     """
     turn = even_turn(text)
-    if turn is None and text.lower().endswith(SUFFIXES):
-        return file_angles(Path(text).absolute())
+    place, column = file_and_column(text)
+    if turn is None and place.lower().endswith(SUFFIXES):
+        return file_angles(Path(place).absolute(), column)
     return turn
+
+
+def file_and_column(text: str) -> tuple[str, str | None]:
+    """The name of a file, and that of the column behind it: ``log.csv:angle``."""
+    match = _COLUMN.fullmatch(text)
+    return (text, None) if match is None else (match[1], match[2])
 
 
 def even_turn(text: str) -> AngleList | None:
@@ -194,20 +206,27 @@ def even_turn(text: str) -> AngleList | None:
     return AngleList(text.strip(), ends, even=True, endpoint=match[3] is not None)
 
 
-def file_angles(path: Path) -> AngleList:
+def file_angles(path: Path, column: str | None = None) -> AngleList:
     """Read angles from a file.
 
     Args:
-        path: a NumPy array (.npy), or text (.txt, .csv) of numbers that stand one to a line or
-            all in one line; what follows ``#`` is a comment.
+        path: a NumPy array (.npy), or text (.txt, .csv) of numbers that stand one to a line, all in
+            one line, or in a column of a table; what follows ``#`` is a comment.
+        column: of such a table, by its name or its number from 1; the one called angle or theta if
+            None.
 
     Raises:
         InputError: there is no such file, or it is named as neither.
         FileFormatError: it holds something else.
         ResourceLimitError: it is far longer than any list of angles.
     """
-    values = read_numbers(path, "angles")
-    return AngleList(str(path), values, unit=named_unit(path.stem))
+    if path.suffix.lower() not in _TABLES:
+        return AngleList(str(path), read_numbers(path, "angles"), unit=named_unit(path.stem))
+    with reading(path, "the list of angles"):
+        if not path.is_file() and path.exists():
+            raise InputError(f"{path}: is not a file")
+        values, name = table_numbers(path, "angles", column, says_angles)
+    return AngleList(str(path), values, unit=named_unit(name) or named_unit(path.stem))
 
 
 def named_unit(name: str) -> AngleUnit | None:

@@ -262,8 +262,9 @@ def _doubts(found: Finding, kind: Kind, seen: Sample, *, calibrated: bool) -> tu
     """What values, and arrays beside them, have against what the scan was taken to be."""
     if kind == "counts":
         return _unused(found) if found.unused and not calibrated else ()
-    doubts = _off_air(kind, seen) if found.kind is None else ()
-    return doubts + _impossible(seen) if kind == "attenuation" else doubts
+    if found.kind is not None:
+        return ()
+    return _off_air(kind, seen) + (_impossible(seen) if kind == "attenuation" else ())
 
 
 def _off_air(kind: Kind, seen: Sample) -> tuple[str, ...]:

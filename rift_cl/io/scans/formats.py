@@ -18,6 +18,7 @@ from rift_cl.io.boundary import reading
 from rift_cl.io.npy_file import SIGNATURE
 from rift_cl.io.scans.beam_file import DESCRIPTIONS, projections_of
 from rift_cl.io.scans.geometries.described import DESCRIBED, is_described
+from rift_cl.io.scans.hdf5_places import HDF5_SUFFIXES
 from rift_cl.io.scans.hdf5_scan import open_hdf5_scan
 from rift_cl.io.scans.literals import AngleUnit, Kind
 from rift_cl.io.scans.mat_scan import open_mat5_scan, open_mat73_scan
@@ -33,7 +34,7 @@ from rift_cl.registry import Registry
 
 # What reads a file, by its extension and then by its content.
 _READERS = {
-    **{suffix: {"HDF5": open_hdf5_scan} for suffix in (".h5", ".hdf5", ".hdf", ".nxs")},
+    **{suffix: {"HDF5": open_hdf5_scan} for suffix in HDF5_SUFFIXES},
     **{suffix: {"TIFF": open_tiff_scan} for suffix in (".tif", ".tiff")},
     ".mat": {"MAT": open_mat5_scan, "HDF5": open_mat73_scan},
     ".npy": {"NPY": open_npy_scan},
@@ -153,7 +154,8 @@ def open_scan(
             Counts without any: "air", where the outermost 2 % of the bins at both ends of the
             detector see nothing but air, takes the beam of every view and row from these; "mean"
             takes it to be the mean of every view, which leaves an unknown level.
-        darks: name of frames without the beam.
+        darks: name of frames without the beam. Of HDF5 scans, flats, darks and angles may be in
+            other files, ``FILE.h5:/name``, or ``FILE.h5`` where one array alone fits.
         image_key: name of an array that says what each frame is, as in NXtomo: 0 a projection, 1 a
             flat, 2 a dark, 3 invalid.
         kind: what the values are: "counts", "transmission" (counts divided by those of the beam)

@@ -4,25 +4,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim
-from rift_cl.io.hdf5_tree import Hdf5Tree, open_tree
 from rift_cl.io.scans.frame_stack import FrameStack, StackedRows
+from rift_cl.io.scans.hdf5_places import Hdf5Files, open_files, other_files
 from rift_cl.io.scans.scan_file import Frames, Part, ScanRows
 
 
 class Hdf5Rows(StackedRows):
     """Reads rows of a scan in an HDF5 file (a ``RowSource``)."""
 
+    @property
+    def others(self) -> tuple[Path, ...]:
+        """Files besides the scan's own that hold flats or darks."""
+        return other_files(*(stack.name for stack in (self.flats, self.darks) if stack))
+
     def read(self, start: int, stop: int) -> ScanRows:
         """Read detector rows ``start`` to ``stop`` of every stack."""
         stacks = (self.projections, self.flats, self.darks)
-        with open_tree(self.path) as tree:
-            nodes = [_unchanged(tree, stack) if stack else None for stack in stacks]
+        with open_files(self.path) as files:
+            nodes = [_unchanged(files, stack) if stack else None for stack in stacks]
             need = sum(
                 _claim(node, stack, stop - start)
                 for node, stack in zip(nodes, stacks, strict=True)
@@ -38,8 +44,8 @@ class Hdf5Rows(StackedRows):
         """Read some rows of some frames of one stack; a chunk is unpacked as seldom as can be."""
         stack = getattr(self, part)
         shape = (len(frames), len(rows), stack.bins)
-        with open_tree(self.path) as tree:
-            node = _unchanged(tree, stack)
+        with open_files(self.path) as files:
+            node = _unchanged(files, stack)
             need = 8 * math.prod(shape) + _chunk(node)
             check_claim(self.path, f"a part of {stack.name!r}", need, self.budget)
             places = [int(place) for place in stack.indices()[list(frames)]]
@@ -66,8 +72,9 @@ def _chunk_size(node: Any, stack: FrameStack, axis: str) -> int:
     return int(node.chunks[stack.axes.index(axis)]) if node.chunks else 1
 
 
-def _unchanged(tree: Hdf5Tree, stack: FrameStack) -> Any:
-    node = tree.dataset(stack.name)
+def _unchanged(files: Hdf5Files, stack: FrameStack) -> Any:
+    tree, name = files.at(stack.name)
+    node = tree.dataset(name)
     if node.shape != stack.shape:
         raise FileFormatError(
             f"{tree.path}: {stack.name!r} had shape {stack.shape} when it was opened and has "

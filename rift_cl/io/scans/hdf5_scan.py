@@ -6,7 +6,7 @@ Data Exchange is the layout of the synchrotron beamlines: ``/exchange/data`` wit
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import h5py
@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError
-from rift_cl.io.hdf5_tree import Hdf5Tree, open_tree
+from rift_cl.io.hdf5_tree import Hdf5Tree
 from rift_cl.io.scans.angle_list import AngleList
 from rift_cl.io.scans.frame_stack import FrameStack
 from rift_cl.io.scans.hdf5_frames import Hdf5Rows
+from rift_cl.io.scans.hdf5_places import Hdf5Files, open_files
 from rift_cl.io.scans.hdf5_values import (
     axes_stated,
     numeric_shape,
@@ -52,9 +53,16 @@ _MOST_NAMED = 1000
 
 def open_hdf5_scan(path: Path, request: ScanRequest, *, budget: int | None) -> ScanFile:
     """Find the scan in an HDF5 file; see ``open_scan``."""
-    with open_tree(path) as tree:
-        store = Hdf5Store(tree, budget)
-        return scan_in(store, _layout(store, request.dataset), request)
+    with open_files(path) as files:
+        store = Hdf5Store(files, budget)
+        layout = _layout(store, request.dataset)
+        frame = store.shape(layout.projections)
+        names = {
+            "theta": files.settled("theta", request.theta, frame),
+            "flats": files.settled("flats", request.flats, frame),
+            "darks": files.settled("darks", request.darks, frame),
+        }
+        return scan_in(store, layout, replace(request, **names))
 
 
 def _layout(store: Hdf5Store, dataset: str | None) -> Layout:
@@ -105,15 +113,20 @@ def _data_exchange(tree: Hdf5Tree) -> Layout:
 
 @dataclass(frozen=True)
 class Hdf5Store:
-    """The arrays of an open HDF5 file (an ``ArrayStore``).
+    """The arrays of an open HDF5 file, and of those named beside it (an ``ArrayStore``).
 
     Args:
-        tree: the file.
+        files: the file, and those.
         budget: bytes that one reading may take.
     """
 
-    tree: Hdf5Tree
+    files: Hdf5Files
     budget: int | None
+
+    @property
+    def tree(self) -> Hdf5Tree:
+        """The file of the projections."""
+        return self.files.tree
 
     @property
     def path(self) -> Path:
@@ -121,32 +134,34 @@ class Hdf5Store:
         return self.tree.path
 
     def __contains__(self, name: str) -> bool:
-        return self.tree.find(name) is not None
+        tree, inner = self.files.at(name)
+        return tree.find(inner) is not None
 
     def shape(self, name: str) -> tuple[int, ...]:
         """See ``numeric_shape``."""
-        return numeric_shape(self.tree, name)
+        return numeric_shape(*self.files.at(name))
 
     def dtype(self, name: str) -> np.dtype[np.generic]:
         """Type of the numbers as they are stored."""
-        dtype: np.dtype[np.generic] = self.tree.dataset(name).dtype
+        tree, inner = self.files.at(name)
+        dtype: np.dtype[np.generic] = tree.dataset(inner).dtype
         return dtype
 
     def vector(self, name: str) -> NDArray[np.float64]:
         """See ``read_vector``."""
-        return read_vector(self.tree, name)
+        return read_vector(*self.files.at(name))
 
     def angles(self, name: str) -> AngleList:
         """See ``read_angles``."""
-        return read_angles(self.tree, name)
+        return read_angles(*self.files.at(name))
 
     def unit(self, name: str) -> str:
         """The attribute ``units``."""
-        return unit_of(self.tree, name)
+        return unit_of(*self.files.at(name))
 
     def axes(self, name: str) -> str | None:
         """The attribute ``axes``."""
-        return axes_stated(self.tree, name)
+        return axes_stated(*self.files.at(name))
 
     def beside(self, name: str) -> list[str]:
         """Names of the datasets in the same group."""

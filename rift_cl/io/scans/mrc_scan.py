@@ -28,7 +28,7 @@ from rift_cl.errors import DTypeError, FileFormatError, InputError
 from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.captures.capture_paths import CaptureFolder
 from rift_cl.io.number_list import text_numbers
-from rift_cl.io.scans.angle_list import AngleList, even_turn, file_angles
+from rift_cl.io.scans.angle_list import AngleList, even_turn, file_and_column, file_angles
 from rift_cl.io.scans.axes import axes_of
 from rift_cl.io.scans.contract import AIR, MEAN, Finding, scan_of
 from rift_cl.io.scans.frame_stack import FrameStack
@@ -183,7 +183,8 @@ def _check_header(path: Path) -> None:
 def _angles(path: Path, file: Any, theta: str | None) -> tuple[AngleList, str]:
     """The tilt angles, and where they are from."""
     if theta is not None:
-        angles = even_turn(theta) or file_angles(Path(theta).absolute())
+        file, column = file_and_column(theta)
+        angles = even_turn(theta) or file_angles(Path(file).absolute(), column)
         return angles, f"The tilt angles are {theta}, about the y axis."
     folder = CaptureFolder(path.parent)
     for suffix in _SIDECARS:

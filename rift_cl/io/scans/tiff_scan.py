@@ -89,7 +89,10 @@ def open_tiff_scan(path: Path, request: ScanRequest, *, budget: int | None) -> S
     if angles is None:
         angles, notes = _assumed(place, stack)
     frames = stack.stack
-    radians, phrase, doubts = angles.settled(path, frames.frames, request.angle_unit)
+    try:
+        radians, phrase, doubts = angles.settled(path, frames.frames, request.angle_unit)
+    except ShapeError as error:
+        raise ShapeError(f"{error}{_missing(place, stack)}") from error
     found = Finding(
         path=path,
         source=f"TIFF{flats_from}{darks_from if flats else ''}",
@@ -235,14 +238,17 @@ def _calibration(
     files, where = _calibration_files(place, kind, named)
     if not files:
         return None, ""
-    stack = replace(tiff_stack(files), axes=projections.axes)
-    found, wanted = stack.stack, projections.stack
-    if (found.rows, found.bins) != (wanted.rows, wanted.bins):
-        raise ShapeError(
-            f"{files[0]}: the {kind} have {found.rows} x {found.bins} rows and bins, the "
-            f"projections {wanted.rows} x {wanted.bins}: they must agree"
-        )
-    return stack, f", {kind} from {where}"
+    wanted, read = projections.stack, tiff_stack(files)
+    # Beside sinograms, flats often stand frame by frame.
+    for axes in (projections.axes, "nrb"):
+        stack = replace(read, axes=axes)
+        if (stack.stack.rows, stack.stack.bins) == (wanted.rows, wanted.bins):
+            return stack, f", {kind} from {where}"
+    found = replace(read, axes=projections.axes).stack
+    raise ShapeError(
+        f"{files[0]}: the {kind} have {found.rows} x {found.bins} rows and bins, the "
+        f"projections {wanted.rows} x {wanted.bins}: they must agree"
+    )
 
 
 def _calibration_files(
@@ -283,7 +289,8 @@ def _angles(place: _Place, theta: str | None) -> tuple[AngleList | None, tuple[s
     """The angles that are named, or that lie beside the frames."""
     if theta is not None:
         turn = angle_list.even_turn(theta)
-        return turn or angle_list.file_angles(_named(place, theta)), ()
+        file, column = angle_list.file_and_column(theta)
+        return turn or angle_list.file_angles(_named(place, file), column), ()
     if place.beam is not None and place.beam.angles is not None:
         return place.beam.angles, ()
     for folder in place.folders:
@@ -297,6 +304,17 @@ def _angles(place: _Place, theta: str | None) -> tuple[AngleList | None, tuple[s
             (path,) = inside(folder, [found[0].name])
             return angle_list.file_angles(path), (f"The angles are those of {path}.",)
     return None, ()
+
+
+def _missing(place: _Place, stack: TiffStack) -> str:
+    """What the numbers of the files say of a view that is missing, as the end of a sentence."""
+    after = gap([path.name for path in place.files]) if stack.axes[0] == "n" else None
+    if after is None:
+        return ""
+    return (
+        f"; the numbers of the files jump after {after!r}: if a view is missing there, take its "
+        "angle out of the list"
+    )
 
 
 def _assumed(place: _Place, stack: TiffStack) -> tuple[AngleList, tuple[str, ...]]:
