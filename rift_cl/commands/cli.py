@@ -295,6 +295,9 @@ def _center(settings: Any, output: Output) -> None:
         return
     if "doubt" in job.metrics:
         _print_notes([job.metrics["doubt"]])
+    low, high = job.metrics["interval"]
+    # Apart from the bin, which a script reads from standard output.
+    print(f"95 % interval: {low:.2f} to {high:.2f}", file=sys.stderr)
     print(f"{job.metrics['center']:.2f}")
     print(f"contact sheet and report.html are in {settings.out}", file=sys.stderr)
 

@@ -98,3 +98,20 @@ def test_an_encoder_that_stuck_is_doubted(scans: dict[str, Path], tmp_path: Path
     common = {"kind": "attenuation", "size": 8, "theta": str(tmp_path / "theta.txt")}
     made = rift.reconstruct_scan(scans["parallel"], tmp_path / "a", center=30.3, **common)
     assert "20 views have the angle of another one" in " ".join(made.notes)
+
+
+def test_least_squares_that_stop_at_no_noise_say_what_the_data_show(tmp_path: Path) -> None:
+    angles, noise = np.pi * np.arange(60) / 60, 0.02
+    views = rift.phantom.project(
+        [Ellipsoid.ball(14, 0.03, (0, 3, -2))],
+        rift.Grid((2, 2, 2)),
+        rift.Cone(angles, 1, 48, 1.0, 1e7, 1e7),
+    )
+    views += noise * np.random.default_rng(0).standard_normal(views.shape).astype(np.float32)
+    np.savez(tmp_path / "scan.npz", projections=views, angles=angles)
+    common = {"kind": "attenuation", "center": 23.5, "method": "cgls", "steps": 3}
+    told = rift.reconstruct_scan(tmp_path / "scan.npz", tmp_path / "a", **common).notes
+    (found,) = [note for note in told if "--noise" in note]
+    assert float(found.split("--noise ")[1].split()[0]) == pytest.approx(noise, rel=0.15)
+    told = rift.reconstruct_scan(tmp_path / "scan.npz", tmp_path / "b", noise=noise, **common).notes
+    assert not [note for note in told if "--noise" in note]

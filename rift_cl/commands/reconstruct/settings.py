@@ -85,7 +85,9 @@ class MethodOptions:
     iterations by about that factor. Default: 1."""
     noise: Auto[float] = None
     """sirt, cgls, tv: standard deviation of the noise of a line integral; iterations stop when the
-    residual reaches it (discrepancy principle). Default: all --steps are taken."""
+    residual reaches it (discrepancy principle). Default: all --steps are taken, which of noisy data
+    make slices noisier than those of fbp; of parallel and fan beams a sentence tells what noise
+    the data show."""
     weight: Auto[float] = None
     """tv, levels: weight of the total variation; larger is smoother. Default: chosen from the noise
     and the number of the projections (levels: from their values), and printed; try half and twice

@@ -50,6 +50,7 @@ from rift_cl.reconstruct.direct.offset_axis import (
 from rift_cl.reconstruct.direct.padding import extended, is_truncated, wider
 from rift_cl.reconstruct.direct.redundancy import redundancy
 from rift_cl.reconstruct.preprocess import binned_center, binning_note, stitched
+from rift_cl.reconstruct.solvers.variation_weight import noise_of_rays
 
 Floats = NDArray[np.float32]
 # A tilt is turned where it moves the axis by so many bins between the middle row and the first; one
@@ -188,7 +189,7 @@ class SliceInput:
         if wanted or self.settings.pad == "on":
             self.pad = max(1, self.scan.shape[2] // _PAD_SHARE)
             self.geometry = self.geometry if self.fan is None else self._geometry()
-        self.notes += _notes_of(self)
+        self.notes += _notes_of(self) + self._noise_note(row[:, 0])
 
     def _doubts(self, row: Floats) -> list[str]:
         """What the middle row has against the angles, and against an axis that was given."""
@@ -216,6 +217,20 @@ class SliceInput:
             for place in (found.center, *found.interval)
         )
         return dataclasses.replace(found, center=center, interval=(low, high))
+
+    def _noise_note(self, row: Floats) -> list[str]:
+        """What least squares that stop at no noise make of noisy data, and where they would."""
+        settings = self.settings
+        if settings.method not in ("cgls", "sirt") or settings.noise or settings.weights:
+            return []
+        order = np.argsort(np.mod(self.scan.angles, 2 * np.pi), kind="stable")
+        views = row[order] if self.stitched is None else row
+        noise = noise_of_rays(views, np.ones_like(views))
+        return [
+            f"--method {settings.method} takes all of its {settings.most_steps} steps, the later "
+            "of which fit the noise as well, or ends before it has converged: the data show noise "
+            f"of about {noise:.2g} in a line integral, and --noise {noise:.2g} stops there."
+        ]
 
     def _find_axis(self) -> None:
         """Find the axis, of a fan the sense of rotation too."""

@@ -57,7 +57,8 @@ class OtherTurn(NamedTuple):
         return (
             f"views half a turn apart by their angles do not match, and others do as if the scan "
             f"had gone round {self.seen:.0f} degrees in place of {self.given:.0f}: the angles are "
-            "probably wrong"
+            "probably wrong, or the rotation axis lies along the rows of the images (--axes "
+            "angle,bin,row)"
         )
 
     def of_rays(self) -> str:
