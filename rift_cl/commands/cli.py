@@ -385,6 +385,8 @@ def _analyze(settings: Any, output: Output) -> None:
         return
     for columns, rows, caption in job.tables:
         print_table(columns, rows, caption=caption)
+    for sentence in job.sentences:
+        print(sentence)
     print(f"report.html and metrics.json are in {settings.out}")
 
 

@@ -137,6 +137,8 @@ def test_a_parallel_scan_has_directions_and_no_cameras(scan, tmp_path, capsys):
     assert found["crowther"]["needed"] == math.ceil(math.pi * 96 / 2)
     assert page_of(tmp_path / "all").count("<img") == 3
     assert not (tmp_path / "all" / "views.csv").exists()
+    printed = capsys.readouterr().out
+    assert "Crowther" in printed and "To add:" in printed
 
 
 def test_the_axis_of_counts_is_searched_in_their_line_integrals(scan, tmp_path, capsys):

@@ -15,6 +15,8 @@ from rift_cl.errors import FileFormatError, InputError, PathEscapeError, RiftErr
 from rift_cl.geometry import Cone, Fan, Vectors
 from rift_cl.geometry.rtk_views import RtkView, rtk_of_vectors, vectors_of_rtk
 from rift_cl.io import ScanFile, open_scan
+from rift_cl.io.scans.beam import Beam
+from rift_cl.io.scans.beam_file import read_beam
 
 POINT = np.array([3.0, -2.0, 1.5])
 LENGTHS = "unit: mm\nsource_to_axis: 50\nsource_to_detector: 200\npitch: [0.25, 0.2]"
@@ -316,3 +318,27 @@ def test_the_walnut(shared_data: Path) -> None:
     cone = cone_of(open_scan(path))
     assert (cone.views, cone.rows, cone.bins) == (241, 256, 256)
     assert cone.magnification == pytest.approx(2.6286, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "found"),
+    [
+        ("source_to_detector: 200\nmagnification: 4", (50, 200)),
+        ("source_to_axis: 50\nmagnification: 4", (50, 200)),
+        ("source_to_axis: 50\nsource_to_detector: 200\nmagnification: 4", (50, 200)),
+        ("source_to_axis: 50\nsource_to_detector: 200\nmagnification: 2", "magnification"),
+        ("source_to_axis: 50\nmagnification: 0.5", "magnification"),
+        ("magnification: 4", "source_to_axis"),
+    ],
+)
+def test_a_magnification_in_place_of_a_distance(
+    tmp_path: Path, lengths: str, found: tuple[int, int] | str
+) -> None:
+    (tmp_path / "geometry.yaml").write_text(f"{lengths}\npitch: 0.2\n")
+    if isinstance(found, str):
+        with pytest.raises(InputError, match=found):
+            read_beam(tmp_path / "geometry.yaml")
+        return
+    beam = read_beam(tmp_path / "geometry.yaml")
+    assert isinstance(beam, Beam)
+    assert (beam.source_to_axis, beam.source_to_detector) == found

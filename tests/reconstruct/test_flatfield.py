@@ -45,7 +45,7 @@ def test_dead_pixels_are_filled_from_their_neighbours(scan, value):
     flats[:, 1, 10:13] = darks[0, 1, 10:13]
     counts[:, 1, 10:13] = value
     result = attenuation(counts.astype(np.float32), flats, darks)
-    assert result.dead == 3
+    assert result.dead == 3 and result.dead_bins == (10, 11, 12)
     np.testing.assert_allclose(result.projections, truth, atol=2e-4)
 
 

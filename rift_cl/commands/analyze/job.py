@@ -50,6 +50,8 @@ class Analysis:
         self.folder = RunFolder.of(settings, "analyze")
         self.metrics: dict[str, Any] = {}
         self.tables: list[Table] = []
+        # Of what is seen through: conclusions, the number of views that it takes among them.
+        self.sentences: list[str] = []
         self.added: tuple[Camera, ...] = ()
 
     @property
@@ -83,6 +85,8 @@ class Analysis:
         yield Report(2, _STEPS, "steps")
         findings.append(more)
         self.tables = [table for found in findings for table in found.tables]
+        if not sampled.opaque:
+            self.sentences = [text for found in findings for text in found.sentences]
         self.metrics = {
             "source": str(self.settings.source),
             "views": sampled.views,

@@ -64,7 +64,8 @@ class AnalyzeOutput:
     group: ClassVar[str] = "output"
 
     out: Path = Path("rift-analyze")
-    """Folder for report.html, config.json, metrics.json and views.csv."""
+    """Folder for report.html, config.json and metrics.json, and of captures views.csv, the views to
+    add."""
 
 
 @dataclass(frozen=True)

@@ -104,7 +104,8 @@ def settled_axis(scan: ScanFile, center: float, device: Device | None = None) ->
             f"do not tell it: {reason}."
         )
         return SettledAxis(center, False, None, {"center": center, "by": told}, (note,))
-    words = f"The rotation axis was found {found.in_words()}; {told} has bin {center:.2f}."
+    says = f"{told} {'is' if middle else 'says'} bin {center:.2f}"
+    words = f"The rotation axis was found {found.in_words()}; {says}."
     notes: tuple[str, ...] = (words,)
     turned = found.sense is not None and found.sense.sign < 0
     if turned:

@@ -114,8 +114,8 @@ def chosen_rows(wanted: tuple[int, int] | None, scan: ScanFile) -> tuple[int, in
     rows = wanted or (0, scan.shape[1])
     if not 0 <= rows[0] < rows[1] <= scan.shape[1]:
         raise InputError(
-            f"--rows is {rows[0]} {rows[1]}, {scan.path} has the rows 0 to {scan.shape[1]}: give "
-            "the first and the one after the last"
+            f"--rows is {rows[0]} {rows[1]}, {scan.path} has the rows 0 to {scan.shape[1] - 1}: "
+            f"give the first and the one after the last, {scan.shape[1]} at most"
         )
     return rows
 

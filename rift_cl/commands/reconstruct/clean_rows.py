@@ -165,7 +165,8 @@ class CleanRows:
             wanted = slice(loaded.start - first, loaded.stop - first)
             rows = self.alignment.aligned(rows, first, wanted, self._device)
         found = loaded.integrals
-        return Attenuation(rows, found.dead_of_rows[counted], found.starved_of_rows[counted])
+        dead, starved = found.dead_of_rows[counted], found.starved_of_rows[counted]
+        return Attenuation(rows, dead, starved, found.dead_bins)
 
     @property
     def _halo(self) -> int:
@@ -194,8 +195,9 @@ class CleanRows:
             )
         if self._settings.zingers is not None:
             notes.append(
-                "Zingers, single pixels that stand out of their neighbours by "
-                f"{self._settings.zingers:g} standard deviations, were removed."
+                "Zingers, single pixels that stand out from their neighbours by "
+                f"{self._settings.zingers:g} standard deviations, are looked for and replaced; "
+                "'zingers' is how many."
             )
         if self._settings.hardening is not None:
             terms = " + ".join(

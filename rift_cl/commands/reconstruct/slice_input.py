@@ -58,6 +58,10 @@ Floats = NDArray[np.float32]
 _TILT_MATTERS, _TOLD = 0.25, 2.0
 # The detector is continued by this share of its width on each side.
 _PAD_SHARE = 2
+# Noise below this share of the greatest line integral spoils nothing.
+_LITTLE = 1e-3
+# Bins that a sentence lists at most.
+_MOST_LISTED = 8
 # A gap between directions that is worth a word, in mean steps and in radians.
 _GAP_STEPS, _GAP = 2.0, np.deg2rad(5)
 
@@ -165,7 +169,8 @@ class SliceInput:
             InputError: the axis cannot be found.
         """
         middle = sum(self.rows) // 2
-        row = self.clean.read(middle, middle + 1).projections
+        read = self.clean.read(middle, middle + 1)
+        row = read.projections
         if not self.settled:
             self._find_axis()
         else:
@@ -190,6 +195,8 @@ class SliceInput:
             self.pad = max(1, self.scan.shape[2] // _PAD_SHARE)
             self.geometry = self.geometry if self.fan is None else self._geometry()
         self.notes += _notes_of(self) + self._noise_note(row[:, 0])
+        if read.dead_bins and self.settings.binning == 1:
+            self.notes.append(_dead_note(read.dead_bins, middle))
 
     def _doubts(self, row: Floats) -> list[str]:
         """What the middle row has against the angles, and against an axis that was given."""
@@ -226,6 +233,8 @@ class SliceInput:
         order = np.argsort(np.mod(self.scan.angles, 2 * np.pi), kind="stable")
         views = row[order] if self.stitched is None else row
         noise = noise_of_rays(views, np.ones_like(views))
+        if noise < _LITTLE * float(np.abs(views).max()):
+            return []
         return [
             f"--method {settings.method} takes all of its {settings.most_steps} steps, the later "
             "of which fit the noise as well, or ends before it has converged: the data show noise "
@@ -525,6 +534,15 @@ def _wide_note(source: SliceInput) -> str:
     return (
         f"{wide}: projections were extrapolated smoothly beyond its ends; values outside the "
         "field of view are not measured."
+    )
+
+
+def _dead_note(bins: tuple[int, ...], row: int) -> str:
+    listed = ", ".join(map(str, bins[:_MOST_LISTED])) + (", ..." if bins[_MOST_LISTED:] else "")
+    words = f"bin {listed} does" if len(bins) == 1 else f"bins {listed} do"
+    return (
+        f"In row {row} {words} not answer to the beam (dead pixels) and "
+        f"{'was' if len(bins) == 1 else 'were'} filled from the neighbours."
     )
 
 

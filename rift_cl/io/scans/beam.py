@@ -142,8 +142,8 @@ class Beam:
         if to_detector < to_axis:
             raise InputError(
                 f"{path}: the detector is {to_detector:g} from the source, and the axis "
-                f"{to_axis:g}: the axis stands before the detector; are the two swapped, or is "
-                "one of them the distance from the axis to the detector? Give others with "
+                f"{to_axis:g}: the axis would stand behind the detector; are the two swapped, or "
+                "is one of them the distance from the axis to the detector? Give others with "
                 "geometry= (--geometry)"
             )
         if to_axis < _FEWEST_BINS * max(self.pitch):

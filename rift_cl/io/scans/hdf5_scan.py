@@ -57,12 +57,13 @@ def open_hdf5_scan(path: Path, request: ScanRequest, *, budget: int | None) -> S
         store = Hdf5Store(files, budget)
         layout = _layout(store, request.dataset)
         frame = store.shape(layout.projections)
-        names = {
-            "theta": files.settled("theta", request.theta, frame),
-            "flats": files.settled("flats", request.flats, frame),
-            "darks": files.settled("darks", request.darks, frame),
-        }
-        return scan_in(store, layout, replace(request, **names))
+        settled = replace(
+            request,
+            theta=files.settled("theta", request.theta, frame),
+            flats=files.settled("flats", request.flats, frame),
+            darks=files.settled("darks", request.darks, frame),
+        )
+        return scan_in(store, layout, settled)
 
 
 def _layout(store: Hdf5Store, dataset: str | None) -> Layout:

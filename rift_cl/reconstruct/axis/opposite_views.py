@@ -214,7 +214,9 @@ def pair_evidence(row: Row, pairs: Pairs, window: float, near: float) -> Evidenc
     known = np.exp(-2 * (ones.frequencies * _DOUBT) ** 2)
     least = energy - 2 * np.abs(terms)
     left = known * (energy + 2 * np.real(phase * terms)) + (1 - known) * least
-    noise = np.maximum(uniform_filter1d(left, _BLUR, mode="nearest"), 1e-12 * energy.max())
+    # Where a window shows nothing at all, there is no energy either.
+    least_noise = max(1e-12 * float(energy.max()), float(np.finfo(np.float64).tiny))
+    noise = np.maximum(uniform_filter1d(left, _BLUR, mode="nearest"), least_noise)
     # How far views exceed noise, in its variance; where they do not, two noises that happen to
     # agree tell nothing, and the best weight for two measurements of one signal falls to zero.
     excess = np.maximum(uniform_filter1d(energy, _BLUR, mode="nearest") / noise - 1, 0)

@@ -44,7 +44,10 @@ class Sense:
     def in_words(self) -> str:
         """One line: the sense, and by how much it was told."""
         given, turned = self.disagreement
-        measured = f"opposite rays differ by {given:.3f} of the contrast, reversed by {turned:.3f}"
+        measured = (
+            f"rays that measure one line from both sides differ by {given:.3f} of the contrast, "
+            f"with reversed angles by {turned:.3f}"
+        )
         if self.sign > 0:
             return f"the angles run as given ({measured})"
         if self.sign < 0:

@@ -99,7 +99,7 @@ def redundancy(scan: Fan | Cone, compensate: str | None = None) -> Redundancy:
                 f"Wang's weights across the {2 * short:.0f} bins about it"
                 if share == 1
                 else f"lines beyond {short:g} bins from it are measured once and count twice, with "
-                f"weights that go over within {share * short:.0f} bins"
+                f"weights that change over within {share * short:.0f} bins"
             )
             sentence = f"full turn of {scan.views} views, {where}: {which}"
         elif not min(left, right) > 0:

@@ -47,11 +47,13 @@ class Attenuation:
         dead_of_rows: detector pixels of each row that were filled from their neighbours, (row,).
         starved_of_rows: samples of each row without a signal above the darks' noise, filled in the
             same way, (row,).
+        dead_bins: bins of which a pixel was filled in some of the rows, ascending.
     """
 
     projections: Floats
     dead_of_rows: Counts
     starved_of_rows: Counts
+    dead_bins: tuple[int, ...] = ()
 
     @property
     def dead(self) -> int:
@@ -198,7 +200,8 @@ def _minus_log(
     if unknown.any():
         for row in np.flatnonzero(unknown.any(axis=(0, 2))):
             _fill(transmission[:, row], unknown[:, row], first_row + int(row))
-    return Attenuation(transmission, dead_of_rows, starved_of_rows)
+    dead_bins = tuple(map(int, np.flatnonzero(dead.any(axis=0))))
+    return Attenuation(transmission, dead_of_rows, starved_of_rows, dead_bins)
 
 
 def _fill(lines: Floats, unknown: NDArray[np.bool_], row: int) -> None:

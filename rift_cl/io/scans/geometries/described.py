@@ -41,7 +41,7 @@ _LENGTHS = ("source_to_axis", "source_to_detector")
 _NAMES = (
     *_LENGTHS,
     *("projections", "unit", "pitch", "center", "angles", "angle_unit", "heights", "curved"),
-    *("lean", "white", "geometry"),
+    *("lean", "white", "geometry", "magnification"),
 )
 
 
@@ -63,12 +63,9 @@ def read_described(path: Path) -> AnyBeam:
     unit = str(fields.get("unit") or "")
     if "geometry" in fields:
         return _elsewhere(path, fields, pitch, unit)
-    missing = [name for name in (*_LENGTHS, "pitch") if fields.get(name) is None]
-    if missing:
-        raise FileFormatError(f"{path}: {missing[0]} is missing; a cone needs it")
-    assert pitch is not None
-    to_axis, to_detector = (_number(path, fields, name) for name in _LENGTHS)
-    assert to_axis is not None and to_detector is not None
+    to_axis, to_detector = _distances(path, fields)
+    if pitch is None:
+        raise FileFormatError(f"{path}: pitch is missing; a cone needs it")
     curved = fields.get("curved") or False
     if not isinstance(curved, bool):
         raise FileFormatError(f"{path}: curved is {reprlib.repr(curved)}, wanted true or false")
@@ -85,6 +82,30 @@ def read_described(path: Path) -> AnyBeam:
         white=_number(path, fields, "white"),
         folder=str(fields.get("projections") or ""),
     )
+
+
+def _distances(path: Path, fields: Mapping[str, Any]) -> tuple[float, float]:
+    """Of the source from the axis and from the detector: both, or one and the magnification."""
+    to_axis, to_detector = (_number(path, fields, name) for name in _LENGTHS)
+    times = _number(path, fields, "magnification")
+    if times is not None and not 1 <= times < math.inf:
+        raise FileFormatError(f"{path}: magnification is {times:g}, wanted 1 or more")
+    if times is not None:
+        if to_axis is None and to_detector is not None:
+            to_axis = to_detector / times
+        if to_detector is None and to_axis is not None:
+            to_detector = to_axis * times
+        if to_axis and to_detector and not math.isclose(to_detector, to_axis * times, rel_tol=0.01):
+            raise FileFormatError(
+                f"{path}: magnification is {times:g}, and its distances make "
+                f"{to_detector / to_axis:.4g}: leave one of the three out"
+            )
+    if to_axis is None or to_detector is None:
+        missing = _LENGTHS[0] if to_axis is None else _LENGTHS[1]
+        raise FileFormatError(
+            f"{path}: {missing} is missing; a cone needs it, or magnification in its place"
+        )
+    return to_axis, to_detector
 
 
 def is_described(path: Path) -> bool:
