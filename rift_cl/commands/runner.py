@@ -17,8 +17,9 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, make_dataclass
 from inspect import Parameter, Signature
+from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin
 
 import tyro
 
@@ -34,6 +35,8 @@ _INPUT, _DEVICE, _OUTPUT, _INTERRUPTED, _TERMINATED = 3, 4, 5, 130, 143
 _OMITTED: Any = tyro.conf.OmitArgPrefixes
 # Options in no group, which the help lists under tyro's own title.
 _TITLELESS = "settings"
+# What values of these types are called in the help.
+_METAVARS: dict[Any, str] = {int: "INT", float: "FLOAT", str: "STR", Path: "PATH"}
 
 
 @dataclass(frozen=True)
@@ -147,7 +150,8 @@ class _Entry(NamedTuple):
         negated = option.default is True and not twins
         name = above + dot + ("no-" if negated else "") + last
         hint = "(on by default; this option turns it off)" if negated else None
-        mark = tyro.conf.arg(name=name, help=option.help, help_behavior_hint=hint)
+        taken = _metavar_of(option.kind)
+        mark = tyro.conf.arg(name=name, help=option.help, help_behavior_hint=hint, metavar=taken)
         kind: Any = Annotated[option.kind, mark]
         default = False if negated else option.default
         return cls(option, "__".join(option.path), kind, default, negated)
@@ -156,6 +160,23 @@ class _Entry(NamedTuple):
         """What was given for it, or its default."""
         found = getattr(part, self.field)
         return not found if self.negated else found
+
+
+def _metavar_of(kind: Any) -> str | None:
+    """What an option that may be left to the run takes, for people; None leaves it to tyro.
+
+    tyro would name the value that stands for nothing given as well: ``{None}|FLOAT``.
+    """
+    while get_origin(kind) is Annotated:
+        kind = get_args(kind)[0]
+    taken = [part for part in get_args(kind) if part is not type(None)]
+    if type(None) not in get_args(kind) or len(taken) != 1:
+        return None
+    if get_origin(taken[0]) is Literal:
+        return f"{{{','.join(map(str, get_args(taken[0])))}}}"
+    words = get_args(taken[0]) if get_origin(taken[0]) is tuple else taken
+    named = ["..." if word is ... else _METAVARS.get(word, "") for word in words]
+    return " ".join(named) if all(named) else None
 
 
 def _class_of(group: Group, entries: Iterable[_Entry]) -> type:

@@ -159,3 +159,11 @@ def test_a_switch_that_is_on_is_turned_off_by_its_negative():
         assert not tyro.cli(entry, args=["capture", f"--homogenisation.{word}"])()
     aware = [made.training.homogenisation.noise_aware for made in found]
     assert aware == [False, False, True]
+
+
+@pytest.mark.parametrize("name", ["reconstruct", "analyze", "fit xray"])
+def test_help_names_what_an_option_takes_and_not_what_stands_for_nothing(name, capsys):
+    with pytest.raises(SystemExit):
+        main([*name.split(), "--help"])
+    printed = capsys.readouterr().out
+    assert "--theta STR" in printed and "None}" not in printed
