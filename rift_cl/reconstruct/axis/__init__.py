@@ -5,6 +5,7 @@ is searched, by a measure that the directions of its views allow. The measures a
 ``opposite_views``, ``double_wedge`` and ``moments``, one a file; the first two hand over
 ``evidence``, a phase for every frequency along the detector. ``circular`` asks the same of fans and
 cones, whose rays ``fan_rays`` reads as parallel views, and ``sense`` which way they turned.
+``turn`` and ``repeated`` say what views have against their angles.
 """
 
 from rift_cl.reconstruct.axis.center import find_center
